@@ -1,0 +1,29 @@
+# Every target does its own set-up (setup.sh says what it installs) and is quick when all is there.
+.PHONY: demo test lint bench validate setup
+
+bin := .venv/bin
+
+setup:
+	@./setup.sh
+
+demo: setup
+	$(bin)/trackbed run scenes/karrech-coarse.toml --control --run-folder demo-bed/run
+	$(bin)/trackbed report demo-bed/run --open
+	$(bin)/trackbed status demo-bed/run
+
+test:
+	@./setup.sh test
+	$(bin)/python -m pytest
+
+lint:
+	@./setup.sh lint
+	$(bin)/ruff check .
+	$(bin)/ruff format --check .
+	$(bin)/mypy
+
+bench:
+	@./setup.sh bench
+	$(bin)/trackbed validate dump-speed
+
+validate: setup
+	$(bin)/trackbed validate settlement --quick

@@ -1,0 +1,1 @@
+"""Settlement of granular beds under cyclic load, computed by an engine as it is installed."""

@@ -1,0 +1,137 @@
+"""Validators: whether what an engine left is credible.  An exit code proves nothing."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from adapters.errors import EngineFailed, NotCredible
+from adapters.overlaps import neighbours
+from adapters.sample import GRAVITY
+from adapters.scene import Scene
+from adapters.state import State
+from adapters.window import Window
+
+OVERLAP_BOUND = 0.05
+"""Greatest overlap over the smallest radius: Hertz contact is a law of small overlaps."""
+
+FORCE_ERROR_BOUND = 0.25
+"""Greatest root mean square of piston force minus target, over the peak, from the fourth cycle on."""
+
+FORCE_ERROR_GOAL = 0.03
+"""The same, as the report's goal."""
+
+FORCE_START_CYCLES = 3
+"""Cycles in which the piston finds the bed; its force is not judged in them."""
+
+
+@dataclass(frozen=True)
+class WindowFigures:
+    """The figures that are judged."""
+
+    overlap_share: float
+    """Greatest overlap over the smallest radius, all cycle ends."""
+    energy_share: float
+    """Greatest kinetic energy at a cycle end over the weight of all grains times their mean radius."""
+    move_share: float
+    """Greatest mean move of the grains in one cycle over their mean radius."""
+    force_error: float
+    """Greatest rms force error of the piston after the first cycles; nan in a short window."""
+
+
+def check_complete(scene: Scene, window: Window, cycles: int) -> None:
+    """All instants and all grains are there, and every number is finite.
+
+    Raises `EngineFailed` for missing instants, `NotCredible` for lost grains and nan.
+    """
+    if len(window) != cycles or np.any(np.diff(window.time_step) != scene.steps_per_cycle):
+        raise EngineFailed(
+            f"{len(window)} of {cycles} cycle ends were written",
+            where="states.dump",
+            remedy="the engine ended early; resume computes the window again",
+        )
+    lost = np.setdiff1d(np.arange(1, scene.grain_count + 1), window.identifier)
+    if len(lost):
+        raise NotCredible(
+            f"{len(lost)} grains are lost: {', '.join(map(str, lost[:10]))}",
+            where="states.dump",
+            remedy="a shorter time step; look whether the container holds them",
+        )
+    for name in ("position", "velocity", "spin"):
+        bad = ~np.isfinite(getattr(window, name)).all(axis=(1, 2))
+        if bad.any():
+            raise NotCredible(
+                f"{name} is not finite from cycle {window.cycle[bad][0]} on",
+                where="states.dump",
+                remedy="a shorter time step; grains may share one centre",
+            )
+
+
+def check_state(scene: Scene, state: State) -> None:
+    """A settled bed holds all its grains, finite and inside; raises `NotCredible`."""
+    lost = scene.grain_count - len(state.identifier)
+    if lost:
+        raise NotCredible(
+            f"{lost} of {scene.grain_count} grains are lost",
+            where="preparation",
+            remedy="a shorter time step; look whether the container holds them",
+        )
+    touching = neighbours(state.position, state.radius, scene.container.walls())
+    share = float(touching.overlap.max(initial=0.0)) / float(state.radius.min())
+    if not share <= OVERLAP_BOUND:
+        raise NotCredible(
+            f"the greatest overlap of the settled bed is {share:.3g} of the smallest radius",
+            where="preparation",
+            remedy="a shorter time step, or stiffer grains",
+        )
+
+
+def figures_of_window(scene: Scene, window: Window) -> WindowFigures:
+    """The figures of `check_bounds`."""
+    walls = scene.container.walls()
+    # From the positions, not from the engine's list of contacts: it can not hide one.
+    overlaps = [
+        float(neighbours(position, window.radius, walls).overlap.max(initial=0.0))
+        for position in window.position[1:]
+    ]
+    inertia = 0.4 * window.mass * window.radius**2
+    kinetic = 0.5 * (
+        np.einsum("n,cni,cni->c", window.mass, window.velocity, window.velocity)
+        + np.einsum("n,cni,cni->c", inertia, window.spin, window.spin)
+    )
+    # The first state after a jump is at rest and not the engine's work: it is not judged.
+    move = np.linalg.norm(np.diff(window.position, axis=0), axis=2).mean(axis=1)
+    force_error = window.piston.force_error(scene.steps_per_cycle)[FORCE_START_CYCLES:]
+    return WindowFigures(
+        max(overlaps) / float(window.radius.min()),
+        float(kinetic[1:].max() / (GRAVITY * np.sum(window.mass) * window.radius.mean())),
+        float(move.max() / window.radius.mean()),
+        float(force_error.max()) if len(force_error) else float("nan"),
+    )
+
+
+def check_bounds(scene: Scene, figures: WindowFigures) -> None:
+    """Overlaps, energies, moves and the piston's force are bounded; raises `NotCredible`."""
+    share = scene.time_step / scene.rayleigh_time
+    remedy = (
+        f"the time step is {share:.3g} of the Rayleigh time; "
+        + ("shorten it below 0.2" if share > 0.2 else "look at the scene's load and stiffness")
+    )
+    bounds = (
+        ("the greatest overlap over the smallest radius", figures.overlap_share, OVERLAP_BOUND),
+        ("kinetic energy over weight times radius at a cycle end", figures.energy_share, 1.0),
+        ("the mean move in one cycle over the radius", figures.move_share, 1.0),
+        ("the piston's rms force error over the peak", figures.force_error, FORCE_ERROR_BOUND),
+    )
+    for what, value, bound in bounds:
+        if value > bound:  # nan, which stands for "not judged", passes
+            raise NotCredible(f"{what} is {value:.3g}, above {bound:g}", remedy=remedy)
+
+
+def check_window(scene: Scene, window: Window, cycles: int) -> dict[str, float]:
+    """All checks of a window; returns the figures judged, for the record."""
+    check_complete(scene, window, cycles)
+    figures = figures_of_window(scene, window)
+    check_bounds(scene, figures)
+    return asdict(figures)

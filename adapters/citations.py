@@ -1,0 +1,35 @@
+"""What to cite for the methods and engines used, as BibTeX."""
+
+from __future__ import annotations
+
+CITATIONS = (
+    ("the jump procedure, its laws and its relaxation", r"""@article{karrech2007,
+  author  = {Karrech, A. and Duhamel, D. and Bonnet, G. and Roux, J.-N. and Chevoir, F. and
+             Canou, J. and Dupla, J.-C. and Sab, K.},
+  title   = {A computational procedure for the prediction of settlement in granular materials
+             under cyclic loading},
+  journal = {Computer Methods in Applied Mechanics and Engineering},
+  volume  = {197}, number = {1--4}, pages = {80--94}, year = {2007},
+  doi     = {10.1016/j.cma.2007.07.011}
+}"""),
+    ("the engine LIGGGHTS", r"""@article{kloss2012,
+  author  = {Kloss, Christoph and Goniva, Christoph and Hager, Alice and Amberger, Stefan and
+             Pirker, Stefan},
+  title   = {Models, algorithms and validation for opensource {DEM} and {CFD-DEM}},
+  journal = {Progress in Computational Fluid Dynamics},
+  volume  = {12}, number = {2/3}, pages = {140--152}, year = {2012},
+  doi     = {10.1504/PCFD.2012.047457}
+}"""),
+    ("trackbed itself", r"""@software{trackbed,
+  author  = {{The trackbed authors}},
+  title   = {trackbed: settlement of railway ballast by extrapolation of granular simulations},
+  version = {VERSION}
+}"""),
+)  # fmt: skip
+"""Pairs (what it is cited for, BibTeX entry)."""
+
+
+def citations_text(version: str) -> str:
+    """All entries, each under a comment saying what it stands for."""
+    entries = "\n\n".join(f"% {purpose}\n{entry}" for purpose, entry in CITATIONS)
+    return entries.replace("VERSION", version)

@@ -1,0 +1,399 @@
+"""The verbs of ``trackbed`` about settlement; what a verb computes with is loaded when it runs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+from pathlib import Path
+from typing import Any
+
+from adapters.errors import EngineMissing, UsageError
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``verb`` to its parser."""
+    {
+        "doctor": doctor_register,
+        "new": new_register,
+        "run": run_register,
+        "resume": resume_register,
+        "status": status_register,
+        "report": report_register,
+        "fit": fit_register,
+        "relax": relax_register,
+        "cite": cite_register,
+    }[verb](parser)
+
+
+def json_flag(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json``."""
+    parser.add_argument("--json", action="store_true", help="print JSON on standard output")
+
+
+def json_print(content: Any) -> None:
+    """Print JSON on standard output; a number that is not finite becomes an error."""
+    print(json.dumps(content, indent=2, allow_nan=False))
+
+
+# --- doctor --------------------------------------------------------------------------------
+
+
+def doctor_register(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``doctor``."""
+    json_flag(parser)
+    parser.set_defaults(command=doctor_command)
+
+
+def doctor_command(arguments: argparse.Namespace) -> int:
+    """Print what is here and what is missing; `EngineMissing` when no engine is here."""
+    from dataclasses import asdict
+
+    from adapters.doctor import engine_usable, findings
+
+    found = findings()
+    if arguments.json:
+        json_print({"ok": engine_usable(found), "findings": [asdict(one) for one in found]})
+    else:
+        for one in found:
+            version = one.version or ("missing" if one.remedy else "yes")
+            print(f"{one.kind:9}{one.name:16}{version:24}{one.where}".rstrip())
+            if one.remedy:
+                print(f"{'':9}-> {one.remedy}")
+    if not engine_usable(found):
+        raise EngineMissing(
+            "no engine is installed, so nothing can be run", remedy="sudo apt-get install liggghts"
+        )
+    return 0
+
+
+# --- new -----------------------------------------------------------------------------------
+
+
+def new_register(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``new``."""
+    parser.add_argument("name", metavar="NAME", help="; ".join(scene_names()))
+    parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
+    parser.set_defaults(command=new_command)
+
+
+def scene_names() -> list[str]:
+    """Names of the shipped scenes."""
+    from importlib.resources import files
+
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in files("scenes").iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def new_command(arguments: argparse.Namespace) -> int:
+    """Copy a shipped scene to FOLDER/scene.toml; a scene that is there already is kept."""
+    from importlib.resources import files
+
+    from adapters.scene_checks import did_you_mean
+
+    names = scene_names()
+    if arguments.name not in names:
+        raise UsageError(f"there is no scene {arguments.name}{did_you_mean(arguments.name, names)}")
+    path: Path = arguments.folder / "scene.toml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with path.open("x", encoding="utf-8") as stream:
+            stream.write((files("scenes") / f"{arguments.name}.toml").read_text("utf-8"))
+    except FileExistsError:
+        raise UsageError(
+            "this scene is there already and is kept", where=str(path),
+            remedy="remove it first, or name another folder",
+        ) from None  # fmt: skip
+    print(f"{path}\nnext: trackbed run {shlex.quote(str(path))} --control")
+    return 0
+
+
+# --- run, resume, status, report -----------------------------------------------------------
+
+
+def run_register(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``run``."""
+    parser.add_argument("scene", metavar="SCENE", type=Path, help="a scene file (TOML)")
+    parser.add_argument(
+        "--run-folder", type=Path, metavar="FOLDER", help="default: run/ beside the scene"
+    )
+    parser.add_argument(
+        "--control", action="store_true", help="also run every cycle, to know the error"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change a key of the scene, such as procedure.h=10; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--engine", metavar="NAME", help="short for --set engine.name=NAME")
+    parser.add_argument(
+        "--launcher", metavar="WORDS", help='before the engine\'s command, as in "mpirun -np 2"'
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="write the decks and print the engine's command"
+    )
+    parser.set_defaults(command=run_command)
+
+
+def overrides_of(arguments: argparse.Namespace) -> list[str]:
+    """KEY=VALUE of ``--set``, ``--engine`` and ``--launcher``; the values are TOML."""
+    overrides = list(arguments.overrides)
+    if arguments.engine is not None:
+        overrides.append(f"engine.name={json.dumps(arguments.engine)}")
+    if arguments.launcher is not None:
+        try:
+            words = shlex.split(arguments.launcher)
+        except ValueError as error:
+            raise UsageError(f"--launcher can not be split into words: {error}") from None
+        overrides.append(f"engine.launcher={json.dumps(words)}")
+    return overrides
+
+
+def run_command(arguments: argparse.Namespace) -> int:
+    """Run a scene from its start."""
+    from adapters import procedure
+
+    procedure.run_scene(
+        arguments.scene,
+        arguments.run_folder or arguments.scene.parent / "run",
+        control=arguments.control,
+        overrides=overrides_of(arguments),
+        dry_run=arguments.dry_run,
+    )
+    return 0
+
+
+def run_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the argument RUN."""
+    parser.add_argument("run_folder", metavar="RUN", type=Path, help="a run folder")
+
+
+def resume_register(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``resume``."""
+    run_argument(parser)
+    parser.set_defaults(command=resume_command)
+
+
+def resume_command(arguments: argparse.Namespace) -> int:
+    """Go on with a run from its last window that passes the checks."""
+    from adapters import procedure
+
+    procedure.resume(arguments.run_folder)
+    return 0
+
+
+def status_register(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``status``."""
+    run_argument(parser)
+    json_flag(parser)
+    parser.set_defaults(command=status_command)
+
+
+def status_command(arguments: argparse.Namespace) -> int:
+    """Print how far a run is."""
+    from adapters.run_folder import status
+
+    content = status(arguments.run_folder).to_dict()
+    if arguments.json:
+        json_print(content)
+    else:
+        for key, value in content.items():
+            print(f"{key.replace('_', ' '):28}{value}")
+    return 0
+
+
+def report_register(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``report``."""
+    run_argument(parser)
+    parser.add_argument("--open", action="store_true", help="show it, when there is a display")
+    parser.set_defaults(command=report_command)
+
+
+def report_command(arguments: argparse.Namespace) -> int:
+    """Write report.html and the figures; print the path."""
+    from adapters.report import report_write
+
+    path = report_write(arguments.run_folder)
+    print(path)
+    if arguments.open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        import webbrowser
+
+        webbrowser.open(path.resolve().as_uri())
+    return 0
+
+
+# --- fit, relax ----------------------------------------------------------------------------
+
+
+def fit_register(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``fit``."""
+    parser.add_argument(
+        "paths", nargs="+", metavar="RUN|DUMP...|CSV", type=Path,
+        help="a run folder, dumps with a frame each cycle, or a CSV of cycle,settlement (m)",
+    )  # fmt: skip
+    parser.add_argument("--law", default="log", metavar="NAME", help="default: log")
+    parser.add_argument(
+        "--to-cycle", type=float, metavar="N", help="cycle to predict; default: the last one given"
+    )
+    parser.add_argument(
+        "--from-cycle", type=float, default=0.0, metavar="N", help="leave earlier cycles out"
+    )
+    parser.add_argument(
+        "--steps-per-cycle", type=float, metavar="N",
+        help="dumps only: time steps of a cycle; default: each frame is the end of one",
+    )  # fmt: skip
+    parser.add_argument(
+        "--probability", type=float, default=0.9, metavar="P",
+        help="that the band should hold the truth; default: 0.9",
+    )  # fmt: skip
+    parser.add_argument(
+        "--confidence", type=float, metavar="C",
+        help="also the cycles k that keep the mean error term below --error so surely (eq. 15)",
+    )  # fmt: skip
+    parser.add_argument("--error", type=float, metavar="E", help="in the unit of the series")
+    json_flag(parser)
+    parser.set_defaults(command=fit_command)
+
+
+def fit_command(arguments: argparse.Namespace) -> int:
+    """Fit a law to a series; print its parameters, a prediction and its band."""
+    from adapters.fit import cycles_needed, fit_series, series_read
+    from adapters.laws import law_named
+
+    if (arguments.confidence is None) != (arguments.error is None):
+        raise UsageError("--confidence and --error belong together", remedy="give both or none")
+    law = law_named(arguments.law)
+    series = series_read(arguments.paths, arguments.steps_per_cycle).since(arguments.from_cycle)
+    to_cycle = arguments.to_cycle
+    if to_cycle is None:
+        to_cycle = series.cycle.max(initial=0.0)
+    fitted = fit_series(series, law, to_cycle, arguments.probability).to_json()
+    if arguments.error is not None:
+        fitted["cycles_needed"] = cycles_needed(series, law, arguments.error, arguments.confidence)
+    if arguments.json:
+        json_print(fitted)
+        return 0
+    unit = fitted["unit"]
+    print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles")
+    for name, value in fitted["parameters"].items():
+        print(f"  {name} = {value:.6g}")
+    low, high = fitted["band"]
+    print(f"settlement at cycle {to_cycle:g}: {fitted['prediction']:.6g} {unit}")
+    print(f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}")
+    if arguments.error is not None:
+        print(
+            f"cycles that keep the mean error term below {arguments.error:g} {unit} with "
+            f"confidence {arguments.confidence:g}: {fitted['cycles_needed']}"
+        )
+    return 0
+
+
+def relax_register(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``relax``."""
+    parser.add_argument("state", metavar="STATE", type=Path, help="a .npz of trackbed or a dump")
+    parser.add_argument(
+        "--out",
+        metavar="STATE",
+        type=Path,
+        required=True,
+        help=".npz, or any other name for a dump",
+    )
+    parser.add_argument(
+        "--scene", type=Path, help="for walls and stiffness; default: that of the run STATE is in"
+    )
+    parser.add_argument(
+        "--before", type=Path, metavar="STATE", help="the state before the jump that made STATE"
+    )
+    parser.add_argument(
+        "--method", default="smallest-move", metavar="NAME",
+        help="smallest-move (default), karrech2007 or proximal",
+    )  # fmt: skip
+    json_flag(parser)
+    parser.set_defaults(command=relax_command)
+
+
+def scene_of_state(state: Path) -> tuple[Path, list[str]]:
+    """Scene file and overrides of the run folder that a state lies in."""
+    from adapters.run_folder import RunFolder
+
+    for folder in state.resolve().parents:
+        if (folder / "manifest.json").exists():
+            return folder / "scene.toml", RunFolder(folder).manifest()["overrides"]
+    raise UsageError(
+        "the walls and the stiffness of the grains are not known",
+        where=str(state),
+        remedy="name the scene: --scene scene.toml",
+    )
+
+
+def relax_command(arguments: argparse.Namespace) -> int:
+    """Relax a state, write it at rest, print what changed."""
+    import numpy as np
+
+    from adapters.relaxation import relax, relax_bare
+    from adapters.scene_file import scene_load
+    from adapters.state import contacts_none
+    from adapters.state_file import state_of_file, state_to_file
+
+    if arguments.scene is None:
+        scene = scene_load(*scene_of_state(arguments.state))
+    else:
+        scene = scene_load(arguments.scene)
+    density = scene.material.grain.density
+    state = state_of_file(arguments.state, density)
+    walls = scene.container.walls(state.piston_height, scene.piston_reach)
+    if arguments.before is None:
+        load = float(scene.stress_at(0.0)) * scene.loaded_area
+        relaxation = relax_bare(state, walls, scene.stiffness, method=arguments.method, load=load)
+    else:
+        before = state_of_file(arguments.before, density)
+        if not np.array_equal(before.identifier, state.identifier):
+            raise UsageError("the grains are not those of STATE", where=str(arguments.before))
+        relaxation = relax(
+            state.position,
+            before,
+            scene.container.walls(before.piston_height, scene.piston_reach),
+            scene.stiffness,
+            walls_after=walls,
+            method=arguments.method,
+        )
+    still = np.zeros_like(state.position)
+    # Contacts and wall forces belong to the positions before and are left out.
+    relaxed = state.moved(
+        relaxation.position, velocity=still, spin=still, contacts=contacts_none(), wall_force={}
+    )
+    state_to_file(relaxed, arguments.out)
+    record = relaxation.record()
+    if arguments.json:
+        json_print(record)
+        return 0
+    for key, value in record.items():
+        if isinstance(value, dict):
+            print(f"{key}:")
+            for name, figure in value.items():
+                print(f"  {name.replace('_', ' '):26}{figure:.6g}")
+        else:
+            shown = f"{value:.6g}" if isinstance(value, float) else value
+            print(f"{key.replace('_', ' '):28}{shown}")
+    return 0
+
+
+# --- cite ----------------------------------------------------------------------------------
+
+
+def cite_register(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``cite``."""
+    parser.set_defaults(command=cite_command)
+
+
+def cite_command(arguments: argparse.Namespace) -> int:
+    """Print BibTeX entries."""
+    from importlib.metadata import version
+
+    from adapters.citations import citations_text
+
+    print(citations_text(version("trackbed")))
+    return 0

@@ -1,0 +1,243 @@
+"""Input files of one LIGGGHTS run: static decks copied, and what the scene names written beside them.
+
+Static decks live in ``liggghts_inputs``; generated are ``parameters.in`` (numbers and the names
+of the parts to include), ``scene.in`` (materials and walls), ``dump_states.in`` (columns),
+``grains.data``, ``piston.stl``, ``moved.dump`` and the load samples.  A deck holds only what its
+scene names.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from adapters.container import Container
+from adapters.state import FloatArray
+
+GRAIN, WALL, MIRROR = 1, 2, 3
+"""Atom types: grains; walls, piston face and piston mass; mirror planes."""
+
+MIRROR_YOUNG = 1e15
+"""Young's modulus of a mirror plane [Pa]: a rigid frictionless plane under a sphere has the
+stiffness and the damping of the mirrored pair exactly; a finite one is softer."""
+
+PISTON_MARGIN = 1.0
+"""By how much the piston's mesh is wider than the container, in greatest radii."""
+
+PARTS_PREPARE = ("in.prepare", "settings.in", "bed.in")
+PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
+
+
+def deck_copy(folder: Path, parts: tuple[str, ...]) -> dict[str, str]:
+    """Copy the named static decks into ``folder``; returns the SHA-256 of each."""
+    digests = {}
+    for name in parts:
+        text = files("liggghts_inputs").joinpath(name).read_bytes()
+        (folder / name).write_bytes(text)
+        digests[name] = hashlib.sha256(text).hexdigest()
+    return digests
+
+
+def parameters_text(parameters: Mapping[str, float | int | str]) -> str:
+    """``parameters.in``: one ``variable NAME index VALUE`` a line; ``-var NAME VALUE`` beats it."""
+    lines = ["# parameters.in : generated; SI units"]
+    for name, value in parameters.items():
+        text = f"{value:.17g}" if isinstance(value, float) else str(value)
+        lines.append(f"variable {name} index {text}")
+    return "\n".join(lines) + "\n"
+
+
+def scene_text(
+    container: Container,
+    grain: tuple[float, float],
+    wall: tuple[float, float],
+    restitution: float,
+    friction: tuple[float, float],
+) -> str:
+    """``scene.in``: material table and walls that the scene names.
+
+    ``grain`` and ``wall`` are Young's modulus [Pa] and Poisson's ratio; ``friction`` is that
+    between grains and that between grain and wall (both 0: no tangential law at all).
+    """
+    mirrors = bool(container.symmetry)
+    young = [grain[0], wall[0]] + [MIRROR_YOUNG] * mirrors
+    poisson = [grain[1], wall[1]] + [grain[1]] * mirrors
+    types = len(young)
+    pairs = np.zeros((types, types))
+    pairs[0, 0] = friction[0]
+    pairs[0, 1] = pairs[1, 0] = friction[1]
+
+    def row(values: object) -> str:
+        return " ".join(f"{v:.17g}" for v in np.ravel(values))  # type: ignore[call-overload]
+
+    lines = [
+        "# scene.in : generated; materials by atom type (1 grains, 2 walls"
+        + (", 3 rigid mirror planes)" if mirrors else ")"),
+        f"fix young all property/global youngsModulus peratomtype {row(young)}",
+        f"fix poisson all property/global poissonsRatio peratomtype {row(poisson)}",
+        "fix restitution all property/global coefficientRestitution peratomtypepair "
+        f"{types} {row(np.full(types * types, restitution))}",
+    ]
+    if any(friction):
+        lines.append(
+            f"fix friction all property/global coefficientFriction peratomtypepair "
+            f"{types} {row(pairs)}"
+        )
+    lines += ["pair_style gran model ${contact_model}", "pair_coeff * *"]
+    for name, kind, shape in wall_primitives(container):
+        # With friction 0 LIGGGHTS still damps a tangential velocity; a mirror knows none.
+        model = "hertz" if kind == MIRROR else "${contact_model}"
+        lines.append(
+            f"fix {name} grains wall/gran model {model} primitive type {kind} {shape} "
+            "store_force yes"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def wall_primitives(container: Container) -> list[tuple[str, int, str]]:
+    """Name, atom type and LIGGGHTS primitive of every wall of the container."""
+    walls = container.walls()
+    primitives = [
+        (name, MIRROR if mirror else WALL, _plane_text(point, normal))
+        for name, mirror, point, normal in zip(
+            walls.plane_name,
+            walls.plane_frictionless,
+            walls.plane_point,
+            walls.plane_normal,
+            strict=True,
+        )
+    ]
+    if np.isfinite(walls.cylinder_radius):
+        primitives.append(("cylinder", WALL, f"zcylinder {walls.cylinder_radius:.17g} 0.0 0.0"))
+    return primitives
+
+
+def _plane_text(point: FloatArray, normal: FloatArray) -> str:
+    axis = int(np.argmax(np.abs(normal)))
+    return f"{'xyz'[axis]}plane {point[axis]:.17g}"
+
+
+def wall_names(container: Container, piston: bool) -> tuple[str, ...]:
+    """Names of all walls in the order of the columns of ``states.dump``."""
+    names = tuple(name for name, _, _ in wall_primitives(container))
+    return (*names, "piston_wall") if piston else names
+
+
+def dump_states_text(names: tuple[str, ...]) -> str:
+    """``dump_states.in``: full-precision state of the grains at every cycle end."""
+    columns = ["id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz"]
+    columns += ["radius", "mass"]
+    columns += [f"f_force_{name}[{axis}]" for name in names for axis in (1, 2, 3)]
+    return (
+        "# dump_states.in : generated\n"
+        f"dump states grains custom ${{steps_per_cycle}} states.dump {' '.join(columns)}\n"
+        f'dump_modify states sort id first yes format "%d{" %.17g" * (len(columns) - 1)}"\n'
+    )
+
+
+def grains_data_text(
+    position: FloatArray,
+    radius: FloatArray,
+    density: float,
+    container: Container,
+    height: float,
+    piston_mass: float | None,
+) -> str:
+    """``grains.data``: grains [m], shapes (n, 3) and (n,), density [kg/m^3], box up to ``height`` [m].
+
+    With a piston, one more atom of mass ``piston_mass`` [kg] is parked outside the container;
+    it touches nothing and gives the piston face its inertia.
+    """
+    low, high = box_bounds(container, radius, height)
+    rows = [
+        f"{i} {GRAIN} {2 * r:.17g} {density:.17g} {x[0]:.17g} {x[1]:.17g} {x[2]:.17g}"
+        for i, (x, r) in enumerate(zip(position, radius, strict=True), 1)
+    ]
+    if piston_mass is not None:
+        r = float(radius.min())
+        x = (*piston_atom_place(container, radius), height)
+        piston_density = piston_mass / (4 / 3 * np.pi * r**3)
+        rows.append(
+            f"{len(radius) + 1} {WALL} {2 * r:.17g} {piston_density:.17g} "
+            f"{x[0]:.17g} {x[1]:.17g} {x[2]:.17g}"
+        )
+    types = MIRROR if container.symmetry else WALL
+    header = ["grains.data : generated; id type diameter density x y z", "", f"{len(rows)} atoms"]
+    header += [f"{types} atom types"]
+    header += [
+        f"{lo:.17g} {hi:.17g} {axis}lo {axis}hi"
+        for lo, hi, axis in zip(low, high, "xyz", strict=True)
+    ]
+    return "\n".join([*header, "", "Atoms", "", *rows]) + "\n"
+
+
+def box_bounds(
+    container: Container, radius: FloatArray, height: float
+) -> tuple[FloatArray, FloatArray]:
+    """Corners of the simulation box [m], shape (3,) each: the container and a margin about it."""
+    margin = 4 * float(radius.max())
+    low, high = _section_bounds(container)
+    return np.array([*low, 0.0]) - margin, np.array([*high, height]) + margin
+
+
+def piston_atom_place(container: Container, radius: FloatArray) -> tuple[float, float]:
+    """Where the atom of the piston's mass is parked [m]: in the box, beyond the piston's mesh.
+
+    LIGGGHTS aborts without a word when an atom's centre lies in a mesh, of its group or not.
+    """
+    _, high = _section_bounds(container)
+    away = PISTON_MARGIN + 1.5
+    return high[0] + away * float(radius.max()), high[1] + away * float(radius.max())
+
+
+def _section_bounds(container: Container) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Lower and upper corner of the horizontal section [m]."""
+    if container.shape == "box":
+        return (0.0, 0.0), (container.size_x, container.size_y)
+    radius = container.radius
+    low = [0.0 if axis in container.symmetry else -radius for axis in "xy"]
+    return (low[0], low[1]), (radius, radius)
+
+
+def piston_stl_write(path: Path, container: Container, reach: float, margin: float) -> None:
+    """Mesh of the piston's face at height 0, normal down, as STL.
+
+    A whole piston (``reach`` infinite) is a rectangle over the section and ``margin`` [m] more;
+    a partial one a disc of radius ``reach`` [m], cut ``margin`` behind the mirror planes so
+    that the mirrored edge is covered.
+    """
+    import meshio
+
+    low, high = _section_bounds(container)
+    if np.isinf(reach):
+        (x0, y0), (x1, y1) = low, high
+        corners = [(x0 - margin, y0 - margin), (x1 + margin, y0 - margin)]
+        corners += [(x1 + margin, y1 + margin), (x0 - margin, y1 + margin)]
+    else:
+        angle = np.linspace(0.0, 2 * np.pi, 97)[:-1]
+        circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
+        floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
+        corners = [tuple(point) for point in _convex_clip(circle, floor)]
+    fan = [[0, i + 1, i] for i in range(1, len(corners) - 1)]
+    points = np.column_stack([np.array(corners), np.zeros(len(corners))])
+    meshio.Mesh(points, [("triangle", np.array(fan))]).write(path, file_format="stl", binary=False)
+
+
+def _convex_clip(polygon: FloatArray, floor: list[float]) -> FloatArray:
+    """Part of a convex polygon, shape (n, 2), above ``floor`` along x and along y."""
+    for axis in (0, 1):
+        if np.isinf(floor[axis]):
+            continue
+        kept: list[FloatArray] = []
+        for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+            if a[axis] >= floor[axis]:
+                kept.append(a)
+            if (a[axis] - floor[axis]) * (b[axis] - floor[axis]) < 0:
+                share = (floor[axis] - a[axis]) / (b[axis] - a[axis])
+                kept.append(a + share * (b - a))
+        polygon = np.array(kept)
+    return polygon

@@ -1,0 +1,205 @@
+"""The contract of an engine, and how one process of it is run.
+
+An engine reads input files from a folder and leaves, in the same folder:
+
+=============== ==================================================================
+preparation     ``history.txt``, ``rain.dump``, ``end.restart``
+load cycles     ``states.dump``, ``contacts.dump``, ``piston.txt``, ``end.restart``
+=============== ==================================================================
+
+Its exit code proves nothing: `adapters.checks` judges what it left.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from adapters.errors import EngineFailed, EngineMissing, Interrupted
+from adapters.scene import Scene
+from adapters.state import FloatArray, State
+
+POLL_S = 0.05
+"""Time between two looks at a running engine [s]."""
+
+
+@dataclass(frozen=True)
+class EngineStart:
+    """The saved state from which a window starts."""
+
+    restart: Path
+    """The engine's own restart file."""
+    time_step: int
+    """Its step count."""
+    piston_mesh: int
+    """Number of the piston's mesh: a jump places a new one."""
+    piston_height: float
+    """Height of the piston's face [m]."""
+    moved: State | None = None
+    """Positions after a jump, at rest; None goes on from the restart file as it is."""
+    first: bool = False
+    """True for the first window after the preparation, which has no piston yet."""
+
+    @property
+    def kind(self) -> str:
+        """``first``, ``continue`` or ``moved``."""
+        if self.first:
+            return "first"
+        return "continue" if self.moved is None else "moved"
+
+
+@dataclass(frozen=True)
+class EngineRun:
+    """One process of an engine that ended and said so."""
+
+    command: tuple[str, ...]
+    cpu_s: float
+    """CPU time of the process and its children, user and system [s]."""
+    wall_s: float
+    """Elapsed time [s]."""
+    start_up_s: float
+    """Part of it before and after the time steps: reading, building neighbours, writing [s]."""
+    decks: dict[str, str]
+    """SHA-256 of every static deck used."""
+
+
+class Engine(Protocol):
+    """What the procedure asks of an engine."""
+
+    name: str
+
+    def version(self) -> str:
+        """The engine's own version banner; raises `EngineMissing`."""
+
+    def command(self, scene: Scene, deck: str) -> list[str]:
+        """Command line that runs ``deck`` in its folder."""
+
+    def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
+        """Names of the walls whose forces ``states.dump`` holds, in the order of its columns."""
+
+    def cycles_done(self, scene: Scene, start: EngineStart, folder: Path) -> int:
+        """Load cycles a running engine has done so far, for the progress line; cheap."""
+
+    def write_preparation(
+        self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
+    ) -> dict[str, str]:
+        """Write the input of the rain of grains; returns the digests of the static decks.
+
+        Start positions [m], shape (n, 3), radii [m], shape (n,), below ``height`` [m].
+        """
+
+    def write_cycles(
+        self, scene: Scene, start: EngineStart, cycles: int, folder: Path
+    ) -> dict[str, str]:
+        """Write the input of ``cycles`` load cycles; returns the digests of the static decks."""
+
+    def run(
+        self, scene: Scene, deck: str, folder: Path, watch: Callable[[], None], digests: dict[str, str]
+    ) -> EngineRun:
+        """Run ``deck`` in ``folder``; ``watch`` is called now and then.  Raises `EngineFailed`."""
+
+
+def _die_with_parent() -> None:
+    """Have the kernel end this child when Python is killed, so that no orphan keeps computing."""
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # 1 = PR_SET_PDEATHSIG
+
+
+def process_run(
+    command: Sequence[str], folder: Path, watch: Callable[[], None]
+) -> tuple[int, float, float]:
+    """Run ``command`` in ``folder``, output to ``screen.txt``; exit status, CPU s, elapsed s.
+
+    On any exception, Ctrl-C included, the whole process group is ended first.
+    Raises `EngineMissing` when the program can not be started.
+    """
+    environment = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    started = time.monotonic()
+    with (folder / "screen.txt").open("wb") as screen:
+        try:
+            child = subprocess.Popen(
+                command,
+                cwd=folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=screen,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                preexec_fn=_die_with_parent,
+            )
+        except OSError as error:
+            raise EngineMissing(
+                f"can not start {command[0]} ({error.strerror})",
+                remedy="install it, or mend the scene's engine.launcher; see: trackbed doctor",
+            ) from error
+        try:
+            pid = 0
+            while pid == 0:
+                time.sleep(POLL_S)
+                watch()
+                pid, status, usage = os.wait4(child.pid, os.WNOHANG)
+        except BaseException:
+            os.killpg(child.pid, signal.SIGKILL)
+            child.wait()
+            raise
+    child.returncode = os.waitstatus_to_exitcode(status)
+    return child.returncode, usage.ru_utime + usage.ru_stime, time.monotonic() - started
+
+
+def python_cpu_s() -> float:
+    """CPU time of this Python process so far, user and system [s], without its children."""
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
+def engine_named(name: str) -> Engine:
+    """The engine a scene names."""
+    if name == "fake":
+        from adapters.engine_fake import FakeEngine
+
+        return FakeEngine()
+    from adapters.engine_liggghts import LiggghtsEngine
+
+    return LiggghtsEngine()
+
+
+def raise_interrupted(number: int, _frame: object) -> None:
+    """Signal handler: end the engine, keep every finished window, exit with 130."""
+    raise Interrupted(
+        f"stopped by {signal.Signals(number).name}; every finished window is saved",
+        remedy="go on with: trackbed resume RUN",
+    )
+
+
+def screen_tail(folder: Path, lines: int = 3) -> str:
+    """The engine's own error line, or the last lines it printed."""
+    try:
+        text = (folder / "screen.txt").read_text(errors="replace").splitlines()
+    except OSError:
+        return ""
+    errors = [line.strip() for line in text if line.startswith("ERROR")]
+    errors += [line.strip() for line in text if "Segmentation fault" in line]
+    return errors[-1] if errors else " | ".join(line.strip() for line in text[-lines:])
+
+
+def engine_failure(status: int, folder: Path) -> EngineFailed:
+    """The error for a process that ended badly, with the engine's own words."""
+    how = (
+        f"was ended by {signal.Signals(-status).name}"
+        if status < 0
+        else f"ended with exit code {status} and no sentinel line"
+    )
+    error = EngineFailed(
+        f"the engine {how}: {screen_tail(folder)}",
+        where=str(folder),
+        remedy="mend the cause and go on with: trackbed resume RUN",
+    )
+    error.from_outside = status < 0
+    return error

@@ -1,0 +1,267 @@
+"""LIGGGHTS (Debian's 3.8.0) as an engine: static decks, generated includes, one process a window."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from math import ceil, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from adapters import decks
+from adapters.dump import Frame, dump_write
+from adapters.engine import EngineRun, EngineStart, engine_failure, process_run
+from adapters.errors import EngineFailed, EngineMissing, NotConverged
+from adapters.sample import GRAVITY
+from adapters.scene import Scene
+from adapters.state import FloatArray
+
+EQUILIBRIUM_RATIO = 1e-6
+"""Kinetic (translational) over potential energy at which a bed counts as settled; section 2.3."""
+
+SETTLE_TIMES = 40
+"""Falling times after which a bed that still moves is given up."""
+
+BANNER = re.compile(r"LIGGGHTS-PUBLIC (\d+)\.(\d+)[^,)]*")
+
+
+class LiggghtsEngine:
+    """Writes the decks of a window, runs ``liggghts``, and knows its manners.
+
+    LIGGGHTS exits 0 after SIGTERM, with lost atoms and with NaN; the deck's last line
+    ``COMPLETE step N`` is the sentinel looked for here, `adapters.checks` does the rest.
+    ``-screen none`` crashes where a mesh is read, so the screen goes to a file.
+    """
+
+    name = "liggghts"
+
+    def version(self) -> str:
+        """Version banner such as ``LIGGGHTS-PUBLIC 3.8.0``; raises `EngineMissing`."""
+        remedy = "sudo apt-get install liggghts"
+        program = shutil.which("liggghts")
+        if program is None:
+            raise EngineMissing("LIGGGHTS is not installed", remedy=remedy)
+        try:
+            answer = subprocess.run(
+                [program, "-h"], capture_output=True, text=True, errors="replace", timeout=30
+            ).stdout
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise EngineMissing(
+                f"LIGGGHTS does not start ({error})", where=program, remedy=remedy
+            ) from error
+        banner = BANNER.search(answer)
+        if banner is None or (int(banner[1]), int(banner[2])) < (3, 8):
+            said = banner[0] if banner else (answer.strip().splitlines() or ["nothing"])[0]
+            raise EngineMissing(
+                f"this is not LIGGGHTS-PUBLIC 3.8 or later; it says: {said}",
+                where=program,
+                remedy=remedy,
+            )
+        return banner[0].strip()
+
+    def command(self, scene: Scene, deck: str) -> list[str]:
+        """Command line that runs ``deck`` in its folder.
+
+        ``stdbuf`` has the screen written line by line: MPI_ABORT throws away what is buffered,
+        and with it the reason.
+        """
+        unbuffered = ["stdbuf", "-oL"] if shutil.which("stdbuf") else []
+        return [*scene.engine.launcher, *unbuffered, "liggghts", "-in", deck, "-log", "log.liggghts"]
+
+    def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
+        """Names of the walls whose forces ``states.dump`` holds; see `adapters.engine.Engine`."""
+        return decks.wall_names(scene.container, piston)
+
+    def cycles_done(self, scene: Scene, start: EngineStart, folder: Path) -> int:
+        """Load cycles done so far, from the last line of ``piston.txt``."""
+        try:
+            with (folder / "piston.txt").open("rb") as stream:
+                stream.seek(max(stream.seek(0, 2) - 400, 0))
+                words = stream.read().splitlines()[-2].split()
+            return (int(words[0]) - start.time_step) // scene.steps_per_cycle
+        except (OSError, IndexError, ValueError):
+            return 0
+
+    def write_preparation(
+        self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
+    ) -> dict[str, str]:
+        """Write the rain of grains; see `adapters.engine.Engine`."""
+        piston_mass = None if scene.loading is None else scene.loading.piston_mass
+        (folder / "grains.data").write_text(
+            decks.grains_data_text(
+                position,
+                radius,
+                scene.material.grain.density,
+                scene.container,
+                height,
+                piston_mass,
+            )
+        )
+        fall_steps = sqrt(2 * height / GRAVITY) / scene.time_step
+        # Cycles start at multiples of steps_per_cycle, so that the load's phase is the step's.
+        cycle = scene.steps_per_cycle or ceil(0.02 / scene.time_step)
+        check_steps = cycle * ceil(0.01 / (cycle * scene.time_step))
+        (folder / "dump_states.in").write_text(
+            decks.dump_states_text(self.wall_names(scene, piston=False))
+        )
+        return self._write(
+            scene,
+            folder,
+            (*decks.PARTS_PREPARE, f"output_{self._kind(scene)}.in"),
+            {
+                "check_steps": check_steps,
+                "check_limit": ceil(SETTLE_TIMES * fall_steps / check_steps),
+                "minimum_steps": ceil(1.2 * fall_steps),
+                "history_steps": max(check_steps // 4, 1),
+                "equilibrium_ratio": EQUILIBRIUM_RATIO,
+                "steps_per_cycle": cycle,
+                "output_part": f"output_{self._kind(scene)}.in",
+            },
+        )
+
+    def write_cycles(
+        self, scene: Scene, start: EngineStart, cycles: int, folder: Path
+    ) -> dict[str, str]:
+        """Write a window of load cycles; see `adapters.engine.Engine`."""
+        assert scene.loading is not None
+        shutil.copyfile(start.restart, folder / "start.restart")
+        margin = decks.PISTON_MARGIN * scene.sample.grain_radius.greatest
+        decks.piston_stl_write(
+            folder / "piston.stl", scene.container, scene.piston_reach, margin
+        )
+        (folder / "dump_states.in").write_text(
+            decks.dump_states_text(self.wall_names(scene, piston=True))
+        )
+        steps = scene.steps_per_cycle
+        waveform = scene.loading.waveform
+        parameters: dict[str, float | int | str] = {
+            "load_part": f"load_{waveform}.in",
+            "run_part": f"run_{waveform}.in",
+            "output_part": f"output_{self._kind(scene)}.in",
+            "start_part": f"start_{start.kind}.in",
+            "steps_per_cycle": steps,
+            "run_steps": cycles * steps,
+            "track_steps": steps // scene.samples_per_cycle,
+            "piston_atom": scene.grain_count + 1,
+            "piston_mesh": f"piston_{start.piston_mesh}",
+            "piston_height": start.piston_height,
+        }
+        if start.moved is not None or waveform == "series":
+            parameters["start_step"] = start.time_step
+        if waveform == "sine":
+            parameters |= {
+                "force_mean": scene.loading.mean * scene.loaded_area,  # type: ignore[operator]
+                "force_amplitude": scene.loading.amplitude * scene.loaded_area,  # type: ignore[operator]
+            }
+        else:
+            parameters |= self._write_series(scene, cycles, folder)
+        if start.moved is not None:
+            self._write_moved(scene, start, folder)
+        parts = tuple(str(parameters[f"{name}_part"]) for name in ("load", "run", "output", "start"))
+        return self._write(scene, folder, decks.PARTS_CYCLES + parts, parameters)
+
+    def run(
+        self,
+        scene: Scene,
+        deck: str,
+        folder: Path,
+        watch: Callable[[], None],
+        digests: dict[str, str],
+    ) -> EngineRun:
+        """Run a deck; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
+        command = self.command(scene, deck)
+        status, cpu_s, wall_s = process_run(command, folder, watch)
+        text = (folder / "screen.txt").read_text(errors="replace")
+        if "NOT SETTLED" in text:
+            raise NotConverged(
+                f"the bed still moves after {SETTLE_TIMES} falling times",
+                where=str(folder),
+                remedy="more damping (viscous_alpha), or a shorter time step",
+            )
+        if status != 0 or not re.search(r"^COMPLETE step \d+", text, re.MULTILINE):
+            raise engine_failure(status, folder)
+        loop_s = sum(float(s) for s in re.findall(r"^Loop time of (\S+) on", text, re.MULTILINE))
+        return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)
+
+    @staticmethod
+    def _kind(scene: Scene) -> str:
+        friction = scene.material.grain.friction > 0 or scene.material.wall.friction > 0
+        return "frictional" if friction else "frictionless"
+
+    def _write(
+        self,
+        scene: Scene,
+        folder: Path,
+        parts: tuple[str, ...],
+        parameters: dict[str, float | int | str],
+    ) -> dict[str, str]:
+        """Static parts, ``scene.in`` and ``parameters.in``; returns the digests of the parts."""
+        material = scene.material
+        shared: dict[str, float | int | str] = {
+            "time_step": scene.time_step,
+            "gravity": GRAVITY,
+            "skin": 0.3 * scene.sample.grain_radius.mean,
+            "contact_part": f"contact_{self._kind(scene)}.in",
+        }
+        (folder / "parameters.in").write_text(decks.parameters_text(shared | parameters))
+        (folder / "scene.in").write_text(
+            decks.scene_text(
+                scene.container,
+                (material.grain.young, material.grain.poisson),
+                (material.wall.young, material.wall.poisson),
+                scene.restitution,
+                (material.grain.friction, material.wall.friction),
+            )
+        )
+        return decks.deck_copy(folder, (*parts, f"contact_{self._kind(scene)}.in"))
+
+    @staticmethod
+    def _write_series(scene: Scene, cycles: int, folder: Path) -> dict[str, float | int | str]:
+        """Load samples of the window, one a line, and their slopes a step."""
+        assert scene.loading is not None and scene.loading.samples is not None
+        force = scene.loading.samples.stress * scene.loaded_area
+        steps = scene.steps_per_cycle // (len(force) - 1)
+        # One sample more than segments: LIGGGHTS draws the next one after the last segment too.
+        samples = np.append(np.tile(force[:-1], cycles), force[0])
+        slopes = np.append(np.tile(np.diff(force) / steps, cycles), 0.0)
+        np.savetxt(folder / "force.txt", samples, fmt="%.17g")
+        np.savetxt(folder / "slope.txt", slopes, fmt="%.17g")
+        return {"steps_per_sample": steps}
+
+    @staticmethod
+    def _write_moved(scene: Scene, start: EngineStart, folder: Path) -> None:
+        """``moved.dump``: grains at rest at their new places, and the piston's atom at its height."""
+        assert start.moved is not None
+        moved = start.moved
+        values = np.zeros((len(moved.radius) + 1, 9))
+        values[:-1, 0] = moved.identifier
+        values[:-1, 1] = decks.GRAIN
+        values[:-1, 2:5] = moved.position
+        values[:-1, 8] = moved.radius
+        values[-1] = [
+            len(moved.radius) + 1,
+            decks.WALL,
+            *decks.piston_atom_place(scene.container, moved.radius),
+            start.piston_height,
+            0.0,
+            0.0,
+            0.0,
+            float(moved.radius.min()),
+        ]
+        columns = ("id", "type", "x", "y", "z", "vx", "vy", "vz", "radius")
+        low, high = decks.box_bounds(scene.container, moved.radius, float(moved.position[:, 2].max()))
+        bounds = np.column_stack([low, high])
+        dump_write(folder / "moved.dump", [Frame(start.time_step, columns, values, bounds, "atoms")])
+
+
+def restart_of(folder: Path) -> Path:
+    """The restart file a finished run left; raises `EngineFailed` when there is none."""
+    path = folder / "end.restart"
+    if not path.exists() or path.stat().st_size == 0:
+        raise EngineFailed(
+            "the engine left no restart file", where=str(path), remedy="resume computes it again"
+        )
+    return path

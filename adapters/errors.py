@@ -1,0 +1,84 @@
+"""Errors of the package: each says what happened, where, and what to do; each has an exit code."""
+
+
+class TrackbedError(Exception):
+    """Base of all errors a user can act on.
+
+    ``what`` is one sentence on what happened; ``where`` names file, line or key;
+    ``remedy`` says what to do.  ``exit_code`` is what the command ``trackbed`` returns.
+    """
+
+    exit_code = 1
+
+    def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
+        self.what, self.where, self.remedy = what, where, remedy
+        super().__init__(
+            (f"{where}: " if where else "") + what + (f"\n  -> {remedy}" if remedy else "")
+        )
+
+
+class UsageError(TrackbedError):
+    """A flag, argument or input file of the command can not be used."""
+
+    exit_code = 2
+
+
+class SceneError(TrackbedError):
+    """A scene file is not valid."""
+
+    exit_code = 3
+
+
+class EngineMissing(TrackbedError):
+    """The engine that a scene names is not installed, or not the version we know."""
+
+    exit_code = 4
+
+
+class EngineFailed(TrackbedError):
+    """The engine stopped, was killed, or left its results incomplete."""
+
+    exit_code = 5
+    from_outside = False
+    """True when a signal or a full disk ended it: trying another jump would not help."""
+
+
+class NotCredible(TrackbedError):
+    """The engine ended, but what it left breaks a law of physics or a bound."""
+
+    exit_code = 6
+
+
+class DumpError(NotCredible):
+    """A dump file is malformed; the text names file, line, time step and lost grains.
+
+    ``complete_frames`` frames before the fault are whole; ``incomplete_end`` is True when the
+    file just ends inside the next one (an engine that was stopped, or still writes);
+    ``lost_ids`` are the grains known to be lost.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: str = "",
+        remedy: str = "",
+        complete_frames: int = 0,
+        incomplete_end: bool = False,
+        lost_ids: tuple[int, ...] = (),
+    ) -> None:
+        self.complete_frames, self.incomplete_end = complete_frames, incomplete_end
+        self.lost_ids = lost_ids
+        super().__init__(what, where=where, remedy=remedy)
+
+
+class NotConverged(TrackbedError):
+    """An iteration (preparation, relaxation, fit) did not reach its tolerance."""
+
+    exit_code = 7
+
+
+class Interrupted(TrackbedError):
+    """The user or the system asked us to stop; everything finished is saved."""
+
+    exit_code = 130

@@ -1,0 +1,170 @@
+"""Fit a law to a settlement series, predict, and say how far the prediction can be off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, log, sqrt
+from typing import Any
+
+import numpy as np
+
+from adapters.errors import NotConverged, UsageError
+from adapters.laws.law import Law
+from adapters.residual import cycles_for_error, error_term
+from adapters.settlement_series import Series, series_read
+from adapters.state import FloatArray
+
+__all__ = ["Prediction", "Series", "cycles_needed", "fit_series", "series_read"]
+
+NOISE_SERIES = 400
+"""Random residual series that a fit is repeated on: scatter to 3.5 %; fewer for long series."""
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A law fitted to a series, and what it says of a later cycle."""
+
+    law: str
+    parameters: dict[str, float]
+    """By name; lengths in ``unit``, rates in ``unit`` per cycle."""
+    prediction: float
+    """Settlement at the cycle asked for, in ``unit``."""
+    band: tuple[float, float]
+    """Low and high end of the settlement at that cycle, in ``unit``; see `prediction_band`."""
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``trackbed fit --json`` prints."""
+        return {
+            "law": self.law,
+            "parameters": self.parameters,
+            "prediction": self.prediction,
+            "band": list(self.band),
+            "unit": self.unit,
+        }
+
+
+def fit_series(series: Series, law: Law, to_cycle: float, probability: float = 0.9) -> Prediction:
+    """Fit ``law`` to all of ``series`` and predict the settlement at ``to_cycle``.
+
+    The prediction is the last settlement of the series plus the law's increment from there on.
+    ``probability`` is the share of cases in which the band should hold the truth.
+
+    Raises `UsageError` when ``to_cycle`` lies before the last cycle of the series or the series
+    is too short (one row more than the law has parameters), `NotConverged` when the result is
+    not finite.
+    """
+    if not 0 < probability < 1:
+        raise UsageError(f"a probability lies between 0 and 1, not at {probability:g}")
+    cycle, settlement = _training_rows(series, law)
+    last = float(cycle[-1])
+    if not (isfinite(to_cycle) and to_cycle >= last):
+        raise UsageError(
+            f"cycle {to_cycle:g} does not lie behind the last one of the series, {last:g}",
+            remedy="ask for a later cycle: the earlier ones are known",
+        )
+    parameters = law.fit(cycle, settlement)
+    prediction = float(settlement[-1] + law.increment(parameters, last, to_cycle))
+    band = (prediction, prediction)
+    if to_cycle > last:
+        below, above = prediction_band(law, cycle, settlement, to_cycle, probability)
+        band = (prediction - below, prediction + above)
+    if not (np.isfinite(parameters).all() and np.isfinite(band).all()):
+        raise NotConverged(
+            f"the law {law.name} gives no finite settlement at cycle {to_cycle:g}",
+            remedy="predict less far, or use the law log",
+        )
+    named = dict(zip(law.parameter_names, map(float, parameters), strict=True))
+    return Prediction(law.name, named, prediction, band, series.unit)
+
+
+def prediction_band(
+    law: Law, cycle: FloatArray, settlement: FloatArray, to_cycle: float, probability: float
+) -> tuple[float, float]:
+    """How far the settlement at ``to_cycle`` can lie below and above the law's prediction.
+
+    Two independent errors, added as squares; both in the unit of ``settlement``, shape (k,).
+
+    *The law may not go on.*  With s the law's slope du/d(ln N) at the last cycle N_k, settlement
+    grows on as the integral of s (N / N_k)^beta over ln N: beta = 1 is a constant rate
+    (ratcheting), 0 the logarithm, -1 a bed that shakes down.  No series tells its own future
+    exponent, so all of [-1, 1] are taken as equally likely, and the band reaches from -P to P.
+
+    *The fit is uncertain.*  Residuals of neighbouring cycles are alike, so k of them count for
+    fewer.  They are taken as a first-order autoregression of the residuals' own variance and
+    correlation; the fit is repeated on such series, and the scatter of its prediction is widened
+    by Student's t for the effective number of cycles.
+
+    The band does not hold for bursts (small beds) and collapse: rates that grow faster than in
+    proportion to N.
+    """
+    last, parameters = float(cycle[-1]), law.fit(cycle, settlement)
+    predicted = float(law.increment(parameters, last, to_cycle))
+    distance, step = log(to_cycle / last), 1e-4
+    ahead, behind = law.value(parameters, last * np.array([1 + step, 1 - step]))
+    slope = float(ahead - behind) / (2 * step)
+    low, high = sorted(
+        slope * np.expm1(beta * distance) / beta for beta in (-probability, probability)
+    )
+    noise = fit_noise(law, cycle, settlement, to_cycle, probability)
+    return (
+        float(np.hypot(max(predicted - low, 0.0), noise)),
+        float(np.hypot(max(high - predicted, 0.0), noise)),
+    )
+
+
+def fit_noise(
+    law: Law, cycle: FloatArray, settlement: FloatArray, to_cycle: float, probability: float
+) -> float:
+    """Half-width of the part of `prediction_band` that the residuals of the fit cause."""
+    from scipy.signal import lfilter
+    from scipy.special import stdtrit
+
+    parameters = law.fit(cycle, settlement)
+    trend = law.value(parameters, cycle)
+    residual = settlement - trend
+    square, count = float(residual @ residual), len(residual)
+    if square == 0:
+        return 0.0
+    # A fitted trend takes correlation out of the residuals; (2 + 4 rho) / k puts it back.
+    seen = max(float(residual[1:] @ residual[:-1]) / square, 0.0)
+    correlation = min(seen + (2 + 4 * seen) / count, 0.99)
+    effective = max(count * (1 - correlation) / (1 + correlation), 1.0 + len(parameters))
+    freedom = effective - len(parameters)
+    deviation = sqrt(square / count * effective / freedom)
+
+    members = int(np.clip(2e7 / count, 50, NOISE_SERIES))
+    white = np.random.default_rng(0).standard_normal((count + 1, members))
+    white[1:-1] *= sqrt(1 - correlation**2)
+    noise = deviation * lfilter([1.0], [1.0, -correlation], white[:-1], axis=0)
+    kept = correlation ** ((to_cycle - cycle[-1]) / (cycle[-1] - cycle[-2]))
+    final = kept * noise[-1] + deviation * sqrt(1 - kept**2) * white[-1]
+    again = law.fit(cycle, trend[:, None] + noise)
+    increments = law.increment(again, float(cycle[-1]), to_cycle)
+    error = final - noise[-1] - (increments - law.increment(parameters, cycle[-1], to_cycle))
+    return float(stdtrit(freedom, (1 + probability) / 2) * np.sqrt(np.mean(error**2)))
+
+
+def cycles_needed(series: Series, law: Law, error: float, confidence: float) -> int:
+    """Cycles that keep the mean error term below ``error`` with ``confidence`` (eq. 15).
+
+    ``error`` is in the unit of the series; p of eq. 15 is 1 - ``confidence``; the interval
+    [a, b] is the range of the residuals of ``law``.  See `residual.cycles_for_error` for when
+    the bound means little.
+    """
+    cycle, settlement = _training_rows(series, law)
+    residual = error_term(law, cycle, settlement)
+    return cycles_for_error(float(residual.min()), float(residual.max()), error, 1 - confidence)
+
+
+def _training_rows(series: Series, law: Law) -> tuple[FloatArray, FloatArray]:
+    """Cycles and settlement that ``law`` can take: cycle 0 only where it has a value there."""
+    rows = (series.cycle > 0) if law.first_state else np.ones(len(series.cycle), bool)
+    cycle, settlement = series.cycle[rows], series.settlement[rows]
+    fewest = law.minimum_cycles + 1
+    if len(cycle) < fewest:
+        raise UsageError(
+            f"{len(cycle)} cycles are too few to fit the law {law.name} and know its error",
+            remedy=f"give at least {fewest} computed cycles",
+        )
+    return cycle, settlement

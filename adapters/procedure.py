@@ -1,0 +1,241 @@
+"""The settlement procedure of Karrech et al. (2007), Fig. 10, and the runs made of it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from adapters import stages
+from adapters.engine import engine_named, raise_interrupted
+from adapters.errors import EngineFailed, NotConverged, NotCredible, SceneError, UsageError
+from adapters.progress import Progress
+from adapters.run_folder import RunFolder, disk_full_named, write_atomically
+from adapters.scene import Scene
+from adapters.scene_file import scene_load
+from adapters.stages import Bed, Run, Variant
+
+RETRIES = 3
+"""How often a failed jump is tried again, each time half as long."""
+
+CONTROL = Variant("control", jumps=False)
+
+
+def settle(run: Run) -> Bed:
+    """The flow chart, Fig. 10: rain, k_i cycles, then k cycles and a jump of h until the end."""
+    p = run.scene.procedure
+    assert p is not None
+    bed = stages.prepare(run)
+    bed = stages.compute(run, bed, p.k_i)
+    bed = stages.compute(run, bed, min(p.k, p.total_cycles - bed.cycle))
+    for number in range(p.total_cycles):
+        h = min(p.jump_cycles(number), p.total_cycles - bed.cycle - p.healing_cycles - p.k)
+        if not run.variant.jumps or h < min(p.h):
+            break
+        bed = jump_and_heal(run, bed, h)
+    while bed.cycle < p.total_cycles:
+        bed = stages.compute(run, bed, min(p.k, p.total_cycles - bed.cycle))
+    return bed
+
+
+def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
+    """A jump of ``h`` cycles and the window after it; a failed jump is tried again, half as long.
+
+    Raises `NotCredible` when the jump and its retries failed.
+    """
+    p = run.scene.procedure
+    assert p is not None
+    why = ""
+    for attempt in range(1, RETRIES + 2):
+        name = f"jump_{bed.cycle:06d}_{attempt}"
+        why = run.folder.failure(name)
+        if not why:
+            try:
+                moved = stages.jump(run, bed, h, attempt)
+                return stages.compute(run, moved, p.healing_cycles + p.k, p.healing_cycles)
+            except (EngineFailed, NotCredible, NotConverged) as error:
+                if isinstance(error, EngineFailed) and error.from_outside:
+                    raise
+                why = str(error)
+                run.folder.give_up(name, why)
+                run.progress.say(f"the jump of {h} cycles from {bed.cycle} failed: {why}")
+        h = h // 2 if h > 1 else h
+    raise NotCredible(
+        f"the jump from cycle {bed.cycle} failed {RETRIES + 1} times, the last time: {why}",
+        where=str(run.folder.path),
+        remedy="more cycles k before the jump, or a shorter h; the cycles before it are kept",
+    )
+
+
+def run_scene(
+    scene_path: Path,
+    run_path: Path,
+    *,
+    control: bool = False,
+    overrides: Sequence[str] = (),
+    dry_run: bool = False,
+    progress: Progress | None = None,
+) -> None:
+    """Run a scene in the folder ``run_path``; with ``control``, every cycle beside it too.
+
+    A folder that holds the same scene is resumed; one that holds another is refused with the
+    differences.  ``dry_run`` writes the first decks and prints the engine's command line.
+    """
+    scene = scene_load(scene_path, overrides)
+    progress = progress or Progress()
+    for warning in scene.warnings:
+        progress.say(f"warning: {warning}")
+    if dry_run:
+        _dry_run(scene, run_path)
+        return
+    folder = RunFolder(run_path)
+    with folder.locked(), disk_full_named(run_path):
+        manifest_settle(folder, scene, scene_path, overrides, control)
+        _run_all(folder, scene, control, progress)
+
+
+def resume(run_path: Path, *, progress: Progress | None = None) -> None:
+    """Go on with the run in ``run_path`` from its last whole stage."""
+    folder = RunFolder(run_path)
+    manifest = folder.manifest()
+    scene = scene_load(run_path / "scene.toml", manifest["overrides"])
+    with folder.locked(), disk_full_named(run_path):
+        refuse_differences(manifest["scene"], scene_record(scene), run_path)
+        folder.event("resumed")
+        _run_all(folder, scene, manifest["control"], progress or Progress())
+
+
+def _run_all(folder: RunFolder, scene: Scene, control: bool, progress: Progress) -> None:
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, raise_interrupted)
+    try:
+        run_variant(folder, scene, Variant(), progress)
+        if control:
+            run_variant(folder, scene, CONTROL, progress)
+    except BaseException as error:
+        with disk_full_named(folder.path):
+            folder.event("stopped", why=str(error) or type(error).__name__)
+        raise
+
+
+def run_variant(folder: RunFolder, scene: Scene, variant: Variant, progress: Progress) -> RunFolder:
+    """Run one variant of a scene: the procedure in ``folder`` itself, others in a folder inside.
+
+    The control shares the stages before the first jump: the same work would give the same bits.
+    """
+    engine = engine_named(scene.engine.name)
+    folder.event("engine", name=engine.name, version=engine.version(), variant=variant.name)
+    if variant.name == "procedure":
+        here = folder
+    else:
+        here = RunFolder(folder.path / variant.name)
+        here.path.mkdir(exist_ok=True)
+        assert scene.procedure is not None
+        shared = scene.procedure.k_i + (0 if variant.perturbed else scene.procedure.k)
+        here.share_start(folder, shared)
+        progress.say(f"{variant.name}: every cycle computed" if not variant.jumps else variant.name)
+    run = Run(scene, here, engine, variant, progress)
+    progress.start()
+    if scene.procedure is None or scene.loading is None:
+        stages.prepare(run)
+    else:
+        settle(run)
+    return here
+
+
+def scene_record(scene: Scene) -> dict[str, Any]:
+    """The effective parameters of a scene, as the manifest keeps them; a load series by its values."""
+    record = scene.model_dump(mode="json")
+    if scene.loading is not None and scene.loading.samples is not None:
+        record["loading"]["series"] = {
+            name: values.tolist() for name, values in vars(scene.loading.samples).items()
+        }
+    return record
+
+
+def manifest_settle(
+    folder: RunFolder, scene: Scene, scene_path: Path, overrides: Sequence[str], control: bool
+) -> None:
+    """Write the manifest of a new run, or refuse a folder that holds another scene's run."""
+    from adapters.provenance import provenance
+
+    path = folder.path / "manifest.json"
+    if path.exists():
+        manifest = folder.manifest()
+        refuse_differences(manifest["scene"], scene_record(scene), folder.path)
+        if control and not manifest["control"]:
+            write_atomically(path, json.dumps(manifest | {"control": True}, indent=1) + "\n")
+        folder.event("resumed")
+        return
+    strangers = [p.name for p in folder.path.iterdir() if p.name not in ("lock", "scene.toml")]
+    if strangers:
+        raise UsageError(
+            f"the folder holds something else ({', '.join(sorted(strangers)[:3])}) and no manifest.json",
+            where=str(folder.path),
+            remedy="give an empty or new folder: --run-folder FOLDER",
+        )
+    shutil.copyfile(scene_path, folder.path / "scene.toml")
+    kept = list(overrides)
+    if scene.loading is not None and scene.loading.series is not None:
+        shutil.copyfile(scene.loading.series, folder.path / "load_series.csv")
+        kept.append('loading.series="load_series.csv"')
+    import sys
+
+    manifest = {
+        "scene": scene_record(scene),
+        "overrides": kept,
+        "control": control,
+        "variant": asdict(Variant()),
+        "provenance": provenance(sys.argv),
+    }
+    write_atomically(path, json.dumps(manifest, indent=1) + "\n")
+    folder.event("started")
+
+
+def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> None:
+    """Raise `SceneError` with every parameter that differs from the run's manifest."""
+    before, now = _flat(old), _flat(new)
+    lines = [
+        f"{key}: {before.get(key)!r} in the run, {now.get(key)!r} now"
+        for key in sorted(before.keys() | now.keys())
+        if before.get(key) != now.get(key)
+    ]
+    if lines:
+        raise SceneError(
+            "the scene differs from the one this run was started with:\n  " + "\n  ".join(lines),
+            where=str(path),
+            remedy="take the parameters back, or start a new run: --run-folder FOLDER",
+        )
+
+
+def _flat(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{prefix}{key}.")
+        else:
+            flat[prefix + key] = value
+    return flat
+
+
+def _dry_run(scene: Scene, run_path: Path) -> None:
+    """Write the decks of the rain (and of the first cycles) and print the commands that run them."""
+    import shlex
+
+    from adapters.radii import radii_sample
+    from adapters.sample import sample_start
+
+    engine = engine_named(scene.engine.name)
+    folder = run_path / "dry_run"
+    folder.mkdir(parents=True, exist_ok=True)
+    radius = radii_sample(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    position, height = sample_start(
+        radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
+    )
+    engine.write_preparation(scene, position, radius, height, folder)
+    print(f"cd {shlex.quote(str(folder))}")
+    print(shlex.join(engine.command(scene, "in.prepare")))

@@ -1,0 +1,63 @@
+"""Progress of a run: one line rewritten on a terminal, plain lines elsewhere; always on stderr."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TextIO
+
+
+class Progress:
+    """Tells cycles computed and jumped, settlement, speed-up so far and time left.
+
+    Speed-up is cycles done over cycles computed: the cost in cycles, known while it runs; the
+    report gives the ratio of CPU times.
+    """
+
+    def __init__(self, stream: TextIO | None = None, quiet: bool = False) -> None:
+        self.stream = sys.stderr if stream is None else stream
+        self.quiet = quiet
+        self.terminal = self.stream.isatty()
+        self._started = time.monotonic()
+        self._printed = 0.0
+
+    def start(self) -> None:
+        """Begin to count time and cycles anew, for another run."""
+        self._started = time.monotonic()
+
+    def say(self, text: str) -> None:
+        """A line that stays."""
+        if not self.quiet:
+            print(("\r\x1b[K" if self.terminal else "") + text, file=self.stream, flush=True)
+
+    def cycles(
+        self,
+        *,
+        done: int,
+        total: int,
+        computed: int,
+        settlement: float | None,
+        computed_here: int,
+        to_compute: int,
+    ) -> None:
+        """Where the run stands.
+
+        ``done`` and ``computed`` cycles of ``total``; mean ``settlement`` [m];
+        ``computed_here`` by this process, ``to_compute`` still.
+        """
+        now = time.monotonic()
+        if self.quiet or now - self._printed < (0.2 if self.terminal else 10.0):
+            return
+        self._printed = now
+        text = f"cycle {done} of {total}: {computed} computed, {done - computed} jumped"
+        if settlement is not None:
+            text += f", settlement {1e6 * settlement:.1f} um"
+        if computed:
+            text += f", speed-up so far {done / computed:.2f}"
+        if computed_here:
+            left = (now - self._started) / computed_here * to_compute
+            text += f", {left / 60:.0f} min left" if left > 90 else f", {left:.0f} s left"
+        if self.terminal:
+            print(f"\r\x1b[K{text}", end="", file=self.stream, flush=True)
+        else:
+            print(text, file=self.stream, flush=True)

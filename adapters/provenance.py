@@ -1,0 +1,67 @@
+"""Where a result comes from: commit, versions, machine, command and time."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shlex
+import subprocess
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+
+def provenance(command: Sequence[str]) -> dict[str, Any]:
+    """What is needed to make a result again; ``command`` is the command line that made it.
+
+    Keys: ``commit``, ``versions`` (name -> version), ``machine``, ``command``, ``started`` (UTC).
+    """
+    return {
+        "commit": commit(),
+        "versions": versions(),
+        "machine": machine(),
+        "command": shlex.join(command),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def commit() -> str:
+    """Commit of the checkout this file lies in, "-modified" when it differs; else ""."""
+    here = Path(__file__).resolve()
+
+    def git(*words: str) -> str:
+        return subprocess.run(
+            ["git", "-C", str(here.parent), *words],
+            capture_output=True, text=True, check=True, stdin=subprocess.DEVNULL,
+        ).stdout.strip()  # fmt: skip
+
+    try:
+        git("ls-files", "--error-unmatch", here.name)  # installed inside a stranger's checkout?
+        modified = git("status", "--porcelain", "--untracked-files=no")
+        return git("rev-parse", "HEAD") + ("-modified" if modified else "")
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, trackbed and the libraries that compute; only what is installed."""
+    found = {"python": platform.python_version()}
+    for name in ("trackbed", "numpy", "scipy", "numba"):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def machine() -> str:
+    """Processor, number of its cores open to this process, and operating system."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    model = next((line.partition(":")[2].strip() for line in lines if "model name" in line), "")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return f"{model or platform.machine()}, {cores} cores, {platform.system()}"

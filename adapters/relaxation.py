@@ -1,0 +1,365 @@
+"""Relaxation: bring the overlaps of an estimated configuration back to what a bed can carry.
+
+After a jump the estimated positions penetrate by up to millimetres and have lost most contacts.
+`relax` offers three methods behind one call and one result:
+
+``smallest-move``   nearest positions in which the force network has its overlaps again, nothing
+                    else penetrates, and the mean settlement of the jump is kept (the default)
+``karrech2007``     least energy of eq. 29, frictionless Hertz contacts under gravity, the grains
+                    at the frontier fixed as in section 4.2 of the paper, or free
+``proximal``        Hertz contacts without gravity, each grain tied to its estimate by a spring
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from adapters.contact_law import equivalent_modulus, normal_force, overlap_under_force
+from adapters.container import Walls
+from adapters.errors import NotConverged, UsageError
+from adapters.overlaps import (
+    Bed,
+    Neighbours,
+    bed_check,
+    bed_measure,
+    behind_discs,
+    neighbours,
+    rows_at,
+    wall_names,
+)
+from adapters.relaxation_kernel import BoolArray
+from adapters.relaxation_printed import Energy, energy_minimise
+from adapters.relaxation_smallest import smallest_move
+from adapters.state import FloatArray, IntArray, State
+
+Method = Literal["smallest-move", "karrech2007", "proximal"]
+METHODS: tuple[Method, ...] = ("smallest-move", "karrech2007", "proximal")
+
+GAP_FACTOR = 5.0
+"""Pairs nearer than so many mean overlaps belong to the network: they close under any load."""
+CHAIN_FACTOR = 10.0
+"""Greatest contact force over the mean one: force chains have an exponential tail, and the
+largest of a hundred thousand contacts stays below it."""
+PROXIMAL_STIFFNESS = 1e3
+"""Stiffness that ties a grain to its estimate in ``proximal`` [N/m]."""
+
+
+@dataclass(frozen=True)
+class HertzStiffness:
+    """Equivalent moduli E* of eq. 5 [Pa]."""
+
+    grain: float
+    """Between two grains."""
+    wall: float
+    """Between a grain and a wall."""
+    mirror: float
+    """Between a grain and its own mirror image, that is, a rigid symmetry plane."""
+
+
+def hertz_stiffness(
+    young: float, poisson: float, wall_young: float, wall_poisson: float
+) -> HertzStiffness:
+    """Moduli from Young's modulus [Pa] and Poisson's ratio of grains and walls."""
+    return HertzStiffness(
+        equivalent_modulus(young, poisson, young, poisson),
+        equivalent_modulus(young, poisson, wall_young, wall_poisson),
+        equivalent_modulus(young, poisson, np.inf, poisson),
+    )
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """Relaxed positions, and what was changed to reach them."""
+
+    position: FloatArray
+    """Centres [m], (n, 3)."""
+    method: Method
+    converged: bool
+    before: Bed
+    """Measures of the state before the jump."""
+    estimated: Bed
+    """Measures of the estimated positions."""
+    relaxed: Bed
+    """Measures of the relaxed positions."""
+    energy: float
+    """Hertz energy of all contacts plus that of the weights above z = 0 [J]."""
+    residual_force: float
+    """Root mean square over the grains of the unbalanced force [N]: Hertz contacts, weight, and
+    the tangential forces that surviving contacts carried before (when the state names them)."""
+    residual_force_before: float
+    """The same in the state before the jump [N]: its kinetic rest, and friction if unnamed."""
+    evaluations: int
+    """Evaluations of all contacts; for ``smallest-move`` products with its matrix count too."""
+    cpu_s: float
+    """Processor time [s]."""
+    largest_move: float
+    """Greatest distance of a grain from its estimate [m]."""
+    median_move: float
+    """Median distance of a grain from its estimate [m]."""
+
+
+class RelaxationNotConverged(NotConverged):
+    """A relaxation stopped short of its tolerance; ``best`` is what it had reached."""
+
+    best: Relaxation
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What does not change while grains move."""
+
+    radius: FloatArray
+    walls: Walls
+    behind: BoolArray
+    stiffness: HertzStiffness
+
+    def rows(self, position: FloatArray, first: IntArray, second: IntArray) -> Neighbours:
+        return rows_at(position, self.radius, first, second, self.walls, self.behind)
+
+    def search(self, position: FloatArray, gap: float) -> Neighbours:
+        return neighbours(position, self.radius, self.walls, gap, self.behind)
+
+    def row_stiffness(self, rows: Neighbours) -> FloatArray:
+        """lambda = 4/3 E* sqrt(R*) of each row [N/m^1.5]."""
+        modulus_of_wall = np.array(
+            [
+                self.stiffness.mirror if mirror else self.stiffness.wall
+                for mirror in self.walls.plane_frictionless
+            ]
+            + [self.stiffness.wall]
+        )
+        pair = rows.second >= 0
+        other = np.where(pair, self.radius[rows.second], np.inf)
+        modulus = np.where(
+            pair, self.stiffness.grain, modulus_of_wall[np.where(pair, 0, -1 - rows.second)]
+        )
+        radius = 1 / (1 / self.radius[rows.first] + 1 / other)
+        return np.asarray(normal_force(1.0, 1.0, radius) * modulus)
+
+
+def relax(
+    position: FloatArray,
+    before: State,
+    walls: Walls,
+    stiffness: HertzStiffness,
+    *,
+    walls_after: Walls | None = None,
+    method: Method = "smallest-move",
+    gravity: float = 9.81,
+    frontier: Literal["fixed", "free"] = "fixed",
+    external_force: FloatArray | None = None,
+    keep_height: bool = True,
+    overlap_cap: float = np.inf,
+    tolerance: float = 0.01,
+    evaluations_max: int = 20_000,
+) -> Relaxation:
+    """Relax the estimated ``position`` (n, 3) [m] of the grains of ``before``.
+
+    ``walls`` are those that ``before`` touches, ``walls_after`` the same with the piston where it
+    is now.  ``gravity`` [m/s^2] acts along -z.
+
+    ``smallest-move``: every pair in contact before the jump gets back its overlap, as far as the
+    network does not turn over; ``overlap_cap`` [m] bounds what counts as carried (a state that
+    was not in equilibrium itself); ``keep_height`` keeps the mean height of ``position``.
+    ``karrech2007``: ``frontier`` fixed holds the grains that touch a wall before the jump;
+    ``external_force`` (n, 3) [N] acts at the unloaded instant (a piston's weight, say).
+
+    ``tolerance`` is relative: an error of an overlap over the mean carried overlap, or a residual
+    force over the mean weight.  Raises `UsageError` for input that is no bed, and
+    `RelaxationNotConverged`, with the best configuration attached.  Do not use ``karrech2007`` on
+    a bed that friction holds: it flows, or loses its contacts.
+    """
+    started = time.process_time()
+    position = np.ascontiguousarray(position, float)
+    radius = np.ascontiguousarray(before.radius, float)
+    bed_check(position, radius)
+    after = walls if walls_after is None else walls_after
+    if wall_names(after) != wall_names(walls):
+        raise UsageError(
+            f"the walls before, {wall_names(walls)}, are not those after, {wall_names(after)}",
+            remedy="the same walls belong to both; a piston may only move",
+        )
+    if method not in METHODS:
+        raise UsageError(f"there is no relaxation '{method}'", remedy=f"choose of {METHODS}")
+    behind = behind_discs(before.position, walls)
+    scene_before = _Scene(radius, walls, behind, stiffness)
+    scene = _Scene(radius, after, behind, stiffness)
+    carried = scene_before.search(before.position, 0.0)
+    mean_weight = gravity * float(before.mass.mean())
+    if method == "smallest-move":
+        scale = _overlap_scale(scene, carried, overlap_cap, mean_weight)
+        near = scene_before.search(before.position, GAP_FACTOR * scale)
+        capped = near.overlap > overlap_cap
+        moved = smallest_move(
+            position,
+            _inside(scene, position),
+            radius,
+            _chosen(near, ~capped),
+            _chosen(near, capped, scale),
+            GAP_FACTOR * scale,
+            scene.rows,
+            scene.search,
+            keep_height=keep_height,
+            tolerance=tolerance * scale,
+        )
+        relaxed, converged, evaluations = moved.position, moved.converged, moved.evaluations
+    else:
+        printed = method == "karrech2007"
+        force = np.zeros_like(position)
+        if printed:
+            force += 0.0 if external_force is None else external_force
+            force[:, 2] -= gravity * before.mass
+        free = np.ones(len(radius), bool)
+        if printed and frontier == "fixed":
+            free[carried.first[carried.second < 0]] = False
+        energy = Energy(
+            radius,
+            force,
+            position,
+            0.0 if printed else PROXIMAL_STIFFNESS,
+            scene.rows,
+            scene.search,
+            scene.row_stiffness,
+        )
+        length = float(overlap_under_force(mean_weight, stiffness.grain, radius.mean() / 2))
+        relaxed, converged, evaluations = energy_minimise(
+            energy, position, free, length, tolerance * mean_weight, evaluations_max
+        )
+    touching = scene.search(relaxed, 0.0)
+    move = np.linalg.norm(relaxed - position, axis=1)
+    result = Relaxation(
+        position=relaxed,
+        method=method,
+        converged=converged,
+        before=bed_measure(before.position, carried),
+        estimated=bed_measure(position, scene.search(position, 0.0)),
+        relaxed=bed_measure(relaxed, touching),
+        energy=_energy(scene, relaxed, touching, before, gravity),
+        residual_force=_residual_force(scene, touching, before, gravity),
+        residual_force_before=_residual_force(scene_before, carried, before, gravity),
+        evaluations=evaluations,
+        cpu_s=time.process_time() - started,
+        largest_move=float(move.max(initial=0.0)),
+        median_move=float(np.median(move)) if len(move) else 0.0,
+    )
+    if not converged:
+        error = RelaxationNotConverged(
+            f"relaxation '{method}' stopped after {evaluations} evaluations with overlaps up to "
+            f"{result.relaxed.max_penetration:.2g} m",
+            remedy="extrapolate over fewer cycles, or smooth and clip the displacements",
+        )
+        error.best = result
+        raise error
+    return result
+
+
+def relax_bare(
+    state: State,
+    walls: Walls,
+    stiffness: HertzStiffness,
+    *,
+    method: Method = "smallest-move",
+    gravity: float = 9.81,
+    load: float = 0.0,
+    tolerance: float = 0.01,
+) -> Relaxation:
+    """Relax a state of which no earlier one is known; arguments and errors as `relax`.
+
+    Overlaps up to what a bed in equilibrium under its weight and ``load`` [N] can show are taken
+    as carried, so that such a bed stays as it is; larger ones are brought down.
+    """
+    bed_check(state.position, state.radius)
+    return relax(
+        state.position,
+        state,
+        walls,
+        stiffness,
+        method=method,
+        gravity=gravity,
+        keep_height=False,
+        overlap_cap=equilibrium_overlap(state, stiffness, gravity, load),
+        tolerance=tolerance,
+    )
+
+
+def equilibrium_overlap(
+    state: State, stiffness: HertzStiffness, gravity: float, load: float = 0.0
+) -> float:
+    """Greatest Hertz overlap [m] that weight and ``load`` [N] cause in a bed at rest.
+
+    The whole vertical force goes through each layer; a contact carries at most `CHAIN_FACTOR`
+    times its share among the grains of a layer, and never more than all of it.
+    """
+    if len(state.radius) == 0:
+        return 0.0
+    top, bottom = state.position[:, 2] + state.radius, state.position[:, 2] - state.radius
+    layer = len(state.radius) * 2 * state.radius.mean() / float(top.max() - bottom.min())
+    force = (gravity * state.mass.sum() + load) * min(1.0, CHAIN_FACTOR / layer)
+    return float(overlap_under_force(force, stiffness.grain, state.radius.min() / 2))
+
+
+def _overlap_scale(
+    scene: _Scene, carried: Neighbours, overlap_cap: float, mean_weight: float
+) -> float:
+    """Mean carried overlap [m]; without any, that of one grain's weight on another."""
+    overlap = carried.overlap[carried.overlap <= overlap_cap]
+    if len(overlap):
+        return float(overlap.mean())
+    radius = float(scene.radius.mean()) if len(scene.radius) else 1.0
+    return float(overlap_under_force(mean_weight, scene.stiffness.grain, radius / 2))
+
+
+def _chosen(rows: Neighbours, which: BoolArray, overlap: float | None = None) -> Neighbours:
+    """Some of the rows, with another overlap [m] when given."""
+    kept = rows.overlap[which] if overlap is None else np.full(int(which.sum()), overlap)
+    return Neighbours(rows.first[which], rows.second[which], rows.normal[which], kept)
+
+
+def _inside(scene: _Scene, position: FloatArray) -> FloatArray:
+    """Positions [m] where grains with their centre beyond a wall are brought to touch it."""
+    start = position.copy()
+    for wall in range(len(wall_names(scene.walls))):
+        rows = scene.search(start, 0.0)
+        beyond = (rows.second == -1 - wall) & (rows.overlap > scene.radius[rows.first])
+        start[rows.first[beyond]] += rows.overlap[beyond, None] * rows.normal[beyond]
+    return start
+
+
+def _energy(
+    scene: _Scene, position: FloatArray, touching: Neighbours, state: State, gravity: float
+) -> float:
+    """Hertz energy 2/5 lambda delta^(5/2) plus m g z [J]."""
+    hertz = 0.4 * scene.row_stiffness(touching) @ touching.overlap**2.5
+    return float(hertz + gravity * state.mass @ position[:, 2])
+
+
+def _residual_force(
+    scene: _Scene, touching: Neighbours, state: State, gravity: float
+) -> float:
+    """Root mean square of the unbalanced force over the grains [N]."""
+    force = np.zeros((len(scene.radius), 3))
+    force[:, 2] = -gravity * state.mass
+    pair = touching.second >= 0
+    normal = (scene.row_stiffness(touching) * touching.overlap**1.5)[:, None] * touching.normal
+    np.add.at(force, touching.first, normal)
+    np.add.at(force, touching.second[pair], -normal[pair])
+    held = np.searchsorted(state.identifier, state.contacts.pair)
+    alive = np.isin(_pair_key(held), _pair_key(np.column_stack([touching.first, touching.second])))
+    np.add.at(force, held[alive, 0], state.contacts.tangential_force[alive])
+    np.add.at(force, held[alive, 1], -state.contacts.tangential_force[alive])
+    for wall, name in enumerate(wall_names(scene.walls)):
+        rows = touching.second == -1 - wall
+        if name in state.wall_force:
+            push = state.wall_force[name][touching.first[rows]]
+            along = np.einsum("ma,ma->m", push, touching.normal[rows])
+            force[touching.first[rows]] += push - along[:, None] * touching.normal[rows]
+    return float(np.sqrt(np.mean(np.sum(force**2, axis=1)))) if len(force) else 0.0
+
+
+def _pair_key(pair: IntArray) -> IntArray:
+    """One number for each pair of grain indices, (m, 2)."""
+    return np.asarray((pair.min(axis=1) << 32) + pair.max(axis=1))

@@ -1,0 +1,365 @@
+"""Compiled kernels of overlaps and relaxation; a *row* is one pair of grains, or a grain and a wall.
+
+Row c names grain ``first[c]`` and ``second[c]``: another grain, or wall w as -1 - w, where the
+planes come first and the cylinder last.  ``normal[c]`` is a unit vector that points at the first
+grain; ``overlap[c]`` delta [m] is positive in contact.  Moving the first grain by dx changes
+delta by -normal.dx, moving the second by +normal.dx: these are the rows of the matrix J below.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from adapters.state import FloatArray, IntArray
+
+BoolArray = NDArray[np.bool_]
+
+_COINCIDENT = 1e-9
+"""Centres nearer than this share of the radii have no direction: one is made up."""
+_TURN = 2.399963229728653
+"""Golden angle [rad]: made-up directions of consecutive rows are spread evenly."""
+_PROPORTION = 1.0
+"""Share of the gradient on the bounds above which a bound is let go (Dostal's Gamma)."""
+
+
+@njit(cache=True)
+def wall_contact(
+    x: FloatArray,
+    radius: float,
+    point: FloatArray,
+    plane_normal: FloatArray,
+    reach: float,
+    behind: bool,
+    normal: FloatArray,
+) -> float:
+    """Overlap [m] of a grain at ``x`` with one plane, whose direction at the grain fills ``normal``.
+
+    A plane that ends at ``reach`` [m] from the z axis is a thin disc: grains that started
+    ``behind`` it stay behind it, and beyond its rim the nearest point of the rim counts.
+    """
+    height = 0.0
+    for a in range(3):
+        height += (x[a] - point[a]) * plane_normal[a]
+    if reach == np.inf:
+        normal[:] = plane_normal
+        return radius - height
+    from_axis = np.hypot(x[0], x[1])
+    beyond = from_axis - reach
+    if beyond <= 0.0:
+        side = -1.0 if behind else 1.0
+        normal[:] = side * plane_normal
+        return radius - side * height
+    distance = np.hypot(beyond, height)
+    for a in range(3):
+        outward = x[a] / from_axis if a < 2 else 0.0
+        normal[a] = (beyond * outward + height * plane_normal[a]) / distance
+    return radius - distance
+
+
+@njit(cache=True)
+def cylinder_contact(x: FloatArray, radius: float, cylinder: float, normal: FloatArray) -> float:
+    """Overlap [m] of a grain at ``x`` with a cylinder of radius ``cylinder`` [m]; fills ``normal``."""
+    from_axis = np.hypot(x[0], x[1])
+    normal[:] = 0.0
+    if from_axis > 0.0:
+        normal[0], normal[1] = -x[0] / from_axis, -x[1] / from_axis
+    else:
+        normal[0] = -1.0
+    return from_axis + radius - cylinder
+
+
+@njit(cache=True)
+def rows_geometry(
+    position: FloatArray,
+    radius: FloatArray,
+    first: IntArray,
+    second: IntArray,
+    plane_point: FloatArray,
+    plane_normal: FloatArray,
+    plane_reach: FloatArray,
+    cylinder: float,
+    behind: BoolArray,
+    normal: FloatArray,
+    overlap: FloatArray,
+) -> None:
+    """Fill ``normal`` (m, 3) and ``overlap`` [m] (m,) of all rows; ``behind`` is (n, p)."""
+    planes = len(plane_reach)
+    for c in range(len(first)):
+        i, j = first[c], second[c]
+        if j < 0:
+            wall = -1 - j
+            if wall < planes:
+                overlap[c] = wall_contact(
+                    position[i],
+                    radius[i],
+                    plane_point[wall],
+                    plane_normal[wall],
+                    plane_reach[wall],
+                    behind[i, wall],
+                    normal[c],
+                )
+            else:
+                overlap[c] = cylinder_contact(position[i], radius[i], cylinder, normal[c])
+            continue
+        square = 0.0
+        for a in range(3):
+            normal[c, a] = position[i, a] - position[j, a]
+            square += normal[c, a] ** 2
+        distance = np.sqrt(square)
+        reach = radius[i] + radius[j]
+        overlap[c] = reach - distance
+        if distance > _COINCIDENT * reach:
+            normal[c] /= distance
+        else:
+            angle, z = _TURN * c, 2.0 * ((c * 0.6180339887498949) % 1.0) - 1.0
+            level = np.sqrt(1.0 - z * z)
+            normal[c, 0], normal[c, 1], normal[c, 2] = (
+                level * np.cos(angle),
+                level * np.sin(angle),
+                z,
+            )
+
+
+@njit(cache=True)
+def rows_of_walls(
+    position: FloatArray,
+    radius: FloatArray,
+    plane_point: FloatArray,
+    plane_normal: FloatArray,
+    plane_reach: FloatArray,
+    cylinder: float,
+    behind: BoolArray,
+    gap: float,
+) -> tuple[IntArray, IntArray]:
+    """``first`` and ``second`` of all grains nearer than ``gap`` [m] to a wall."""
+    planes = len(plane_reach)
+    walls = planes + (1 if cylinder < np.inf else 0)
+    first = np.empty(len(radius) * walls, np.int64)
+    second = np.empty(len(radius) * walls, np.int64)
+    normal = np.empty(3)
+    m = 0
+    for i in range(len(radius)):
+        for wall in range(walls):
+            if wall < planes:
+                overlap = wall_contact(
+                    position[i],
+                    radius[i],
+                    plane_point[wall],
+                    plane_normal[wall],
+                    plane_reach[wall],
+                    behind[i, wall],
+                    normal,
+                )
+            else:
+                overlap = cylinder_contact(position[i], radius[i], cylinder, normal)
+            if overlap > -gap:
+                first[m], second[m] = i, -1 - wall
+                m += 1
+    return first[:m].copy(), second[:m].copy()
+
+
+@njit(cache=True)
+def hertz_energy_gradient(
+    first: IntArray,
+    second: IntArray,
+    normal: FloatArray,
+    overlap: FloatArray,
+    stiffness: FloatArray,
+    gradient: FloatArray,
+) -> float:
+    """Sum of psi = lambda/(gamma + 1) delta^(gamma + 1), gamma = 3/2 [J]; adds its gradient [N].
+
+    ``stiffness`` lambda = 4/3 E* sqrt(R*) [N/m^1.5] of each row, ``gradient`` (n, 3).
+    """
+    energy = 0.0
+    for c in range(len(first)):
+        delta = overlap[c]
+        if delta > 0.0:
+            force = stiffness[c] * delta * np.sqrt(delta)
+            energy += 0.4 * force * delta
+            for a in range(3):
+                gradient[first[c], a] -= force * normal[c, a]
+                if second[c] >= 0:
+                    gradient[second[c], a] += force * normal[c, a]
+    return energy
+
+
+@njit(cache=True)
+def rows_move(
+    first: IntArray,
+    second: IntArray,
+    normal: FloatArray,
+    height_share: float,
+    multiplier: FloatArray,
+    move: FloatArray,
+) -> None:
+    """Fill ``move`` = -J^T mu (n, 3); the last multiplier is that of the mean height."""
+    m = len(first)
+    move[:] = 0.0
+    for c in range(m):
+        mu = multiplier[c]
+        if mu != 0.0:
+            i, j = first[c], second[c]
+            for a in range(3):
+                move[i, a] += mu * normal[c, a]
+                if j >= 0:
+                    move[j, a] -= mu * normal[c, a]
+    for i in range(len(move)):
+        move[i, 2] -= height_share * multiplier[m]
+
+
+@njit(cache=True)
+def rows_change(
+    first: IntArray,
+    second: IntArray,
+    normal: FloatArray,
+    height_share: float,
+    move: FloatArray,
+    change: FloatArray,
+) -> None:
+    """Fill ``change`` = J move (m + 1,): of the overlaps [m], and of the mean height last."""
+    m = len(first)
+    for c in range(m):
+        i, j = first[c], second[c]
+        total = 0.0
+        for a in range(3):
+            total -= normal[c, a] * move[i, a]
+            if j >= 0:
+                total += normal[c, a] * move[j, a]
+        change[c] = total
+    total = 0.0
+    for i in range(len(move)):
+        total += move[i, 2]
+    change[m] = height_share * total
+
+
+@njit(cache=True)
+def _apply(first, second, normal, height_share, slack, multiplier, move, out):  # type: ignore[no-untyped-def]
+    """``out`` = (J J^T + slack) mu."""
+    rows_move(first, second, normal, height_share, multiplier, move)
+    rows_change(first, second, normal, height_share, move, out)
+    for c in range(len(out)):
+        out[c] = -out[c] + slack * multiplier[c]
+
+
+@njit(cache=True)
+def _split(multiplier, gradient, two_sided, step, free, chopped):  # type: ignore[no-untyped-def]
+    """Free and chopped gradient; (reduced free . free, chopped . chopped, greatest entry)."""
+    reduced, square, greatest = 0.0, 0.0, 0.0
+    for c in range(len(gradient)):
+        free[c], chopped[c] = gradient[c], 0.0
+        if not two_sided[c]:
+            if multiplier[c] <= 0.0:
+                free[c], chopped[c] = 0.0, min(gradient[c], 0.0)
+            reduced += free[c] * min(multiplier[c] / step, free[c])
+        else:
+            reduced += free[c] ** 2
+        square += chopped[c] ** 2
+        greatest = max(greatest, abs(free[c]), abs(chopped[c]))
+    return reduced, square, greatest
+
+
+@njit(cache=True)
+def rows_norm(
+    first: IntArray,
+    second: IntArray,
+    normal: FloatArray,
+    height_share: float,
+    grains: int,
+    iterations: int,
+) -> float:
+    """Estimate of the greatest eigenvalue of J J^T, from below (power iteration)."""
+    m = len(first)
+    vector = np.empty(m + 1)
+    for c in range(m + 1):
+        vector[c] = 1.0 + 0.5 * np.sin(_TURN * c)
+    out, move = np.empty(m + 1), np.empty((grains, 3))
+    norm = 1.0
+    for _ in range(iterations):
+        vector /= np.sqrt(np.sum(vector**2))
+        _apply(first, second, normal, height_share, 0.0, vector, move, out)
+        norm = np.sqrt(np.sum(out**2))
+        if norm == 0.0:
+            return 1.0
+        vector[:] = out
+    return norm
+
+
+@njit(cache=True)
+def multipliers_solve(
+    first: IntArray,
+    second: IntArray,
+    normal: FloatArray,
+    height_share: float,
+    slack: float,
+    two_sided: BoolArray,
+    right: FloatArray,
+    norm: float,
+    tolerance: float,
+    products_max: int,
+    grains: int,
+    multiplier: FloatArray,
+) -> tuple[int, float]:
+    """Minimise 1/2 mu.(J J^T + slack) mu - right.mu, with mu >= 0 where not ``two_sided``.
+
+    Conjugate gradients on the free multipliers, with reduced-gradient projections where a bound
+    is met and proportioning where one is let go: MPRGP, Dostal and Schoeberl, Comput. Optim.
+    Appl. 30 (2005) 23.  ``multiplier`` (m + 1,) holds the start and the result.  Returns the
+    products with J J^T and the greatest violated entry [m] of the optimality conditions.
+    """
+    size = len(multiplier)
+    move, applied = np.empty((grains, 3)), np.empty(size)
+    gradient, free, chopped = np.empty(size), np.empty(size), np.empty(size)
+    step = 1.0 / (norm + slack)
+    for c in range(size):
+        if not two_sided[c]:
+            multiplier[c] = max(multiplier[c], 0.0)
+    _apply(first, second, normal, height_share, slack, multiplier, move, applied)
+    gradient[:] = applied - right
+    products = 1
+    reduced, square, greatest = _split(multiplier, gradient, two_sided, step, free, chopped)
+    direction = free.copy()
+    while greatest > tolerance and products < products_max:
+        if square > _PROPORTION**2 * reduced:
+            _apply(first, second, normal, height_share, slack, chopped, move, applied)
+            products += 1
+            length = np.sum(gradient * chopped) / np.sum(chopped * applied)
+            multiplier -= length * chopped
+            gradient -= length * applied
+            reduced, square, greatest = _split(
+                multiplier, gradient, two_sided, step, free, chopped
+            )
+            direction[:] = free
+            continue
+        _apply(first, second, normal, height_share, slack, direction, move, applied)
+        products += 1
+        curvature = np.sum(direction * applied)
+        length = np.sum(gradient * direction) / curvature
+        feasible = np.inf
+        for c in range(size):
+            if not two_sided[c] and direction[c] > 0.0:
+                feasible = min(feasible, multiplier[c] / direction[c])
+        if length <= feasible:
+            multiplier -= length * direction
+            gradient -= length * applied
+            reduced, square, greatest = _split(
+                multiplier, gradient, two_sided, step, free, chopped
+            )
+            direction *= -np.sum(free * applied) / curvature
+            direction += free
+            continue
+        multiplier -= feasible * direction
+        gradient -= feasible * applied
+        _split(multiplier, gradient, two_sided, step, free, chopped)
+        for c in range(size):
+            multiplier[c] -= step * free[c]
+            if not two_sided[c]:
+                multiplier[c] = max(multiplier[c], 0.0)
+        _apply(first, second, normal, height_share, slack, multiplier, move, applied)
+        products += 1
+        gradient[:] = applied - right
+        reduced, square, greatest = _split(multiplier, gradient, two_sided, step, free, chopped)
+        direction[:] = free
+    return products, greatest

@@ -1,0 +1,222 @@
+"""The smallest move that gives a force network back the overlaps that it carried.
+
+Among all positions x the one nearest to the estimated ones x_hat,
+
+    minimise  1/2 sum_beta |x_beta - x_hat_beta|^2
+    with      delta_c(x) = delta_c    in each contact c of the network            (two-sided)
+              delta_c(x) <= -gap      for every other pair, and grain and wall    (one-sided)
+              mean height of x = mean height of x_hat,
+
+solved as a sequence of linearised problems, each in its multipliers mu: x = x_hat - J^T mu with
+J = d delta/dx.  Spheres are convex, so a linearised "stay apart" is on the safe side.
+
+The *network* is every pair with delta > -gap before the jump: contacts, and those so near that
+they close under the next load.  It turns over: a pair outside that is pressed (mu > 0) takes the
+place, and the overlap, of a member that is torn (mu < 0), the most pressed for the most torn.
+So the number of contacts and the distribution of overlaps are those of before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from adapters.overlaps import Neighbours
+from adapters.relaxation_kernel import (
+    BoolArray,
+    multipliers_solve,
+    rows_change,
+    rows_move,
+    rows_norm,
+)
+from adapters.state import FloatArray, IntArray
+
+SLACK = 1e-5
+"""Weight of the multipliers in their own equations: keeps redundant contacts solvable."""
+SWAP_SHARE = 0.5
+"""Share of the pressed pairs that join the network at a time."""
+SWAPS_MAX = 20
+"""Times that the network turns over."""
+NEAREST_ITERATIONS = 20
+"""Iterations that look for the nearest positions; later ones only for the next that fit."""
+OPEN_ITERATIONS = 35
+"""Iterations after which contacts of the network that can not be closed are left open."""
+STEP_MAX = 0.5
+"""Greatest step of a grain in its own radii: beyond it the linearised contacts mislead."""
+PRODUCTS_MAX = 500
+"""Products with J J^T in one linearised problem."""
+
+Geometry = Callable[[FloatArray, IntArray, IntArray], Neighbours]
+Search = Callable[[FloatArray, float], Neighbours]
+
+
+@dataclass
+class _Rows:
+    """All rows of a linearised problem, sorted by ``key``."""
+
+    key: IntArray
+    first: IntArray
+    second: IntArray
+    member: BoolArray
+    """True for a contact of the network."""
+    target: FloatArray
+    """Overlap of a member, greatest overlap of any other row [m]."""
+    multiplier: FloatArray
+    """mu of each row, and that of the mean height last."""
+
+
+@dataclass(frozen=True)
+class SmallestMove:
+    """Outcome of `smallest_move`."""
+
+    position: FloatArray
+    """Centres [m], (n, 3)."""
+    converged: bool
+    violation: float
+    """Greatest error of an overlap [m]."""
+    evaluations: int
+    """Evaluations of all overlaps, the products with J J^T counted in."""
+    swaps: int
+    """Contacts of the network that changed places."""
+
+
+def smallest_move(
+    estimate: FloatArray,
+    start: FloatArray,
+    radius: FloatArray,
+    network: Neighbours,
+    bounded: Neighbours,
+    gap: float,
+    geometry: Geometry,
+    search: Search,
+    *,
+    keep_height: bool,
+    tolerance: float,
+    iterations_max: int = 60,
+) -> SmallestMove:
+    """Move grains from ``estimate`` (n, 3) [m] as little as the network allows.
+
+    ``start`` (n, 3) is where the iteration begins.  The overlaps of ``network`` are those to get
+    back, those of ``bounded`` are upper bounds of these pairs [m]; all others stay ``gap`` [m]
+    apart.  ``tolerance`` [m] is the greatest error of an overlap.
+    """
+    n = len(radius)
+    height_share = 1 / np.sqrt(n) if keep_height else 0.0
+    skin = 0.2 * float(np.median(radius))
+    x, anchor = start.copy(), estimate
+    rows = _rows_start(network, bounded, n)
+    listed_at, norm = x, 1.0
+    evaluations = swaps = 0
+    violation = np.inf
+    turns = 0
+    move = np.empty((n, 3))
+    for iteration in range(iterations_max):
+        if iteration == 0 or np.linalg.norm(x - listed_at, axis=1).max() > skin / 2:
+            rows = _rows_listed(rows, search(x, skin), gap, n)
+            listed_at = x
+        near = geometry(x, rows.first, rows.second)
+        evaluations += 1
+        error = np.where(
+            rows.member,
+            np.abs(near.overlap - rows.target),
+            np.maximum(near.overlap - rows.target, 0.0),
+        )
+        violation = float(error.max(initial=0.0))
+        swapped = 0
+        if 0 < iteration < NEAREST_ITERATIONS and violation < 0.1 * skin and turns < SWAPS_MAX:
+            swapped = _swap(rows, gap)
+            swaps += swapped
+            turns += 1
+        if swapped == 0 and iteration and violation <= tolerance:
+            return SmallestMove(x, True, violation, evaluations, swaps)
+        if iteration == 0 or listed_at is x:
+            norm = rows_norm(rows.first, rows.second, near.normal, height_share, n, 20)
+        if iteration >= NEAREST_ITERATIONS:
+            anchor = x
+            if iteration >= OPEN_ITERATIONS:
+                rows.member &= (rows.target - near.overlap <= tolerance) | (rows.multiplier[:-1] >= 0)
+            rows.multiplier[:] = 0.0
+        # x = x_hat - J^T mu in delta(x_k) + J (x - x_k) = target, the slack's share put back
+        right = np.empty(len(rows.key) + 1)
+        rows_change(rows.first, rows.second, near.normal, height_share, anchor - x, right)
+        right[:-1] += near.overlap - rows.target
+        right[-1] = height_share * float((anchor - estimate)[:, 2].sum())
+        right += SLACK * rows.multiplier
+        products, _ = multipliers_solve(
+            rows.first,
+            rows.second,
+            near.normal,
+            height_share,
+            SLACK,
+            np.append(rows.member, True),
+            right,
+            norm,
+            max(0.3 * tolerance, 0.01 * violation),
+            PRODUCTS_MAX,
+            n,
+            rows.multiplier,
+        )
+        evaluations += products
+        rows_move(rows.first, rows.second, near.normal, height_share, rows.multiplier, move)
+        step = anchor + move - x
+        length = np.linalg.norm(step, axis=1)
+        limit = STEP_MAX * radius
+        x = x + step * np.minimum(1.0, limit / np.maximum(length, limit))[:, None]
+    return SmallestMove(x, False, violation, evaluations, swaps)
+
+
+def _key(first: IntArray, second: IntArray, n: int) -> IntArray:
+    """One number for each row of n grains, the same wherever the row is listed."""
+    return (first << 32) + np.where(second >= 0, second, n - 1 - second)
+
+
+def _rows_start(network: Neighbours, bounded: Neighbours, n: int) -> _Rows:
+    """Members of the network and rows with a bound of their own."""
+    first = np.concatenate([network.first, bounded.first])
+    second = np.concatenate([network.second, bounded.second])
+    key = _key(first, second, n)
+    order = np.argsort(key)
+    return _Rows(
+        key[order],
+        first[order],
+        second[order],
+        (np.arange(len(key)) < len(network))[order],
+        np.concatenate([network.overlap, bounded.overlap])[order],
+        np.zeros(len(key) + 1),
+    )
+
+
+def _rows_listed(rows: _Rows, near: Neighbours, gap: float, n: int) -> _Rows:
+    """Rows nearby, and those of ``rows`` whose target is not that of any pair."""
+    key = _key(near.first, near.second, n)
+    own = rows.member | (rows.target != -gap)
+    extra = own & ~np.isin(rows.key, key)
+    key = np.concatenate([key, rows.key[extra]])
+    order = np.argsort(key)
+    key = key[order]
+    first = np.concatenate([near.first, rows.first[extra]])[order]
+    second = np.concatenate([near.second, rows.second[extra]])[order]
+    member, target = np.zeros(len(key), bool), np.full(len(key), -gap)
+    multiplier = np.append(np.zeros(len(key)), rows.multiplier[-1])
+    known = np.isin(rows.key, key)
+    place = np.searchsorted(key, rows.key[known])
+    member[place], target[place] = rows.member[known], rows.target[known]
+    multiplier[place] = rows.multiplier[:-1][known]
+    return _Rows(key, first, second, member, target, multiplier)
+
+
+def _swap(rows: _Rows, gap: float) -> int:
+    """Let the most pressed pairs outside the network take the places of its most torn members."""
+    mu = rows.multiplier[:-1]
+    pressed = np.flatnonzero(~rows.member & (mu > gap))
+    torn = np.flatnonzero(rows.member & (mu < -gap))
+    count = min(int(np.ceil(SWAP_SHARE * len(pressed))), len(torn))
+    pressed = pressed[np.argsort(-mu[pressed])[:count]]
+    torn = torn[np.argsort(mu[torn])[:count]]
+    rows.target[pressed] = np.sort(rows.target[torn])[::-1]
+    rows.target[torn] = -gap
+    rows.member[pressed], rows.member[torn] = True, False
+    mu[torn] = 0.0
+    return count

@@ -1,0 +1,259 @@
+"""The run folder: finished stages, the manifest, the events, one writer at a time.
+
+A stage (``preparation``, ``window_000020``, ``jump_000040_1``) is worked in ``partial/`` and
+renamed to its place when its ``outcome.json`` is written: what stands in its place is whole.
+Nothing is overwritten; what does not belong any more is moved to ``discarded/``.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from errno import EDQUOT, ENOSPC
+from pathlib import Path
+from typing import Any
+
+from adapters.errors import EngineFailed, UsageError
+
+COLUMNS = (
+    "cycle",
+    "settlement",
+    "kind",
+    "coordination_number",
+    "relative_density",
+    "piston_height",
+    "elastic_deflection",
+    "force_error",
+    "maximum_overlap",
+    "kinetic_translational",
+    "kinetic_rotational",
+)
+"""Columns of ``settlement.csv``: SI units; kind is ``computed``, ``healing`` or ``jumped``."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a finished stage left behind, besides its files."""
+
+    stage: str
+    """``preparation``, ``window`` or ``jump``."""
+    first_cycle: int
+    """Cycles done before the stage."""
+    last_cycle: int
+    """Cycles done after it."""
+    rows: list[dict[str, Any]]
+    """One row of ``settlement.csv`` for each cycle end, by the names in `COLUMNS`."""
+    cost: dict[str, float]
+    """CPU time by purpose [s]: engine, start_up (part of engine), parse, fit, relax, other."""
+    checks: dict[str, float] = field(default_factory=dict)
+    """Figures the validators judged."""
+    notes: dict[str, Any] = field(default_factory=dict)
+    """What else the report tells: time step, piston mesh, command, relaxation."""
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write ``text`` to ``path``: a killed writer leaves the old file or the new, never a part."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    with temporary.open("w", encoding="utf-8") as stream:
+        stream.write(text)
+        stream.flush()
+        os.fsync(stream.fileno())
+    temporary.replace(path)
+
+
+class RunFolder:
+    """Finished stages of one run under ``path``."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Hold the folder's only writer's lock; raises `UsageError` when another process has it.
+
+        The kernel drops the lock with the process, however it ends.
+        """
+        self.path.mkdir(parents=True, exist_ok=True)
+        with (self.path / "lock").open("a+", encoding="utf-8") as stream:
+            try:
+                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                stream.seek(0)
+                raise UsageError(
+                    f"another process writes to this run ({stream.read().strip()})",
+                    where=str(self.path),
+                    remedy="wait for it, or stop it; nothing was changed",
+                ) from error
+            stream.truncate(0)
+            stream.write(f"pid {os.getpid()} on {socket.gethostname()}")
+            stream.flush()
+            yield
+
+    def event(self, what: str, **details: object) -> None:
+        """Append one line to ``events.jsonl``."""
+        line = {"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "event": what, **details}
+        with (self.path / "events.jsonl").open("a", encoding="utf-8") as stream:
+            stream.write(json.dumps(line) + "\n")
+
+    def events(self) -> list[dict[str, Any]]:
+        """All events; a last line cut short by a crash is left out."""
+        path = self.path / "events.jsonl"
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        events = []
+        for line in lines:
+            try:
+                events.append(json.loads(line))
+            except json.JSONDecodeError:
+                continue
+        return events
+
+    def outcome(self, name: str) -> Outcome | None:
+        """Outcome of a finished stage; None when it is not there or its outcome is damaged."""
+        try:
+            text = (self.path / name / "outcome.json").read_text(encoding="utf-8")
+            return Outcome(**json.loads(text))
+        except (OSError, ValueError, TypeError):
+            return None
+
+    def stage_names(self) -> list[str]:
+        """Names of all stage folders in the order of the run."""
+        names = [p.name for p in self.path.iterdir() if p.is_dir()] if self.path.exists() else []
+        kinds = {"preparation": 0, "window": 1, "jump": 2}
+        stages = [name for name in names if name.split("_")[0] in kinds]
+
+        def place(name: str) -> tuple[int, int, str]:
+            parts = name.split("_")
+            return (int(parts[1]) if len(parts) > 1 else -1, kinds[parts[0]], name)
+
+        return sorted(stages, key=place)
+
+    def outcomes(self) -> list[Outcome]:
+        """Outcomes of all finished stages in order; failed jumps are left out."""
+        finished = (
+            self.outcome(name) for name in self.stage_names() if not self.failure(name)
+        )
+        return [outcome for outcome in finished if outcome is not None]
+
+    def failure(self, name: str) -> str:
+        """Why a jump was given up, or an empty text."""
+        path = self.path / name / "failed.json"
+        return str(json.loads(path.read_text(encoding="utf-8"))["why"]) if path.exists() else ""
+
+    def give_up(self, name: str, why: str) -> None:
+        """Mark a jump as failed, for good: its attempt is not made again on resume."""
+        folder = self.path / name
+        folder.mkdir(exist_ok=True)
+        write_atomically(folder / "failed.json", json.dumps({"why": why}) + "\n")
+        self.event("jump failed", stage=name, why=why)
+        self.settlement_write()
+
+    def begin(self, name: str) -> Path:
+        """An empty folder to work stage ``name`` in.
+
+        What is there already is unfinished, damaged, or comes after it: it is moved away.
+        """
+        (self.path / name).mkdir(exist_ok=True)
+        stages = self.stage_names()
+        for later in stages[stages.index(name) :]:
+            self.discard(self.path / later)
+        partial = self.path / "partial"
+        if partial.exists():
+            for leftover in sorted(partial.iterdir()):
+                self.discard(leftover)
+        folder = partial / name
+        folder.mkdir(parents=True)
+        return folder
+
+    def finish(self, folder: Path, outcome: Outcome) -> Path:
+        """Write the outcome and move the stage to its place; then rewrite ``settlement.csv``."""
+        write_atomically(folder / "outcome.json", json.dumps(asdict(outcome), indent=1) + "\n")
+        place = self.path / folder.name
+        folder.rename(place)
+        self.settlement_write()
+        return place
+
+    def discard(self, folder: Path) -> None:
+        """Move ``folder`` to ``discarded/`` under a free name, if it exists."""
+        if not folder.exists():
+            return
+        home = self.path / "discarded"
+        home.mkdir(exist_ok=True)
+        number = 1
+        while (home / f"{folder.name}.{number}").exists():
+            number += 1
+        folder.rename(home / f"{folder.name}.{number}")
+
+    def settlement_write(self) -> None:
+        """Write ``settlement.csv`` from the outcomes of all finished stages."""
+        lines = [",".join(COLUMNS)]
+        for outcome in self.outcomes():
+            for row in outcome.rows:
+                lines.append(",".join(_cell(row.get(column)) for column in COLUMNS))
+        write_atomically(self.path / "settlement.csv", "\n".join(lines) + "\n")
+
+    def manifest(self) -> dict[str, Any]:
+        """The manifest; raises `UsageError` when this is no run folder."""
+        path = self.path / "manifest.json"
+        try:
+            return dict(json.loads(path.read_text(encoding="utf-8")))
+        except (OSError, ValueError) as error:
+            raise UsageError(
+                "this is not a run folder (no readable manifest.json)",
+                where=str(self.path),
+                remedy="give the folder that trackbed run made",
+            ) from error
+
+    def share_start(self, other: RunFolder, last_cycle: int) -> None:
+        """Link the stages of ``other`` up to ``last_cycle`` into this empty run: same work, same bits."""
+        for name in other.stage_names():
+            outcome = other.outcome(name)
+            here = self.path / name
+            if (
+                outcome is None
+                or outcome.stage == "jump"
+                or outcome.last_cycle > last_cycle
+                or here.exists()
+            ):
+                continue
+            temporary = self.path / f".{name}.linked"
+            shutil.rmtree(temporary, ignore_errors=True)
+            shutil.copytree(other.path / name, temporary, copy_function=_link)
+            temporary.rename(here)
+        self.settlement_write()
+
+
+def _link(source: str, target: str) -> None:
+    try:
+        os.link(source, target)
+    except OSError:  # another file system, or one without hard links
+        shutil.copy2(source, target)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+@contextmanager
+def disk_full_named(path: Path) -> Iterator[None]:
+    """Turn the system's "no space left" into a sentence that says what is safe."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in (ENOSPC, EDQUOT):
+            raise
+        full = EngineFailed(
+            f"the disk is full ({error.strerror})",
+            where=str(path),
+            remedy="free some space and go on with: trackbed resume RUN; finished windows are whole",
+        )
+        full.from_outside = True
+        raise full from error

@@ -1,0 +1,332 @@
+"""What the keys of a scene demand of one another; each check is a few lines of mechanics.
+
+A check reads the scene as dotted keys.  It is skipped when a key it asks for is not valid in
+itself, so that one wrong key never hides what is wrong elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from math import nan, sqrt
+from pathlib import Path
+from typing import Any
+
+from adapters.contact_law import rayleigh_time
+from adapters.container import Container
+from adapters.errors import SceneError
+from adapters.load_series import load_series_read
+from adapters.radii import RadiusDistribution, grain_count_expected
+
+ALTERNATIVES = (
+    ("sample.count", "sample.fill_height"),
+    ("material.grain.viscous_alpha", "material.grain.restitution"),
+    ("engine.rayleigh_share", "engine.time_step"),
+)
+"""Pairs of keys of which a scene gives exactly one."""
+
+COUNT_GREATEST = 10**8
+"""Most grains a scene may have."""
+
+RAYLEIGH_SHARE_DOUBTFUL = 0.4
+"""Share of the Rayleigh time above which a time step is doubtful."""
+WIDTH_DOUBTFUL = 8
+"""Least width of a container, in mean grain diameters, that is free of doubt."""
+STEPS_DOUBTFUL = 100
+"""Least number of time steps a cycle that is free of doubt."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is wrong with a key."""
+
+    key: str
+    """Dotted key."""
+    what: str
+    """One sentence."""
+    where: str = ""
+    """File and line where that is not the scene file."""
+
+
+class _NotValid(Exception):
+    """A check asked for a key that is not valid in itself."""
+
+
+class _Values:
+    def __init__(self, values: Mapping[str, Any], invalid: Iterable[str]) -> None:
+        self._values, self._invalid = values, tuple(invalid)
+
+    def get(self, key: str) -> Any:
+        if any(key == bad or key.startswith(bad + ".") for bad in self._invalid):
+            raise _NotValid
+        return self._values.get(key)
+
+    def need(self, key: str) -> Any:
+        value = self.get(key)
+        if value is None:
+            raise _NotValid
+        return value
+
+    def has_table(self, name: str) -> bool:
+        self.get(name)
+        return any(key.startswith(name + ".") for key in self._values)
+
+
+Check = Callable[[_Values], Iterator[Problem]]
+
+
+def _alternatives(scene: _Values) -> Iterator[Problem]:
+    for first, second in ALTERNATIVES:
+        given = [key for key in (first, second) if _present(scene, key)]
+        name = second.rpartition(".")[2]
+        if not given:
+            yield Problem(first, f"missing: give this or {name}")
+        elif len(given) == 2:
+            yield Problem(first, f"give this or {name}, not both")
+
+
+def _present(scene: _Values, key: str) -> bool:
+    """Whether a key is given, valid or not; a table that is not valid is another problem."""
+    try:
+        return scene.get(key) is not None
+    except _NotValid:
+        scene.get(key.rpartition(".")[0])
+        return True
+
+
+def _container(scene: _Values) -> Iterator[Problem]:
+    sizes = {"cylinder": ("radius",), "box": ("size_x", "size_y")}
+    shape = scene.need("sample.container")
+    for owner, keys in sizes.items():
+        for key in keys:
+            given = _present(scene, f"sample.{key}")
+            if owner == shape and not given:
+                yield Problem(f"sample.{key}", f"missing: a {shape} has a {key}")
+            if owner != shape and given:
+                yield Problem(f"sample.{key}", f"a {shape} has no {key}")
+
+
+def _symmetry(scene: _Values) -> Iterator[Problem]:
+    planes = scene.get("sample.symmetry") or ()
+    if len(set(planes)) != len(planes):
+        yield Problem("sample.symmetry", "each mirror plane only once")
+
+
+def _radii(scene: _Values) -> RadiusDistribution:
+    table = "sample.grain_radius."
+    return RadiusDistribution(
+        scene.need(table + "distribution"),
+        scene.need(table + "mean"),
+        scene.get(table + "standard_deviation") or 0.0,
+        scene.get(table + "truncation") or 2.0,
+    )
+
+
+def _grain_radius(scene: _Values) -> Iterator[Problem]:
+    radii = _radii(scene)
+    key = "sample.grain_radius.standard_deviation"
+    if radii.name == "constant" and radii.standard_deviation > 0:
+        yield Problem(key, "constant radii have no standard deviation")
+    elif radii.name != "constant" and radii.standard_deviation == 0:
+        yield Problem(key, f"a {radii.name} distribution needs one above zero")
+    elif radii.smallest <= 0:
+        yield Problem(key, f"too wide: the smallest radius would be {radii.smallest:g} m")
+
+
+def _room(scene: _Values) -> Iterator[Problem]:
+    largest_grain = _radii(scene).greatest
+    room = _room_radius(scene)
+    if largest_grain > room:
+        yield Problem(
+            "sample.grain_radius.mean",
+            f"radii up to {largest_grain:g} m do not fit: "
+            f"the container takes radii up to {room:g} m",
+        )
+
+
+def _room_radius(scene: _Values) -> float:
+    """Radius of the largest sphere that fits between the upright walls and mirrors [m]."""
+    if scene.need("sample.container") == "box":
+        return float(min(scene.need("sample.size_x"), scene.need("sample.size_y"))) / 2
+    mirrors = len(set(scene.get("sample.symmetry") or ()))
+    return float(scene.need("sample.radius")) / (1, 2, 1 + sqrt(2))[mirrors]
+
+
+def _loading(scene: _Values) -> Iterator[Problem]:
+    if not scene.has_table("loading"):
+        return
+    keys = {"sine": ("amplitude", "mean", "frequency"), "series": ("series",)}
+    waveform = scene.need("loading.waveform")
+    for owner, names in keys.items():
+        for name in names:
+            given = _present(scene, f"loading.{name}")
+            if owner == waveform and not given:
+                yield Problem(f"loading.{name}", f"missing: waveform {waveform!r} needs it")
+            if owner != waveform and given:
+                yield Problem(f"loading.{name}", f"waveform {waveform!r} does not use it")
+
+
+def _no_tension(scene: _Values) -> Iterator[Problem]:
+    trough = scene.need("loading.mean") - scene.need("loading.amplitude") / 2
+    if trough < 0:
+        yield Problem(
+            "loading.mean",
+            f"the stress would fall to mean - amplitude/2 = {trough:g} Pa: a piston can not pull",
+        )
+
+
+def _series(scene: _Values) -> Iterator[Problem]:
+    try:
+        load_series_read(Path(scene.need("loading.series")))
+    except SceneError as error:
+        yield Problem("loading.series", error.what, error.where)
+
+
+def _partial_piston(scene: _Values) -> Iterator[Problem]:
+    if scene.need("loading.area_share") < 1 and scene.need("sample.container") == "box":
+        yield Problem("loading.area_share", "a piston on a part of the section needs a cylinder")
+
+
+def _procedure(scene: _Values) -> Iterator[Problem]:
+    if scene.has_table("procedure") and not scene.has_table("loading"):
+        yield Problem("procedure", "there are no cycles without a loading table")
+    first, total = scene.need("procedure.k_i"), scene.need("procedure.total_cycles")
+    if total <= first:
+        yield Problem("procedure.total_cycles", f"must exceed k_i = {first}, is {total}")
+
+
+def _law(scene: _Values) -> Iterator[Problem]:
+    from adapters.laws import laws_known
+
+    law, known = scene.need("procedure.law"), laws_known()
+    if law not in known:
+        yield Problem("procedure.law", f"unknown law {law!r}{did_you_mean(law, known)}")
+
+
+def _rayleigh_time(scene: _Values) -> float:
+    grain = "material.grain."
+    radii = _radii(scene)
+    if radii.smallest <= 0:
+        raise _NotValid
+    return rayleigh_time(
+        radii.smallest,
+        scene.need(grain + "density"),
+        scene.need(grain + "young"),
+        scene.need(grain + "poisson"),
+    )
+
+
+def _rayleigh_share(scene: _Values) -> float:
+    if scene.get("engine.time_step") is None:
+        return float(scene.need("engine.rayleigh_share"))
+    return float(scene.need("engine.time_step")) / _rayleigh_time(scene)
+
+
+def _time_step(scene: _Values) -> Iterator[Problem]:
+    share = _rayleigh_share(scene)
+    if share > 1:
+        yield Problem(
+            "engine.time_step",
+            f"{share:.3g} Rayleigh times of the smallest grain "
+            f"({_rayleigh_time(scene):.3g} s): the grains would explode",
+        )
+
+
+def _fill_height(scene: _Values) -> Iterator[Problem]:
+    height = scene.need("sample.fill_height")
+    walls = {key: scene.get(f"sample.{key}") or nan for key in ("radius", "size_x", "size_y")}
+    container = Container(
+        scene.need("sample.container"), tuple(scene.get("sample.symmetry") or ()), **walls
+    )
+    count = grain_count_expected(_radii(scene), container, height)
+    if not 1 <= count <= COUNT_GREATEST:
+        yield Problem("sample.fill_height", f"{height:g} m would take {count:.3g} grains")
+
+
+CHECKS: tuple[Check, ...] = (
+    _alternatives,
+    _container,
+    _symmetry,
+    _grain_radius,
+    _room,
+    _fill_height,
+    _loading,
+    _no_tension,
+    _series,
+    _partial_piston,
+    _procedure,
+    _law,
+    _time_step,
+)
+
+
+def _long_time_step(scene: _Values) -> Iterator[Problem]:
+    share = _rayleigh_share(scene)
+    if RAYLEIGH_SHARE_DOUBTFUL < share <= 1:
+        key = "rayleigh_share" if scene.get("engine.time_step") is None else "time_step"
+        yield Problem(
+            f"engine.{key}",
+            f"{share:.2g} of the Rayleigh time; above {RAYLEIGH_SHARE_DOUBTFUL} collisions "
+            "gain energy and settlement is doubtful",
+        )
+
+
+def _narrow(scene: _Values) -> Iterator[Problem]:
+    if scene.need("sample.container") == "box":
+        width = min(scene.need("sample.size_x"), scene.need("sample.size_y"))
+    else:
+        width = 2 * scene.need("sample.radius")
+    ratio = width / (2 * scene.need("sample.grain_radius.mean"))
+    if ratio < WIDTH_DOUBTFUL:
+        yield Problem(
+            "sample.grain_radius.mean",
+            f"the container is {ratio:.2g} mean grain diameters wide: walls rule the result",
+        )
+
+
+def _few_steps(scene: _Values) -> Iterator[Problem]:
+    if scene.get("engine.time_step") is None:
+        longest = scene.need("engine.rayleigh_share") * _rayleigh_time(scene)
+    else:
+        longest = scene.need("engine.time_step")
+    frequency = scene.need("loading.frequency")
+    steps = 1 / (frequency * longest)
+    if steps < STEPS_DOUBTFUL:
+        yield Problem("loading.frequency", f"a cycle is only {steps:.3g} time steps long")
+
+
+DOUBTS: tuple[Check, ...] = (_long_time_step, _narrow, _few_steps)
+
+
+def scene_problems(values: Mapping[str, Any], invalid: Iterable[str] = ()) -> list[Problem]:
+    """All that is wrong between the keys of a scene.
+
+    ``values`` by dotted key, defaults included; ``invalid`` names keys and tables that are not
+    valid in themselves.
+    """
+    return _found(CHECKS, _Values(values, invalid))
+
+
+def scene_warnings(values: Mapping[str, Any]) -> list[Problem]:
+    """All that is doubtful in a valid scene; ``values`` by dotted key, defaults included."""
+    return _found(DOUBTS, _Values(values, ()))
+
+
+def _found(checks: Iterable[Check], scene: _Values) -> list[Problem]:
+    problems: list[Problem] = []
+    for check in checks:
+        try:
+            problems.extend(check(scene))
+        except _NotValid:
+            continue
+    return problems
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """``; did you mean X?`` for the nearest of the known words, or what they are."""
+    known = sorted(known)
+    near = get_close_matches(word.lower(), known, n=1, cutoff=0.6)
+    if near:
+        return f"; did you mean {near[0]}?"
+    return f"; known: {', '.join(known)}" if known else ""

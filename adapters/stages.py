@@ -1,0 +1,353 @@
+"""The three stages of a run: rain of grains, a window of load cycles, a jump.
+
+Each is done once: a finished stage is read back, an unfinished one is done again from its start.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from adapters import checks
+from adapters.engine import Engine, EngineRun, EngineStart
+from adapters.jump_field import jump_field
+from adapters.laws import law_named
+from adapters.overlaps import neighbours
+from adapters.progress import Progress
+from adapters.radii import radii_sample
+from adapters.relaxation import Relaxation, hertz_stiffness, relax
+from adapters.run_folder import Outcome, RunFolder
+from adapters.sample import (
+    GRAVITY,
+    SURFACE_SHARE,
+    bed_height,
+    relative_density,
+    sample_figures,
+    sample_start,
+)
+from adapters.scene import Scene
+from adapters.state import FloatArray, State, state_load, state_save
+from adapters.window import Window, state_read, window_load, window_read, window_save
+
+PERTURBATION = 1e-10
+"""Displacement [m] of one grain that makes the control of round-off: a bed is chaotic."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Which of the runs of a scene this is."""
+
+    name: str = "procedure"
+    jumps: bool = True
+    """False computes every cycle: the control."""
+    perturbed: bool = False
+    """True moves one grain by `PERTURBATION` after the first k_i cycles."""
+
+
+class Clock:
+    """CPU time of this process by purpose, from one finished stage to the next."""
+
+    def __init__(self) -> None:
+        self._start = 0.0  # the first stage bears the start-up of Python
+        self._parts: dict[str, float] = {}
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Count the CPU time of a block under ``name`` [s]."""
+        start = time.process_time()
+        try:
+            yield
+        finally:
+            self._parts[name] = self._parts.get(name, 0.0) + time.process_time() - start
+
+    def lap(self, engine_s: float = 0.0, start_up_s: float = 0.0) -> dict[str, float]:
+        """Costs since the last lap [s], the engine's and its start-up's among them."""
+        now = time.process_time()
+        other = now - self._start - sum(self._parts.values())
+        cost = {"engine": engine_s, "start_up": start_up_s, **self._parts, "other": other}
+        self._start, self._parts = now, {}
+        return cost
+
+
+@dataclass
+class Run:
+    """A run in progress: what to do, where, with what."""
+
+    scene: Scene
+    folder: RunFolder
+    engine: Engine
+    variant: Variant
+    progress: Progress
+    clock: Clock = field(default_factory=Clock)
+    computed_here: int = 0
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Where a run stands: the saved state the next window starts from."""
+
+    cycle: int
+    """Cycles done, jumped ones included."""
+    start: EngineStart
+    window: str = ""
+    """Name of the stage with the last computed window."""
+    healing: int = 0
+    """First cycles of that window to keep out of the fit."""
+
+
+def prepare(run: Run) -> Bed:
+    """Rain of grains under gravity until equilibrium (section 2.3)."""
+    scene, name = run.scene, "preparation"
+    outcome = run.folder.outcome(name)
+    if outcome is None:
+        sample = scene.sample
+        run.progress.say(f"rain of {scene.grain_count} grains")
+        radius = radii_sample(sample.grain_radius.law, scene.grain_count, sample.seed)
+        position, height = sample_start(
+            radius, scene.container, sample.relative_density_start, sample.seed
+        )
+        folder = run.folder.begin(name)
+        decks = run.engine.write_preparation(scene, position, radius, height, folder)
+        done = run.engine.run(scene, "in.prepare", folder, lambda: None, decks)
+        with run.clock.part("parse"):
+            state = state_read(folder, run.engine.wall_names(scene, piston=False))
+            checks.check_state(scene, state)
+            state_save(state, folder / "state.npz")
+        bed = bed_height(state.position, state.radius)
+        notes = {
+            "figures": asdict(sample_figures(state, scene.container)),
+            "density_height": SURFACE_SHARE * bed,
+            "mean_height": float(state.position[:, 2].mean()),
+            "time_step": state.time_step,
+            **_run_notes(done),
+        }
+        cost = run.clock.lap(done.cpu_s, done.start_up_s)
+        _finish(run, folder, Outcome(name, 0, 0, [], cost, notes=notes))
+        outcome = run.folder.outcome(name)
+    assert outcome is not None
+    state = state_load(run.folder.path / name / "state.npz")
+    under = np.hypot(state.position[:, 0], state.position[:, 1]) - state.radius < scene.piston_reach
+    top = float((state.position[:, 2] + state.radius)[under].max())
+    restart = run.folder.path / name / "end.restart"
+    return Bed(0, EngineStart(restart, state.time_step, 0, top, first=True))
+
+
+def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
+    """A window of ``cycles`` load cycles in a fresh engine process, the first ``healing`` unfitted."""
+    name = f"window_{bed.cycle:06d}"
+    outcome = run.folder.outcome(name)
+    if outcome is None:
+        folder = run.folder.begin(name)
+        decks = run.engine.write_cycles(run.scene, bed.start, cycles, folder)
+        done = run.engine.run(run.scene, "in.cycles", folder, _watch(run, bed, folder), decks)
+        with run.clock.part("parse"):
+            window = window_read(
+                folder,
+                bed.cycle,
+                run.engine.wall_names(run.scene, piston=True),
+                bed.start.piston_height,
+            )
+            figures = checks.check_window(run.scene, window, cycles)
+            window_save(window, folder / "states.npz")
+            for text in ("states.dump", "contacts.dump"):
+                (folder / text).unlink()
+            rows = settlement_rows(run, window, healing)
+        notes = {
+            "time_step": int(window.time_step[-1]),
+            "piston_mesh": bed.start.piston_mesh,
+            "piston_height": float(window.piston.height[-1]),
+            **_run_notes(done),
+        }
+        cost = run.clock.lap(done.cpu_s, done.start_up_s)
+        run.computed_here += cycles
+        outcome = Outcome(
+            "window", bed.cycle, bed.cycle + cycles, rows, cost, checks=figures, notes=notes
+        )
+        _finish(run, folder, outcome)
+    start = EngineStart(
+        run.folder.path / name / "end.restart",
+        outcome.notes["time_step"],
+        outcome.notes["piston_mesh"],
+        outcome.notes["piston_height"],
+    )
+    return Bed(outcome.last_cycle, start, name, healing)
+
+
+def jump(run: Run, bed: Bed, h: int, attempt: int) -> Bed:
+    """Estimate the bed ``h`` cycles on (eqs 16, 17), relax it (eq. 29), and hand it back at rest."""
+    name = f"jump_{bed.cycle:06d}_{attempt}"
+    folder = run.folder.path / name
+    if run.folder.outcome(name) is None:
+        folder = run.folder.begin(name)
+        before, target, piston_height = estimate(run, bed, h)
+        with run.clock.part("relax"):
+            position, record = relaxed(run, before, target, piston_height)
+        after = before.moved(
+            position,
+            velocity=np.zeros_like(target),
+            spin=np.zeros_like(target),
+            piston_height=piston_height,
+            cycle=bed.cycle + h,
+        )
+        state_save(before.moved(target), folder / "estimated.npz")
+        state_save(after, folder / "relaxed.npz")
+        notes = {"h": h, "attempt": attempt, "relaxation": record}
+        rows = [_row(run, after, "jumped")] if h else []
+        cost = run.clock.lap()
+        folder = _finish(
+            run, folder, Outcome("jump", bed.cycle, bed.cycle + h, rows, cost, notes=notes)
+        )
+    moved = state_load(folder / "relaxed.npz")
+    start = EngineStart(
+        bed.start.restart,
+        bed.start.time_step,
+        bed.start.piston_mesh + 1,
+        moved.piston_height,
+        moved=moved,
+    )
+    return Bed(bed.cycle + h, start, bed.window, bed.healing)
+
+
+def estimate(run: Run, bed: Bed, h: int) -> tuple[State, FloatArray, float]:
+    """State before a jump, estimated positions after it [m], shape (n, 3), and the piston's height [m].
+
+    The piston follows the law of its own heights, so that a loose grain can not lift it; it is
+    never placed above where it is.
+    """
+    procedure = run.scene.procedure
+    assert procedure is not None
+    with run.clock.part("parse"):
+        window = window_load(run.folder.path / bed.window / "states.npz")
+    with run.clock.part("fit"):
+        law = law_named(procedure.law)
+        cycle = window.cycle[bed.healing :].astype(float)
+        field_ = jump_field(cycle, window.position[bed.healing :], window.radius, law, h)
+        heights = window.piston_heights()[bed.healing :]
+        parameters = law.fit(cycle, heights)
+        drop = float(law.increment(parameters, cycle[-1], cycle[-1] + h)) if h else 0.0
+    before = window.state(-1)
+    return before, before.position + field_, before.piston_height + min(drop, 0.0)
+
+
+def relaxed(
+    run: Run, before: State, target: FloatArray, piston_height: float
+) -> tuple[FloatArray, dict[str, object]]:
+    """Relaxed positions [m], shape (n, 3), of the ``target`` ones, and the record of the relaxation.
+
+    Raises `RelaxationNotConverged`.
+    """
+    scene, procedure = run.scene, run.scene.procedure
+    assert procedure is not None
+    if procedure.relaxation == "none":
+        return target, {"method": "none"}
+    material = scene.material
+    relaxation = relax(
+        target,
+        before,
+        scene.container.walls(before.piston_height, scene.piston_reach),
+        hertz_stiffness(
+            material.grain.young, material.grain.poisson, material.wall.young, material.wall.poisson
+        ),
+        method=procedure.relaxation,
+        gravity=GRAVITY,
+        walls_after=scene.container.walls(piston_height, scene.piston_reach),
+    )
+    return relaxation.position, relaxation_record(relaxation)
+
+
+def relaxation_record(relaxation: Relaxation) -> dict[str, object]:
+    """A relaxation as the run folder keeps it: all but the positions."""
+    record = asdict(relaxation)
+    del record["position"]
+    return record
+
+
+def settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, object]]:
+    """One row of ``settlement.csv`` for each cycle of a window."""
+    steps = run.scene.steps_per_cycle
+    errors = window.piston.force_error(steps)
+    deflections = window.piston.elastic_deflection(steps)
+    rows = []
+    for c in range(1, len(window) + 1):
+        row = _row(run, window.state(c), "healing" if c <= healing else "computed")
+        row["elastic_deflection"] = float(deflections[c - 1])
+        row["force_error"] = float(errors[c - 1])
+        rows.append(row)
+    return rows
+
+
+def _row(run: Run, state: State, kind: str) -> dict[str, object]:
+    preparation = run.folder.outcome("preparation")
+    assert preparation is not None
+    container = run.scene.container
+    walls = container.walls(state.piston_height, run.scene.piston_reach)
+    touching = neighbours(state.position, state.radius, walls)
+    grains = int((touching.second >= 0).sum())
+    inertia = 0.4 * state.mass * state.radius**2
+    return {
+        "cycle": state.cycle,
+        "settlement": preparation.notes["mean_height"] - float(state.position[:, 2].mean()),
+        "kind": kind,
+        "coordination_number": 2 * grains / len(state.radius),
+        "relative_density": relative_density(
+            state.position, state.radius, container, preparation.notes["density_height"]
+        ),
+        "piston_height": state.piston_height,
+        "maximum_overlap": float(touching.overlap.max(initial=0.0)),
+        "kinetic_translational": 0.5 * float(state.mass @ (state.velocity**2).sum(axis=1)),
+        "kinetic_rotational": 0.5 * float(inertia @ (state.spin**2).sum(axis=1)),
+    }
+
+
+def _run_notes(done: EngineRun) -> dict[str, object]:
+    return {"command": done.command, "wall_s": done.wall_s, "decks": done.decks}
+
+
+def _finish(run: Run, folder: Path, outcome: Outcome) -> Path:
+    place = run.folder.finish(folder, outcome)
+    run.folder.event("finished", stage=folder.name, cycles=[outcome.first_cycle, outcome.last_cycle])
+    if outcome.rows:
+        row = outcome.rows[-1]
+        run.progress.say(
+            f"{folder.name}: cycle {row['cycle']}, settlement {1e6 * row['settlement']:.2f} um"
+        )
+    return place
+
+
+def _watch(run: Run, bed: Bed, folder: Path):  # type: ignore[no-untyped-def]
+    """A function that shows progress from what the engine has written so far."""
+    procedure = run.scene.procedure
+    assert procedure is not None
+    outcomes = run.folder.outcomes()
+    computed = sum(o.last_cycle - o.first_cycle for o in outcomes if o.stage == "window")
+    rows = [row for outcome in outcomes for row in outcome.rows]
+    settlement = rows[-1]["settlement"] if rows else None
+
+    def watch() -> None:
+        here = run.engine.cycles_done(run.scene, bed.start, folder)
+        run.progress.cycles(
+            done=bed.cycle + here,
+            total=procedure.total_cycles,
+            computed=computed + here,
+            settlement=settlement,
+            computed_here=run.computed_here + here,
+            to_compute=cycles_to_compute(run, bed.cycle + here),
+        )
+
+    return watch
+
+
+def cycles_to_compute(run: Run, cycle: int) -> int:
+    """Cycles still to be computed from ``cycle`` on, as an estimate for the time left."""
+    procedure = run.scene.procedure
+    assert procedure is not None
+    left = procedure.total_cycles - cycle
+    if not run.variant.jumps:
+        return left
+    block = procedure.k + procedure.healing_cycles
+    return round(left * block / (block + procedure.h[-1]))

@@ -1,0 +1,23 @@
+"""Scenes to copy and edit: ``scene_names`` lists them, ``scene_template`` is the text of one."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+
+def scene_names() -> tuple[str, ...]:
+    """Names of the scenes that ship with the package, sorted."""
+    return tuple(
+        sorted(
+            entry.name.removesuffix(".toml")
+            for entry in files(__name__).iterdir()
+            if entry.name.endswith(".toml")
+        )
+    )
+
+
+def scene_template(name: str) -> str:
+    """Text of the scene file ``name``; raises KeyError, which lists the names, for another."""
+    if name not in scene_names():
+        raise KeyError(f"no scene {name!r}; there are {', '.join(scene_names())}")
+    return (files(__name__) / f"{name}.toml").read_text(encoding="utf-8")

@@ -1,0 +1,87 @@
+"""README tells the truth: its code blocks run, its files exist, its make targets are there."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+BLOCK = re.compile(
+    r"^(?P<engine><!-- runs: engine -->\n)?```(?P<language>bash|python)\n(?P<code>.*?)^```$",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+def blocks() -> list[object]:
+    """Code blocks in the order of the text; those that start an engine are marked so."""
+    return [
+        pytest.param(
+            block["language"],
+            block["code"],
+            id=f"line-{README.count(chr(10), 0, block.start()) + 1}",
+            marks=[pytest.mark.engine] if block["engine"] else [],
+        )
+        for block in BLOCK.finditer(README)
+    ]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One folder for all blocks: later ones use what earlier ones wrote."""
+    return tmp_path_factory.mktemp("readme")
+
+
+@pytest.mark.parametrize(("language", "code"), blocks())
+def test_block_runs(language: str, code: str, folder: Path) -> None:
+    """Each code block runs as it is printed, in order, in one empty folder."""
+    command = {"bash": ["bash", "-euo", "pipefail", "-c"], "python": [sys.executable, "-c"]}
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    run = subprocess.run(
+        [*command[language], code],
+        cwd=folder, env=os.environ | {"PATH": path}, stdin=subprocess.DEVNULL,
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert run.returncode == 0, f"{code}\n{run.stdout[-2000:]}\n{run.stderr[-2000:]}"
+
+
+def test_every_block_is_found() -> None:
+    """No fence with code escapes the reader above; a session to read is fenced as console."""
+    fences = re.findall(r"^```(\w*)$", README, re.MULTILINE)
+    languages = [language for language in fences if language]
+    assert set(languages) <= {"bash", "python", "console"}
+    assert len(blocks()) == sum(language != "console" for language in languages) > 0
+
+
+def test_links_into_the_repository_exist() -> None:
+    """Each relative link or picture of README is a file here."""
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        if not target.startswith("http"):
+            assert (ROOT / target).exists(), target
+
+
+def test_make_targets_exist() -> None:
+    """Each ``make`` command of README and CONTRIBUTING is a target of the Makefile."""
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    named = re.findall(r"(?:\$ |`)make ([a-z]+)", README + (ROOT / "CONTRIBUTING.md").read_text())
+    assert {"demo", "test", "lint", "bench", "validate"} <= targets
+    assert named
+    assert set(named) <= targets
+
+
+def test_readme_names_every_exit_code() -> None:
+    """The table of exit codes is that of ``trackbed --help``."""
+    import trackbed
+
+    listed = {
+        (code, meaning.strip())
+        for row in re.findall(r"^\|(.*)\|$", README, re.MULTILINE)
+        for code, meaning in re.findall(r"\s(\d+) \|([^|]+)", row)
+    }
+    told = re.findall(r"(\d+)  (\S+(?: \S+)*)", trackbed.EXIT_CODES)
+    assert listed == set(told)

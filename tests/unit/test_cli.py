@@ -1,0 +1,277 @@
+"""The command trackbed: its verbs, exit codes and sentences, without an engine."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import trackbed
+from adapters import errors
+from trackbed import main
+
+ROOT = Path(__file__).parents[2]
+
+
+def command(*words: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """The command in a process of its own."""
+    return subprocess.run(
+        [sys.executable, str(ROOT / "trackbed.py"), *words],
+        cwd=cwd, capture_output=True, text=True, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+
+
+def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+    """``trackbed --help`` lists the verbs shipped, and every exit code an error can have."""
+    with pytest.raises(SystemExit) as stop:
+        main(["--help"])
+    assert stop.value.code == 0
+    text = capsys.readouterr().out
+    shipped = {"doctor", "new", "run", "resume", "status", "report", "fit", "relax"}
+    assert shipped | {"validate", "cite"} == set(trackbed.VERBS)
+    for verb in trackbed.VERBS:
+        assert f"\n    {verb}" in text
+    codes = {
+        kind.exit_code
+        for kind in vars(errors).values()
+        if isinstance(kind, type) and issubclass(kind, errors.TrackbedError)
+    }
+    for code in codes | {0, 1}:
+        assert f"  {code}  " in text
+
+
+@pytest.mark.parametrize("verb", trackbed.VERBS)
+def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """``trackbed VERB --help`` exits 0 and shows the verb's usage."""
+    with pytest.raises(SystemExit) as stop:
+        main([verb, "--help"])
+    assert stop.value.code == 0
+    assert f"usage: trackbed {verb}" in capsys.readouterr().out
+
+
+def test_help_loads_nothing_heavy() -> None:
+    """The help of the command and of every verb starts without any of the big libraries."""
+    code = (
+        "import sys, trackbed\n"
+        "[trackbed.parser_build(verb) for verb in trackbed.VERBS]\n"
+        "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    heavy = {"numpy", "scipy", "numba", "pydantic", "matplotlib", "rich", "meshio", "pandas"}
+    assert not heavy & set(run.stdout.split())
+
+
+def test_version() -> None:
+    """``trackbed --version`` prints the version."""
+    run = command("--version")
+    assert (run.returncode, run.stdout) == (0, f"trackbed {trackbed.__version__}\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ([], "required: VERB"),
+        (["rnu"], "did you mean 'run'?"),
+        (["zzzzzz"], "the verbs are doctor, new"),
+        (["run"], "required: SCENE"),
+        (["run", "scene.toml", "--contrl"], "unrecognized arguments: --contrl"),
+        (["new", "karech", "x"], "did you mean karrech?"),
+        (["validate", "no-such-case"], "no validation case"),
+        (["run", "no-such-scene.toml"], "no-such-scene.toml"),
+        (["run", "no-such-scene.toml", "--launcher", "mpirun 'x"], "--launcher"),
+        (["status", "no-such-run"], "no-such-run"),
+        (["resume", "no-such-run"], "no-such-run"),
+        (["report", "no-such-run"], "no-such-run"),
+        (["fit", "no-such-file.csv"], "no-such-file.csv"),
+        (["relax", "no-such-state.npz", "--out", "x.npz"], "no-such-state.npz"),
+    ],
+)
+def test_wrong_use(words: list[str], sentence: str, tmp_path: Path) -> None:
+    """Wrong words end with exit code 2 and a sentence naming them, never a traceback."""
+    run = command(*words, cwd=tmp_path)
+    assert run.returncode == 2, run.stderr
+    assert sentence in run.stderr
+    assert "Traceback" not in run.stderr
+    assert run.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00\xff\x80garbage", b"[sample\n", b"a = 1\n" * 3])
+def test_malformed_scene(content: bytes, tmp_path: Path) -> None:
+    """A scene file that is none ends with exit code 3, naming the file, and makes no run."""
+    scene = tmp_path / "scene.toml"
+    scene.write_bytes(content)
+    run = command("run", str(scene))
+    assert run.returncode == 3, run.stderr
+    assert "scene.toml" in run.stderr
+    assert "Traceback" not in run.stderr
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (errors.SceneError("x"), 3),
+        (errors.EngineMissing("x"), 4),
+        (errors.EngineFailed("x"), 5),
+        (errors.DumpError("x"), 6),
+        (errors.NotConverged("x"), 7),
+        (errors.Interrupted("x"), 130),
+        (KeyboardInterrupt(), 130),
+        (PermissionError(13, "Permission denied", "there"), 2),
+        (ModuleNotFoundError("No module named 'numba'", name="numba"), 4),
+        (ImportError("cannot import name 'x'", name="adapters.fit"), 1),
+        (ZeroDivisionError("division by zero"), 1),
+    ],
+)
+def test_exit_codes(
+    error: BaseException, code: int,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """Every kind of error has its exit code; only an unknown one is called a bug."""
+
+    def fails(_arguments: object) -> int:
+        raise error
+
+    monkeypatch.setattr("adapters.cli.cite_command", fails)
+    assert main(["cite"]) == code
+    text = capsys.readouterr().err
+    assert text.startswith("trackbed: ")
+    assert ("this is a bug" in text) == (code == 1)
+    assert "Traceback" not in text
+    assert main(["cite", "--debug"]) == main(["--debug", "cite"]) == code
+    assert capsys.readouterr().err.count("Traceback") == 2
+
+
+def test_reader_goes_away() -> None:
+    """``trackbed cite | true`` ends quietly."""
+    run = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", f"{sys.executable} trackbed.py cite | true"],
+        cwd=ROOT, capture_output=True, text=True,
+    )  # fmt: skip
+    assert (run.returncode, run.stderr) == (0, "")
+
+
+def test_new_writes_the_shipped_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """``new`` copies a scene byte for byte, says what to do next, and keeps what is there."""
+    folder = tmp_path / "deep" / "my bed"
+    assert main(["new", "karrech", str(folder)]) == 0
+    written = folder / "scene.toml"
+    assert written.read_bytes() == (ROOT / "scenes" / "karrech.toml").read_bytes()
+    assert f"trackbed run '{written}'" in capsys.readouterr().out
+    written.write_text("mine")
+    assert main(["new", "karrech", str(folder)]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert written.read_text() == "mine"
+
+
+def test_every_shipped_scene_is_offered(capsys: pytest.CaptureFixture[str]) -> None:
+    """The help of ``new`` names each scene file of the project."""
+    with pytest.raises(SystemExit):
+        main(["new", "--help"])
+    text = capsys.readouterr().out
+    for path in (ROOT / "scenes").glob("*.toml"):
+        assert path.stem in text
+
+
+def test_run_hands_over_what_was_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``run`` passes scene, folder and overrides on; --engine and --launcher are overrides."""
+    asked = {}
+
+    def run_scene(scene: Path, run_folder: Path, **options: object) -> None:
+        asked.update(options, scene=scene, run_folder=run_folder)
+
+    monkeypatch.setattr("adapters.procedure.run_scene", run_scene)
+    scene = tmp_path / "scene.toml"
+    words = ["--control", "--set", "procedure.h=10", "--set", "sample.seed=2"]
+    words += ["--engine", "fake", "--launcher", "mpirun -np '2'", "--dry-run"]
+    assert main(["run", str(scene), *words]) == 0
+    assert asked["scene"] == scene
+    assert asked["run_folder"] == tmp_path / "run"
+    assert asked["control"] is asked["dry_run"] is True
+    assert asked["overrides"] == [
+        "procedure.h=10",
+        "sample.seed=2",
+        'engine.name="fake"',
+        'engine.launcher=["mpirun", "-np", "2"]',
+    ]
+
+
+def test_cite_is_bibtex(capsys: pytest.CaptureFixture[str]) -> None:
+    """``cite`` prints balanced BibTeX entries for method, engine and trackbed itself."""
+    assert main(["cite"]) == 0
+    text = capsys.readouterr().out
+    assert text.count("{") == text.count("}")
+    for word in ("@article{karrech2007", "10.1016/j.cma.2007.07.011", "@article{kloss2012"):
+        assert word in text
+    assert f"version = {{{trackbed.__version__}}}" in text
+
+
+def test_validate_lists_cases(capsys: pytest.CaptureFixture[str]) -> None:
+    """``validate`` without a case lists the files of validation/cases, with dashes."""
+    assert main(["validate"]) == 0
+    files = {path.stem for path in (ROOT / "validation" / "cases").glob("[!_]*.py")}
+    assert capsys.readouterr().out.split() == sorted(name.replace("_", "-") for name in files)
+
+
+def test_python_m_validation_is_the_verb() -> None:
+    """``python -m validation`` and ``trackbed validate`` are one."""
+    module = subprocess.run(
+        [sys.executable, "-m", "validation"], cwd=ROOT, capture_output=True, text=True
+    )
+    verb = command("validate")
+    assert (module.returncode, module.stdout) == (verb.returncode, verb.stdout)
+
+
+@pytest.mark.parametrize(
+    ("body", "code", "written"),
+    [
+        ("return [Check('a', 1.0, '<= 2', True, 'm')]", 0, [(1.0, True)]),
+        ("return [Check('a', 1.0, '<= 2', True), Check('b', 3.0, '<= 2', False)]", 6,
+         [(1.0, True), (3.0, False)]),
+        ("return [Check('a', float('nan'), '<= 2', True)]", 6, [(None, False)]),
+        ("return []", 6, []),
+        ("raise NotConverged('no end')", 7, [(None, False)]),
+    ],
+)  # fmt: skip
+def test_validate_record(
+    body: str, code: int, written: list[tuple[float | None, bool]], tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """The record holds every check; 0 only when all hold; NaN, nothing, an error never do."""
+    from validation import cases
+
+    (tmp_path / "my_case.py").write_text(
+        "from adapters.errors import NotConverged\nfrom validation.case import Check\n"
+        f"def run(quick):\n    assert quick\n    {body}\n"
+    )
+    monkeypatch.setattr(cases, "__path__", [str(tmp_path)])
+    monkeypatch.delitem(sys.modules, "validation.cases.my_case", raising=False)
+    record = tmp_path / "record.json"
+    assert main(["validate", "my-case", "--quick", "--json", str(record)]) == code
+    content = json.loads(record.read_text())
+    assert content["case"] == "my-case"
+    assert [(check["value"], check["ok"]) for check in content["checks"]] == written
+    assert all({"name", "bar", "unit"} <= set(check) for check in content["checks"])
+    origin = content["provenance"]
+    assert set(origin) == {"commit", "versions", "machine", "command", "started"}
+    assert origin["command"] == "trackbed validate my-case --quick"
+    assert origin["versions"]["numpy"]
+
+
+def test_validate_refuses_a_record_it_can_not_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A --json in a folder that is not there is refused before the case runs."""
+    from validation import cases
+
+    (tmp_path / "my_case.py").write_text("def run(quick):\n    raise SystemExit('it ran')\n")
+    monkeypatch.setattr(cases, "__path__", [str(tmp_path)])
+    monkeypatch.delitem(sys.modules, "validation.cases.my_case", raising=False)
+    assert main(["validate", "my-case", "--json", str(tmp_path / "no" / "f.json")]) == 2
+    assert "does not exist" in capsys.readouterr().err

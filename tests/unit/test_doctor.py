@@ -1,0 +1,101 @@
+"""``trackbed doctor`` tells what is here and how to get the rest."""
+
+from __future__ import annotations
+
+import json
+import os
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+from trackbed import main
+
+
+@pytest.fixture
+def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Make a ``liggghts``, the only program on PATH, with the manners of the real one on ``-h``."""
+
+    def make(text: str) -> None:
+        path = tmp_path / "liggghts"
+        path.write_text(f"#!/bin/sh\necho '{text}'\n: > log.liggghts\nexit 1\n")
+        path.chmod(0o755)
+
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    return make
+
+
+BANNER = (
+    "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, compiled 2022-01-26-19:42:32 by buildd, "
+    "git commit unknown)"
+)
+
+
+def doctor(capsys: pytest.CaptureFixture[str]) -> tuple[int, dict, str]:
+    """Exit code, findings by name, and what went to standard error."""
+    code = main(["doctor", "--json"])
+    printed = capsys.readouterr()
+    content = json.loads(printed.out)
+    return code, {one["name"]: one for one in content["findings"]}, printed.err
+
+
+def test_engine_here(program, capsys: pytest.CaptureFixture[str]) -> None:
+    """An engine that tells its version is enough, though ``liggghts -h`` itself exits 1."""
+    program(BANNER)
+    code, found, errors = doctor(capsys)
+    assert (code, errors) == (0, "")
+    assert "3.8.0" in found["liggghts"]["version"]
+    assert found["liggghts"]["remedy"] == ""
+
+
+@pytest.mark.parametrize("text", [None, "hello", "", "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.1.0)"])
+def test_no_usable_engine(text: str | None, program, capsys: pytest.CaptureFixture[str]) -> None:
+    """A missing, foreign, mute or too old engine: exit code 4 and how to get one."""
+    if text is not None:
+        program(text)
+    code, found, errors = doctor(capsys)
+    assert code == 4
+    assert found["liggghts"]["version"] == ""
+    assert "apt-get install liggghts" in found["liggghts"]["remedy"]
+    assert "apt-get install liggghts" in errors
+
+
+def test_text_names_everything(program, capsys: pytest.CaptureFixture[str]) -> None:
+    """The plain text has a line for the engine, Python, every library and the BLAS."""
+    program(BANNER)
+    assert main(["doctor"]) == 0
+    text = capsys.readouterr().out
+    for name in ("liggghts", "python", "numpy", "scipy", "numba", "scikit-fem", "BLAS"):
+        assert name in text
+    assert metadata.version("numpy") in text
+
+
+def test_leaves_no_file(program, tmp_path: Path) -> None:
+    """Asking the engine for its version leaves nothing in the user's folder."""
+    program(BANNER)
+    before = set(os.listdir(tmp_path))
+    main(["doctor"])
+    assert set(os.listdir(tmp_path)) == before
+
+
+@pytest.mark.parametrize("name", ["numba", "adapters"])
+def test_conflict_and_missing_library(
+    name: str, program, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A missing library is named with its install command; the PyPI ``adapters`` is warned of."""
+    program(BANNER)
+    real = metadata.version
+
+    def version(asked: str) -> str:
+        if asked == "numba" == name:
+            raise metadata.PackageNotFoundError(asked)
+        return "1.3.0" if asked == "adapters" == name else real(asked)
+
+    monkeypatch.setattr(metadata, "version", version)
+    _, found, _ = doctor(capsys)
+    if name == "numba":
+        assert found["numba"]["remedy"] == "pip install numba"
+        assert "adapters (PyPI)" not in found
+    else:
+        assert "pip uninstall adapters" in found["adapters (PyPI)"]["remedy"]

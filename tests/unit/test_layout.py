@@ -1,0 +1,134 @@
+"""The house rules that a machine can hold: who imports whom, names, what is packaged."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+STORIES = ("adapters", "qdem_fem", "rigid_lcp")
+FORBIDDEN = {"utils", "util", "helpers", "helper", "common", "core", "manager", "misc", "tools"}
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PACKAGES = PYPROJECT["tool"]["setuptools"]["packages"]
+
+
+def sources() -> list[Path]:
+    """Python files of the project."""
+    folders = [package for package in PACKAGES if "." not in package] + ["tests"]
+    return [
+        ROOT / "trackbed.py",
+        *(path for folder in folders for path in (ROOT / folder).rglob("*.py")),
+    ]
+
+
+def imported(source: str) -> set[str]:
+    """Top-level names that a source imports anywhere, ``import_module`` of a literal included."""
+    names = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names.add((node.module or "").partition(".")[0])
+        elif isinstance(node, ast.Call) and "import_module" in ast.unparse(node.func):
+            names |= {
+                word.value.partition(".")[0]
+                for word in node.args
+                if isinstance(word, ast.Constant) and isinstance(word.value, str)
+            }
+    return names
+
+
+@pytest.mark.parametrize("story", STORIES)
+def test_stories_do_not_import_one_another(story: str) -> None:
+    """A story's package imports neither another story nor what stands above the stories."""
+    strangers = {*STORIES, "validation", "tests", "trackbed"} - {story}
+    for path in (ROOT / story).rglob("*.py"):
+        assert not imported(path.read_text()) & strangers, path
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import rigid_lcp.solvers",
+        "def f():\n    from qdem_fem import mesh",
+        "import importlib\nimportlib.import_module('qdem_fem.mesh')",
+    ],
+)
+def test_import_reader_sees_hidden_imports(source: str) -> None:
+    """The rule above is held by a reader that also sees imports inside functions."""
+    assert imported(source) & {"rigid_lcp", "qdem_fem"}
+
+
+def test_no_vague_names() -> None:
+    """No file or folder is named after nothing."""
+    for path in sources():
+        parts = {part.removesuffix(".py") for part in path.relative_to(ROOT).parts}
+        assert not parts & FORBIDDEN, path
+
+
+def test_package_list_is_the_folders() -> None:
+    """Each folder with an ``__init__.py`` is packaged, tests are not, and nothing else is."""
+    folders = {
+        ".".join(path.parent.relative_to(ROOT).parts)
+        for path in ROOT.glob("*/**/__init__.py")
+        if not path.relative_to(ROOT).parts[0].startswith((".", "build", "tests"))
+    }
+    assert folders == set(PACKAGES)
+
+
+def test_data_files_are_packaged() -> None:
+    """Each file beside the decks, scenes and results matches a package-data pattern."""
+    patterns = PYPROJECT["tool"]["setuptools"]["package-data"]
+    for package, globs in patterns.items():
+        folder = ROOT / package
+        packaged = {path for pattern in globs for path in folder.glob(pattern)}
+        data = {
+            path
+            for path in folder.rglob("*")
+            if path.is_file() and path.suffix not in {".py", ".pyc", ".md"}
+        }
+        assert data <= packaged, f"{package}: not packaged {data - packaged}"
+
+
+def test_imported_packages_are_ours() -> None:
+    """``import adapters`` finds this project's folder, not the PyPI package of the same name."""
+    for package in PACKAGES:
+        found = subprocess.run(
+            [sys.executable, "-c", f"import {package} as p; print(p.__file__)"],
+            capture_output=True, text=True, cwd=ROOT,
+        )  # fmt: skip
+        expected = ROOT / Path(*package.split(".")) / "__init__.py"
+        assert found.stdout.strip() == str(expected), (
+            f"{package} is imported from {found.stdout.strip() or found.stderr}: if that is the "
+            "unrelated PyPI package 'adapters', pip uninstall adapters"
+        )
+
+
+def test_version_is_one() -> None:
+    """CITATION.cff and CHANGELOG.md name the version of ``trackbed --version``."""
+    import trackbed
+
+    assert f"version: {trackbed.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"## [{trackbed.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
+
+
+@pytest.mark.parametrize(("ci", "outcome"), [("true", "error"), ("", "skipped")])
+def test_engine_marker(tmp_path: Path, ci: str, outcome: str) -> None:
+    """A test whose engine is missing fails in CI and is skipped, with the reason, elsewhere."""
+    (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text())
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = engine\naddopts = -ra\n")
+    (tmp_path / "test_one.py").write_text(
+        "import pytest\n\n@pytest.mark.engine('no-such-engine')\ndef test_one(): pass\n"
+    )
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", str(tmp_path)],
+        capture_output=True, text=True, cwd=tmp_path,
+        env={"PATH": "/usr/bin:/bin", "CI": ci},
+    )  # fmt: skip
+    assert f"1 {outcome}" in run.stdout
+    assert "the engine no-such-engine is not installed" in run.stdout

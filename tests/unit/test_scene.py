@@ -1,0 +1,597 @@
+"""The scene file: what it means, and that every wrong one is answered with lines and keys."""
+
+from __future__ import annotations
+
+import json
+import re
+from math import inf, pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from adapters.errors import SceneError, TrackbedError, UsageError
+from adapters.load_series import load_series_read
+from adapters.scene import ENGINES, Engine, Loading, Scene
+from adapters.scene_file import key_lines, scene_load
+from scenes import scene_names, scene_template
+
+KARRECH = scene_template("karrech")
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def with_value(text: str, key: str, statement: str) -> tuple[str, int]:
+    """The text with the statement of a dotted key replaced, and its line number."""
+    *tables, name = key.split(".")
+    header, table = f"[{'.'.join(tables)}]", ""
+    lines = text.split("\n")
+    for index, line in enumerate(lines):
+        if line.startswith("["):
+            table = line.split("]")[0] + "]"
+        if table == header and line.startswith(f"{name} ="):
+            lines[index] = statement
+            return "\n".join(lines), index + 1
+    raise AssertionError(f"no key {key}")
+
+
+def refusal(folder: Path, text: str, overrides: list[str] | None = None) -> str:
+    with pytest.raises(SceneError) as caught:
+        scene_load(write(folder, text), overrides or [])
+    return str(caught.value)
+
+
+def scene_or_refusal(path: Path) -> Scene | None:
+    """The scene, or None when it was refused by an error of ours that names the file."""
+    try:
+        return scene_load(path)
+    except TrackbedError as error:
+        if str(path) not in str(error):
+            raise
+        return None
+
+
+# ---------------------------------------------------------------------------- what a scene means
+
+
+def test_shipped_scenes_load_without_doubts() -> None:
+    """Every scene that ships is valid and free of warnings, on LIGGGHTS."""
+    assert scene_names() == ("karrech", "karrech-coarse", "karrech-partial")
+    for name in scene_names():
+        scene = scene_load(Path(__file__).parents[2] / "scenes" / f"{name}.toml")
+        assert scene.warnings == ()
+        assert scene.engine.name == "liggghts"
+    with pytest.raises(KeyError, match="karrech-coarse"):
+        scene_template("carrech")
+
+
+def test_karrech_scene_is_table_1(tmp_path: Path) -> None:
+    """karrech.toml holds the numbers of the paper's Table 1 and its load."""
+    scene = scene_load(write(tmp_path, KARRECH))
+    grain = scene.material.grain
+    assert (grain.young, grain.poisson, grain.density) == (46.9e9, 0.25, 2710)
+    assert (grain.friction, grain.viscous_alpha) == (0.5, 0.44)
+    assert (scene.sample.radius, scene.sample.grain_radius.mean) == (0.075, 3.2e-3)
+    assert scene.container.area == pytest.approx(pi * 0.075**2 / 4, rel=1e-15)
+    assert float(scene.stress_at(0.5) - scene.stress_at(0)) == pytest.approx(14150, rel=1e-14)
+    assert scene.restitution == pytest.approx(0.2145, abs=5e-5)
+
+
+def test_partial_scene_loads_its_share(tmp_path: Path) -> None:
+    """The piston of karrech-partial.toml is a disc of 80 % of the section, 5.87 kPa at 10 Hz."""
+    scene = scene_load(write(tmp_path, scene_template("karrech-partial")))
+    assert pi * scene.piston_reach**2 / 4 == pytest.approx(scene.loaded_area, rel=1e-14)
+    assert scene.loaded_area == pytest.approx(0.8 * scene.container.area, rel=1e-14)
+    assert scene.loading is not None
+    assert (scene.loading.amplitude, scene.loading.period) == (5870, 0.1)
+    whole = scene_load(write(tmp_path, KARRECH))
+    assert whole.piston_reach == inf
+
+
+def test_coarse_scene_peaks_at_ten_newton(tmp_path: Path) -> None:
+    """The demo's piston presses with 10 N at the crest and nothing at the trough."""
+    scene = scene_load(write(tmp_path, scene_template("karrech-coarse")))
+    assert float(scene.stress_at(0.5)) * scene.loaded_area == pytest.approx(10.0, rel=1e-3)
+    assert float(scene.stress_at(3.0)) == pytest.approx(0, abs=1e-9)
+    assert scene.sample.count == 150
+
+
+def test_every_key_of_the_models_is_explained(tmp_path: Path) -> None:
+    """karrech.toml, the format's specification, names every key the models know."""
+
+    def names(schema: dict[str, object], definitions: dict[str, dict[str, object]]) -> set[str]:
+        properties = schema.get("properties", {})
+        assert isinstance(properties, dict)
+        found = set(properties)
+        for value in properties.values():
+            for target in re.findall(r"#/\$defs/(\w+)", json.dumps(value)):
+                found |= names(definitions[target], definitions)
+        return found
+
+    schema = Scene.model_json_schema()
+    missing = [
+        key for key in names(schema, schema["$defs"]) if not re.search(rf"\b{key}\b", KARRECH)
+    ]
+    assert missing == []
+
+
+def test_engine_names_agree() -> None:
+    """ENGINES lists the names that the engine table accepts."""
+    for name in ENGINES:
+        assert Engine(name=name, rayleigh_share=0.2).name == name  # type: ignore[arg-type]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    frequency=st.floats(0.01, 1000),
+    share=st.floats(0.05, 1),
+    samples=st.integers(2, 40) | st.none(),
+)
+def test_period_is_whole_steps(
+    tmp_path_factory: pytest.TempPathFactory, frequency: float, share: float, samples: int | None
+) -> None:
+    """The time step divides the period, and a series' interval, and is the longest allowed one."""
+    folder = tmp_path_factory.mktemp("scene")
+    overrides = [f"engine.rayleigh_share={share!r}", f"loading.frequency={frequency!r}"]
+    text = KARRECH
+    if samples is not None:
+        times = np.arange(samples + 1) / (frequency * samples)
+        rows = "\n".join(f"{t!r},{1e3 * (i % samples)}" for i, t in enumerate(times.tolist()))
+        (folder / "load.csv").write_text(f"time,stress\n{rows}\n")
+        for key in ("amplitude", "mean", "frequency"):
+            text, _ = with_value(text, f"loading.{key}", "")
+        text, _ = with_value(text, "loading.waveform", 'waveform = "series"\nseries = "load.csv"')
+        overrides = overrides[:1]
+    scene = scene_load(write(folder, text), overrides)
+    limit = share * scene.rayleigh_time
+    intervals = samples or 1
+    steps = scene.steps_per_cycle
+    assert steps % intervals == 0
+    assert steps * scene.time_step == pytest.approx(1 / frequency, rel=1e-9)
+    assert scene.time_step <= limit * (1 + 1e-9)
+    longer = 1 / frequency / (steps - intervals) if steps > intervals else inf
+    assert longer > limit * (1 - 1e-9)
+
+
+def test_time_step_that_fits_is_kept(tmp_path: Path) -> None:
+    """A time step that divides the period already, 0.02 s/5e-7 s = 40,000, is not shortened."""
+    scene = scene_load(write(tmp_path, KARRECH), ["engine.time_step=5e-7"])
+    assert scene.steps_per_cycle == 40_000
+    assert scene.time_step == pytest.approx(5e-7, rel=1e-12)
+
+
+def test_unloaded_scene(tmp_path: Path) -> None:
+    """A scene may leave out loading and procedure: no stress, no area, the longest time step."""
+    text = KARRECH[: KARRECH.index("[loading]")] + KARRECH[KARRECH.index("[engine]") :]
+    scene = scene_load(write(tmp_path, text))
+    assert scene.loading is None
+    assert (scene.loaded_area, scene.piston_reach, scene.steps_per_cycle) == (0, inf, 0)
+    assert scene.time_step == pytest.approx(0.2 * scene.rayleigh_time)
+    assert scene.stress_at(np.array([0.0, 0.3])).tolist() == [0, 0]
+
+
+@given(phase=st.floats(-50, 50))
+def test_sine_stress(phase: float) -> None:
+    """stress = mean - amplitude/2 cos(2 pi phase): periodic, even, its mean over antiphases."""
+    loading = Loading(amplitude=1000.0, mean=500.0, frequency=5.0, piston_mass=0.1)
+    stress = float(loading.stress_at(phase))
+    assert stress >= -1e-9
+    assert stress == pytest.approx(float(loading.stress_at(-phase)), abs=1e-8)
+    assert stress + float(loading.stress_at(phase + 0.5)) == pytest.approx(2 * 500, abs=1e-8)
+
+
+def test_fill_height_gives_the_count(tmp_path: Path) -> None:
+    """``fill_height`` alone fixes the count, through relative density 0.5615 and mean volume."""
+    scene = scene_load(write(tmp_path, KARRECH), ["sample.fill_height=0.06"])
+    assert scene.sample.count is None
+    grains = scene.grain_count * scene.sample.grain_radius.law.volume_mean
+    assert grains / (scene.container.area * 0.06) == pytest.approx(0.5615, rel=1e-3)
+
+
+def test_schedule_of_jumps(tmp_path: Path) -> None:
+    """A schedule's last entry repeats; a bare number is a schedule of one."""
+    procedure = scene_load(write(tmp_path, KARRECH), ["procedure.h=[5, 10]"]).procedure
+    assert procedure is not None
+    assert [procedure.jump_cycles(i) for i in range(4)] == [5, 10, 10, 10]
+    procedure = scene_load(write(tmp_path, KARRECH), ["procedure.h=0"]).procedure
+    assert procedure is not None
+    assert procedure.h == (0,)
+
+
+def test_scene_survives_json(tmp_path: Path) -> None:
+    """What a manifest stores gives back the same scene."""
+    scene = scene_load(write(tmp_path, KARRECH))
+    stored = json.loads(scene.model_dump_json(exclude_none=True))
+    assert Scene.model_validate(stored) == scene
+
+
+def test_scene_built_in_python_is_checked() -> None:
+    """The demands between keys hold for scenes that come from no file, too."""
+    import tomllib
+
+    data = tomllib.loads(KARRECH)
+    data["loading"]["mean"] = 0.0
+    with pytest.raises(ValueError, match="a piston can not pull"):
+        Scene.model_validate(data)
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("engine.rayleigh_share=0.5", "0.5 of the Rayleigh time"),
+        ("engine.time_step=1.5e-6", "0.56 of the Rayleigh time"),
+        ("sample.radius=0.02", "mean grain diameters wide"),
+        ("loading.frequency=50000.0", "time steps long"),
+    ],
+)
+def test_doubts_are_warnings(tmp_path: Path, override: str, words: str) -> None:
+    """What is allowed but doubtful is said, once, and is no error."""
+    (warning,) = scene_load(write(tmp_path, KARRECH), [override]).warnings
+    assert words in warning
+
+
+# ---------------------------------------------------------------------------- what is refused
+
+REFUSED = [
+    ("sample.container", 'container = "cylindre"', "did you mean cylinder?"),
+    ("sample.radius", "radius = -0.075", "at least"),
+    ("sample.radius", "", "a cylinder has a radius"),
+    ("sample.radius", "radius = 0.01", "do not fit"),
+    ("sample.container", 'container = "box"', "a box has a size_x"),
+    ("sample.symmetry", 'symmetry = ["x", "z"]', "must be 'x' or 'y'"),
+    ("sample.symmetry", 'symmetry = ["x", "x"]', "only once"),
+    ("sample.count", "count = 0", "at least 1"),
+    ("sample.count", "count = 10.5", "integer"),
+    ("sample.count", "", "give this or fill_height"),
+    ("sample.count", "count = 9\nfill_height = 0.05", "not both"),
+    ("sample.count", "fill_height = 1e-5", "would take 0 grains"),
+    ("sample.relative_density_start", "relative_density_start = 0.5", "at most 0.15"),
+    ("sample.seed", "seed = -1", "at least 0"),
+    ("sample.grain_radius.mean", "mean = nan", "finite"),
+    ("sample.grain_radius.standard_deviation", "standard_deviation = 2e-3", "smallest radius"),
+    ("sample.grain_radius.standard_deviation", "", "needs one above zero"),
+    ("sample.grain_radius.distribution", 'distribution = "constant"', "no standard deviation"),
+    ("material.grain.young", "young = true", "number"),
+    ("material.grain.young", 'young = "46.9e9"', "number"),
+    ("material.grain.poisson", "poisson = 0.5", "below 0.5"),
+    ("material.grain.viscous_alpha", "viscous_alpha = 0.7", "below 0.690"),
+    ("material.grain.viscous_alpha", "restitution = 0.05", "above 0.05"),
+    ("material.grain.viscous_alpha", "viscous_alpha = 0.2\nrestitution = 0.5", "not both"),
+    ("material.grain.friction", "friction = -0.1", "at least 0"),
+    ("material.wall.young", "", "missing"),
+    ("loading.waveform", 'waveform = "series"', "does not use it"),
+    ("loading.amplitude", "", "needs it"),
+    ("loading.mean", "mean = 7000.0", "a piston can not pull"),
+    ("loading.area_share", "area_share = 1.2", "at most 1"),
+    ("loading.piston_mass", "piston_mass = 0", "at least"),
+    ("procedure.k_i", "k_i = 0", "at least 1"),
+    ("procedure.k", "k = 1", "at least 2"),
+    ("procedure.h", "h = -1", "at least 0"),
+    ("procedure.h", "h = []", "at least 1 item"),
+    ("procedure.h", "h = [20, 2.5]", "integer"),
+    ("procedure.healing_cycles", "healing_cycles = -1", "at least 0"),
+    ("procedure.law", 'law = "lug"', "did you mean log?"),
+    ("procedure.relaxation", 'relaxation = "smallest move"', "did you mean smallest-move?"),
+    ("procedure.total_cycles", "total_cycles = 20", "must exceed k_i = 20"),
+    ("engine.name", 'name = "ligghts"', "did you mean liggghts?"),
+    ("engine.name", 'name = "yade"', "must be 'liggghts' or 'fake'"),
+    ("engine.rayleigh_share", "rayleigh_share = 1.1", "at most 1"),
+    ("engine.rayleigh_share", "time_step = 1.0", "Rayleigh times"),
+    ("engine.launcher", 'launcher = "mpirun"', "tuple"),
+    ("engine.launcher", 'launcher = ["mpirun", ""]', "at least 1 character"),
+]
+
+
+@pytest.mark.parametrize(("key", "statement", "words"), REFUSED)
+def test_wrong_value_is_refused_with_its_place(
+    tmp_path: Path, key: str, statement: str, words: str
+) -> None:
+    """Each wrong value is named by file, a line of its table, its table, and a sentence."""
+    text, line = with_value(KARRECH, key, statement)
+    message = refusal(tmp_path, text)
+    table = key.rpartition(".")[0]
+    (entry, *_) = [entry for entry in message.split("\n") if words in entry]
+    found = re.match(rf"  {re.escape(str(tmp_path))}/scene\.toml:(\d+): ([\w.]+): ", entry)
+    assert found
+    assert found[2].startswith(table)
+    if found[2] == key and statement:
+        assert int(found[1]) == line
+
+
+SAFE_TO_COMBINE = [
+    ("sample.seed", "seed = 1.5"),
+    ("sample.grain_radius.truncation", "truncation = -2"),
+    ("material.grain.poisson", "poisson = 0.7"),
+    ("material.grain.friction", 'friction = "0.5"'),
+    ("material.wall.poisson", "poisson = inf"),
+    ("loading.mean", "mean = 1.0"),
+    ("loading.area_share", "area_share = 0.0"),
+    ("procedure.k", "k = true"),
+    ("procedure.total_cycles", "total_cycles = 3"),
+    ("engine.launcher", "launcher = [1]"),
+    ("engine.rayleigh_share", "rayleigh_share = 2"),
+]
+
+
+@settings(max_examples=60, deadline=None)
+@given(chosen=st.lists(st.sampled_from(SAFE_TO_COMBINE), min_size=1, unique=True))
+def test_all_problems_at_once(
+    tmp_path_factory: pytest.TempPathFactory, chosen: list[tuple[str, str]]
+) -> None:
+    """Any set of wrong keys is reported whole, each at its own line, and nothing else."""
+    folder = tmp_path_factory.mktemp("scene")
+    text, expected = KARRECH, set()
+    for key, statement in chosen:
+        text, line = with_value(text, key, statement)
+        expected.add((line, key))
+    message = refusal(folder, text)
+    found = re.findall(r"scene\.toml:(\d+): ([\w.]+): ", message)
+    assert {(int(line), key) for line, key in found} == expected
+    assert len(found) == len(expected)
+    assert [int(line) for line, _ in found] == sorted(int(line) for line, _ in found)
+
+
+ALL_KEYS = sorted(key for key in key_lines(KARRECH) if "." in key)
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_misspelt_key_is_recognised(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    """A key with one letter dropped or doubled is refused, with the right spelling beside it."""
+    key = data.draw(st.sampled_from([key for key in ALL_KEYS if len(key.split(".")[-1]) > 3]))
+    name = key.rpartition(".")[2]
+    place = data.draw(st.integers(1, len(name) - 1))
+    wrong = data.draw(
+        st.sampled_from([name[:place] + name[place + 1 :], name[:place] + name[place - 1 :]])
+    )
+    if wrong == name:
+        return
+    lines = KARRECH.split("\n")
+    line = key_lines(KARRECH)[key]
+    lines[line - 1] = re.sub(
+        rf"(?<![\w.]){name}(?=\]| =)|(?<=\.){name}(?=\])", wrong, lines[line - 1]
+    )
+    message = refusal(tmp_path_factory.mktemp("scene"), "\n".join(lines))
+    table = key.rpartition(".")[0]
+    assert f":{line}: {table}.{wrong}: unknown key; did you mean {name}?" in message
+
+
+# ---------------------------------------------------------------------------- overrides
+
+
+def test_override_is_checked_and_named(tmp_path: Path) -> None:
+    """An override passes through the same checks and is named as its place."""
+    path = write(tmp_path, KARRECH)
+    assert scene_load(path, ["procedure.k=10"]).procedure.k == 10  # type: ignore[union-attr]
+    assert scene_load(path, ["engine.name=fake"]).engine.name == "fake"
+    message = refusal(tmp_path, KARRECH, ["procedure.k=1", "load.frequency=20"])
+    assert "--set procedure.k=1: procedure.k: must be at least 2" in message
+    assert "--set load.frequency=20: load: unknown key; did you mean loading?" in message
+
+
+def test_override_of_an_alternative_replaces_the_other(tmp_path: Path) -> None:
+    """Setting one of two alternative keys removes the other of the file."""
+    path = write(tmp_path, KARRECH)
+    scene = scene_load(path, ["material.grain.restitution=0.5", "engine.time_step=1e-7"])
+    assert scene.restitution == 0.5
+    assert scene.material.grain.viscous_alpha is None
+    assert scene.engine.rayleigh_share is None
+
+
+@pytest.mark.parametrize("override", ["", "procedure.k", "=3", "a b=3", "procedure.k.x=2", ".=1"])
+def test_unreadable_override(tmp_path: Path, override: str) -> None:
+    """An override that is no table.key=value is a usage error."""
+    with pytest.raises(UsageError, match="--set"):
+        scene_load(write(tmp_path, KARRECH), [override])
+
+
+# ---------------------------------------------------------------------------- files
+
+
+def test_key_lines_of_awkward_toml() -> None:
+    """Lines are right through multi-line values, inline tables, quotes, comments, dotted keys."""
+    text = "\n".join(
+        [
+            "# [not.a.table]",
+            'title = """',
+            "[neither]",
+            'a = 1"""',
+            "dotted.key = 2 # = 3",
+            "",
+            '[ table . "quoted = name" ]',
+            "list = [",
+            "  1, # ]",
+            "  2,",
+            "]",
+            'inline = { one = 1, "two" = { three = "x = 1" } }',
+            "'literal' = 0",
+            "[table.inner]",
+            "key=1",
+        ]
+    )
+    prefix = "table.quoted = name"
+    assert key_lines(text) == {
+        "title": 2,
+        "dotted": 5,
+        "dotted.key": 5,
+        prefix: 7,
+        f"{prefix}.list": 8,
+        f"{prefix}.inline": 12,
+        f"{prefix}.inline.one": 12,
+        f"{prefix}.inline.two": 12,
+        f"{prefix}.inline.two.three": 12,
+        f"{prefix}.literal": 13,
+        "table.inner": 14,
+        "table.inner.key": 15,
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("a = 1\nb = \n", 2),
+        ("a = 1\na = 2\n", 2),
+        ("a = 1\n[x\n", 2),
+        ('a = 1\nb = "open\n', 2),
+        ("a = 1\n\nb = [1,\n", 4),
+        ("= 1", 1),
+        ("a = " + "[" * 5000, 1),
+    ],
+)
+def test_syntax_error_names_its_line(tmp_path: Path, text: str, line: int) -> None:
+    """A file that is not TOML is refused at the line where reading stopped."""
+    assert refusal(tmp_path, text).startswith(f"{tmp_path}/scene.toml:{line}: this is not TOML")
+
+
+def test_unreadable_files(tmp_path: Path) -> None:
+    """A missing file and a folder are usage errors, binary garbage is no scene."""
+    for path in (tmp_path / "none.toml", tmp_path, Path("a\0b")):
+        with pytest.raises(UsageError, match="can not read the scene"):
+            scene_load(path)
+    (tmp_path / "scene.toml").write_bytes(bytes(range(256)))
+    with pytest.raises(SceneError, match="not a text file"):
+        scene_load(tmp_path / "scene.toml")
+
+
+def test_windows_files_are_read(tmp_path: Path) -> None:
+    """A byte-order mark and carriage returns change neither the scene nor line numbers."""
+    path = tmp_path / "scene.toml"
+    text, line = with_value(KARRECH, "procedure.k", "k = 1")
+    path.write_bytes(b"\xef\xbb\xbf" + KARRECH.replace("\n", "\r\n").encode())
+    assert scene_load(path) == scene_load(write(tmp_path / "..", KARRECH))
+    path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+    with pytest.raises(SceneError, match=rf"scene.toml:{line}: procedure.k"):
+        scene_load(path)
+
+
+VALUES = st.sampled_from(
+    [
+        *("0", "-1", "0.3", "1.5", "2", "1e400", "nan", "-inf", "-0.0", "5e-324", "1.7e308"),
+        *("true", '""', '"x"', "[]", "[1, 'a', [2]]", "{}", "{ a = 1 }", "[{ a = 1 }]"),
+        *("1979-05-27", "07:32:00", "'\\u0000'", "9" * 400),
+    ]
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    changes=st.dictionaries(st.sampled_from(ALL_KEYS), VALUES, max_size=4),
+    dropped=st.sets(st.integers(0, KARRECH.count("\n")), max_size=3),
+)
+def test_no_scene_ends_in_a_traceback(
+    tmp_path_factory: pytest.TempPathFactory, changes: dict[str, str], dropped: set[int]
+) -> None:
+    """Whatever values keys take, and whatever lines are lost: a scene or an error of ours."""
+    lines = KARRECH.split("\n")
+    for key, value in changes.items():
+        line = key_lines(KARRECH)[key] - 1
+        if not lines[line].startswith("["):
+            lines[line] = f"{key.rpartition('.')[2]} = {value}"
+    text = "\n".join(line for index, line in enumerate(lines) if index not in dropped)
+    path = write(tmp_path_factory.mktemp("scene"), text)
+    scene = scene_or_refusal(path)
+    if scene:
+        assert 0 < scene.time_step < inf
+        assert scene.grain_count >= 1
+        assert 0.05 < scene.restitution <= 1
+        assert scene.loaded_area <= scene.container.area
+
+
+@settings(max_examples=150, deadline=None)
+@given(cut=st.integers(0, len(KARRECH)), inserted=st.text(max_size=12), length=st.integers(0, 40))
+def test_damaged_text_never_ends_in_a_traceback(
+    tmp_path_factory: pytest.TempPathFactory, cut: int, inserted: str, length: int
+) -> None:
+    """A scene with any stretch of text replaced by any other is read or refused."""
+    text = KARRECH[:cut] + inserted + KARRECH[cut + length :]
+    path = tmp_path_factory.mktemp("scene") / "scene.toml"
+    path.write_bytes(text.encode("utf-8", "surrogatepass"))
+    scene_or_refusal(path)
+
+
+# ---------------------------------------------------------------------------- load series
+
+
+def series_scene(folder: Path, rows: str) -> Path:
+    (folder / "load.csv").write_text(rows)
+    text = KARRECH
+    for key in ("amplitude", "mean", "frequency"):
+        text, _ = with_value(text, f"loading.{key}", "")
+    text, _ = with_value(text, "loading.waveform", 'waveform = "series"\nseries = "load.csv"')
+    return write(folder, text)
+
+
+def test_series_is_read_beside_the_scene(tmp_path: Path) -> None:
+    """A series is found beside its scene, linear between samples, and periodic."""
+    path = series_scene(tmp_path, "time,stress\n0.5,0\n0.6,100\n0.7,300\n0.8,200\n0.9,0\n")
+    scene = scene_load(path)
+    assert scene.loading is not None
+    assert scene.loading.period == pytest.approx(0.4)
+    assert scene.stress_at(np.array([0, 0.25, 0.375, 0.5, 1.25, -0.25])).tolist() == pytest.approx(
+        [0, 100, 200, 300, 100, 200]
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "line", "words"),
+    [
+        ("", None, "first line must be"),
+        ("t,s\n0,0\n1,1\n2,0\n", 1, "first line must be time,stress"),
+        ("time,stress\n0,0\n1,0\n", None, "at least three rows"),
+        ("time,stress\n0,0\n1,x\n2,0\n", 3, "two numbers"),
+        ("time,stress\n0,0\n1,2,3\n2,0\n", 3, "two numbers"),
+        ("time,stress\n0,0\n1,nan\n2,0\n", 3, "finite"),
+        ("time,stress\n0,0\n1,-5\n2,0\n", 3, "can not pull"),
+        ("time,stress\n0,0\n\n1,5\n2.1,6\n3,0\n", 5, "even steps"),
+        ("time,stress\n0,0\n1,5\n1,6\n3,0\n", 4, "even steps"),
+        ("time,stress\n0,0\n1,5\n2,5\n4,6\n5,0\n", 5, "even steps"),
+        ("time,stress\n0,0\n-1,5\n-2,0\n", 3, "even steps"),
+        ("time,stress\n0,1\n1,5\n2,2\n", 4, "must be the first"),
+        ("time,stress\n0,\0\n", None, ""),
+    ],
+)
+def test_wrong_series_is_refused_with_its_line(
+    tmp_path: Path, rows: str, line: int | None, words: str
+) -> None:
+    """A series is refused with its own file and line, beside the scene's other problems."""
+    path = series_scene(tmp_path, rows)
+    text, bad_line = with_value(path.read_text(), "procedure.k", "k = 0")
+    message = refusal(tmp_path, text)
+    where = f"{tmp_path}/load.csv" + (f":{line}" if line else "")
+    assert re.search(rf"  {re.escape(where)}(:\d+)?: loading.series: .*{words}", message)
+    assert f"scene.toml:{bad_line}: procedure.k" in message
+
+
+def test_missing_series(tmp_path: Path) -> None:
+    """A series that is not there is refused by its full path."""
+    path = series_scene(tmp_path, "")
+    (tmp_path / "load.csv").unlink()
+    assert f"{tmp_path}/load.csv: loading.series: can not read" in refusal(
+        tmp_path, path.read_text()
+    )
+
+
+@settings(max_examples=40, deadline=None)
+@given(stress=st.lists(st.floats(0, 1e6), min_size=2, max_size=30), step=st.floats(1e-6, 10))
+def test_series_returns_what_was_written(
+    tmp_path_factory: pytest.TempPathFactory, stress: list[float], step: float
+) -> None:
+    """Every even, periodic series is read without loss, and its samples are its stresses."""
+    path = tmp_path_factory.mktemp("series") / "load.csv"
+    stress = [*stress, stress[0]]
+    path.write_text(
+        "time,stress\n" + "\n".join(f"{i * step!r},{s!r}" for i, s in enumerate(stress))
+    )
+    series = load_series_read(path)
+    assert series.stress.tolist() == stress
+    assert series.period == pytest.approx((len(stress) - 1) * step)
+    phase = np.arange(len(stress)) / (len(stress) - 1)
+    assert series.stress_at(phase) == pytest.approx(stress, rel=1e-9, abs=1e-6)

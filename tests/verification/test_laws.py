@@ -1,0 +1,316 @@
+"""Laws of residual displacement: closed forms, invariances, round-off, speed (eqs 16 to 21)."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import adapters.laws
+from adapters.errors import UsageError
+from adapters.laws import Law, law_named, laws_known
+from adapters.laws.law_karrech2007 import Karrech2007
+from adapters.state import FloatArray
+
+LAWS = [law_named(name) for name in laws_known()]
+DEFAULTS = [law for law in LAWS if law.name != "karrech2007"]
+EPS = np.finfo(float).eps
+
+every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+every_default_law = pytest.mark.parametrize("law", DEFAULTS, ids=lambda law: law.name)
+
+
+def windows(fewest: int = 4) -> st.SearchStrategy[FloatArray]:
+    """Cycles of a window: ascending, uneven, the last at least 1.5 times the first."""
+    gaps = st.lists(st.floats(0.5, 50.0), min_size=fewest, max_size=30)
+    return st.builds(
+        lambda first, gap: np.cumsum([first, *gap, 0.5 * first]), st.floats(1.0, 1e3), gaps
+    )
+
+
+lengths = st.integers(-1000, 1000).map(lambda micrometres: 1e-6 * micrometres)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def paths(seed: int, shape: tuple[int, ...]) -> FloatArray:
+    """Random paths [m] of the size of a settlement."""
+    return 1e-4 * np.random.default_rng(seed).standard_normal(shape).cumsum(axis=0)
+
+
+def round_off(law: Law, cycle: FloatArray, displacement: FloatArray, end: float) -> FloatArray:
+    """Bound of the round-off in the increment from the last cycle to ``end`` [m], shape (...).
+
+    The increment is sum_p w_p u_p with weights w of the law itself: summing it errs by
+    eps sum |w u|.  Cycles in another unit are rounded too, by eps each, which the columns of the
+    fit pass on amplified by their condition number and by 1 / (relative length of the window).
+    """
+    ahead = max(end, 2 * cycle[-1])  # rounding the two cycles errs by eps times the slope
+    weight = law.increment(law.fit(cycle, np.eye(len(cycle))), cycle[-1], ahead)
+    columns = np.stack([np.ones_like(cycle), np.log(cycle), cycle], axis=1)
+    columns = columns[:, : max(2, len(law.parameter_names))]
+    columns[:, 1:] -= columns[:, 1:].mean(axis=0)
+    columns /= np.linalg.norm(columns, axis=0)
+    amplified = np.linalg.cond(columns) * cycle[-1] / (cycle[-1] - cycle[0])
+    return 100 * EPS * amplified * np.tensordot(np.abs(weight), np.abs(displacement), 1)
+
+
+@every_default_law
+@given(cycle=windows(), seed=seeds, reach=st.floats(1.0, 100.0))
+@settings(max_examples=1500, deadline=None)
+def test_increment_is_the_same_in_s_ms_and_cycles(
+    law: Law, cycle: FloatArray, seed: int, reach: float
+) -> None:
+    """The estimate of a jump does not depend on the unit in which cycles are counted."""
+    displacement, end = paths(seed, (len(cycle), 2)), reach * cycle[-1]
+    reference = law.increment(law.fit(cycle, displacement), cycle[-1], end)
+    bound = round_off(law, cycle, displacement, end)
+    for duration in (0.02, 20.0, 1 / 3):
+        moved = law.fit(cycle * duration, displacement)
+        estimate = law.increment(moved, cycle[-1] * duration, end * duration)
+        assert (np.abs(estimate - reference) <= bound).all()
+
+
+def test_karrech2007_depends_on_the_unit_of_time() -> None:
+    """As printed, eqs 17 to 21 give another estimate in seconds than in cycles: the known fault."""
+    cycle = np.arange(20.0, 41.0)
+    displacement = 1e-4 * np.log(cycle) + 2e-4
+    estimates = []
+    for period in (1.0, 0.02, 20.0):
+        law = Karrech2007(period)
+        estimates.append(float(law.increment(law.fit(cycle, displacement), 40.0, 60.0)))
+        same = LAWS[0].fit(cycle * period, displacement)
+        np.testing.assert_array_equal(same, law.fit(cycle, displacement))
+    assert np.ptp(estimates) > 0.01 * abs(estimates[0])
+
+
+def test_karrech2007_is_eqs_17_20_21_as_printed() -> None:
+    """Closed form = least squares of eq. 18 without a constant; the whole law is added (eq. 17)."""
+    t = 0.02 * np.arange(11.0, 51.0)
+    displacement = paths(1, (40, 5, 3))
+    law = Karrech2007(period=0.02)
+    a, b = law.fit(np.arange(11.0, 51.0), displacement)
+    columns = np.stack([np.log(t), t], axis=1)
+    expected = np.linalg.lstsq(columns, displacement.reshape(40, -1), rcond=None)[0]
+    np.testing.assert_allclose(np.stack([a, b]).reshape(2, -1), expected, rtol=1e-10)
+    whole = law.increment(np.stack([a, b]), 50.0, 70.0)
+    np.testing.assert_allclose(whole, a * np.log(1.4) + b * 1.4, rtol=1e-14)
+
+
+def test_linear_is_eq_16() -> None:
+    """The linear estimate is h/k times the sum of the window's increments."""
+    displacement = paths(2, (21, 7, 3))
+    law = law_named("linear")
+    estimate = law.increment(law.fit(np.arange(30.0, 51.0), displacement), 50.0, 85.0)
+    expected = 35 / 20 * np.diff(displacement, axis=0).sum(axis=0)
+    np.testing.assert_allclose(estimate, expected, rtol=1e-13)
+
+
+@every_default_law
+@given(cycle=windows(), seed=seeds)
+@settings(max_examples=1500, deadline=None)
+def test_fit_is_the_textbook_least_squares(law: Law, cycle: FloatArray, seed: int) -> None:
+    """Residuals are orthogonal to the columns 1, ln N[, N]; the linear law joins the end points."""
+    displacement = paths(seed, (len(cycle),))
+    residual = displacement - law.value(law.fit(cycle, displacement), cycle)
+    if law.name == "linear":
+        columns = np.zeros((len(cycle), 2))
+        columns[0, 0] = columns[-1, 1] = 1.0
+    else:
+        columns = np.stack([np.ones_like(cycle), np.log(cycle), cycle], axis=1)
+        columns = columns[:, : len(law.parameter_names)]
+    columns[:, 1:] -= columns[:, 1:].mean(axis=0) * (law.name != "linear")
+    size = np.linalg.norm(columns, axis=0) * np.linalg.norm(displacement)
+    amplified = cycle[-1] / (cycle[-1] - cycle[0])
+    assert (np.abs(columns.T @ residual) <= 1e4 * EPS * amplified**2 * size).all()
+
+
+@every_law
+@given(cycle=windows(), parameters=st.tuples(lengths, lengths, lengths), reach=st.floats(2, 10))
+@settings(max_examples=1500, deadline=None)
+def test_data_that_follow_a_law_are_recovered(
+    law: Law, cycle: FloatArray, parameters: tuple[float, ...], reach: float
+) -> None:
+    """A law fitted to its own values returns them, inside the window and beyond it."""
+    true = np.array(parameters[: len(law.parameter_names)])
+    if law.parameter_names[-1] == "b":
+        true[-1] /= cycle[-1]
+    displacement = law.value(true, cycle)
+    end = cycle[-1] * reach
+    column = {"c": 1.0, "a": np.log(end), "b": end}
+    size = sum(abs(x) * column[name] for x, name in zip(true, law.parameter_names, strict=True))
+    bound = round_off(law, cycle, np.full_like(cycle, size), end) + 100 * EPS * size
+    if law.name == "karrech2007":
+        bound *= np.linalg.cond(np.stack([np.log(cycle) / np.log(end), cycle / end], 1))
+    found = law.fit(cycle, displacement)
+    assert np.abs(law.value(found, cycle) - displacement).max() <= bound
+    true_increment = law.increment(true, cycle[-1], end)
+    assert np.abs(law.increment(found, cycle[-1], end) - true_increment) <= bound
+
+
+@every_default_law
+@given(cycle=windows(), parameters=st.tuples(lengths, lengths, lengths))
+@settings(max_examples=1500, deadline=None)
+def test_increment_is_the_difference_of_values(
+    law: Law, cycle: FloatArray, parameters: tuple[float, ...]
+) -> None:
+    """increment(N, N + h) = u(N + h) - u(N), for one end and for many at once."""
+    chosen = np.array(parameters[: len(law.parameter_names)])[:, None] * np.ones(4)
+    ends = cycle[-1] * np.array([1.0, 1.5, 7.0])
+    increment = law.increment(chosen, cycle[-1], ends)
+    difference = law.value(chosen, ends) - law.value(chosen, cycle[-1])
+    size = np.abs(chosen).max() * 2 * ends[-1]
+    assert increment.shape == (3, 4)
+    assert np.abs(increment - difference).max() <= 8 * EPS * size
+    np.testing.assert_array_equal(increment[1], law.increment(chosen, cycle[-1], ends[1]))
+
+
+@every_law
+@given(cycle=windows(), seed=seeds, factor=st.floats(-5.0, 5.0))
+@settings(max_examples=1500, deadline=None)
+def test_fit_is_linear_in_displacement(
+    law: Law, cycle: FloatArray, seed: int, factor: float
+) -> None:
+    """fit(u + s v) = fit(u) + s fit(v): so the law of the mean is the mean of the laws."""
+    first, second = paths(seed, (len(cycle), 3)), paths(seed + 1, (len(cycle), 3))
+    combined = law.fit(cycle, first + factor * second)
+    separate = law.fit(cycle, first) + factor * law.fit(cycle, second)
+    weight = np.abs(law.fit(cycle, np.eye(len(cycle))))
+    size = np.tensordot(weight, np.abs(first) + abs(factor) * np.abs(second), 1)
+    assert (np.abs(combined - separate) <= 1e4 * EPS * size).all()
+
+
+@every_default_law
+@given(cycle=windows(), seed=seeds, shift=st.floats(-1.0, 1.0))
+@settings(max_examples=1500, deadline=None)
+def test_increment_does_not_see_the_origin(
+    law: Law, cycle: FloatArray, seed: int, shift: float
+) -> None:
+    """Displacements counted from anywhere give the same estimate (karrech2007 does not)."""
+    displacement, end = paths(seed, (len(cycle), 3)), 3 * cycle[-1]
+    here = law.increment(law.fit(cycle, displacement), cycle[-1], end)
+    there = law.increment(law.fit(cycle, displacement + shift), cycle[-1], end)
+    bound = round_off(law, cycle, np.abs(displacement) + abs(shift), end)
+    assert (np.abs(here - there) <= bound).all()
+
+
+@every_default_law
+def test_a_million_cycles_do_not_spoil_the_fit(law: Law) -> None:
+    """At cycles 1e6 to 1e6 + 20 a noisy fit agrees with one in extended precision.
+
+    There ln N varies by 2e-5 and departs from a straight line by 5e-11: the columns of the fit
+    are parallel to 1e-5 at best (after centring), so eps / 1e-5 of the result can be lost.
+    """
+    cycle = 1e6 + np.arange(21.0)
+    displacement = 1e-4 + 1e-6 * np.random.default_rng(5).standard_normal(21)
+    estimate = law.increment(law.fit(cycle, displacement), cycle[-1], cycle[-1] + 20)
+    x = (np.asarray(cycle, np.longdouble) - cycle[0]) / cycle[0]
+    columns = {"linear": [x], "log": [np.log1p(x)], "log-linear": [x, np.log1p(x)]}[law.name]
+    ahead = np.longdouble(cycle[-1] + 20 - cycle[0]) / cycle[0]
+    steps = {
+        "linear": [ahead - x[-1]],
+        "log": [np.log1p(ahead) - np.log1p(x[-1])],
+        "log-linear": [ahead - x[-1], np.log1p(ahead) - np.log1p(x[-1])],
+    }[law.name]
+    if law.name == "linear":
+        slopes = [(displacement[-1] - displacement[0]) / x[-1]]
+    else:
+        slopes = gram_schmidt(columns, np.asarray(displacement, np.longdouble))
+    expected = float(sum(slope * step for slope, step in zip(slopes, steps, strict=True)))
+    assert abs(estimate - expected) <= 1e3 * EPS / 1e-5 * max(abs(expected), 1e-4)
+
+
+def gram_schmidt(columns: list[np.ndarray], target: np.ndarray) -> list[np.longdouble]:
+    """Least-squares slopes on centred columns in extended precision, one or two columns."""
+    centred = [column - column.mean() for column in columns]
+    target = target - target.mean()
+    if len(centred) == 1:
+        return [centred[0] @ target / (centred[0] @ centred[0])]
+    first, second = centred
+    overlap = first @ second / (first @ first)
+    rest = second - overlap * first
+    slope = rest @ target / (rest @ rest)
+    return [first @ target / (first @ first) - overlap * slope, slope]
+
+
+@every_law
+def test_fewest_cycles_are_interpolated(law: Law) -> None:
+    """With as many cycles as parameters the law passes through every state."""
+    cycle = np.array([10.0, 11.0, 13.0])[: law.minimum_cycles]
+    displacement = paths(3, (law.minimum_cycles, 4))
+    value = law.value(law.fit(cycle, displacement), cycle)
+    np.testing.assert_allclose(value, displacement, atol=1e3 * EPS * np.abs(displacement).max())
+
+
+@every_law
+@pytest.mark.parametrize(
+    ("cycle", "displacement", "message"),
+    [
+        ([1.0], [0.0], "do not determine"),
+        ([3.0, 3.0, 4.0, 5.0], np.zeros(4), "ascend"),
+        ([3.0, 5.0, 4.0, 6.0], np.zeros(4), "ascend"),
+        ([3.0, np.nan, 5.0, 6.0], np.zeros(4), "finite"),
+        ([-1.0, 1.0, 2.0, 3.0], np.zeros(4), "negative|logarithm"),
+        ([3.0, 4.0, 5.0, 6.0], np.zeros(3), "shape"),
+        ([3.0, 4.0, 5.0, 6.0], [[0.0], [0.0], [np.nan], [0.0]], r"at cycle 5, grain and axis \[0"),
+        ([3.0, 4.0, 5.0, 6.0], [0.0, np.inf, -np.inf, 0.0], "2 displacements are not finite"),
+    ],
+)
+def test_data_that_can_not_be_fitted_are_refused(
+    law: Law, cycle: list[float], displacement: FloatArray, message: str
+) -> None:
+    """A fit names what is wrong with its data, and never returns nan."""
+    with pytest.raises(UsageError, match=message):
+        law.fit(np.array(cycle), np.asarray(displacement))
+
+
+def test_laws_break_down_with_a_sentence() -> None:
+    """Where ln N and N can not be told apart at all, laws with both say so."""
+    cycle = 1e15 + np.arange(4.0)
+    for name in ("log-linear", "karrech2007"):
+        with pytest.raises(UsageError, match="use the law log"):
+            law_named(name).fit(cycle, np.zeros(4))
+
+
+@pytest.mark.parametrize("name", ["log", "linear", "log-linear", "karrech2007"])
+def test_shipped_laws_are_found(name: str) -> None:
+    """The four laws are known by their names, and describe all of their parameters."""
+    law = law_named(name)
+    assert law.name == name
+    assert len(law.parameter_names) == len(law.parameter_units)
+    assert len(law.fit(np.arange(1.0, 9.0), np.zeros(8))) == len(law.parameter_names)
+
+
+@pytest.mark.parametrize(("wrong", "meant"), [("Log", "log"), ("log_linear", "log-linear")])
+def test_unknown_law_names_the_nearest(wrong: str, meant: str) -> None:
+    """A law that does not exist is refused with the nearest name and all names."""
+    with pytest.raises(UsageError, match=f"did you mean '{meant}'") as raised:
+        law_named(wrong)
+    assert "karrech2007, linear, log, log-linear" in raised.value.remedy
+    with pytest.raises(UsageError) as raised:
+        law_named("hyperbolic")
+    assert raised.value.what == "there is no law 'hyperbolic'"
+
+
+def test_a_law_is_added_by_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A new file law_NAME.py is a law; no list has to be kept."""
+    (tmp_path / "law_square_root.py").write_text("LAW = 'the law'\n")
+    monkeypatch.setattr(adapters.laws, "__path__", [*adapters.laws.__path__, str(tmp_path)])
+    assert "square-root" in laws_known()
+    assert str(law_named("square-root")) == "the law"
+
+
+def test_hundred_thousand_grains_take_less_than_a_second() -> None:
+    """Fit and increment of 1e5 grains, 3 axes, 100 cycles: under 1 s for every law."""
+    cycle = np.arange(51.0, 151.0)
+    displacement = np.random.default_rng(0).random((100, 100_000, 3))
+    for law in LAWS:
+        seconds = []
+        for _ in range(3):
+            start = time.perf_counter()
+            law.increment(law.fit(cycle, displacement), 150.0, 250.0)
+            seconds.append(time.perf_counter() - start)
+        assert min(seconds) < 1.0, law.name

@@ -1,0 +1,131 @@
+"""The command ``trackbed``: names the verbs and hands each to its package, loaded only then."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+__version__ = "0.1.0"
+
+ADAPTERS = "adapters.cli"
+VERBS = {
+    "doctor": (ADAPTERS, "engines and libraries: versions, what is missing, how to get it"),
+    "new": (ADAPTERS, "write a commented example scene into a folder"),
+    "run": (ADAPTERS, "the whole procedure of a scene: prepare, compute, jump, relax, repeat"),
+    "resume": (ADAPTERS, "go on with an interrupted run"),
+    "status": (ADAPTERS, "how far a run is, its settlement and speed-up"),
+    "report": (ADAPTERS, "write report.html and the figures of a run"),
+    "fit": (ADAPTERS, "fit a residual law to a run, dumps or a CSV series and extrapolate it"),
+    "relax": (ADAPTERS, "bring the overlaps of a state back to equilibrium"),
+    "validate": ("validation.cli", "measure trackbed against a case with a known answer"),
+    "cite": (ADAPTERS, "print what to cite, as BibTeX"),
+}
+"""Verb -> module whose ``register(verb, parser)`` adds the verb's arguments, and a summary."""
+
+EXIT_CODES = """\
+exit codes:
+  0  ok                     5  engine failed
+  1  bug in trackbed        6  result not credible
+  2  usage                  7  not converged
+  3  scene invalid        130  interrupted, state saved
+  4  engine or library missing
+"""
+
+
+def parser_build(verb: str | None) -> argparse.ArgumentParser:
+    """The command's parser; only ``verb`` gets its arguments, so only its package is loaded."""
+    parser = argparse.ArgumentParser(
+        prog="trackbed",
+        description="Settlement of a ballast bed under many load cycles, on your granular engine.",
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"trackbed {__version__}")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    verbs = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs", required=True)
+    for name, (module, summary) in VERBS.items():
+        verb_parser = verbs.add_parser(
+            name, help=summary, description=summary, allow_abbrev=False, epilog=EXIT_CODES,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )  # fmt: skip
+        verb_parser.add_argument(
+            "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
+        )
+        if name == verb:
+            import_module(module).register(name, verb_parser)
+    return parser
+
+
+def verb_named(words: Sequence[str]) -> str | None:
+    """The first word that is no flag; exits with a suggestion when it is no verb."""
+    verb = next((word for word in words if not word.startswith("-")), None)
+    if verb is not None and verb not in VERBS:
+        from difflib import get_close_matches
+
+        near = get_close_matches(verb, VERBS, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"the verbs are {', '.join(VERBS)}"
+        parser_build(None).error(f"there is no verb '{verb}'; {hint}")
+    return verb
+
+
+def import_failed(error: ImportError) -> str:
+    """Why a package can not be imported, and what to do; empty when the fault is ours."""
+    from importlib import metadata
+
+    try:
+        metadata.distribution("adapters")
+    except metadata.PackageNotFoundError:
+        if (error.name or "").partition(".")[0] in ("", "adapters", "validation"):
+            return ""
+        return f"{error}\n  -> install trackbed with its dependencies: pip install -e ."
+    return (
+        f"{error}: the unrelated PyPI package 'adapters' is installed beside trackbed, and both "
+        "have a folder adapters/\n  -> pip uninstall adapters, then reinstall trackbed; "
+        "or give trackbed a virtual environment of its own"
+    )
+
+
+def explained(error: BaseException) -> tuple[str, int]:
+    """What to say of an error, and the exit code."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", 130
+    if isinstance(error, ImportError) and (why := import_failed(error)):
+        return why, 4
+    if hasattr(error, "exit_code"):
+        return str(error), error.exit_code
+    if isinstance(error, OSError):
+        return str(error), 2
+    return (
+        f"{type(error).__name__}: {error}\n  -> this is a bug in trackbed; run again with --debug "
+        "and report the traceback",
+        1,
+    )
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run one verb; every outcome is an exit code and, if bad, a sentence on stderr."""
+    words = sys.argv[1:] if words is None else words
+    try:
+        arguments = parser_build(verb_named(words)).parse_args(words)
+        code: int = arguments.command(arguments)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # the reader of our output went away, as in: trackbed ... | head
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except (KeyboardInterrupt, Exception) as error:
+        if "--debug" in words:
+            import traceback
+
+            traceback.print_exc()
+        message, code = explained(error)
+        print(f"trackbed: {message}", file=sys.stderr)
+        return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Cases with known answers: ``python -m validation CASE`` measures trackbed against them."""

@@ -1,0 +1,7 @@
+"""``python -m validation CASE`` is ``trackbed validate CASE``."""
+
+import sys
+
+from trackbed import main
+
+sys.exit(main(["validate", *sys.argv[1:]]))
