@@ -17,7 +17,7 @@ OVERLAP_BOUND = 0.05
 """Greatest overlap over the smallest radius: Hertz contact is a law of small overlaps."""
 
 FORCE_ERROR_BOUND = 0.25
-"""Greatest root mean square of piston force minus target, over the peak, from the fourth cycle on."""
+"""Greatest rms of piston force minus target, over the peak target, from the fourth cycle on."""
 
 FORCE_ERROR_GOAL = 0.03
 """The same, as the report's goal."""
@@ -33,7 +33,7 @@ class WindowFigures:
     overlap_share: float
     """Greatest overlap over the smallest radius, all cycle ends."""
     energy_share: float
-    """Greatest kinetic energy at a cycle end over the weight of all grains times their mean radius."""
+    """Greatest kinetic energy at a cycle end over the grains' weight times their mean radius."""
     move_share: float
     """Greatest mean move of the grains in one cycle over their mean radius."""
     force_error: float
@@ -114,9 +114,8 @@ def figures_of_window(scene: Scene, window: Window) -> WindowFigures:
 def check_bounds(scene: Scene, figures: WindowFigures) -> None:
     """Overlaps, energies, moves and the piston's force are bounded; raises `NotCredible`."""
     share = scene.time_step / scene.rayleigh_time
-    remedy = (
-        f"the time step is {share:.3g} of the Rayleigh time; "
-        + ("shorten it below 0.2" if share > 0.2 else "look at the scene's load and stiffness")
+    remedy = f"the time step is {share:.3g} of the Rayleigh time; " + (
+        "shorten it below 0.2" if share > 0.2 else "look at the scene's load and stiffness"
     )
     bounds = (
         ("the greatest overlap over the smallest radius", figures.overlap_share, OVERLAP_BOUND),

@@ -338,6 +338,8 @@ def relax_command(arguments: argparse.Namespace) -> int:
     from adapters.state import contacts_none
     from adapters.state_file import state_of_file, state_to_file
 
+    if not arguments.out.parent.is_dir():
+        raise UsageError("the folder of --out does not exist", where=str(arguments.out))
     if arguments.scene is None:
         scene = scene_load(*scene_of_state(arguments.state))
     else:
@@ -370,6 +372,7 @@ def relax_command(arguments: argparse.Namespace) -> int:
     if arguments.json:
         json_print(record)
         return 0
+    print(f"{arguments.out}, at rest; all figures in SI units")
     for key, value in record.items():
         if isinstance(value, dict):
             print(f"{key}:")

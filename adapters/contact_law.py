@@ -67,6 +67,29 @@ def equivalent_shear_modulus(
     )
 
 
+@dataclass(frozen=True)
+class HertzStiffness:
+    """Equivalent moduli E* of eq. 5 [Pa]."""
+
+    grain: float
+    """Between two grains."""
+    wall: float
+    """Between a grain and a wall."""
+    mirror: float
+    """Between a grain and its own mirror image, that is, a rigid symmetry plane."""
+
+
+def hertz_stiffness(
+    young: float, poisson: float, wall_young: float, wall_poisson: float
+) -> HertzStiffness:
+    """Moduli from Young's modulus [Pa] and Poisson's ratio of grains and walls."""
+    return HertzStiffness(
+        equivalent_modulus(young, poisson, young, poisson),
+        equivalent_modulus(young, poisson, wall_young, wall_poisson),
+        equivalent_modulus(young, poisson, inf, poisson),
+    )
+
+
 def equivalent_radius(radius_i: float, radius_j: float = inf) -> float:
     """R* [m]: 1/R* = 1/R_i + 1/R_j; a plane wall has ``radius_j`` = inf."""
     return 1 / (1 / radius_i + 1 / radius_j)

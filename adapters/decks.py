@@ -1,4 +1,4 @@
-"""Input files of one LIGGGHTS run: static decks copied, and what the scene names written beside them.
+"""Input files of one LIGGGHTS run: static decks copied, what the scene names written beside them.
 
 Static decks live in ``liggghts_inputs``; generated are ``parameters.in`` (numbers and the names
 of the parts to include), ``scene.in`` (materials and walls), ``dump_states.in`` (columns),
@@ -147,7 +147,7 @@ def grains_data_text(
     height: float,
     piston_mass: float | None,
 ) -> str:
-    """``grains.data``: grains [m], shapes (n, 3) and (n,), density [kg/m^3], box up to ``height`` [m].
+    """``grains.data``: centres (n, 3) and radii (n,) [m], density [kg/m^3], box to ``height`` [m].
 
     With a piston, one more atom of mass ``piston_mass`` [kg] is parked outside the container;
     it touches nothing and gives the piston face its inertia.

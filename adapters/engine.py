@@ -102,7 +102,12 @@ class Engine(Protocol):
         """Write the input of ``cycles`` load cycles; returns the digests of the static decks."""
 
     def run(
-        self, scene: Scene, deck: str, folder: Path, watch: Callable[[], None], digests: dict[str, str]
+        self,
+        scene: Scene,
+        deck: str,
+        folder: Path,
+        watch: Callable[[], None],
+        digests: dict[str, str],
     ) -> EngineRun:
         """Run ``deck`` in ``folder``; ``watch`` is called now and then.  Raises `EngineFailed`."""
 
@@ -120,7 +125,10 @@ def process_run(
     On any exception, Ctrl-C included, the whole process group is ended first.
     Raises `EngineMissing` when the program can not be started.
     """
-    environment = os.environ | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    environment = os.environ | {
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    }
     started = time.monotonic()
     with (folder / "screen.txt").open("wb") as screen:
         try:

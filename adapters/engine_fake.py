@@ -148,17 +148,15 @@ def lattice(scene: Scene, count: int, radius: float) -> FloatArray:
 
 
 def _frame(step: int, radius: FloatArray, position: FloatArray) -> Frame:
-    names = ("id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz", "radius", "mass")
-    names += tuple(f"f_force_floor[{axis}]" for axis in (1, 2, 3))
+    names: tuple[str, ...] = ("id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
+    names += ("radius", "mass", *(f"f_force_floor[{axis}]" for axis in (1, 2, 3)))
     n = len(radius)
     still, mass = np.zeros((n, 6)), 4 / 3 * np.pi * 2710 * radius**3
     rows = [np.arange(1, n + 1), position, still, radius, mass, np.zeros((n, 3))]
     return Frame(step, names, np.column_stack(rows))
 
 
-def _dumps_write(
-    folder: Path, radius: FloatArray, position: FloatArray, steps: list[int]
-) -> None:
+def _dumps_write(folder: Path, radius: FloatArray, position: FloatArray, steps: list[int]) -> None:
     """``states.dump``, and a ``contacts.dump`` without contacts."""
     frames = [_frame(step, radius, x) for step, x in zip(steps, position, strict=True)]
     dump_write(folder / "states.dump", frames)

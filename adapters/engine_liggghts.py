@@ -1,4 +1,4 @@
-"""LIGGGHTS (Debian's 3.8.0) as an engine: static decks, generated includes, one process a window."""
+"""LIGGGHTS (Debian's 3.8.0) as an engine: static decks, generated includes, fresh processes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import subprocess
 from collections.abc import Callable
 from math import ceil, sqrt
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -45,9 +46,15 @@ class LiggghtsEngine:
         if program is None:
             raise EngineMissing("LIGGGHTS is not installed", remedy=remedy)
         try:
-            answer = subprocess.run(
-                [program, "-h"], capture_output=True, text=True, errors="replace", timeout=30
-            ).stdout
+            with TemporaryDirectory() as folder:  # it writes log.liggghts where it is started
+                answer = subprocess.run(
+                    [program, "-h"],
+                    cwd=folder,
+                    capture_output=True,
+                    text=True,
+                    errors="replace",
+                    timeout=30,
+                ).stdout
         except (OSError, subprocess.TimeoutExpired) as error:
             raise EngineMissing(
                 f"LIGGGHTS does not start ({error})", where=program, remedy=remedy
@@ -69,7 +76,15 @@ class LiggghtsEngine:
         and with it the reason.
         """
         unbuffered = ["stdbuf", "-oL"] if shutil.which("stdbuf") else []
-        return [*scene.engine.launcher, *unbuffered, "liggghts", "-in", deck, "-log", "log.liggghts"]
+        return [
+            *scene.engine.launcher,
+            *unbuffered,
+            "liggghts",
+            "-in",
+            deck,
+            "-log",
+            "log.liggghts",
+        ]
 
     def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
         """Names of the walls whose forces ``states.dump`` holds; see `adapters.engine.Engine`."""
@@ -129,9 +144,7 @@ class LiggghtsEngine:
         assert scene.loading is not None
         shutil.copyfile(start.restart, folder / "start.restart")
         margin = decks.PISTON_MARGIN * scene.sample.grain_radius.greatest
-        decks.piston_stl_write(
-            folder / "piston.stl", scene.container, scene.piston_reach, margin
-        )
+        decks.piston_stl_write(folder / "piston.stl", scene.container, scene.piston_reach, margin)
         (folder / "dump_states.in").write_text(
             decks.dump_states_text(self.wall_names(scene, piston=True))
         )
@@ -160,7 +173,9 @@ class LiggghtsEngine:
             parameters |= self._write_series(scene, cycles, folder)
         if start.moved is not None:
             self._write_moved(scene, start, folder)
-        parts = tuple(str(parameters[f"{name}_part"]) for name in ("load", "run", "output", "start"))
+        parts = tuple(
+            str(parameters[f"{name}_part"]) for name in ("load", "run", "output", "start")
+        )
         return self._write(scene, folder, decks.PARTS_CYCLES + parts, parameters)
 
     def run(
@@ -221,7 +236,8 @@ class LiggghtsEngine:
     @staticmethod
     def _write_series(scene: Scene, cycles: int, folder: Path) -> dict[str, float | int | str]:
         """Load samples of the window, one a line, and their slopes a step."""
-        assert scene.loading is not None and scene.loading.samples is not None
+        assert scene.loading is not None
+        assert scene.loading.samples is not None
         force = scene.loading.samples.stress * scene.loaded_area
         steps = scene.steps_per_cycle // (len(force) - 1)
         # One sample more than segments: LIGGGHTS draws the next one after the last segment too.
@@ -233,7 +249,7 @@ class LiggghtsEngine:
 
     @staticmethod
     def _write_moved(scene: Scene, start: EngineStart, folder: Path) -> None:
-        """``moved.dump``: grains at rest at their new places, and the piston's atom at its height."""
+        """``moved.dump``: grains at rest at their new places, the piston's atom at its height."""
         assert start.moved is not None
         moved = start.moved
         values = np.zeros((len(moved.radius) + 1, 9))
@@ -252,9 +268,13 @@ class LiggghtsEngine:
             float(moved.radius.min()),
         ]
         columns = ("id", "type", "x", "y", "z", "vx", "vy", "vz", "radius")
-        low, high = decks.box_bounds(scene.container, moved.radius, float(moved.position[:, 2].max()))
+        low, high = decks.box_bounds(
+            scene.container, moved.radius, float(moved.position[:, 2].max())
+        )
         bounds = np.column_stack([low, high])
-        dump_write(folder / "moved.dump", [Frame(start.time_step, columns, values, bounds, "atoms")])
+        dump_write(
+            folder / "moved.dump", [Frame(start.time_step, columns, values, bounds, "atoms")]
+        )
 
 
 def restart_of(folder: Path) -> Path:

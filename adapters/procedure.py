@@ -22,6 +22,9 @@ from adapters.stages import Bed, Run, Variant
 RETRIES = 3
 """How often a failed jump is tried again, each time half as long."""
 
+OWN_FILES = ("lock", "scene.toml", "dry_run")
+"""What may stand in a run folder before its manifest is written."""
+
 CONTROL = Variant("control", jumps=False)
 
 
@@ -148,7 +151,7 @@ def run_variant(folder: RunFolder, scene: Scene, variant: Variant, progress: Pro
 
 
 def scene_record(scene: Scene) -> dict[str, Any]:
-    """The effective parameters of a scene, as the manifest keeps them; a load series by its values."""
+    """The effective parameters of a scene, as the manifest keeps them; a load series as values."""
     record = scene.model_dump(mode="json")
     if scene.loading is not None and scene.loading.samples is not None:
         record["loading"]["series"] = {
@@ -171,10 +174,10 @@ def manifest_settle(
             write_atomically(path, json.dumps(manifest | {"control": True}, indent=1) + "\n")
         folder.event("resumed")
         return
-    strangers = [p.name for p in folder.path.iterdir() if p.name not in ("lock", "scene.toml")]
+    strangers = [p.name for p in folder.path.iterdir() if p.name not in OWN_FILES]
     if strangers:
         raise UsageError(
-            f"the folder holds something else ({', '.join(sorted(strangers)[:3])}) and no manifest.json",
+            f"the folder holds something else ({', '.join(sorted(strangers)[:3])}), no manifest",
             where=str(folder.path),
             remedy="give an empty or new folder: --run-folder FOLDER",
         )
@@ -223,7 +226,7 @@ def _flat(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _dry_run(scene: Scene, run_path: Path) -> None:
-    """Write the decks of the rain (and of the first cycles) and print the commands that run them."""
+    """Write the decks of the rain of grains and print the command that runs them."""
     import shlex
 
     from adapters.radii import radii_sample

@@ -84,6 +84,13 @@ def radii_sample(distribution: RadiusDistribution, count: int, seed: int) -> Flo
     return distribution.mean + distribution.standard_deviation * deviation
 
 
+def radius_that_fits(container: Container) -> float:
+    """Radius of the largest sphere between the upright walls and mirror planes [m]."""
+    if container.shape == "box":
+        return min(container.size_x, container.size_y) / 2
+    return container.radius / (1, 2, 1 + sqrt(2))[len(container.symmetry)]
+
+
 def grain_count_expected(
     distribution: RadiusDistribution, container: Container, fill_height: float
 ) -> int:

@@ -13,12 +13,12 @@ After a jump the estimated positions penetrate by up to millimetres and have los
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
 
 import numpy as np
 
-from adapters.contact_law import equivalent_modulus, normal_force, overlap_under_force
+from adapters.contact_law import HertzStiffness, normal_force, overlap_under_force
 from adapters.container import Walls
 from adapters.errors import NotConverged, UsageError
 from adapters.overlaps import (
@@ -46,29 +46,6 @@ CHAIN_FACTOR = 10.0
 largest of a hundred thousand contacts stays below it."""
 PROXIMAL_STIFFNESS = 1e3
 """Stiffness that ties a grain to its estimate in ``proximal`` [N/m]."""
-
-
-@dataclass(frozen=True)
-class HertzStiffness:
-    """Equivalent moduli E* of eq. 5 [Pa]."""
-
-    grain: float
-    """Between two grains."""
-    wall: float
-    """Between a grain and a wall."""
-    mirror: float
-    """Between a grain and its own mirror image, that is, a rigid symmetry plane."""
-
-
-def hertz_stiffness(
-    young: float, poisson: float, wall_young: float, wall_poisson: float
-) -> HertzStiffness:
-    """Moduli from Young's modulus [Pa] and Poisson's ratio of grains and walls."""
-    return HertzStiffness(
-        equivalent_modulus(young, poisson, young, poisson),
-        equivalent_modulus(young, poisson, wall_young, wall_poisson),
-        equivalent_modulus(young, poisson, np.inf, poisson),
-    )
 
 
 @dataclass(frozen=True)
@@ -100,6 +77,12 @@ class Relaxation:
     """Greatest distance of a grain from its estimate [m]."""
     median_move: float
     """Median distance of a grain from its estimate [m]."""
+
+    def record(self) -> dict[str, Any]:
+        """All but the positions, for the run folder and the command line."""
+        record = asdict(self)
+        del record["position"]
+        return record
 
 
 class RelaxationNotConverged(NotConverged):

@@ -58,6 +58,16 @@ class Outcome:
     """What else the report tells: time step, piston mesh, command, relaxation."""
 
 
+STAGES = ("preparation", "window", "jump")
+"""Kinds of stages; at one cycle in this order."""
+
+
+def stage_place(name: str) -> tuple[int, int, str]:
+    """Sorting key of a stage's name: its first cycle, its kind, its attempt."""
+    kind, *numbers = name.split("_")
+    return (int(numbers[0]) if numbers else -1, STAGES.index(kind), name)
+
+
 def write_atomically(path: Path, text: str) -> None:
     """Write ``text`` to ``path``: a killed writer leaves the old file or the new, never a part."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
@@ -98,7 +108,11 @@ class RunFolder:
 
     def event(self, what: str, **details: object) -> None:
         """Append one line to ``events.jsonl``."""
-        line = {"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "event": what, **details}
+        line = {
+            "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+            "event": what,
+            **details,
+        }
         with (self.path / "events.jsonl").open("a", encoding="utf-8") as stream:
             stream.write(json.dumps(line) + "\n")
 
@@ -125,20 +139,11 @@ class RunFolder:
     def stage_names(self) -> list[str]:
         """Names of all stage folders in the order of the run."""
         names = [p.name for p in self.path.iterdir() if p.is_dir()] if self.path.exists() else []
-        kinds = {"preparation": 0, "window": 1, "jump": 2}
-        stages = [name for name in names if name.split("_")[0] in kinds]
-
-        def place(name: str) -> tuple[int, int, str]:
-            parts = name.split("_")
-            return (int(parts[1]) if len(parts) > 1 else -1, kinds[parts[0]], name)
-
-        return sorted(stages, key=place)
+        return sorted((name for name in names if name.split("_")[0] in STAGES), key=stage_place)
 
     def outcomes(self) -> list[Outcome]:
         """Outcomes of all finished stages in order; failed jumps are left out."""
-        finished = (
-            self.outcome(name) for name in self.stage_names() if not self.failure(name)
-        )
+        finished = (self.outcome(name) for name in self.stage_names() if not self.failure(name))
         return [outcome for outcome in finished if outcome is not None]
 
     def failure(self, name: str) -> str:
@@ -159,10 +164,9 @@ class RunFolder:
 
         What is there already is unfinished, damaged, or comes after it: it is moved away.
         """
-        (self.path / name).mkdir(exist_ok=True)
-        stages = self.stage_names()
-        for later in stages[stages.index(name) :]:
-            self.discard(self.path / later)
+        for other in self.stage_names():
+            if stage_place(other) >= stage_place(name):
+                self.discard(self.path / other)
         partial = self.path / "partial"
         if partial.exists():
             for leftover in sorted(partial.iterdir()):
@@ -211,7 +215,7 @@ class RunFolder:
             ) from error
 
     def share_start(self, other: RunFolder, last_cycle: int) -> None:
-        """Link the stages of ``other`` up to ``last_cycle`` into this empty run: same work, same bits."""
+        """Link the stages of ``other`` up to ``last_cycle`` into this run: same work, same bits."""
         for name in other.stage_names():
             outcome = other.outcome(name)
             here = self.path / name
@@ -253,7 +257,7 @@ def disk_full_named(path: Path) -> Iterator[None]:
         full = EngineFailed(
             f"the disk is full ({error.strerror})",
             where=str(path),
-            remedy="free some space and go on with: trackbed resume RUN; finished windows are whole",
+            remedy="free some space, then: trackbed resume RUN; finished windows are whole",
         )
         full.from_outside = True
         raise full from error

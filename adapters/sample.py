@@ -16,7 +16,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from adapters.container import Container
-from adapters.errors import NotConverged
+from adapters.errors import NotConverged, SceneError
+from adapters.radii import radius_that_fits
 from adapters.state import Contacts, FloatArray, IntArray, State
 
 GRAVITY = 9.81
@@ -50,8 +51,16 @@ def sample_start(
     sequential addition in rounds: all grains are drawn at once, uniformly; those that overlap a
     settled grain, or a lower index of their own round, are drawn anew.  The same for the same seed.
 
-    Not for dense samples: raises `NotConverged` when no place is found, from about 0.2 on.
+    Not for dense samples: raises `NotConverged` when no place is found, from about 0.2 on, and
+    `SceneError` when a grain is wider than the container.
     """
+    if radius.max() > radius_that_fits(container):
+        raise SceneError(
+            f"a grain of radius {radius.max():g} m does not fit into the container, which takes "
+            f"radii up to {radius_that_fits(container):g} m",
+            where="sample.grain_radius",
+            remedy="give smaller grains or a wider container",
+        )
     generator = np.random.default_rng([seed, 1])
     volume = 4 / 3 * pi * float(np.sum(radius**3))
     height = max(volume / (relative_density * container.area), 4 * float(radius.max()))

@@ -269,6 +269,12 @@ class Scene(Table):
         return contact_law.restitution_of_alpha(grain.viscous_alpha)
 
     @property
+    def stiffness(self) -> contact_law.HertzStiffness:
+        """Equivalent moduli of grains, walls and mirror planes."""
+        grain, wall = self.material.grain, self.material.wall
+        return contact_law.hertz_stiffness(grain.young, grain.poisson, wall.young, wall.poisson)
+
+    @property
     def rayleigh_time(self) -> float:
         """Rayleigh time [s] of the smallest grain the radius distribution allows."""
         grain = self.material.grain

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from math import nan, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from adapters.contact_law import rayleigh_time
 from adapters.container import Container
 from adapters.errors import SceneError
 from adapters.load_series import load_series_read
-from adapters.radii import RadiusDistribution, grain_count_expected
+from adapters.radii import RadiusDistribution, grain_count_expected, radius_that_fits
 
 ALTERNATIVES = (
     ("sample.count", "sample.fill_height"),
@@ -136,7 +135,7 @@ def _grain_radius(scene: _Values) -> Iterator[Problem]:
 
 def _room(scene: _Values) -> Iterator[Problem]:
     largest_grain = _radii(scene).greatest
-    room = _room_radius(scene)
+    room = radius_that_fits(_geometry(scene))
     if largest_grain > room:
         yield Problem(
             "sample.grain_radius.mean",
@@ -145,12 +144,15 @@ def _room(scene: _Values) -> Iterator[Problem]:
         )
 
 
-def _room_radius(scene: _Values) -> float:
-    """Radius of the largest sphere that fits between the upright walls and mirrors [m]."""
-    if scene.need("sample.container") == "box":
-        return float(min(scene.need("sample.size_x"), scene.need("sample.size_y"))) / 2
-    mirrors = len(set(scene.get("sample.symmetry") or ()))
-    return float(scene.need("sample.radius")) / (1, 2, 1 + sqrt(2))[mirrors]
+def _geometry(scene: _Values) -> Container:
+    """The container; of a valid shape, without mirror planes given twice."""
+    shape = scene.need("sample.container")
+    planes = scene.get("sample.symmetry") or ()
+    if shape == "box":
+        sizes = {key: scene.need(f"sample.{key}") for key in ("size_x", "size_y")}
+    else:
+        sizes = {"radius": scene.need("sample.radius")}
+    return Container(shape, tuple(dict.fromkeys(planes)), **sizes)
 
 
 def _loading(scene: _Values) -> Iterator[Problem]:
@@ -235,11 +237,7 @@ def _time_step(scene: _Values) -> Iterator[Problem]:
 
 def _fill_height(scene: _Values) -> Iterator[Problem]:
     height = scene.need("sample.fill_height")
-    walls = {key: scene.get(f"sample.{key}") or nan for key in ("radius", "size_x", "size_y")}
-    container = Container(
-        scene.need("sample.container"), tuple(scene.get("sample.symmetry") or ()), **walls
-    )
-    count = grain_count_expected(_radii(scene), container, height)
+    count = grain_count_expected(_radii(scene), _geometry(scene), height)
     if not 1 <= count <= COUNT_GREATEST:
         yield Problem("sample.fill_height", f"{height:g} m would take {count:.3g} grains")
 
@@ -273,10 +271,9 @@ def _long_time_step(scene: _Values) -> Iterator[Problem]:
 
 
 def _narrow(scene: _Values) -> Iterator[Problem]:
-    if scene.need("sample.container") == "box":
-        width = min(scene.need("sample.size_x"), scene.need("sample.size_y"))
-    else:
-        width = 2 * scene.need("sample.radius")
+    container = _geometry(scene)
+    is_box = container.shape == "box"
+    width = min(container.size_x, container.size_y) if is_box else 2 * container.radius
     ratio = width / (2 * scene.need("sample.grain_radius.mean"))
     if ratio < WIDTH_DOUBTFUL:
         yield Problem(

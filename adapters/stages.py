@@ -6,10 +6,11 @@ Each is done once: a finished stage is read back, an unfinished one is done agai
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from adapters.laws import law_named
 from adapters.overlaps import neighbours
 from adapters.progress import Progress
 from adapters.radii import radii_sample
-from adapters.relaxation import Relaxation, hertz_stiffness, relax
+from adapters.relaxation import relax
 from adapters.run_folder import Outcome, RunFolder
 from adapters.sample import (
     GRAVITY,
@@ -138,7 +139,7 @@ def prepare(run: Run) -> Bed:
 
 
 def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
-    """A window of ``cycles`` load cycles in a fresh engine process, the first ``healing`` unfitted."""
+    """A window of ``cycles`` load cycles in a fresh process, the first ``healing`` kept unfitted."""
     name = f"window_{bed.cycle:06d}"
     outcome = run.folder.outcome(name)
     if outcome is None:
@@ -179,7 +180,7 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
 
 
 def jump(run: Run, bed: Bed, h: int, attempt: int) -> Bed:
-    """Estimate the bed ``h`` cycles on (eqs 16, 17), relax it (eq. 29), and hand it back at rest."""
+    """Estimate the bed ``h`` cycles on (eqs 16, 17), relax it (eq. 29), hand it back at rest."""
     name = f"jump_{bed.cycle:06d}_{attempt}"
     folder = run.folder.path / name
     if run.folder.outcome(name) is None:
@@ -214,7 +215,7 @@ def jump(run: Run, bed: Bed, h: int, attempt: int) -> Bed:
 
 
 def estimate(run: Run, bed: Bed, h: int) -> tuple[State, FloatArray, float]:
-    """State before a jump, estimated positions after it [m], shape (n, 3), and the piston's height [m].
+    """State before a jump, estimated positions after it (n, 3) and the piston's height, in metres.
 
     The piston follows the law of its own heights, so that a loose grain can not lift it; it is
     never placed above where it is.
@@ -236,8 +237,8 @@ def estimate(run: Run, bed: Bed, h: int) -> tuple[State, FloatArray, float]:
 
 def relaxed(
     run: Run, before: State, target: FloatArray, piston_height: float
-) -> tuple[FloatArray, dict[str, object]]:
-    """Relaxed positions [m], shape (n, 3), of the ``target`` ones, and the record of the relaxation.
+) -> tuple[FloatArray, dict[str, Any]]:
+    """Relaxed positions of the ``target`` ones, (n, 3) in metres, and the relaxation's record.
 
     Raises `RelaxationNotConverged`.
     """
@@ -245,29 +246,19 @@ def relaxed(
     assert procedure is not None
     if procedure.relaxation == "none":
         return target, {"method": "none"}
-    material = scene.material
     relaxation = relax(
         target,
         before,
         scene.container.walls(before.piston_height, scene.piston_reach),
-        hertz_stiffness(
-            material.grain.young, material.grain.poisson, material.wall.young, material.wall.poisson
-        ),
+        scene.stiffness,
         method=procedure.relaxation,
         gravity=GRAVITY,
         walls_after=scene.container.walls(piston_height, scene.piston_reach),
     )
-    return relaxation.position, relaxation_record(relaxation)
+    return relaxation.position, relaxation.record()
 
 
-def relaxation_record(relaxation: Relaxation) -> dict[str, object]:
-    """A relaxation as the run folder keeps it: all but the positions."""
-    record = asdict(relaxation)
-    del record["position"]
-    return record
-
-
-def settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, object]]:
+def settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, Any]]:
     """One row of ``settlement.csv`` for each cycle of a window."""
     steps = run.scene.steps_per_cycle
     errors = window.piston.force_error(steps)
@@ -281,7 +272,7 @@ def settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, ob
     return rows
 
 
-def _row(run: Run, state: State, kind: str) -> dict[str, object]:
+def _row(run: Run, state: State, kind: str) -> dict[str, Any]:
     preparation = run.folder.outcome("preparation")
     assert preparation is not None
     container = run.scene.container
@@ -304,13 +295,15 @@ def _row(run: Run, state: State, kind: str) -> dict[str, object]:
     }
 
 
-def _run_notes(done: EngineRun) -> dict[str, object]:
+def _run_notes(done: EngineRun) -> dict[str, Any]:
     return {"command": done.command, "wall_s": done.wall_s, "decks": done.decks}
 
 
 def _finish(run: Run, folder: Path, outcome: Outcome) -> Path:
     place = run.folder.finish(folder, outcome)
-    run.folder.event("finished", stage=folder.name, cycles=[outcome.first_cycle, outcome.last_cycle])
+    run.folder.event(
+        "finished", stage=folder.name, cycles=[outcome.first_cycle, outcome.last_cycle]
+    )
     if outcome.rows:
         row = outcome.rows[-1]
         run.progress.say(
@@ -319,7 +312,7 @@ def _finish(run: Run, folder: Path, outcome: Outcome) -> Path:
     return place
 
 
-def _watch(run: Run, bed: Bed, folder: Path):  # type: ignore[no-untyped-def]
+def _watch(run: Run, bed: Bed, folder: Path) -> Callable[[], None]:
     """A function that shows progress from what the engine has written so far."""
     procedure = run.scene.procedure
     assert procedure is not None

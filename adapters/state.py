@@ -14,6 +14,10 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
+GRAIN_ARRAYS = ("identifier", "position", "radius", "mass", "velocity", "spin")
+"""Fields of a `State` with one row a grain."""
+
+
 @dataclass(frozen=True)
 class Contacts:
     """Grain-grain contacts of one instant, each pair once."""
@@ -77,10 +81,7 @@ class State:
 
 def state_save(state: State, path: Path) -> None:
     """Write a state to ``path`` (npz), atomically: a killed writer leaves the old file."""
-    arrays = {
-        name: getattr(state, name)
-        for name in ("identifier", "position", "radius", "mass", "velocity", "spin")
-    }
+    arrays = {name: getattr(state, name) for name in GRAIN_ARRAYS}
     arrays |= {f"contact_{name}": value for name, value in vars(state.contacts).items()}
     arrays |= {f"wall_{name}": value for name, value in state.wall_force.items()}
     scalars = np.array([state.piston_height, state.cycle, state.time_step])
@@ -99,10 +100,7 @@ def state_load(path: Path) -> State:
                 **{name[8:]: data[name] for name in data.files if name.startswith("contact_")}
             )
             walls = {name[5:]: data[name] for name in data.files if name.startswith("wall_")}
-            grains = [
-                data[name]
-                for name in ("identifier", "position", "radius", "mass", "velocity", "spin")
-            ]
+            grains = {name: data[name] for name in GRAIN_ARRAYS}
     except Exception as error:  # numpy raises many kinds for a file that is not a whole npz
         raise UsageError(
             f"this is not a whole state file ({error})",
@@ -110,5 +108,10 @@ def state_load(path: Path) -> State:
             remedy="give a .npz written by trackbed, or a LIGGGHTS dump",
         ) from error
     return State(
-        *grains, contacts, walls, float(height), cycle=int(cycle), time_step=int(step)
+        **grains,
+        contacts=contacts,
+        wall_force=walls,
+        piston_height=float(height),
+        cycle=int(cycle),
+        time_step=int(step),
     )

@@ -13,6 +13,9 @@ from adapters.dump import Frame, dump_frames
 from adapters.errors import EngineFailed
 from adapters.state import Contacts, FloatArray, IntArray, State
 
+ARRAYS = ("time_step", "identifier", "radius", "mass", "position", "velocity", "spin")
+"""Fields of a `Window` that are plain arrays."""
+
 
 @dataclass(frozen=True)
 class PistonTrack:
@@ -31,20 +34,20 @@ class PistonTrack:
     kinetic_rotational: FloatArray
     """Rotational kinetic energy of the grains [J], shape (s,)."""
 
-    def cycles(self, steps_per_cycle: int) -> FloatArray:
-        """Cycle number from the window's start that each sample belongs to, shape (s,): 0, 1, ..."""
+    def cycles(self, steps_per_cycle: int) -> IntArray:
+        """Cycles from the window's start that each sample comes after, shape (s,): 0, 1, ..."""
         start = (self.time_step[0] // steps_per_cycle) * steps_per_cycle
-        return np.asarray((self.time_step - start - 1) // steps_per_cycle, float)
+        return np.asarray((self.time_step - start - 1) // steps_per_cycle)
 
     def force_error(self, steps_per_cycle: int) -> FloatArray:
-        """Root mean square of contact minus target force in each cycle, over the peak target force."""
-        cycle = self.cycles(steps_per_cycle).astype(int)
+        """Root mean square of contact minus target force in each cycle, over the peak target."""
+        cycle = self.cycles(steps_per_cycle)
         square = ((self.contact_force - self.target_force) / self.target_force.max()) ** 2
         return np.asarray(np.sqrt(np.bincount(cycle, square) / np.bincount(cycle)))
 
     def elastic_deflection(self, steps_per_cycle: int) -> FloatArray:
         """Height at each cycle's end minus the lowest height in it [m]."""
-        cycle = self.cycles(steps_per_cycle).astype(int)
+        cycle = self.cycles(steps_per_cycle)
         heights = [self.height[cycle == c] for c in range(cycle.max() + 1)]
         return np.array([height[-1] - height.min() for height in heights])
 
@@ -166,7 +169,7 @@ def _wall_force(frame: Frame, name: str) -> FloatArray:
 def window_read(
     folder: Path, first_cycle: int, wall_names: tuple[str, ...], piston_start: float
 ) -> Window:
-    """Read the dumps an engine left in ``folder``; ``piston_start`` [m] is the piston's first height.
+    """Read the dumps an engine left in ``folder``; the piston started at ``piston_start`` [m].
 
     Raises `DumpError` for a malformed dump and `EngineFailed` for missing files.
     """
@@ -208,8 +211,7 @@ def window_read(
 
 def window_save(window: Window, path: Path) -> None:
     """Write a window to ``path`` (npz), without loss, atomically."""
-    plain = ("first_cycle", "piston_start", "time_step", "identifier", "radius", "mass")
-    arrays = {name: getattr(window, name) for name in (*plain, "position", "velocity", "spin")}
+    arrays = {name: getattr(window, name) for name in (*ARRAYS, "first_cycle", "piston_start")}
     arrays |= {f"wall_{name}": force for name, force in window.wall_force.items()}
     arrays |= {f"piston_{name}": values for name, values in vars(window.piston).items()}
     arrays["contact_count"] = np.array([len(contacts) for contacts in window.contacts])
@@ -239,12 +241,12 @@ def window_load(path: Path) -> Window:
         for a, b in pairwise(ends)
     )
     return Window(
-        int(arrays["first_cycle"]),
-        *(arrays[f.name] for f in fields(Window)[1:8]),
-        {name[5:]: values for name, values in arrays.items() if name.startswith("wall_")},
-        contacts,
-        PistonTrack(*(arrays[f"piston_{c.name}"] for c in fields(PistonTrack))),
-        float(arrays["piston_start"]),
+        first_cycle=int(arrays["first_cycle"]),
+        **{name: arrays[name] for name in ARRAYS},
+        wall_force={n[5:]: values for n, values in arrays.items() if n.startswith("wall_")},
+        contacts=contacts,
+        piston=PistonTrack(*(arrays[f"piston_{c.name}"] for c in fields(PistonTrack))),
+        piston_start=float(arrays["piston_start"]),
     )
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import trackbed
@@ -200,6 +202,61 @@ def test_run_hands_over_what_was_asked(tmp_path: Path, monkeypatch: pytest.Monke
         'engine.name="fake"',
         'engine.launcher=["mpirun", "-np", "2"]',
     ]
+
+
+def test_fit_prints_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """``fit --json`` predicts u = 2 + 3 ln N, of which the series is made, exactly."""
+    series = tmp_path / "series.csv"
+    rows = "".join(f"{n},{2 + 3 * math.log(n)!r}\n" for n in range(1, 30))
+    series.write_text("cycle,settlement_mm\n" + rows)
+    assert main(["fit", str(series), "--law", "log", "--to-cycle", "1000", "--json"]) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    fitted = json.loads(printed.out)
+    assert set(fitted) == {"law", "parameters", "prediction", "band", "unit"}
+    assert (fitted["law"], fitted["unit"]) == ("log", "mm")
+    assert fitted["prediction"] == pytest.approx(2 + 3 * math.log(1000), rel=1e-12)
+    low, high = fitted["band"]
+    assert low < fitted["prediction"] < high
+
+
+def test_fit_confidence_is_eq_15(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """k = (b - a)^2 / (2 eps^2) ln(2 / p), here of residuals +1 and -1 about a straight line.
+
+    With b - a = 2, eps = 0.5 and p = 0.05 that is 8 ln 40 = 29.5, so 30 cycles.
+    """
+    series = tmp_path / "series.csv"
+    signs = (1, -1, -1, 1) * 2  # neither a mean nor a slope
+    rows = "".join(f"{n},{10 * n + sign}\n" for n, sign in enumerate(signs))
+    series.write_text("cycle,settlement\n" + rows)
+    words = ["fit", str(series), "--law", "linear", "--error", "0.5", "--confidence", "0.95"]
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["cycles_needed"] == 30
+    assert main(words) == 0
+    assert capsys.readouterr().out.rstrip().endswith(": 30")
+    assert main(words[:-2]) == 2
+
+
+def test_relax_writes_a_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """``relax`` takes 50 % of overlap out of two grains and states what the bed was and is."""
+    from adapters.dump import Frame, dump_frames, dump_write
+
+    assert main(["new", "karrech-coarse", str(tmp_path)]) == 0
+    radius = 3.2e-3
+    columns = ("id", "x", "y", "z", "radius")
+    deep, there = tmp_path / "deep.dump", tmp_path / "relaxed.dump"
+    values = np.array([[1, 0.01, 0.01, radius, radius], [2, 0.013, 0.01, radius, radius]])
+    dump_write(deep, [Frame(0, columns, values)])
+    words = ["relax", str(deep), "--out", str(there), "--json"]
+    assert main(words) == 2
+    assert "--scene" in capsys.readouterr().err
+    assert main([*words, "--scene", str(tmp_path / "scene.toml")]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["estimated"]["max_penetration"] == pytest.approx(2 * radius - 0.003)
+    assert record["relaxed"]["max_penetration"] < 1e-6
+    (frame,) = dump_frames(there)
+    apart = np.linalg.norm(np.diff(frame.block("x", "y", "z"), axis=0))
+    assert apart == pytest.approx(2 * radius, abs=1e-6)
 
 
 def test_cite_is_bibtex(capsys: pytest.CaptureFixture[str]) -> None:

@@ -443,6 +443,8 @@ ROW_END = GRAINS[: GRAINS.index("5 1 -0.009 1e-3")]
         (GRAINS.replace("1e-3", "-nan"), 23, 10, "column vx of grain 5 is -nan", (), 1),
         (GRAINS.replace("-0.009 1", "inf 1"), 23, 10, "column x of grain 5 is inf", (), 1),
         (GRAINS.replace("1e-3", "1e999"), 23, 10, "column vx of grain 5 is 1e999", (), 1),
+        (GRAINS.replace("1e-3", "1.8e308"), 23, 10, "column vx of grain 5 is 1.8e308", (), 1),
+        (GRAINS.replace("1e-3", "-3.5e308"), 23, 10, "column vx of grain 5 is -3.5e308", (), 1),
         (GRAINS.replace("x vx \n7", "x vy \n7"), 21, 10, "gone: vx; new: vy", (), 1),
         (GRAINS.replace("x vx \n7", "vx x \n7"), 21, 10, "the columns change", (), 1),
         (GRAINS + CONTACTS.replace("P\n0", "P\n30"), 45, 30, "to 'ENTRIES c_pl[1]", (), 3),

@@ -60,7 +60,7 @@ def round_off(law: Law, cycle: FloatArray, displacement: FloatArray, end: float)
 
 @every_default_law
 @given(cycle=windows(), seed=seeds, reach=st.floats(1.0, 100.0))
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_increment_is_the_same_in_s_ms_and_cycles(
     law: Law, cycle: FloatArray, seed: int, reach: float
 ) -> None:
@@ -111,7 +111,7 @@ def test_linear_is_eq_16() -> None:
 
 @every_default_law
 @given(cycle=windows(), seed=seeds)
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_fit_is_the_textbook_least_squares(law: Law, cycle: FloatArray, seed: int) -> None:
     """Residuals are orthogonal to the columns 1, ln N[, N]; the linear law joins the end points."""
     displacement = paths(seed, (len(cycle),))
@@ -130,7 +130,7 @@ def test_fit_is_the_textbook_least_squares(law: Law, cycle: FloatArray, seed: in
 
 @every_law
 @given(cycle=windows(), parameters=st.tuples(lengths, lengths, lengths), reach=st.floats(2, 10))
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_data_that_follow_a_law_are_recovered(
     law: Law, cycle: FloatArray, parameters: tuple[float, ...], reach: float
 ) -> None:
@@ -153,7 +153,7 @@ def test_data_that_follow_a_law_are_recovered(
 
 @every_default_law
 @given(cycle=windows(), parameters=st.tuples(lengths, lengths, lengths))
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_increment_is_the_difference_of_values(
     law: Law, cycle: FloatArray, parameters: tuple[float, ...]
 ) -> None:
@@ -170,7 +170,7 @@ def test_increment_is_the_difference_of_values(
 
 @every_law
 @given(cycle=windows(), seed=seeds, factor=st.floats(-5.0, 5.0))
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_fit_is_linear_in_displacement(
     law: Law, cycle: FloatArray, seed: int, factor: float
 ) -> None:
@@ -185,7 +185,7 @@ def test_fit_is_linear_in_displacement(
 
 @every_default_law
 @given(cycle=windows(), seed=seeds, shift=st.floats(-1.0, 1.0))
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_increment_does_not_see_the_origin(
     law: Law, cycle: FloatArray, seed: int, shift: float
 ) -> None:

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.stats import kstest, truncnorm
 
 from adapters.container import Container
-from adapters.errors import NotConverged
+from adapters.errors import NotConverged, SceneError
 from adapters.radii import (
     PAPER_RELATIVE_DENSITY,
     RadiusDistribution,
@@ -184,11 +184,27 @@ def test_start_is_uniform_in_the_section(container: Container) -> None:
         assert abs(position[:, axis].mean() - centroid) < 5 * error + 1e-4
 
 
-def test_grains_as_wide_as_the_container_find_their_place() -> None:
-    """Spheres that just fit between two mirrors and the cylinder stack up, they do not hang."""
-    radius = np.full(5, 0.1 / (1 + sqrt(2)))
-    position, _ = sample_start(radius, Container("cylinder", ("x", "y"), radius=0.1), 0.05, 1)
-    assert position[:, :2] == pytest.approx(np.broadcast_to(radius[0], (5, 2)), rel=1e-6)
+@pytest.mark.parametrize(
+    ("container", "fits"),
+    [
+        (Container("cylinder", radius=0.1), 0.1),
+        (Container("cylinder", ("x",), radius=0.1), 0.05),
+        (Container("cylinder", ("y",), radius=0.1), 0.05),
+        (Container("cylinder", ("x", "y"), radius=0.1), 0.1 / (1 + sqrt(2))),
+        (Container("box", size_x=0.1, size_y=0.3), 0.05),
+    ],
+    ids=str,
+)
+def test_grains_as_wide_as_the_container(container: Container, fits: float) -> None:
+    """Spheres that just fit find their one place across, without an endless search; wider ones
+    are refused."""
+    position, _ = sample_start(np.full(5, fits), container, 0.05, 1)
+    walls = container.walls()
+    for point, normal in zip(walls.plane_point, walls.plane_normal, strict=True):
+        assert ((position - point) @ normal >= fits * (1 - 1e-6)).all()
+    assert (np.hypot(position[:, 0], position[:, 1]) + fits <= walls.cylinder_radius + 1e-7).all()
+    with pytest.raises(SceneError, match="does not fit"):
+        sample_start(np.full(5, fits * (1 + 1e-9)), container, 0.05, 1)
 
 
 def test_start_that_is_too_dense_is_refused() -> None:
