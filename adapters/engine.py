@@ -48,12 +48,17 @@ class EngineStart:
     first: bool = False
     """True for the first window after the preparation, which has no piston yet."""
 
+    perturbation: float = 0.0
+    """Displacement [m] of the first grain along x, for a control of round-off."""
+
     @property
     def kind(self) -> str:
-        """``first``, ``continue`` or ``moved``."""
+        """``first``, ``continue``, ``moved`` or ``perturbed``."""
         if self.first:
             return "first"
-        return "continue" if self.moved is None else "moved"
+        if self.moved is not None:
+            return "moved"
+        return "perturbed" if self.perturbation else "continue"
 
 
 @dataclass(frozen=True)

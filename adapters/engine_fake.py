@@ -64,6 +64,7 @@ class FakeEngine:
         shutil.copyfile(start.restart, folder / "start.restart")
         with np.load(start.restart) as data:
             position = data["position"] if start.moved is None else start.moved.position
+            position[0, 0] += start.perturbation
             np.savez(
                 folder / "input.npz",
                 position=position,

@@ -162,6 +162,8 @@ class LiggghtsEngine:
             "piston_mesh": f"piston_{start.piston_mesh}",
             "piston_height": start.piston_height,
         }
+        if start.kind == "perturbed":
+            parameters["perturbation"] = start.perturbation
         if start.moved is not None or waveform == "series":
             parameters["start_step"] = start.time_step
         if waveform == "sine":

@@ -63,12 +63,13 @@ def fit_series(series: Series, law: Law, to_cycle: float, probability: float = 0
             f"cycle {to_cycle:g} does not lie behind the last one of the series, {last:g}",
             remedy="ask for a later cycle: the earlier ones are known",
         )
-    parameters = law.fit(cycle, settlement)
-    prediction = float(settlement[-1] + law.increment(parameters, last, to_cycle))
-    band = (prediction, prediction)
-    if to_cycle > last:
-        below, above = prediction_band(law, cycle, settlement, to_cycle, probability)
-        band = (prediction - below, prediction + above)
+    with np.errstate(over="ignore", invalid="ignore"):  # judged below, in one place
+        parameters = law.fit(cycle, settlement)
+        prediction = float(settlement[-1] + law.increment(parameters, last, to_cycle))
+        band = (prediction, prediction)
+        if to_cycle > last:
+            below, above = prediction_band(law, cycle, settlement, to_cycle, probability)
+            band = (prediction - below, prediction + above)
     if not (np.isfinite(parameters).all() and np.isfinite(band).all()):
         raise NotConverged(
             f"the law {law.name} gives no finite settlement at cycle {to_cycle:g}",
@@ -124,8 +125,8 @@ def fit_noise(
     trend = law.value(parameters, cycle)
     residual = settlement - trend
     square, count = float(residual @ residual), len(residual)
-    if square == 0:
-        return 0.0
+    if square == 0 or not isfinite(square):
+        return square
     # A fitted trend takes correlation out of the residuals; (2 + 4 rho) / k puts it back.
     seen = max(float(residual[1:] @ residual[:-1]) / square, 0.0)
     correlation = min(seen + (2 + 4 * seen) / count, 0.99)

@@ -6,7 +6,7 @@ import json
 import shutil
 import signal
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,12 @@ OWN_FILES = ("lock", "scene.toml", "dry_run")
 """What may stand in a run folder before its manifest is written."""
 
 CONTROL = Variant("control", jumps=False)
+CONTROL_STILL = Variant("control_still", still=True)
+
+
+def control_perturbed(member: int) -> Variant:
+    """A control from a state that differs by ``member`` times 1e-10 m in one grain."""
+    return Variant(f"control_perturbed_{member}", jumps=False, perturbation=member * 1e-10)
 
 
 def settle(run: Run) -> Bed:
@@ -34,10 +40,12 @@ def settle(run: Run) -> Bed:
     assert p is not None
     bed = stages.prepare(run)
     bed = stages.compute(run, bed, p.k_i)
+    bed = replace(bed, start=replace(bed.start, perturbation=run.variant.perturbation))
     bed = stages.compute(run, bed, min(p.k, p.total_cycles - bed.cycle))
     for number in range(p.total_cycles):
-        h = min(p.jump_cycles(number), p.total_cycles - bed.cycle - p.healing_cycles - p.k)
-        if not run.variant.jumps or h < min(p.h):
+        longest = p.total_cycles - bed.cycle - p.healing_cycles - p.k
+        h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
+        if not run.variant.jumps or longest < min(p.h):
             break
         bed = jump_and_heal(run, bed, h)
     while bed.cycle < p.total_cycles:
@@ -138,9 +146,9 @@ def run_variant(folder: RunFolder, scene: Scene, variant: Variant, progress: Pro
         here = RunFolder(folder.path / variant.name)
         here.path.mkdir(exist_ok=True)
         assert scene.procedure is not None
-        shared = scene.procedure.k_i + (0 if variant.perturbed else scene.procedure.k)
+        shared = scene.procedure.k_i + (0 if variant.perturbation else scene.procedure.k)
         here.share_start(folder, shared)
-        progress.say(f"{variant.name}: every cycle computed" if not variant.jumps else variant.name)
+        progress.say(variant.name.replace("_", " "))
     run = Run(scene, here, engine, variant, progress)
     progress.start()
     if scene.procedure is None or scene.loading is None:

@@ -18,12 +18,12 @@ class Progress:
         self.stream = sys.stderr if stream is None else stream
         self.quiet = quiet
         self.terminal = self.stream.isatty()
-        self._started = time.monotonic()
         self._printed = 0.0
+        self._first: tuple[float, int] | None = None
 
     def start(self) -> None:
         """Begin to count time and cycles anew, for another run."""
-        self._started = time.monotonic()
+        self._first = None
 
     def say(self, text: str) -> None:
         """A line that stays."""
@@ -46,6 +46,8 @@ class Progress:
         ``computed_here`` by this process, ``to_compute`` still.
         """
         now = time.monotonic()
+        if self._first is None:
+            self._first = now, computed_here
         if self.quiet or now - self._printed < (0.2 if self.terminal else 10.0):
             return
         self._printed = now
@@ -54,8 +56,9 @@ class Progress:
             text += f", settlement {1e6 * settlement:.1f} um"
         if computed:
             text += f", speed-up so far {done / computed:.2f}"
-        if computed_here:
-            left = (now - self._started) / computed_here * to_compute
+        started, at_start = self._first
+        if computed_here > at_start:
+            left = (now - started) / (computed_here - at_start) * to_compute
             text += f", {left / 60:.0f} min left" if left > 90 else f", {left:.0f} s left"
         if self.terminal:
             print(f"\r\x1b[K{text}", end="", file=self.stream, flush=True)

@@ -196,18 +196,19 @@ def rows_move(
     move: FloatArray,
 ) -> None:
     """Fill ``move`` = -J^T mu (n, 3); the last multiplier is that of the mean height."""
-    m = len(first)
-    move[:] = 0.0
-    for c in range(m):
+    move[:, :2], move[:, 2] = 0.0, -height_share * multiplier[-1]
+    for c in range(len(first)):
         mu = multiplier[c]
         if mu != 0.0:
             i, j = first[c], second[c]
-            for a in range(3):
-                move[i, a] += mu * normal[c, a]
-                if j >= 0:
-                    move[j, a] -= mu * normal[c, a]
-    for i in range(len(move)):
-        move[i, 2] -= height_share * multiplier[m]
+            x, y, z = mu * normal[c, 0], mu * normal[c, 1], mu * normal[c, 2]
+            move[i, 0] += x
+            move[i, 1] += y
+            move[i, 2] += z
+            if j >= 0:
+                move[j, 0] -= x
+                move[j, 1] -= y
+                move[j, 2] -= z
 
 
 @njit(cache=True)
@@ -220,19 +221,18 @@ def rows_change(
     change: FloatArray,
 ) -> None:
     """Fill ``change`` = J move (m + 1,): of the overlaps [m], and of the mean height last."""
-    m = len(first)
-    for c in range(m):
+    for c in range(len(first)):
         i, j = first[c], second[c]
-        total = 0.0
-        for a in range(3):
-            total -= normal[c, a] * move[i, a]
-            if j >= 0:
-                total += normal[c, a] * move[j, a]
-        change[c] = total
-    total = 0.0
+        x, y, z = move[i, 0], move[i, 1], move[i, 2]
+        if j >= 0:
+            x -= move[j, 0]
+            y -= move[j, 1]
+            z -= move[j, 2]
+        change[c] = -(normal[c, 0] * x + normal[c, 1] * y + normal[c, 2] * z)
+    height = 0.0
     for i in range(len(move)):
-        total += move[i, 2]
-    change[m] = height_share * total
+        height += move[i, 2]
+    change[len(first)] = height_share * height
 
 
 @njit(cache=True)
@@ -261,6 +261,22 @@ def _split(multiplier, gradient, two_sided, step, free, chopped):  # type: ignor
     return reduced, square, greatest
 
 
+@njit(cache=True, fastmath=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    """Scalar product, without a temporary array."""
+    total = 0.0
+    for c in range(len(a)):
+        total += a[c] * b[c]
+    return total
+
+
+@njit(cache=True)
+def _subtract(a, length, b):  # type: ignore[no-untyped-def]
+    """a -= length b, without a temporary array."""
+    for c in range(len(a)):
+        a[c] -= length * b[c]
+
+
 @njit(cache=True)
 def rows_norm(
     first: IntArray,
@@ -278,9 +294,9 @@ def rows_norm(
     out, move = np.empty(m + 1), np.empty((grains, 3))
     norm = 1.0
     for _ in range(iterations):
-        vector /= np.sqrt(np.sum(vector**2))
+        vector /= np.sqrt(_dot(vector, vector))
         _apply(first, second, normal, height_share, 0.0, vector, move, out)
-        norm = np.sqrt(np.sum(out**2))
+        norm = np.sqrt(_dot(out, out))
         if norm == 0.0:
             return 1.0
         vector[:] = out
@@ -325,9 +341,9 @@ def multipliers_solve(
         if square > _PROPORTION**2 * reduced:
             _apply(first, second, normal, height_share, slack, chopped, move, applied)
             products += 1
-            length = np.sum(gradient * chopped) / np.sum(chopped * applied)
-            multiplier -= length * chopped
-            gradient -= length * applied
+            length = _dot(gradient, chopped) / _dot(chopped, applied)
+            _subtract(multiplier, length, chopped)
+            _subtract(gradient, length, applied)
             reduced, square, greatest = _split(
                 multiplier, gradient, two_sided, step, free, chopped
             )
@@ -335,26 +351,22 @@ def multipliers_solve(
             continue
         _apply(first, second, normal, height_share, slack, direction, move, applied)
         products += 1
-        curvature = np.sum(direction * applied)
-        length = np.sum(gradient * direction) / curvature
+        curvature = _dot(direction, applied)
+        length = _dot(gradient, direction) / curvature
         feasible = np.inf
         for c in range(size):
             if not two_sided[c] and direction[c] > 0.0:
                 feasible = min(feasible, multiplier[c] / direction[c])
+        _subtract(multiplier, min(length, feasible), direction)
+        _subtract(gradient, min(length, feasible), applied)
+        reduced, square, greatest = _split(multiplier, gradient, two_sided, step, free, chopped)
         if length <= feasible:
-            multiplier -= length * direction
-            gradient -= length * applied
-            reduced, square, greatest = _split(
-                multiplier, gradient, two_sided, step, free, chopped
-            )
-            direction *= -np.sum(free * applied) / curvature
-            direction += free
+            turn = _dot(free, applied) / curvature
+            for c in range(size):
+                direction[c] = free[c] - turn * direction[c]
             continue
-        multiplier -= feasible * direction
-        gradient -= feasible * applied
-        _split(multiplier, gradient, two_sided, step, free, chopped)
+        _subtract(multiplier, step, free)
         for c in range(size):
-            multiplier[c] -= step * free[c]
             if not two_sided[c]:
                 multiplier[c] = max(multiplier[c], 0.0)
         _apply(first, second, normal, height_share, slack, multiplier, move, applied)

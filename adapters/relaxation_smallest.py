@@ -45,7 +45,7 @@ OPEN_ITERATIONS = 35
 """Iterations after which contacts of the network that can not be closed are left open."""
 STEP_MAX = 0.5
 """Greatest step of a grain in its own radii: beyond it the linearised contacts mislead."""
-PRODUCTS_MAX = 500
+PRODUCTS_MAX = 200
 """Products with J J^T in one linearised problem."""
 
 Geometry = Callable[[FloatArray, IntArray, IntArray], Neighbours]
@@ -153,7 +153,7 @@ def smallest_move(
             np.append(rows.member, True),
             right,
             norm,
-            max(0.3 * tolerance, 0.01 * violation),
+            max(0.3 * tolerance, 0.1 * violation),
             PRODUCTS_MAX,
             n,
             rows.multiplier,

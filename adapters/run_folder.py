@@ -58,8 +58,8 @@ class Outcome:
     """What else the report tells: time step, piston mesh, command, relaxation."""
 
 
-STAGES = ("preparation", "window", "jump")
-"""Kinds of stages; at one cycle in this order."""
+STAGES = ("preparation", "jump", "window")
+"""Kinds of stages; at one cycle in this order: a jump of h = 0 comes before its window."""
 
 
 def stage_place(name: str) -> tuple[int, int, str]:

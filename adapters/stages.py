@@ -35,9 +35,6 @@ from adapters.scene import Scene
 from adapters.state import FloatArray, State, state_load, state_save
 from adapters.window import Window, state_read, window_load, window_read, window_save
 
-PERTURBATION = 1e-10
-"""Displacement [m] of one grain that makes the control of round-off: a bed is chaotic."""
-
 
 @dataclass(frozen=True)
 class Variant:
@@ -46,8 +43,10 @@ class Variant:
     name: str = "procedure"
     jumps: bool = True
     """False computes every cycle: the control."""
-    perturbed: bool = False
-    """True moves one grain by `PERTURBATION` after the first k_i cycles."""
+    still: bool = False
+    """True jumps over no cycle: dump, relax, resubmit, which shows what that alone costs."""
+    perturbation: float = 0.0
+    """Displacement [m] of one grain after the first k_i cycles: how far two equal runs part."""
 
 
 class Clock:
@@ -139,7 +138,7 @@ def prepare(run: Run) -> Bed:
 
 
 def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
-    """A window of ``cycles`` load cycles in a fresh process, the first ``healing`` kept unfitted."""
+    """A window of ``cycles`` load cycles, fresh process; the first ``healing`` are not fitted."""
     name = f"window_{bed.cycle:06d}"
     outcome = run.folder.outcome(name)
     if outcome is None:

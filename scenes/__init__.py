@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.resources import files
+from pathlib import Path
 
 
 def scene_names() -> tuple[str, ...]:
@@ -21,3 +22,8 @@ def scene_template(name: str) -> str:
     if name not in scene_names():
         raise KeyError(f"no scene {name!r}; there are {', '.join(scene_names())}")
     return (files(__name__) / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def scene_path(name: str) -> Path:
+    """File of the scene ``name``."""
+    return Path(str(files(__name__) / f"{name}.toml"))

@@ -1,0 +1,161 @@
+"""A run folder as its report reads it: as far as the run has come, changing nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from adapters.errors import UsageError
+from adapters.report_error import History, cost_total, history_of
+from adapters.run_folder import Outcome, RunFolder
+from adapters.scene import Scene
+from adapters.scene_file import scene_load
+from adapters.state import FloatArray, State, state_load
+from adapters.window import Window, window_load
+
+CONTROL = "control"
+"""Folder inside a run that holds the full run beside it."""
+
+
+@dataclass(frozen=True)
+class FailedJump:
+    """A jump that was given up."""
+
+    stage: str
+    why: str
+    lost_s: float
+    """What it cost and no finished stage bears [s]; see `lost_time`."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """One run of the scene: the procedure, its control, or another variant beside it."""
+
+    name: str
+    folder: RunFolder
+    outcomes: tuple[Outcome, ...]
+    """Finished stages in order, failed jumps left out."""
+    names: tuple[str, ...]
+    """Their folders."""
+    failed_jumps: tuple[FailedJump, ...]
+    discarded: tuple[str, ...]
+    """Stages whose unfinished or superseded work was moved away; empty folders left out."""
+    events: tuple[dict[str, Any], ...]
+
+    @property
+    def history(self) -> History:
+        """The table of the run, with the CPU time at each row; lost time is borne by the first."""
+        return history_of(self.outcomes, sum(jump.lost_s for jump in self.failed_jumps))
+
+    @property
+    def preparation(self) -> Outcome | None:
+        """The outcome of the rain of grains, once it is done."""
+        return next((o for o in self.outcomes if o.stage == "preparation"), None)
+
+    @property
+    def jumps(self) -> list[tuple[str, Outcome]]:
+        """Folder and outcome of every jump that was kept."""
+        return [pair for pair in zip(self.names, self.outcomes, strict=True) if pair[1].stage == "jump"]
+
+    @property
+    def windows(self) -> list[tuple[str, Outcome]]:
+        """Folder and outcome of every window."""
+        return [
+            pair for pair in zip(self.names, self.outcomes, strict=True) if pair[1].stage == "window"
+        ]
+
+    def start(self) -> State:
+        """The bed before the first load cycle."""
+        return state_load(self.folder.path / "preparation" / "state.npz")
+
+    def window(self, name: str) -> Window:
+        """States and piston of one window."""
+        return window_load(self.folder.path / name / "states.npz")
+
+    def position(self, cycle: int) -> FloatArray:
+        """Centres at the end of a cycle [m], shape (n, 3); raises `UsageError` for a jumped one."""
+        if cycle == 0:
+            return self.start().position
+        for name, outcome in self.windows:
+            if outcome.first_cycle < cycle <= outcome.last_cycle:
+                return self.window(name).position[cycle - outcome.first_cycle]
+        for name, outcome in self.jumps:
+            if outcome.last_cycle == cycle:
+                return state_load(self.folder.path / name / "relaxed.npz").position
+        raise UsageError(f"no state was computed at cycle {cycle}", where=str(self.folder.path))
+
+    def before(self, jump: Outcome) -> State | None:
+        """The computed state a jump starts from."""
+        for name, outcome in self.windows:
+            if outcome.last_cycle == jump.first_cycle:
+                return self.window(name).state(-1)
+        return None
+
+
+@dataclass(frozen=True)
+class Record:
+    """All that the report tells of."""
+
+    path: Path
+    manifest: dict[str, Any]
+    scene: Scene
+    run: Track
+    control: Track | None
+    """None when there is none, or it has not yet a cycle of its own."""
+    others: tuple[Track, ...]
+    """Further runs of the scene inside the folder, such as one from a perturbed state."""
+
+
+def record_read(path: Path) -> Record:
+    """Read the run folder ``path``; raises `UsageError` when it is none."""
+    folder = RunFolder(path)
+    manifest = folder.manifest()
+    scene = scene_load(path / "scene.toml", manifest["overrides"])
+    beside = {
+        inner.name: track_read(inner.name, RunFolder(inner))
+        for inner in sorted(path.iterdir())
+        if (inner / "settlement.csv").exists()
+    }
+    control = beside.pop(CONTROL, None)
+    if control is not None and not len(control.history.cycle):
+        control = None
+    others = tuple(track for track in beside.values() if len(track.history.cycle))
+    return Record(path, manifest, scene, track_read("this run", folder), control, others)
+
+
+def track_read(name: str, folder: RunFolder) -> Track:
+    """One run's finished stages, failures and events."""
+    names, outcomes, failed = [], [], []
+    events = folder.events()
+    for stage in folder.stage_names():
+        outcome, why = folder.outcome(stage), folder.failure(stage)
+        if why:
+            failed.append(FailedJump(stage, why, lost_time(stage, outcome, events)))
+        elif outcome is not None:
+            names.append(stage)
+            outcomes.append(outcome)
+    home = folder.path / "discarded"
+    discarded = sorted(p.name for p in home.iterdir() if any(p.iterdir())) if home.exists() else []
+    return Track(
+        name, folder, tuple(outcomes), tuple(names), tuple(failed), tuple(discarded), tuple(events)
+    )
+
+
+def lost_time(stage: str, outcome: Outcome | None, events: Sequence[dict[str, Any]]) -> float:
+    """Time of a failed jump that no finished stage bears [s].
+
+    Python's own goes over to the next stage.  A jump that was finished and then failed in the
+    window behind it lost its own cost and the engine's, of which only the elapsed time is known:
+    from the event before the failure to the failure.
+    """
+    if outcome is None:
+        return 0.0
+    lost = cost_total(outcome.cost)
+    for before, event in zip(events, events[1:], strict=False):
+        if event["event"] == "jump failed" and event.get("stage") == stage:
+            ended, began = (datetime.fromisoformat(e["time"]) for e in (event, before))
+            lost += (ended - began).total_seconds()
+    return lost

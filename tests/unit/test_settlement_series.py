@@ -1,0 +1,162 @@
+"""Settlement series from CSV files, run folders and dumps, and what is said of faulty ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from adapters.dump import Frame, dump_write
+from adapters.errors import TrackbedError, UsageError
+from adapters.settlement_series import series_read
+
+
+def written(path: Path, text: str) -> Path:
+    """``path`` with this text in it."""
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def dumped(path: Path, heights: dict[int, list[float]], first_id: int = 1) -> Path:
+    """A dump of grains at these heights [m], by time step."""
+    frames = []
+    for step, z in heights.items():
+        identifier = np.arange(first_id, first_id + len(z), dtype=float)
+        values = np.stack([identifier, np.array(z)], axis=1)
+        frames.append(Frame(step, ("id", "z"), values, np.array([[0.0, 1.0]] * 3)))
+    dump_write(path, frames)
+    return path
+
+
+@pytest.mark.parametrize(("column", "unit"), [("settlement", "m"), ("settlement_mm", "mm")])
+def test_unit_is_that_of_the_header(tmp_path: Path, column: str, unit: str) -> None:
+    """A plain column is in m, settlement_mm in mm; other columns, comments, order do not matter."""
+    text = f"# a track\nstress, Cycle ,{column}\n5,20,0.5\n\n5,10,0.25\n# end\n5,30.5,0.75\n"
+    series = series_read([written(tmp_path / "series.csv", text)])
+    assert series.unit == unit
+    assert series.cycle.tolist() == [10.0, 20.0, 30.5]
+    assert series.settlement.tolist() == [0.25, 0.5, 0.75]
+    assert series.since(20).settlement.tolist() == [0.5, 0.75]
+
+
+def test_only_computed_rows_are_taken(tmp_path: Path) -> None:
+    """Of a run folder's table, healing and jumped cycles stay out, cells they leave empty too."""
+    text = (
+        "cycle,settlement,kind,coordination_number\n1,1e-5,computed,4.5\n2,2e-5,computed,\n"
+        "12,,jumped,\n13,9e-5,healing,4.5\n14,4e-5,computed,4.6\n"
+    )
+    written(tmp_path / "settlement.csv", text)
+    series = series_read([tmp_path])
+    assert series.cycle.tolist() == [1.0, 2.0, 14.0]
+    assert series.settlement.tolist() == [1e-5, 2e-5, 4e-5]
+
+
+@given(
+    rows=st.dictionaries(
+        st.floats(0, 1e7), st.floats(-1.0, 1.0, allow_subnormal=False), min_size=1, max_size=20
+    ),
+    bom=st.booleans(),
+    end=st.sampled_from(["\n", "\r\n"]),
+)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50, deadline=None
+)
+def test_csv_is_read_without_loss(
+    tmp_path: Path, rows: dict[float, float], bom: bool, end: str
+) -> None:
+    """Any cycles and settlements written in full come back to the last bit, sorted."""
+    lines = ["cycle,settlement", *(f"{cycle!r},{value!r}" for cycle, value in rows.items())]
+    path = tmp_path / "series.csv"
+    path.write_bytes(("\ufeff" * bom + end.join(lines)).encode())
+    series = series_read([path])
+    expected = sorted({cycle + 0.0: value for cycle, value in rows.items()}.items())
+    assert list(zip(series.cycle.tolist(), series.settlement.tolist(), strict=True)) == expected
+
+
+@given(content=st.one_of(st.text(max_size=80), st.binary(max_size=80)))
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=100, deadline=None
+)
+def test_any_file_is_read_or_refused_with_a_sentence(tmp_path: Path, content: str | bytes) -> None:
+    """Text and bytes of any kind, named .csv or after a dump, never end in a traceback."""
+    data = content if isinstance(content, bytes) else content.encode(errors="surrogatepass")
+    for head, name in ((b"", "a.csv"), (b"cycle,settlement\n", "b.csv"), (b"", "c.dump")):
+        path = tmp_path / name
+        path.write_bytes(head + data)
+        try:
+            series = series_read([path])
+        except TrackbedError as error:
+            assert name in str(error)  # noqa: PT017
+        else:
+            assert np.isfinite(series.settlement).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "message"),
+    [
+        ("", "", "empty"),
+        ("cycle,settlement\n", "", "no computed cycle"),
+        ("cycle,settlement,kind\n1,0.0,jumped\n", "", "no computed cycle"),
+        ("1,0.5\n2,0.6\n", ":1", "no column cycle"),
+        ("cycles,settlement\n", ":1", "did you mean cycle?"),
+        ("cycle,setlement\n", ":1", "did you mean settlement?"),
+        ("cycle,settlement_inch\n", ":1", "no column settlement"),
+        ("cycle;settlement\n1;2\n", ":1", "no column cycle"),
+        ("cycle,settlement,settlement_mm\n", ":1", "two columns settlement"),
+        ("cycle,settlement,cycle\n", ":1", "two columns cycle"),
+        ("cycle,settlement\n1,0.0\n2\n", ":3", "1 cells under a header of 2"),
+        ("cycle,settlement\n1,0.0\n2,0.1,\n", ":3", "3 cells under a header of 2"),
+        ("cycle,settlement\n1,0.0\n2,abc\n", ":3, column settlement", "'abc' is not a number"),
+        ("cycle,settlement\n,0.0\n", ":2, column cycle", "'' is not a number"),
+        ("cycle,settlement_mm\n1,nan\n", ":2, column settlement_mm", "not a finite number"),
+        ("cycle,settlement\n\n\n-1,0.0\n", ":4, column cycle", "negative"),
+        ("cycle,settlement\n5,0.0\n6,0.1\n5,0.2\n", ":4, column cycle", "given in line 2 already"),
+        ("cycle,settlement,kind\n1,0,guessed\n", ":2, column kind", "'guessed' is no kind"),
+        ('cycle,settlement\n"1,0.5\n', "", "not a text file of comma-separated values"),
+    ],
+)
+def test_faulty_csv_names_file_line_and_column(
+    tmp_path: Path, text: str, place: str, message: str
+) -> None:
+    """Each fault of a CSV is refused where it is."""
+    path = written(tmp_path / "series.csv", text)
+    with pytest.raises(UsageError) as raised:
+        series_read([path])
+    assert raised.value.where == f"{path}{place}"
+    assert message in raised.value.what
+
+
+def test_dumps_are_taken_in_natural_order(tmp_path: Path) -> None:
+    """2.dump comes before 10.dump; settlement is the drop of the mean height, frame by frame."""
+    late = dumped(tmp_path / "10.dump", {300: [1.0, 2.0], 400: [0.8, 2.0]})
+    early = dumped(tmp_path / "2.dump", {100: [1.5, 2.5], 200: [1.2, 2.6], 300: [1.0, 2.0]})
+    series = series_read([late, early])
+    assert series.unit == "m"
+    assert series.cycle.tolist() == [0.0, 1.0, 2.0, 3.0]
+    np.testing.assert_allclose(series.settlement, [0.0, 0.1, 0.5, 0.6], atol=1e-15)
+    steps = series_read([late, early], steps_per_cycle=50)
+    assert steps.cycle.tolist() == [2.0, 4.0, 6.0, 8.0]
+
+
+def test_series_of_unlike_files_is_refused(tmp_path: Path) -> None:
+    """Other grains, time that runs back, and mixed kinds of files are named."""
+    first = dumped(tmp_path / "1.dump", {100: [1.0, 2.0]})
+    others = dumped(tmp_path / "2.dump", {200: [1.0, 2.0]}, first_id=7)
+    earlier = dumped(tmp_path / "3.dump", {50: [1.0, 2.0]})
+    table = written(tmp_path / "series.csv", "cycle,settlement\n1,0\n")
+    for paths, message in (
+        ([first, others], r"2.dump, time step 200: the grains are not those"),
+        ([first, earlier], r"3.dump, time step 50: the time step falls from 100"),
+        ([first, table], r"series.csv: only dumps can be joined"),
+        ([first, tmp_path], r"only dumps can be joined"),
+        ([tmp_path], r"settlement.csv: can not read the series \(No such file"),
+        ([tmp_path / "absent.dump"], r"absent.dump"),
+        ([], "no series was named"),
+    ):
+        with pytest.raises(UsageError, match=message):
+            series_read(paths)
+    with pytest.raises(UsageError, match="steps per cycle"):
+        series_read([first], steps_per_cycle=0)

@@ -1,0 +1,209 @@
+"""The flow chart of Fig. 10 on the fake engine, whose settlement is known in closed form."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters import procedure, stages
+from adapters.engine_fake import SETTLEMENT
+from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
+from adapters.progress import Progress
+from adapters.run_folder import RunFolder
+from adapters.window import window_load
+from scenes import scene_path
+
+QUIET = Progress(quiet=True)
+
+
+def settle(folder: Path, *overrides: str, control: bool = False) -> list[dict[str, str]]:
+    """Run the coarse scene on the fake engine; the rows of settlement.csv."""
+    procedure.run_scene(
+        scene_path("karrech-coarse"),
+        folder,
+        control=control,
+        overrides=['engine.name="fake"', *overrides],
+        progress=QUIET,
+    )
+    return rows_of(folder)
+
+
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    with (folder / "settlement.csv").open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def stages_of(folder: Path) -> list[str]:
+    return RunFolder(folder).stage_names()
+
+
+def test_flow_chart(tmp_path: Path) -> None:
+    """k_i cycles, k cycles, then jumps of h, each followed by healing and k cycles, to the end."""
+    rows = settle(
+        tmp_path / "run",
+        "procedure.k_i=10",
+        "procedure.k=5",
+        "procedure.h=[10, 20]",
+        "procedure.healing_cycles=2",
+        "procedure.total_cycles=70",
+    )
+    assert stages_of(tmp_path / "run") == [
+        "preparation",
+        "window_000000",
+        "window_000010",
+        "jump_000015_1",
+        "window_000025",
+        "jump_000032_1",
+        "window_000052",
+        "window_000059",
+        "window_000064",
+        "window_000069",
+    ]
+    kinds = {int(row["cycle"]): row["kind"] for row in rows}
+    assert [cycle for cycle, kind in kinds.items() if kind == "jumped"] == [25, 52]
+    assert [cycle for cycle, kind in kinds.items() if kind == "healing"] == [26, 27, 53, 54]
+    assert max(kinds) == 70
+
+
+def test_settlement_of_the_closed_form(tmp_path: Path) -> None:
+    """Against u = a ln(1 + N): the log law fits N, which differs by 1/N, less than 1 % here."""
+    rows = settle(tmp_path / "run")
+    final = float(rows[-1]["settlement"])
+    assert final == pytest.approx(SETTLEMENT * np.log(1 + 100), rel=0.01)
+    jumped = [float(row["settlement"]) for row in rows if row["kind"] == "jumped"]
+    assert jumped[0] > 0
+
+
+def test_healing_cycles_stay_out_of_the_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The fit after a jump sees k + 1 states, and none of the healing ones."""
+    seen: list[np.ndarray] = []
+    real = stages.jump_field
+
+    def spy(cycle: np.ndarray, *rest: object) -> np.ndarray:
+        seen.append(cycle)
+        return real(cycle, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(stages, "jump_field", spy)
+    settle(tmp_path / "run", "procedure.h=10", "procedure.total_cycles=120")
+    first, second = seen[:2]
+    assert first.tolist() == list(range(20, 41))
+    assert second.tolist() == list(range(55, 76))  # 40 + 10 jumped + 5 healing, then k = 20
+
+
+def test_control_computes_every_cycle_and_shares_the_start(tmp_path: Path) -> None:
+    """The control has no jump; its files before the first jump are those of the procedure."""
+    settle(tmp_path / "run", control=True)
+    control = tmp_path / "run" / "control"
+    assert all(row["kind"] == "computed" for row in rows_of(control))
+    assert [int(row["cycle"]) for row in rows_of(control)] == list(range(1, 101))
+    shared = Path("window_000020") / "states.npz"
+    assert (control / shared).samefile(tmp_path / "run" / shared)
+
+
+def test_no_jump_h_zero(tmp_path: Path) -> None:
+    """h = 0 resubmits without a jump: it ends where the control does, to the relaxation's bar."""
+    still = settle(tmp_path / "still", "procedure.h=0", control=True)
+    control = rows_of(tmp_path / "still" / "control")
+    assert any(name.startswith("jump") for name in stages_of(tmp_path / "still"))
+    assert float(still[-1]["settlement"]) == pytest.approx(
+        float(control[-1]["settlement"]), abs=1e-6
+    )
+
+
+def test_failed_jump_is_tried_again_half_as_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two failures leave h = 20, 10, 5; the events name each; the run goes on."""
+    lengths: list[int] = []
+    real = stages.jump
+
+    def fail_twice(run: stages.Run, bed: stages.Bed, h: int, attempt: int) -> stages.Bed:
+        lengths.append(h)
+        if attempt <= 2:
+            raise NotConverged("made to fail")
+        return real(run, bed, h, attempt)
+
+    monkeypatch.setattr(stages, "jump", fail_twice)
+    rows = settle(tmp_path / "run", "procedure.total_cycles=90")
+    assert lengths[:3] == [20, 10, 5]
+    assert [int(row["cycle"]) for row in rows if row["kind"] == "jumped"][0] == 45
+    events = RunFolder(tmp_path / "run").events()
+    assert [e["stage"] for e in events if e["event"] == "jump failed"][:2] == [
+        "jump_000040_1",
+        "jump_000040_2",
+    ]
+
+
+def test_jump_that_keeps_failing_ends_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After the first attempt and three shorter ones: exit code 6, the windows before are kept."""
+
+    def fail(*_: object) -> stages.Bed:
+        raise NotCredible("made to fail")
+
+    monkeypatch.setattr(stages, "jump", fail)
+    with pytest.raises(NotCredible, match="failed 4 times") as caught:
+        settle(tmp_path / "run")
+    assert caught.value.exit_code == 6
+    assert int(rows_of(tmp_path / "run")[-1]["cycle"]) == 40
+
+
+def test_piston_is_never_lifted_by_a_jump(tmp_path: Path) -> None:
+    """The piston follows the law of its own heights, downwards only."""
+    settle(tmp_path / "run")
+    run = tmp_path / "run"
+    before = window_load(run / "window_000020" / "states.npz").piston_heights()[-1]
+    after = window_load(run / "window_000060" / "states.npz").piston_start
+    assert after <= before
+    drop = SETTLEMENT * np.log(61 / 41)
+    assert before - after == pytest.approx(drop, rel=0.05)
+
+
+def test_another_scene_is_refused_with_the_difference(tmp_path: Path) -> None:
+    """A changed physical parameter names both values and leaves the run as it was."""
+    settle(tmp_path / "run")
+    before = (tmp_path / "run" / "settlement.csv").read_bytes()
+    with pytest.raises(SceneError, match=r"loading\.frequency: 50\.0 in the run, 25\.0 now"):
+        settle(tmp_path / "run", "loading.frequency=25.0")
+    assert (tmp_path / "run" / "settlement.csv").read_bytes() == before
+
+
+def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
+    """Nothing is written among a user's own files."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "thesis.txt").write_text("mine")
+    with pytest.raises(UsageError, match="something else"):
+        settle(tmp_path / "run")
+
+
+def test_unloaded_scene_is_prepared_only(tmp_path: Path) -> None:
+    """Without loading there are no cycles, and no piston."""
+    text = scene_path("karrech-coarse").read_text()
+    head, _, rest = text.partition("[loading]")
+    scene = tmp_path / "scene.toml"
+    scene.write_text(head + "[engine]" + rest.partition("[engine]")[2])
+    procedure.run_scene(scene, tmp_path / "run", overrides=['engine.name="fake"'], progress=QUIET)
+    assert stages_of(tmp_path / "run") == ["preparation"]
+
+
+def test_costs_add_up(tmp_path: Path) -> None:
+    """Every stage names its CPU time by purpose, none negative, and the sum is what was spent."""
+    import time
+
+    start = time.process_time()
+    settle(tmp_path / "run")
+    spent = time.process_time() - start
+    costs = [
+        json.loads((tmp_path / "run" / name / "outcome.json").read_text())["cost"]
+        for name in stages_of(tmp_path / "run")
+    ]
+    assert all(value >= -1e-9 for cost in costs for value in cost.values())
+    inside = sum(v for cost in costs[1:] for k, v in cost.items() if k != "start_up")
+    assert inside <= 1.1 * spent + 0.05
