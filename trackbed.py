@@ -91,12 +91,12 @@ def import_failed(error: ImportError) -> str:
 
 def explained(error: BaseException) -> tuple[str, int]:
     """What to say of an error, and the exit code."""
+    if hasattr(error, "exit_code"):
+        return str(error), error.exit_code
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", 130
     if isinstance(error, ImportError) and (why := import_failed(error)):
         return why, 4
-    if hasattr(error, "exit_code"):
-        return str(error), error.exit_code
     if isinstance(error, OSError):
         return str(error), 2
     return (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class WindowFigures:
 
 
 def check_complete(scene: Scene, window: Window, cycles: int) -> None:
-    """All instants and all grains are there, and every number is finite.
+    """All instants and all grains are there, the piston too, and every number is finite.
 
     Raises `EngineFailed` for missing instants, `NotCredible` for lost grains and nan.
     """
@@ -66,6 +66,21 @@ def check_complete(scene: Scene, window: Window, cycles: int) -> None:
                 where="states.dump",
                 remedy="a shorter time step; grains may share one centre",
             )
+    track = window.piston
+    if not np.isin(window.time_step[1:], track.time_step).all():
+        raise EngineFailed(
+            f"the piston's record ends at step {track.time_step.max(initial=0)}, "
+            f"the window at {window.time_step[-1]}",
+            where="piston.txt",
+            remedy="the engine ended early; resume computes the window again",
+        )
+    finite = np.isfinite([getattr(track, f.name) for f in fields(track)]).all(axis=0)
+    if not finite.all():
+        raise NotCredible(
+            f"the piston's record is not finite from step {track.time_step[~finite][0]} on",
+            where="piston.txt",
+            remedy="a shorter time step, or a heavier piston",
+        )
 
 
 def check_state(scene: Scene, state: State) -> None:

@@ -85,7 +85,8 @@ def dump_write(path: str | Path, frames: Iterable[Frame], format: str = "%.17g")
 
     ``format`` is one printf format for all columns, or one for each, separated by blanks, as in
     the engine's ``dump_modify format``; the default loses nothing.  LIGGGHTS takes the file in
-    ``read_dump FILE STEP x y z vx vy vz radius replace yes box no``.
+    ``read_dump FILE STEP x y z vx vy vz radius replace yes box no`` when it has the columns
+    ``id`` and ``type`` too; without them it stops, and says nothing.
     """
     path = Path(path)
     temporary = path.with_name(path.name + ".partial")

@@ -17,8 +17,10 @@ import os
 import resource
 import signal
 import subprocess
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -117,6 +119,10 @@ class Engine(Protocol):
         """Run ``deck`` in ``folder``; ``watch`` is called now and then.  Raises `EngineFailed`."""
 
 
+CRASHES = (signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGBUS, signal.SIGILL)
+"""Signals by which a program ends itself; all others come from outside."""
+
+
 def _die_with_parent() -> None:
     """Have the kernel end this child when Python is killed, so that no orphan keeps computing."""
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # 1 = PR_SET_PDEATHSIG
@@ -183,11 +189,26 @@ def engine_named(name: str) -> Engine:
     return LiggghtsEngine()
 
 
-def raise_interrupted(number: int, _frame: object) -> None:
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """SIGTERM and Ctrl-C raise `Interrupted` inside, in the main thread; elsewhere a no-op."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    numbers = (signal.SIGTERM, signal.SIGINT)
+    before = {number: signal.signal(number, _raise_interrupted) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+
+def _raise_interrupted(number: int, _frame: object) -> None:
     """Signal handler: end the engine, keep every finished window, exit with 130."""
     raise Interrupted(
-        f"stopped by {signal.Signals(number).name}; every finished window is saved",
-        remedy="go on with: trackbed resume RUN",
+        f"stopped by {signal.Signals(number).name}; every finished window is saved"
+        "\n  -> go on with: trackbed resume RUN"
     )
 
 
@@ -203,16 +224,20 @@ def screen_tail(folder: Path, lines: int = 3) -> str:
 
 
 def engine_failure(status: int, folder: Path) -> EngineFailed:
-    """The error for a process that ended badly, with the engine's own words."""
-    how = (
-        f"was ended by {signal.Signals(-status).name}"
-        if status < 0
-        else f"ended with exit code {status} and no sentinel line"
-    )
+    """The error for a process that ended badly, with the engine's own words.
+
+    ``status`` is its exit code, or minus the signal that ended it; shells and mpirun say
+    128 + signal.
+    """
+    number = -status if status < 0 else status - 128
+    if number in signal.valid_signals():
+        how = f"was ended by {signal.Signals(number).name}"
+    else:
+        how = f"ended with exit code {status} and no sentinel line"
     error = EngineFailed(
         f"the engine {how}: {screen_tail(folder)}",
         where=str(folder),
         remedy="mend the cause and go on with: trackbed resume RUN",
     )
-    error.from_outside = status < 0
+    error.from_outside = number in signal.valid_signals() and number not in CRASHES
     return error

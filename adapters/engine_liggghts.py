@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable
 from math import ceil, sqrt
@@ -198,8 +199,11 @@ class LiggghtsEngine:
                 where=str(folder),
                 remedy="more damping (viscous_alpha), or a shorter time step",
             )
+        if status == 0 and "SIGINT/SIGTERM caught" in text:
+            raise engine_failure(-signal.SIGTERM, folder)
         if status != 0 or not re.search(r"^COMPLETE step \d+", text, re.MULTILINE):
             raise engine_failure(status, folder)
+        restart_check(folder)
         loop_s = sum(float(s) for s in re.findall(r"^Loop time of (\S+) on", text, re.MULTILINE))
         return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)
 
@@ -279,11 +283,12 @@ class LiggghtsEngine:
         )
 
 
-def restart_of(folder: Path) -> Path:
-    """The restart file a finished run left; raises `EngineFailed` when there is none."""
+def restart_check(folder: Path) -> None:
+    """Raise `EngineFailed` when a finished run left no restart file, as on a full disk."""
     path = folder / "end.restart"
     if not path.exists() or path.stat().st_size == 0:
         raise EngineFailed(
-            "the engine left no restart file", where=str(path), remedy="resume computes it again"
+            "the engine left no restart file",
+            where=str(path),
+            remedy="look whether the disk is full; resume computes it again",
         )
-    return path

@@ -78,7 +78,10 @@ class NotConverged(TrackbedError):
     exit_code = 7
 
 
-class Interrupted(TrackbedError):
-    """The user or the system asked us to stop; everything finished is saved."""
+class Interrupted(KeyboardInterrupt):
+    """The user or the system asked us to stop; everything finished is saved.
+
+    No `Exception`: nothing on its way up that mends errors may take it for one.
+    """
 
     exit_code = 130

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
-import signal
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from adapters import stages
-from adapters.engine import engine_named, raise_interrupted
+from adapters.engine import engine_named, interruptible
 from adapters.errors import EngineFailed, NotConverged, NotCredible, SceneError, UsageError
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder, disk_full_named, write_atomically
@@ -22,7 +21,7 @@ from adapters.stages import Bed, Run, Variant
 RETRIES = 3
 """How often a failed jump is tried again, each time half as long."""
 
-OWN_FILES = ("lock", "scene.toml", "dry_run")
+OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
 """What may stand in a run folder before its manifest is written."""
 
 CONTROL = Variant("control", jumps=False)
@@ -104,7 +103,7 @@ def run_scene(
         _dry_run(scene, run_path)
         return
     folder = RunFolder(run_path)
-    with folder.locked(), disk_full_named(run_path):
+    with interruptible(), disk_full_named(run_path), folder.locked():
         manifest_settle(folder, scene, scene_path, overrides, control)
         _run_all(folder, scene, control, progress)
 
@@ -114,15 +113,13 @@ def resume(run_path: Path, *, progress: Progress | None = None) -> None:
     folder = RunFolder(run_path)
     manifest = folder.manifest()
     scene = scene_load(run_path / "scene.toml", manifest["overrides"])
-    with folder.locked(), disk_full_named(run_path):
+    with interruptible(), disk_full_named(run_path), folder.locked():
         refuse_differences(manifest["scene"], scene_record(scene), run_path)
         folder.event("resumed")
         _run_all(folder, scene, manifest["control"], progress or Progress())
 
 
 def _run_all(folder: RunFolder, scene: Scene, control: bool, progress: Progress) -> None:
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, raise_interrupted)
     try:
         run_variant(folder, scene, Variant(), progress)
         if control:
@@ -155,6 +152,7 @@ def run_variant(folder: RunFolder, scene: Scene, variant: Variant, progress: Pro
         stages.prepare(run)
     else:
         settle(run)
+    here.settlement_write()  # a run killed after its last stage may lack a row
     return here
 
 

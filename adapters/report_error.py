@@ -86,22 +86,21 @@ def cost_total(cost: Mapping[str, float]) -> float:
     return sum(seconds for purpose, seconds in cost.items() if purpose != "start_up")
 
 
-def history_of(outcomes: Sequence[Outcome], lost_s: float = 0.0) -> History:
+def history_of(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = ()) -> History:
     """The table of a run from its stages; a window's cost is spread evenly over its cycles.
 
-    ``lost_s``: CPU time of failed attempts [s], borne by the first jump.  The preparation has no
-    rows and is left out of the cost.
+    ``lost``: after which cycle failed attempts lost how much CPU time [s].  The preparation has
+    no rows and is left out of the cost.
     """
     rows, cpu, spent = [], [], 0.0
     for outcome in outcomes:
         if outcome.stage == "preparation":
             continue
         cost = cost_total(outcome.cost)
-        if outcome.stage == "jump":
-            cost, lost_s = cost + lost_s, 0.0
         for number, row in enumerate(outcome.rows, start=1):
             rows.append(row)
-            cpu.append(spent + cost * number / len(outcome.rows))
+            failed = sum(seconds for cycle, seconds in lost if cycle < row["cycle"])
+            cpu.append(spent + failed + cost * number / len(outcome.rows))
         spent += cost
     columns = {
         column.name: np.array([_number(row.get(column.name)) for row in rows])
@@ -111,7 +110,7 @@ def history_of(outcomes: Sequence[Outcome], lost_s: float = 0.0) -> History:
         cycle=np.array([row["cycle"] for row in rows], np.int64),
         kind=tuple(row["kind"] for row in rows),
         **columns,
-        cpu_s=np.array(cpu) + lost_s,
+        cpu_s=np.array(cpu),
     )
 
 
@@ -184,8 +183,8 @@ class Beds:
 
     start: FloatArray
     """Before loading."""
-    before_jump: FloatArray
-    """Before the first jump; the last computed state both runs share."""
+    before_jump: FloatArray | None
+    """Before the first jump; the last computed state both runs share.  None without a jump."""
     full: FloatArray
     """The full run at the cycle of comparison."""
     own: FloatArray
@@ -234,9 +233,9 @@ def error_row(
     )
 
 
-def _displacement_error(start: FloatArray, beds: Beds) -> float:
+def _displacement_error(start: FloatArray | None, beds: Beds) -> float:
     """E_r, nan where the full run did not move on from ``start`` and E_r has no denominator."""
-    if np.array_equal(start, beds.full):
+    if start is None or np.array_equal(start, beds.full):
         return nan
     return error_of_displacement(start, beds.full, beds.own)
 

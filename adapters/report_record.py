@@ -10,7 +10,7 @@ from typing import Any
 
 from adapters.errors import UsageError
 from adapters.report_error import History, cost_total, history_of
-from adapters.run_folder import Outcome, RunFolder
+from adapters.run_folder import Outcome, RunFolder, stage_place
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State, state_load
@@ -25,6 +25,7 @@ class FailedJump:
     """A jump that was given up."""
 
     stage: str
+    first_cycle: int
     why: str
     lost_s: float
     """What it cost and no finished stage bears [s]; see `lost_time`."""
@@ -47,8 +48,8 @@ class Track:
 
     @property
     def history(self) -> History:
-        """The table of the run, with the CPU time at each row; lost time is borne by the first."""
-        return history_of(self.outcomes, sum(jump.lost_s for jump in self.failed_jumps))
+        """The table of the run, with the CPU time at each row."""
+        return history_of(self.outcomes, [(j.first_cycle, j.lost_s) for j in self.failed_jumps])
 
     @property
     def preparation(self) -> Outcome | None:
@@ -133,7 +134,7 @@ def track_read(name: str, folder: RunFolder) -> Track:
     for stage in folder.stage_names():
         outcome, why = folder.outcome(stage), folder.failure(stage)
         if why:
-            failed.append(FailedJump(stage, why, lost_time(stage, outcome, events)))
+            failed.append(FailedJump(stage, stage_place(stage)[0], why, lost_time(stage, outcome, events)))
         elif outcome is not None:
             names.append(stage)
             outcomes.append(outcome)

@@ -15,7 +15,7 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from errno import EDQUOT, ENOSPC
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,12 @@ class Outcome:
     notes: dict[str, Any] = field(default_factory=dict)
     """What else the report tells: time step, piston mesh, command, relaxation."""
 
+
+NEEDED = ("*.npz", "end.restart")
+"""Files of a stage that a run goes on from; the others may be removed to save space."""
+
+MANIFEST = ("scene", "overrides", "control")
+"""What a manifest must hold for its run to be resumed."""
 
 STAGES = ("preparation", "jump", "window")
 """Kinds of stages; at one cycle in this order: a jump of h = 0 comes before its window."""
@@ -104,6 +110,8 @@ class RunFolder:
             stream.truncate(0)
             stream.write(f"pid {os.getpid()} on {socket.gethostname()}")
             stream.flush()
+            for leftover in self.path.glob(".*.partial"):  # of a killed writer
+                leftover.unlink()
             yield
 
     def event(self, what: str, **details: object) -> None:
@@ -119,9 +127,9 @@ class RunFolder:
     def events(self) -> list[dict[str, Any]]:
         """All events; a last line cut short by a crash is left out."""
         path = self.path / "events.jsonl"
-        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
         events = []
-        for line in lines:
+        for line in text.splitlines():
             try:
                 events.append(json.loads(line))
             except json.JSONDecodeError:
@@ -129,12 +137,16 @@ class RunFolder:
         return events
 
     def outcome(self, name: str) -> Outcome | None:
-        """Outcome of a finished stage; None when it is not there or its outcome is damaged."""
+        """Outcome of a finished stage; None when it is not there, or not as it was left."""
+        folder = self.path / name
         try:
-            text = (self.path / name / "outcome.json").read_text(encoding="utf-8")
-            return Outcome(**json.loads(text))
-        except (OSError, ValueError, TypeError):
+            text = (folder / "outcome.json").read_text(encoding="utf-8")
+            outcome = Outcome(**json.loads(text))
+            found = _sizes(folder)
+            whole = outcome.notes.get("files", found) == found
+        except (OSError, ValueError, TypeError, AttributeError):
             return None
+        return outcome if whole else None
 
     def stage_names(self) -> list[str]:
         """Names of all stage folders in the order of the run."""
@@ -149,7 +161,12 @@ class RunFolder:
     def failure(self, name: str) -> str:
         """Why a jump was given up, or an empty text."""
         path = self.path / name / "failed.json"
-        return str(json.loads(path.read_text(encoding="utf-8"))["why"]) if path.exists() else ""
+        if not path.exists():
+            return ""
+        try:
+            return str(json.loads(path.read_text(encoding="utf-8"))["why"])
+        except (ValueError, TypeError, KeyError):
+            return "the record of its failure is damaged"
 
     def give_up(self, name: str, why: str) -> None:
         """Mark a jump as failed, for good: its attempt is not made again on resume."""
@@ -176,7 +193,11 @@ class RunFolder:
         return folder
 
     def finish(self, folder: Path, outcome: Outcome) -> Path:
-        """Write the outcome and move the stage to its place; then rewrite ``settlement.csv``."""
+        """Write the outcome and move the stage to its place; then rewrite ``settlement.csv``.
+
+        The outcome's notes get the sizes of the `NEEDED` files, which `outcome` looks for.
+        """
+        outcome = replace(outcome, notes=outcome.notes | {"files": _sizes(folder)})
         write_atomically(folder / "outcome.json", json.dumps(asdict(outcome), indent=1) + "\n")
         place = self.path / folder.name
         folder.rename(place)
@@ -193,6 +214,7 @@ class RunFolder:
         while (home / f"{folder.name}.{number}").exists():
             number += 1
         folder.rename(home / f"{folder.name}.{number}")
+        self.event("discarded", stage=folder.name, to=f"discarded/{folder.name}.{number}")
 
     def settlement_write(self) -> None:
         """Write ``settlement.csv`` from the outcomes of all finished stages."""
@@ -206,12 +228,14 @@ class RunFolder:
         """The manifest; raises `UsageError` when this is no run folder."""
         path = self.path / "manifest.json"
         try:
-            return dict(json.loads(path.read_text(encoding="utf-8")))
-        except (OSError, ValueError) as error:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            return {key: content[key] for key in MANIFEST} | content
+        except (OSError, ValueError, TypeError, KeyError) as error:
             raise UsageError(
                 "this is not a run folder (no readable manifest.json)",
                 where=str(self.path),
-                remedy="give the folder that trackbed run made",
+                remedy="give the folder that trackbed run made; if it was stopped in its first "
+                "second, start it again with: trackbed run SCENE",
             ) from error
 
     def share_start(self, other: RunFolder, last_cycle: int) -> None:
@@ -231,6 +255,12 @@ class RunFolder:
             shutil.copytree(other.path / name, temporary, copy_function=_link)
             temporary.rename(here)
         self.settlement_write()
+
+
+def _sizes(folder: Path) -> dict[str, int]:
+    """Size of each of the `NEEDED` files [bytes]."""
+    paths = sorted(path for pattern in NEEDED for path in folder.glob(pattern))
+    return {path.name: path.stat().st_size for path in paths}
 
 
 def _link(source: str, target: str) -> None:

@@ -1,9 +1,9 @@
 """The sample: a random start, and the figures of a bed (Karrech et al. 2007, section 2.3, Fig. 3).
 
 The paper's figures do not all agree.  Its Table 1 (relative density 0.5615, R, H, density) gives a
-weight of 3.96 N for the quarter cylinder, 15.8 N for the whole and about 990 grains; the 1,085 of
-our scene, which count the volume of the mean radius alone, weigh 4.2 to 4.3 N (17.3 N the whole)
-and stand 64 mm high.  The 13.6 N of Fig. 3a follow from none of these.
+weight of 3.96 N for the quarter cylinder, 15.8 N for the whole, and about 990 grains with its
+normal radii.  Our scene's 1,085, which follow from the volume of the mean radius alone, weigh about
+4.25 N (17.0 N the whole) and stand 64 mm high.  The 13.6 N of Fig. 3a follow from none of these.
 """
 
 from __future__ import annotations

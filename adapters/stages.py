@@ -111,7 +111,7 @@ def prepare(run: Run) -> Bed:
         position, height = sample_start(
             radius, scene.container, sample.relative_density_start, sample.seed
         )
-        folder = run.folder.begin(name)
+        folder = _begin(run, name)
         decks = run.engine.write_preparation(scene, position, radius, height, folder)
         done = run.engine.run(scene, "in.prepare", folder, lambda: None, decks)
         with run.clock.part("parse"):
@@ -142,7 +142,7 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
     name = f"window_{bed.cycle:06d}"
     outcome = run.folder.outcome(name)
     if outcome is None:
-        folder = run.folder.begin(name)
+        folder = _begin(run, name)
         decks = run.engine.write_cycles(run.scene, bed.start, cycles, folder)
         done = run.engine.run(run.scene, "in.cycles", folder, _watch(run, bed, folder), decks)
         with run.clock.part("parse"):
@@ -183,7 +183,7 @@ def jump(run: Run, bed: Bed, h: int, attempt: int) -> Bed:
     name = f"jump_{bed.cycle:06d}_{attempt}"
     folder = run.folder.path / name
     if run.folder.outcome(name) is None:
-        folder = run.folder.begin(name)
+        folder = _begin(run, name)
         before, target, piston_height = estimate(run, bed, h)
         with run.clock.part("relax"):
             position, record = relaxed(run, before, target, piston_height)
@@ -296,6 +296,12 @@ def _row(run: Run, state: State, kind: str) -> dict[str, Any]:
 
 def _run_notes(done: EngineRun) -> dict[str, Any]:
     return {"command": done.command, "wall_s": done.wall_s, "decks": done.decks}
+
+
+def _begin(run: Run, name: str) -> Path:
+    if (run.folder.path / name).exists():
+        run.progress.say(f"{name} is damaged: it is computed again, the old is in discarded/")
+    return run.folder.begin(name)
 
 
 def _finish(run: Run, folder: Path, outcome: Outcome) -> Path:

@@ -147,6 +147,7 @@ def contacts_of_frame(frame: Frame) -> Contacts:
 
 def state_read(folder: Path, wall_names: tuple[str, ...]) -> State:
     """The settled bed that a preparation left in ``folder``; raises as `window_read`."""
+    _check_files(folder, "states.dump", "contacts.dump")
     frame = list(dump_frames(folder / "states.dump"))[-1]
     contact_frame = list(dump_frames(folder / "contacts.dump"))[-1]
     return State(
@@ -162,6 +163,16 @@ def state_read(folder: Path, wall_names: tuple[str, ...]) -> State:
     )
 
 
+def _check_files(folder: Path, *names: str) -> None:
+    for name in names:
+        if not (folder / name).exists():
+            raise EngineFailed(
+                f"the engine left no {name}",
+                where=str(folder),
+                remedy="look at screen.txt there for the engine's own words",
+            )
+
+
 def _wall_force(frame: Frame, name: str) -> FloatArray:
     return frame.block(*(f"f_force_{name}[{axis}]" for axis in (1, 2, 3)))
 
@@ -173,13 +184,7 @@ def window_read(
 
     Raises `DumpError` for a malformed dump and `EngineFailed` for missing files.
     """
-    for name in ("states.dump", "contacts.dump", "piston.txt"):
-        if not (folder / name).exists():
-            raise EngineFailed(
-                f"the engine left no {name}",
-                where=str(folder),
-                remedy="look at screen.txt there for the engine's own words",
-            )
+    _check_files(folder, "states.dump", "contacts.dump", "piston.txt")
     frames = list(dump_frames(folder / "states.dump"))
     contact_frames = list(dump_frames(folder / "contacts.dump"))
     if [f.time_step for f in frames] != [f.time_step for f in contact_frames]:

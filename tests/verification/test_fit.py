@@ -114,7 +114,7 @@ def test_fit_noise_covers_correlated_residuals(correlation: float, reach: float)
 
 
 def test_ignoring_correlation_would_not_cover() -> None:
-    """What the autoregression is for: independent residuals would give less than two thirds of the width."""
+    """What the autoregression is for: shuffled residuals give less than 2/3 of the width."""
     cycle = np.arange(21.0, 61.0)
     settlement = 10 * np.log(cycle) + correlated_noise(3, 40, 0.8, 1)[:, 0]
     shuffled = settlement - 10 * np.log(cycle)

@@ -152,7 +152,7 @@ def read_pandas_round_trip(path: str) -> Any:
 
 
 def read_ovito(path: str) -> Any:
-    from ovito.io import import_file
+    from ovito.io import import_file  # type: ignore[import-not-found]
 
     pipeline = import_file(path, sort_particles=True)
     frames = [pipeline.compute(frame) for frame in range(pipeline.source.num_frames)]
