@@ -92,6 +92,12 @@ def check_state(scene: Scene, state: State) -> None:
             where="preparation",
             remedy="a shorter time step; look whether the container holds them",
         )
+    if not np.isfinite(state.position).all():
+        raise NotCredible(
+            "a position of the settled bed is not finite",
+            where="preparation",
+            remedy="a shorter time step",
+        )
     touching = neighbours(state.position, state.radius, scene.container.walls())
     share = float(touching.overlap.max(initial=0.0)) / float(state.radius.min())
     if not share <= OVERLAP_BOUND:

@@ -194,7 +194,7 @@ def status_register(parser: argparse.ArgumentParser) -> None:
 
 def status_command(arguments: argparse.Namespace) -> int:
     """Print how far a run is."""
-    from adapters.run_folder import status
+    from adapters.status import status
 
     content = status(arguments.run_folder).to_dict()
     if arguments.json:

@@ -24,6 +24,15 @@ from adapters.state import FloatArray
 EQUILIBRIUM_RATIO = 1e-6
 """Kinetic (translational) over potential energy at which a bed counts as settled; section 2.3."""
 
+SEAT_SPEED = 0.1
+"""Greatest speed of the piston while it finds the bed [m/s]."""
+
+SEAT_SHARE = 1.0
+"""Force that seats the piston, over the peak of the load."""
+
+PARTS = ("load", "run", "output", "start", "seat")
+"""Parts of a window's deck that depend on the scene or on where the window starts."""
+
 SETTLE_TIMES = 40
 """Falling times after which a bed that still moves is given up."""
 
@@ -92,12 +101,14 @@ class LiggghtsEngine:
         return decks.wall_names(scene.container, piston)
 
     def cycles_done(self, scene: Scene, start: EngineStart, folder: Path) -> int:
-        """Load cycles done so far, from the last line of ``piston.txt``."""
+        """Load cycles done so far, from the first and the last whole line of ``piston.txt``."""
         try:
             with (folder / "piston.txt").open("rb") as stream:
+                stream.readline()
+                first = int(stream.readline().split()[0])
                 stream.seek(max(stream.seek(0, 2) - 400, 0))
-                words = stream.read().splitlines()[-2].split()
-            return (int(words[0]) - start.time_step) // scene.steps_per_cycle
+                last = int(stream.read().splitlines()[-2].split()[0])
+            return (last - first) // scene.steps_per_cycle
         except (OSError, IndexError, ValueError):
             return 0
 
@@ -156,6 +167,7 @@ class LiggghtsEngine:
             "run_part": f"run_{waveform}.in",
             "output_part": f"output_{self._kind(scene)}.in",
             "start_part": f"start_{start.kind}.in",
+            "seat_part": f"seat_{'first' if start.first else 'none'}.in",
             "steps_per_cycle": steps,
             "run_steps": cycles * steps,
             "track_steps": steps // scene.samples_per_cycle,
@@ -165,8 +177,10 @@ class LiggghtsEngine:
         }
         if start.kind == "perturbed":
             parameters["perturbation"] = start.perturbation
-        if start.moved is not None or waveform == "series":
+        if start.moved is not None:
             parameters["start_step"] = start.time_step
+        if start.first:
+            parameters |= self._seat(scene)
         if waveform == "sine":
             parameters |= {
                 "force_mean": scene.loading.mean * scene.loaded_area,  # type: ignore[operator]
@@ -177,7 +191,7 @@ class LiggghtsEngine:
         if start.moved is not None:
             self._write_moved(scene, start, folder)
         parts = tuple(
-            str(parameters[f"{name}_part"]) for name in ("load", "run", "output", "start")
+            str(parameters[f"{name}_part"]) for name in PARTS
         )
         return self._write(scene, folder, decks.PARTS_CYCLES + parts, parameters)
 
@@ -238,6 +252,21 @@ class LiggghtsEngine:
             )
         )
         return decks.deck_copy(folder, (*parts, f"contact_{self._kind(scene)}.in"))
+
+    @staticmethod
+    def _seat(scene: Scene) -> dict[str, float | int | str]:
+        """How the piston is pressed on the bed and let go before the first cycle."""
+        steps = scene.steps_per_cycle
+        peak = float(scene.stress_at(np.linspace(0, 1, 1001)).max()) * scene.loaded_area
+        press_s = 2 * scene.sample.grain_radius.greatest / SEAT_SPEED
+        cycles = ceil(press_s / (steps * scene.time_step))
+        return {
+            "seat_force": SEAT_SHARE * peak,
+            "seat_speed": SEAT_SPEED,
+            "seat_steps": cycles * steps,
+            "release_force": float(scene.stress_at(0.0)) * scene.loaded_area,
+            "release_steps": ceil(cycles / 2) * steps,
+        }
 
     @staticmethod
     def _write_series(scene: Scene, cycles: int, folder: Path) -> dict[str, float | int | str]:

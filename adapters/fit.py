@@ -118,7 +118,6 @@ def fit_noise(
     law: Law, cycle: FloatArray, settlement: FloatArray, to_cycle: float, probability: float
 ) -> float:
     """Half-width of the part of `prediction_band` that the residuals of the fit cause."""
-    from scipy.signal import lfilter
     from scipy.special import stdtrit
 
     parameters = law.fit(cycle, settlement)
@@ -135,15 +134,26 @@ def fit_noise(
     deviation = sqrt(square / count * effective / freedom)
 
     members = int(np.clip(2e7 / count, 50, NOISE_SERIES))
-    white = np.random.default_rng(0).standard_normal((count + 1, members))
-    white[1:-1] *= sqrt(1 - correlation**2)
-    noise = deviation * lfilter([1.0], [1.0, -correlation], white[:-1], axis=0)
+    random = np.random.default_rng(0)
+    noise = deviation * autoregression(random, correlation, (count, members))
     kept = correlation ** ((to_cycle - cycle[-1]) / (cycle[-1] - cycle[-2]))
-    final = kept * noise[-1] + deviation * sqrt(1 - kept**2) * white[-1]
+    news = deviation * random.standard_normal(members)
+    final = kept * noise[-1] + sqrt(1 - kept**2) * news
     again = law.fit(cycle, trend[:, None] + noise)
     increments = law.increment(again, float(cycle[-1]), to_cycle)
     error = final - noise[-1] - (increments - law.increment(parameters, cycle[-1], to_cycle))
     return float(stdtrit(freedom, (1 + probability) / 2) * np.sqrt(np.mean(error**2)))
+
+
+def autoregression(
+    random: np.random.Generator, correlation: float, shape: tuple[int, int]
+) -> FloatArray:
+    """Stationary series of variance 1, each value ``correlation`` times the last and news."""
+    from scipy.signal import lfilter
+
+    white = random.standard_normal(shape)
+    white[1:] *= sqrt(1 - correlation**2)
+    return np.asarray(lfilter([1.0], [1.0, -correlation], white, axis=0))
 
 
 def cycles_needed(series: Series, law: Law, error: float, confidence: float) -> int:

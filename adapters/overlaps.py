@@ -40,7 +40,9 @@ class Bed:
     contacts: int
     """Rows in contact: pairs of grains, and grains with walls."""
     coordination_number: float
-    """Contacts a grain: twice the pairs plus the wall contacts, over all grains."""
+    """Mean number of contacts of a grain with other grains."""
+    coordination_with_walls: float
+    """The same, contacts with walls, mirror planes and piston counted too."""
     max_penetration: float
     """Greatest overlap [m]; 0 without contact."""
     mean_penetration: float
@@ -91,6 +93,23 @@ def pairs_within(position: FloatArray, radius: FloatArray, gap: float) -> IntArr
     return pair[np.lexsort((pair[:, 1], pair[:, 0]))]
 
 
+def wall_rows(
+    position: FloatArray, radius: FloatArray, walls: Walls, behind: BoolArray, gap: float
+) -> tuple[IntArray, IntArray]:
+    """``first`` and ``second`` of all grains nearer than ``gap`` [m] to a wall."""
+    first, second = rows_of_walls(
+        position,
+        radius,
+        walls.plane_point,
+        walls.plane_normal,
+        walls.plane_reach,
+        walls.cylinder_radius,
+        behind,
+        gap,
+    )
+    return first, second
+
+
 def rows_at(
     position: FloatArray,
     radius: FloatArray,
@@ -134,16 +153,7 @@ def neighbours(
     bed_check(position, radius)
     side = behind_discs(position, walls) if behind is None else behind
     pair = pairs_within(position, radius, gap)
-    grain, wall = rows_of_walls(
-        position,
-        radius,
-        walls.plane_point,
-        walls.plane_normal,
-        walls.plane_reach,
-        walls.cylinder_radius,
-        side,
-        gap,
-    )
+    grain, wall = wall_rows(position, radius, walls, side, gap)
     first = np.concatenate([pair[:, 0], grain])
     second = np.concatenate([pair[:, 1], wall])
     return rows_at(position, radius, first, second, walls, side)
@@ -171,7 +181,8 @@ def bed_measure(position: FloatArray, touching: Neighbours) -> Bed:
     pairs = int((touching.second[touching.overlap > 0] >= 0).sum())
     return Bed(
         contacts=len(overlap),
-        coordination_number=(len(overlap) + pairs) / max(len(position), 1),
+        coordination_number=2 * pairs / max(len(position), 1),
+        coordination_with_walls=(len(overlap) + pairs) / max(len(position), 1),
         max_penetration=float(overlap.max(initial=0.0)),
         mean_penetration=float(overlap.mean()) if len(overlap) else 0.0,
         mean_height=float(position[:, 2].mean()) if len(position) else 0.0,

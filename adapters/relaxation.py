@@ -30,6 +30,7 @@ from adapters.overlaps import (
     neighbours,
     rows_at,
     wall_names,
+    wall_rows,
 )
 from adapters.relaxation_kernel import BoolArray
 from adapters.relaxation_printed import Energy, energy_minimise
@@ -137,7 +138,7 @@ def relax(
     walls_after: Walls | None = None,
     method: Method = "smallest-move",
     gravity: float = 9.81,
-    frontier: Literal["fixed", "free"] = "fixed",
+    frontier: Literal["fixed", "free"] | BoolArray = "fixed",
     external_force: FloatArray | None = None,
     keep_height: bool = True,
     overlap_cap: float = np.inf,
@@ -152,8 +153,9 @@ def relax(
     ``smallest-move``: every pair in contact before the jump gets back its overlap, as far as the
     network does not turn over; ``overlap_cap`` [m] bounds what counts as carried (a state that
     was not in equilibrium itself); ``keep_height`` keeps the mean height of ``position``.
-    ``karrech2007``: ``frontier`` fixed holds the grains that touch a wall before the jump;
-    ``external_force`` (n, 3) [N] acts at the unloaded instant (a piston's weight, say).
+    ``karrech2007``: ``frontier`` fixed holds the grains that touch a wall before the jump where
+    they are estimated, an array (n,) of bool names the grains to hold; ``external_force`` (n, 3)
+    [N] acts at the unloaded instant (a piston's weight, say).
 
     ``tolerance`` is relative: an error of an overlap over the mean carried overlap, or a residual
     force over the mean weight.  Raises `UsageError` for input that is no bed, and
@@ -172,52 +174,39 @@ def relax(
         )
     if method not in METHODS:
         raise UsageError(f"there is no relaxation '{method}'", remedy=f"choose of {METHODS}")
+    if not (len(radius) and gravity > 0 and tolerance > 0):
+        raise UsageError("a relaxation wants grains, gravity above 0 and a tolerance above 0")
     behind = behind_discs(before.position, walls)
     scene_before = _Scene(radius, walls, behind, stiffness)
     scene = _Scene(radius, after, behind, stiffness)
     carried = scene_before.search(before.position, 0.0)
-    mean_weight = gravity * float(before.mass.mean())
+    weight = gravity * before.mass
     if method == "smallest-move":
-        scale = _overlap_scale(scene, carried, overlap_cap, mean_weight)
-        order = _spatial_order(before.position, radius)
-        sorted_before, sorted_scene = scene_before.taken(order), scene.taken(order)
-        near = sorted_before.search(before.position[order], GAP_FACTOR * scale)
-        capped = near.overlap > overlap_cap
-        moved = smallest_move(
-            position[order],
-            _inside(sorted_scene, position[order]),
-            radius[order],
-            _chosen(near, ~capped),
-            _chosen(near, capped, scale),
-            GAP_FACTOR * scale,
-            sorted_scene.rows,
-            sorted_scene.search,
-            keep_height=keep_height,
-            tolerance=tolerance * scale,
-        )
-        relaxed, converged, evaluations = np.empty_like(position), moved.converged, moved.evaluations
-        relaxed[order] = moved.position
-    else:
-        printed = method == "karrech2007"
-        force = np.zeros_like(position)
-        if printed:
-            force += 0.0 if external_force is None else external_force
-            force[:, 2] -= gravity * before.mass
-        free = np.ones(len(radius), bool)
-        if printed and frontier == "fixed":
-            free[carried.first[carried.second < 0]] = False
-        energy = Energy(
-            radius,
-            force,
+        scale = _overlap_scale(scene, carried, overlap_cap, float(weight.mean()))
+        relaxed, converged, evaluations = _relax_by_move(
+            scene_before,
+            scene,
+            before.position,
             position,
-            0.0 if printed else PROXIMAL_STIFFNESS,
-            scene.rows,
-            scene.search,
-            scene.row_stiffness,
+            scale,
+            overlap_cap,
+            keep_height,
+            tolerance,
         )
-        length = float(overlap_under_force(mean_weight, stiffness.grain, radius.mean() / 2))
+    else:
+        force, held, proximal = np.zeros_like(position), np.zeros(len(radius), bool), 0.0
+        if method == "proximal":
+            proximal = PROXIMAL_STIFFNESS
+        else:
+            force[:, 2] = -weight
+            force += 0.0 if external_force is None else external_force
+            held = _frontier(carried, len(radius), frontier)
+        energy = Energy(
+            radius, force, position, proximal, scene.rows, scene.search, scene.row_stiffness
+        )
+        length = float(overlap_under_force(weight.mean(), stiffness.grain, radius.mean() / 2))
         relaxed, converged, evaluations = energy_minimise(
-            energy, position, free, length, tolerance * mean_weight, evaluations_max
+            energy, position, ~held, length, tolerance * float(weight.mean()), evaluations_max
         )
     touching = scene.search(relaxed, 0.0)
     move = np.linalg.norm(relaxed - position, axis=1)
@@ -292,6 +281,50 @@ def equilibrium_overlap(
     return float(overlap_under_force(force, stiffness.grain, state.radius.min() / 2))
 
 
+def _relax_by_move(
+    before: _Scene,
+    after: _Scene,
+    position_before: FloatArray,
+    estimate: FloatArray,
+    scale: float,
+    overlap_cap: float,
+    keep_height: bool,
+    tolerance: float,
+) -> tuple[FloatArray, bool, int]:
+    """`smallest_move` of grains sorted in space; centres [m], whether converged, evaluations."""
+    order = _spatial_order(position_before, before.radius)
+    before, after = before.taken(order), after.taken(order)
+    network = before.search(position_before[order], GAP_FACTOR * scale)
+    capped = network.overlap > overlap_cap
+    moved = smallest_move(
+        estimate[order],
+        _inside(after, estimate[order]),
+        after.radius,
+        _chosen(network, ~capped),
+        _chosen(network, capped, scale),
+        GAP_FACTOR * scale,
+        after.rows,
+        after.search,
+        keep_height=keep_height,
+        tolerance=tolerance * scale,
+    )
+    position = np.empty_like(estimate)
+    position[order] = moved.position
+    return position, moved.converged, moved.evaluations
+
+
+def _frontier(
+    carried: Neighbours, n: int, frontier: Literal["fixed", "free"] | BoolArray
+) -> BoolArray:
+    """Grains (n,) that eq. 29 holds where they are estimated."""
+    if isinstance(frontier, np.ndarray):
+        return frontier
+    held = np.zeros(n, bool)
+    if frontier == "fixed":
+        held[carried.first[carried.second < 0]] = True
+    return held
+
+
 def _overlap_scale(
     scene: _Scene, carried: Neighbours, overlap_cap: float, mean_weight: float
 ) -> float:
@@ -299,13 +332,12 @@ def _overlap_scale(
     overlap = carried.overlap[carried.overlap <= overlap_cap]
     if len(overlap):
         return float(overlap.mean())
-    radius = float(scene.radius.mean()) if len(scene.radius) else 1.0
-    return float(overlap_under_force(mean_weight, scene.stiffness.grain, radius / 2))
+    return float(overlap_under_force(mean_weight, scene.stiffness.grain, scene.radius.mean() / 2))
 
 
 def _spatial_order(position: FloatArray, radius: FloatArray) -> IntArray:
-    """Order in which neighbours in space are neighbours in memory: halves the time at 1e5 grains."""
-    cell = np.floor(position / (4 * np.median(radius))) if len(radius) else position
+    """Order in which neighbours in space are neighbours in memory: half the time at 1e5 grains."""
+    cell = np.floor(position / (4 * np.median(radius)))
     return np.lexsort((position[:, 0], cell[:, 0], cell[:, 1], cell[:, 2]))
 
 
@@ -319,7 +351,7 @@ def _inside(scene: _Scene, position: FloatArray) -> FloatArray:
     """Positions [m] where grains with their centre beyond a wall are brought to touch it."""
     start = position.copy()
     for wall in range(len(wall_names(scene.walls))):
-        rows = scene.search(start, 0.0)
+        rows = scene.rows(start, *wall_rows(start, scene.radius, scene.walls, scene.behind, 0.0))
         beyond = (rows.second == -1 - wall) & (rows.overlap > scene.radius[rows.first])
         start[rows.first[beyond]] += rows.overlap[beyond, None] * rows.normal[beyond]
     return start
@@ -333,9 +365,7 @@ def _energy(
     return float(hertz + gravity * state.mass @ position[:, 2])
 
 
-def _residual_force(
-    scene: _Scene, touching: Neighbours, state: State, gravity: float
-) -> float:
+def _residual_force(scene: _Scene, touching: Neighbours, state: State, gravity: float) -> float:
     """Root mean square of the unbalanced force over the grains [N]."""
     force = np.zeros((len(scene.radius), 3))
     force[:, 2] = -gravity * state.mass
@@ -349,8 +379,10 @@ def _residual_force(
     np.add.at(force, held[alive, 1], -state.contacts.tangential_force[alive])
     for wall, name in enumerate(wall_names(scene.walls)):
         rows = touching.second == -1 - wall
-        if name in state.wall_force:
-            push = state.wall_force[name][touching.first[rows]]
+        # the engine names a mesh wall after its fix: the piston's is piston_wall
+        force_on_grains = state.wall_force.get(name, state.wall_force.get(f"{name}_wall"))
+        if force_on_grains is not None:
+            push = force_on_grains[touching.first[rows]]
             along = np.einsum("ma,ma->m", push, touching.normal[rows])
             force[touching.first[rows]] += push - along[:, None] * touching.normal[rows]
     return float(np.sqrt(np.mean(np.sum(force**2, axis=1)))) if len(force) else 0.0

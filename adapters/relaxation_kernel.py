@@ -1,9 +1,10 @@
-"""Compiled kernels of overlaps and relaxation; a *row* is one pair of grains, or a grain and a wall.
+"""Compiled kernels of overlaps and relaxation.
 
-Row c names grain ``first[c]`` and ``second[c]``: another grain, or wall w as -1 - w, where the
-planes come first and the cylinder last.  ``normal[c]`` is a unit vector that points at the first
-grain; ``overlap[c]`` delta [m] is positive in contact.  Moving the first grain by dx changes
-delta by -normal.dx, moving the second by +normal.dx: these are the rows of the matrix J below.
+A *row* is one pair of grains, or one grain and a wall.  Row c names grain ``first[c]`` and
+``second[c]``: another grain, or wall w as -1 - w, where the planes come first and the cylinder
+last.  ``normal[c]`` is a unit vector that points at the first grain; ``overlap[c]`` delta [m] is
+positive in contact.  Moving the first grain by dx changes delta by -normal.dx, moving the second
+by +normal.dx: these are the rows of the matrix J below.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def wall_contact(
     behind: bool,
     normal: FloatArray,
 ) -> float:
-    """Overlap [m] of a grain at ``x`` with one plane, whose direction at the grain fills ``normal``.
+    """Overlap [m] of a grain at ``x`` with one plane; fills ``normal``, its direction at the grain.
 
     A plane that ends at ``reach`` [m] from the z axis is a thin disc: grains that started
     ``behind`` it stay behind it, and beyond its rim the nearest point of the rim counts.
@@ -60,7 +61,7 @@ def wall_contact(
 
 @njit(cache=True)
 def cylinder_contact(x: FloatArray, radius: float, cylinder: float, normal: FloatArray) -> float:
-    """Overlap [m] of a grain at ``x`` with a cylinder of radius ``cylinder`` [m]; fills ``normal``."""
+    """Overlap [m] of a grain at ``x`` with a ``cylinder`` of that radius [m]; fills ``normal``."""
     from_axis = np.hypot(x[0], x[1])
     normal[:] = 0.0
     if from_axis > 0.0:
@@ -344,9 +345,7 @@ def multipliers_solve(
             length = _dot(gradient, chopped) / _dot(chopped, applied)
             _subtract(multiplier, length, chopped)
             _subtract(gradient, length, applied)
-            reduced, square, greatest = _split(
-                multiplier, gradient, two_sided, step, free, chopped
-            )
+            reduced, square, greatest = _split(multiplier, gradient, two_sided, step, free, chopped)
             direction[:] = free
             continue
         _apply(first, second, normal, height_share, slack, direction, move, applied)

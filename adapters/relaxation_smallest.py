@@ -37,16 +37,17 @@ SLACK = 1e-5
 """Weight of the multipliers in their own equations: keeps redundant contacts solvable."""
 SWAP_SHARE = 0.5
 """Share of the pressed pairs that join the network at a time."""
-SWAPS_MAX = 20
-"""Times that the network turns over."""
+SKIN = 0.2
+"""Reach of the neighbour list beyond contact, in median radii."""
 NEAREST_ITERATIONS = 20
 """Iterations that look for the nearest positions; later ones only for the next that fit."""
 OPEN_ITERATIONS = 35
 """Iterations after which contacts of the network that can not be closed are left open."""
 STEP_MAX = 0.5
 """Greatest step of a grain in its own radii: beyond it the linearised contacts mislead."""
-PRODUCTS_MAX = 200
-"""Products with J J^T in one linearised problem."""
+PRODUCTS_NEAREST, PRODUCTS_FIT = 100, 1000
+"""Most products with J J^T in one linearised problem: of the first iterations, whose normals
+still turn, and of the later ones."""
 
 Geometry = Callable[[FloatArray, IntArray, IntArray], Neighbours]
 Search = Callable[[FloatArray, float], Neighbours]
@@ -94,7 +95,7 @@ def smallest_move(
     *,
     keep_height: bool,
     tolerance: float,
-    iterations_max: int = 60,
+    iterations_max: int = 100,
 ) -> SmallestMove:
     """Move grains from ``estimate`` (n, 3) [m] as little as the network allows.
 
@@ -104,41 +105,35 @@ def smallest_move(
     """
     n = len(radius)
     height_share = 1 / np.sqrt(n) if keep_height else 0.0
-    skin = 0.2 * float(np.median(radius))
+    skin = SKIN * float(np.median(radius))
     x, anchor = start.copy(), estimate
     rows = _rows_start(network, bounded, n)
-    listed_at, norm = x, 1.0
-    evaluations = swaps = 0
-    violation = np.inf
-    turns = 0
-    move = np.empty((n, 3))
+    listed_at = None
+    violation, norm, evaluations, swaps = np.inf, 1.0, 0, 0
     for iteration in range(iterations_max):
-        if iteration == 0 or np.linalg.norm(x - listed_at, axis=1).max() > skin / 2:
-            rows = _rows_listed(rows, search(x, skin), gap, n)
-            listed_at = x
+        if listed_at is None or np.linalg.norm(x - listed_at, axis=1).max() > skin / 2:
+            rows, listed_at = _rows_listed(rows, search(x, skin), gap, n), x
+            near = geometry(x, rows.first, rows.second)
+            norm = rows_norm(rows.first, rows.second, near.normal, height_share, n, 20)
         near = geometry(x, rows.first, rows.second)
         evaluations += 1
-        error = np.where(
-            rows.member,
-            np.abs(near.overlap - rows.target),
-            np.maximum(near.overlap - rows.target, 0.0),
-        )
+        excess = near.overlap - rows.target
+        error = np.where(rows.member, np.abs(excess), np.maximum(excess, 0.0))
         violation = float(error.max(initial=0.0))
+        lift = height_share * float((x - estimate)[:, 2].sum())
         swapped = 0
-        if 0 < iteration < NEAREST_ITERATIONS and violation < 0.1 * skin and turns < SWAPS_MAX:
+        if 0 < iteration < NEAREST_ITERATIONS and violation < skin / 10:
             swapped = _swap(rows, gap)
             swaps += swapped
-            turns += 1
-        if swapped == 0 and iteration and violation <= tolerance:
+        if iteration and not swapped and violation <= tolerance and abs(lift) <= tolerance:
             return SmallestMove(x, True, violation, evaluations, swaps)
-        if iteration == 0 or listed_at is x:
-            norm = rows_norm(rows.first, rows.second, near.normal, height_share, n, 20)
+        products_max = PRODUCTS_NEAREST
         if iteration >= NEAREST_ITERATIONS:
-            anchor = x
+            anchor, products_max = x, PRODUCTS_FIT
             if iteration >= OPEN_ITERATIONS:
-                rows.member &= (rows.target - near.overlap <= tolerance) | (rows.multiplier[:-1] >= 0)
+                rows.member &= (excess >= -tolerance) | (rows.multiplier[:-1] >= 0)
             rows.multiplier[:] = 0.0
-        # x = x_hat - J^T mu in delta(x_k) + J (x - x_k) = target, the slack's share put back
+        # x = anchor - J^T mu in delta(x_k) + J (x - x_k) = target, the slack's share put back
         right = np.empty(len(rows.key) + 1)
         rows_change(rows.first, rows.second, near.normal, height_share, anchor - x, right)
         right[:-1] += near.overlap - rows.target
@@ -154,15 +149,15 @@ def smallest_move(
             right,
             norm,
             max(0.3 * tolerance, 0.1 * violation),
-            PRODUCTS_MAX,
+            products_max,
             n,
             rows.multiplier,
         )
         evaluations += products
+        move = np.empty((n, 3))
         rows_move(rows.first, rows.second, near.normal, height_share, rows.multiplier, move)
         step = anchor + move - x
-        length = np.linalg.norm(step, axis=1)
-        limit = STEP_MAX * radius
+        length, limit = np.linalg.norm(step, axis=1), STEP_MAX * radius
         x = x + step * np.minimum(1.0, limit / np.maximum(length, limit))[:, None]
     return SmallestMove(x, False, violation, evaluations, swaps)
 
@@ -208,15 +203,21 @@ def _rows_listed(rows: _Rows, near: Neighbours, gap: float, n: int) -> _Rows:
 
 
 def _swap(rows: _Rows, gap: float) -> int:
-    """Let the most pressed pairs outside the network take the places of its most torn members."""
-    mu = rows.multiplier[:-1]
-    pressed = np.flatnonzero(~rows.member & (mu > gap))
-    torn = np.flatnonzero(rows.member & (mu < -gap))
-    count = min(int(np.ceil(SWAP_SHARE * len(pressed))), len(torn))
-    pressed = pressed[np.argsort(-mu[pressed])[:count]]
-    torn = torn[np.argsort(mu[torn])[:count]]
-    rows.target[pressed] = np.sort(rows.target[torn])[::-1]
-    rows.target[torn] = -gap
-    rows.member[pressed], rows.member[torn] = True, False
-    mu[torn] = 0.0
-    return count
+    """Let the most pressed rows outside the network take the places of its most torn members.
+
+    Pairs of grains replace pairs and wall contacts wall contacts; forces that would move a grain
+    by less than ``gap`` [m] change nothing.  Returns how many changed places.
+    """
+    mu, swapped = rows.multiplier[:-1], 0
+    for kind in (rows.second >= 0, rows.second < 0):
+        pressed = np.flatnonzero(kind & ~rows.member & (mu > gap))
+        torn = np.flatnonzero(kind & rows.member & (mu < -gap))
+        count = min(int(np.ceil(SWAP_SHARE * len(pressed))), len(torn))
+        pressed = pressed[np.argsort(-mu[pressed])[:count]]
+        torn = torn[np.argsort(mu[torn])[:count]]
+        rows.target[pressed] = np.sort(rows.target[torn])[::-1]
+        rows.target[torn] = -gap
+        rows.member[pressed], rows.member[torn] = True, False
+        mu[torn] = 0.0
+        swapped += count
+    return swapped

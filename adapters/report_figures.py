@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -76,6 +76,22 @@ def _panels(rows: int, columns: int, height: float, **keywords: Any) -> tuple[Fi
     return figure, figure.subplots(rows, columns, squeeze=False, **keywords)
 
 
+def _logarithmic(panel: Axes, name: Literal["x", "y"]) -> None:
+    """A logarithmic axis with plain numbers at 1, 2 and 5 where there is room, else at decades."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    if name == "x":
+        panel.set_xscale("log")
+        axis, (low, high) = panel.xaxis, panel.get_xlim()
+    else:
+        panel.set_yscale("log")
+        axis, (low, high) = panel.yaxis, panel.get_ylim()
+    roomy = abs(np.log10(high / low)) < 2.2
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if roomy else (1,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def _spans_shade(axes: Axes, spans: Sequence[tuple[int, int]]) -> None:
     for first, last in spans:
         axes.axvspan(first, last, color=SPAN, lw=0, zorder=0)
@@ -86,6 +102,7 @@ def settlement_figure(
     control: History | None,
     others: Sequence[tuple[str, History]],
     spans: Sequence[tuple[int, int]],
+    title: str,
 ) -> Figure:
     """Settlement against load cycles, linear and logarithmic: the picture of the report."""
     figure, axes = _panels(1, 2, 3.7, sharey=True)
@@ -93,12 +110,13 @@ def settlement_figure(
         _settlement_panel(panel, run, control, others, spans)
     axes[0, 0].set_ylabel("mean settlement of the grains (µm)")
     axes[0, 0].invert_yaxis()
-    axes[0, 1].set_xscale("log")
+    _logarithmic(axes[0, 1], "x")
     axes[0, 0].set_xlim(left=0)
+    axes[0, 1].set_title(title, loc="right")
     axes[0, 0].set_xlabel("load cycles")
     axes[0, 1].set_xlabel("load cycles (logarithmic)")
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 4))
+    figure.legend(handles, labels, loc="outside upper center", ncols=5, columnspacing=1.2)
     return figure
 
 
@@ -146,8 +164,16 @@ def _nothing_moved(
     )
 
 
-def error_cost_figure(rows: Sequence[ErrorRow], lines: Sequence[tuple[str, CostLine]]) -> Figure:
-    """Work against precision: error of the settlement against CPU time, both logarithmic."""
+def error_cost_figure(
+    rows: Sequence[ErrorRow],
+    lines: Sequence[tuple[str, CostLine]],
+    scatter: float,
+    scatter_name: str,
+) -> Figure:
+    """Work against precision: error of the settlement against CPU time, both logarithmic.
+
+    ``scatter``: relative error below which two full runs can not be told apart; nan for unknown.
+    """
     figure, axes = _panels(1, 1, 3.6)
     panel = axes[0, 0]
     for (name, line), (style, colour) in zip(
@@ -161,20 +187,27 @@ def error_cost_figure(rows: Sequence[ErrorRow], lines: Sequence[tuple[str, CostL
             color=colour,
             label=name,
         )
-    for row in rows:
-        if row.settlement_error and np.isfinite(row.settlement_error):
-            panel.plot(
-                row.cpu_s,
-                100 * abs(row.settlement_error),
-                "o",
-                ms=8,
-                color=COMPUTED if row is rows[0] else HEALING,
-                label=f"{row.name}: {row.computed} cycles computed",
-            )
+    marks = ("o", "s", "D", "^", "v", "P", "X")
+    shown = [row for row in rows if row.settlement_error and np.isfinite(row.settlement_error)]
+    for row, mark in zip(shown, marks, strict=False):
+        first = row is rows[0]
+        panel.plot(
+            row.cpu_s,
+            100 * abs(row.settlement_error),
+            mark,
+            ms=10 if first else 7,
+            color=COMPUTED if first else HEALING,
+            mec="white",
+            label=f"{row.name}: {row.computed} cycles computed",
+            zorder=5,
+        )
+    if np.isfinite(scatter):
+        panel.axhspan(0, 100 * scatter, color=SPAN, lw=0, label=scatter_name)
     full = rows[-1].cpu_s
     panel.axvline(full, color=CONTROL, lw=1.1, label="cost of the full run")
-    panel.set_xscale("log")
-    panel.set_yscale("log")
+    panel.set_xlim(left=full / 20)
+    _logarithmic(panel, "x")
+    _logarithmic(panel, "y")
     panel.set_xlabel("CPU time from the start of loading (s)")
     panel.set_ylabel("|error of the settlement| (%)")
     figure.legend(loc="outside right upper")
@@ -240,7 +273,7 @@ def penetration_figure(jumps: Sequence[tuple[str, dict[str, FloatArray]]]) -> Fi
             )
         panel.set_title(name)
         panel.set_ylabel("contacts")
-    axes[-1, 0].set_xscale("log")
+    _logarithmic(axes[-1, 0], "x")
     axes[-1, 0].set_xlabel("penetration (µm)")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
@@ -253,10 +286,11 @@ def sample_figure(
     """The sample at several instants: (title, centres [m], (n, 3), residual displacement [m], (n,))."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import PowerNorm
 
     longest = max(float(np.quantile(displacement, 0.98)) for _, _, displacement in panels)
-    norm = Normalize(0.0, 1e6 * longest if longest > 0 else 1.0)
+    # The square root spreads the many small moves; a linear scale would show the few large ones.
+    norm = PowerNorm(0.5, 0.0, 1e6 * longest if longest > 0 else 1.0)
     extent = extent_of([position for _, position, _ in panels], radius)
     aspect = (extent[3] - extent[2]) / (extent[1] - extent[0])
     figure, axes = _panels(1, len(panels), 1.0 + WIDTH / len(panels) * min(aspect, 2.0))
@@ -315,7 +349,7 @@ def preparation_figure(
     panels[3].axhline(1e-6, color=CONTROL, ls="--", lw=1, label="criterion")
     panels[3].set_yscale("log")
     panels[3].set_title("d  kinetic over potential energy")
-    panels[3].legend(loc="upper right")
+    panels[3].legend(loc="best")
     for panel, value in ((panels[1], paper_coordination), (panels[2], paper_density)):
         if value is not None:
             panel.axhline(value, color=CONTROL, ls=":", lw=1.1, label=f"paper: {value:g}")
@@ -347,7 +381,7 @@ def piston_figure(
             panel.plot(run.cycle[which], 100 * run.force_error[which], ".", color=colour, label=name)
     bar = 100 * FORCE_ERROR_GOAL
     panel.axhline(bar, color=CONTROL, ls="--", lw=1, label=f"bar {bar:g} %")
-    panel.set_yscale("log")
+    _logarithmic(panel, "y")
     panel.set_xlabel("load cycles")
     panel.set_ylabel("rms force error over peak (%)")
     panel.legend()

@@ -29,9 +29,11 @@ table { border-collapse: collapse; font: .84rem/1.35 "Source Sans 3", Helvetica,
 th, td { padding: .28rem .55rem; text-align: right; vertical-align: top; }
 th { font-weight: 600; border-bottom: 1px solid #888; vertical-align: bottom; }
 tbody tr { border-bottom: 1px solid #e4e4e4; }
-th:first-child, td:first-child { text-align: left; padding-left: 0; }
-td.words { text-align: left; }
+th:first-child, td:first-child { text-align: left; padding-left: 0; white-space: nowrap; }
+th.words, td.words { text-align: left; }
 tr.this td { font-weight: 700; background: #f1f6fb; }
+td .error { display: inline-block; min-width: 4.6em; }
+sub, sup { line-height: 0; }
 .no { color: #b02020; font-weight: 600; } .yes { color: #1b6e3a; }
 code, pre { font: .82rem/1.4 "Source Code Pro", Menlo, Consolas, monospace; }
 pre { background: #f5f5f5; padding: .7rem .9rem; white-space: pre-wrap; overflow-wrap: anywhere; }
@@ -73,7 +75,17 @@ def number(value: float | None, text: str) -> str:
     """A number as ``text``, its full value beside it for machines; a dash when not known."""
     if value is None or not isfinite(value):
         return UNKNOWN
-    return f'<data value="{value!r}">{escape(text)}</data>'
+    return f'<data value="{float(value)!r}">{_typeset(text)}</data>'
+
+
+def _typeset(text: str) -> str:
+    """Minus signs and powers of ten as in print."""
+    mantissa, exponent, power = escape(text).partition("e")
+    if mantissa.startswith("-"):
+        mantissa = "−" + mantissa[1:]
+    if exponent and power.lstrip("+-").isdigit():
+        return f"{mantissa} × 10<sup>{str(int(power)).replace('-', '−')}</sup>"
+    return mantissa + exponent + power
 
 
 def micrometres(value: float, form: str = ".1f") -> str:
@@ -124,11 +136,18 @@ def table(
 
     ``words``: columns of text, set flush left.
     """
-    lines = [f'<div class="scroll"><table><caption>{caption}</caption>']
-    lines.append("<thead><tr>" + "".join(f"<th>{cell}</th>" for cell in header) + "</tr></thead>")
+    lines = ['<div class="scroll"><table>']
+    if caption:
+        lines.append(f"<caption>{caption}</caption>")
+    if header:
+        cells = "".join(
+            f'<th class="words">{cell}</th>' if place in words else f"<th>{cell}</th>"
+            for place, cell in enumerate(header)
+        )
+        lines.append(f"<thead><tr>{cells}</tr></thead>")
     lines.append("<tbody>")
     for row in rows:
-        kind = ' class="this"' if row[0] == marked else ""
+        kind = ' class="this"' if marked and row[0] == marked else ""
         cells = "".join(
             f'<td class="words">{cell}</td>' if place in words else f"<td>{cell}</td>"
             for place, cell in enumerate(row)
@@ -138,9 +157,9 @@ def table(
     return "\n".join(lines)
 
 
-def picture(path: Path, description: str, caption: str) -> str:
-    """The image file ``path`` inside the page; nothing when it was not drawn."""
-    if not path.exists():
+def picture(path: Path | None, description: str, caption: str) -> str:
+    """The image file ``path`` inside the page; nothing for None."""
+    if path is None:
         return ""
     content = base64.b64encode(path.read_bytes()).decode("ascii")
     return (

@@ -228,7 +228,7 @@ def estimate(run: Run, bed: Bed, h: int) -> tuple[State, FloatArray, float]:
         cycle = window.cycle[bed.healing :].astype(float)
         field_ = jump_field(cycle, window.position[bed.healing :], window.radius, law, h)
         heights = window.piston_heights()[bed.healing :]
-        parameters = law.fit(cycle, heights)
+        parameters = law.fit(cycle[law.first_state :], heights[law.first_state :])
         drop = float(law.increment(parameters, cycle[-1], cycle[-1] + h)) if h else 0.0
     before = window.state(-1)
     return before, before.position + field_, before.piston_height + min(drop, 0.0)

@@ -340,6 +340,16 @@ def test_all_problems_at_once(
     assert [int(line) for line, _ in found] == sorted(int(line) for line, _ in found)
 
 
+@pytest.mark.parametrize(
+    "table", ["sample", "sample.grain_radius", "material", "material.grain", "loading", "engine"]
+)
+def test_value_in_place_of_a_table(tmp_path: Path, table: str) -> None:
+    """A table that is a value is one problem: nothing is said about the keys it can not have."""
+    message = refusal(tmp_path, KARRECH, [f"{table}=3"])
+    assert message.startswith(f"{tmp_path}/scene.toml: 1 problem\n")
+    assert f"--set {table}=3: {table}: must be a table, not 3" in message
+
+
 ALL_KEYS = sorted(key for key in key_lines(KARRECH) if "." in key)
 
 

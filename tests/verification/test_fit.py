@@ -10,7 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapters.errors import NotConverged, UsageError
-from adapters.fit import Series, cycles_needed, fit_noise, fit_series, prediction_band
+from adapters.fit import (
+    Series,
+    autoregression,
+    cycles_needed,
+    fit_noise,
+    fit_series,
+    prediction_band,
+)
 from adapters.laws import Law, law_named, laws_known
 from adapters.residual import error_term
 from adapters.state import FloatArray
@@ -20,11 +27,18 @@ every_law = pytest.mark.parametrize("law", [law_named(name) for name in laws_kno
 
 
 def correlated_noise(seed: int, count: int, correlation: float, many: int) -> FloatArray:
-    """Stationary first-order autoregression of variance 1, shape (count, many)."""
+    """Stationary first-order autoregression of variance 1, shape (count, many), by recursion."""
     noise = np.random.default_rng(seed).standard_normal((count, many))
     for row in range(1, count):
         noise[row] = correlation * noise[row - 1] + (1 - correlation**2) ** 0.5 * noise[row]
     return noise
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.95])
+def test_autoregression_is_its_recursion(correlation: float) -> None:
+    """The filter gives the same series as a loop: of variance 1 from its first value on."""
+    filtered = autoregression(np.random.default_rng(5), correlation, (30, 4))
+    np.testing.assert_allclose(filtered, correlated_noise(5, 30, correlation, 4), atol=1e-13)
 
 
 @pytest.mark.parametrize(

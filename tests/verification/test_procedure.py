@@ -132,7 +132,7 @@ def test_failed_jump_is_tried_again_half_as_long(
     monkeypatch.setattr(stages, "jump", fail_twice)
     rows = settle(tmp_path / "run", "procedure.total_cycles=90")
     assert lengths[:3] == [20, 10, 5]
-    assert [int(row["cycle"]) for row in rows if row["kind"] == "jumped"][0] == 45
+    assert next(int(row["cycle"]) for row in rows if row["kind"] == "jumped") == 45
     events = RunFolder(tmp_path / "run").events()
     assert [e["stage"] for e in events if e["event"] == "jump failed"][:2] == [
         "jump_000040_1",

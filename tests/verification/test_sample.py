@@ -207,6 +207,15 @@ def test_grains_as_wide_as_the_container(container: Container, fits: float) -> N
         sample_start(np.full(5, fits * (1 + 1e-9)), container, 0.05, 1)
 
 
+def test_start_at_the_densest_a_scene_allows() -> None:
+    """Relative density 0.15 is reached with radii spread by a factor of ten."""
+    law = RadiusDistribution("uniform", 3e-3, 0.47 * 3e-3)
+    radius = radii_sample(law, 1000, 2)
+    position, height = sample_start(radius, QUARTER, 0.15, 2)
+    assert len(pairs_in_contact(position, radius)) == 0
+    assert relative_density(position, radius, QUARTER, height) == pytest.approx(0.15, rel=1e-12)
+
+
 def test_start_that_is_too_dense_is_refused() -> None:
     """Random addition can not reach a packed bed, and says so with a remedy."""
     with pytest.raises(NotConverged, match="start looser"):
@@ -265,14 +274,15 @@ def test_cubic_lattice() -> None:
 
 
 @given(
-    edges=st.lists(st.floats(-0.01, 1.2), min_size=2, max_size=8, unique=True).map(sorted),
+    millimetres=st.lists(st.integers(-10, 1200), min_size=2, max_size=8, unique=True).map(sorted),
     seed=st.integers(0, 100),
 )
-def test_layers_add_up(edges: list[float], seed: int) -> None:
+def test_layers_add_up(millimetres: list[int], seed: int) -> None:
     """The layers of a profile hold together what the whole slab holds."""
+    edges = np.array(millimetres) / 1000
     radius = radii_sample(TABLE_1, 50, seed)
     position = np.random.default_rng(seed).uniform(0, 1, (50, 3))
-    layers = relative_density_profile(position, radius, QUARTER, np.array(edges))
+    layers = relative_density_profile(position, radius, QUARTER, edges)
     whole = relative_density(position, radius, QUARTER, edges[-1], edges[0])
     assert layers @ np.diff(edges) == pytest.approx(
         whole * (edges[-1] - edges[0]), rel=1e-9, abs=1e-12

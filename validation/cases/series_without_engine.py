@@ -6,10 +6,9 @@ The environment variable TRACKBED_DATA names a folder with ``ballast_triaxial/*.
 predicted to r times its last cycle.  Nothing is tuned to them: the exponents of the band are
 bounds of mechanics (shakedown, constant rate), its noise is the residuals' own.
 
-Bars are on the law `log`: that the 90 % band holds the truth in at least 80 % of the cases (cuts
-of one series are no independent trials: 12 ballast series, one bed), and that it leaves it as
-the laws' own error grows.  The bursty bed of 150 grains breaks the band's assumption, and is
-listed with no bar but that it was measured.
+The bar is on the law `log`: the 90 % band holds the truth in at least 80 % of the cases (cuts of
+one series are no independent trials: 12 ballast series, one bed).  Errors and widths are measured,
+without a bar.  So is the bursty bed of 150 grains: it breaks the band's assumption.
 """
 
 from __future__ import annotations

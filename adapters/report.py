@@ -1,0 +1,166 @@
+"""The report of a run: ``report.html``, ``report.json`` and ``figures/`` in its folder.
+
+The page is one file that loads nothing.  It begins with one claim and where it fails, and tells
+the error beside the cost it saved; `adapters.report_error` defines both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from adapters import report_sections as sections
+from adapters.overlaps import neighbours
+from adapters.report_error import jumped_spans
+from adapters.report_html import page
+from adapters.report_numbers import (
+    PROCEDURE,
+    TWIN_SCATTER,
+    Numbers,
+    numbers_of,
+    preparation_series,
+)
+from adapters.report_record import Record, Track, record_read
+from adapters.run_folder import Outcome, disk_full_named, write_atomically
+from adapters.sample import PAPER_COORDINATION
+from adapters.state import FloatArray, state_load
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+JUMPS_SHOWN = 4
+"""Jumps whose penetrations are drawn: the first ones and the last."""
+
+
+def report_write(run_folder: Path) -> Path:
+    """Write the report of a run, finished or not; returns the path of ``report.html``.
+
+    Raises `UsageError` when ``run_folder`` is no run folder.  Only reads what finished stages
+    left, so it may be called while the run goes on.
+    """
+    record = record_read(run_folder)
+    numbers = numbers_of(record)
+    with disk_full_named(run_folder):
+        figures = figures_write(record, numbers)
+        write_atomically(run_folder / "report.json", numbers.to_json())
+        html = page(f"Settlement of {numbers.scene}", sections.body(record, numbers, figures))
+        write_atomically(run_folder / "report.html", html)
+    return run_folder / "report.html"
+
+
+def figures_write(record: Record, numbers: Numbers) -> dict[str, Path]:
+    """Draw every figure that the run has come to; their files by name."""
+    from adapters.report_figures import figure_save
+
+    folder = record.path / "figures"
+    folder.mkdir(exist_ok=True)
+    files = {
+        name: figure_save(draw, folder / name) for name, draw in _figures(record, numbers)
+    }
+    return {name.partition(".")[0]: path for name, path in files.items()}
+
+
+def _figures(record: Record, numbers: Numbers) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """Name and drawing of each figure; a svg comes after a png of the same name."""
+    from adapters import report_figures as figures
+
+    series = preparation_series(record)
+    if series is not None:
+        paper = (sections.PAPER_DENSITY, PAPER_COORDINATION) if sections.karrech(record) else (None, None)
+        yield "preparation.svg", partial(figures.preparation_figure, series, *paper)
+    run = record.run.history
+    if not len(run.cycle):
+        return
+    control = None if record.control is None else record.control.history
+    spans = jumped_spans(record.run.outcomes)
+    others = [(track.name, track.history) for track in record.others]
+    title = ""
+    if (row := numbers.row(PROCEDURE)) is not None:
+        title = f"error {100 * row.settlement_error:+.1f} % at a speed-up of {row.speed_up:.2f}"
+    settlement = partial(figures.settlement_figure, run, control, others, spans, title)
+    yield "settlement.png", settlement
+    yield "settlement.svg", settlement
+    if numbers.stopped_early is not None and numbers.curve_fitted is not None:
+        lines = (
+            ("full run stopped early, nothing moved", numbers.stopped_early),
+            ("law fitted to the full run's curve, no bed", numbers.curve_fitted),
+        )
+        yield "error_cost.svg", partial(
+            figures.error_cost_figure, numbers.error_rows, lines, *_scatter(record, numbers)
+        )
+    yield "coordination.svg", partial(figures.coordination_figure, run, control, spans)
+    if beds := list(_penetrations(record)):
+        yield "penetration.svg", partial(figures.penetration_figure, beds)
+    yield "sample.png", partial(figures.sample_figure, _samples(record), record.run.start().radius)
+    yield "piston.svg", partial(figures.piston_figure, run, spans, *_last_cycle(record))
+    yield "cost.svg", partial(figures.cost_figure, numbers.costs)
+
+
+def _scatter(record: Record, numbers: Numbers) -> tuple[float, str]:
+    """Error below which two full runs can not be told apart, and how it is known; nan when not."""
+    beside = {track.name for track in record.others}
+    known = [abs(r.settlement_error) for r in numbers.error_rows if r.name.split(",")[0] in beside]
+    if known:
+        return max(known), "further runs of this scene"
+    if sections.karrech(record):
+        return TWIN_SCATTER, "scatter of twin runs"
+    return np.nan, ""
+
+
+def _penetrations(record: Record) -> Iterator[tuple[str, dict[str, FloatArray]]]:
+    """Title and overlaps [m] before, as estimated and relaxed, for the jumps shown."""
+    jumps = record.run.jumps
+    shown = jumps if len(jumps) <= JUMPS_SHOWN else [*jumps[: JUMPS_SHOWN - 1], jumps[-1]]
+    for name, jump in shown:
+        overlaps = {when: bed for when, bed in _overlaps(record, name, jump) if len(bed)}
+        if overlaps:
+            yield f"jump from cycle {jump.first_cycle} to {jump.last_cycle}", overlaps
+
+
+def _overlaps(record: Record, name: str, jump: Outcome) -> Iterator[tuple[str, FloatArray]]:
+    folder = record.run.folder.path / name
+    relaxed = state_load(folder / "relaxed.npz")
+    before = record.run.before(jump)
+    estimated = state_load(folder / "estimated.npz")
+    for when, state, height in (
+        ("before", before, np.nan if before is None else before.piston_height),
+        ("estimated", estimated, relaxed.piston_height),
+        ("relaxed", relaxed, relaxed.piston_height),
+    ):
+        if state is not None:
+            walls = record.scene.container.walls(height, record.scene.piston_reach)
+            touching = neighbours(state.position, state.radius, walls)
+            yield when, touching.overlap[touching.overlap > 0]
+
+
+def _samples(record: Record) -> list[tuple[str, FloatArray, FloatArray]]:
+    """The bed before loading and now, and the control's, each grain with its residual displacement."""
+
+    def moved(track: Track, cycle: int) -> tuple[FloatArray, FloatArray]:
+        position = track.position(cycle)
+        return position, np.linalg.norm(position - start, axis=1)
+
+    start = record.run.start().position
+    cycle = int(record.run.history.cycle[-1])
+    now, displacement = moved(record.run, cycle)
+    panels = [
+        ("before loading", start, displacement),
+        (f"after {cycle} cycles, this run", now, displacement),
+    ]
+    if record.control is not None and cycle in record.control.history.cycle:
+        panels.append((f"after {cycle} cycles, full run", *moved(record.control, cycle)))
+    return panels
+
+
+def _last_cycle(record: Record) -> tuple[int, FloatArray, FloatArray, FloatArray]:
+    """The last computed cycle: its number, phase, target and contact force [N]."""
+    name, outcome = record.run.windows[-1]
+    window = record.run.window(name)
+    piston, (start, end) = window.piston, window.time_step[-2:]
+    last = piston.time_step > start
+    phase = (piston.time_step[last] - start) / (end - start)
+    return outcome.last_cycle, phase, piston.target_force[last], piston.contact_force[last]

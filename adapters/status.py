@@ -1,0 +1,115 @@
+"""How far a run is, from its folder."""
+
+from __future__ import annotations
+
+import fcntl
+import re
+import socket
+from dataclasses import asdict, dataclass
+from math import isfinite, nan
+from pathlib import Path
+from typing import Any
+
+from adapters.report_error import cost_total
+from adapters.report_record import Record, Track, record_read
+
+
+@dataclass(frozen=True)
+class Status:
+    """Where a run stands; SI units, None for what is not known yet."""
+
+    run_folder: str
+    state: str
+    """``running``, ``finished`` or ``stopped``."""
+    why: str
+    """Why it stopped, as the run's last words have it."""
+    cycle: int
+    """Load cycles done."""
+    total_cycles: int
+    """0 for a scene without loading."""
+    cycles_computed: int
+    cycles_jumped: int
+    jumps: int
+    failed_jumps: int
+    settlement_m: float | None
+    speed_up_so_far: float | None
+    """Cycles done over cycles computed; the report gives the ratio of CPU times."""
+    cpu_s: float
+    """CPU time of all finished stages, preparation included [s]."""
+    control_cycle: int | None
+    """Cycles the full run beside it has done; None without one."""
+    next: str
+    """The command that goes on from here."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Fields by name, as ``trackbed status --json`` prints them."""
+        return asdict(self)
+
+
+def status(run_folder: Path) -> Status:
+    """How far the run in ``run_folder`` is; raises `UsageError` when it is no run folder."""
+    record = record_read(run_folder)
+    history = record.run.history
+    cycle = int(history.cycle[-1]) if len(history.cycle) else 0
+    computed = history.computed(cycle)
+    state = "running" if _is_written(run_folder) else "stopped"
+    if state == "stopped" and _is_finished(record):
+        state = "finished"
+    ratio = cycle / computed if computed else nan
+    procedure = record.scene.procedure if record.scene.loading is not None else None
+    verb = {"running": "status", "stopped": "resume", "finished": "report"}[state]
+    last = record.run.events[-1] if record.run.events else {}
+    return Status(
+        run_folder=str(run_folder),
+        state=state,
+        why=str(last.get("why", "")) if state == "stopped" and last["event"] == "stopped" else "",
+        cycle=cycle,
+        total_cycles=procedure.total_cycles if procedure is not None else 0,
+        cycles_computed=computed,
+        cycles_jumped=cycle - computed,
+        jumps=len(record.run.jumps),
+        failed_jumps=len(record.run.failed_jumps),
+        settlement_m=float(history.settlement[-1]) if cycle else None,
+        speed_up_so_far=ratio if isfinite(ratio) else None,
+        cpu_s=sum(cost_total(outcome.cost) for outcome in record.run.outcomes),
+        control_cycle=_cycle(record.control) if record.control is not None else None,
+        next=f"trackbed {verb} {run_folder}",
+    )
+
+
+def _cycle(track: Track) -> int:
+    return int(track.history.cycle[-1])
+
+
+def _is_finished(record: Record) -> bool:
+    """All cycles of the run are done, and of its control when it was asked for one."""
+    if record.scene.loading is None or record.scene.procedure is None:
+        return record.run.preparation is not None
+    tracks = [record.run, record.control] if record.manifest.get("control") else [record.run]
+    total = record.scene.procedure.total_cycles
+    return all(
+        track is not None and len(track.history.cycle) > 0 and _cycle(track) == total
+        for track in tracks
+    )
+
+
+def _is_written(run_folder: Path) -> bool:
+    """Whether a process holds the folder's lock.
+
+    The lock is tried only when the process that last took it may still live: a try can refuse,
+    for its instant, a writer that starts.
+    """
+    path = run_folder / "lock"
+    try:
+        with path.open(encoding="utf-8") as stream:
+            holder = re.fullmatch(r"pid (\d+) on (.+)", stream.read().strip())
+            here = holder is not None and holder[2] == socket.gethostname()
+            if holder is not None and here and not Path(f"/proc/{holder[1]}").exists():
+                return False
+            try:
+                fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return True
+    except OSError:
+        return False
+    return False

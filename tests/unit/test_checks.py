@@ -1,0 +1,267 @@
+"""The validators of a window: each figure against a closed form, each fault named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adapters.checks import (
+    FORCE_ERROR_BOUND,
+    FORCE_START_CYCLES,
+    OVERLAP_BOUND,
+    WindowFigures,
+    check_bounds,
+    check_complete,
+    check_state,
+    check_window,
+    figures_of_window,
+)
+from adapters.errors import EngineFailed, NotCredible
+from adapters.sample import GRAVITY
+from adapters.scene import Scene
+from adapters.state import contacts_none
+from adapters.window import PistonTrack, Window
+
+RADIUS = 3e-3
+MASS = 2e-4
+SAMPLES = 100
+SCENE = Scene.model_validate(
+    {
+        "sample": {
+            "container": "cylinder",
+            "radius": 0.03,
+            "count": 3,
+            "grain_radius": {"distribution": "constant", "mean": RADIUS},
+        },
+        "material": {
+            "grain": {
+                "young": 1e9, "poisson": 0.25, "density": 2710.0, "restitution": 0.5, "friction": 0,
+            },
+            "wall": {"young": 1e10, "poisson": 0.3, "friction": 0},
+        },
+        "loading": {"amplitude": 1000.0, "mean": 500.0, "frequency": 50.0, "piston_mass": 0.01},
+        "engine": {"name": "fake", "rayleigh_share": 0.2},
+    }
+)  # fmt: skip
+STEPS = SCENE.steps_per_cycle
+BED = np.array([[0.0, 0.0, RADIUS], [0.01, 0.0, RADIUS], [0.02, 0.0, RADIUS]])
+
+
+def window(cycles: int = 4, **change: Any) -> Window:
+    """A window of three grains that stand still on the floor, the piston's force as asked for."""
+    n = cycles + 1
+    step = STEPS * np.arange(n)
+    track = np.arange(1, cycles * SAMPLES + 1)
+    force = 1.0 - np.cos(2 * np.pi * track / SAMPLES)
+    whole = Window(
+        first_cycle=7,
+        time_step=step,
+        identifier=np.arange(1, 4),
+        radius=np.full(3, RADIUS),
+        mass=np.full(3, MASS),
+        position=np.repeat(BED[None], n, axis=0),
+        velocity=np.zeros((n, 3, 3)),
+        spin=np.zeros((n, 3, 3)),
+        wall_force={"floor": np.zeros((n, 3, 3))},
+        contacts=(contacts_none(),) * n,
+        piston=PistonTrack(
+            time_step=track * (STEPS // SAMPLES),
+            target_force=force,
+            contact_force=force.copy(),
+            height=np.full(len(track), 0.01),
+            kinetic_translational=np.zeros(len(track)),
+            kinetic_rotational=np.zeros(len(track)),
+        ),
+        piston_start=0.01,
+    )
+    return replace(whole, **change)
+
+
+def tracked(cycles: int = 4, **change: Any) -> Window:
+    """The same with another record of the piston."""
+    plain = window(cycles)
+    return replace(plain, piston=replace(plain.piston, **change))
+
+
+def test_a_whole_window_passes() -> None:
+    """Nothing moves, nothing overlaps: every figure is zero and the record says so."""
+    assert STEPS % SAMPLES == 0
+    assert check_window(SCENE, window(), 4) == {
+        "overlap_share": pytest.approx(0, abs=1e-15),
+        "energy_share": 0.0,
+        "move_share": 0.0,
+        "force_error": 0.0,
+    }
+
+
+@given(st.floats(1e-6, 1.9))
+def test_overlap_of_a_pair(share: float) -> None:
+    """Two grains at distance 2 r - delta: the share is delta / r."""
+    position = window().position.copy()
+    position[2, 1, 0] = 2 * RADIUS - share * RADIUS
+    figures = figures_of_window(SCENE, window(position=position))
+    assert figures.overlap_share == pytest.approx(share, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("axis", "place"), [(2, 0.6 * RADIUS), (0, 0.03 - 0.6 * RADIUS), (1, -0.03 + 0.6 * RADIUS)]
+)
+def test_overlap_with_a_wall(axis: int, place: float) -> None:
+    """A grain 0.4 r inside the floor or the cylinder shows 0.4."""
+    position = window().position.copy()
+    position[3, 0] = [0, 0, 2.5 * RADIUS]
+    position[3, 0, axis] = place
+    figures = figures_of_window(SCENE, window(position=position))
+    assert figures.overlap_share == pytest.approx(0.4, rel=1e-9)
+
+
+def test_a_grain_outside_is_an_overlap() -> None:
+    """A grain that left through a wall is as deep in it as it is far."""
+    position = window().position.copy()
+    position[-1, 1, 0] = 1.0
+    with pytest.raises(NotCredible, match="greatest overlap"):
+        check_window(SCENE, window(position=position), 4)
+
+
+def test_the_state_before_the_window_is_not_judged() -> None:
+    """After a jump the first state is ours, not the engine's."""
+    position, velocity = window().position.copy(), window().velocity.copy()
+    position[0, 1, 0] = RADIUS
+    velocity[0] = 100.0
+    figures = figures_of_window(SCENE, window(position=position, velocity=velocity))
+    assert figures.overlap_share == pytest.approx(0, abs=1e-15)
+    assert figures.energy_share == 0
+
+
+def test_kinetic_energy() -> None:
+    """m v^2 / 2 + (2/5) m r^2 w^2 / 2 of one grain, over 3 m g r."""
+    velocity, spin = window().velocity.copy(), window().spin.copy()
+    velocity[2, 0] = [3.0, 0, 4.0]
+    spin[2, 0] = [0, 20.0, 0]
+    figures = figures_of_window(SCENE, window(velocity=velocity, spin=spin))
+    energy = 0.5 * MASS * 25 + 0.5 * 0.4 * MASS * RADIUS**2 * 400
+    assert figures.energy_share == pytest.approx(energy / (3 * MASS * GRAVITY * RADIUS), rel=1e-12)
+
+
+def test_mean_move() -> None:
+    """One of three grains moves by 0.6 r in one cycle: the mean is 0.2 r."""
+    position = window().position.copy()
+    position[2:, 0, 2] += 0.6 * RADIUS
+    figures = figures_of_window(SCENE, window(position=position))
+    assert figures.move_share == pytest.approx(0.2, rel=1e-12)
+
+
+@pytest.mark.parametrize("cycle", range(4))
+def test_force_error(cycle: int) -> None:
+    """A constant error in one cycle is its own rms, over the peak 2 N; three cycles are free."""
+    plain = window().piston
+    force = plain.contact_force.copy()
+    force[cycle * SAMPLES : (cycle + 1) * SAMPLES] += 0.3
+    figures = figures_of_window(SCENE, tracked(contact_force=force))
+    expected = 0.15 if cycle >= FORCE_START_CYCLES else 0.0
+    assert figures.force_error == pytest.approx(expected, rel=1e-12)
+
+
+def test_short_window_has_no_force_error() -> None:
+    """With no cycle behind the first three the figure is nan, and that is no fault."""
+    figures = figures_of_window(SCENE, window(3))
+    assert np.isnan(figures.force_error)
+    check_bounds(SCENE, figures)
+
+
+@pytest.mark.parametrize(
+    ("name", "bound", "words"),
+    [
+        ("overlap_share", OVERLAP_BOUND, "overlap over the smallest radius"),
+        ("energy_share", 1.0, "kinetic energy"),
+        ("move_share", 1.0, "mean move in one cycle"),
+        ("force_error", FORCE_ERROR_BOUND, "piston's rms force error"),
+    ],
+)
+@pytest.mark.parametrize("excess", [1 + 1e-9, 10.0, np.inf])
+def test_bounds(name: str, bound: float, words: str, excess: float) -> None:
+    """At a bound a window passes, above it the figure and the time step are named."""
+    still = WindowFigures(0.0, 0.0, 0.0, 0.0)
+    check_bounds(SCENE, replace(still, **{name: bound}))
+    with pytest.raises(NotCredible, match=words) as caught:
+        check_bounds(SCENE, replace(still, **{name: bound * excess}))
+    assert caught.value.exit_code == 6
+    assert "of the Rayleigh time" in caught.value.remedy
+
+
+@pytest.mark.parametrize("cycles", [3, 5])
+def test_missing_cycles(cycles: int) -> None:
+    """A window of four cycles is not one of three, nor of five."""
+    with pytest.raises(EngineFailed, match=f"4 of {cycles} cycle ends"):
+        check_complete(SCENE, window(4), cycles)
+
+
+def test_wrong_steps() -> None:
+    """Cycle ends must lie a cycle apart."""
+    step = window().time_step.copy()
+    step[-1] += 1
+    with pytest.raises(EngineFailed, match="cycle ends"):
+        check_complete(SCENE, window(time_step=step), 4)
+
+
+def test_lost_grains_are_named() -> None:
+    """A grain that is missing from the start on is named by its identifier."""
+    kept = {name: getattr(window(), name)[:, [0, 2]] for name in ("position", "velocity", "spin")}
+    one = window(identifier=np.array([1, 3]), **kept)
+    with pytest.raises(NotCredible, match="1 grains are lost: 2"):
+        check_complete(SCENE, one, 4)
+
+
+@pytest.mark.parametrize("name", ["position", "velocity", "spin"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_not_finite(name: str, value: float) -> None:
+    """The first cycle with a number that is not finite is named."""
+    array = getattr(window(), name).copy()
+    array[2:, 1, 2] = value
+    with pytest.raises(NotCredible, match=f"{name} is not finite from cycle 9 on"):
+        check_complete(SCENE, window(**{name: array}), 4)
+
+
+@pytest.mark.parametrize("name", ["target_force", "contact_force", "height"])
+def test_piston_not_finite(name: str) -> None:
+    """nan in the piston's record is a fault, although nan stands for "not judged" in figures."""
+    array = getattr(window().piston, name).copy()
+    array[150:] = np.nan
+    step = window().piston.time_step[150]
+    with pytest.raises(NotCredible, match=rf"not finite from step {step} on"):
+        check_complete(SCENE, tracked(**{name: array}), 4)
+
+
+@pytest.mark.parametrize("left", [399, 250, 0])
+def test_short_piston_record(left: int) -> None:
+    """A record that does not reach the last cycle's end is named with both steps."""
+    track = {name: values[:left] for name, values in vars(window().piston).items()}
+    with pytest.raises(EngineFailed, match=f"record ends at step .* the window at {4 * STEPS}"):
+        check_complete(SCENE, tracked(**track), 4)
+
+
+@pytest.mark.parametrize("fault", ["lost", "overlap", "nan"])
+def test_settled_bed(fault: str) -> None:
+    """A bed without all its grains, pressed into one another, or nan is refused."""
+    state = window().state(0)
+    check_state(SCENE, state)
+    position = state.position.copy()
+    if fault == "lost":
+        state = replace(
+            state,
+            **{
+                name: getattr(state, name)[:2]
+                for name in ("identifier", "position", "radius", "mass", "velocity", "spin")
+            },
+        )
+    else:
+        position[1, 0] = 1.9 * RADIUS if fault == "overlap" else np.nan
+        state = state.moved(position)
+    with pytest.raises(NotCredible) as caught:
+        check_state(SCENE, state)
+    assert caught.value.where == "preparation"

@@ -1,0 +1,296 @@
+"""The run folder: what stands in its place is whole, nothing is overwritten, one writer."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adapters.errors import EngineFailed, UsageError
+from adapters.run_folder import (
+    COLUMNS,
+    Outcome,
+    RunFolder,
+    disk_full_named,
+    stage_place,
+    write_atomically,
+)
+
+ROOT = Path(__file__).parents[2]
+
+
+def finish(folder: RunFolder, name: str, first: int, last: int, **more: Any) -> Path:
+    """A finished stage with the files a run goes on from, and one it does not need."""
+    work = folder.begin(name)
+    (work / "states.npz").write_bytes(b"states" * 100)
+    (work / "end.restart").write_bytes(b"restart" * 100)
+    (work / "log.liggghts").write_text("words")
+    rows = [
+        {"cycle": c, "settlement": c / 3, "kind": "computed"} for c in range(first + 1, last + 1)
+    ]
+    kind = name.split("_")[0]
+    return folder.finish(work, Outcome(kind, first, last, rows, {"engine": 0.1}, **more))
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> RunFolder:
+    """A run of a preparation, two windows and a jump between them."""
+    folder = RunFolder(tmp_path / "run")
+    folder.path.mkdir()
+    finish(folder, "preparation", 0, 0)
+    finish(folder, "window_000000", 0, 2)
+    finish(folder, "jump_000002_1", 2, 4)
+    finish(folder, "window_000004", 4, 5)
+    return folder
+
+
+def table(folder: RunFolder) -> list[list[str]]:
+    lines = (folder.path / "settlement.csv").read_text().splitlines()
+    assert lines[0] == ",".join(COLUMNS)
+    return [line.split(",") for line in lines[1:]]
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    """Every file with its content."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+# --- stages ---------------------------------------------------------------------------------
+
+
+def test_outcome_comes_back(run: RunFolder) -> None:
+    """An outcome is read back as it was written, and its notes name the files left."""
+    outcome = run.outcome("window_000000")
+    assert outcome is not None
+    assert (outcome.stage, outcome.first_cycle, outcome.last_cycle) == ("window", 0, 2)
+    assert outcome.rows[1] == {"cycle": 2, "settlement": 2 / 3, "kind": "computed"}
+    assert outcome.notes["files"] == {"states.npz": 600, "end.restart": 700}
+
+
+def test_table_is_exact(run: RunFolder) -> None:
+    """Numbers in settlement.csv are the shortest that come back bit for bit; nothing is a blank."""
+    rows = table(run)
+    assert [row[0] for row in rows] == ["1", "2", "3", "4", "5"]
+    assert [float(row[1]) for row in rows] == [c / 3 for c in range(1, 6)]
+    assert {row[3] for row in rows} == {""}
+
+
+@pytest.mark.parametrize("name", ["states.npz", "end.restart"])
+@pytest.mark.parametrize("damage", ["missing", "shorter", "longer", "empty"])
+def test_damaged_files_are_noticed(run: RunFolder, name: str, damage: str) -> None:
+    """A stage without its files, each at its size, does not count as finished."""
+    path = run.path / "window_000000" / name
+    if damage == "missing":
+        path.unlink()
+    else:
+        size = {"shorter": path.stat().st_size - 1, "longer": 1000, "empty": 0}[damage]
+        os.truncate(path, size)
+    assert run.outcome("window_000000") is None
+    assert run.outcome("window_000004") is not None
+
+
+def test_files_no_one_needs_may_go(run: RunFolder) -> None:
+    """Removing a log or a dump to save space does not undo a stage."""
+    (run.path / "window_000000" / "log.liggghts").unlink()
+    assert run.outcome("window_000000") is not None
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"{", b"null", b"[]", b"[1]", b'"text"', b"{}", b"\xff\xfe\x00", b'{"stage": "window"}'],
+)
+def test_damaged_outcome_is_no_outcome(run: RunFolder, content: bytes) -> None:
+    """A record that is cut, empty, of another kind or no text is no record."""
+    (run.path / "window_000000" / "outcome.json").write_bytes(content)
+    assert run.outcome("window_000000") is None
+    run.settlement_write()
+    assert [row[0] for row in table(run)] == ["3", "4", "5"]
+
+
+@given(st.integers(0, 10**7), st.integers(0, 10**7), st.integers(1, 4))
+def test_stages_sort_by_cycle(first: int, second: int, attempt: int) -> None:
+    """Preparation first, then by cycle; a jump of no cycles stands before the window after it."""
+    names = [f"window_{first:06d}", f"jump_{second:06d}_{attempt}", "preparation"]
+    ordered = sorted(names, key=stage_place)
+    assert ordered[0] == "preparation"
+    jump_first = second <= first
+    assert ordered[1].startswith("jump") == jump_first
+
+
+def test_begin_moves_later_stages_away(run: RunFolder) -> None:
+    """Doing a stage again moves it and all behind it to discarded/, under free names, unchanged."""
+    before = tree(run.path / "jump_000002_1")
+    run.begin("jump_000002_1")
+    assert run.stage_names() == ["preparation", "window_000000"]
+    discarded = run.path / "discarded"
+    assert tree(discarded / "jump_000002_1.1") == before
+    assert (discarded / "window_000004.1" / "states.npz").exists()
+    (run.path / "partial" / "jump_000002_1").rename(run.path / "jump_000002_1")
+    run.begin("jump_000002_1")
+    assert tree(discarded / "jump_000002_1.1") == before
+    assert (discarded / "jump_000002_1.2").exists()
+    moved = [(e["stage"], e["to"]) for e in run.events() if e["event"] == "discarded"]
+    assert moved == [
+        ("jump_000002_1", "discarded/jump_000002_1.1"),
+        ("window_000004", "discarded/window_000004.1"),
+        ("jump_000002_1", "discarded/jump_000002_1.2"),
+    ]
+
+
+def test_begin_of_the_window_after_a_jump_of_nothing(run: RunFolder) -> None:
+    """A jump of h = 0 and its window share a cycle: beginning the window keeps the jump."""
+    finish(run, "jump_000005_1", 5, 5)
+    run.begin("window_000005")
+    assert "jump_000005_1" in run.stage_names()
+
+
+def test_unfinished_work_is_moved_away(run: RunFolder) -> None:
+    """What a killed process left in partial/ is kept, and never part of the next attempt."""
+    work = run.begin("window_000005")
+    (work / "states.dump").write_text("half")
+    again = run.begin("window_000005")
+    assert list(again.iterdir()) == []
+    kept = run.path / "discarded" / "window_000005.1" / "states.dump"
+    assert kept.read_text() == "half"
+
+
+def test_failed_jump(run: RunFolder) -> None:
+    """A jump given up keeps its reason, drops out of table and outcomes, and is in the events."""
+    run.give_up("jump_000002_1", "because")
+    assert run.failure("jump_000002_1") == "because"
+    assert run.failure("window_000000") == ""
+    assert [o.stage for o in run.outcomes()] == ["preparation", "window", "window"]
+    assert [row[0] for row in table(run)] == ["1", "2", "5"]
+    assert run.events()[-1]["event"] == "jump failed"
+    assert run.events()[-1]["why"] == "because"
+    run.give_up("jump_000005_1", "never got as far as a folder")
+    assert run.failure("jump_000005_1")
+
+
+@pytest.mark.parametrize("content", ["", "{", "null", "{}"])
+def test_damaged_failure_stays_a_failure(run: RunFolder, content: str) -> None:
+    """A jump that was given up is not made again because its reason can not be read."""
+    run.give_up("jump_000002_1", "because")
+    (run.path / "jump_000002_1" / "failed.json").write_text(content)
+    assert "damaged" in run.failure("jump_000002_1")
+
+
+def test_events_survive_a_torn_line(run: RunFolder) -> None:
+    """A line cut by a crash, or bytes that are no text, hide no other event."""
+    run.event("one", cycle=3)
+    with (run.path / "events.jsonl").open("ab") as stream:
+        stream.write(b'{"event": "tor\xff\n')
+    run.event("two")
+    assert [e["event"] for e in run.events()][-2:] == ["one", "two"]
+
+
+def test_shared_start(run: RunFolder, tmp_path: Path) -> None:
+    """The control gets the stages before the first jump, the same files, and no jump."""
+    control = RunFolder(tmp_path / "run" / "control")
+    control.path.mkdir()
+    for _ in range(2):  # a second time changes nothing
+        control.share_start(run, 4)
+        assert control.stage_names() == ["preparation", "window_000000"]
+    for name in control.stage_names():
+        assert tree(control.path / name) == tree(run.path / name)
+        assert (control.path / name / "states.npz").samefile(run.path / name / "states.npz")
+        assert control.outcome(name) == run.outcome(name)
+    assert [row[0] for row in table(control)] == ["1", "2"]
+
+
+def test_shared_start_leaves_damage_behind(run: RunFolder, tmp_path: Path) -> None:
+    """A damaged stage is not shared."""
+    (run.path / "window_000000" / "end.restart").unlink()
+    control = RunFolder(tmp_path / "control")
+    control.path.mkdir()
+    control.share_start(run, 4)
+    assert control.stage_names() == ["preparation"]
+
+
+# --- manifest, lock, disk -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("content", [None, b"", b"{", b"[]", b"null", b'{"scene": {}}', b"\xff"])
+def test_no_run_folder(tmp_path: Path, content: bytes | None) -> None:
+    """A folder without a whole manifest is named, with what to do."""
+    if content is not None:
+        (tmp_path / "manifest.json").write_bytes(content)
+    with pytest.raises(UsageError, match="not a run folder") as caught:
+        RunFolder(tmp_path).manifest()
+    assert caught.value.where == str(tmp_path)
+
+
+def test_second_writer_is_refused(tmp_path: Path) -> None:
+    """Another process gets the pid of the first; when the first is gone the folder is free."""
+    folder = RunFolder(tmp_path)
+    code = (
+        "import sys; from pathlib import Path; from adapters.run_folder import RunFolder\n"
+        "with RunFolder(Path(sys.argv[1])).locked():\n"
+        "    print('in', flush=True); sys.stdin.read()"
+    )
+    first = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path)],
+        cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        assert first.stdout is not None
+        assert first.stdout.readline() == "in\n"
+        before = tree(tmp_path)
+        with pytest.raises(UsageError, match=f"pid {first.pid} on "), folder.locked():
+            pass
+        assert tree(tmp_path) == before
+    finally:
+        first.kill()
+        first.communicate()
+    with folder.locked():
+        assert f"pid {os.getpid()} on " in (tmp_path / "lock").read_text()
+
+
+def test_leftovers_of_a_killed_writer_go(tmp_path: Path) -> None:
+    """Half-written hidden files are removed by the next writer, and nothing else is."""
+    (tmp_path / ".settlement.csv.123.partial").write_text("ha")
+    (tmp_path / "settlement.csv").write_text("whole")
+    with RunFolder(tmp_path).locked():
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["lock", "settlement.csv"]
+
+
+def test_write_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """When writing fails, the old content is there and nothing of the new."""
+    path = tmp_path / "table.csv"
+    write_atomically(path, "old")
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_atomically(path, "new")
+    assert path.read_text() == "old"
+
+
+@pytest.mark.parametrize(
+    ("number", "named"), [(errno.ENOSPC, True), (errno.EDQUOT, True), (errno.EIO, False)]
+)
+def test_disk_full_is_named(tmp_path: Path, number: int, named: bool) -> None:
+    """A full disk or quota becomes exit code 5 with a remedy; other faults stay what they are."""
+    with pytest.raises(EngineFailed if named else OSError) as caught, disk_full_named(tmp_path):
+        raise OSError(number, os.strerror(number))
+    if named:
+        assert "the disk is full" in str(caught.value)
+        assert "resume" in str(caught.value)
+        assert caught.value.exit_code == 5
+        assert caught.value.from_outside
+
+
+def test_outcome_is_plain_json(run: RunFolder) -> None:
+    """The record of a stage is JSON that any program reads."""
+    text = (run.path / "window_000000" / "outcome.json").read_text()
+    assert json.loads(text)["last_cycle"] == 2

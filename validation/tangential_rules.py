@@ -1,0 +1,83 @@
+"""Rules for the tangential force of a Hertz-Mindlin contact whose normal force changes.
+
+Eq. 6 gives F_t = k_t delta_t with k_t = 8 G* sqrt(R* delta_n), and leaves open what becomes of F_t
+when delta_n changes at fixed delta_t.  Each rule here answers that; a path is a series of overlaps
+delta_n and tangential displacements delta_t, shape (s,) each, of a contact that does not slide as a
+whole.  The paper's rule: "when the normal effort F_n decreases by dF_n, the value of the tangential
+force when the normal force was F_n - dF_n is assigned to F_t" (section 2.2, after Roux, and Elata
+and Berryman).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.contact_law import tangential_stiffness
+from adapters.state import FloatArray
+
+
+def force_secant(stiffness: FloatArray, displacement: FloatArray) -> FloatArray:
+    """F_t = k_t delta_t [N], shape (s,): eq. 6 as printed, and LIGGGHTS' ``tangential history``.
+
+    ``stiffness`` k_t [N/m] and ``displacement`` delta_t [m] along the path, shape (s,).
+    """
+    return stiffness * displacement
+
+
+def force_incremental(stiffness: FloatArray, displacement: FloatArray) -> FloatArray:
+    """dF_t = k_t d delta_t [N], shape (s,): a change of the normal force leaves F_t as it is."""
+    mean = (stiffness[1:] + stiffness[:-1]) / 2
+    steps = mean * np.diff(displacement)
+    return stiffness[0] * displacement[0] + np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def force_rescaled(stiffness: FloatArray, displacement: FloatArray) -> FloatArray:
+    """The paper's rule [N], shape (s,): dF_t = k_t d delta_t, and F_t ~ k_t while F_n decreases.
+
+    The tangential force that a contact under F_n - dF_n has at the same elastic displacement
+    F_t/k_t is F_t k_t(F_n - dF_n)/k_t(F_n).
+    """
+    force = np.empty_like(displacement)
+    force[0] = stiffness[0] * displacement[0]
+    for i in range(1, len(force)):
+        kept = force[i - 1] * min(1.0, stiffness[i] / stiffness[i - 1])
+        mean = (stiffness[i] + stiffness[i - 1]) / 2
+        force[i] = kept + mean * (displacement[i] - displacement[i - 1])
+    return force
+
+
+def force_mindlin_deresiewicz(
+    overlap: FloatArray,
+    displacement: FloatArray,
+    modulus: float,
+    shear: float,
+    radius: float,
+    friction: float,
+    springs: int = 4000,
+) -> FloatArray:
+    """The contact with micro-slip [N], shape (s,), along any path: what the rules approximate.
+
+    Springs side by side, each with its own overlap delta_n - x^2/R* and Coulomb's limit, are the
+    half-space of Cattaneo, Mindlin and Deresiewicz (method of dimensionality reduction; Popov and
+    Hess 2015, chapter 5).  ``overlap`` and ``displacement`` [m], shape (s,); ``modulus`` E* and
+    ``shear`` G* [Pa]; ``radius`` R* [m]; ``friction`` may be inf.  The first state has no force.
+    """
+    edge = np.sqrt(radius * overlap.max())
+    x = (np.arange(springs) + 0.5) / springs * edge
+    width = 2 * edge / springs  # both halves
+    stretch = np.zeros(springs)
+    force = np.zeros_like(displacement)
+    for i in range(1, len(force)):
+        depth = overlap[i] - x**2 / radius
+        stretch = stretch + displacement[i] - displacement[i - 1]
+        if np.isfinite(friction):
+            limit = friction * modulus / (4 * shear) * np.maximum(depth, 0.0)
+            stretch = np.clip(stretch, -limit, limit)
+        stretch = np.where(depth > 0, stretch, 0.0)
+        force[i] = 4 * shear * width * stretch.sum()
+    return force
+
+
+def work(force: FloatArray, displacement: FloatArray) -> float:
+    """Work done on the contact along a path, integral of F_t d delta_t [J]: what it swallows."""
+    return float(np.trapezoid(force, displacement))
