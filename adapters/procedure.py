@@ -14,7 +14,7 @@ from adapters.engine import engine_named, interruptible
 from adapters.errors import EngineFailed, NotConverged, NotCredible, SceneError, UsageError
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder, disk_full_named, write_atomically
-from adapters.scene import Scene
+from adapters.scene import Scene, flat_keys
 from adapters.scene_file import scene_load
 from adapters.stages import Bed, Run, Variant
 
@@ -207,7 +207,7 @@ def manifest_settle(
 
 def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> None:
     """Raise `SceneError` with every parameter that differs from the run's manifest."""
-    before, now = _flat(old), _flat(new)
+    before, now = flat_keys(old), flat_keys(new)
     lines = [
         f"{key}: {before.get(key)!r} in the run, {now.get(key)!r} now"
         for key in sorted(before.keys() | now.keys())
@@ -219,16 +219,6 @@ def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> 
             where=str(path),
             remedy="take the parameters back, or start a new run: --run-folder FOLDER",
         )
-
-
-def _flat(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in table.items():
-        if isinstance(value, dict):
-            flat |= _flat(value, f"{prefix}{key}.")
-        else:
-            flat[prefix + key] = value
-    return flat
 
 
 def _dry_run(scene: Scene, run_path: Path) -> None:

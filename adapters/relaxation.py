@@ -79,10 +79,17 @@ class Relaxation:
     median_move: float
     """Median distance of a grain from its estimate [m]."""
 
+    @property
+    def coordination_change(self) -> float:
+        """Relative change of the coordination number over the jump; a sound jump stays in 3 %."""
+        before = self.before.coordination_with_walls
+        return self.relaxed.coordination_with_walls / before - 1 if before else 0.0
+
     def record(self) -> dict[str, Any]:
         """All but the positions, for the run folder and the command line."""
         record = asdict(self)
         del record["position"]
+        record["coordination_change"] = self.coordination_change
         return record
 
 
@@ -121,7 +128,7 @@ class _Scene:
             + [self.stiffness.wall]
         )
         pair = rows.second >= 0
-        other = np.where(pair, self.radius[rows.second], np.inf)
+        other = np.where(pair, self.radius[np.where(pair, rows.second, 0)], np.inf)
         modulus = np.where(
             pair, self.stiffness.grain, modulus_of_wall[np.where(pair, 0, -1 - rows.second)]
         )
@@ -143,7 +150,7 @@ def relax(
     keep_height: bool = True,
     overlap_cap: float = np.inf,
     tolerance: float = 0.01,
-    evaluations_max: int = 20_000,
+    evaluations_max: int = 40_000,
 ) -> Relaxation:
     """Relax the estimated ``position`` (n, 3) [m] of the grains of ``before``.
 
@@ -192,6 +199,7 @@ def relax(
             overlap_cap,
             keep_height,
             tolerance,
+            evaluations_max,
         )
     else:
         force, held, proximal = np.zeros_like(position), np.zeros(len(radius), bool), 0.0
@@ -290,6 +298,7 @@ def _relax_by_move(
     overlap_cap: float,
     keep_height: bool,
     tolerance: float,
+    evaluations_max: int,
 ) -> tuple[FloatArray, bool, int]:
     """`smallest_move` of grains sorted in space; centres [m], whether converged, evaluations."""
     order = _spatial_order(position_before, before.radius)
@@ -307,6 +316,8 @@ def _relax_by_move(
         after.search,
         keep_height=keep_height,
         tolerance=tolerance * scale,
+        accepted=min(overlap_cap, max(scale, network.overlap.max(initial=0.0))),
+        evaluations_max=evaluations_max,
     )
     position = np.empty_like(estimate)
     position[order] = moved.position

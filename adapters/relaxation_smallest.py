@@ -41,8 +41,12 @@ SKIN = 0.2
 """Reach of the neighbour list beyond contact, in median radii."""
 NEAREST_ITERATIONS = 20
 """Iterations that look for the nearest positions; later ones only for the next that fit."""
-OPEN_ITERATIONS = 35
-"""Iterations after which contacts of the network that can not be closed are left open."""
+OPEN_ITERATIONS, OPEN_SHARE = 25, 0.1
+"""Iterations after which contacts of the network that can not be closed are let go, and the
+share of them each time."""
+ACCEPT_ITERATIONS, ITERATIONS_MAX = 45, 100
+"""Iterations after which any bed without overlaps beyond those of the network will do, and the
+most of them."""
 STEP_MAX = 0.5
 """Greatest step of a grain in its own radii: beyond it the linearised contacts mislead."""
 PRODUCTS_NEAREST, PRODUCTS_FIT = 100, 1000
@@ -95,13 +99,16 @@ def smallest_move(
     *,
     keep_height: bool,
     tolerance: float,
-    iterations_max: int = 100,
+    accepted: float,
+    evaluations_max: int,
 ) -> SmallestMove:
     """Move grains from ``estimate`` (n, 3) [m] as little as the network allows.
 
     ``start`` (n, 3) is where the iteration begins.  The overlaps of ``network`` are those to get
     back, those of ``bounded`` are upper bounds of these pairs [m]; all others stay ``gap`` [m]
-    apart.  ``tolerance`` [m] is the greatest error of an overlap.
+    apart.  ``tolerance`` [m] is the greatest error of an overlap.  Where the demands contradict
+    each other, late iterations end as soon as no overlap is above ``accepted`` [m].  Gives up
+    after about ``evaluations_max`` evaluations.
     """
     n = len(radius)
     height_share = 1 / np.sqrt(n) if keep_height else 0.0
@@ -110,7 +117,9 @@ def smallest_move(
     rows = _rows_start(network, bounded, n)
     listed_at = None
     violation, norm, evaluations, swaps = np.inf, 1.0, 0, 0
-    for iteration in range(iterations_max):
+    for iteration in range(ITERATIONS_MAX):
+        if evaluations > evaluations_max:
+            break
         if listed_at is None or np.linalg.norm(x - listed_at, axis=1).max() > skin / 2:
             rows, listed_at = _rows_listed(rows, search(x, skin), gap, n), x
             near = geometry(x, rows.first, rows.second)
@@ -125,13 +134,16 @@ def smallest_move(
         if 0 < iteration < NEAREST_ITERATIONS and violation < skin / 10:
             swapped = _swap(rows, gap)
             swaps += swapped
-        if iteration and not swapped and violation <= tolerance and abs(lift) <= tolerance:
+        done = violation <= tolerance or (
+            iteration >= ACCEPT_ITERATIONS and near.overlap.max() <= accepted + tolerance
+        )
+        if iteration and not swapped and done and abs(lift) <= tolerance:
             return SmallestMove(x, True, violation, evaluations, swaps)
         products_max = PRODUCTS_NEAREST
         if iteration >= NEAREST_ITERATIONS:
             anchor, products_max = x, PRODUCTS_FIT
             if iteration >= OPEN_ITERATIONS:
-                rows.member &= (excess >= -tolerance) | (rows.multiplier[:-1] >= 0)
+                _open(rows, excess, tolerance)
             rows.multiplier[:] = 0.0
         # x = anchor - J^T mu in delta(x_k) + J (x - x_k) = target, the slack's share put back
         right = np.empty(len(rows.key) + 1)
@@ -221,3 +233,10 @@ def _swap(rows: _Rows, gap: float) -> int:
         mu[torn] = 0.0
         swapped += count
     return swapped
+
+
+def _open(rows: _Rows, excess: FloatArray, tolerance: float) -> None:
+    """Let go of the widest open members of the network; their overlap stays an upper bound."""
+    gaping = np.flatnonzero(rows.member & (excess < -tolerance) & (rows.multiplier[:-1] < 0))
+    count = int(np.ceil(OPEN_SHARE * len(gaping)))
+    rows.member[gaping[np.argsort(excess[gaping])[:count]]] = False

@@ -13,18 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from adapters import report_sections as sections
 from adapters.overlaps import neighbours
-from adapters.report_error import jumped_spans
+from adapters.report_bed import PAPER_DENSITY, karrech
+from adapters.report_history import jumped_spans
 from adapters.report_html import page
-from adapters.report_numbers import (
-    PROCEDURE,
-    TWIN_SCATTER,
-    Numbers,
-    numbers_of,
-    preparation_series,
-)
+from adapters.report_numbers import TWIN_SCATTER, Numbers, numbers_of, variant_name
+from adapters.report_preparation import preparation_series
 from adapters.report_record import Record, Track, record_read
+from adapters.report_sections import body
+from adapters.report_verdict import PROCEDURE
 from adapters.run_folder import Outcome, disk_full_named, write_atomically
 from adapters.sample import PAPER_COORDINATION
 from adapters.state import FloatArray, state_load
@@ -47,7 +44,7 @@ def report_write(run_folder: Path) -> Path:
     with disk_full_named(run_folder):
         figures = figures_write(record, numbers)
         write_atomically(run_folder / "report.json", numbers.to_json())
-        html = page(f"Settlement of {numbers.scene}", sections.body(record, numbers, figures))
+        html = page(f"Settlement of {numbers.scene}", body(record, numbers, figures))
         write_atomically(run_folder / "report.html", html)
     return run_folder / "report.html"
 
@@ -58,39 +55,39 @@ def figures_write(record: Record, numbers: Numbers) -> dict[str, Path]:
 
     folder = record.path / "figures"
     folder.mkdir(exist_ok=True)
-    files = {
-        name: figure_save(draw, folder / name) for name, draw in _figures(record, numbers)
-    }
+    files = {name: figure_save(draw, folder / name) for name, draw in _figures(record, numbers)}
     return {name.partition(".")[0]: path for name, path in files.items()}
 
 
 def _figures(record: Record, numbers: Numbers) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Name and drawing of each figure; a svg comes after a png of the same name."""
+    """File name and drawing of each figure."""
     from adapters import report_figures as figures
 
     series = preparation_series(record)
     if series is not None:
-        paper = (sections.PAPER_DENSITY, PAPER_COORDINATION) if sections.karrech(record) else (None, None)
+        paper = (PAPER_DENSITY, PAPER_COORDINATION) if karrech(record) else (None, None)
         yield "preparation.svg", partial(figures.preparation_figure, series, *paper)
     run = record.run.history
     if not len(run.cycle):
         return
     control = None if record.control is None else record.control.history
     spans = jumped_spans(record.run.outcomes)
-    others = [(track.name, track.history) for track in record.others]
+    others = [(variant_name(track.name), track.history) for track in record.others]
     title = ""
     if (row := numbers.row(PROCEDURE)) is not None:
         title = f"error {100 * row.settlement_error:+.1f} % at a speed-up of {row.speed_up:.2f}"
     settlement = partial(figures.settlement_figure, run, control, others, spans, title)
     yield "settlement.png", settlement
-    yield "settlement.svg", settlement
     if numbers.stopped_early is not None and numbers.curve_fitted is not None:
         lines = (
             ("full run stopped early, nothing moved", numbers.stopped_early),
             ("law fitted to the full run's curve, no bed", numbers.curve_fitted),
         )
-        yield "error_cost.svg", partial(
-            figures.error_cost_figure, numbers.error_rows, lines, *_scatter(record, numbers)
+        yield (
+            "error_cost.svg",
+            partial(
+                figures.error_cost_figure, numbers.error_rows, lines, *_scatter(record, numbers)
+            ),
         )
     yield "coordination.svg", partial(figures.coordination_figure, run, control, spans)
     if beds := list(_penetrations(record)):
@@ -102,11 +99,9 @@ def _figures(record: Record, numbers: Numbers) -> Iterator[tuple[str, Callable[[
 
 def _scatter(record: Record, numbers: Numbers) -> tuple[float, str]:
     """Error below which two full runs can not be told apart, and how it is known; nan when not."""
-    beside = {track.name for track in record.others}
-    known = [abs(r.settlement_error) for r in numbers.error_rows if r.name.split(",")[0] in beside]
-    if known:
-        return max(known), "further runs of this scene"
-    if sections.karrech(record):
+    if (floor := numbers.floor) is not None:
+        return floor, "h = 0 and perturbed full runs"
+    if karrech(record):
         return TWIN_SCATTER, "scatter of twin runs"
     return np.nan, ""
 
@@ -138,7 +133,7 @@ def _overlaps(record: Record, name: str, jump: Outcome) -> Iterator[tuple[str, F
 
 
 def _samples(record: Record) -> list[tuple[str, FloatArray, FloatArray]]:
-    """The bed before loading and now, and the control's, each grain with its residual displacement."""
+    """Title, centres [m] and residual displacements [m] of the beds that are drawn."""
 
     def moved(track: Track, cycle: int) -> tuple[FloatArray, FloatArray]:
         position = track.position(cycle)

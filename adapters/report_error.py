@@ -10,21 +10,17 @@ unless "with preparation" is said.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 from math import nan
 
 import numpy as np
 
-from adapters.errors import UsageError
 from adapters.laws import Law
+from adapters.report_history import History, cost_total, history_read
 from adapters.residual import error_of_coordinates, error_of_displacement
-from adapters.run_folder import Outcome
+from adapters.run_folder import Outcome, RunFolder
 from adapters.state import FloatArray, IntArray
-
-AVERAGED = 10
-"""Computed cycles at the end over which coordination number and deflection are averaged: both
-scatter from one cycle to the next."""
 
 COORDINATION_BAR = 0.03
 """Greatest relative change of the coordination number, by a relaxation or against a control."""
@@ -34,88 +30,6 @@ HEIGHT_BAR = 0.05
 
 PYTHON_BAR = 0.05
 """Greatest share of Python in the CPU time of a run."""
-
-
-@dataclass(frozen=True)
-class History:
-    """A run at the ends of its cycles, r rows in ascending cycles; nan where nothing was measured."""
-
-    cycle: IntArray
-    kind: tuple[str, ...]
-    """``computed``, ``healing`` or ``jumped``."""
-    settlement: FloatArray
-    """Mean settlement of the grains since the preparation [m]."""
-    coordination_number: FloatArray
-    """Contacts with other grains, mean over all grains."""
-    relative_density: FloatArray
-    elastic_deflection: FloatArray
-    """Rise of the piston on unloading [m]."""
-    force_error: FloatArray
-    """Root mean square of the piston's force error in the cycle over the peak force."""
-    maximum_overlap: FloatArray
-    """Greatest overlap of grains, and of grains with walls [m]."""
-    cpu_s: FloatArray
-    """CPU time from the start of loading to the row [s]."""
-
-    def row(self, cycle: int) -> int:
-        """Index of a cycle's row; raises `UsageError` when it was not computed."""
-        found = np.flatnonzero(self.cycle == cycle)
-        if not len(found):
-            raise UsageError(f"there is no row of cycle {cycle}")
-        return int(found[0])
-
-    def computed(self, cycle: int) -> int:
-        """Cycles computed until ``cycle``: rows that are not jumps."""
-        return int(((self.cycle <= cycle) & self.engine_rows).sum())
-
-    @property
-    def engine_rows(self) -> np.typing.NDArray[np.bool_]:
-        """Which rows the engine computed, shape (r,)."""
-        return np.array([kind != "jumped" for kind in self.kind], bool)
-
-    def late_mean(self, name: str, cycle: int) -> float:
-        """Mean of a column over the computed rows among the last `AVERAGED` cycles to ``cycle``."""
-        late = (self.cycle > cycle - AVERAGED) & (self.cycle <= cycle) & self.engine_rows
-        values = getattr(self, name)[late]
-        values = values[np.isfinite(values)]
-        return float(values.mean()) if len(values) else nan
-
-
-def cost_total(cost: Mapping[str, float]) -> float:
-    """CPU time of a stage [s]; ``start_up`` is a part of ``engine``."""
-    return sum(seconds for purpose, seconds in cost.items() if purpose != "start_up")
-
-
-def history_of(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = ()) -> History:
-    """The table of a run from its stages; a window's cost is spread evenly over its cycles.
-
-    ``lost``: after which cycle failed attempts lost how much CPU time [s].  The preparation has
-    no rows and is left out of the cost.
-    """
-    rows, cpu, spent = [], [], 0.0
-    for outcome in outcomes:
-        if outcome.stage == "preparation":
-            continue
-        cost = cost_total(outcome.cost)
-        for number, row in enumerate(outcome.rows, start=1):
-            rows.append(row)
-            failed = sum(seconds for cycle, seconds in lost if cycle < row["cycle"])
-            cpu.append(spent + failed + cost * number / len(outcome.rows))
-        spent += cost
-    columns = {
-        column.name: np.array([_number(row.get(column.name)) for row in rows])
-        for column in fields(History)[2:-1]
-    }
-    return History(
-        cycle=np.array([row["cycle"] for row in rows], np.int64),
-        kind=tuple(row["kind"] for row in rows),
-        **columns,
-        cpu_s=np.array(cpu),
-    )
-
-
-def _number(value: object) -> float:
-    return float(value) if isinstance(value, int | float) else nan
 
 
 def relative_error(value: float, reference: float) -> float:
@@ -133,18 +47,8 @@ def gained_time(ratio: float) -> float:
     return ratio - 1
 
 
-def jumped_spans(outcomes: Sequence[Outcome]) -> list[tuple[int, int]]:
-    """Cycles before and after each jump."""
-    return [(o.first_cycle, o.last_cycle) for o in outcomes if o.stage == "jump" and o.rows]
-
-
-def cycles_computed(cycle: int, spans: Sequence[tuple[int, int]]) -> int:
-    """Cycles among the first ``cycle`` that were computed; ``cycle`` lies outside the jumps."""
-    return cycle - sum(last - first for first, last in spans if last <= cycle)
-
-
 @dataclass(frozen=True)
-class ErrorRow:
+class Comparison:
     """A way to the bed at one cycle, its errors against the full run, and its cost.
 
     Errors are relative and signed, except E_r; nan where not known.
@@ -158,12 +62,12 @@ class ErrorRow:
     settlement_error: float = nan
     coordination_number: float = nan
     """Mean of the last `AVERAGED` cycles, as the elastic deflection."""
-    coordination_error: float = nan
+    coordination_number_error: float = nan
     relative_density: float = nan
-    density_error: float = nan
+    relative_density_error: float = nan
     elastic_deflection: float = nan
     """[m]"""
-    deflection_error: float = nan
+    elastic_deflection_error: float = nan
     displacement_error: float = nan
     """E_r (eq. 22) of the residual displacement since the start of loading."""
     jump_displacement_error: float = nan
@@ -191,19 +95,19 @@ class Beds:
     """What stands for it."""
 
 
-def error_row(
+def comparison(
     name: str,
     own: History,
     own_cycle: int,
     full: History,
     full_cycle: int,
     preparation_s: float,
-    beds: Beds,
-) -> ErrorRow:
+    beds: Beds | None = None,
+) -> Comparison:
     """``own`` at its cycle ``own_cycle`` taken for the bed of ``full`` at ``full_cycle``.
 
     The two cycles differ for "jump and move nothing", which is the full run cut short.
-    ``preparation_s``: CPU time of the preparation, the same for both [s].
+    ``preparation_s``: CPU time of the preparation, the same for both [s].  E_r needs ``beds``.
     """
     mine, truth = own.row(own_cycle), full.row(full_cycle)
     late = {
@@ -212,20 +116,24 @@ def error_row(
     }
     cost, full_cost = float(own.cpu_s[mine]), float(full.cpu_s[truth])
     ratio = speed_up(full_cost, cost)
-    return ErrorRow(
+    return Comparison(
         name=name,
         computed=own.computed(own_cycle),
         settlement=float(own.settlement[mine]),
         settlement_error=relative_error(own.settlement[mine], full.settlement[truth]),
         coordination_number=late["coordination_number"][0],
-        coordination_error=relative_error(*late["coordination_number"]),
+        coordination_number_error=relative_error(*late["coordination_number"]),
         relative_density=float(own.relative_density[mine]),
-        density_error=relative_error(own.relative_density[mine], full.relative_density[truth]),
+        relative_density_error=relative_error(
+            own.relative_density[mine], full.relative_density[truth]
+        ),
         elastic_deflection=late["elastic_deflection"][0],
-        deflection_error=relative_error(*late["elastic_deflection"]),
-        displacement_error=_displacement_error(beds.start, beds),
-        jump_displacement_error=_displacement_error(beds.before_jump, beds),
-        coordinates_error=error_of_coordinates(beds.full, beds.own),
+        elastic_deflection_error=relative_error(*late["elastic_deflection"]),
+        displacement_error=nan if beds is None else _displacement_error(beds.start, beds),
+        jump_displacement_error=(
+            nan if beds is None else _displacement_error(beds.before_jump, beds)
+        ),
+        coordinates_error=nan if beds is None else error_of_coordinates(beds.full, beds.own),
         cpu_s=cost,
         speed_up=ratio,
         gained_time=gained_time(ratio),
@@ -238,6 +146,18 @@ def _displacement_error(start: FloatArray | None, beds: Beds) -> float:
     if start is None or np.array_equal(start, beds.full):
         return nan
     return error_of_displacement(start, beds.full, beds.own)
+
+
+def compare(own: RunFolder, full: RunFolder) -> Comparison:
+    """The run in ``own`` against the full run in ``full``, at the last cycle that both have.
+
+    Raises `UsageError` when they have none.
+    """
+    mine, truth = history_read(own), history_read(full)
+    cycle = last_common_cycle(mine, truth)
+    prepared = full.outcome("preparation")
+    preparation_s = nan if prepared is None else cost_total(prepared.cost)
+    return comparison(own.path.name, mine, cycle, truth, cycle, preparation_s)
 
 
 @dataclass(frozen=True)
@@ -262,9 +182,7 @@ def stopped_early(full: History, cycle: int) -> CostLine:
     return CostLine(full.cycle[early], full.cpu_s[early], error)
 
 
-def curve_fitted(
-    full: History, law: Law, first: int, cycle: int, at: Sequence[int]
-) -> CostLine:
+def curve_fitted(full: History, law: Law, first: int, cycle: int, at: Sequence[int]) -> CostLine:
     """The law fitted to the settlement from cycle ``first`` on, stopped at each cycle of ``at``.
 
     Extrapolates the curve from there to ``cycle``, without relaxing or resubmitting any bed: it
@@ -357,8 +275,11 @@ def _settled(history: History | None, first: int, last: int) -> float:
     """Settlement between two cycles [m]; nan unless the table has both."""
     if history is None or not {first, last} <= {0, *history.cycle.tolist()}:
         return nan
-    ends = [0.0 if cycle == 0 else history.settlement[history.row(cycle)] for cycle in (first, last)]
-    return float(ends[1] - ends[0])
+    start, end = (
+        0.0 if cycle == 0 else float(history.settlement[history.row(cycle)])
+        for cycle in (first, last)
+    )
+    return end - start
 
 
 def last_common_cycle(own: History, full: History) -> int:

@@ -13,13 +13,16 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from adapters.checks import FORCE_ERROR_GOAL, FORCE_START_CYCLES
-from adapters.report_error import CostLine, History
-from adapters.report_numbers import CostSplit, ErrorRow, PreparationSeries
+from adapters.report_error import Comparison, CostLine
+from adapters.report_history import History
+from adapters.report_preparation import PreparationSeries
 from adapters.report_spheres import extent_of, spheres_draw
+from adapters.report_verdict import CostSplit
 from adapters.state import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 COMPUTED, HEALING, JUMPED, CONTROL, OTHER = "#0b5fa5", "#e07b00", "#8c8c8c", "#111111", "#2a9d6f"
@@ -28,10 +31,13 @@ COMPUTED, HEALING, JUMPED, CONTROL, OTHER = "#0b5fa5", "#e07b00", "#8c8c8c", "#1
 SPAN = "#e9e9e9"
 """Shade of a jumped span."""
 
+ERROR_SHOWN = 0.05
+"""Least error of a settlement shown [%]: no single run of a chaotic bed says anything below."""
+
 WIDTH = 7.2
 """Width of a figure [inch]."""
 
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "font.size": 9.5,
     "axes.titlesize": 10,
     "axes.titlelocation": "left",
@@ -80,12 +86,9 @@ def _logarithmic(panel: Axes, name: Literal["x", "y"]) -> None:
     """A logarithmic axis with plain numbers at 1, 2 and 5 where there is room, else at decades."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    if name == "x":
-        panel.set_xscale("log")
-        axis, (low, high) = panel.xaxis, panel.get_xlim()
-    else:
-        panel.set_yscale("log")
-        axis, (low, high) = panel.yaxis, panel.get_ylim()
+    panel.set(**{f"{name}scale": "log"})
+    axis: Axis = panel.xaxis if name == "x" else panel.yaxis
+    low, high = panel.get_xlim() if name == "x" else panel.get_ylim()
     roomy = abs(np.log10(high / low)) < 2.2
     axis.set_major_locator(LogLocator(subs=(1, 2, 5) if roomy else (1,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -132,11 +135,17 @@ def _settlement_panel(
         panel.plot(other.cycle, 1e6 * other.settlement, color=OTHER, lw=0.9, label=name)
     if control is not None:
         panel.plot(
-            control.cycle, 1e6 * control.settlement, color=CONTROL, lw=1.1, label="full run (control)"
+            control.cycle,
+            1e6 * control.settlement,
+            color=CONTROL,
+            lw=1.1,
+            label="full run (control)",
         )
         if spans:
             still = _nothing_moved(run, control, spans)
-            panel.plot(run.cycle, 1e6 * still, ":", color=JUMPED, lw=1.2, label="jump, move nothing")
+            panel.plot(
+                run.cycle, 1e6 * still, ":", color=JUMPED, lw=1.2, label="jump, move nothing"
+            )
     kinds = np.array(run.kind)
     label: str | None = "jumped"
     for first, last in spans:
@@ -151,21 +160,19 @@ def _settlement_panel(
             # A line for the eye through dots; a gap wherever another kind of cycle lies between.
             shown = np.where(kinds == kind, 1e6 * run.settlement, np.nan)
             size = 3 if len(kinds) < 150 else 1.8
-            panel.plot(run.cycle, shown, ".-", ms=size, color=colour, label=f"{kind} cycles", lw=1.1)
+            panel.plot(
+                run.cycle, shown, ".-", ms=size, color=colour, label=f"{kind} cycles", lw=1.1
+            )
 
 
-def _nothing_moved(
-    run: History, control: History, spans: Sequence[tuple[int, int]]
-) -> FloatArray:
+def _nothing_moved(run: History, control: History, spans: Sequence[tuple[int, int]]) -> FloatArray:
     """Settlement of the full run with the jumped cycles cut out, at the rows of ``run``."""
     jumped = [sum(last - first for first, last in spans if last <= c) for c in run.cycle]
-    return np.interp(
-        run.cycle - np.array(jumped), control.cycle, control.settlement, right=np.nan
-    )
+    return np.interp(run.cycle - np.array(jumped), control.cycle, control.settlement, right=np.nan)
 
 
 def error_cost_figure(
-    rows: Sequence[ErrorRow],
+    rows: Sequence[Comparison],
     lines: Sequence[tuple[str, CostLine]],
     scatter: float,
     scatter_name: str,
@@ -176,9 +183,7 @@ def error_cost_figure(
     """
     figure, axes = _panels(1, 1, 3.6)
     panel = axes[0, 0]
-    for (name, line), (style, colour) in zip(
-        lines, (("-", JUMPED), (".-", OTHER)), strict=False
-    ):
+    for (name, line), (style, colour) in zip(lines, (("-", JUMPED), (".-", OTHER)), strict=False):
         seen = np.abs(line.settlement_error) > 0
         panel.plot(
             line.cpu_s[seen],
@@ -206,6 +211,7 @@ def error_cost_figure(
     full = rows[-1].cpu_s
     panel.axvline(full, color=CONTROL, lw=1.1, label="cost of the full run")
     panel.set_xlim(left=full / 20)
+    panel.set_ylim(bottom=ERROR_SHOWN)
     _logarithmic(panel, "x")
     _logarithmic(panel, "y")
     panel.set_xlabel("CPU time from the start of loading (s)")
@@ -243,7 +249,12 @@ def coordination_figure(
                 name = "after a jump, relaxed" if kind == "jumped" else f"{kind} cycles"
                 rows = kinds == kind
                 panel.plot(
-                    run.cycle[rows], getattr(run, column)[rows], mark, color=colour, ms=5, label=name
+                    run.cycle[rows],
+                    getattr(run, column)[rows],
+                    mark,
+                    color=colour,
+                    ms=5,
+                    label=name,
                 )
         panel.set_ylabel(label)
     axes[1, 0].set_xlabel("load cycles")
@@ -283,10 +294,11 @@ def penetration_figure(jumps: Sequence[tuple[str, dict[str, FloatArray]]]) -> Fi
 def sample_figure(
     panels: Sequence[tuple[str, FloatArray, FloatArray]], radius: FloatArray
 ) -> Figure:
-    """The sample at several instants: (title, centres [m], (n, 3), residual displacement [m], (n,))."""
+    """The sample at several instants: title, centres [m], (n, 3), residual moves [m], (n,)."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import PowerNorm
+    from matplotlib.ticker import MaxNLocator
 
     longest = max(float(np.quantile(displacement, 0.98)) for _, _, displacement in panels)
     # The square root spreads the many small moves; a linear scale would show the few large ones.
@@ -310,6 +322,7 @@ def sample_figure(
         orientation="horizontal",
         shrink=0.55,
         aspect=40,
+        ticks=MaxNLocator(4),
         extend="max",
         label="residual displacement since the start of loading (µm)",
     )
@@ -367,7 +380,7 @@ def piston_figure(
     target: FloatArray,
     contact: FloatArray,
 ) -> Figure:
-    """Force error of every cycle, and target and contact force [N] over one ``cycle`` (phase 0-1)."""
+    """Force error of every cycle; target and contact force [N] over one ``cycle`` (phase 0-1)."""
     figure, axes = _panels(1, 2, 3.2)
     panel = axes[0, 0]
     _spans_shade(panel, spans)
@@ -378,7 +391,9 @@ def piston_figure(
         (rows & early, HEALING, "first three cycles"),
     ):
         if which.any():
-            panel.plot(run.cycle[which], 100 * run.force_error[which], ".", color=colour, label=name)
+            panel.plot(
+                run.cycle[which], 100 * run.force_error[which], ".", color=colour, label=name
+            )
     bar = 100 * FORCE_ERROR_GOAL
     panel.axhline(bar, color=CONTROL, ls="--", lw=1, label=f"bar {bar:g} %")
     _logarithmic(panel, "y")

@@ -11,7 +11,7 @@ from pathlib import Path
 STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 "Source Serif 4", Charter, Georgia, serif; color: #1a1a1a; background: #fff;
-  max-width: 54rem; margin: 2.5rem auto; padding: 0 1.25rem; }
+  max-width: 56rem; margin: 2.5rem auto; padding: 0 1.25rem; }
 h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .3rem; }
 h2 { font-size: 1.2rem; margin: 2.6rem 0 .5rem; border-top: 1px solid #ccc; padding-top: .7rem; }
 p, ul { margin: .55rem 0; }
@@ -26,13 +26,14 @@ caption { padding-bottom: .4rem; }
 .scroll { overflow-x: auto; margin: 1.1rem 0; }
 table { border-collapse: collapse; font: .84rem/1.35 "Source Sans 3", Helvetica, Arial, sans-serif;
   font-variant-numeric: tabular-nums; break-inside: avoid; width: 100%; }
-th, td { padding: .28rem .55rem; text-align: right; vertical-align: top; }
+th, td { padding: .28rem .5rem; text-align: right; vertical-align: top; }
+td { white-space: nowrap; }
 th { font-weight: 600; border-bottom: 1px solid #888; vertical-align: bottom; }
 tbody tr { border-bottom: 1px solid #e4e4e4; }
 th:first-child, td:first-child { text-align: left; padding-left: 0; white-space: nowrap; }
-th.words, td.words { text-align: left; }
+th.words, td.words { text-align: left; white-space: normal; }
 tr.this td { font-weight: 700; background: #f1f6fb; }
-td .error { display: inline-block; min-width: 4.6em; }
+td .error { display: inline-block; min-width: 4.4em; }
 sub, sup { line-height: 0; }
 .no { color: #b02020; font-weight: 600; } .yes { color: #1b6e3a; }
 code, pre { font: .82rem/1.4 "Source Code Pro", Menlo, Consolas, monospace; }
@@ -45,7 +46,8 @@ summary { cursor: pointer; color: #0b5fa5; }
 
 TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 
-UNKNOWN = "–"
+MINUS, TIMES, UNKNOWN = "\N{MINUS SIGN}", "\N{MULTIPLICATION SIGN}", "\N{EN DASH}"
+"""Signs as in print, and what stands for a number that is not known."""
 
 
 def page(title: str, body: Iterable[str]) -> str:
@@ -82,9 +84,9 @@ def _typeset(text: str) -> str:
     """Minus signs and powers of ten as in print."""
     mantissa, exponent, power = escape(text).partition("e")
     if mantissa.startswith("-"):
-        mantissa = "−" + mantissa[1:]
+        mantissa = MINUS + mantissa[1:]
     if exponent and power.lstrip("+-").isdigit():
-        return f"{mantissa} × 10<sup>{str(int(power)).replace('-', '−')}</sup>"
+        return f"{mantissa} {TIMES} 10<sup>{str(int(power)).replace('-', MINUS)}</sup>"
     return mantissa + exponent + power
 
 
@@ -162,8 +164,9 @@ def picture(path: Path | None, description: str, caption: str) -> str:
     if path is None:
         return ""
     content = base64.b64encode(path.read_bytes()).decode("ascii")
+    source = f"data:{TYPES[path.suffix]};base64,{content}"
     return (
-        f'<figure><img alt="{escape(description)}" src="data:{TYPES[path.suffix]};base64,{content}"/>'
+        f'<figure><img alt="{escape(description)}" src="{source}"/>'
         f"<figcaption>{caption}</figcaption></figure>"
     )
 

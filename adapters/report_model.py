@@ -20,16 +20,14 @@ def _grains(scene: Scene) -> Iterator[str]:
     yield "Breakage, abrasion and wear of grains."
     law = scene.sample.grain_radius
     if law.distribution == "normal" and law.standard_deviation:
-        yield (
-            f"Radii beyond {law.truncation:g} standard deviations of the mean; fines and water."
-        )
+        yield (f"Radii beyond {law.truncation:g} standard deviations of the mean; fines and water.")
     else:
         yield "Fines and water."
 
 
 def _contacts(scene: Scene) -> Iterator[str]:
     grain = scene.material.grain
-    yield "Plastic and adhesive contacts: Hertz's law is elastic, for overlaps small beside a radius."
+    yield "Plastic and adhesive contacts: Hertz's law is elastic, for overlaps far below a radius."
     if grain.friction or scene.material.wall.friction:
         yield "Rolling and spinning resistance: a loose grain may spin without end."
     if grain.friction:
@@ -44,8 +42,8 @@ def _contacts(scene: Scene) -> Iterator[str]:
     if grain.viscous_alpha is not None and grain.viscous_alpha < DAMPING_FACTOR:
         literal = restitution_literal(grain.viscous_alpha)
         yield (
-            f"A literal eq. 7: LIGGGHTS damps by sqrt(5/6) = {DAMPING_FACTOR:.3f} of it, which makes "
-            f"the restitution {scene.restitution:.4f} at every speed (literal: {literal:.4f})."
+            f"A literal eq. 7: LIGGGHTS damps by sqrt(5/6) = {DAMPING_FACTOR:.3f} of it, which "
+            f"makes the restitution {scene.restitution:.4f} at any speed (literal: {literal:.4f})."
         )
 
 
@@ -56,9 +54,10 @@ def _bed(scene: Scene) -> Iterator[str]:
             f"The other sectors: {part} of the container is computed between rigid, frictionless "
             "mirror planes, at which grains can not cross."
         )
-    yield "Sleepers, subgrade and the track's stiffness: floor, walls and piston are rigid and smooth."
+    yield "Sleepers, subgrade and the track's stiffness: floor, walls and piston are rigid."
     share = scene.time_step / scene.rayleigh_time
-    yield f"Times below the step of {scene.time_step:.3g} s, {share:.2f} of the smallest Rayleigh time."
+    step = f"{scene.time_step:.3g} s, {share:.2f} of the smallest grain's Rayleigh time"
+    yield f"Times below the step of {step}."
 
 
 def _load(scene: Scene) -> Iterator[str]:

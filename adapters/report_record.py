@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from adapters.errors import UsageError
-from adapters.report_error import History, cost_total, history_of
-from adapters.run_folder import Outcome, RunFolder, stage_place
+from adapters.report_history import FailedJump, History, failed_jumps, history_of
+from adapters.run_folder import Outcome, RunFolder
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State, state_load
@@ -18,17 +17,6 @@ from adapters.window import Window, window_load
 
 CONTROL = "control"
 """Folder inside a run that holds the full run beside it."""
-
-
-@dataclass(frozen=True)
-class FailedJump:
-    """A jump that was given up."""
-
-    stage: str
-    first_cycle: int
-    why: str
-    lost_s: float
-    """What it cost and no finished stage bears [s]; see `lost_time`."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +34,7 @@ class Track:
     """Stages whose unfinished or superseded work was moved away; empty folders left out."""
     events: tuple[dict[str, Any], ...]
 
-    @property
+    @cached_property
     def history(self) -> History:
         """The table of the run, with the CPU time at each row."""
         return history_of(self.outcomes, [(j.first_cycle, j.lost_s) for j in self.failed_jumps])
@@ -59,13 +47,17 @@ class Track:
     @property
     def jumps(self) -> list[tuple[str, Outcome]]:
         """Folder and outcome of every jump that was kept."""
-        return [pair for pair in zip(self.names, self.outcomes, strict=True) if pair[1].stage == "jump"]
+        return [
+            pair for pair in zip(self.names, self.outcomes, strict=True) if pair[1].stage == "jump"
+        ]
 
     @property
     def windows(self) -> list[tuple[str, Outcome]]:
         """Folder and outcome of every window."""
         return [
-            pair for pair in zip(self.names, self.outcomes, strict=True) if pair[1].stage == "window"
+            pair
+            for pair in zip(self.names, self.outcomes, strict=True)
+            if pair[1].stage == "window"
         ]
 
     def start(self) -> State:
@@ -82,7 +74,7 @@ class Track:
             return self.start().position
         for name, outcome in self.windows:
             if outcome.first_cycle < cycle <= outcome.last_cycle:
-                return self.window(name).position[cycle - outcome.first_cycle]
+                return self.window(name).state(cycle - outcome.first_cycle).position
         for name, outcome in self.jumps:
             if outcome.last_cycle == cycle:
                 return state_load(self.folder.path / name / "relaxed.npz").position
@@ -129,34 +121,19 @@ def record_read(path: Path) -> Record:
 
 def track_read(name: str, folder: RunFolder) -> Track:
     """One run's finished stages, failures and events."""
-    names, outcomes, failed = [], [], []
-    events = folder.events()
-    for stage in folder.stage_names():
-        outcome, why = folder.outcome(stage), folder.failure(stage)
-        if why:
-            failed.append(FailedJump(stage, stage_place(stage)[0], why, lost_time(stage, outcome, events)))
-        elif outcome is not None:
-            names.append(stage)
-            outcomes.append(outcome)
+    stages = [
+        (stage, outcome)
+        for stage in folder.stage_names()
+        if (outcome := folder.outcome(stage)) is not None and not folder.failure(stage)
+    ]
     home = folder.path / "discarded"
     discarded = sorted(p.name for p in home.iterdir() if any(p.iterdir())) if home.exists() else []
     return Track(
-        name, folder, tuple(outcomes), tuple(names), tuple(failed), tuple(discarded), tuple(events)
+        name=name,
+        folder=folder,
+        outcomes=tuple(outcome for _, outcome in stages),
+        names=tuple(stage for stage, _ in stages),
+        failed_jumps=failed_jumps(folder),
+        discarded=tuple(discarded),
+        events=tuple(folder.events()),
     )
-
-
-def lost_time(stage: str, outcome: Outcome | None, events: Sequence[dict[str, Any]]) -> float:
-    """Time of a failed jump that no finished stage bears [s].
-
-    Python's own goes over to the next stage.  A jump that was finished and then failed in the
-    window behind it lost its own cost and the engine's, of which only the elapsed time is known:
-    from the event before the failure to the failure.
-    """
-    if outcome is None:
-        return 0.0
-    lost = cost_total(outcome.cost)
-    for before, event in zip(events, events[1:], strict=False):
-        if event["event"] == "jump failed" and event.get("stage") == stage:
-            ended, began = (datetime.fromisoformat(e["time"]) for e in (event, before))
-            lost += (ended - began).total_seconds()
-    return lost

@@ -6,7 +6,7 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from adapters.state import FloatArray
+from adapters.state import FloatArray, IntArray
 
 AZIMUTH, ELEVATION = radians(225), radians(28)
 """Direction of the viewer: into the cut faces of a quarter cylinder (x > 0, y > 0), from above."""
@@ -16,7 +16,7 @@ LIGHT = np.array([-0.35, 0.55, 0.76])
 
 
 def view(position: FloatArray) -> FloatArray:
-    """Coordinates right, up and towards the viewer [m], shape (n, 3), of ``position`` [m], (n, 3)."""
+    """Coordinates right, up and towards the viewer [m] of ``position`` [m], both (n, 3)."""
     right = np.array([-sin(AZIMUTH), cos(AZIMUTH), 0.0])
     towards = np.array(
         [cos(ELEVATION) * cos(AZIMUTH), cos(ELEVATION) * sin(AZIMUTH), sin(ELEVATION)]
@@ -61,8 +61,8 @@ def spheres_draw(
     return image
 
 
-def _pixels(centre: float, radius: float, pixel: float, count: int) -> np.typing.NDArray[np.int64]:
-    """Indices of the pixels that a sphere covers along one axis, inside the picture; at least one."""
+def _pixels(centre: float, radius: float, pixel: float, count: int) -> IntArray:
+    """Indices of the pixels that a sphere covers along one axis; at least one."""
     low = int(np.clip((centre - radius) / pixel, 0, count - 1))
     high = int(np.clip((centre + radius) / pixel, low, count - 1))
     return np.arange(low, high + 1)

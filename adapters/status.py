@@ -10,7 +10,7 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from adapters.report_error import cost_total
+from adapters.report_history import cost_total
 from adapters.report_record import Record, Track, record_read
 
 

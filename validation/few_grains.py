@@ -1,16 +1,17 @@
-"""A few grains in LIGGGHTS under the contact law, walls and settings that every scene gets."""
+"""One contact in LIGGGHTS, under the contact law, walls and settings that every scene gets."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import pi
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from adapters import decks
-from adapters.contact_law import CONTACT_TIME_FACTOR
+from adapters import contact_law
+from adapters.contact_law import Collision
 from adapters.dump import dump_frames
 from adapters.engine_liggghts import LiggghtsEngine
 from adapters.scene import Scene
@@ -19,11 +20,17 @@ from adapters.state import Contacts, FloatArray
 from adapters.window import contacts_of_frame
 from scenes import scene_path
 
+RADIUS = 3.2e-3
+"""Radius of every grain here [m], the mean of Table 1."""
+
+PLACE = np.array([0.02, 0.02, 0.02])
+"""A place far from every wall [m]."""
+
 PAIR_STYLE = "pair_style gran model ${contact_model}"
 
 DECK = """\
 variable gravity index 0.0
-{own}
+variable steps_per_cycle index {every}
 include parameters.in
 include settings.in
 read_data grains.data
@@ -31,10 +38,9 @@ include bed.in
 timestep {time_step:.17g}
 dump grains grains custom {every} grains.dump id x y z vx vy vz omegax omegay omegaz fx fy fz
 dump_modify grains sort id first yes format "%d{columns}"
-variable steps_per_cycle index {every}
-include {output}
+include ${{output_part}}
 thermo_modify lost error norm no
-{motion}
+{lines}
 write_restart end.restart
 variable steps_done equal step
 print "COMPLETE step ${{steps_done}}"
@@ -43,7 +49,7 @@ print "COMPLETE step ${{steps_done}}"
 
 @dataclass(frozen=True)
 class Track:
-    """``s`` instants of ``n`` grains, evenly spaced in time but where a run follows another."""
+    """``s`` instants of ``n`` grains."""
 
     time: FloatArray
     """Time [s], shape (s,)."""
@@ -59,63 +65,135 @@ class Track:
     """Contacts between grains at each instant."""
 
 
-def scene_of(*overrides: str) -> Scene:
+def table_1(*overrides: str) -> Scene:
     """Grains, walls and contact law of the paper's Table 1 (``scenes/karrech.toml``), changed."""
     return scene_load(scene_path("karrech"), overrides)
+
+
+def grain_mass(scene: Scene) -> float:
+    """Mass of a grain [kg]."""
+    return 4 / 3 * pi * scene.material.grain.density * RADIUS**3
+
+
+def shear_modulus(scene: Scene) -> float:
+    """G* of two grains [Pa]."""
+    grain = (scene.material.grain.young, scene.material.grain.poisson)
+    return contact_law.equivalent_shear_modulus(*grain, *grain)
 
 
 def track_run(
     scene: Scene,
     position: FloatArray,
     velocity: FloatArray,
-    radius: FloatArray,
     motion: Sequence[str],
     *,
     time_step: float,
     every: int = 1,
-    settings: str = "",
+    pair_settings: str = "",
 ) -> Track:
-    """Run LIGGGHTS, without gravity, on grains of ``radius`` [m], shape (n,).
+    """Run LIGGGHTS, without gravity, from ``position`` [m] and ``velocity`` [m/s], shape (n, 3).
 
-    ``position`` [m] and ``velocity`` [m/s], shape (n, 3); ``motion`` are the deck's lines that
-    move them, ``time_step`` [s], ``every`` steps between two instants.  ``replaced`` are texts of
-    deck parts by name, in place of the project's own.  Raises as `LiggghtsEngine.run`.
+    ``motion`` are the deck's lines that move the grains, each in a group ``grain_1``, ...;
+    ``time_step`` [s]; ``every`` steps between two instants; ``pair_settings`` end the pair style,
+    such as ``limitForce on``.  Raises as `LiggghtsEngine.run`.
     """
     engine = LiggghtsEngine()
-    kind = "frictional" if scene.material.grain.friction > 0 else "frictionless"
-    speeds = [
-        f"velocity first set {v[0]:.17g} {v[1]:.17g} {v[2]:.17g} units box".replace(
-            "first", f"grain_{i}"
-        )
-        for i, v in enumerate(velocity, 1)
-    ]
-    groups = [f"group grain_{i} id {i}" for i in range(1, len(radius) + 1)]
+    lines = []
+    for number, v in enumerate(velocity, 1):
+        lines.append(f"group grain_{number} id {number}")
+        lines.append(f"velocity grain_{number} set {v[0]:.17g} {v[1]:.17g} {v[2]:.17g} units box")
+    deck = DECK.format(
+        every=every,
+        time_step=time_step,
+        columns=" %.17g" * 12,
+        lines="\n".join([*lines, *motion]),
+    )
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         height = float(position[:, 2].max())
+        radius = np.full(len(position), RADIUS)
         digests = engine.write_preparation(scene, position, radius, height, folder)
-        text = DECK.format(
-            own="",
-            time_step=time_step,
-            every=every,
-            columns=" %.17g" * 12,
-            output=f"output_{kind}.in",
-            motion="\n".join([*groups, *speeds, *motion]),
-        )
-        (folder / "in.few").write_text(text)
+        (folder / "in.few").write_text(deck)
         materials = (folder / "scene.in").read_text()
-        (folder / "scene.in").write_text(materials.replace(PAIR_STYLE, f"{PAIR_STYLE} {settings}"))
+        (folder / "scene.in").write_text(
+            materials.replace(PAIR_STYLE, f"{PAIR_STYLE} {pair_settings}")
+        )
         engine.run(scene, "in.few", folder, lambda: None, digests)
         frames = list(dump_frames(folder / "grains.dump"))
-        contacts = tuple(contacts_of_frame(f) for f in dump_frames(folder / "contacts.dump"))
-    step = np.array([frame.time_step for frame in frames])
-    blocks = [
-        np.array([frame.block(*names) for frame in frames])
-        for names in (
-            ("x", "y", "z"),
-            ("vx", "vy", "vz"),
-            ("omegax", "omegay", "omegaz"),
-            ("fx", "fy", "fz"),
-        )
+        contacts = tuple(contacts_of_frame(frame) for frame in dump_frames(folder / "contacts.dump"))
+    position, velocity, spin, force = (
+        np.array([frame.block(*(letter + axis for axis in "xyz")) for frame in frames])
+        for letter in ("", "v", "omega", "f")
+    )
+    time = time_step * np.array([frame.time_step for frame in frames])
+    return Track(time, position, velocity, spin, force, contacts)
+
+
+def head_on(
+    scene: Scene,
+    speed: float,
+    *,
+    steps: float = 1000,
+    mirror: bool = False,
+    slide: float = 0.0,
+    pair_settings: str = "",
+) -> tuple[Collision, Track]:
+    """Two grains that meet at ``speed`` [m/s], or one and its image in the mirror plane x = 0.
+
+    ``steps`` in the time of an undamped contact; ``slide`` [m/s] is a velocity of both along z.
+    """
+    mass = contact_law.effective_mass(grain_mass(scene), grain_mass(scene))
+    undamped = contact_law.hertz_collision(speed, scene.stiffness.grain, RADIUS / 2, mass)
+    time_step = undamped.contact_time / steps
+    gap = 2.25 * speed * time_step  # small, and no whole number of steps
+    middle = np.array([0.0 if mirror else PLACE[0], *PLACE[1:]])
+    apart = np.array([RADIUS + gap / 2, 0.0, 0.0])
+    position = np.array([middle + apart, middle - apart])
+    velocity = np.array([[-speed / 2, 0.0, slide], [speed / 2, 0.0, slide]])
+    grains = 1 if mirror else 2
+    track = track_run(
+        scene,
+        position[:grains],
+        velocity[:grains],
+        ["fix motion grains nve/sphere", f"run {round(1.7 * steps)}"],
+        time_step=time_step,
+        pair_settings=pair_settings,
+    )
+    x, v = track.position[:, :, 0], track.velocity[:, :, 0]
+    overlap = 2 * (RADIUS - x[:, 0]) if mirror else 2 * RADIUS - (x[:, 0] - x[:, 1])
+    rebound = 2 * v[-1, 0] if mirror else v[-1, 0] - v[-1, 1]
+    touching = np.flatnonzero(overlap > 0)
+    ends = [
+        track.time[i] - overlap[i] * (track.time[j] - track.time[i]) / (overlap[j] - overlap[i])
+        for i, j in ((touching[0], touching[0] - 1), (touching[-1], touching[-1] + 1))
     ]
-    return Track(step * time_step, *blocks, contacts)
+    return Collision(rebound / speed, float(overlap.max()), ends[1] - ends[0]), track
+
+
+def driven_contact(
+    scene: Scene,
+    overlap: FloatArray,
+    displacement: FloatArray,
+    *,
+    speed: float = 1e-3,
+    steps: int = 1000,
+) -> tuple[Track, FloatArray, FloatArray]:
+    """One contact driven along straight legs between the corners of a path; the other grain held.
+
+    ``overlap`` delta_n and ``displacement`` delta_t [m] of the corners, shape (c,); ``speed`` [m/s]
+    along each leg, in ``steps`` steps.  Returns the track, delta_n and the distance moved along the
+    tangent [m], shape (s,) each.  The normal turns by delta_t/(2 R), which must be small.
+    """
+    legs = np.column_stack([-np.diff(overlap), np.diff(displacement)])  # along x, along y
+    length = np.hypot(*legs.T)
+    time_step = float(length.max()) / speed / steps
+    motion = []
+    for leg in legs / (steps * time_step):
+        motion.append(f"fix leg grain_1 move linear {leg[0]:.17g} {leg[1]:.17g} 0.0 units box")
+        motion += [f"run {steps}", "unfix leg"]
+    start = np.array([PLACE + [2 * RADIUS - overlap[0], displacement[0], 0.0], PLACE])
+    track = track_run(
+        scene, start, np.zeros((2, 3)), motion, time_step=time_step, every=max(steps // 100, 1)
+    )
+    apart = track.position[:, 0] - track.position[:, 1]
+    return track, 2 * RADIUS - np.linalg.norm(apart, axis=1), apart[:, 1]

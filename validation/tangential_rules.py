@@ -12,8 +12,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.contact_law import tangential_stiffness
 from adapters.state import FloatArray
+
+LOOPS = {
+    "load n, load t, unload n, unload t": np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]),
+    "load t, load n, unload t, unload n": np.array([[0, 0], [0, 1], [1, 1], [1, 0], [0, 0]]),
+    "load both, unload both": np.array([[0, 0], [1, 1], [0, 0]]),
+}
+"""Closed paths: corners (n, t), 0 and 1 for the least and greatest overlap and displacement.
+
+The second is the first run backwards.
+"""
+
+
+def path(corners: FloatArray, steps: int) -> FloatArray:
+    """Points along straight legs of ``steps`` steps each, shape ((c - 1) steps + 1, 2).
+
+    ``corners`` (delta_n, delta_t), shape (c, 2).
+    """
+    share = np.arange(steps)[:, None] / steps
+    legs = [a + share * (b - a) for a, b in zip(corners[:-1], corners[1:], strict=True)]
+    return np.concatenate([*legs, corners[-1:]])
 
 
 def force_secant(stiffness: FloatArray, displacement: FloatArray) -> FloatArray:
@@ -79,5 +98,8 @@ def force_mindlin_deresiewicz(
 
 
 def work(force: FloatArray, displacement: FloatArray) -> float:
-    """Work done on the contact along a path, integral of F_t d delta_t [J]: what it swallows."""
+    """Work done on the contact along a path, integral of F_t d delta_t [J].
+
+    Around a closed loop of a contact that is the same at its end: energy lost, if negative created.
+    """
     return float(np.trapezoid(force, displacement))

@@ -6,8 +6,8 @@ Forking spares loading the libraries for every command.  Requests are JSON objec
 words     the command line
 here      true: run it in the server itself, so that later processes find everything loaded
 slow      seconds that every part of a run sleeps before and behind its work
-crash     number of the file operation below ``root`` in place of which the process kills itself
-root      folder below which file operations count
+crash     number of the file operation in place of which the process kills itself
+root      folder below which file operations count, except those inside a folder ``partial``
 path      PATH of the process
 output    file for what the command prints
 ========= ======================================================================================
@@ -24,6 +24,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from typing import Any
 
 WRITING = ("os.rename", "os.mkdir", "os.remove", "os.rmdir", "os.link", "os.truncate")
@@ -61,6 +62,9 @@ def slow_down(seconds: float) -> None:
 def count_operations(root: str, crash: int) -> None:
     """Count file operations below ``root``; kill this process in place of number ``crash``."""
 
+    def counts(path: object) -> bool:
+        return str(path).startswith(root) and "/partial/" not in str(path)
+
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
         global operations
         if event == "open":
@@ -69,7 +73,7 @@ def count_operations(root: str, crash: int) -> None:
                 return
         elif event not in WRITING:
             return
-        if not str(arguments[0]).startswith(root):
+        if not any(map(counts, arguments[:2])):
             return
         operations += 1
         if operations == crash:
@@ -88,8 +92,7 @@ def serve(request: dict[str, Any]) -> None:
         slow_down(request["slow"])
     if "root" in request:
         count_operations(request["root"], request.get("crash", 0))
-    with open(request["output"], "w") as output:
-        sys.stdout = sys.stderr = output
+    with open(request["output"], "w") as output, redirect_stdout(output), redirect_stderr(output):
         status = trackbed.main(request["words"])
     tell(operations=operations)
     if not request.get("here"):

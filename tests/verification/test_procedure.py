@@ -26,7 +26,7 @@ def settle(folder: Path, *overrides: str, control: bool = False) -> list[dict[st
         scene_path("karrech-coarse"),
         folder,
         control=control,
-        overrides=['engine.name="fake"', *overrides],
+        overrides=['engine.name="fake"', "procedure.h=20", *overrides],
         progress=QUIET,
     )
     return rows_of(folder)

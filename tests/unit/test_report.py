@@ -1,0 +1,461 @@
+"""The report and the status of a run: whole, self-contained, honest about what is missing."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adapters.errors import UsageError
+from adapters.procedure import run_scene
+from adapters.progress import Progress
+from adapters.report import report_write
+from adapters.report_html import number, per_cent, plain
+from adapters.report_model import left_out
+from adapters.report_spheres import extent_of, spheres_draw, view
+from adapters.run_folder import RunFolder
+from adapters.scene import Scene
+from adapters.scene_file import scene_load
+from adapters.status import status
+from scenes import scene_path
+
+ROOT = Path(__file__).parents[2]
+
+SMALL = (
+    'engine.name="fake"',
+    "sample.count=30",
+    "procedure.k_i=4",
+    "procedure.k=6",
+    "procedure.h=5",
+    "procedure.total_cycles=40",
+)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of the fake engine with its control, and its report."""
+    folder = tmp_path_factory.mktemp("report") / "run"
+    run_scene(
+        scene_path("karrech-coarse"),
+        folder,
+        control=True,
+        overrides=SMALL,
+        progress=Progress(quiet=True),
+    )
+    report_write(folder)
+    return folder
+
+
+@pytest.fixture
+def copy(finished: Path, tmp_path: Path) -> Path:
+    """A copy of that run without its report."""
+    folder = tmp_path / "run"
+    shutil.copytree(finished, folder, ignore=shutil.ignore_patterns("report.*", "figures"))
+    return folder
+
+
+def report_of(folder: Path) -> tuple[dict[str, Any], str]:
+    """Numbers and page of the report that is in ``folder``."""
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    return json.loads((folder / "report.json").read_text(encoding="utf-8")), page
+
+
+def written(folder: Path) -> tuple[dict[str, Any], str]:
+    """Write the report of ``folder``; its numbers and page."""
+    assert report_write(folder) == folder / "report.html"
+    return report_of(folder)
+
+
+def page_tree(page: str) -> ElementTree.Element:
+    """The page as a tree; raises when a tag is not closed."""
+    assert page.startswith("<!DOCTYPE html>\n")
+    return ElementTree.fromstring(page.partition("\n")[2])
+
+
+def shown(page: str) -> set[float]:
+    """The full values of all numbers on the page."""
+    return {float(data.attrib["value"]) for data in page_tree(page).iter("data")}
+
+
+def numbers_in(content: Any) -> Iterator[float]:
+    """All numbers of a JSON content."""
+    if isinstance(content, dict):
+        content = list(content.values())
+    if isinstance(content, list):
+        for inner in content:
+            yield from numbers_in(inner)
+    elif isinstance(content, float):
+        yield content
+
+
+def test_page_shows_the_numbers_of_the_json(finished: Path) -> None:
+    """Every number of the tables in report.json is on the page, to the last bit."""
+    numbers, page = report_of(finished)
+    told = ("error_rows", "jumps", "piston", "costs", "bars", "preparation", "settlement")
+    wanted = {value for name in told for value in numbers_in(numbers[name])}
+    hidden = wanted - shown(page)
+    assert not hidden
+    assert len(wanted) > 50
+
+
+def test_json_is_strict_and_says_what_was_run(finished: Path) -> None:
+    """report.json has no NaN, the cycles of the run, and the definition S = T_full/T_procedure."""
+
+    def refuse(name: str) -> None:
+        raise AssertionError(name)
+
+    numbers = json.loads((finished / "report.json").read_text(), parse_constant=refuse)
+    assert (numbers["cycle"], numbers["total_cycles"], numbers["compared_at"]) == (40, 40, 40)
+    spans = [(jump["first_cycle"], jump["last_cycle"]) for jump in numbers["jumps"]]
+    assert numbers["cycles_computed"] == 40 - sum(last - first for first, last in spans)
+    rows = {row["name"]: row for row in numbers["error_rows"]}
+    run, nothing = rows["this run"], rows["jump and move nothing"]
+    full = rows["full run (control)"]
+    assert run["speed_up"] == pytest.approx(full["cpu_s"] / run["cpu_s"])
+    assert run["gained_time"] == pytest.approx(run["speed_up"] - 1)
+    # The fake engine settles by a ln(1 + N): moving nothing is wrong by what 40 - m cycles settle.
+    exact = np.log1p(numbers["cycles_computed"]) / np.log(41) - 1
+    assert nothing["settlement_error"] == pytest.approx(exact, rel=1e-9)
+    assert abs(run["settlement_error"]) < 0.01 < abs(exact)
+    assert numbers["decks"] == {}
+    assert numbers["engines"] == ["fake: fake 1"]
+
+
+def test_page_is_self_contained(finished: Path) -> None:
+    """The page is well-formed, loads nothing from anywhere, and forbids itself to."""
+    page = (finished / "report.html").read_text(encoding="utf-8")
+    tree = page_tree(page)
+    for element in tree.iter():
+        for name in ("src", "href", "srcset", "action", "data", "poster"):
+            assert element.attrib.get(name, "data:").startswith("data:")
+    assert not list(tree.iter("script"))
+    assert "url(" not in page
+    assert "@import" not in page
+    policy = next(m for m in tree.iter("meta") if "http-equiv" in m.attrib)
+    assert policy.attrib["content"].startswith("default-src 'none'")
+    images = list(tree.iter("img"))
+    assert all(image.attrib["alt"] for image in images)
+    drawn = {path.stem for path in (finished / "figures").iterdir()}
+    assert drawn == {
+        "settlement", "error_cost", "coordination", "sample", "preparation", "piston", "cost",
+    }  # fmt: skip  # no penetration: the fake engine's grains do not touch
+    assert len(images) == len(drawn)
+    assert (finished / "figures" / "settlement.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_sections_stand_in_order(finished: Path) -> None:
+    """The claim and where it fails come first, the command to make it again last."""
+    page = (finished / "report.html").read_text(encoding="utf-8")
+    titles = [heading.text for heading in page_tree(page).iter("h2")]
+    assert titles == [
+        "Settlement",
+        "Error against speed-up",
+        "Coordination number and relative density",
+        "Jumps and relaxation",
+        "The sample",
+        "Preparation",
+        "The load on the piston",
+        "Cost",
+        "Bars",
+        "What the model leaves out",
+        "Failures",
+        "Provenance",
+        "Known limits of fairness",
+        "Make it again",
+    ]
+    assert page.index('class="claim"') < page.index('class="fails"') < page.index("<h2>")
+    command = "trackbed run scene.toml --run-folder ../again --control --set &#x27;engine.name="
+    assert command in page
+
+
+@pytest.mark.engine("chromium")
+def test_page_opens_in_a_browser(finished: Path, tmp_path: Path) -> None:
+    """Chromium shows every image, writes nothing to its console and asks for nothing."""
+    page = (finished / "report.html").read_text(encoding="utf-8")
+    script = """<script>addEventListener("load", () => { document.title = JSON.stringify({
+      widths: [...document.images].map(image => image.naturalWidth),
+      asked: performance.getEntriesByType("resource").map(entry => entry.name)
+        .filter(name => !name.startsWith("data:")),
+      scrolls: document.documentElement.scrollWidth > innerWidth}); });</script>"""
+    allowed = page.replace("style-src", "script-src 'unsafe-inline'; style-src")
+    probe = tmp_path / "probe.html"
+    probe.write_text(allowed.replace("</head>", script + "</head>"), encoding="utf-8")
+    run = subprocess.run(
+        [
+            "chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic",
+            "--no-first-run", "--disable-background-networking", "--disable-component-update",
+            "--disable-sync", f"--user-data-dir={tmp_path / 'browser'}", "--window-size=1000,800",
+            "--enable-logging=stderr", "--dump-dom", probe.as_uri(),
+        ],
+        capture_output=True, text=True, timeout=120, check=True, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    title = re.search(r"<title>(.*?)</title>", run.stdout)
+    assert title is not None
+    seen = json.loads(title[1])
+    assert len(seen["widths"]) == 7
+    assert min(seen["widths"]) > 0
+    assert seen["asked"] == []
+    assert not seen["scrolls"]
+    assert "CONSOLE" not in run.stderr
+
+
+def test_report_changes_nothing_else_and_repeats_itself(finished: Path, copy: Path) -> None:
+    """A report adds three things to the run folder, the same bytes each time and anywhere."""
+
+    def files(folder: Path) -> dict[Path, bytes]:
+        found = (path for path in folder.rglob("*") if path.is_file())
+        return {path.relative_to(folder): path.read_bytes() for path in found}
+
+    before = files(copy)
+    report_write(copy)
+    after = files(copy)
+    assert {path.parts[0] for path in after.keys() - before.keys()} == {
+        "report.html", "report.json", "figures",
+    }  # fmt: skip
+    assert {path: after[path] for path in before} == before
+    assert after == files(finished)
+
+
+def remove(folder: Path, *patterns: str) -> None:
+    """Remove stages, then rewrite the table as the run does."""
+    for pattern in patterns:
+        for path in folder.glob(pattern):
+            shutil.rmtree(path)
+    RunFolder(folder).settlement_write()
+
+
+def without_control(folder: Path) -> None:
+    """The same run, started without --control."""
+    shutil.rmtree(folder / "control")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    (folder / "manifest.json").write_text(json.dumps(manifest | {"control": False}))
+
+
+def after_the_first_jump(folder: Path) -> None:
+    """Killed in the window after the first jump, before the control began."""
+    remove(folder, "window_000015", "window_00002*", "jump_00002*", "window_00003*", "control")
+
+
+def control_at_the_jump(folder: Path) -> None:
+    """The control has linked the shared stages and computed none of its own."""
+    remove(folder / "control", "window_00001[6-9]", "window_00002*", "window_00003*")
+    remove(folder / "control", "window_000010")
+
+
+def before_loading(folder: Path) -> None:
+    """Killed in the first window."""
+    remove(folder, "window_*", "jump_*", "control")
+
+
+def before_the_end_of_the_rain(folder: Path) -> None:
+    """Killed during the preparation."""
+    remove(folder, "preparation", "window_*", "jump_*", "control")
+
+
+def no_jumps(folder: Path) -> None:
+    """Nothing but computed cycles: the control as a run of its own."""
+    remove(folder, "preparation", "window_*", "jump_*")
+    for path in (folder / "control").glob("*_*"):
+        path.rename(folder / path.name)
+    (folder / "control" / "preparation").rename(folder / "preparation")
+    shutil.rmtree(folder / "control")
+    RunFolder(folder).settlement_write()
+
+
+@pytest.mark.parametrize(
+    ("damage", "sentences"),
+    [
+        (without_control, ["The error is unknown", "--control</code> adds it", "at most"]),
+        (after_the_first_jump, ["Unfinished, at cycle 15 of 40", "has not gone past"]),
+        (control_at_the_jump, ["has not gone past the first jump yet"]),
+        (before_loading, ["The bed is settled; no load cycle has been computed."]),
+        (before_the_end_of_the_rain, ["The bed is not settled yet", "has not ended yet"]),
+        (no_jumps, ["No jump was made.", "The error is unknown"]),
+    ],
+)
+def test_report_of_a_part_of_a_run(
+    damage: Callable[[Path], None], sentences: list[str], copy: Path
+) -> None:
+    """The report of an unfinished or lonely run is whole and says what is not known."""
+    damage(copy)
+    numbers, page = written(copy)
+    page_tree(page)
+    for sentence in sentences:
+        assert sentence in page
+    assert numbers["error_rows"] == []
+    assert status(copy).to_dict()["cycle"] == numbers["cycle"]
+
+
+def test_failed_jumps_are_named_counted_and_charged(finished: Path, copy: Path) -> None:
+    """A jump that was given up is in the report with its reason, and its time in the cost."""
+    before = report_of(finished)[0]
+    name = "jump_000010_1"
+    shutil.copytree(copy / name, copy / "jump_000010_2")
+    (copy / name / "outcome.json").write_text(
+        (copy / name / "outcome.json").read_text().replace('"fit": 0', '"fit": 100')
+    )
+    RunFolder(copy).give_up(name, "3 grains are lost: 4, 7, <12>")
+    (copy / "discarded" / "window_000015.1").mkdir(parents=True, exist_ok=True)
+    (copy / "discarded" / "window_000015.1" / "screen.txt").write_text("ERROR")
+    after, page = written(copy)
+    assert after["failed_jumps"] == [[name, "3 grains are lost: 4, 7, <12>"]]
+    assert "3 grains are lost: 4, 7, &lt;12&gt;" in page
+    assert "1 failed jumps" in page
+    assert "1 jumps failed and were tried again, shorter" in page
+    assert "window_000015.1" in after["discarded"]
+    assert after["cycle"] == 40
+    lost = after["costs"][0]["failed_jumps"]
+    assert lost >= 100
+    assert after["costs"][0]["total"] == pytest.approx(before["costs"][0]["total"] + lost)
+    assert after["error_rows"][0]["speed_up"] < before["error_rows"][0]["speed_up"]
+
+
+def test_scene_without_loading(tmp_path: Path) -> None:
+    """A scene that is prepared and not loaded has a report of its preparation."""
+    scene = tmp_path / "scene.toml"
+    text = scene_path("karrech-coarse").read_text(encoding="utf-8")
+    text = re.sub(r"\[loading\].*?(?=\[engine\])", "", text, flags=re.DOTALL)
+    scene.write_text(text, encoding="utf-8")
+    run_scene(scene, tmp_path / "run", overrides=SMALL[:2], progress=Progress(quiet=True))
+    numbers, page = written(tmp_path / "run")
+    assert numbers["finished"]
+    assert "prepared and not loaded" in page
+    assert "the scene names none" in page
+    assert status(tmp_path / "run").state == "finished"
+    assert status(tmp_path / "run").next.startswith("trackbed report ")
+
+
+def test_further_runs_stand_beside(copy: Path) -> None:
+    """Runs of the same scene inside the folder are rows of the table, and the claim's floor."""
+    shutil.copytree(copy / "control", copy / "control_perturbed_1")
+    shutil.copytree(copy / "control", copy / "control_still")
+    last = sorted((copy / "control_still").glob("window_*"))[-1] / "outcome.json"
+    outcome = json.loads(last.read_text())
+    outcome["rows"][-1]["settlement"] *= 1.05
+    last.write_text(json.dumps(outcome))
+    numbers, page = written(copy)
+    rows = {row["name"]: row["settlement_error"] for row in numbers["error_rows"]}
+    assert rows["full run, perturbed 1"] == 0
+    assert rows["h = 0, resubmitted"] == pytest.approx(0.05)
+    assert "differ by up to <data" in page
+
+
+@pytest.mark.parametrize("content", [None, "{", '{"scene": 1'])
+def test_no_run_folder(content: str | None, tmp_path: Path) -> None:
+    """A folder that is no run is refused, and nothing is written into it."""
+    if content is not None:
+        (tmp_path / "manifest.json").write_text(content)
+    there = sorted(tmp_path.iterdir())
+    for verb in (report_write, status):
+        with pytest.raises(UsageError, match="run folder"):
+            verb(tmp_path)
+    assert sorted(tmp_path.iterdir()) == there
+
+
+def test_status(copy: Path) -> None:
+    """The status tells cycles, speed-up in cycles and the next command; it notices a writer."""
+    content = status(copy)
+    assert (content.state, content.cycle, content.total_cycles) == ("finished", 40, 40)
+    assert content.cycles_computed + content.cycles_jumped == 40
+    assert content.speed_up_so_far == pytest.approx(40 / content.cycles_computed)
+    assert content.control_cycle == 40
+    with RunFolder(copy).locked():
+        assert status(copy).state == "running"
+    assert json.loads(json.dumps(content.to_dict(), allow_nan=False)) == content.to_dict()
+    remove(copy, "window_00003*", "window_00002*", "jump_00002*")
+    RunFolder(copy).event("stopped", why="stopped by SIGTERM")
+    stopped = status(copy)
+    assert (stopped.state, stopped.why) == ("stopped", "stopped by SIGTERM")
+    assert stopped.next == f"trackbed resume {copy}"
+
+
+def test_plotting_library_is_loaded_only_to_draw() -> None:
+    """Importing the report's modules loads no matplotlib, and the status no numba."""
+    code = (
+        "import sys, adapters.status\n"
+        "assert 'numba' not in sys.modules\n"
+        "import adapters.report, adapters.report_figures\n"
+        "assert 'matplotlib' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+@pytest.mark.parametrize(
+    ("value", "text", "html"),
+    [
+        (None, "", "\N{EN DASH}"),
+        (float("nan"), "nan", "\N{EN DASH}"),
+        (-0.5, "-0.5", '<data value="-0.5">\N{MINUS SIGN}0.5</data>'),
+        (1.5, "1.5 <b>", '<data value="1.5">1.5 &lt;b&gt;</data>'),
+    ],
+)
+def test_numbers_are_typeset(value: float | None, text: str, html: str) -> None:
+    """A number keeps its full value, has a real minus sign, and a dash when not known."""
+    assert number(value, text) == html
+
+
+def test_powers_and_shares_are_typeset() -> None:
+    """Powers of ten and per cents are as in print."""
+    assert plain(3.8e-7, ".1e").endswith(
+        ">3.8 \N{MULTIPLICATION SIGN} 10<sup>\N{MINUS SIGN}7</sup></data>"
+    )
+    assert per_cent(-0.0691).endswith(">\N{MINUS SIGN}6.9 %</data>")
+
+
+def coarse(*overrides: str) -> Scene:
+    """The coarse scene, changed."""
+    return scene_load(scene_path("karrech-coarse"), overrides)
+
+
+def test_what_is_left_out_follows_from_the_scene() -> None:
+    """Friction, mirrors, damping and jumps are told of exactly where the scene has them."""
+    text = " ".join(left_out(coarse()))
+    assert "Elata and Berryman" in text
+    assert "0.2145" in text
+    assert "mirror" in text
+    assert "law 'log'" in text
+    smooth = " ".join(left_out(coarse("material.grain.friction=0.0", "material.wall.friction=0.0")))
+    assert "Elata" not in smooth
+    assert "Friction between grains: its coefficient is 0" in smooth
+    assert "spin" not in smooth
+    assert "mirror" not in " ".join(left_out(coarse("sample.symmetry=[]")))
+    assert "no figure here is a result" in " ".join(left_out(coarse('engine.name="fake"')))
+
+
+def test_view_keeps_lengths() -> None:
+    """The view is a rotation: it keeps distances, and up points up."""
+    points = np.random.default_rng(0).normal(size=(20, 3))
+    seen = view(points)
+    assert np.allclose(np.linalg.norm(seen, axis=1), np.linalg.norm(points, axis=1))
+    assert view(np.array([[0.0, 0.0, 1.0]]))[0, 1] > 0
+
+
+def test_spheres_cover_their_disc_and_hide_each_other() -> None:
+    """A sphere covers pi r^2 of the picture; of two in line the nearer one is seen."""
+    red, blue = np.array([[1.0, 0, 0]]), np.array([[0, 0, 1.0]])
+    origin, radius = np.zeros((1, 3)), np.array([0.5])
+    alone = spheres_draw(origin, radius, red, (-1, 1, -1, 1), 200)
+    # The rim crosses about 2 pi r / pixel pixels, each of which may fall either way.
+    assert (alone < 1).any(axis=2).mean() * 4 == pytest.approx(pi / 4, abs=2 * pi * 0.5 * 0.01)
+    towards = 3 * view(np.eye(3))[:, 2]
+    both = np.vstack([origin, towards[None]])
+    assert np.allclose(view(both)[1], [0, 0, 3], atol=1e-12)
+    for order in ([0, 1], [1, 0]):
+        colour = np.vstack([red, blue])[order]
+        image = spheres_draw(both[order], np.repeat(radius, 2), colour, (-1, 1, -1, 1), 100)
+        centre = image[50, 50]
+        assert centre[2] > 0.3
+        assert centre[0] == 0
+    left, right, bottom, top = extent_of([both], np.repeat(radius, 2))
+    assert left < -0.5 < 0.5 < right
+    assert bottom < -0.5 < 0.5 < top

@@ -1,0 +1,352 @@
+"""Errors, speed-up and gained time of a report, against hand-made runs with closed forms."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import isnan, log
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from adapters.errors import UsageError
+from adapters.laws import law_named
+from adapters.report_error import (
+    Beds,
+    compare,
+    comparison,
+    curve_fitted,
+    gained_time,
+    jump_figures,
+    last_common_cycle,
+    relative_error,
+    speed_up,
+    stopped_early,
+)
+from adapters.report_history import (
+    AVERAGED,
+    History,
+    cost_total,
+    cycles_computed,
+    failed_jumps,
+    history_of,
+    jumped_spans,
+)
+from adapters.run_folder import Outcome, RunFolder
+
+A = 3e-5
+"""Settlement a ln(1 + N) of the hand-made full run [m]."""
+
+CYCLE_S = 4.0
+"""Its CPU time a cycle [s]."""
+
+
+def settled(cycle: float) -> float:
+    """u(N) = a ln(1 + N) [m]."""
+    return A * log(1 + cycle)
+
+
+def row(cycle: int, kind: str = "computed", **columns: float) -> dict[str, Any]:
+    """A row of a table; settlement of the closed form unless given."""
+    values: dict[str, Any] = {
+        "settlement": settled(cycle),
+        "coordination_number": 4.0,
+        "relative_density": 0.56,
+        "elastic_deflection": 1e-5,
+        "force_error": 0.01,
+        "maximum_overlap": 1e-7,
+    }
+    return {"cycle": cycle, "kind": kind} | values | columns
+
+
+def window(first: int, last: int, healing: int = 0, **columns: float) -> Outcome:
+    """A window of computed cycles, `CYCLE_S` each, a tenth of it Python's."""
+    kinds = ["healing"] * healing + ["computed"] * (last - first - healing)
+    rows = [row(first + 1 + c, kind, **columns) for c, kind in enumerate(kinds)]
+    total = CYCLE_S * (last - first)
+    cost = {"engine": 0.9 * total, "start_up": 0.2 * total, "parse": 0.1 * total}
+    return Outcome("window", first, last, rows, cost)
+
+
+def jump(first: int, last: int, cost_s: float, settlement: float | None = None) -> Outcome:
+    """A jump; its record of relaxation has round numbers, see the tests."""
+    if settlement is None:
+        settlement = settled(last)
+    before, estimated = 0.03 - settled(first), 0.03 - settlement - 1e-7
+    record = {
+        "method": "smallest-move",
+        "before": {"mean_height": before, "coordination_number": 5.0},
+        "estimated": {"mean_height": estimated, "coordination_number": 3.0},
+        "relaxed": {"mean_height": 0.03 - settlement, "coordination_number": 4.9},
+    }
+    notes = {"h": last - first, "relaxation": record}
+    rows = [row(last, "jumped", settlement=settlement)]
+    return Outcome(
+        "jump", first, last, rows, {"fit": 0.25 * cost_s, "relax": 0.75 * cost_s}, notes=notes
+    )
+
+
+def full_run(cycles: int = 100) -> History:
+    """A full run in windows of 25 cycles."""
+    return history_of([window(first, first + 25) for first in range(0, cycles, 25)])
+
+
+PROCEDURE = (
+    Outcome("preparation", 0, 0, [], {"engine": 1000.0}),
+    window(0, 25),
+    window(25, 50),
+    jump(50, 70, 3.0),
+    window(70, 100, healing=5),
+)
+
+
+def test_definitions() -> None:
+    """S = T_full / T_procedure and G = S - 1: the paper's 180 % is a speed-up of 2.8."""
+    assert speed_up(28.0, 10.0) == pytest.approx(2.8)
+    assert gained_time(2.8) == pytest.approx(1.8)
+    assert gained_time(speed_up(5.0, 5.0)) == 0
+    assert isnan(speed_up(1.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("value", "reference", "error"), [(110, 100, 0.1), (-90, -100, 0.1), (90, 100, -0.1)]
+)
+def test_relative_error_is_signed(value: float, reference: float, error: float) -> None:
+    """(value - reference)/|reference| is positive for too much, whatever the sign of both."""
+    assert relative_error(value, reference) == pytest.approx(error)
+    assert isnan(relative_error(value, 0.0))
+
+
+def test_cost_counts_start_up_once() -> None:
+    """The start-up is a part of the engine's time; every other purpose adds."""
+    cost = {"engine": 5.0, "start_up": 2.0, "parse": 0.5, "fit": 0.25, "relax": 1.0, "other": 0.125}
+    assert cost_total(cost) == 6.875
+
+
+def test_history_spreads_a_windows_cost_over_its_cycles() -> None:
+    """CPU time at cycle N of a run of equal cycles is N times a cycle's; the rain is left out."""
+    history = history_of(PROCEDURE)
+    assert history.cycle.tolist() == [*range(1, 51), *range(70, 101)]
+    assert np.allclose(history.cpu_s[:50], CYCLE_S * np.arange(1, 51))
+    assert history.cpu_s[history.row(70)] == pytest.approx(50 * CYCLE_S + 3.0)
+    assert history.cpu_s[-1] == pytest.approx(80 * CYCLE_S + 3.0)
+    assert history.computed(100) == 80
+    assert jumped_spans(PROCEDURE) == [(50, 70)]
+    assert cycles_computed(100, [(50, 70)]) == 80
+    with pytest.raises(UsageError, match="60"):
+        history.row(60)
+
+
+@given(
+    costs=st.lists(st.floats(0, 1e6), min_size=1, max_size=6),
+    lost=st.lists(st.tuples(st.integers(0, 5), st.floats(0, 1e6)), max_size=4),
+)
+def test_no_cost_is_lost(costs: list[float], lost: list[tuple[int, float]]) -> None:
+    """The last row bears all that the stages and the failed attempts before it cost."""
+    stages = [
+        Outcome("window", n, n + 1, [row(n + 1)], {"engine": cost, "start_up": cost / 2})
+        for n, cost in enumerate(costs)
+    ]
+    history = history_of(stages, lost)
+    borne = sum(seconds for cycle, seconds in lost if cycle < len(costs))
+    assert history.cpu_s[-1] == pytest.approx(sum(costs) + borne)
+    assert (np.diff(history.cpu_s) >= 0).all()
+
+
+def test_a_jump_of_no_cycles_costs_too() -> None:
+    """h = 0 leaves no row, but its relaxation is paid by the cycles after it."""
+    still = Outcome("jump", 10, 10, [], {"relax": 7.0}, notes={"relaxation": {"method": "none"}})
+    history = history_of([window(0, 10), still, window(10, 20)])
+    assert history.cpu_s[9] == pytest.approx(10 * CYCLE_S)
+    assert history.cpu_s[10] == pytest.approx(11 * CYCLE_S + 7)
+
+
+def test_comparison_in_closed_form() -> None:
+    """A run 2 % too deep, cut short or not: every error and the speed-up as by hand."""
+    own = history_of(
+        [
+            *PROCEDURE[:-1],
+            window(70, 100, 5, settlement=1.02 * settled(100), coordination_number=3.8,
+                   relative_density=0.567, elastic_deflection=1.5e-5),
+        ]
+    )  # fmt: skip
+    row_ = comparison("x", own, 100, full_run(), 100, preparation_s=1000.0)
+    assert row_.computed == 80
+    assert row_.settlement_error == pytest.approx(0.02)
+    assert row_.coordination_number_error == pytest.approx(-0.05)
+    assert row_.relative_density_error == pytest.approx(0.0125)
+    assert row_.elastic_deflection_error == pytest.approx(0.5)
+    assert row_.speed_up == pytest.approx(400 / 323)
+    assert row_.gained_time == pytest.approx(400 / 323 - 1)
+    assert row_.speed_up_with_preparation == pytest.approx(1400 / 1323)
+    assert isnan(row_.displacement_error)
+
+
+def test_averages_leave_jumped_rows_out() -> None:
+    """Coordination number and deflection are means of the last computed cycles alone."""
+    stages = [window(0, 50), jump(50, 70, 1.0), window(70, 74, coordination_number=2.0)]
+    history = history_of(stages)
+    assert AVERAGED == 10
+    assert history.late_mean("coordination_number", 74) == 2.0
+    assert history.late_mean("coordination_number", 50) == 4.0
+    assert isnan(history.late_mean("coordination_number", 70))
+
+
+@given(share=st.floats(0.01, 2.0), shift=st.floats(-10, 10), unit=st.sampled_from([1.0, 1e3]))
+def test_displacement_error_of_a_share(share: float, shift: float, unit: float) -> None:
+    """Moving every grain ``share`` of its way gives E_r = |1 - share|, in any unit and frame.
+
+    E_r of the coordinates is smaller by the size of the sample, and not the same in every frame.
+    """
+    random = np.random.default_rng(3)
+    start = unit * (random.uniform(0, 0.06, (40, 3)) + shift)
+    before = start + unit * random.normal(0, 1e-4, (40, 3))
+    full = before + unit * random.normal(0, 1e-4, (40, 3))
+    beds = Beds(start, before, full, before + share * (full - before))
+    own, truth = history_of(PROCEDURE), full_run()
+    row_ = comparison("x", own, 100, truth, 100, 0.0, beds)
+    # Differences of coordinates of size |shift| + 0.06 carry round-off of that size over 1e-4.
+    exact = abs(1 - share)
+    tolerance = 1e-15 * (abs(shift) + 1) / 1e-5
+    assert row_.jump_displacement_error == pytest.approx(exact, abs=tolerance)
+    by_hand = exact * np.linalg.norm(full - before) / np.linalg.norm(full)
+    assert row_.coordinates_error == pytest.approx(by_hand, abs=1e-12)
+    whole = exact * np.linalg.norm(full - before) / np.linalg.norm(full - start)
+    assert row_.displacement_error == pytest.approx(whole, abs=tolerance)
+
+
+def test_a_run_that_did_not_move_has_no_displacement_error() -> None:
+    """Without a denominator E_r is not known, rather than an exception or zero."""
+    still = np.ones((5, 3))
+    beds = Beds(still, None, still, still)
+    row_ = comparison("x", full_run(), 100, full_run(), 100, 0.0, beds)
+    assert isnan(row_.displacement_error)
+    assert isnan(row_.jump_displacement_error)
+    assert row_.coordinates_error == 0
+
+
+def test_moving_nothing_is_the_full_run_cut_short() -> None:
+    """The null hypothesis at m computed cycles: error ln(1+m)/ln(1+N) - 1 at a speed-up N/m."""
+    line = stopped_early(full_run(), 100)
+    assert line.computed.tolist() == list(range(1, 100))
+    by_hand = np.log1p(np.arange(1, 100)) / log(101) - 1
+    assert np.allclose(line.settlement_error, by_hand, rtol=1e-12)
+    assert np.allclose(line.cpu_s, CYCLE_S * np.arange(1, 100))
+    row_ = comparison("x", full_run(), 80, full_run(), 100, 0.0)
+    assert row_.settlement_error == pytest.approx(log(81) / log(101) - 1)
+    assert row_.speed_up == pytest.approx(100 / 80)
+
+
+def test_a_law_that_holds_is_extrapolated_without_error() -> None:
+    """Fitting c + a ln N to a settlement of that form gives the full run at any cost."""
+    rows = [row(n, settlement=1e-4 + A * log(n)) for n in range(1, 101)]
+    full = history_of([Outcome("window", 0, 100, rows, {"engine": 400.0})])
+    line = curve_fitted(full, law_named("log"), 10, 100, [11, 12, 20, 50, 99])
+    assert line.computed.tolist() == [12, 20, 50, 99]  # two cycles say nothing of their own error
+    assert np.allclose(line.settlement_error, 0, atol=1e-9)
+    assert np.allclose(line.cpu_s, CYCLE_S * line.computed)
+
+
+def test_the_steps_of_a_jump_add_up() -> None:
+    """law + relaxation + healing = the run's settlement less the control's, same cycles."""
+    own = history_of(
+        [window(0, 50), jump(50, 70, 1.0, 1.1 * settled(70)), window(70, 100, 5, settlement=2e-4)]
+    )
+    full = full_run()
+    figures = jump_figures("jump_000050_1", jump(50, 70, 1.0, 1.1 * settled(70)), own, full)
+    assert figures.estimated == pytest.approx(1.1 * settled(70) - settled(50) + 1e-7)
+    assert figures.truth == pytest.approx(settled(70) - settled(50))
+    assert figures.relaxation_change == pytest.approx(-1e-7)
+    apart = (2e-4 - settled(50)) - (settled(75) - settled(50))
+    steps = figures.law_error + figures.relaxation_change + figures.healing_error
+    assert steps == pytest.approx(apart)
+    assert figures.coordination_change == pytest.approx(-0.02)
+    assert figures.coordination_ok
+    assert figures.height_change == pytest.approx(1e-7 / figures.estimated)
+    assert figures.height_ok
+
+
+@pytest.mark.parametrize(("coordination", "ok"), [(4.851, True), (4.849, False), (5.151, False)])
+def test_bar_of_the_coordination_number(coordination: float, ok: bool) -> None:
+    """A relaxation keeps the coordination number of the state before within 3 %, both ways."""
+    outcome = jump(50, 70, 1.0)
+    outcome.notes["relaxation"]["relaxed"]["coordination_number"] = coordination
+    figures = jump_figures("x", outcome, history_of(PROCEDURE), None)
+    assert figures.coordination_ok is ok
+    assert isnan(figures.truth)
+
+
+@pytest.mark.parametrize(("share", "ok"), [(0.049, True), (-0.049, True), (0.051, False)])
+def test_bar_of_the_mean_height(share: float, ok: bool) -> None:
+    """A relaxation keeps the estimated mean height within 5 % of the jump's own settlement."""
+    outcome = jump(50, 70, 1.0)
+    record = outcome.notes["relaxation"]
+    own = record["before"]["mean_height"] - record["estimated"]["mean_height"]
+    record["relaxed"]["mean_height"] = record["estimated"]["mean_height"] + share * own
+    assert jump_figures("x", outcome, history_of(PROCEDURE), None).height_ok is ok
+
+
+def test_a_jump_without_relaxation_is_not_judged() -> None:
+    """A scene that asks for no relaxation leaves no measures, and no verdict."""
+    outcome = Outcome("jump", 50, 70, [row(70)], {}, notes={"relaxation": {"method": "none"}})
+    figures = jump_figures("x", outcome, history_of(PROCEDURE), None)
+    assert figures.coordination_ok is None
+    assert figures.height_ok is None
+
+
+def test_common_cycle() -> None:
+    """Run and control are compared at the last cycle both have, never inside a jump."""
+    own = history_of(PROCEDURE)
+    assert last_common_cycle(own, full_run(75)) == 75
+    assert last_common_cycle(history_of(PROCEDURE[:4]), full_run(75)) == 70
+    assert last_common_cycle(history_of(PROCEDURE[:4]), full_run(50)) == 50
+    assert last_common_cycle(own, history_of([])) == 0
+
+
+def folder_of(path: Path, outcomes: tuple[Outcome, ...]) -> RunFolder:
+    """A run folder with these stages."""
+    folder = RunFolder(path)
+    path.mkdir()
+    for outcome in outcomes:
+        name = outcome.stage
+        if name != "preparation":
+            name += f"_{outcome.first_cycle:06d}" + ("_1" if name == "jump" else "")
+        folder.finish(folder.begin(name), outcome)
+    return folder
+
+
+def test_two_folders_are_compared(tmp_path: Path) -> None:
+    """`compare` reads two run folders and gives what their tables give."""
+    own = folder_of(tmp_path / "own", PROCEDURE)
+    stages = (PROCEDURE[0], *(window(first, first + 25) for first in range(0, 100, 25)))
+    full = folder_of(tmp_path / "full", stages)
+    assert compare(own, full).speed_up == pytest.approx(400 / 323)
+    assert compare(own, full).settlement_error == 0
+    assert compare(own, full).speed_up_with_preparation == pytest.approx(1400 / 1323)
+    with pytest.raises(UsageError):
+        compare(own, folder_of(tmp_path / "none", PROCEDURE[:1]))
+
+
+def test_a_failed_jump_is_charged(tmp_path: Path) -> None:
+    """A jump given up in the window after it costs its own time and the clock's until then."""
+    folder = folder_of(tmp_path / "run", PROCEDURE[:4])
+    times = ("2026-01-01T10:00:00Z", "2026-01-01T10:02:30Z", "2026-01-01T11:00:00Z")
+    whats = ("finished", "jump failed", "finished")
+    events = [
+        f'{{"time": "{time}", "event": "{what}", "stage": "jump_000050_1"}}\n'
+        for time, what in zip(times, whats, strict=True)
+    ]
+    folder.give_up("jump_000050_1", "nan")
+    folder.give_up("jump_000050_2", "the relaxation did not converge")
+    (tmp_path / "run" / "events.jsonl").write_text("".join(events))
+    lost = [(one.stage, one.why, one.lost_s) for one in failed_jumps(folder)]
+    assert lost == [
+        ("jump_000050_1", "nan", pytest.approx(3.0 + 150.0)),
+        ("jump_000050_2", "the relaxation did not converge", 0.0),
+    ]
+    assert all(
+        before.first_cycle <= after.first_cycle for before, after in pairwise(failed_jumps(folder))
+    )
