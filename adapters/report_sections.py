@@ -254,8 +254,9 @@ def _bars(numbers: Numbers) -> str:
 def _failures(numbers: Numbers) -> str:
     """Failures named and counted."""
     counted = paragraph(
-        f"{len(numbers.failed_jumps)} failed jumps, {len(numbers.stops)} stops before the end, "
-        f"{len(numbers.discarded)} unfinished or superseded stages moved to discarded/."
+        f"Failed attempts at a jump: {len(numbers.failed_jumps)}; stops before the end: "
+        f"{len(numbers.stops)}; unfinished or superseded stages moved to discarded/: "
+        f"{len(numbers.discarded)}."
     )
     items = [f"<code>{escape(stage)}</code>: {escape(why)}" for stage, why in numbers.failed_jumps]
     items += [f"stopped {escape(time)}: {escape(why)}" for time, why in numbers.stops]

@@ -163,39 +163,41 @@ def bars_of(
 
 
 def fails_of(record: Record, rows: tuple[Comparison, ...], bars: tuple[Bar, ...]) -> Iterator[str]:
-    """Where the claim fails: bars missed, and cheaper ways that do as well."""
-    by_name = {row.name: row for row in rows}
-    run = by_name.get(PROCEDURE)
-    if not record.run.history.cycle.size:
+    """Where the claim fails: cheaper ways that do as well, bars missed, a bed too small."""
+    if not len(record.run.history.cycle):
         return
-    if run is None:
-        yield "no full run stands beside this one, so its error is not known (--control adds it)"
-    else:
-        error = abs(run.settlement_error)
-        for name, how in (
-            (NOTHING, "jumping and moving nothing"),
-            (FITTED, "fitting the law to the full run's curve, which leaves no bed,"),
-        ):
-            other = by_name.get(name)
-            if other is not None and abs(other.settlement_error) <= error:
-                yield (
-                    f"{how} comes at least as near to the full run "
-                    f"({100 * other.settlement_error:+.1f} %) for about the same cost"
-                )
-        if run.jump_displacement_error >= 1:
-            yield (
-                "single grains are not predicted: E_r of their displacement since the first jump "
-                f"is {run.jump_displacement_error:.2f}, and 1 is the error of not moving them"
-            )
-        if run.speed_up < 1:
-            yield "the procedure cost more than the full run"
+    yield from _beaten({row.name: row for row in rows})
     for bar in bars:
         if bar.ok is False:
             yield f"{bar.name} is {100 * bar.value:.1f} %, above {100 * bar.bar:.0f} %"
     if record.run.failed_jumps:
-        yield f"{len(record.run.failed_jumps)} jumps failed and were tried again, shorter"
+        yield f"attempts at a jump that failed: {len(record.run.failed_jumps)}"
     if record.scene.grain_count < FEW_GRAINS:
         yield (
             f"a bed of {record.scene.grain_count} grains settles in bursts: it shows the machinery "
             "and can not judge a law"
         )
+
+
+def _beaten(rows: dict[str, Comparison]) -> Iterator[str]:
+    """Where a cheaper way does as well as this run; nothing without a control."""
+    run = rows.get(PROCEDURE)
+    if run is None:
+        return
+    for name, how in (
+        (NOTHING, "jumping and moving nothing"),
+        (FITTED, "fitting the law to the full run's curve, which leaves no bed,"),
+    ):
+        other = rows.get(name)
+        if other is not None and abs(other.settlement_error) <= abs(run.settlement_error):
+            yield (
+                f"{how} comes at least as near to the full run "
+                f"({100 * other.settlement_error:+.1f} %) for about the same cost"
+            )
+    if run.jump_displacement_error >= 1:
+        yield (
+            "single grains are not predicted: E_r of their displacement since the first jump is "
+            f"{run.jump_displacement_error:.2f}, and 1 is the error of not moving them"
+        )
+    if run.speed_up < 1:
+        yield "the procedure cost more than the full run"

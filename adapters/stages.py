@@ -52,8 +52,9 @@ class Variant:
 class Clock:
     """CPU time of this process by purpose, from one finished stage to the next."""
 
-    def __init__(self) -> None:
-        self._start = 0.0  # the first stage bears the start-up of Python
+    def __init__(self, start_s: float | None = None) -> None:
+        """Count from ``start_s`` of this process's CPU time [s]; 0 counts Python's start-up too."""
+        self._start = time.process_time() if start_s is None else start_s
         self._parts: dict[str, float] = {}
 
     @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import re
+import shlex
 import socket
 from dataclasses import asdict, dataclass
 from math import isfinite, nan
@@ -22,7 +23,7 @@ class Status:
     state: str
     """``running``, ``finished`` or ``stopped``."""
     why: str
-    """Why it stopped, as the run's last words have it."""
+    """Why it stopped, the first of the run's last words."""
     cycle: int
     """Load cycles done."""
     total_cycles: int
@@ -62,7 +63,7 @@ def status(run_folder: Path) -> Status:
     return Status(
         run_folder=str(run_folder),
         state=state,
-        why=str(last.get("why", "")) if state == "stopped" and last["event"] == "stopped" else "",
+        why=_why(last) if state == "stopped" else "",
         cycle=cycle,
         total_cycles=procedure.total_cycles if procedure is not None else 0,
         cycles_computed=computed,
@@ -73,8 +74,14 @@ def status(run_folder: Path) -> Status:
         speed_up_so_far=ratio if isfinite(ratio) else None,
         cpu_s=sum(cost_total(outcome.cost) for outcome in record.run.outcomes),
         control_cycle=_cycle(record.control) if record.control is not None else None,
-        next=f"trackbed {verb} {run_folder}",
+        next=f"trackbed {verb} {shlex.quote(str(run_folder))}",
     )
+
+
+def _why(event: dict[str, Any]) -> str:
+    """The first line of a stop's reason; empty when the run was killed and left none."""
+    words = str(event.get("why", "")) if event.get("event") == "stopped" else ""
+    return words.partition("\n")[0]
 
 
 def _cycle(track: Track) -> int:

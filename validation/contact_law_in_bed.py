@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from adapters.contact_law import restitution_literal, tangential_stiffness
 from adapters.dump import Frame, dump_frames
@@ -86,7 +88,17 @@ class SpringEnergy:
     lost: float
     """Lost by it while k_t falls [J]."""
     piston_work: float
-    """Work of the piston on the bed [J], all but a few percent of it dissipated."""
+    """Work of the piston on the bed [J]."""
+
+    @property
+    def created_share(self) -> float:
+        """``created`` over the piston's work."""
+        return self.created / self.piston_work
+
+    @property
+    def lost_share(self) -> float:
+        """``lost`` over the piston's work."""
+        return self.lost / self.piston_work
 
 
 def spring_energy(home: Path, seed: int, cycles: int, every: int) -> SpringEnergy:
@@ -106,6 +118,7 @@ def spring_energy(home: Path, seed: int, cycles: int, every: int) -> SpringEnerg
         outcome.notes["piston_height"],
     )
     engine, work = engine_named("liggghts"), home / "dense"
+    shutil.rmtree(work, ignore_errors=True)
     work.mkdir()
     digests = engine.write_cycles(scene, start, 1, work)
     columns = " ".join(f"c_contact[{i}]" for i in (1, 2, 4, 5, 6, 10, 11, 12, 13))
@@ -133,7 +146,7 @@ def spring_energy(home: Path, seed: int, cycles: int, every: int) -> SpringEnerg
     return SpringEnergy(
         float(gift[gift > 0].sum()),
         float(-gift[gift < 0].sum()),
-        -float(np.trapezoid(force, height)),
+        -float(trapezoid(force, height)),
     )
 
 

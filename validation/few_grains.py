@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
@@ -25,8 +25,6 @@ RADIUS = 3.2e-3
 
 PLACE = np.array([0.02, 0.02, 0.02])
 """A place far from every wall [m]."""
-
-PAIR_STYLE = "pair_style gran model ${contact_model}"
 
 DECK = """\
 variable gravity index 0.0
@@ -89,13 +87,13 @@ def track_run(
     *,
     time_step: float,
     every: int = 1,
-    pair_settings: str = "",
+    materials: Callable[[str], str] = str,
 ) -> Track:
     """Run LIGGGHTS, without gravity, from ``position`` [m] and ``velocity`` [m/s], shape (n, 3).
 
     ``motion`` are the deck's lines that move the grains, each in a group ``grain_1``, ...;
-    ``time_step`` [s]; ``every`` steps between two instants; ``pair_settings`` end the pair style,
-    such as ``limitForce on``.  Raises as `LiggghtsEngine.run`.
+    ``time_step`` [s]; ``every`` steps between two instants; ``materials`` may change the text of
+    ``scene.in``, such as `limit_force`.  Raises as `LiggghtsEngine.run`.
     """
     engine = LiggghtsEngine()
     lines = []
@@ -114,19 +112,30 @@ def track_run(
         radius = np.full(len(position), RADIUS)
         digests = engine.write_preparation(scene, position, radius, height, folder)
         (folder / "in.few").write_text(deck)
-        materials = (folder / "scene.in").read_text()
-        (folder / "scene.in").write_text(
-            materials.replace(PAIR_STYLE, f"{PAIR_STYLE} {pair_settings}")
-        )
+        scene_part = folder / "scene.in"
+        scene_part.write_text(materials(scene_part.read_text()))
         engine.run(scene, "in.few", folder, lambda: None, digests)
         frames = list(dump_frames(folder / "grains.dump"))
-        contacts = tuple(contacts_of_frame(frame) for frame in dump_frames(folder / "contacts.dump"))
+        contacts = tuple(
+            contacts_of_frame(frame) for frame in dump_frames(folder / "contacts.dump")
+        )
     position, velocity, spin, force = (
         np.array([frame.block(*(letter + axis for axis in "xyz")) for frame in frames])
         for letter in ("", "v", "omega", "f")
     )
     time = time_step * np.array([frame.time_step for frame in frames])
     return Track(time, position, velocity, spin, force, contacts)
+
+
+def limit_force(scene_part: str) -> str:
+    """``scene.in`` with contacts that end where their force turns to tension."""
+    style = "pair_style gran model ${contact_model}"
+    return scene_part.replace(style, f"{style} limitForce on")
+
+
+def mirror_tangential(scene_part: str) -> str:
+    """``scene.in`` with the grains' own contact law, at friction 0, on the mirror planes."""
+    return scene_part.replace("wall/gran model hertz ", "wall/gran model ${contact_model} ")
 
 
 def head_on(
@@ -136,7 +145,7 @@ def head_on(
     steps: float = 1000,
     mirror: bool = False,
     slide: float = 0.0,
-    pair_settings: str = "",
+    materials: Callable[[str], str] = str,
 ) -> tuple[Collision, Track]:
     """Two grains that meet at ``speed`` [m/s], or one and its image in the mirror plane x = 0.
 
@@ -157,7 +166,7 @@ def head_on(
         velocity[:grains],
         ["fix motion grains nve/sphere", f"run {round(1.7 * steps)}"],
         time_step=time_step,
-        pair_settings=pair_settings,
+        materials=materials,
     )
     x, v = track.position[:, :, 0], track.velocity[:, :, 0]
     overlap = 2 * (RADIUS - x[:, 0]) if mirror else 2 * RADIUS - (x[:, 0] - x[:, 1])
@@ -191,9 +200,29 @@ def driven_contact(
     for leg in legs / (steps * time_step):
         motion.append(f"fix leg grain_1 move linear {leg[0]:.17g} {leg[1]:.17g} 0.0 units box")
         motion += [f"run {steps}", "unfix leg"]
-    start = np.array([PLACE + [2 * RADIUS - overlap[0], displacement[0], 0.0], PLACE])
+    start = PLACE + np.array([[2 * RADIUS - overlap[0], displacement[0], 0.0], [0.0, 0.0, 0.0]])
     track = track_run(
         scene, start, np.zeros((2, 3)), motion, time_step=time_step, every=max(steps // 100, 1)
     )
     apart = track.position[:, 0] - track.position[:, 1]
     return track, 2 * RADIUS - np.linalg.norm(apart, axis=1), apart[:, 1]
+
+
+def mirror_slide(
+    scene: Scene, speed: float, runs: int, materials: Callable[[str], str] = str
+) -> Track:
+    """A grain that 1 N presses on the mirror plane x = 0 slides along z at ``speed`` [m/s].
+
+    In ``runs`` commands ``run`` of ten steps each, at the scene's own time step.
+    """
+    modulus = scene.stiffness.mirror
+    overlap = float(contact_law.overlap_under_force(1.0, modulus, RADIUS))
+    push = ["fix motion grains nve/sphere", "fix push grains addforce -1.0 0.0 0.0"]
+    return track_run(
+        scene,
+        np.array([[RADIUS - overlap, *PLACE[1:]]]),
+        np.array([[0.0, 0.0, speed]]),
+        [*push, *["run 10"] * runs],
+        time_step=scene.time_step,
+        materials=materials,
+    )

@@ -10,7 +10,10 @@ and Berryman).
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
+from scipy.integrate import trapezoid
 
 from adapters.state import FloatArray
 
@@ -31,7 +34,7 @@ def path(corners: FloatArray, steps: int) -> FloatArray:
     ``corners`` (delta_n, delta_t), shape (c, 2).
     """
     share = np.arange(steps)[:, None] / steps
-    legs = [a + share * (b - a) for a, b in zip(corners[:-1], corners[1:], strict=True)]
+    legs = [a + share * (b - a) for a, b in pairwise(corners)]
     return np.concatenate([*legs, corners[-1:]])
 
 
@@ -53,8 +56,8 @@ def force_incremental(stiffness: FloatArray, displacement: FloatArray) -> FloatA
 def force_rescaled(stiffness: FloatArray, displacement: FloatArray) -> FloatArray:
     """The paper's rule [N], shape (s,): dF_t = k_t d delta_t, and F_t ~ k_t while F_n decreases.
 
-    The tangential force that a contact under F_n - dF_n has at the same elastic displacement
-    F_t/k_t is F_t k_t(F_n - dF_n)/k_t(F_n).
+    We read the value "when the normal force was F_n - dF_n" as that of the same elastic
+    displacement F_t/k_t, that is F_t k_t(F_n - dF_n)/k_t(F_n).
     """
     force = np.empty_like(displacement)
     force[0] = stiffness[0] * displacement[0]
@@ -72,13 +75,13 @@ def force_mindlin_deresiewicz(
     shear: float,
     radius: float,
     friction: float,
-    springs: int = 4000,
+    springs: int = 2000,
 ) -> FloatArray:
     """The contact with micro-slip [N], shape (s,), along any path: what the rules approximate.
 
     Springs side by side, each with its own overlap delta_n - x^2/R* and Coulomb's limit, are the
     half-space of Cattaneo, Mindlin and Deresiewicz (method of dimensionality reduction; Popov and
-    Hess 2015, chapter 5).  ``overlap`` and ``displacement`` [m], shape (s,); ``modulus`` E* and
+    Hess 2015).  ``overlap`` and ``displacement`` [m], shape (s,); ``modulus`` E* and
     ``shear`` G* [Pa]; ``radius`` R* [m]; ``friction`` may be inf.  The first state has no force.
     """
     edge = np.sqrt(radius * overlap.max())
@@ -102,4 +105,4 @@ def work(force: FloatArray, displacement: FloatArray) -> float:
 
     Around a closed loop of a contact that is the same at its end: energy lost, if negative created.
     """
-    return float(np.trapezoid(force, displacement))
+    return float(trapezoid(force, displacement))

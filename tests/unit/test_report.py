@@ -310,8 +310,8 @@ def test_failed_jumps_are_named_counted_and_charged(finished: Path, copy: Path) 
     after, page = written(copy)
     assert after["failed_jumps"] == [[name, "3 grains are lost: 4, 7, <12>"]]
     assert "3 grains are lost: 4, 7, &lt;12&gt;" in page
-    assert "1 failed jumps" in page
-    assert "1 jumps failed and were tried again, shorter" in page
+    assert "Failed attempts at a jump: 1; " in page
+    assert "attempts at a jump that failed: 1" in page
     assert "window_000015.1" in after["discarded"]
     assert after["cycle"] == 40
     lost = after["costs"][0]["failed_jumps"]
@@ -373,7 +373,7 @@ def test_status(copy: Path) -> None:
         assert status(copy).state == "running"
     assert json.loads(json.dumps(content.to_dict(), allow_nan=False)) == content.to_dict()
     remove(copy, "window_00003*", "window_00002*", "jump_00002*")
-    RunFolder(copy).event("stopped", why="stopped by SIGTERM")
+    RunFolder(copy).event("stopped", why="stopped by SIGTERM\n  -> go on")
     stopped = status(copy)
     assert (stopped.state, stopped.why) == ("stopped", "stopped by SIGTERM")
     assert stopped.next == f"trackbed resume {copy}"

@@ -65,6 +65,8 @@ class Commands:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.output = folder / "output.txt"
+        self.operations = 0
+        self._running = 0
         self._lines: queue.Queue[dict[str, Any]] = queue.Queue()
         self._process = subprocess.Popen(
             [sys.executable, str(Path(__file__).with_name("forked_commands.py"))],
@@ -87,17 +89,20 @@ class Commands:
         return self._lines.get(timeout=60)
 
     def start(self, *words: object, **request: Any) -> int:
-        """Start a command; its process id."""
+        """Start a command; its process id.  One that a failed test left is killed first."""
+        self.stop()
         request |= {"words": [str(word) for word in words], "output": str(self.output)}
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(request) + "\n")
         self._process.stdin.flush()
-        return 0 if request.get("here") else int(self.answer()["pid"])
+        self._running = 0 if request.get("here") else int(self.answer()["pid"])
+        return self._running
 
     def end(self) -> int:
         """Wait for the end of a command; its exit status."""
         while "status" not in (answer := self.answer()):
             self.operations = answer.get("operations", 0)
+        self._running = 0
         return int(answer["status"])
 
     def run(self, *words: object, **request: Any) -> int:
@@ -110,11 +115,20 @@ class Commands:
         while True:
             answer = self.answer()
             if "status" in answer:
+                self._running = 0
                 return False
             if answer.get("part") == part:
                 return True
 
+    def stop(self) -> None:
+        """Kill what still runs."""
+        if self._running:
+            os.kill(self._running, signal.SIGKILL)
+            self.end()
+
     def close(self) -> None:
+        """End the server."""
+        self.stop()
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.close()

@@ -47,9 +47,9 @@ def bed() -> Bed:
 def settled() -> Bed:
     """A bed in the equilibrium of eq. 29 without friction: every force is balanced."""
     generator = np.random.default_rng(0)
-    radius = generator.uniform(2e-3, 4e-3, 24)
-    walls = Container("cylinder", ("x", "y"), radius=0.018).walls()
-    start = generator.random((24, 3)) * [0.012, 0.012, 0.03]
+    radius = generator.uniform(2e-3, 4e-3, 14)
+    walls = Container("cylinder", ("x", "y"), radius=0.014).walls()
+    start = generator.random((14, 3)) * [0.009, 0.009, 0.03]
     start = relax_bare(state_at_rest(start, radius), walls, STIFFNESS).position
     state = state_at_rest(start, radius)
     found = relax(start, state, walls, STIFFNESS, method="karrech2007", frontier="free")
