@@ -17,8 +17,8 @@ Measured on Karrech's bed of 1,085 grains, cycle 50 to 100 by the log law of eac
 | the estimate        | 1.05             | 8.1e-4 m, 2.8e-5 m      | 43 um      |                  |
 | smallest-move       | 3.34             | 3.0e-7 m, 5.7e-8 m      | 43 um      | 1,058, 0.06 s    |
 | proximal            | 3.63             | 8.5e-7 m, 1.5e-7 m      | 34 um      | 597, 0.5 s       |
-| karrech2007, fixed  | 3.24             | 3.6e-4 m, 2.1e-6 m      | 341 um     | > 20,000, 12 s   |
-| karrech2007, free   | 3.76             | 2.4e-7 m, 5.8e-8 m      | > 1,700 um | > 20,000, 12 s   |
+| karrech2007, fixed  | 3.24             | 3.6e-4 m, 2.1e-6 m      | 341 um     | > 20,000, 13 s   |
+| karrech2007, free   | 3.76             | 2.4e-7 m, 5.8e-8 m      | > 1,700 um | > 20,000, 15 s   |
 
 Fixed grains keep the overlaps they were estimated with (Fig. 9 ends at 6e-5 m for the same
 reason); free ones flow, as nothing stands for friction.

@@ -109,8 +109,8 @@ def main() -> None:
             continue
         pid = os.fork()
         if pid == 0:
+            tell(pid=os.getpid())
             serve(request)
-        tell(pid=pid)
         tell(status=os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))
 
 

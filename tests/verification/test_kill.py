@@ -85,8 +85,8 @@ class Commands:
             self._lines.put(json.loads(line))
 
     def answer(self) -> dict[str, Any]:
-        """The next answer; an empty queue for a minute is a failure."""
-        return self._lines.get(timeout=60)
+        """The next answer; none in ten minutes is a failure."""
+        return self._lines.get(timeout=600)
 
     def start(self, *words: object, **request: Any) -> int:
         """Start a command; its process id.  One that a failed test left is killed first."""
@@ -132,7 +132,7 @@ class Commands:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.close()
-        self._process.wait(timeout=60)
+        self._process.wait(timeout=600)
         self._reader.join()
         self._process.stdout.close()
 
@@ -178,8 +178,8 @@ def test_killed_at_random_times(commands: Commands, whole: bytes, tmp_path: Path
             wait = times.uniform(0, 2.5 * SLOW)
             time.sleep(wait)
             os.kill(pid, signal.SIGKILL)
-            kills.append((part, wait))
             assert commands.end() == -signal.SIGKILL, kills
+            kills.append((part, wait))
         assert whole.startswith(table(run)), f"after the kills {kills}, seed {SEED}"
     assert commands.run(*resume(commands, run)) == 0, commands.output.read_text()
     assert table(run) == whole, f"after the kills {kills}, seed {SEED}"
@@ -261,23 +261,25 @@ def test_two_writers(
 
 
 def test_report_killed_at_random_times(commands: Commands, whole: bytes, tmp_path: Path) -> None:
-    """Five kills while the report is written: the table is untouched, the next report whole."""
-    run, times = tmp_path / "run", random.Random(SEED)
+    """Kills while the report is written: the page of before or the new one, never a part."""
+    run, times, statuses = tmp_path / "run", random.Random(SEED), []
     shutil.copytree(commands.folder / "whole", run)
+    commands.run("report", run, here=True)
     began = time.monotonic()
-    assert commands.run("report", run, here=True) == 0, commands.output.read_text()
+    assert commands.run("report", run) == 0, commands.output.read_text()
     span = time.monotonic() - began
     page = run / "report.html"
-    first = page.read_bytes()
+    size = page.stat().st_size
     for _ in range(5):
         pid = commands.start("report", run)
-        time.sleep(times.uniform(0, 0.7 * span))
+        time.sleep(times.uniform(0.2, 0.9) * span)
         os.kill(pid, signal.SIGKILL)
-        assert commands.end() in (0, -signal.SIGKILL)
+        statuses.append(commands.end())
         assert page.read_bytes()[-200:].rstrip().endswith(b"</html>")
+        assert page.stat().st_size == pytest.approx(size, rel=0.01)
         assert table(run) == whole
+    assert -signal.SIGKILL in statuses
     assert commands.run("report", run) == 0
-    assert len(page.read_bytes()) == pytest.approx(len(first), rel=0.01)
 
 
 # --- the engine's own process ---------------------------------------------------------------
@@ -309,7 +311,7 @@ def test_no_engine_is_left_behind(
     assert alive(engine)
     os.kill(pid, number)
     assert commands.end() == status, commands.output.read_text()
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 60
     while alive(engine) and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not alive(engine)
@@ -317,7 +319,7 @@ def test_no_engine_is_left_behind(
 
 def awaited(path: Path) -> str:
     """Content of a file that another process is about to write."""
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 300
     while time.monotonic() < deadline:
         if path.exists() and (text := path.read_text()):
             return text

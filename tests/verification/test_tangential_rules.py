@@ -39,6 +39,7 @@ def loop_of(
     return overlap, slip
 
 
+@settings(max_examples=30, deadline=None)
 @given(low=low_share, displacement=displacements)
 def test_energy_of_loops_in_closed_form(low: float, displacement: float) -> None:
     """(k_t1 - k_t0) delta_t^2/2 is lost or created around the loop, by every rule; by hand.
@@ -56,6 +57,7 @@ def test_energy_of_loops_in_closed_form(low: float, displacement: float) -> None
             assert lost == pytest.approx(sign * unit, rel=1e-9)
 
 
+@settings(max_examples=15, deadline=None)
 @given(low=low_share, displacement=displacements)
 def test_the_papers_rule_never_creates_energy(low: float, displacement: float) -> None:
     """F_t^2/(2 k_t) falls by every change of k_t, either way, so a loop loses energy.

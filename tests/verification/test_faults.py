@@ -1,0 +1,645 @@
+"""Faults on purpose: each is caught and named, with its exit code, and spoils nothing before it."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import signal
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trackbed
+from adapters import procedure, stages
+from adapters.dump import Frame, dump_frames, dump_write
+from adapters.engine import EngineRun, engine_failure
+from adapters.engine_fake import FakeEngine
+from adapters.errors import EngineFailed, NotCredible
+from adapters.progress import Progress
+from adapters.run_folder import RunFolder
+from adapters.scene import Scene
+
+SCENE = """\
+[sample]
+container = "cylinder"
+radius = 0.02
+symmetry = ["x", "y"]
+count = 60
+grain_radius = { distribution = "uniform", mean = 2e-3, standard_deviation = 2e-4 }
+
+[material]
+grain = { young = 1e9, poisson = 0.25, density = 2710.0, viscous_alpha = 0.4, friction = 0.5 }
+wall = { young = 1e10, poisson = 0.3, friction = 0.5 }
+
+[loading]
+amplitude = 14150.0
+mean = 7075.0
+frequency = 50.0
+piston_mass = 0.005
+
+[procedure]
+k_i = 2
+k = 4
+h = 8
+healing_cycles = 1
+total_cycles = 24
+
+[engine]
+name = "fake"
+rayleigh_share = 0.2
+"""
+
+FIRST, SECOND, AFTER = "window_000000", "window_000002", "window_000014"
+"""The k_i window, the k window, and the window after the jump of 8 cycles from 6."""
+
+Damage = Callable[[Path], None]
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run folder of an undisturbed run."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "scene.toml").write_text(SCENE)
+    assert trackbed.main(["run", str(folder / "scene.toml")]) == 0
+    assert AFTER in RunFolder(folder / "run").stage_names()
+    return folder / "run"
+
+
+def table(run: Path) -> bytes:
+    return (run / "settlement.csv").read_bytes()
+
+
+def damaged(damage: Damage, *names: str) -> Callable[..., EngineRun]:
+    """`FakeEngine.run`, with ``damage`` done to the files of the stages named."""
+    real = FakeEngine.run
+
+    def run(self: FakeEngine, scene: Scene, deck: str, folder: Path, *rest: object) -> EngineRun:
+        done = real(self, scene, deck, folder, *rest)  # type: ignore[arg-type]
+        if folder.name in names:
+            damage(folder)
+        return done
+
+    return run
+
+
+# --- damage ---------------------------------------------------------------------------------
+
+
+def frames_of(path: Path) -> list[Frame]:
+    return list(dump_frames(path, allow_nan=True))
+
+
+def last_frame(change: Callable[[Frame], Frame]) -> Damage:
+    """Change the last frame of states.dump."""
+
+    def damage(folder: Path) -> None:
+        *before, last = frames_of(folder / "states.dump")
+        dump_write(folder / "states.dump", [*before, change(last)])
+
+    return damage
+
+
+def with_value(row: int, column: str, value: float) -> Damage:
+    """Another value for one grain in the last frame."""
+
+    def change(frame: Frame) -> Frame:
+        values = frame.values.copy()
+        values[row, frame.columns.index(column)] = value
+        return replace(frame, values=values)
+
+    return last_frame(change)
+
+
+def coincident(folder: Path) -> None:
+    """Grain 2 at the centre of grain 1."""
+
+    def change(frame: Frame) -> Frame:
+        values = frame.values.copy()
+        place = [frame.columns.index(axis) for axis in "xyz"]
+        values[1, place] = values[0, place]
+        return replace(frame, values=values)
+
+    last_frame(change)(folder)
+
+
+def lost_at_the_end(folder: Path) -> None:
+    last_frame(lambda frame: replace(frame, values=np.delete(frame.values, 6, axis=0)))(folder)
+
+
+def lost_always(folder: Path) -> None:
+    frames = frames_of(folder / "states.dump")
+    less = [replace(frame, values=np.delete(frame.values, 6, axis=0)) for frame in frames]
+    dump_write(folder / "states.dump", less)
+
+
+def truncated(name: str, share: float) -> Damage:
+    """A file cut at a share of its length."""
+
+    def damage(folder: Path) -> None:
+        path = folder / name
+        os.truncate(path, int(share * path.stat().st_size))
+
+    return damage
+
+
+def short(*names: str) -> Damage:
+    """Dumps without their last frame."""
+
+    def damage(folder: Path) -> None:
+        for name in names:
+            dump_write(folder / name, frames_of(folder / name)[:-1])
+
+    return damage
+
+
+def gone(name: str) -> Damage:
+    return lambda folder: (folder / name).unlink()
+
+
+def track_with(rows: slice, column: int, value: float) -> Damage:
+    """Another value in the piston's record."""
+
+    def damage(folder: Path) -> None:
+        track = np.loadtxt(folder / "piston.txt")
+        track[rows, column] = value
+        np.savetxt(folder / "piston.txt", track, header="step ...")
+
+    return damage
+
+
+def track_short(folder: Path) -> None:
+    track = np.loadtxt(folder / "piston.txt")
+    np.savetxt(folder / "piston.txt", track[:-3], header="step ...")
+
+
+def garbage(name: str) -> Damage:
+    return lambda folder: (folder / name).write_bytes(b"\x00\x01garbage\xff" * 50) and None
+
+
+STATES: dict[str, tuple[Damage, int, str]] = {
+    "nan": (with_value(3, "vx", np.nan), 6, "nan"),
+    "infinite": (with_value(3, "z", np.inf), 6, "inf"),
+    "truncated dump": (truncated("states.dump", 0.9), 6, "ends inside"),
+    "truncated contacts": (truncated("contacts.dump", 0.95), 6, "ends inside"),
+    "binary garbage": (garbage("states.dump"), 6, "no text dump"),
+    "empty dump": (truncated("states.dump", 0.0), 6, "empty"),
+    "no dump": (gone("states.dump"), 5, "left no states.dump"),
+    "no contacts": (gone("contacts.dump"), 5, "left no contacts.dump"),
+    "coincident grains": (coincident, 6, "greatest overlap"),
+    "escaped grain": (with_value(3, "x", 0.5), 6, "greatest overlap"),
+}
+"""Damage to the dumps of any stage: what is done, the exit code, words of the message."""
+
+WINDOWS: dict[str, tuple[Damage, int, str]] = STATES | {
+    "lost at the end": (lost_at_the_end, 6, "lost grains: 7"),
+    "lost always": (lost_always, 6, "1 grains are lost: 7"),
+    "short dump": (short("states.dump", "contacts.dump"), 5, "3 of 4 cycle ends"),
+    "short states": (short("states.dump"), 5, "4 instants and contacts.dump 5"),
+    "fast grain": (with_value(3, "vz", 1e3), 6, "kinetic energy"),
+    "piston nan": (track_with(slice(60, 70), 2, np.nan), 6, "not finite from step"),
+    "piston misses its force": (track_with(slice(60, 80), 2, 0.0), 6, "force error"),
+    "piston record short": (track_short, 5, "record ends at step"),
+    "piston record garbage": (garbage("piston.txt"), 5, "record is not whole"),
+    "no piston record": (gone("piston.txt"), 5, "left no piston.txt"),
+}
+
+
+@pytest.mark.parametrize("fault", STATES)
+def test_fault_in_the_rain(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], fault: str
+) -> None:
+    """A fault in what the rain left ends the run with its name; mended, the run goes on."""
+    damage, code, words = STATES[fault]
+    with monkeypatch.context() as patch:
+        patch.setattr(FakeEngine, "run", damaged(damage, "preparation"))
+        assert trackbed.main(["run", str(scene)]) == code
+    said = capsys.readouterr().err
+    assert words in said
+    assert "this is a bug" not in said
+    assert RunFolder(scene.parent / "run").stage_names() == []
+
+
+def test_grain_lost_in_the_rain(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A grain that is in no frame of the rain is missed all the same."""
+    monkeypatch.setattr(FakeEngine, "run", damaged(lost_always, "preparation"))
+    assert trackbed.main(["run", str(scene)]) == 6
+    assert "1 of 60 grains are lost" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("fault", WINDOWS)
+def test_fault_in_a_window(
+    scene: Path,
+    whole: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    fault: str,
+) -> None:
+    """A fault in a window is named, the window before it kept; mended, the table is the same."""
+    damage, code, words = WINDOWS[fault]
+    run = scene.parent / "run"
+    with monkeypatch.context() as patch:
+        patch.setattr(FakeEngine, "run", damaged(damage, SECOND))
+        assert trackbed.main(["run", str(scene)]) == code
+    said = capsys.readouterr().err
+    assert words in said
+    assert "this is a bug" not in said
+    assert RunFolder(run).stage_names() == ["preparation", FIRST]
+    assert table(whole).startswith(table(run))
+    assert trackbed.main(["resume", str(run)]) == 0
+    assert table(run) == table(whole)
+    kept = run / "discarded" / f"{SECOND}.1"
+    assert (kept / "input.npz").exists()
+
+
+# --- failed jumps ---------------------------------------------------------------------------
+
+
+def failing(count: int, error: Exception) -> Callable[..., EngineRun]:
+    """`FakeEngine.run` that fails after the ``count`` longest of the jumps of 8, 4, 2, 1 from 6."""
+    real = FakeEngine.run
+    names = [f"window_{6 + (8 >> i):06d}" for i in range(count)]
+
+    def run(self: FakeEngine, scene: Scene, deck: str, folder: Path, *rest: object) -> EngineRun:
+        if folder.name in names:
+            raise error
+        return real(self, scene, deck, folder, *rest)  # type: ignore[arg-type]
+
+    return run
+
+
+@pytest.mark.parametrize(
+    "error",
+    [NotCredible("made to fail"), EngineFailed("made to fail"), engine_failure(-11, Path("."))],
+)
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_failed_jump_is_retried(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, count: int, error: Exception
+) -> None:
+    """Jumps of 8, 4, 2 cycles fail, the next is half as long, succeeds, and all is recorded."""
+    run = scene.parent / "run"
+    monkeypatch.setattr(FakeEngine, "run", failing(count, error))
+    assert trackbed.main(["run", str(scene)]) == 0
+    names = RunFolder(run).stage_names()
+    assert [f"jump_000006_{i}" for i in range(1, count + 2)] == names[3 : 4 + count]
+    assert names[4 + count] == f"window_{6 + (8 >> count):06d}"
+    failed = [e for e in RunFolder(run).events() if e["event"] == "jump failed"]
+    assert [e["stage"] for e in failed] == names[3 : 3 + count]
+    assert all(str(error) in e["why"] for e in failed)
+    lines = table(run).decode().splitlines()
+    assert next(line.split(",")[0] for line in lines if ",jumped," in line) == str(6 + (8 >> count))
+    cycles = [int(line.split(",")[0]) for line in lines[1:]]
+    assert cycles == sorted(set(cycles))
+    assert cycles[-1] == 24
+
+
+def test_jump_that_fails_for_good(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """After three shorter tries: exit code 6, all stages and reasons kept, again on resume."""
+    run = scene.parent / "run"
+    monkeypatch.setattr(FakeEngine, "run", failing(4, NotCredible("made to fail")))
+    for words in (["run", str(scene)], ["resume", str(run)]):
+        assert trackbed.main(words) == 6
+        assert "failed 4 times, the last time: made to fail" in capsys.readouterr().err
+        jumps = [f"jump_000006_{i}" for i in (1, 2, 3, 4)]
+        assert RunFolder(run).stage_names() == ["preparation", FIRST, SECOND, *jumps]
+        assert all(RunFolder(run).failure(name) == "made to fail" for name in jumps)
+        assert all((run / name / "relaxed.npz").exists() for name in jumps)
+        assert table(run).decode().splitlines()[-1].startswith("6,")
+    events = [event["event"] for event in RunFolder(run).events()]
+    assert events.count("jump failed") == 4
+
+
+@pytest.mark.parametrize("stop_at", [1, 2, 3])
+def test_resume_amid_retries(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop_at: int
+) -> None:
+    """Interrupted while a retry computes, the run resumes with the next length, not the first."""
+    run, fails = scene.parent / "run", failing(3, NotCredible("made to fail"))
+    monkeypatch.setattr(FakeEngine, "run", fails)
+    other = tmp_path / "undisturbed"
+    assert trackbed.main(["run", str(scene), "--run-folder", str(other)]) == 0
+
+    def stop(self: FakeEngine, scene: Scene, deck: str, folder: Path, *rest: object) -> EngineRun:
+        if folder.name == f"window_{6 + (8 >> stop_at):06d}":
+            os.kill(os.getpid(), signal.SIGTERM)
+        return fails(self, scene, deck, folder, *rest)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(FakeEngine, "run", stop)
+        assert trackbed.main(["run", str(scene)]) == 130
+    assert len([e for e in RunFolder(run).events() if e["event"] == "jump failed"]) == stop_at
+    assert trackbed.main(["resume", str(run)]) == 0
+    assert table(run) == table(other)
+    assert len([e for e in RunFolder(run).events() if e["event"] == "jump failed"]) == 3
+
+
+@pytest.mark.parametrize("status", [-signal.SIGKILL, -signal.SIGTERM, 128 + signal.SIGKILL])
+def test_killed_engine_is_not_a_failed_jump(
+    scene: Path,
+    whole: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    status: int,
+) -> None:
+    """An engine killed from outside stops the run: a shorter jump would not help."""
+    run = scene.parent / "run"
+    error = engine_failure(status, scene.parent)
+    with monkeypatch.context() as patch:
+        patch.setattr(FakeEngine, "run", failing(4, error))
+        assert trackbed.main(["run", str(scene)]) == 5
+    assert "was ended by SIG" in capsys.readouterr().err
+    assert not any(RunFolder(run).failure(name) for name in RunFolder(run).stage_names())
+    assert trackbed.main(["resume", str(run)]) == 0
+    assert table(run) == table(whole)
+
+
+# --- finished stages that were damaged later ------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("stage", "name"),
+    [
+        ("preparation", "state.npz"),
+        ("preparation", "end.restart"),
+        ("preparation", "outcome.json"),
+        (FIRST, "outcome.json"),
+        (SECOND, "states.npz"),
+        (SECOND, "end.restart"),
+        ("jump_000006_1", "relaxed.npz"),
+        ("jump_000006_1", "estimated.npz"),
+        (AFTER, "outcome.json"),
+    ],
+)
+@pytest.mark.parametrize("how", ["truncated", "missing"])
+def test_damage_is_noticed_on_resume(
+    tmp_path: Path, whole: Path, capsys: pytest.CaptureFixture[str], stage: str, name: str, how: str
+) -> None:
+    """The stage and all behind it are moved to discarded/, computed again, to the same table."""
+    run = tmp_path / "run"
+    shutil.copytree(whole, run)
+    names = RunFolder(run).stage_names()
+    if how == "missing":
+        (run / stage / name).unlink()
+    else:
+        os.truncate(run / stage / name, (run / stage / name).stat().st_size // 2)
+    left = {
+        other: (run / other / "outcome.json").stat().st_ino for other in names if other != stage
+    }
+    assert trackbed.main(["resume", str(run)]) == 0
+    assert f"{stage} is damaged" in capsys.readouterr().err
+    assert table(run) == table(whole)
+    assert RunFolder(run).stage_names() == names
+    later = names[names.index(stage) :]
+    discarded = {path.name for path in (run / "discarded").iterdir()}
+    assert {f"{other}.1" for other in later} <= discarded
+    for other in names:
+        if other != stage:
+            place = run / "discarded" / f"{other}.1" if other in later else run / other
+            assert (place / "outcome.json").stat().st_ino == left[other]
+
+
+def test_lost_table_is_written_again(tmp_path: Path, whole: Path) -> None:
+    """settlement.csv follows from the stages: a resumed run writes it, whatever was there."""
+    run = tmp_path / "run"
+    shutil.copytree(whole, run)
+    for content in (None, b"", table(whole)[:-200]):
+        (run / "settlement.csv").unlink()
+        if content is not None:
+            (run / "settlement.csv").write_bytes(content)
+        assert trackbed.main(["resume", str(run)]) == 0
+        assert table(run) == table(whole)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("material.grain.young", "2e9"), ("sample.seed", "2"), ("procedure.h", "[8, 10]")],
+)
+def test_changed_parameter_is_refused(
+    tmp_path: Path, whole: Path, capsys: pytest.CaptureFixture[str], key: str, value: str
+) -> None:
+    """run --set, or an edited scene.toml, names the parameter with both values and stops with 3."""
+    run = tmp_path / "run"
+    shutil.copytree(whole, run)
+    scene = str(whole.parent / "scene.toml")
+    words = ["run", scene, "--run-folder", str(run), "--set", f"{key}={value}"]
+    assert trackbed.main(words) == 3
+    said = capsys.readouterr().err
+    assert f"{key}: " in said
+    assert " in the run, " in said
+    assert table(run) == table(whole)
+
+
+def test_edited_scene_is_refused_on_resume(
+    tmp_path: Path, whole: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The scene in the run folder is compared too."""
+    run = tmp_path / "run"
+    shutil.copytree(whole, run)
+    path = run / "scene.toml"
+    path.write_text(path.read_text().replace("2710.0", "2700.0"))
+    assert trackbed.main(["resume", str(run)]) == 3
+    assert "material.grain.density: 2710.0 in the run, 2700.0 now" in capsys.readouterr().err
+
+
+# --- full disk ------------------------------------------------------------------------------
+
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize(
+    ("where", "stage"),
+    [
+        ("adapters.stages.state_save", ""),
+        ("adapters.stages.window_save", "preparation"),
+        ("adapters.run_folder.write_atomically", ""),
+        ("adapters.engine_fake.dump_write", ""),
+    ],
+)
+def test_full_disk(
+    scene: Path,
+    whole: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    where: str,
+    stage: str,
+) -> None:
+    """No space left, at any writer: exit code 5 and said so, earlier stages whole."""
+    run = scene.parent / "run"
+
+    def full(*_: object, **__: object) -> None:
+        raise FULL
+
+    with monkeypatch.context() as patch:
+        patch.setattr(where, full)
+        assert trackbed.main(["run", str(scene)]) == 5
+    said = capsys.readouterr().err
+    assert "the disk is full" in said
+    assert "trackbed resume" in said
+    assert RunFolder(run).stage_names() == [name for name in [stage] if name]
+    assert trackbed.main(["resume", str(run)]) == 0
+    assert table(run) == table(whole)
+
+
+def test_full_disk_in_a_jump_is_no_failed_jump(
+    scene: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The disk is full while the jump is saved: the jump is not given up for it."""
+    run = scene.parent / "run"
+    real = stages.state_save
+
+    def full(state: object, path: Path) -> None:
+        if path.name == "relaxed.npz":
+            raise FULL
+        real(state, path)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stages, "state_save", full)
+        assert trackbed.main(["run", str(scene)]) == 5
+    assert not any(event["event"] == "jump failed" for event in RunFolder(run).events())
+    assert trackbed.main(["resume", str(run)]) == 0
+    assert table(run) == table(whole)
+
+
+def test_full_disk_at_the_lock(
+    tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A disk that is full from the first byte on is named as well."""
+    run = tmp_path / "run"
+    shutil.copytree(whole, run)
+
+    def full() -> str:
+        raise FULL
+
+    monkeypatch.setattr("adapters.run_folder.socket.gethostname", full)
+    assert trackbed.main(["resume", str(run)]) == 5
+    assert "the disk is full" in capsys.readouterr().err
+
+
+# --- a program that is not what it should be ------------------------------------------------
+
+
+@pytest.fixture
+def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A PATH without liggghts, and a folder in front of it for one."""
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "plain").mkdir()
+    for name in ("sh", "sleep", "kill", "env"):
+        if program := shutil.which(name):
+            (tmp_path / "plain" / name).symlink_to(program)
+    monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:{tmp_path / 'plain'}")
+    return tmp_path / "bin"
+
+
+def install(programs: Path, banner: str, work: str = "exit 0") -> None:
+    """A shell script for LIGGGHTS: what it says to -h, and what it does otherwise."""
+    path = programs / "liggghts"
+    path.write_text(f'#!/bin/sh\nif [ "$1" = -h ]; then\n{banner}\nexit 0\nfi\n{work}\n')
+    path.chmod(0o755)
+
+
+GOOD = 'echo "LIGGGHTS-PUBLIC 3.8.0, compiled 2022-01-26"'
+
+
+def liggghts(scene: Path) -> int:
+    return trackbed.main(["run", str(scene), "--engine", "liggghts"])
+
+
+def test_engine_missing(scene: Path, programs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No liggghts on the PATH: exit code 4 and how to install it."""
+    assert liggghts(scene) == 4
+    said = capsys.readouterr().err
+    assert "LIGGGHTS is not installed" in said
+    assert "apt-get install liggghts" in said
+
+
+@pytest.mark.parametrize(
+    "banner",
+    [
+        'echo "LIGGGHTS-PUBLIC 3.0.6"',
+        'echo "Large-scale Atomic/Molecular Massively Parallel Simulator - 2 Aug 2023"',
+        'echo "something else"',
+        "true",
+        "exit 1",
+        "kill -9 $$",
+    ],
+)
+def test_wrong_version(
+    scene: Path, programs: Path, capsys: pytest.CaptureFixture[str], banner: str
+) -> None:
+    """A program of that name that is another, or too old: exit code 4 with its own words."""
+    install(programs, banner)
+    assert liggghts(scene) == 4
+    assert "not LIGGGHTS-PUBLIC 3.8 or later" in capsys.readouterr().err
+
+
+def test_launcher_missing(scene: Path, programs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A launcher that is not there is named."""
+    install(programs, GOOD)
+    words = ["run", str(scene), "--engine", "liggghts", "--launcher", "no-such-launcher -np 2"]
+    assert trackbed.main(words) == 4
+    assert "can not start no-such-launcher" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("work", "code", "words"),
+    [
+        ("echo 'ERROR: made to fail (x.cpp:1)'; exit 3", 5, "exit code 3"),
+        ("echo 'ERROR: made to fail (x.cpp:1)'; exit 3", 5, "ERROR: made to fail"),
+        ("echo last words; exit 0", 5, "no sentinel line: last words"),
+        ("kill -9 $$", 5, "was ended by SIGKILL"),
+        ("exit 137", 5, "was ended by SIGKILL"),
+        ("kill -11 $$", 5, "was ended by SIGSEGV"),
+        ("echo 'SIGINT/SIGTERM caught - Writing restart'; exit 0", 5, "was ended by SIGTERM"),
+        ("echo NOT SETTLED ratio 1; exit 0", 7, "still moves"),
+        ("echo COMPLETE step 5", 5, "left no restart file"),
+        ("echo COMPLETE step 5; echo x > end.restart", 5, "left no states.dump"),
+        ("printf '\\377\\376'; exit 3", 5, "exit code 3"),
+    ],
+)
+def test_engine_that_fails(
+    scene: Path,
+    programs: Path,
+    capsys: pytest.CaptureFixture[str],
+    work: str,
+    code: int,
+    words: str,
+) -> None:
+    """An engine that exits badly, is killed, or ends early without saying so, is named."""
+    install(programs, GOOD, work)
+    assert liggghts(scene) == code
+    said = capsys.readouterr().err
+    assert words in said
+    assert "this is a bug" not in said
+    assert RunFolder(scene.parent / "run").stage_names() == []
+
+
+def test_library_use_in_a_thread(scene: Path) -> None:
+    """Outside the main thread no signal handler can be set, and none is needed."""
+    import threading
+
+    failures: list[BaseException] = []
+
+    def work() -> None:
+        try:
+            procedure.run_scene(scene, scene.parent / "run", progress=Progress(quiet=True))
+        except BaseException as error:
+            failures.append(error)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert failures == []
