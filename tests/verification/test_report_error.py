@@ -153,7 +153,8 @@ def test_no_cost_is_lost(costs: list[float], lost: list[tuple[int, float]]) -> N
     history = history_of(stages, lost)
     borne = sum(seconds for cycle, seconds in lost if cycle < len(costs))
     assert history.cpu_s[-1] == pytest.approx(sum(costs) + borne)
-    assert (np.diff(history.cpu_s) >= 0).all()
+    round_off = 1e-15 * len(history.cpu_s) * history.cpu_s[-1]  # of the running sum
+    assert (np.diff(history.cpu_s) >= -round_off).all()
 
 
 def test_a_jump_of_no_cycles_costs_too() -> None:

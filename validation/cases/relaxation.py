@@ -157,7 +157,7 @@ def checks_of_methods(state: State, walls: Walls) -> list[Check]:
 
 
 def run(quick: bool) -> list[Check]:
-    """Checks at paper scale and, unless ``quick``, at 1e5 grains (about five minutes)."""
+    """Checks at paper scale and, unless ``quick``, at 1e5 grains (about two minutes)."""
     small = bed_made(300)
     relax(jump(small[0]), *small, STIFFNESS)  # compiles the kernels, kept out of the times below
     state, walls = bed_made(1085)
