@@ -190,9 +190,7 @@ class LiggghtsEngine:
             parameters |= self._write_series(scene, cycles, folder)
         if start.moved is not None:
             self._write_moved(scene, start, folder)
-        parts = tuple(
-            str(parameters[f"{name}_part"]) for name in PARTS
-        )
+        parts = tuple(str(parameters[f"{name}_part"]) for name in PARTS)
         return self._write(scene, folder, decks.PARTS_CYCLES + parts, parameters)
 
     def run(
