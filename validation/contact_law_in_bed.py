@@ -40,12 +40,17 @@ Table = dict[tuple[int, int], tuple[float, float, float]]
 """Tangential stiffness [N/m], length of the tangential spring [m], mu F_n [N] of each contact."""
 
 
-def coarse_bed(seed: int, cycles: int, *overrides: str) -> Scene:
-    """The coarse scene with another sample; ``cycles`` cycles, the first in a window of its own."""
+def bed_scene(seed: int, cycles: int, *overrides: str) -> Scene:
+    """400 grains of the coarse scene, as deep as its 150; the first cycle in a window of its own.
+
+    The 150 themselves stray too far: twins differ by half of what they settle in 15 cycles.
+    """
+    sample = [f"sample.seed={seed}", "sample.count=400", "sample.radius=0.049"]
     procedure = [f"procedure.total_cycles={cycles}", f"procedure.k={cycles - 1}"]
     return scene_load(
         scene_path("karrech-coarse"),
-        [f"sample.seed={seed}", "procedure.k_i=1", *procedure, "procedure.h=1", *overrides],
+        [*sample, "loading.piston_mass=0.0267", "procedure.k_i=1", *procedure, "procedure.h=1"]
+        + list(overrides),
     )
 
 
@@ -56,11 +61,11 @@ def settlements(home: Path, seed: int, members: int, cycles: int) -> tuple[Float
     eq. 7.  All runs share the sample, its rain and cycle 1, with e = 0.2145; the twins of either
     kind differ by `SEPARATION` and show how far a chaotic bed strays by itself.
     """
-    paper = coarse_bed(seed, cycles)
+    paper = bed_scene(seed, cycles)
     alpha = paper.material.grain.viscous_alpha
     assert alpha is not None
     restitution = f"material.grain.restitution={restitution_literal(alpha)!r}"
-    literal = coarse_bed(seed, cycles, restitution)
+    literal = bed_scene(seed, cycles, restitution)
     folder, progress = RunFolder(home), Progress(quiet=True)
     with folder.locked():
         plain = run_variant(folder, paper, Variant(jumps=False), progress)
@@ -108,7 +113,7 @@ def spring_energy(home: Path, seed: int, cycles: int, every: int) -> SpringEnerg
     stiffness that grows by d k_t gives delta_t^2/2 d k_t for nothing.  Contacts are compared
     ``every`` so many steps.  Sliding ones are left out: they carry mu F_n under any rule.
     """
-    scene, folder = coarse_bed(seed, cycles), RunFolder(home)
+    scene, folder = bed_scene(seed, cycles), RunFolder(home)
     outcome = folder.outcome("window_000001")
     assert outcome is not None
     start = EngineStart(

@@ -1,7 +1,7 @@
 """What LIGGGHTS makes of eqs 5 to 7: collisions, a driven contact, mirror planes, a bed.
 
 docs/contact-law.md explains the figures.  Contacts are those of Table 1 (radius 3.2 mm), driven
-under the project's own decks; the bed is ``karrech-coarse`` with other samples.
+under the project's own decks; the beds are those of `validation.contact_law_in_bed`.
 """
 
 from __future__ import annotations
@@ -42,14 +42,11 @@ from validation.tangential_rules import (
 SPEED = 0.1
 """Speed at which two grains meet [m/s]."""
 
-BEDS = {True: (1, 2, 6), False: (2, 3, 16)}
+BEDS = {True: (1, 2, 4), False: (2, 4, 11)}
 """Quick or not: beds, runs of each for either damping, load cycles of a run."""
 
 LOOPS_DONE = 30
 """Loops of a driven contact after which each is as the one before, under every rule."""
-
-RESOLVED = 3.0
-"""Standard errors from which on a difference would count as resolved."""
 
 
 def run(quick: bool) -> list[Check]:
@@ -170,7 +167,7 @@ def loop_checks() -> list[Check]:
             return work(force[last], slip[last]) / unit
 
         expected = lost(force_secant(stiffness, slip))
-        bar = f"{expected:.3g} within 0.01"
+        bar = f"{expected:.2f} within 0.01"
         checks.append(Check(f"{name}: LIGGGHTS", engine, bar, abs(engine - expected) <= 0.01))
         real = [
             force_mindlin_deresiewicz(overlap, slip, modulus, shear, radius, mu)
@@ -211,21 +208,15 @@ def bed_checks(home: Path, beds: int, members: int, cycles: int) -> list[Check]:
         runs.append(settlements(folder, seed, members, cycles))
     settled = np.array(runs)  # bed, damping, member
     mean = settled.mean(axis=(0, 2))
-    difference = mean[1] - mean[0]
     scatter = settled.std(axis=2, ddof=1)
     error = float(np.sqrt((scatter**2 / members).sum())) / beds
     energy = spring_energy(home / "bed_1", 1, cycles, every=20)
     span = f"settlement of cycles 2 to {cycles}, {beds} bed(s), {members} twins"
     return [
         measured(f"{span}: e = 0.2145", mean[0], "m"),
-        measured(f"{span}: e = 0.1776", mean[1], "m"),
         measured(f"{span}: scatter of twins, root mean square", np.sqrt((scatter**2).mean()), "m"),
-        Check(
-            f"{span}: difference over its standard error",
-            difference / error,
-            f"within +-{RESOLVED:g}: not resolved",
-            abs(difference) <= RESOLVED * error,
-        ),
+        measured(f"{span}: e = 0.1776 less e = 0.2145", mean[1] - mean[0], "m"),
+        measured(f"{span}: standard error of that", error, "m"),
         measured("energy created by k_t growing, over the piston's work", energy.created_share),
         measured("energy lost by k_t falling, over the piston's work", energy.lost_share),
     ]
