@@ -47,10 +47,10 @@ def bed_scene(seed: int, cycles: int, *overrides: str) -> Scene:
     """
     sample = [f"sample.seed={seed}", "sample.count=400", "sample.radius=0.049"]
     procedure = [f"procedure.total_cycles={cycles}", f"procedure.k={cycles - 1}"]
+    procedure += ["procedure.k_i=1", "procedure.h=1"]
     return scene_load(
         scene_path("karrech-coarse"),
-        [*sample, "loading.piston_mass=0.0267", "procedure.k_i=1", *procedure, "procedure.h=1"]
-        + list(overrides),
+        [*sample, *procedure, "loading.piston_mass=0.0267", *overrides],
     )
 
 

@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -120,11 +121,16 @@ class Commands:
             if answer.get("part") == part:
                 return True
 
+    def kill(self) -> int:
+        """SIGKILL to the command; its exit status, another one when it had ended just before."""
+        with suppress(ProcessLookupError):
+            os.kill(self._running, signal.SIGKILL)
+        return self.end()
+
     def stop(self) -> None:
         """Kill what still runs."""
         if self._running:
-            os.kill(self._running, signal.SIGKILL)
-            self.end()
+            self.kill()
 
     def close(self) -> None:
         """End the server."""
@@ -173,12 +179,11 @@ def test_killed_at_random_times(commands: Commands, whole: bytes, tmp_path: Path
     """24 SIGKILLs at random times in rain, windows, jumps and relaxations change nothing."""
     run, times, kills = tmp_path / "run", random.Random(SEED), []
     for part in sorted(PARTS * 6, key=PARTS.index):
-        pid = commands.start(*resume(commands, run), slow=SLOW)
+        commands.start(*resume(commands, run), slow=SLOW)
         if commands.until(part):
             wait = times.uniform(0, 2.5 * SLOW)
             time.sleep(wait)
-            os.kill(pid, signal.SIGKILL)
-            assert commands.end() == -signal.SIGKILL, kills
+            assert commands.kill() == -signal.SIGKILL, kills
             kills.append((part, wait))
         assert whole.startswith(table(run)), f"after the kills {kills}, seed {SEED}"
     assert commands.run(*resume(commands, run)) == 0, commands.output.read_text()
@@ -271,10 +276,9 @@ def test_report_killed_at_random_times(commands: Commands, whole: bytes, tmp_pat
     page = run / "report.html"
     size = page.stat().st_size
     for _ in range(5):
-        pid = commands.start("report", run)
+        commands.start("report", run)
         time.sleep(times.uniform(0.2, 0.9) * span)
-        os.kill(pid, signal.SIGKILL)
-        statuses.append(commands.end())
+        statuses.append(commands.kill())
         assert page.read_bytes()[-200:].rstrip().endswith(b"</html>")
         assert page.stat().st_size == pytest.approx(size, rel=0.01)
         assert table(run) == whole
