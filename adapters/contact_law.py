@@ -21,8 +21,8 @@ in x = delta^(5/4) the damped Hertz contact is a linear oscillator of damping ra
 Both end the collision at delta = 0, so a parting contact pulls for an instant, as in eq. 7.  An
 engine that ends it when the force turns to tension (LIGGGHTS' ``limitForce on``) rebounds faster,
 e = 0.335 for alpha = 0.44: `collision` integrates both.  In LIGGGHTS the same alpha damps the
-tangent, and only while it sticks; the paper's rule that rescales F_t when F_n decreases is not in
-LIGGGHTS.
+tangent, and only while it sticks.  Its F_t = k_t delta_t follows k_t down when F_n decreases, as in
+the paper, but also up when F_n increases, which creates energy: docs/contact-law.md.
 """
 
 from __future__ import annotations

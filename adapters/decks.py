@@ -89,7 +89,8 @@ def scene_text(
         )
     lines += ["pair_style gran model ${contact_model}", "pair_coeff * *"]
     for name, kind, shape in wall_primitives(container):
-        # With friction 0 LIGGGHTS still damps a tangential velocity; a mirror knows none.
+        # With friction 0 LIGGGHTS still damps a tangential velocity at the start of every run,
+        # where a spring of length zero counts as sticking; a mirror knows no tangential force.
         model = "hertz" if kind == MIRROR else "${contact_model}"
         lines.append(
             f"fix {name} grains wall/gran model {model} primitive type {kind} {shape} "

@@ -78,9 +78,10 @@ def test_readme_names_every_exit_code() -> None:
     """The table of exit codes is that of ``trackbed --help``."""
     import trackbed
 
+    table = README.partition("| exit code |")[2].partition("\n\n")[0]
     listed = {
         (code, meaning.strip())
-        for row in re.findall(r"^\|(.*)\|$", README, re.MULTILINE)
+        for row in re.findall(r"^\|(.*)\|$", table, re.MULTILINE)
         for code, meaning in re.findall(r"\s(\d+) \|([^|]+)", row)
     }
     told = re.findall(r"(\d+)  (\S+(?: \S+)*)", trackbed.EXIT_CODES)

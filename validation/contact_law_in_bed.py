@@ -43,7 +43,7 @@ Table = dict[tuple[int, int], tuple[float, float, float]]
 def bed_scene(seed: int, cycles: int, *overrides: str) -> Scene:
     """400 grains of the coarse scene, as deep as its 150; the first cycle in a window of its own.
 
-    The 150 themselves stray too far: twins differ by half of what they settle in 15 cycles.
+    The 150 themselves stray too far: twins differ by as much as they settle in 15 cycles.
     """
     sample = [f"sample.seed={seed}", "sample.count=400", "sample.radius=0.049"]
     procedure = [f"procedure.total_cycles={cycles}", f"procedure.k={cycles - 1}"]

@@ -132,9 +132,14 @@ def tangent_checks() -> list[Check]:
     dumped = np.array([np.linalg.norm(c.tangential_force[0]) for c in track.contacts])
     return [
         close("tangential damping while a contact sticks", viscous.mean(), damping, 0.01, "N s/m"),
-        close("tangential over normal force while it slides", force[slides].mean(), friction, 0.01),
-        measured("the same with the viscous term of eq. 7", friction + damping * speed),
-        measured("the same, greatest in compute pair/gran/local", dumped[slides].max()),
+        close(
+            "tangential over normal force of a sliding contact",
+            force[slides].mean(),
+            friction,
+            0.01,
+        ),
+        measured("the same, had it the viscous term of eq. 7", friction + damping * speed),
+        measured("the same as compute pair/gran/local prints it, greatest", dumped[slides].max()),
     ]
 
 
@@ -194,8 +199,12 @@ def mirror_checks() -> list[Check]:
     return [
         close("mirror: restitution", mirrored.restitution, pair.restitution, 1e-3),
         close("mirror: contact time", mirrored.contact_time, pair.contact_time, 1e-3, "s"),
-        Check("mirror: speed kept by a sliding grain, 3 runs", kept, "1 exactly", kept == 1),
-        measured("the same, tangential law at friction 0 on the mirror (not used)", braked),
+        Check(
+            "mirror: share of its speed a sliding grain keeps, 3 runs", kept, "1 exactly", kept == 1
+        ),
+        measured(
+            "mirror with a tangential law at friction 0 (not used): speed kept, 3 runs", braked
+        ),
     ]
 
 
