@@ -214,7 +214,9 @@ class LiggghtsEngine:
         if status == 0 and "SIGINT/SIGTERM caught" in text:
             raise engine_failure(-signal.SIGTERM, folder)
         if status != 0 or not re.search(r"^COMPLETE step \d+", text, re.MULTILINE):
-            raise engine_failure(status, folder)
+            failure = engine_failure(status, folder)
+            failure.from_outside |= BANNER.search(text) is None  # MPI failed before it
+            raise failure
         restart_check(folder)
         loop_s = sum(float(s) for s in re.findall(r"^Loop time of (\S+) on", text, re.MULTILINE))
         return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)

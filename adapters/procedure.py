@@ -65,8 +65,9 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
         why = run.folder.failure(name)
         if not why:
             try:
-                moved = stages.jump(run, bed, h, attempt)
-                return stages.compute(run, moved, p.healing_cycles + p.k, p.healing_cycles)
+                with disk_full_named(run.folder.path):
+                    moved = stages.jump(run, bed, h, attempt)
+                    return stages.compute(run, moved, p.healing_cycles + p.k, p.healing_cycles)
             except (EngineFailed, NotCredible, NotConverged) as error:
                 if isinstance(error, EngineFailed) and error.from_outside:
                     raise

@@ -20,7 +20,7 @@ from errno import EDQUOT, ENOSPC
 from pathlib import Path
 from typing import Any
 
-from adapters.errors import EngineFailed, UsageError
+from adapters.errors import EngineFailed, NotCredible, UsageError
 
 COLUMNS = (
     "cycle",
@@ -60,6 +60,9 @@ class Outcome:
 
 NEEDED = ("*.npz", "end.restart")
 """Files of a stage that a run goes on from; the others may be removed to save space."""
+
+FREE_LEAST = 2**20
+"""Free space below which a disk counts as full when an engine has failed [bytes]."""
 
 MANIFEST = ("scene", "overrides", "control")
 """What a manifest must hold for its run to be resumed."""
@@ -278,16 +281,28 @@ def _cell(value: object) -> str:
 
 @contextmanager
 def disk_full_named(path: Path) -> Iterator[None]:
-    """Turn the system's "no space left" into a sentence that says what is safe."""
+    """Turn the system's "no space left" into a sentence that says what is safe.
+
+    An engine does not always notice: what it left is cut short, and the disk tells why.
+    """
     try:
         yield
     except OSError as error:
         if error.errno not in (ENOSPC, EDQUOT):
             raise
-        full = EngineFailed(
-            f"the disk is full ({error.strerror})",
-            where=str(path),
-            remedy="free some space, then: trackbed resume RUN; finished windows are whole",
-        )
-        full.from_outside = True
-        raise full from error
+        raise _disk_full(path, str(error.strerror)) from error
+    except (EngineFailed, NotCredible) as error:
+        free = shutil.disk_usage(path).free
+        if free >= FREE_LEAST or (isinstance(error, EngineFailed) and error.from_outside):
+            raise
+        raise _disk_full(path, f"{free} bytes left") from error
+
+
+def _disk_full(path: Path, why: str) -> EngineFailed:
+    full = EngineFailed(
+        f"the disk is full ({why})",
+        where=str(path),
+        remedy="free some space, then: trackbed resume RUN; finished windows are whole",
+    )
+    full.from_outside = True
+    return full

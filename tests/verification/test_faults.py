@@ -514,6 +514,22 @@ def test_full_disk_in_a_jump_is_no_failed_jump(
     assert table(run) == table(whole)
 
 
+def test_full_disk_that_the_engine_did_not_notice(
+    scene: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A dump cut short on a disk without space is the disk's fault, not the jump's."""
+    run = scene.parent / "run"
+    usage = shutil.disk_usage(scene.parent)
+    with monkeypatch.context() as patch:
+        patch.setattr(FakeEngine, "run", damaged(truncated("states.dump", 0.9), AFTER))
+        patch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=4096))
+        assert trackbed.main(["run", str(scene)]) == 5
+    assert "the disk is full (4096 bytes left)" in capsys.readouterr().err
+    assert not any(event["event"] == "jump failed" for event in RunFolder(run).events())
+    assert trackbed.main(["resume", str(run)]) == 0
+    assert table(run) == table(whole)
+
+
 def test_full_disk_at_the_lock(
     tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -607,6 +623,7 @@ def test_launcher_missing(scene: Path, programs: Path, capsys: pytest.CaptureFix
         ("echo NOT SETTLED ratio 1; exit 0", 7, "still moves"),
         ("echo COMPLETE step 5", 5, "left no restart file"),
         ("echo COMPLETE step 5; echo x > end.restart", 5, "left no states.dump"),
+        ("echo COMPLETE step 5 > /dev/null; exit 0", 5, "no sentinel line"),
         ("printf '\\377\\376'; exit 3", 5, "exit code 3"),
     ],
 )
