@@ -277,7 +277,8 @@ def test_a_lifted_loose_grain_does_not_raise_the_piston(
 
     def thrown(*arguments: object) -> FloatArray:
         move = real(*arguments)  # type: ignore[arg-type]
-        move[top, 2] += lift * before.radius[top]
+        above = before.piston_height + lift * before.radius[top]
+        move[top, 2] = above - before.radius[top] - before.position[top, 2]
         return move
 
     monkeypatch.setattr(stages, "jump_field", thrown)

@@ -644,6 +644,26 @@ def test_engine_that_fails(
     assert RunFolder(scene.parent / "run").stage_names() == []
 
 
+@pytest.mark.parametrize(
+    ("work", "from_outside"),
+    [
+        ("echo MPI could not start; exit 1", True),
+        (GOOD + "; echo ERROR: made to fail; exit 1", False),
+        (GOOD + "; kill -11 $$", False),
+        (GOOD + "; kill -9 $$", True),
+    ],
+)
+def test_who_is_to_blame(scene: Path, programs: Path, work: str, from_outside: bool) -> None:
+    """Only an engine that began and then failed by itself can blame the jump before it."""
+    from adapters.engine_liggghts import LiggghtsEngine
+    from adapters.scene_file import scene_load
+
+    install(programs, GOOD, work)
+    with pytest.raises(EngineFailed) as caught:
+        LiggghtsEngine().run(scene_load(scene), "in.cycles", scene.parent, lambda: None, {})
+    assert caught.value.from_outside == from_outside
+
+
 def test_library_use_in_a_thread(scene: Path) -> None:
     """Outside the main thread no signal handler can be set, and none is needed."""
     import threading
