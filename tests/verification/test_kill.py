@@ -9,12 +9,15 @@ import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import trackbed
+from adapters.engine import process_run
 from adapters.run_folder import RunFolder
-from tests.forked_commands import Commands, alive, awaited
+from tests.forked_commands import Commands, alive, awaited, processes_in
 
 SEED = 2007
 SLOW = 0.04
@@ -153,10 +156,14 @@ def test_interrupt_is_not_taken_for_a_damaged_file(
     """A signal that comes while a file is read stops the run; the jump is not given up for it."""
     (tmp_path / "scene.toml").write_text(SCENE)
 
-    def interrupt(*_: object, **__: object) -> None:
-        os.kill(os.getpid(), signal.SIGTERM)
+    load = np.load
 
-    monkeypatch.setattr("adapters.window.np.load", interrupt)
+    def interrupt(path: Path, **named: Any) -> Any:
+        if path.name == "states.npz":
+            os.kill(os.getpid(), signal.SIGTERM)
+        return load(path, **named)
+
+    monkeypatch.setattr(np, "load", interrupt)
     assert trackbed.main(["run", str(tmp_path / "scene.toml")]) == 130
     events = [event["event"] for event in RunFolder(tmp_path / "run").events()]
     assert "jump failed" not in events
@@ -233,3 +240,17 @@ def test_no_engine_is_left_behind(
     while alive(engine) and time.monotonic() < deadline:
         time.sleep(0.01)
     assert not alive(engine)
+
+
+def test_engine_ends_with_its_run_when_python_lives_on(tmp_path: Path) -> None:
+    """In a notebook Python stays after Ctrl-C; the engine and what it started do not."""
+
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        process_run(["sh", "-c", "sleep 600 & sleep 600"], tmp_path, interrupted)
+    deadline = time.monotonic() + 60
+    while processes_in(tmp_path) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert processes_in(tmp_path) == []
