@@ -1,0 +1,159 @@
+"""A deformable body: its mesh, its material, and its state as the user sees it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qdem_fem.errors import ConditionError
+from qdem_fem.material import Material
+from qdem_fem.mesh import TetMesh, element_gradients, mesh_read
+from qdem_fem.reference_forces import (
+    STRESS,
+    Strain,
+    displacement_gradient,
+    stress_cauchy,
+    von_mises,
+)
+from qdem_fem.surface import surface_faces
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Body:
+    """Linear tetrahedra of one viscoelastic body.
+
+    ``mesh``: a `skfem.MeshTet`, a `meshio.Mesh`, a pair ``(nodes (n, 3) [m], elements (m, 4))``,
+    a `qdem_fem.mesh.TetMesh` or the path of a mesh file.  Left-handed elements are turned
+    (``mesh.flipped`` lists them).  Numbers of nodes and elements stay the user's own.
+    Raises `MeshError`, `MaterialError`.
+    """
+
+    def __init__(self, mesh: Any, material: Material, name: str = "body") -> None:
+        self.name = name
+        self.mesh = mesh if isinstance(mesh, TetMesh) else mesh_read(mesh, where=name)
+        self.material = material.per_element(len(self.mesh.elements))
+        self._displacement = np.zeros_like(self.mesh.nodes)
+        self._velocity = np.zeros_like(self.mesh.nodes)
+        self._simulation: Simulation | None = None
+
+    @property
+    def nodes(self) -> Floats:
+        """Reference coordinates X [m], (n, 3)."""
+        return self.mesh.nodes
+
+    @property
+    def elements(self) -> Integers:
+        """Nodes of the right-handed elements, (m, 4)."""
+        return self.mesh.elements
+
+    @cached_property
+    def surface(self) -> Integers:
+        """Nodes of the outward surface triangles, (k, 3)."""
+        return surface_faces(self.elements)
+
+    @cached_property
+    def gradients(self) -> tuple[Floats, Floats]:
+        """Reference gradients of the shape functions [1/m], (m, 3, 3), and volumes [m^3], (m,)."""
+        return element_gradients(self.nodes, self.elements)
+
+    @property
+    def displacement(self) -> Floats:
+        """Displacement of the nodes [m], (n, 3), a copy; may be set before or between advances."""
+        if self._simulation is not None:
+            return self._simulation._field_of(self, "displacement")
+        return self._displacement.copy()
+
+    @displacement.setter
+    def displacement(self, value: ArrayLike) -> None:
+        field = self._checked(value, "displacement")
+        if self._simulation is not None:
+            self._simulation._field_set(self, "displacement", field)
+        self._displacement = field
+
+    @property
+    def velocity(self) -> Floats:
+        """Velocity of the nodes [m/s], (n, 3), at the time of the displacement, a copy."""
+        if self._simulation is not None:
+            return self._simulation._field_of(self, "velocity")
+        return self._velocity.copy()
+
+    @velocity.setter
+    def velocity(self, value: ArrayLike) -> None:
+        field = self._checked(value, "velocity")
+        if self._simulation is not None:
+            self._simulation._field_set(self, "velocity", field)
+        self._velocity = field
+
+    @property
+    def strain(self) -> Strain:
+        """The strain measure of the simulation the body is in; the paper's outside of one."""
+        return self._simulation.strain if self._simulation is not None else "finger"
+
+    def stress(self) -> Floats:
+        """Elastic Cauchy stress of the elements [Pa], (m, 3, 3) (eq. 2)."""
+        gradient = displacement_gradient(self.gradients[0], self.elements, self.displacement)
+        nominal = STRESS[self.strain](gradient, self.material.lame_first, self.material.lame_second)
+        return stress_cauchy(gradient, nominal, self.strain)
+
+    def von_mises(self) -> Floats:
+        """Von Mises stress of the elements [Pa], (m,)."""
+        return von_mises(self.stress())
+
+    def nodes_select(self, nodes: Any, where: str) -> Integers:
+        """Node numbers of a selection: a mask (n,), an index or indices.
+
+        Raises `ConditionError` for a selection that is empty, out of range or of another type.
+        """
+        count = len(self.nodes)
+        chosen = np.asarray(nodes)
+        if chosen.dtype == bool:
+            if chosen.shape != (count,):
+                raise ConditionError(
+                    f"a mask of shape {chosen.shape} for the {count} nodes of {self.name}",
+                    where=where,
+                )
+            chosen = np.flatnonzero(chosen)
+        elif chosen.dtype.kind not in "iu" and chosen.size:
+            raise ConditionError(
+                f"nodes are named by a mask or by whole numbers, not by {chosen.dtype}",
+                where=where,
+            )
+        chosen = np.unique(chosen.ravel().astype(np.int64))
+        if not chosen.size:
+            raise ConditionError(
+                f"the selection names no node of {self.name}",
+                where=where,
+                remedy="check the coordinates it asks for against body.nodes and its tolerance",
+            )
+        if chosen[0] < -count or chosen[-1] >= count:
+            raise ConditionError(
+                f"node {chosen[-1] if chosen[-1] >= count else chosen[0]} is not one of the "
+                f"{count} nodes of {self.name}",
+                where=where,
+            )
+        chosen = np.unique(chosen % count)
+        unused = np.intersect1d(chosen, self.mesh.unused)
+        if unused.size == chosen.size:
+            raise ConditionError(
+                f"the selection names only nodes that no element of {self.name} uses",
+                where=where,
+                remedy="choose nodes of elements, or remove the unused nodes from the mesh",
+            )
+        return np.setdiff1d(chosen, unused)
+
+    def _checked(self, value: ArrayLike, what: str) -> Floats:
+        field = np.array(value, dtype=float)
+        if field.shape != self.nodes.shape or not np.isfinite(field).all():
+            raise ConditionError(
+                f"a {what} is finite and of shape {self.nodes.shape}; this one has {field.shape}",
+                where=self.name,
+            )
+        return field

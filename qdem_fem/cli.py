@@ -1,0 +1,216 @@
+"""The verb ``trackbed qdem SCENE``: what it computes with is loaded when it runs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from qdem_fem.scene_checks import Prepared
+
+TRIAL = 0.5
+"""Time that a dry run may spend on trial steps to tell the cost [s]."""
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``qdem`` to its parser."""
+    assert verb == "qdem"
+    parser.add_argument("scene", metavar="SCENE", type=Path, help="a QDEM scene file (TOML)")
+    parser.add_argument(
+        "--run-folder", type=Path, metavar="FOLDER", help="default: SCENE-run beside the scene"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change a key of the scene, such as simulation.duration=0.1; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--dry-run", action="store_true",
+        help="check the scene and tell what would run: step, steps, cost, what is left out",
+    )  # fmt: skip
+    parser.add_argument(
+        "--resume", action="store_true", help="go on from the last checkpoint, to the same bits"
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="lose the run that is in the folder and start anew"
+    )
+    parser.add_argument("--no-pictures", action="store_true", help="write the report without any")
+    parser.add_argument("--json", action="store_true", help="print JSON on standard output")
+    parser.set_defaults(command=qdem_command)
+
+
+def qdem_command(arguments: argparse.Namespace) -> int:
+    """Run a scene, or tell what would run."""
+    from qdem_fem.errors import UsageError
+    from qdem_fem.scene_checks import scene_load
+
+    if arguments.resume and arguments.force:
+        raise UsageError("--resume and --force exclude each other", remedy="give one of them")
+    prepared = scene_load(arguments.scene, arguments.overrides)
+    if arguments.dry_run:
+        _print(_outlook(prepared), arguments.json)
+        return 0
+    path = arguments.run_folder or arguments.scene.with_name(f"{arguments.scene.stem}-run")
+    _print(_run(prepared, path, arguments), arguments.json)
+    return 0
+
+
+def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
+    """The whole run with its report; its summary."""
+    from qdem_fem.output import write_whole
+    from qdem_fem.report import report_write
+    from qdem_fem.run_folder import RESULT, RunFolder, manifest_of
+    from qdem_fem.scene_run import run_dynamic, run_static
+    from qdem_fem.summary import summary_of
+
+    folder = RunFolder(path)
+    manifest = manifest_of(
+        prepared.scene.parameters(),
+        prepared.files,
+        arguments.overrides,
+        ["trackbed", *sys.argv[1:]],
+    )
+    with folder.locked():
+        goes_on = folder.settle(
+            manifest, prepared.text.text, resume=arguments.resume, force=arguments.force
+        )
+        if goes_on and folder.finished:
+            summary = json.loads((path / RESULT).read_text(encoding="utf-8"))
+            return dict(summary) | {"folder": str(path)}
+        if prepared.scene.simulation.method == "static":
+            done = run_static(prepared, folder)
+        else:
+            with Progress() as progress:
+                done = run_dynamic(prepared, folder, resume=goes_on, progress=progress)
+        summary = summary_of(prepared, done, folder)
+        report_write(folder, manifest, summary, None if arguments.no_pictures else done)
+        write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
+    return summary | {"folder": str(path)}
+
+
+def _outlook(prepared: Prepared) -> dict[str, Any]:
+    """What a run would be: bodies, steps, and the cost as a short trial tells it."""
+    from qdem_fem.scene_build import simulation_of
+    from qdem_fem.scene_run import plan_of
+    from qdem_fem.summary import body_facts, critical_step_of
+
+    run, bodies = simulation_of(prepared)
+    outlook: dict[str, Any] = {
+        "title": prepared.scene.title,
+        "method": prepared.scene.simulation.method,
+        "bodies": {name: body_facts(body) for name, body in bodies.items()},
+        "critical_step": critical_step_of(run),
+        "left_out": prepared.scene.left_out(),
+    }
+    if prepared.scene.simulation.method == "dynamic":
+        plan = plan_of(prepared, float(run.step))
+        seconds = _seconds_a_step(run, plan.total)
+        outlook |= {
+            "step": plan.step,
+            "steps": plan.total,
+            "rows": plan.total // plan.sampling + 1,
+            "vtu_files": len(plan.field_files(plan.total)),
+            "estimated_s": seconds * plan.total,
+        }
+    return outlook
+
+
+def _seconds_a_step(run: Any, most: int) -> float:
+    """Time of one step on the clock [s], from a few steps; the first ones compile."""
+    run.advance(run.step)
+    steps, spent = 1, 0.0
+    while True:
+        started = time.perf_counter()
+        run.advance(steps * run.step)
+        spent = time.perf_counter() - started
+        if spent > TRIAL / 4 or 2 * steps > most:
+            return spent / steps
+        steps *= 2
+
+
+def _print(content: dict[str, Any], as_json: bool) -> None:
+    """A summary on standard output, as JSON or as lines a reader takes in."""
+    if as_json:
+        print(json.dumps(content, indent=2, allow_nan=False))
+        return
+    for name, body in content["bodies"].items():
+        print(
+            f"{name}: {body['elements']} elements, {body['nodes']} nodes, smallest altitude "
+            f"{body['smallest_altitude']:.4g} m in element {body['thinnest_element']}, "
+            f"{body['flipped']} turned right-handed, {body['unused_nodes']} unused nodes"
+        )
+    critical = content["critical_step"]
+    print(
+        f"critical step {critical['value']:.4g} s, governed by element {critical['element']} "
+        f"of {critical['body']}"
+    )
+    if content["method"] == "dynamic":
+        print(
+            f"{content['steps']} steps of {content['step']:.4g} s, "
+            f"{100 * critical['share_used']:.1f} % of the critical one"
+        )
+    if "estimated_s" in content:
+        print(f"estimated time {content['estimated_s']:.3g} s on this machine")
+        print(f"{content['rows']} rows of probes, {content['vtu_files']} VTU files")
+    for name, probe in content.get("probes", {}).items():
+        print(f"{name} at the end (m): {' '.join(f'{value:.7g}' for value in probe['end'])}")
+    for name, modes in content.get("modes", {}).items():
+        found = [f"{mode['frequency']:.6g} Hz" for mode in modes]
+        print(f"{name}: {', '.join(found)}")
+    print(f"not in this run: {'; '.join(content['left_out'])}")
+    if "cost" in content:
+        cost = content["cost"]
+        speed = cost.get("million_elements_per_s")
+        rate = f", {speed:.3g} million element-steps per second" if speed else ""
+        print(f"{cost['cpu_s']:.3g} s of CPU time{rate}")
+        print(f"{content['folder']}/report.html")
+
+
+class Progress:
+    """How far a run is, on standard error: a bar on a terminal, a line every 10 s elsewhere."""
+
+    def __init__(self) -> None:
+        self._bar: Any = None
+        self._task: Any = None
+        self._told = time.monotonic()
+        self._first: tuple[float, int] | None = None
+
+    def __enter__(self) -> Progress:
+        if sys.stderr.isatty():
+            from rich import progress
+            from rich.console import Console
+
+            self._bar = progress.Progress(
+                progress.TextColumn("{task.description}"),
+                progress.BarColumn(),
+                progress.TaskProgressColumn(),
+                progress.TimeRemainingColumn(),
+                console=Console(stderr=True),
+            )
+            self._bar.start()
+            self._task = self._bar.add_task("t = 0 s")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def at(self, steps: int, total: int, when: float) -> None:
+        """So many of all steps are done; ``when`` is the simulated time [s]."""
+        now = time.monotonic()
+        if self._bar is not None:
+            self._bar.update(
+                self._task, completed=steps, total=total, description=f"t = {when:.4g} s"
+            )
+            return
+        first = self._first = self._first or (now, steps)
+        if now - self._told >= 10 and steps > first[1]:
+            self._told = now
+            left = (now - first[0]) / (steps - first[1]) * (total - steps)
+            print(
+                f"t = {when:.4g} s, step {steps} of {total}, {left:.0f} s left",
+                file=sys.stderr, flush=True,
+            )  # fmt: skip

@@ -1,0 +1,112 @@
+"""Boundary conditions and loads: what the user asked for, and the lists the kernel walks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.kernel import Constraints, Loads
+from qdem_fem.layout import Packed
+from qdem_fem.series import Driver
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+COMPONENTS = "xyz"
+
+
+@dataclass(eq=False)
+class NodalLoad:
+    """Forces ``weights[i, c] x driver[s]`` on the nodes, with ``s = c`` or 0 for one column."""
+
+    nodes: Integers
+    """Numbers in the simulation, (k,)."""
+    weights: Floats
+    """(k, 3): shares of a total force [-], or areas under a pressure [m^2]."""
+    driver: Driver
+
+
+@dataclass(eq=False)
+class Held:
+    """Components of nodes whose displacement is given; no driver: zero."""
+
+    nodes: Integers
+    components: tuple[int, ...]
+    driver: Driver | None = None
+
+
+@dataclass(eq=False)
+class Roller:
+    """Nodes that stay in a plane of unit normal ``normal`` (3,)."""
+
+    nodes: Integers
+    normal: Floats
+
+
+@dataclass
+class Conditions:
+    """All conditions of a simulation, in the order in which they were given."""
+
+    loads: list[NodalLoad] = field(default_factory=list)
+    held: list[Held] = field(default_factory=list)
+    rollers: list[Roller] = field(default_factory=list)
+
+    def drivers(self) -> list[Driver]:
+        """What changes with time, each once, loads first."""
+        return [load.driver for load in self.loads] + [
+            held.driver for held in self.held if held.driver is not None
+        ]
+
+    def table(self, times: Floats) -> Floats:
+        """Amplitudes (k, series) at ``times`` (k,); column 0 is one, for what is constant."""
+        columns = [np.ones((len(times), 1))]
+        columns += [driver.sample(times) for driver in self.drivers()]
+        return np.concatenate(columns, axis=1)
+
+    def loads_packed(self, packed: Packed, place: Integers) -> Loads:
+        """The kernel's list of forces; ``place`` (n,) is the kernel's number of a node."""
+        at, series, weight, column = [], [], [], 1
+        for load in self.loads:
+            several = load.driver.components > 1
+            for c in range(3):
+                acting = load.weights[:, c] != 0
+                at.append(4 * place[load.nodes[acting]] + c)
+                weight.append(load.weights[acting, c])
+                series.append(np.full(acting.sum(), column + c * several))
+            column += load.driver.components
+        node_at, all_series, weights = _joined(at), _joined(series), _joined(weight)
+        return Loads(
+            force_at=node_at + packed.node_window[node_at // 4],
+            node_at=node_at,
+            series=all_series,
+            weight=weights.astype(float),
+        )
+
+    def constraints_packed(self, place: Integers) -> Constraints:
+        """The kernel's list of given displacements; of two for one component the later counts."""
+        column = 1 + sum(load.driver.components for load in self.loads)
+        given: dict[int, tuple[int, float]] = {}
+        for held in self.held:
+            series, weight = (0, 0.0) if held.driver is None else (column, 1.0)
+            for c in held.components:
+                given.update(dict.fromkeys((4 * place[held.nodes] + c).tolist(), (series, weight)))
+            column += held.driver is not None
+        at = np.array(sorted(given), dtype=np.int64)
+        values = [given[key] for key in at.tolist()]
+        nodes = [place[roller.nodes] for roller in self.rollers]
+        normals = [np.tile(roller.normal, (len(roller.nodes), 1)) for roller in self.rollers]
+        return Constraints(
+            node_at=at,
+            series=np.array([series for series, _ in values], dtype=np.int64),
+            weight=np.array([weight for _, weight in values], dtype=float),
+            previous=np.zeros(len(at)),
+            roller_at=4 * _joined(nodes),
+            roller_normal=np.concatenate([*normals, np.zeros((0, 3))]),
+        )
+
+
+def _joined(parts: Sequence[NDArray[np.generic]]) -> NDArray[np.int64]:
+    return np.concatenate([*parts, np.zeros(0, np.int64)])

@@ -1,0 +1,378 @@
+"""The compiled time step: forces of the elements (eqs. 1-11), then the motion of the nodes.
+
+Elements are worked on in chunks, each with its own window of nodal forces (`qdem_fem.layout`),
+so that threads never write to the same place; the order of all sums is fixed by the layout,
+not by the threads, and a run gives the same bits on any number of them.
+
+A scene pays for what it names: the strain measure is chosen by the type of ``law``, and an
+argument that is ``None`` (viscosity, gravity) takes its branch out of the compiled code.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, prange
+from numba.core import types
+from numba.extending import overload
+
+from qdem_fem import stress
+from qdem_fem.lanes import (
+    gather_edges,
+    lane_count,
+    lanes_load,
+    lanes_not_positive,
+    lanes_sum,
+    lanes_zero,
+    row_clear,
+    row_load,
+    row_store,
+    scatter_pulls,
+)
+
+MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "reassoc"}}
+ROWS_ELASTIC, ROWS_VISCOUS = 11, 13
+"""Numbers an element brings: nine gradients, lambda V, mu V; with viscosity also those of it."""
+
+
+class Finger(NamedTuple):
+    """The paper's strain; ``half`` is 0.5 in the kernel's precision."""
+
+    half: Any
+
+
+class Small(NamedTuple):
+    """Linear elasticity."""
+
+    half: Any
+
+
+class Svk(NamedTuple):
+    """St. Venant-Kirchhoff."""
+
+    half: Any
+
+
+class Corotational(NamedTuple):
+    """Hooke's law in the element's turned frame."""
+
+    half: Any
+
+
+LAWS: dict[str, type] = {
+    "finger": Finger, "small": Small, "svk": Svk, "corotational": Corotational,
+}  # fmt: skip
+STRESS = {
+    Finger: stress.stress_finger,
+    Small: stress.stress_small,
+    Svk: stress.stress_svk,
+    Corotational: stress.stress_corotational,
+}
+element_gradient = njit(forceinline=True, **MATHEMATICS)(stress.element_gradient)
+element_pulls = njit(forceinline=True, **MATHEMATICS)(stress.element_pulls)
+
+
+def elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
+    """``(P V, J)`` of the strain measure that the type of ``law`` names."""
+    return STRESS[type(law)](h, lame_first, lame_second, law.half)
+
+
+def viscous_stress(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
+    """Viscous ``P V``: linear beside `Small`, else in the current configuration (eq. 7)."""
+    viscous = stress.viscous_small if isinstance(law, Small) else stress.viscous_current
+    return viscous(h, rate, first, second, law.half)
+
+
+@overload(elastic_stress, strict=False, jit_options={"forceinline": True, **MATHEMATICS})
+def _elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
+    chosen = njit(forceinline=True, **MATHEMATICS)(STRESS[law.instance_class])
+    return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
+
+
+@overload(viscous_stress, strict=False, jit_options={"forceinline": True, **MATHEMATICS})
+def _viscous_stress(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
+    small = law.instance_class is Small
+    chosen = njit(forceinline=True, **MATHEMATICS)(
+        stress.viscous_small if small else stress.viscous_current
+    )
+    return lambda law, h, rate, first, second: chosen(h, rate, first, second, law.half)
+
+
+@njit(forceinline=True, **MATHEMATICS)
+def add(p: Any, q: Any) -> Any:
+    """Sum of two matrices in rows."""
+    return (
+        p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3], p[4] + q[4], p[5] + q[5],
+        p[6] + q[6], p[7] + q[7], p[8] + q[8],
+    )  # fmt: skip
+
+
+@njit(**MATHEMATICS)
+def chunk_forces(
+    law: Any, viscous: Any, corners: Any, rows: Any, first_block: int, stop_block: int,
+    displacement: Any, velocity: Any, forces: Any, shift: int,
+) -> float:  # fmt: skip
+    """Forces of the blocks of elements of one chunk (eqs. 1-10), added to its window.
+
+    ``displacement`` [m], ``velocity`` [m/s], ``forces`` [N]: flat, four numbers a node.
+    Returns how many of its elements are inverted or not finite.
+    """
+    width = lane_count_of(rows)
+    bad = lanes_zero(rows)
+    for block in range(first_block, stop_block):
+        at = block * block_size(viscous) * width
+        g = (
+            lanes_load(rows, at), lanes_load(rows, at + width), lanes_load(rows, at + 2 * width),
+            lanes_load(rows, at + 3 * width), lanes_load(rows, at + 4 * width),
+            lanes_load(rows, at + 5 * width), lanes_load(rows, at + 6 * width),
+            lanes_load(rows, at + 7 * width), lanes_load(rows, at + 8 * width),
+        )  # fmt: skip
+        h = element_gradient(gather_edges(displacement, corners, block), g)
+        p, jacobian = elastic_stress(
+            law, h, lanes_load(rows, at + 9 * width), lanes_load(rows, at + 10 * width)
+        )
+        bad = bad + lanes_not_positive(jacobian)
+        if viscous is not None:
+            rate = element_gradient(gather_edges(velocity, corners, block), g)
+            first, second = lanes_load(rows, at + 11 * width), lanes_load(rows, at + 12 * width)
+            p = add(p, viscous_stress(law, h, rate, first, second))
+        scatter_pulls(forces, corners, block, shift, element_pulls(p, g))
+    return lanes_sum(bad)
+
+
+def lane_count_of(rows: Any) -> int:
+    """Lanes of a block of this array."""
+    return lane_count(rows.dtype)
+
+
+@overload(lane_count_of, strict=False)
+def _lane_count_of(rows: Any) -> Any:
+    width = lane_count(rows.dtype)
+    return lambda rows: width
+
+
+def block_size(viscous: Any) -> int:
+    """Rows of a block."""
+    return ROWS_ELASTIC if viscous is None else ROWS_VISCOUS
+
+
+@overload(block_size, strict=False)
+def _block_size(viscous: Any) -> Any:
+    size = ROWS_ELASTIC if isinstance(viscous, types.NoneType) else ROWS_VISCOUS
+    return lambda viscous: size
+
+
+@njit(**MATHEMATICS)
+def piece_motion(
+    start: int, stop: int, shifts: Any, first: int, last: int, forces: Any, inverse_mass: Any,
+    displacement: Any, velocity: Any, step: Any, gravity: Any, kinetic: Any, k: int, piece: int,
+) -> None:  # fmt: skip
+    """Velocity Verlet for the nodes ``start`` to ``stop``: ``v += dt f/m``, ``u += dt v``.
+
+    ``shifts[first:last]`` are the windows of forces that hold these nodes; they are summed
+    (eq. 11) and emptied.  With ``kinetic`` the piece's kinetic energy [J] is written there.
+    """
+    for window in range(first + 1, last):
+        for at in range(4 * start, 4 * stop, 4):
+            here, there = at + shifts[first], at + shifts[window]
+            row_store(forces, here, row_load(forces, here) + row_load(forces, there))
+            row_clear(forces, there)
+    energy = 0.0
+    for node in range(start, stop):
+        at = 4 * node
+        here = at + shifts[first]
+        change = row_load(forces, here) * (step * inverse_mass[node])
+        row_clear(forces, here)
+        if gravity is not None:
+            change = change + row_load(gravity, 4 * k) * step
+        faster = row_load(velocity, at) + change
+        row_store(velocity, at, faster)
+        row_store(displacement, at, row_load(displacement, at) + faster * step)
+        if kinetic is not None:
+            energy += lanes_sum(faster * faster) / inverse_mass[node]
+    if kinetic is not None:
+        kinetic[k, piece] = 0.5 * energy
+
+
+class Layout(NamedTuple):
+    """Where the elements' data lie (`qdem_fem.layout.layout_build`); integers are int64."""
+
+    corners: Any
+    """4 x node number of the corners, (blocks x 4 x lanes,) int32."""
+    rows: Any
+    """Gradients [1/m] and Lame constants times volume [N m], (blocks x rows x lanes,)."""
+    chunk_block: Any
+    """First block of every chunk, and the end, (chunks + 1,)."""
+    chunk_shift: Any
+    """Place of a node's force in the chunk's window, less 4 x its number, (chunks,)."""
+    piece_node: Any
+    """First node of every piece of the motion, and the end, (pieces + 1,)."""
+    piece_window: Any
+    """First of the piece's entries in ``window_shift``, and the end, (pieces + 1,)."""
+    window_shift: Any
+    """Shifts of the windows that hold the piece's nodes."""
+
+
+class State(NamedTuple):
+    """What moves: flat arrays of four numbers a node, in the kernel's precision."""
+
+    displacement: Any
+    """[m]"""
+    velocity: Any
+    """Half a step behind the displacement [m/s]."""
+    forces: Any
+    """The windows of the chunks, zero between steps [N]."""
+    inverse_mass: Any
+    """(n,) [1/kg]"""
+
+
+class Loads(NamedTuple):
+    """Nodal forces: ``weight x table[k, series]`` [N] at one place of ``State.forces``."""
+
+    force_at: Any
+    """(L,) int64, in the windows."""
+    node_at: Any
+    """(L,) int64, in ``State.velocity``."""
+    series: Any
+    weight: Any
+
+
+class Constraints(NamedTuple):
+    """Components whose displacement is ``weight x table[k, series]`` [m]."""
+
+    node_at: Any
+    """(C,) int64, in ``State.displacement``."""
+    series: Any
+    weight: Any
+    previous: Any
+    """(C,) velocity given in the last step [m/s], to count the work of the motion."""
+    roller_at: Any
+    """(R,) 4 x number of the nodes that stay in an oblique plane."""
+    roller_normal: Any
+    """(R, 3) unit normals."""
+
+
+class Probes(NamedTuple):
+    """Nodes whose displacement is recorded every ``stride`` steps."""
+
+    node_at: Any
+    """(Q,) 4 x node number."""
+    record: Any
+    """(samples, Q, 3) [m]"""
+    stride: int
+    first: int
+    """Steps of the window before its first sample."""
+
+
+@njit(**MATHEMATICS)
+def loads_apply(loads: Any, table_row: Any, forces: Any) -> None:
+    """Add the loads to the forces."""
+    for i in range(loads.force_at.size):
+        forces[loads.force_at[i]] += loads.weight[i] * table_row[loads.series[i]]
+
+
+@njit(**MATHEMATICS)
+def loads_power(loads: Any, table_row: Any, velocity: Any) -> float:
+    """Power of the loads [W]."""
+    power = 0.0
+    for i in range(loads.node_at.size):
+        power += loads.weight[i] * table_row[loads.series[i]] * velocity[loads.node_at[i]]
+    return power
+
+
+@njit(**MATHEMATICS)
+def constraints_apply(held: Any, table_row: Any, state: Any, step: float) -> float:
+    """Hold rollers in their planes and components at their values; returns the work done [J]."""
+    displacement, velocity = state.displacement, state.velocity
+    for i in range(held.roller_at.size):
+        at, normal = held.roller_at[i], held.roller_normal[i]
+        for field in (displacement, velocity):
+            across = 0.0
+            for c in range(3):
+                across += field[at + c] * normal[c]
+            for c in range(3):
+                field[at + c] -= across * normal[c]
+    work = 0.0
+    for i in range(held.node_at.size):
+        at = held.node_at[i]
+        target = held.weight[i] * table_row[held.series[i]]
+        before = displacement[at] - step * velocity[at]
+        given = (target - before) / step
+        impulse = (given - velocity[at]) / state.inverse_mass[at // 4]
+        work += 0.5 * impulse * (given + held.previous[i])
+        held.previous[i] = given
+        velocity[at] = given
+        displacement[at] = target
+    return work
+
+
+@njit(**MATHEMATICS)
+def probes_take(probes: Any, done: int, displacement: Any) -> None:
+    """Record the probes when the step number asks for it."""
+    if done >= probes.first and (done - probes.first) % probes.stride == 0:
+        sample = (done - probes.first) // probes.stride
+        if sample < probes.record.shape[0]:
+            for i in range(probes.node_at.size):
+                for c in range(3):
+                    probes.record[sample, i, c] = displacement[probes.node_at[i] + c]
+
+
+def window_build(variant: str) -> Any:
+    """The compiled loop over time steps, on ``"threads"`` or on ``"one thread"``.
+
+    Its compiled form is kept on disk.  ``made_from`` is a part of its key there, so that a change
+    of the stress or of the lanes, which are other files, is never answered by an old kernel.
+    """
+    sources = (Path(__file__).with_name(name).read_bytes() for name in ("stress.py", "lanes.py"))
+    made_from = variant + hashlib.sha256(b"".join(sources)).hexdigest()
+
+    @njit(parallel=variant == "threads", cache=True, **MATHEMATICS)
+    def window(
+        law: Any, viscous: Any, layout: Any, state: Any, loads: Any, held: Any, probes: Any,
+        table: Any, gravity: Any, kinetic: Any, work: Any, step: Any, steps: int,
+    ) -> tuple[int, float]:  # fmt: skip
+        """Compute up to ``steps`` time steps; returns how many, and the count of bad elements.
+
+        ``law``: one of `LAWS`; ``viscous``: True or None; ``table`` (steps + 1, series):
+        amplitudes at the times of the steps; ``gravity`` (4 (steps + 1),) [m/s^2] or None;
+        ``kinetic`` (steps, pieces) [J] or None; ``work`` (2,) [J], of the loads and of
+        prescribed motion, is added to.  Stops after a step that met an inverted element or NaN.
+        """
+        stamp = made_from  # noqa: F841  (makes it a part of the key)
+        corners, rows, chunk_block, chunk_shift = layout[0], layout[1], layout[2], layout[3]
+        piece_node, piece_window, window_shift = layout[4], layout[5], layout[6]
+        displacement, velocity, forces, inverse_mass = state[0], state[1], state[2], state[3]
+        bad = np.zeros(chunk_shift.size)
+        for k in range(steps):
+            for c in prange(chunk_shift.size):
+                bad[c] = chunk_forces(
+                    law, viscous, corners, rows, chunk_block[c], chunk_block[c + 1], displacement,
+                    velocity, forces, chunk_shift[c],
+                )  # fmt: skip
+            loads_apply(loads, table[k], forces)
+            work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
+            for p in prange(piece_node.size - 1):
+                piece_motion(
+                    piece_node[p], piece_node[p + 1], window_shift, piece_window[p],
+                    piece_window[p + 1], forces, inverse_mass, displacement, velocity, step,
+                    gravity, kinetic, k, p,
+                )  # fmt: skip
+            work[1] += constraints_apply(held, table[k + 1], state, step)
+            work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
+            probes_take(probes, k + 1, displacement)
+            inverted = bad.sum()
+            if inverted > 0.0:
+                return k + 1, inverted
+        return steps, 0.0
+
+    return window
+
+
+@cache
+def window_kernel(threads: int) -> Any:
+    """The loop for so many threads; one thread pays for no barrier."""
+    return window_build("threads" if threads > 1 else "one thread")

@@ -1,0 +1,206 @@
+"""What a mesh can be given as: arrays, scikit-fem, meshio, a file.  Nothing is checked here yet.
+
+Neither scikit-fem nor meshio is imported: their meshes are told by what they hold, and meshio
+is loaded only to read a file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+import warnings
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.errors import LibraryMissing, MeshError
+
+_ACCEPTED = (
+    "give a skfem.MeshTet, a meshio.Mesh, a pair (nodes, elements) of arrays, "
+    "or the path of a mesh file"
+)
+_KEEP_CORNERS = (
+    "mesh with linear elements (gmsh: Mesh.ElementOrder = 1), or keep the four corners of each "
+    "element, `elements[:, :4]`"
+)
+
+
+@dataclass(frozen=True)
+class MeshParts:
+    """Nodes, elements and named sets as they were given, of any type and not checked."""
+
+    nodes: Any
+    elements: Any
+    node_sets: dict[str, Any] = field(default_factory=dict)
+    element_sets: dict[str, Any] = field(default_factory=dict)
+
+
+def mesh_parts(source: Any, where: str) -> MeshParts:
+    """Take a mesh apart; see `qdem_fem.mesh.mesh_read` for what ``source`` may be.
+
+    Raises `MeshError` if the source is of no known kind, or holds no linear tetrahedra.
+    """
+    if isinstance(source, (str, os.PathLike)):
+        return _parts_of_meshio(_file_read(source, where), where)
+    if isinstance(source, (tuple, list)):
+        if len(source) != 2:
+            raise MeshError(
+                f"a mesh of arrays is a pair (nodes, elements), not {len(source)} items",
+                where=where,
+                remedy=_ACCEPTED,
+            )
+        return MeshParts(source[0], source[1])
+    if hasattr(source, "points") and hasattr(source, "cells"):
+        return _parts_of_meshio(source, where)
+    if hasattr(source, "p") and hasattr(source, "t"):
+        return _parts_of_skfem(source, where)
+    raise MeshError(
+        f"an object of type {type(source).__name__} is no mesh", where=where, remedy=_ACCEPTED
+    )
+
+
+def _parts_of_skfem(mesh: Any, where: str) -> MeshParts:
+    """``p`` is (3, n), ``t`` is (4, m); boundaries hold facets, subdomains hold elements."""
+    kind = type(mesh).__name__
+    shape = getattr(getattr(mesh, "elem", None), "__name__", "ElementTetP1")
+    if "Tet" not in shape:
+        raise MeshError(
+            f"a {kind} has no tetrahedra",
+            where=where,
+            remedy="split its cells first, as skfem's `to_meshtet` does where a mesh has it",
+        )
+    if shape != "ElementTetP1":
+        raise MeshError(
+            f"a {kind} is of higher order; QDEM has linear tetrahedra only",
+            where=where,
+            remedy="skfem.MeshTet.from_mesh(mesh) keeps the corners",
+        )
+    node_sets: dict[str, Any] = {}
+    boundaries = getattr(mesh, "boundaries", None) or {}
+    try:
+        for name, facets in boundaries.items():
+            node_sets[name] = np.unique(mesh.facets[:, np.asarray(facets, dtype=np.int64)])
+    except (IndexError, TypeError, ValueError) as error:
+        raise MeshError(
+            f"the boundaries of the {kind} can not be read: {error}",
+            where=where,
+            remedy="name facets of the mesh only",
+        ) from error
+    subdomains = getattr(mesh, "subdomains", None) or {}
+    return MeshParts(np.asarray(mesh.p).T, np.asarray(mesh.t).T, node_sets, dict(subdomains))
+
+
+def _parts_of_meshio(mesh: Any, where: str) -> MeshParts:
+    """All blocks of tetrahedra joined; sets and physical groups of every block by name."""
+    kinds = [block.type for block in mesh.cells]
+    curved = sorted({kind for kind in kinds if kind.startswith("tetra") and kind != "tetra"})
+    if curved:
+        raise MeshError(
+            f"the mesh holds elements of higher order ({', '.join(curved)}); "
+            "QDEM has linear tetrahedra only",
+            where=where,
+            remedy=_KEEP_CORNERS,
+        )
+    blocks = [block.data for block in mesh.cells if block.type == "tetra"]
+    if sum(len(block) for block in blocks) == 0:
+        counts: Counter[str] = Counter()
+        for block in mesh.cells:
+            counts[block.type] += len(block.data)
+        found = ", ".join(f"{count} of type {kind}" for kind, count in counts.items()) or "no cells"
+        raise MeshError(
+            f"the mesh holds no tetrahedra, only {found}" if counts else "the mesh holds no cells",
+            where=where,
+            remedy="mesh the volume with tetrahedra (gmsh: `mesh.generate(3)`), and save them",
+        )
+    try:
+        elements = np.concatenate(blocks)
+        node_sets, element_sets = _sets_of_meshio(mesh)
+    except (IndexError, TypeError, ValueError, AttributeError, KeyError) as error:
+        raise MeshError(
+            f"cells and sets of the meshio mesh do not fit together: {error}",
+            where=where,
+            remedy="make the mesh anew with meshio.Mesh, which checks this",
+        ) from error
+    return MeshParts(mesh.points, elements, node_sets, element_sets)
+
+
+def _sets_of_meshio(mesh: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """A named group of tetrahedra is an element set, any other one the set of its nodes."""
+    nodes: dict[str, list[Any]] = {k: [np.asarray(v)] for k, v in mesh.point_sets.items()}
+    elements: dict[str, list[Any]] = {}
+    starts = np.cumsum([0, *(len(b.data) if b.type == "tetra" else 0 for b in mesh.cells)])
+
+    def add(name: str, block: int, cells: Any) -> None:
+        if mesh.cells[block].type == "tetra":
+            if cells.min() < 0 or cells.max() >= len(mesh.cells[block].data):
+                raise ValueError(f"set '{name}' names cells that block {block} does not have")
+            elements.setdefault(name, []).append(starts[block] + cells)
+        else:
+            nodes.setdefault(name, []).append(np.unique(mesh.cells[block].data[cells]))
+
+    for name, of_blocks in mesh.cell_sets.items():
+        if name.startswith("gmsh:"):  # meshio's own notes on the geometry, no groups of the user
+            continue
+        for block, cells in enumerate(of_blocks):
+            if cells is not None and len(cells):
+                add(name, block, np.asarray(cells, dtype=np.int64))
+    names = {
+        (int(entry[1]), int(entry[0])): name
+        for name, entry in mesh.field_data.items()
+        if np.shape(entry) == (2,)
+    }
+    for block, tags in enumerate(mesh.cell_data.get("gmsh:physical", [])):
+        for tag in np.unique(tags):
+            if tag:  # 0: in no group
+                name = names.get((mesh.cells[block].dim, int(tag)), str(int(tag)))
+                add(name, block, np.flatnonzero(np.asarray(tags) == tag))
+    return (
+        {name: np.unique(np.concatenate(parts)) for name, parts in nodes.items()},
+        {name: np.unique(np.concatenate(parts)) for name, parts in elements.items()},
+    )
+
+
+def _file_read(path: str | os.PathLike[str], where: str) -> Any:
+    """The meshio.Mesh of a file; whatever meshio says or does on a bad one is in a `MeshError`."""
+    if not Path(path).is_file():
+        raise MeshError(
+            "it is a directory" if Path(path).is_dir() else "there is no such file",
+            where=where,
+            remedy="give the path of a mesh file that meshio reads (.msh, .vtu, .inp, .mesh, ...)",
+        )
+    try:
+        import meshio
+    except ImportError as error:
+        raise LibraryMissing(
+            "reading a mesh file needs meshio", where=where, remedy="pip install meshio"
+        ) from error
+    said = io.StringIO()
+    try:
+        with (
+            warnings.catch_warnings(),
+            contextlib.redirect_stdout(said),
+            contextlib.redirect_stderr(said),
+        ):
+            warnings.simplefilter("ignore")  # deprecations inside meshio are not the user's
+            mesh = meshio.read(path)
+    except ImportError as error:  # of h5py or netCDF4, which meshio needs for some formats
+        raise LibraryMissing(
+            f"meshio can not read this format without {error.name}",
+            where=where,
+            remedy=f"pip install {error.name}",
+        ) from error
+    except (Exception, SystemExit) as error:  # meshio leaves Python altogether on some files
+        reason = "" if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
+        text = " ".join(f"{said.getvalue()} {reason}".split())
+        raise MeshError(
+            f"meshio can not read it ({text})",
+            where=where,
+            remedy="check that the file is whole and that its name ends as its format demands",
+        ) from error
+    sys.stderr.write(said.getvalue())
+    return mesh

@@ -1,0 +1,233 @@
+"""The report of a run: one page, ``report.html``, that loads nothing, and its pictures as PNG."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from qdem_fem.output import table_read, write_whole
+from qdem_fem.run_folder import RunFolder
+from qdem_fem.scene_run import Done
+from qdem_fem.spectra import Mode
+from qdem_fem.summary import moving_components
+
+STYLE = """
+:root { color-scheme: light; }
+body { font: 16px/1.5 "Source Serif 4", Charter, Georgia, serif; color: #1a1a1a; background: #fff;
+  max-width: 54rem; margin: 2.5rem auto; padding: 0 1.25rem; }
+h1 { font-size: 1.6rem; line-height: 1.2; margin: 0 0 .3rem; }
+h2 { font-size: 1.15rem; margin: 2.2rem 0 .5rem; border-top: 1px solid #ccc; padding-top: .6rem; }
+.claim { font-size: 1.1rem; border-left: 4px solid #0b5fa5; padding: .1rem 0 .1rem 1rem; }
+figure { margin: 1rem 0; break-inside: avoid; }
+figure img { width: 100%; height: auto; display: block; }
+figcaption { font-size: .87rem; color: #444; }
+table { border-collapse: collapse; width: 100%; font: .86rem/1.4 "Source Sans 3", Helvetica, Arial,
+  sans-serif; font-variant-numeric: tabular-nums; margin: .8rem 0; }
+th, td { padding: .25rem .5rem; text-align: right; vertical-align: top; }
+th { border-bottom: 1px solid #888; } tbody tr { border-bottom: 1px solid #e4e4e4; }
+th:first-child, td:first-child { text-align: left; padding-left: 0; }
+code, pre { font: .82rem/1.4 "Source Code Pro", Menlo, Consolas, monospace; }
+pre { background: #f5f5f5; padding: .7rem .9rem; white-space: pre-wrap; overflow-wrap: anywhere; }
+summary { cursor: pointer; color: #0b5fa5; }
+"""
+
+
+def report_write(
+    folder: RunFolder, manifest: dict[str, Any], summary: dict[str, Any], done: Done | None
+) -> Path:
+    """Write the report of a finished run, and its pictures unless ``done`` is None; its path."""
+    pictures = [] if done is None else list(_pictures(folder.path, summary, done))
+    title = summary["title"] or "QDEM run"
+    body = [
+        f"<h1>{escape(title)}</h1>",
+        _claim(summary),
+        *(_figure(path, caption) for path, caption in pictures),
+        *_probes(summary),
+        *_modes(summary),
+        *_meshes(summary),
+        *_step(summary),
+        *_energy(summary),
+        *_left_out(summary),
+        *_cost(summary),
+        *_again(manifest),
+    ]
+    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    head = [
+        "<!DOCTYPE html>",
+        '<html lang="en"><head><meta charset="utf-8"/>',
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}"/>',
+        '<meta name="viewport" content="width=device-width, initial-scale=1"/>',
+        '<link rel="icon" href="data:,"/>',
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>",
+    ]
+    path = folder.path / "report.html"
+    write_whole(path, "\n".join([*head, *body, "</body></html>\n"]))
+    return path
+
+
+def _pictures(path: Path, summary: dict[str, Any], done: Done) -> Iterator[tuple[Path, str]]:
+    """Draw what there is to draw; file and caption of each picture."""
+    from qdem_fem import pictures
+
+    deformed = path / "picture-deformed.png"
+    factor = pictures.picture_deformed(deformed, list(done.bodies.values()))
+    when = "at rest" if done.plan is None else f"at t = {summary['time']:.6g} s"
+    yield (
+        deformed,
+        f"Bodies {when}, displacement magnified {factor:g} times; thin lines: undeformed.",
+    )
+    if done.plan is None:
+        return
+    rows, energy = table_read(path / "probes.csv"), table_read(path / "energy.csv")
+    time = rows.pop("time")
+    moving = {name: (time, rows[name]) for name in moving_components(rows)}
+    if moving:
+        history = path / "picture-history.png"
+        pictures.picture_history(history, moving)
+        yield history, "Mean displacement of the probes; components that hardly move are left out."
+    modes = summary["modes"]
+    seen = {name: curve for name, curve in moving.items() if name in modes}
+    if seen:
+        spectrum = path / "picture-spectrum.png"
+        found = [Mode(**mode) for of_probe in modes.values() for mode in of_probe]
+        pictures.picture_spectrum(spectrum, seen, found)
+        yield spectrum, "Amplitude spectrum of the whole record (Hann window); dotted: modes."
+    balance = path / "picture-energy.png"
+    pictures.picture_energy(balance, energy)
+    yield balance, "Energies; external is the work of loads, gravity and prescribed motion."
+
+
+def _claim(summary: dict[str, Any]) -> str:
+    bodies = summary["bodies"].values()
+    elements, nodes = (sum(body[key] for body in bodies) for key in ("elements", "nodes"))
+    mesh = f"{elements:,} linear tetrahedra with {nodes:,} nodes"
+    if summary["method"] == "static":
+        text = f"Static answer by kinetic damping, {mesh}."
+    else:
+        text = (
+            f"{summary['time']:.6g} s of motion in {summary['steps']:,} steps of "
+            f"{summary['step']:.4g} s, {mesh}."
+        )
+    return f'<p class="claim">{escape(text)}</p>'
+
+
+def _probes(summary: dict[str, Any]) -> Iterator[str]:
+    if not summary["probes"]:
+        return
+    yield "<h2>Displacement of the probes</h2>"
+    rows = [
+        (name, axis, *(f"{1e6 * facts[what][i]:.6g}" for what in ("end", "least", "greatest")))
+        for name, facts in summary["probes"].items()
+        for i, axis in enumerate("xyz")
+    ]
+    yield _table(("probe", "component", "end (um)", "least (um)", "greatest (um)"), rows)
+
+
+def _modes(summary: dict[str, Any]) -> Iterator[str]:
+    if not summary["modes"]:
+        return
+    yield "<h2>Modes of the free motion</h2>"
+    yield (
+        "<p>Damped cosines fitted to the record since the last change of a load, strongest "
+        "first.</p>"
+    )
+    rows = [
+        (name, f"{m['frequency']:.6g}", f"{m['decay']:.4g}", f"{1e6 * m['amplitude']:.4g}")
+        for name, modes in summary["modes"].items()
+        for m in modes
+    ]
+    yield _table(("record", "frequency (Hz)", "decay (1/s)", "amplitude (um)"), rows)
+
+
+def _meshes(summary: dict[str, Any]) -> Iterator[str]:
+    yield "<h2>Bodies and meshes</h2>"
+    yield _table(
+        (
+            "body", "elements", "nodes", "surface faces", "turned right-handed", "unused nodes",
+            "smallest altitude (mm)", "in element", "mass (kg)",
+        ),
+        [
+            (
+                name, f"{b['elements']:,}", f"{b['nodes']:,}", f"{b['surface_faces']:,}",
+                str(b["flipped"]), str(b["unused_nodes"]), f"{1e3 * b['smallest_altitude']:.4g}",
+                str(b["thinnest_element"]), f"{b['mass']:.6g}",
+            )
+            for name, b in summary["bodies"].items()
+        ],
+    )  # fmt: skip
+
+
+def _step(summary: dict[str, Any]) -> Iterator[str]:
+    critical = summary["critical_step"]
+    yield "<h2>Time step</h2>"
+    text = (
+        f"Critical step {critical['value']:.4g} s (highest angular frequency "
+        f"{critical['omega']:.4g} 1/s); its motion is strongest in element {critical['element']} "
+        f"of {critical['body']}. "
+    )
+    if summary["method"] != "static":
+        text += f"Used: {summary['step']:.4g} s, {100 * critical['share_used']:.1f} % of it."
+    yield f"<p>{escape(text)}</p>"
+
+
+def _energy(summary: dict[str, Any]) -> Iterator[str]:
+    energy = summary["energy"]
+    yield "<h2>Energy</h2>"
+    rows = [(f"{name} at the end", f"{energy[name]:.6g}") for name in energy if name in NAMED]
+    imbalance = f"{energy['greatest_imbalance']:.3g} ({100 * energy['relative_imbalance']:.2g} %)"
+    rows.append(("greatest external - kinetic - elastic on the way", imbalance))
+    yield _table(("energy", "J"), rows)
+    if summary["method"] == "static":
+        yield "<p>Kinetic damping takes energy out on purpose.</p>"
+
+
+NAMED = ("kinetic", "elastic", "external")
+
+
+def _left_out(summary: dict[str, Any]) -> Iterator[str]:
+    yield "<h2>What is not in this run</h2>"
+    yield "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in summary["left_out"]) + "</ul>"
+
+
+def _cost(summary: dict[str, Any]) -> Iterator[str]:
+    cost = summary["cost"]
+    yield "<h2>Cost</h2>"
+    rows = [
+        ("CPU time (s)", f"{cost['cpu_s']:.3g}"),
+        ("time on the clock (s)", f"{cost['wall_s']:.3g}"),
+    ]
+    if "million_elements_per_s" in cost:
+        speed = f"{cost['million_elements_per_s']:.3g}"
+        rows.append(("million element-steps per second on the clock", speed))
+    yield _table(("", ""), rows)
+    yield "<p>Advancing alone; without reading, pictures and compilation before the first step.</p>"
+
+
+def _again(manifest: dict[str, Any]) -> Iterator[str]:
+    yield "<h2>To compute it again</h2>"
+    versions = ", ".join(f"{name} {version}" for name, version in manifest["versions"].items())
+    yield f"<pre>{escape(manifest['command'])}</pre>"
+    yield f"<p>{escape(versions)}; {escape(manifest['machine'])}; {escape(manifest['started'])}.</p>"
+    asked = json.dumps(manifest["scene"], indent=1)
+    yield f"<details><summary>What was asked, defaults included</summary><pre>{escape(asked)}</pre>"
+    for name, digest in manifest["files"].items():
+        yield f"<p>{escape(name)}: SHA-256 <code>{digest}</code></p>"
+    yield "</details>"
+
+
+def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
+    body = ("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
+
+
+def _figure(path: Path, caption: str) -> str:
+    content = base64.b64encode(path.read_bytes()).decode("ascii")
+    return (
+        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{content}"/>'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )

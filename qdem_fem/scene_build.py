@@ -1,0 +1,108 @@
+"""A scene becomes a simulation: its meshes, its materials by element, its conditions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from qdem_fem.errors import QdemError
+from qdem_fem.scene import BodyTable, Mesh
+from qdem_fem.scene_file import Problem, error_told
+from qdem_fem.scene_nodes import NoNodes
+from qdem_fem.scene_series import TimeSeries
+
+if TYPE_CHECKING:
+    from qdem_fem.mesh import TetMesh
+    from qdem_fem.scene_checks import Prepared
+
+CELLS_MOST = 4_000_000
+"""Most cells of a generated mesh: what 128 GB of memory hold."""
+
+
+def mesh_of(table: Mesh, folder: Path, key: str) -> TetMesh:
+    """The mesh of a body; a relative path counts from ``folder``.
+
+    Raises `MeshError`, or `NoNodes` with the key for measures that make no mesh.
+    """
+    from qdem_fem.mesh import mesh_read
+    from qdem_fem.mesh_generation import box_mesh, ring_mesh
+
+    given = [name for name in ("file", "box", "ring") if getattr(table, name) is not None]
+    if len(given) != 1:
+        raise NoNodes(Problem(key, "give exactly one of file, box, ring"))
+    if table.file is not None:
+        return mesh_read(folder / table.file)
+    shape = table.box or table.ring
+    assert shape is not None
+    count = int(np.prod(shape.cells))
+    if count > CELLS_MOST:
+        what = f"{count} cells are too many; at most {CELLS_MOST}"
+        raise NoNodes(Problem(f"{key}.{given[0]}.cells", what))
+    if table.box is not None:
+        box = table.box
+        return mesh_read(box_mesh(box.size, box.cells, box.pattern, box.origin))
+    ring = table.ring
+    assert ring is not None
+    return mesh_read(ring_mesh(ring.inner_radius, ring.outer_radius, ring.height, ring.cells))
+
+
+def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
+    """The `qdem_fem.Simulation` of a scene and its bodies by name.
+
+    In a static scene each series gives its last value.  Raises `SceneError` with every condition
+    that the simulation refuses.
+    """
+    import qdem_fem
+
+    scene, table = prepared.scene, prepared.scene.simulation
+    bodies = {
+        body.name: qdem_fem.Body(
+            prepared.meshes[body.name], _material(body, prepared.meshes[body.name]), name=body.name
+        )
+        for body in scene.body
+    }
+    run = qdem_fem.Simulation(
+        list(bodies.values()),
+        strain=table.strain,
+        precision=table.precision,
+        step=table.step,
+        safety=table.safety,
+        gravity=table.gravity,
+        threads=table.threads,
+        mass_scaling=table.mass_scaling,
+    )
+    problems = []
+    for step in prepared.conditions:
+        arguments = [_argument(value, table.method) for value in step.arguments]
+        try:
+            getattr(run, step.verb)(bodies[step.body], *arguments)
+        except QdemError as error:
+            problems.append(Problem(step.key, error_told(error)))
+    prepared.text.refuse(problems)
+    return run, bodies
+
+
+def _argument(value: Any, method: str) -> Any:
+    """What the simulation takes for an argument: a series becomes its own kind of series."""
+    import qdem_fem
+
+    if not isinstance(value, TimeSeries):
+        return value
+    if method == "static" or len(value.times) == 1:
+        return value.end()
+    return qdem_fem.Series(value.times, value.values)
+
+
+def _material(body: BodyTable, mesh: TetMesh) -> Any:
+    """Material of a body: uniform, or by element where regions differ."""
+    import qdem_fem
+
+    values: dict[str, Any] = body.material.model_dump()
+    for name, region in body.regions.items():
+        for key, value in region.model_dump(exclude_none=True).items():
+            if np.ndim(values[key]) == 0:
+                values[key] = np.full(len(mesh.elements), values[key])
+            values[key][mesh.element_sets[name]] = value
+    return qdem_fem.Material(**values)

@@ -1,0 +1,259 @@
+"""A scene checked as a whole: meshes, sets, nodes and series, all that is wrong at once."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from qdem_fem.errors import MeshError
+from qdem_fem.scene import (
+    BodyTable,
+    Condition,
+    Fix,
+    Load,
+    Nodes,
+    Output,
+    Periodic,
+    Prescribe,
+    Pressure,
+    Probe,
+    Roller,
+    Scene,
+    SeriesTable,
+    SimulationTable,
+)
+from qdem_fem.scene_build import mesh_of
+from qdem_fem.scene_file import Problem, SceneText, did_you_mean, error_told, scene_read
+from qdem_fem.scene_nodes import NoNodes, nodes_named, unit_vector
+from qdem_fem.scene_series import WrongSeries, series_of
+
+if TYPE_CHECKING:
+    from qdem_fem.mesh import TetMesh
+
+IntArray = npt.NDArray[np.int64]
+
+ROWS_MOST = 100_000_000
+"""Most rows of a table that is written."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One call that puts a condition on the simulation."""
+
+    key: str
+    verb: str
+    """Method of `qdem_fem.Simulation`."""
+    body: str
+    arguments: tuple[Any, ...]
+    """Behind the body; series are `TimeSeries`."""
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scene without a fault, and what it was checked with."""
+
+    scene: Scene
+    text: SceneText
+    meshes: dict[str, TetMesh]
+    conditions: list[Step]
+    probes: dict[str, tuple[str, IntArray]]
+    """Name -> body and nodes."""
+    files: dict[str, str]
+    """Each file that the scene names, as it is written there, and its SHA-256."""
+
+
+def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
+    """Read and check a whole scene with its meshes and series.
+
+    Raises `SceneError` with all that is wrong (file, line, key and sentence of each), `UsageError`
+    when the scene or an override can not be read.
+    """
+    text = scene_read(path, overrides)
+    problems = list(text.problems)
+    folder = text.path.parent
+    meshes, found = _meshes(text, folder)
+    problems += found
+    names = _body_names(text)
+    conditions: list[Step] = []
+    for key, table in _tables(text, Condition, Periodic):
+        if names and table.body not in names:
+            near = did_you_mean(table.body, names)
+            problems.append(Problem(f"{key}.body", f"there is no body {table.body!r}{near}"))
+        mesh = meshes.get(table.body)
+        for step in _condition(key, table, mesh, folder):
+            if isinstance(step, Problem):
+                problems.append(step)
+            else:
+                conditions.append(step)
+    probes: dict[str, tuple[str, IntArray]] = {}
+    for _, output in _tables(text, Output):
+        found = list(_probes(output, names, meshes, probes))
+        problems += found
+    problems += _times(text)
+    text.refuse(problems)
+    scene = Scene.model_validate(text.data)
+    return Prepared(scene, text, meshes, conditions, probes, dict(_files(text, folder)))
+
+
+def _tables(text: SceneText, *kinds: Any) -> Iterator[tuple[str, Any]]:
+    for key, table in text.tables.items():
+        if isinstance(table, kinds):
+            yield key, table
+
+
+def _body_names(text: SceneText) -> list[str]:
+    """Names of all bodies, sound or not, so that a wrong body makes no other problem."""
+    bodies = text.data.get("body")
+    entries = bodies if isinstance(bodies, list) else []
+    names = [entry.get("name") for entry in entries if isinstance(entry, dict)]
+    return [name for name in names if isinstance(name, str)]
+
+
+def _meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Problem]]:
+    """The mesh of each body that has a sound one, and what is wrong with bodies."""
+    meshes: dict[str, TetMesh] = {}
+    problems: list[Problem] = []
+    seen: dict[str, str] = {}
+    for key, body in _tables(text, BodyTable):
+        if body.name in seen:
+            what = f"{seen[body.name]} has this name already"
+            problems.append(Problem(f"{key}.name", what))
+            continue
+        seen[body.name] = key
+        try:
+            mesh = mesh_of(body.mesh, folder, f"{key}.mesh")
+        except NoNodes as wrong:
+            problems.append(wrong.problem)
+            continue
+        except MeshError as error:
+            problems.append(Problem(f"{key}.mesh", error_told(error), _of_file(error)))
+            continue
+        for name in body.regions:
+            if name not in mesh.element_sets:
+                near = did_you_mean(name, mesh.element_sets) or "; the mesh has none"
+                what = f"there is no element set {name!r}{near}"
+                problems.append(Problem(f"{key}.regions.{name}", what))
+        meshes[body.name] = mesh
+    return meshes, problems
+
+
+def _of_file(error: MeshError) -> str:
+    return error.where if error.where.startswith("mesh file") else ""
+
+
+def _condition(
+    key: str, table: Any, mesh: TetMesh | None, folder: Path
+) -> Iterator[Step | Problem]:
+    """The call that a condition stands for, or everything that is wrong with it."""
+    found: list[Problem] = []
+    arguments: list[Any] = []
+
+    def take(make: Any, *words: Any, **named: Any) -> None:
+        try:
+            arguments.append(make(*words, **named))
+        except (NoNodes, WrongSeries) as wrong:
+            found.append(wrong.problem)
+
+    def select(name: str, nodes: Nodes) -> None:
+        if mesh is not None:
+            take(nodes_named, nodes, mesh, f"{key}.{name}")
+
+    verb = type(table).__name__.lower()
+    if isinstance(table, Periodic):
+        select("nodes_a", table.nodes_a)
+        select("nodes_b", table.nodes_b)
+    else:
+        select("nodes", table.nodes)
+    if isinstance(table, Fix):
+        arguments.append(table.components)
+    elif isinstance(table, Prescribe):
+        arguments.append(table.component)
+        take(series_of, table.value, f"{key}.value", folder, vector=False)
+    elif isinstance(table, Roller):
+        take(unit_vector, table.normal, f"{key}.normal")
+    elif isinstance(table, Load):
+        take(series_of, table.force, f"{key}.force", folder, vector=True)
+    elif isinstance(table, Pressure):
+        take(series_of, table.pressure, f"{key}.pressure", folder, vector=False)
+    yield from found
+    if not found and mesh is not None:
+        yield Step(key, verb, table.body, tuple(arguments))
+
+
+def _probes(
+    output: Output,
+    names: Sequence[str],
+    meshes: dict[str, TetMesh],
+    probes: dict[str, tuple[str, IntArray]],
+) -> Iterator[Problem]:
+    """Fill ``probes`` with name -> body and nodes."""
+    for name, probe in output.probes.items():
+        key = f"output.probes.{name}"
+        body = probe.body or (names[0] if len(names) == 1 else None)
+        if body is None:
+            if names:
+                yield Problem(f"{key}.body", "missing: there are several bodies")
+        elif body not in names:
+            if names:
+                near = did_you_mean(body, names)
+                yield Problem(f"{key}.body", f"there is no body {body!r}{near}")
+        elif body in meshes:
+            try:
+                probes[name] = (body, nodes_named(_without_body(probe), meshes[body], key))
+            except NoNodes as wrong:
+                yield wrong.problem
+
+
+def _without_body(probe: Probe) -> Nodes:
+    return Nodes(**probe.model_dump(exclude={"body"}))
+
+
+def _times(text: SceneText) -> Iterator[Problem]:
+    """What duration, step and intervals demand of one another."""
+    simulation = text.tables.get("simulation")
+    output = text.tables.get("output", Output())
+    if not isinstance(simulation, SimulationTable) or not isinstance(output, Output):
+        return
+    duration = simulation.duration
+    if simulation.method == "static":
+        return
+    if duration is None:
+        yield Problem("simulation.duration", "missing: a dynamic run needs it")
+        return
+    if simulation.step is not None and simulation.step > duration:
+        yield Problem("simulation.step", f"must not exceed the duration, {duration:g} s")
+    for name in ("sampling", "energy_interval", "vtu_interval"):
+        interval = getattr(output, name)
+        if interval is None:
+            continue
+        most = 1e6 if name == "vtu_interval" else ROWS_MOST
+        if interval > duration:
+            yield Problem(f"output.{name}", f"must not exceed the duration, {duration:g} s")
+        elif duration / interval > most:
+            what = f"too short: it would be met {duration / interval:.3g} times"
+            yield Problem(f"output.{name}", what)
+
+
+def _files(text: SceneText, folder: Path) -> Iterator[tuple[str, str]]:
+    """Files that the scene names and their SHA-256."""
+    for name in sorted(_file_names(text)):
+        digest = hashlib.sha256()
+        with (folder / name).open("rb") as stream:
+            while block := stream.read(1 << 20):
+                digest.update(block)
+        yield name, digest.hexdigest()
+
+
+def _file_names(text: SceneText) -> set[str]:
+    names = {body.mesh.file for _, body in _tables(text, BodyTable) if body.mesh.file}
+    for _, table in _tables(text, Condition):
+        for series in dict(table).values():
+            if isinstance(series, SeriesTable) and series.csv:
+                names.add(series.csv)
+    return names

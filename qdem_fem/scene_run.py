@@ -1,0 +1,274 @@
+"""The run of a scene: advance, record, save; goes on after a kill to the same bits."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.errors import Interrupted
+from qdem_fem.output import Table, bodies_vtu_write, pvd_write, write_whole
+from qdem_fem.run_folder import RunFolder
+from qdem_fem.scene_build import simulation_of
+from qdem_fem.scene_checks import Prepared
+
+CHUNK = 0.3
+"""Time between two looks at the clock, the signals and the progress line [s]."""
+ENERGIES = ("kinetic", "elastic", "external")
+COST = "cost.json"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """When what is written, in time steps; all are multiples of ``sampling``.
+
+    They depend on the scene alone, so that an interrupted run writes what a whole one does.
+    """
+
+    step: float
+    """[s]"""
+    total: int
+    sampling: int
+    energy: int
+    fields: int
+    every_field: bool
+    """Whether fields are written on the way, or only at the end."""
+
+    def next_row(self, done: int) -> int:
+        """Steps at which something but a probe is written next."""
+        marks = [self.total, done - done % self.energy + self.energy]
+        if self.every_field:
+            marks.append(done - done % self.fields + self.fields)
+        return min(marks)
+
+    def field_files(self, done: int) -> list[tuple[int, float, str]]:
+        """Step, time [s] and name of all VTU files of a run that has done so many steps."""
+        steps = list(range(0, done + 1, self.fields)) if self.every_field else []
+        if done == self.total and self.total not in steps:
+            steps.append(self.total)
+        return [(n, n * self.step, f"fields_{i:06}.vtu") for i, n in enumerate(steps)]
+
+
+def plan_of(prepared: Prepared, step: float) -> Plan:
+    """When what is written; ``step`` is the time step [s]."""
+    duration, output = prepared.scene.simulation.duration, prepared.scene.output
+    assert duration is not None
+
+    def multiple(interval: float, unit: int) -> int:
+        return unit * max(1, round(interval / (unit * step)))
+
+    sampling = multiple(output.sampling or duration / 2000, 1)
+    return Plan(
+        step=step,
+        total=sampling * max(1, ceil(duration / (sampling * step) - 1e-6)),
+        sampling=sampling,
+        energy=multiple(output.energy_interval or duration / 200, sampling),
+        fields=multiple(output.vtu_interval or duration, sampling),
+        every_field=output.vtu_interval is not None,
+    )
+
+
+@dataclass
+class Done:
+    """A run at its end."""
+
+    run: Any
+    """`qdem_fem.Simulation`"""
+    bodies: dict[str, Any]
+    plan: Plan | None
+    """None for a static answer."""
+    cost: dict[str, float]
+    """``cpu_s`` and ``wall_s`` [s] of advancing, all sittings together."""
+
+
+def run_dynamic(prepared: Prepared, folder: RunFolder, *, resume: bool, progress: Any) -> Done:
+    """Advance a scene to its duration, from its start or from the last checkpoint.
+
+    Every row and field is the same, bit by bit, however often the run was interrupted.  SIGINT
+    and SIGTERM save the state and raise `Interrupted`.
+    """
+    goes_on = resume and folder.checkpoint.exists()
+    if goes_on:
+        import qdem_fem
+
+        run = qdem_fem.Simulation.load(folder.checkpoint)
+        bodies = {body.name: body for body in run.bodies}
+    else:
+        run, bodies = simulation_of(prepared)
+    probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
+    plan = plan_of(prepared, run.step)
+    rows, energies = _tables(folder.path, probes)
+    record = _Record(run, list(bodies.values()), plan, folder.path, rows, energies)
+    if goes_on:
+        record.go_on()
+    else:
+        record.begin(probes)
+    cost = _cost_read(folder.path) if goes_on else {"cpu_s": 0.0, "wall_s": 0.0}
+    done = Done(run, bodies, plan, cost)
+    saved = time.monotonic()
+    chunk = 1
+    with stop_signals() as stop:
+        while run.steps_done < plan.total:
+            steps = min(chunk * plan.sampling, plan.next_row(run.steps_done) - run.steps_done)
+            started, cpu = time.perf_counter(), time.process_time()
+            record.advance(steps, probes)
+            elapsed = time.perf_counter() - started
+            cost["wall_s"] += elapsed
+            cost["cpu_s"] += time.process_time() - cpu
+            if steps == chunk * plan.sampling:
+                chunk = max(1, min(2 * chunk, int(chunk * CHUNK / max(elapsed, 1e-9))))
+            progress.at(run.steps_done, plan.total, run.time)
+            late = time.monotonic() - saved >= prepared.scene.output.checkpoint_interval
+            if stop.name or late or run.steps_done == plan.total:
+                checkpoint_write(done, folder, record)
+                saved = time.monotonic()
+            if stop.name and run.steps_done < plan.total:
+                raise Interrupted(
+                    f"stopped by {stop.name} at t = {run.time:.6g} s; the state is saved in "
+                    f"{folder.checkpoint}\n  -> the same command with --resume goes on from there"
+                )
+    return done
+
+
+def run_static(prepared: Prepared, folder: RunFolder) -> Done:
+    """Find the static answer of a scene by kinetic damping; it leaves nothing to resume from.
+
+    Raises `NotConverged` when the tolerance is not reached.
+    """
+    run, bodies = simulation_of(prepared)
+    started, cpu = time.perf_counter(), time.process_time()
+    run.relax(tolerance=prepared.scene.simulation.tolerance)
+    cost = {
+        "cpu_s": time.process_time() - cpu,
+        "wall_s": time.perf_counter() - started,
+    }
+    probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
+    rows, energies = _tables(folder.path, probes)
+    for table in (rows, energies):
+        table.begin()
+    rows.append(np.array([[0.0, *_probed(probes)]]))
+    energies.append(_energy_row(run, 0.0))
+    bodies_vtu_write(folder.path / "fields_000000.vtu", list(bodies.values()))
+    pvd_write(folder.path / "fields.pvd", [(0.0, "fields_000000.vtu")])
+    return Done(run, bodies, None, cost)
+
+
+@dataclass
+class _Record:
+    """What a dynamic run writes on its way."""
+
+    run: Any
+    bodies: list[Any]
+    plan: Plan
+    path: Path
+    rows: Table
+    energies: Table
+
+    def begin(self, probes: dict[str, Any]) -> None:
+        """First rows and fields, at t = 0."""
+        self.rows.begin()
+        self.energies.begin()
+        self.rows.append(np.array([[0.0, *_probed(probes)]]))
+        self.energies.append(_energy_row(self.run, 0.0))
+        self.write_fields()
+
+    def go_on(self) -> None:
+        """Take back what was written behind the checkpoint."""
+        now = (self.run.steps_done + 0.5) * self.plan.step
+        self.rows.cut(now)
+        self.energies.cut(now)
+        kept = {name for _, _, name in self.plan.field_files(self.run.steps_done)}
+        for path in self.path.glob("fields_*.vtu"):
+            if path.name not in kept:
+                path.unlink()
+
+    def advance(self, steps: int, probes: dict[str, Any]) -> None:
+        """Advance and write the rows, energies and fields that fall due."""
+        run, plan = self.run, self.plan
+        start = run.steps_done
+        history = run.advance(steps * plan.step, probes=probes, sampling=plan.sampling * plan.step)
+        new = history.time > (start + 0.5) * plan.step
+        number = np.rint(history.time[new] / plan.step)
+        columns = [history[name][new] for name in probes]
+        self.rows.append(np.column_stack([number * plan.step, *columns]))
+        if run.steps_done % plan.energy == 0 or run.steps_done == plan.total:
+            self.energies.append(_energy_row(run, run.steps_done * plan.step))
+        self.write_fields()
+
+    def write_fields(self) -> None:
+        """Write the VTU file that is due now, and the list of all."""
+        files = self.plan.field_files(self.run.steps_done)
+        if files and files[-1][0] == self.run.steps_done:
+            bodies_vtu_write(self.path / files[-1][2], self.bodies)
+            pvd_write(self.path / "fields.pvd", [(when, name) for _, when, name in files])
+
+
+def checkpoint_write(done: Done, folder: RunFolder, record: _Record) -> None:
+    """Save the state; the tables reach the disk first, so that they hold all rows up to it."""
+    record.rows.sync()
+    record.energies.sync()
+    done.run.save(folder.checkpoint)
+    write_whole(folder.path / COST, json.dumps(done.cost) + "\n")
+
+
+def _cost_read(path: Path) -> dict[str, float]:
+    try:
+        found = json.loads((path / COST).read_text(encoding="utf-8"))
+        return {name: float(found[name]) for name in ("cpu_s", "wall_s")}
+    except (OSError, ValueError, KeyError, TypeError):  # killed before it was written
+        return {"cpu_s": 0.0, "wall_s": 0.0}
+
+
+def _tables(path: Path, probes: dict[str, Any]) -> tuple[Table, Table]:
+    names = [f"{name}_{axis}" for name in probes for axis in "xyz"]
+    rows = Table(path / "probes.csv", ["time", *names])
+    return rows, Table(path / "energy.csv", ["time", *ENERGIES])
+
+
+def _probed(probes: dict[str, Any]) -> list[float]:
+    means = (body.displacement[nodes].mean(axis=0) for body, nodes in probes.values())
+    return [float(component) for mean in means for component in mean]
+
+
+def _energy_row(run: Any, when: float) -> Any:
+    energy = run.energy()
+    return np.array([[when, *(float(getattr(energy, name)) for name in ENERGIES)]])
+
+
+class Stop:
+    """Whether we were asked to stop: ``name`` of the signal."""
+
+    name = ""
+
+
+@contextmanager
+def stop_signals() -> Iterator[Stop]:
+    """SIGINT and SIGTERM set ``name`` and let the step finish; a second one stops at once."""
+    stop = Stop()
+    before: dict[signal.Signals, Any] = {}
+
+    def heard(number: int, _frame: object) -> None:
+        stop.name = signal.Signals(number).name
+        for one, handler in before.items():
+            signal.signal(one, handler)
+        print(f"{stop.name}: the state is saved, then the run stops", file=sys.stderr)
+
+    try:
+        for one in (signal.SIGINT, signal.SIGTERM):
+            before[one] = signal.signal(one, heard)
+    except ValueError:  # not in the main thread: whoever runs us there takes care of signals
+        before = {}
+    try:
+        yield stop
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)

@@ -1,0 +1,495 @@
+"""The judge itself on trial: patch test, order of convergence, closed forms, known figures."""
+
+from __future__ import annotations
+
+import builtins
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sparse
+import skfem
+
+from qdem_fem.errors import LibraryMissing, NotConverged, Unstable, UsageError
+from validation import qdem_closed_forms as closed
+from validation import qdem_judge as judge
+from validation.qdem_judge_dynamics import central_difference, newmark, quasi_static_kelvin_voigt
+from validation.qdem_judge_modes import modes
+
+YOUNG, POISSON, DENSITY = 45e9, 0.167, 2350.0
+SIZE = (2.4, 0.25, 0.22)
+
+Mesh = tuple[np.ndarray, np.ndarray]
+
+
+def kuhn(cells: tuple[int, int, int], size: tuple[float, float, float] = SIZE) -> Mesh:
+    """A box of six tetrahedra a cell: nodes (n, 3) [m] and elements (m, 4)."""
+    mesh = skfem.MeshTet.init_tensor(
+        *(np.linspace(0, side, n + 1) for side, n in zip(size, cells, strict=True))
+    )
+    return mesh.p.T.copy(), mesh.t.T.astype(np.int64)
+
+
+def end_area(nodes: np.ndarray, elements: np.ndarray, axis: int) -> np.ndarray:
+    """Each node's third of the faces around it on the far end along ``axis`` [m^2], (n,)."""
+    mesh = skfem.MeshTet(nodes.T.copy(), elements.T.copy())
+    far = nodes[:, axis].max()
+    facets = mesh.facets[:, mesh.facets_satisfying(lambda x: np.isclose(x[axis], far))]
+    a, b, c = nodes[facets]
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return np.bincount(facets.ravel(), np.tile(area / 3, 3), len(nodes))
+
+
+def skewed(seed: int = 0) -> Mesh:
+    """A box with all nodes displaced at random, elements of either orientation."""
+    nodes, elements = kuhn((3, 2, 2), (1.0, 0.8, 0.7))
+    generator = np.random.default_rng(seed)
+    return nodes + 0.05 * generator.standard_normal(nodes.shape), elements
+
+
+def cantilever(cells: tuple[int, int, int]) -> tuple[Any, ...]:
+    """Section 3.1: nodes, elements, K, mass, free nodes, end load [N], node at the tip."""
+    nodes, elements = kuhn(cells)
+    end = np.isclose(nodes[:, 0], SIZE[0])
+    load = np.zeros_like(nodes)
+    load[end, 2] = -200 / end.sum()
+    middle = [SIZE[0], SIZE[1] / 2, SIZE[2] / 2]
+    return (
+        nodes,
+        elements,
+        judge.stiffness(nodes, elements, YOUNG, POISSON),
+        judge.lumped_mass(nodes, elements, DENSITY),
+        nodes[:, 0] > 1e-9,
+        load,
+        int(np.argmin(np.linalg.norm(nodes - middle, axis=1))),
+    )
+
+
+# --- matrices ---------------------------------------------------------------------------------
+
+
+def test_stiffness_is_symmetric_and_kills_rigid_motions() -> None:
+    """K = K^T and K r = 0 for six rigid motions, to rounding; six zero eigenvalues, no more."""
+    nodes, elements = skewed()
+    matrix = judge.stiffness(nodes, elements, YOUNG, POISSON)
+    scale = abs(matrix).max()
+    assert abs(matrix - matrix.T).max() < 1e-14 * scale
+    assert np.abs(matrix @ judge.rigid_motions(nodes)).max() < 1e-13 * scale
+    value = np.linalg.eigvalsh(matrix.toarray())
+    assert np.abs(value[:6]).max() < 1e-13 * value[-1]
+    assert value[6] > 1e-5 * value[-1]
+
+
+def test_stiffness_of_one_element_by_hand() -> None:
+    """V B^T D B in Voigt's notation, written out; the order of the vertices changes nothing."""
+    nodes = np.array([[0, 0, 0], [1, 0.1, 0], [0.2, 0.9, 0.1], [0.1, 0.2, 1.2]])
+    lam, mu = 3.0, 2.0
+    gradient = np.linalg.inv(np.column_stack([np.ones(4), nodes]))[1:]
+    b = np.zeros((6, 12))
+    for a, (x, y, z) in enumerate(gradient.T):
+        b[:, 3 * a : 3 * a + 3] = [[x, 0, 0], [0, y, 0], [0, 0, z], [y, x, 0], [0, z, y], [z, 0, x]]
+    d = np.diag([2 * mu] * 3 + [mu] * 3)
+    d[:3, :3] += lam
+    volume = np.linalg.det(nodes[1:] - nodes[0]) / 6
+    expected = volume * b.T @ d @ b
+    for order in ([0, 1, 2, 3], [1, 0, 2, 3]):
+        found = judge.stiffness_lame(nodes, np.array([order]), lam, mu).toarray()
+        np.testing.assert_allclose(found, expected, atol=1e-14)
+
+
+def test_assembly_in_batches_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Batches of seven elements, moduli element by element: the sum of two regions' matrices."""
+    nodes, elements = skewed()
+    first = np.arange(len(elements)) % 3 == 0
+    whole = judge.stiffness(nodes, elements[first], 2e9, 0.3)
+    whole = whole + judge.stiffness(nodes, elements[~first], 5e9, 0.1)
+    monkeypatch.setattr(judge, "BATCH", 7)
+    young, poisson = np.where(first, 2e9, 5e9), np.where(first, 0.3, 0.1)
+    found = judge.stiffness(nodes, elements, young, poisson)
+    assert abs(found - whole).max() < 1e-14 * abs(whole).max()
+    u = np.random.default_rng(1).standard_normal(nodes.shape)
+    stress = judge.von_mises(nodes, elements, young, poisson, u)
+    assert stress[first] == pytest.approx(judge.von_mises(nodes, elements[first], 2e9, 0.3, u))
+
+
+def test_lumped_mass_is_the_whole_mass_about_its_centre() -> None:
+    """Eq. 11: the sum is rho V and its first moment that of the body, for any mesh of a box."""
+    nodes, elements = kuhn((4, 3, 2))
+    mass = judge.lumped_mass(nodes, elements, DENSITY)
+    assert mass.sum() == pytest.approx(DENSITY * np.prod(SIZE), rel=1e-14)
+    assert mass @ nodes / mass.sum() == pytest.approx(np.array(SIZE) / 2, rel=1e-13)
+
+
+@pytest.mark.parametrize("method", ["amg", "direct"])
+def test_patch(method: Any) -> None:
+    """Inner nodes follow a linear field on the boundary exactly, with one stress everywhere."""
+    nodes, elements = kuhn((4, 3, 3))
+    inner = np.all((nodes > 1e-9) & (nodes < np.array(SIZE) - 1e-9), axis=1)
+    nodes[inner] += 0.01 * np.random.default_rng(2).standard_normal((inner.sum(), 3))
+    slope = 1e-4 * np.random.default_rng(3).standard_normal((3, 3))
+    exact = nodes @ slope.T
+    matrix = judge.stiffness(nodes, elements, YOUNG, POISSON)
+    held = np.where(inner[:, None], 0.0, exact)
+    answer = judge.static_solve(
+        matrix, inner, -(matrix @ held.ravel()).reshape(-1, 3), nodes, method
+    )
+    np.testing.assert_allclose(answer.displacement + held, exact, atol=1e-13 * np.abs(exact).max())
+    strain = (slope + slope.T) / 2
+    deviator = YOUNG / (1 + POISSON) * (strain - np.eye(3) * np.trace(strain) / 3)
+    stress = judge.von_mises(nodes, elements, YOUNG, POISSON, exact)
+    assert stress == pytest.approx(np.sqrt(1.5 * np.sum(deviator**2)), rel=1e-11)
+
+
+# --- statics ----------------------------------------------------------------------------------
+
+
+def test_cantilever_of_46080_elements() -> None:
+    """Known figures of the Kuhn mesh 96 x 10 x 8: tip 88.093 um, first mode 27.550 Hz."""
+    nodes, _, matrix, mass, free, load, tip = cantilever((96, 10, 8))
+    answer = judge.static_solve(matrix, free, load, nodes)
+    assert -answer.displacement[tip, 2] == pytest.approx(88.093e-6, abs=5e-10)
+    assert answer.correction < 1e-10
+    assert answer.residual < 1e-9
+    found = modes(matrix, mass, free, 1, "amg", nodes)
+    assert found.frequency[0] == pytest.approx(27.550, abs=5e-4)
+
+
+def test_linear_elements_converge_at_order_two_to_quadratic_ones() -> None:
+    """Linear elements are too stiff, by C h^2 against P2: a ratio near 4 as sides are halved."""
+    reference = judge.cantilever_p2((32, 4, 4))
+    excess = []
+    for n in (1, 2, 4):
+        nodes, _, matrix, _, free, load, tip = cantilever((12 * n, 2 * n, 2 * n))
+        answer = judge.static_solve(matrix, free, load, nodes)
+        excess.append(reference / -answer.displacement[tip, 2] - 1)
+    assert min(excess) > 0
+    order = np.log2(np.array(excess[:-1]) / excess[1:])
+    assert order == pytest.approx(2, abs=0.1)
+
+
+def test_quadratic_elements_and_beams() -> None:
+    """P2 meets Timoshenko to what a clamp's hindered contraction makes, 0.3 %; eq. 12 as printed.
+
+    Shear adds 3 E I / kappa G A L^2 = 0.58 % to eq. 12, so the bound tells the two apart.
+    """
+    tip = judge.cantilever_p2((32, 4, 4))
+    assert tip == pytest.approx(closed.timoshenko_tip(200), rel=3e-3)
+    assert closed.euler_bernoulli_tip(200) == pytest.approx(92.32156e-6, rel=1e-7)
+    assert closed.timoshenko_tip(200) == pytest.approx(92.858e-6, rel=1e-5)
+
+
+def test_multigrid_and_direct_agree_far_beyond_a_pass_of_conjugate_gradients() -> None:
+    """Two solvers, refined with extended residuals: the same field to 1e-11, asked 1e-7."""
+    nodes, _, matrix, _, free, load, _ = cantilever((24, 4, 4))
+    one = judge.static_solve(matrix, free, load, nodes, "amg")
+    other = judge.static_solve(matrix, free, load, method="direct")
+    scale = np.abs(other.displacement).max()
+    np.testing.assert_allclose(one.displacement, other.displacement, atol=1e-11 * scale)
+
+
+def test_free_components() -> None:
+    """A roller: a mask of components; a bar pulled on rollers has eps = sigma / E, nu eps aside."""
+    nodes, elements = kuhn((3, 2, 2))
+    free = nodes > 1e-9
+    load = np.zeros_like(nodes)
+    load[:, 0] = 1e6 * end_area(nodes, elements, 0)
+    matrix = judge.stiffness(nodes, elements, YOUNG, POISSON)
+    answer = judge.static_solve(matrix, free, load, nodes, "direct")
+    expected = 1e6 / YOUNG * nodes * [1, -POISSON, -POISSON]
+    np.testing.assert_allclose(answer.displacement, expected, atol=1e-12 * 1e6 / YOUNG)
+
+
+def test_what_can_not_be_solved_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mask that does not fit, multigrid without nodes, a missing library, a body not held."""
+    nodes, elements = kuhn((2, 1, 1))
+    matrix = judge.stiffness(nodes, elements, YOUNG, POISSON)
+    load, free = np.zeros_like(nodes), nodes[:, 0] > 1e-9
+    load[-1, 2] = 1.0
+    with pytest.raises(UsageError, match="free"):
+        judge.static_solve(matrix, free[1:], load, nodes)
+    with pytest.raises(UsageError, match="nodes"):
+        judge.static_solve(matrix, free, load)
+    with pytest.raises(NotConverged, match="correction"):
+        judge.static_solve(matrix, free, load, nodes, "direct", tolerance=0.0)
+    real = builtins.__import__
+
+    def without_pyamg(name: str, *args: Any, **kwargs: Any) -> Any:
+        if name == "pyamg":
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", without_pyamg)
+    with pytest.raises(LibraryMissing, match="pip install pyamg"):
+        judge.static_solve(matrix, free, load, nodes)
+
+
+# --- modes ------------------------------------------------------------------------------------
+
+
+def test_modes_by_two_methods() -> None:
+    """LOBPCG with multigrid and inversion about zero: the same five modes, M-orthonormal."""
+    nodes, _, matrix, mass, free, _, _ = cantilever((24, 4, 4))
+    one = modes(matrix, mass, free, 5, "amg", nodes)
+    other = modes(matrix, mass, free, 5)
+    assert one.frequency == pytest.approx(other.frequency, rel=1e-7)
+    for found in (one, other):
+        flat = found.shape.reshape(5, -1)
+        gram = flat * np.repeat(mass, 3) @ flat.T
+        np.testing.assert_allclose(gram, np.eye(5), atol=1e-5)
+
+
+def test_modes_come_down_to_those_of_beams() -> None:
+    """Extrapolated to h = 0 from two meshes: Timoshenko's bending, Saint-Venant's torsion.
+
+    omega^2 is too large by C h^2.  Left over: the hindered contraction and warping of the clamp,
+    and h^4: 1 % for bending, 3 % for torsion.
+    """
+    found = []
+    for n in (1, 2):
+        _, _, matrix, mass, free, _, _ = cantilever((24 * n, 4 * n, 4 * n))
+        found.append(modes(matrix, mass, free, 5).frequency)
+    limit = np.sqrt((4 * found[1] ** 2 - found[0] ** 2) / 3)
+    theory = closed.cantilever_frequencies()
+    names = ("bending z 1", "bending y 1", "bending z 2", "bending y 2", "torsion 1")
+    expected = np.array([theory[name] for name in names])
+    assert limit[:4] == pytest.approx(expected[:4], rel=0.01)
+    assert limit[4] == pytest.approx(expected[4], rel=0.03)
+
+
+def test_beam_frequencies() -> None:
+    """Eq. 13 gives 27.00 Hz (the paper's text: 27.01); slender beams need no shear."""
+    assert closed.bending_frequency(1) == pytest.approx(27.01, rel=5e-4)
+    ratio = closed.bending_frequency(2) / closed.bending_frequency(1)
+    assert ratio == pytest.approx((4.694091 / 1.875104) ** 2, rel=1e-6)
+    slender = closed.Beam(length=240.0)
+    for order in (1, 2, 3, 5):
+        plain = closed.bending_frequency(order, slender)
+        assert closed.bending_frequency(order, slender, shear=True) == pytest.approx(
+            plain, rel=1e-4
+        )
+    assert closed.Beam(width=1.0, height=1.0).torsion_constant == pytest.approx(0.140577, rel=1e-5)
+
+
+# --- motion -----------------------------------------------------------------------------------
+
+
+def one_mode() -> tuple[Any, ...]:
+    """A short cantilever in its first mode: K, mass, free, shape [m], omega [rad/s]."""
+    nodes, elements = kuhn((6, 2, 2), (1.0, 0.25, 0.22))
+    matrix = judge.stiffness(nodes, elements, YOUNG, POISSON)
+    mass = judge.lumped_mass(nodes, elements, DENSITY)
+    free = nodes[:, 0] > 1e-9
+    found = modes(matrix, mass, free, 1)
+    return matrix, mass, free, 1e-5 * found.shape[0], 2 * np.pi * found.frequency[0]
+
+
+def critical_step(matrix: Any, mass: np.ndarray, free: np.ndarray) -> float:
+    """2 / omega_max [s] of the assembled matrices."""
+    dof = judge.free_dof(free, matrix.shape[0])
+    root = 1 / np.sqrt(np.repeat(mass, 3)[dof])
+    scaled = sparse.diags(root) @ matrix[dof][:, dof] @ sparse.diags(root)
+    return float(2 / np.sqrt(np.linalg.eigvalsh(scaled.toarray())[-1]))
+
+
+def test_newmark_is_of_order_two_and_conserves_energy() -> None:
+    """A mode, u = phi cos(omega t), over 1.25 periods: steps halved; energy to rounding."""
+    matrix, mass, free, shape, omega = one_mode()
+    still = np.zeros_like(shape)
+    error = []
+    for steps in (40, 80):
+        step = 2 * np.pi / omega / steps
+        end = newmark(matrix, mass, None, still, free, step, steps * 5 // 4, displacement=shape)
+        error.append(np.linalg.norm(end.displacement) / np.linalg.norm(shape))
+        kinetic = np.sum(mass[:, None] * end.velocity**2) / 2
+        u = end.displacement.ravel()
+        start = shape.ravel() @ (matrix @ shape.ravel()) / 2
+        assert kinetic + u @ (matrix @ u) / 2 == pytest.approx(start, rel=1e-10)
+    # average acceleration lags by (omega dt)^2 / 12 of the phase: after 1.25 periods the sine
+    # passes zero and the displacement is that lag
+    assert error[0] / error[1] == pytest.approx(4, rel=0.02)
+    assert error[1] == pytest.approx(2.5 * np.pi * (2 * np.pi / 80) ** 2 / 12, rel=0.02)
+
+
+def test_newmark_and_central_differences_agree() -> None:
+    """A load suddenly put on, with viscosity: two methods, the same record as steps get short.
+
+    Central differences lag the viscous force by half a step: first order in C, second without.
+    """
+    matrix, mass, free, shape, omega = one_mode()
+    nodes, elements = kuhn((6, 2, 2), (1.0, 0.25, 0.22))
+    load = np.zeros_like(shape)
+    load[np.isclose(nodes[:, 0], 1.0), 2] = -10.0
+    tip = len(nodes) - 1
+    period = 2 * np.pi / omega
+    viscous = judge.stiffness_lame(nodes, elements, -2 / 3 * 2e5, 2e5)
+    for damping, order in ((None, 2), (viscous, 1)):
+        difference = []
+        for steps in (1500, 3000):
+            run = (load, free, period / steps, steps)
+            one = newmark(matrix, mass, damping, *run, record=[tip]).recorded
+            other = central_difference(matrix, mass, damping, *run, record=[tip]).recorded
+            difference.append(np.abs(one - other).max() / np.abs(one).max())
+        assert difference[1] < 2e-3
+        assert difference[0] / difference[1] > 0.8 * 2**order
+
+
+def test_newmark_by_multigrid_and_what_is_kept() -> None:
+    """The same record as factorised; a held node reads zero; cost is split."""
+    nodes, _, matrix, mass, free, load, tip = cantilever((12, 2, 2))
+    held = int(np.flatnonzero(~free)[0])
+    run = (matrix, mass, None, lambda t: load * min(1.0, t / 1e-3), free, 1e-4, 20)
+    one = newmark(*run, record=[tip, held])
+    other = newmark(*run, record=[tip, held], method="amg", nodes=nodes)
+    np.testing.assert_allclose(one.recorded, other.recorded, atol=1e-7 * np.abs(one.recorded).max())
+    assert not one.recorded[:, 1].any()
+    np.testing.assert_array_equal(one.recorded[-1, 0], one.displacement[tip])
+    assert one.time[-1] == pytest.approx(2e-3)
+    assert one.setup_s >= 0
+    assert one.stepping_s >= 0
+
+
+def test_a_step_too_long_is_said() -> None:
+    """Stable below 2 / omega_max of the assembled matrices, `Unstable` above."""
+    matrix, mass, free, shape, _ = one_mode()
+    critical = critical_step(matrix, mass, free)
+    noise = shape + 1e-9 * np.random.default_rng(5).standard_normal(shape.shape)
+    run = (matrix, mass, None, np.zeros_like(shape), free)
+    calm = central_difference(*run, 0.99 * critical, 4000, displacement=noise)
+    assert np.abs(calm.displacement).max() < 10 * np.abs(shape).max()
+    with pytest.raises(Unstable, match="step"):
+        central_difference(*run, 1.02 * critical, 4000, displacement=noise)
+
+
+def test_viscosity_shortens_the_critical_step() -> None:
+    """A viscous force of the last velocity: dt <= (sqrt(1 + xi^2) - xi) 2 / omega_max.
+
+    From lambda = -1 in u_{k+1} - 2 u_k + u_{k-1} = -W^2 u_k - 2 xi W (u_k - u_{k-1}), W = omega dt;
+    with C = tau K, xi = omega tau / 2.
+    """
+    matrix, mass, free, shape, _ = one_mode()
+    omega = 2 / critical_step(matrix, mass, free)
+    xi = 0.6
+    critical = (np.sqrt(1 + xi**2) - xi) * 2 / omega
+    noise = shape + 1e-9 * np.random.default_rng(6).standard_normal(shape.shape)
+    run = (matrix, mass, matrix * (2 * xi / omega), np.zeros_like(shape), free)
+    calm = central_difference(*run, 0.99 * critical, 4000, displacement=noise)
+    assert np.abs(calm.displacement).max() < 2 * np.abs(shape).max()
+    with pytest.raises(Unstable, match="step"):
+        central_difference(*run, 1.02 * critical, 20_000, displacement=noise)
+
+
+# --- creep, section 3.2 -----------------------------------------------------------------------
+
+CREEP_YOUNG, VISCOSITY, HEIGHT = 0.5e6, 1.0, 0.22
+STRESS = 10 / (2.4 * 0.25)
+
+
+def slab(cells: tuple[int, int, int]) -> tuple[Any, ...]:
+    """Section 3.2: nodes, K, C (nu = 0, no bulk viscosity), load of a uniform pressure, centre."""
+    nodes, elements = kuhn(cells)
+    load = np.zeros_like(nodes)
+    load[:, 2] = -STRESS * end_area(nodes, elements, 2)
+    centre = int(np.argmin(np.linalg.norm(nodes - [1.2, 0.125, HEIGHT], axis=1)))
+    return (
+        nodes,
+        judge.stiffness(nodes, elements, CREEP_YOUNG, 0.0),
+        judge.stiffness_lame(nodes, elements, -2 / 3 * VISCOSITY, VISCOSITY),
+        load,
+        centre,
+    )
+
+
+@pytest.mark.parametrize("sides", ["rollers", "free"])
+def test_creep_and_recovery(sides: str) -> None:
+    """Uniform strain, so the mesh does not matter: both closed forms, to backward Euler's error.
+
+    Its error is at most h/2 tau e^-1 of the amplitude, 5e-4 at h = tau/400 on a time of
+    3/4 tau; the load goes at 2 tau.
+    """
+    nodes, matrix, viscous, load, centre = slab((4, 2, 2))
+    tau = VISCOSITY / CREEP_YOUNG
+    free = np.ones_like(nodes, bool)
+    free[np.isclose(nodes[:, 2], 0), 2] = False
+    if sides == "rollers":
+        free[:, :2] = False
+    else:  # a symmetric quarter: planes through two sides hold the rigid motions alone
+        free[np.isclose(nodes[:, 0], 0), 0] = False
+        free[np.isclose(nodes[:, 1], 0), 1] = False
+    step, steps = tau / 400, 1600
+
+    def pressed(t: float) -> np.ndarray:
+        return load if t < 2 * tau + step / 2 else np.zeros_like(load)
+
+    run = quasi_static_kelvin_voigt(matrix, viscous, pressed, free, step, steps, record=[centre])
+    theory = closed.creep_uniaxial_strain if sides == "rollers" else closed.creep_uniaxial_stress
+    exact = theory(run.time, STRESS, CREEP_YOUNG, VISCOSITY, unloaded=2 * tau)
+    strain = -run.recorded[:, 0, 2] / HEIGHT
+    np.testing.assert_allclose(strain, exact, atol=6e-4 * STRESS / CREEP_YOUNG)
+    wrong = closed.creep_equation_14(run.time, STRESS, CREEP_YOUNG, VISCOSITY, 2 * tau)
+    assert np.abs(strain - wrong).max() > 0.08 * STRESS / CREEP_YOUNG
+
+
+def test_creep_under_the_papers_conditions() -> None:
+    """No slip at both ends, nodal shares, Kuhn 40 x 6 x 6: known figures of the top's centre."""
+    nodes, matrix, viscous, _, centre = slab((40, 6, 6))
+    free = np.ones_like(nodes, bool)
+    free[np.isclose(nodes[:, 2], 0)] = False
+    top = np.isclose(nodes[:, 2], HEIGHT)
+    free[top, :2] = False
+    load = np.zeros_like(nodes)
+    load[top, 2] = -10 / top.sum()
+    tau = VISCOSITY / CREEP_YOUNG
+    run = quasi_static_kelvin_voigt(matrix, viscous, load, free, tau / 100, 400, record=[centre])
+    strain = -run.recorded[[50, 100, 200, 300, 400], 0, 2] / HEIGHT / (STRESS / CREEP_YOUNG)
+    assert strain == pytest.approx([0.3125, 0.5085, 0.7185, 0.8144, 0.8620], abs=3e-3)
+
+
+def test_creep_closed_forms() -> None:
+    """Known table; general forms at other nu and bulk viscosity end at sigma/M and sigma/E."""
+    t = np.array([0.5, 1, 2, 3, 4])
+    assert closed.creep_uniaxial_strain(t, 1, 1, 1) == pytest.approx(
+        [0.3127, 0.5276, 0.7769, 0.8946, 0.9502], abs=5e-5
+    )
+    assert closed.creep_uniaxial_stress(t, 1, 1, 1) == pytest.approx(
+        [0.4808, 0.5956, 0.7547, 0.8512, 0.9098], abs=5e-5
+    )
+    assert closed.creep_equation_14(t, 1, 1, 1) == pytest.approx(
+        [0.3935, 0.6321, 0.8647, 0.9502, 0.9817], abs=5e-5
+    )
+    assert closed.creep_equation_14([2.0, 2.001], 1, 1, 1, 2.0, printed=True)[1] < 0
+    late = {"poisson": 0.3, "bulk_viscosity": 2.0}
+    assert closed.creep_uniaxial_stress(1e4, 1, 1, 1, **late) == pytest.approx(1)
+    modulus = closed.dilatational_speed(1, 0.3, 1) ** 2
+    assert closed.creep_uniaxial_strain(1e4, 1, 1, 1, **late) == pytest.approx(1 / modulus)
+
+
+def test_thickness_mode_decays_by_four_thirds_of_the_viscosity() -> None:
+    """On rollers the first mode decays at phi C phi / 2: 0.01446 mu_D, the paper's 0.015.
+
+    12 layers: (k h)^2 / 24 = 0.07 % off in k^2.
+    """
+    nodes, elements = kuhn((2, 2, 12), (0.3, 0.1, HEIGHT))
+    matrix = judge.stiffness(nodes, elements, YOUNG, 0.0)
+    viscous = judge.stiffness_lame(nodes, elements, -2 / 3, 1.0)
+    free = np.zeros_like(nodes, bool)
+    free[:, 2] = nodes[:, 2] > 1e-9
+    found = modes(matrix, judge.lumped_mass(nodes, elements, DENSITY), free, 1)
+    phi = found.shape[0].ravel()
+    decay = closed.thickness_decay(HEIGHT, 1.0, DENSITY)
+    assert decay == pytest.approx(0.01446, rel=3e-4)
+    assert phi @ (viscous @ phi) / 2 == pytest.approx(decay, rel=3e-3)
+    frequency = closed.thickness_frequency(HEIGHT, YOUNG, DENSITY)
+    assert found.frequency[0] == pytest.approx(frequency, rel=2e-3)
+    assert frequency == pytest.approx(4973, abs=1)
+
+
+def test_waves() -> None:
+    """Ordering of speeds, and the discrete row: exact at a Courant number of one."""
+    bar = closed.bar_speed(YOUNG, DENSITY)
+    fast = closed.dilatational_speed(YOUNG, POISSON, DENSITY)
+    slow = closed.shear_speed(YOUNG, POISSON, DENSITY)
+    assert slow < bar < fast
+    ratio = np.sqrt(2 * (1 - POISSON) / (1 - 2 * POISSON))
+    assert fast / slow == pytest.approx(ratio, rel=1e-12)
+    k = np.array([1.0, 10.0, 100.0])
+    assert closed.discrete_frequency(k, bar, 0.01, 0.01 / bar) == pytest.approx(bar * k, rel=1e-12)
