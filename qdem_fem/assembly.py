@@ -39,7 +39,8 @@ class Assembly:
         density_factor: Floats | None = None,
     ) -> None:
         self.n_nodes = len(master)
-        self.dtype: Any = np.dtype(dtype)
+        kind: Any = np.dtype(dtype)
+        self.dtype = kind
         starts = np.cumsum([0] + [len(body.nodes) for body in bodies])
         shifted = [body.elements + start for body, start in zip(bodies, starts, strict=False)]
         self.elements = master[np.concatenate(shifted)]
@@ -54,13 +55,15 @@ class Assembly:
         mass = np.concatenate([m.density for m in materials]) * volumes / 4
         if density_factor is not None:
             mass = mass * density_factor
-        self.mass = np.bincount(self.elements.ravel(), np.repeat(mass, 4), self.n_nodes)
+        self.mass: Floats = np.bincount(
+            self.elements.ravel(), np.repeat(mass, 4), self.n_nodes
+        ).astype(float)
         """Quarter masses of the elements, summed [kg], (n,); zero for nodes that follow others."""
         self.packed = layout_build(self.elements, self.n_nodes, rows, self.dtype)
         self.place = self.packed.node_place[master]
         """The kernel's number of a node, (n,)."""
         self.viscous = True if viscous else None
-        self.law = kernel.LAWS[strain](self.dtype.type(0.5))
+        self.law = kernel.LAWS[strain](kind.type(0.5))
         chunks = len(self.packed.layout.chunk_shift)
         self.threads = min(threads or numba.get_num_threads(), chunks)
         inverse = np.zeros(self.n_nodes)

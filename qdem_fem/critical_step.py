@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import inf, sqrt
 
 import numpy as np
@@ -73,7 +74,7 @@ def highest_mode(
     start = np.random.default_rng(seed).normal(size=3 * n)
     step, rate = inf, 0.0
     for _ in range(ROUNDS):
-        operator = LinearOperator((3 * n, 3 * n), matvec=lambda x: product(x, rate), dtype=float)
+        operator = LinearOperator((3 * n, 3 * n), matvec=partial(product, rate=rate), dtype=float)
         if 3 * n <= 24:  # too small for Lanczos
             matrix = np.stack([operator.matvec(e) for e in np.eye(3 * n)])
             values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)

@@ -11,12 +11,13 @@ argument that is ``None`` (viscosity, gravity) takes its branch out of the compi
 from __future__ import annotations
 
 import hashlib
-from functools import cache
+import os
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import config, njit, prange
 from numba.core import types
 from numba.extending import overload
 
@@ -34,7 +35,17 @@ from qdem_fem.lanes import (
     scatter_pulls,
 )
 
-MATHEMATICS = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "reassoc"}}
+MATHEMATICS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "reassoc"}}
+"""Fused multiply-add and reassociation are allowed; NaN and infinity keep their meaning."""
+compiled: Any = partial(njit, **MATHEMATICS)
+inlined: Any = partial(njit, forceinline=True, **MATHEMATICS)
+INLINED: Any = {"forceinline": True, **MATHEMATICS}
+
+if not {"NUMBA_THREADING_LAYER", "NUMBA_THREADING_LAYER_PRIORITY"} & set(os.environ):
+    # numba's first choice, TBB, takes ten times longer to start a loop than OpenMP does
+    settings: Any = config
+    settings.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]
+
 ROWS_ELASTIC, ROWS_VISCOUS = 11, 13
 """Numbers an element brings: nine gradients, lambda V, mu V; with viscosity also those of it."""
 
@@ -72,8 +83,8 @@ STRESS = {
     Svk: stress.stress_svk,
     Corotational: stress.stress_corotational,
 }
-element_gradient = njit(forceinline=True, **MATHEMATICS)(stress.element_gradient)
-element_pulls = njit(forceinline=True, **MATHEMATICS)(stress.element_pulls)
+element_gradient = inlined(stress.element_gradient)
+element_pulls = inlined(stress.element_pulls)
 
 
 def elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
@@ -81,28 +92,51 @@ def elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
     return STRESS[type(law)](h, lame_first, lame_second, law.half)
 
 
-def viscous_stress(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
-    """Viscous ``P V``: linear beside `Small`, else in the current configuration (eq. 7)."""
+def viscous_pulls(
+    law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
+) -> Any:
+    """``(pulls, J)`` with viscosity, linear beside `Small`, else current (eq. 7)."""
+    if isinstance(law, Finger):
+        return stress.pulls_finger_viscous(
+            h, w, g, lame_first, lame_second, first, second, law.half
+        )
     viscous = stress.viscous_small if isinstance(law, Small) else stress.viscous_current
-    return viscous(h, rate, first, second, law.half)
+    p, jacobian = elastic_stress(law, h, lame_first, lame_second)
+    q = viscous(h, stress.element_gradient(w, g), first, second, law.half)
+    return stress.element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g), jacobian
 
 
-@overload(elastic_stress, strict=False, jit_options={"forceinline": True, **MATHEMATICS})
+@overload(elastic_stress, strict=False, jit_options=INLINED)
 def _elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
-    chosen = njit(forceinline=True, **MATHEMATICS)(STRESS[law.instance_class])
+    chosen = inlined(STRESS[law.instance_class])
     return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
 
 
-@overload(viscous_stress, strict=False, jit_options={"forceinline": True, **MATHEMATICS})
-def _viscous_stress(law: Any, h: Any, rate: Any, first: Any, second: Any) -> Any:
+@overload(viscous_pulls, strict=False, jit_options=INLINED)
+def _viscous_pulls(
+    law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
+) -> Any:
+    if law.instance_class is Finger:
+        fused = inlined(stress.pulls_finger_viscous)
+        return lambda law, h, w, g, lame_first, lame_second, first, second: fused(
+            h, w, g, lame_first, lame_second, first, second, law.half
+        )
     small = law.instance_class is Small
-    chosen = njit(forceinline=True, **MATHEMATICS)(
-        stress.viscous_small if small else stress.viscous_current
-    )
-    return lambda law, h, rate, first, second: chosen(h, rate, first, second, law.half)
+    elastic = inlined(STRESS[law.instance_class])
+    viscous = inlined(stress.viscous_small if small else stress.viscous_current)
+
+    def composed(
+        law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any,
+        second: Any,
+    ) -> Any:  # fmt: skip
+        p, jacobian = elastic(h, lame_first, lame_second, law.half)
+        q = viscous(h, element_gradient(w, g), first, second, law.half)
+        return element_pulls(add(p, q), g), jacobian
+
+    return composed
 
 
-@njit(forceinline=True, **MATHEMATICS)
+@inlined()
 def add(p: Any, q: Any) -> Any:
     """Sum of two matrices in rows."""
     return (
@@ -111,7 +145,7 @@ def add(p: Any, q: Any) -> Any:
     )  # fmt: skip
 
 
-@njit(**MATHEMATICS)
+@compiled()
 def chunk_forces(
     law: Any, viscous: Any, corners: Any, rows: Any, first_block: int, stop_block: int,
     displacement: Any, velocity: Any, forces: Any, shift: int,
@@ -122,7 +156,7 @@ def chunk_forces(
     Returns how many of its elements are inverted or not finite.
     """
     width = lane_count_of(rows)
-    bad = lanes_zero(rows)
+    bad: Any = lanes_zero(rows)
     for block in range(first_block, stop_block):
         at = block * block_size(viscous) * width
         g = (
@@ -132,15 +166,18 @@ def chunk_forces(
             lanes_load(rows, at + 7 * width), lanes_load(rows, at + 8 * width),
         )  # fmt: skip
         h = element_gradient(gather_edges(displacement, corners, block), g)
-        p, jacobian = elastic_stress(
-            law, h, lanes_load(rows, at + 9 * width), lanes_load(rows, at + 10 * width)
-        )
+        first, second = lanes_load(rows, at + 9 * width), lanes_load(rows, at + 10 * width)
+        if viscous is None:
+            p, jacobian = elastic_stress(law, h, first, second)
+            pulls = element_pulls(p, g)
+        else:
+            rate = gather_edges(velocity, corners, block)
+            pulls, jacobian = viscous_pulls(
+                law, h, rate, g, first, second, lanes_load(rows, at + 11 * width),
+                lanes_load(rows, at + 12 * width),
+            )  # fmt: skip
         bad = bad + lanes_not_positive(jacobian)
-        if viscous is not None:
-            rate = element_gradient(gather_edges(velocity, corners, block), g)
-            first, second = lanes_load(rows, at + 11 * width), lanes_load(rows, at + 12 * width)
-            p = add(p, viscous_stress(law, h, rate, first, second))
-        scatter_pulls(forces, corners, block, shift, element_pulls(p, g))
+        scatter_pulls(forces, corners, block, shift, pulls, viscous)
     return lanes_sum(bad)
 
 
@@ -166,7 +203,7 @@ def _block_size(viscous: Any) -> Any:
     return lambda viscous: size
 
 
-@njit(**MATHEMATICS)
+@compiled()
 def piece_motion(
     start: int, stop: int, shifts: Any, first: int, last: int, forces: Any, inverse_mass: Any,
     displacement: Any, velocity: Any, step: Any, gravity: Any, kinetic: Any, k: int, piece: int,
@@ -268,14 +305,14 @@ class Probes(NamedTuple):
     """Steps of the window before its first sample."""
 
 
-@njit(**MATHEMATICS)
+@compiled()
 def loads_apply(loads: Any, table_row: Any, forces: Any) -> None:
     """Add the loads to the forces."""
     for i in range(loads.force_at.size):
         forces[loads.force_at[i]] += loads.weight[i] * table_row[loads.series[i]]
 
 
-@njit(**MATHEMATICS)
+@compiled()
 def loads_power(loads: Any, table_row: Any, velocity: Any) -> float:
     """Power of the loads [W]."""
     power = 0.0
@@ -284,7 +321,7 @@ def loads_power(loads: Any, table_row: Any, velocity: Any) -> float:
     return power
 
 
-@njit(**MATHEMATICS)
+@compiled()
 def constraints_apply(held: Any, table_row: Any, state: Any, step: float) -> float:
     """Hold rollers in their planes and components at their values; returns the work done [J]."""
     displacement, velocity = state.displacement, state.velocity
@@ -310,7 +347,7 @@ def constraints_apply(held: Any, table_row: Any, state: Any, step: float) -> flo
     return work
 
 
-@njit(**MATHEMATICS)
+@compiled()
 def probes_take(probes: Any, done: int, displacement: Any) -> None:
     """Record the probes when the step number asks for it."""
     if done >= probes.first and (done - probes.first) % probes.stride == 0:
@@ -330,7 +367,7 @@ def window_build(variant: str) -> Any:
     sources = (Path(__file__).with_name(name).read_bytes() for name in ("stress.py", "lanes.py"))
     made_from = variant + hashlib.sha256(b"".join(sources)).hexdigest()
 
-    @njit(parallel=variant == "threads", cache=True, **MATHEMATICS)
+    @compiled(parallel=variant == "threads", cache=True)
     def window(
         law: Any, viscous: Any, layout: Any, state: Any, loads: Any, held: Any, probes: Any,
         table: Any, gravity: Any, kinetic: Any, work: Any, step: Any, steps: int,

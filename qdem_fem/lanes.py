@@ -19,7 +19,10 @@ from llvmlite import binding, ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.extending import intrinsic as numba_intrinsic
+from numba.extending import lower_builtin, models, register_model
+
+intrinsic: Any = numba_intrinsic
 
 FLAGS = ("contract", "nsz", "arcp", "reassoc")
 """Fused multiply-add and reassociation are allowed; NaN and infinity keep their meaning."""
@@ -187,6 +190,9 @@ def _block_corners(
     With ``again`` they are read from memory a second time, which costs less than to keep
     them through the stress with no register to spare.
     """
+    if again:  # an empty instruction that may have changed memory: nothing read before is kept
+        nothing = ir.FunctionType(ir.VoidType(), [])
+        builder.asm(nothing, "", "~{memory}", [], side_effect=True)
     start = builder.mul(block, block.type(4 * width))
     corners = []
     for corner in range(4):
@@ -194,7 +200,6 @@ def _block_corners(
         for lane in range(width):
             at = builder.add(start, start.type(corner * width + lane))
             number = builder.load(_pointer(context, builder, kind, array, at))
-            number.volatile = again
             lanes.append(builder.sext(number, ir.IntType(64)))
         corners.append(lanes)
     return corners
@@ -285,17 +290,19 @@ def gather_edges(typingctx: Any, vectors: Any, corners: Any, block: Any) -> Any:
 
 @intrinsic
 def scatter_pulls(
-    typingctx: Any, forces: Any, corners: Any, block: Any, shift: Any, pulls: Any
+    typingctx: Any, forces: Any, corners: Any, block: Any, shift: Any, pulls: Any, viscous: Any
 ) -> Any:
     """Subtract nine lanes of pulls from corners 1, 2, 3 and add their sum to corner 0.
 
     ``shift`` is added to the place of a node: ``forces`` may hold a window of the nodes only.
-    Elements of a block that share a node are added one after the other.
+    Elements of a block that share a node are added one after the other.  ``viscous`` is the
+    kernel's: with viscosity in double precision no register is left to keep the places in.
     """
     width = lane_count(forces.dtype)
+    again = forces.dtype is types.float64 and not isinstance(viscous, types.NoneType)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        at = _block_corners(context, builder, corners, args[1], args[2], width, again=True)
+        at = _block_corners(context, builder, corners, args[1], args[2], width, again=again)
         number, size = _number(forces.dtype), forces.dtype.bitwidth // 8
         base = _pointer(context, builder, forces, args[0], args[3])
         pull = cgutils.unpack_tuple(builder, args[4], 9)
@@ -317,7 +324,8 @@ def scatter_pulls(
                 builder.store(combine(before, row, flags=FLAGS), vector, align=4 * size)
         return context.get_dummy_value()
 
-    return signature(types.void, forces, corners, types.intp, types.intp, pulls), codegen
+    kinds = (forces, corners, types.intp, types.intp, pulls, viscous)
+    return signature(types.void, *kinds), codegen
 
 
 @intrinsic

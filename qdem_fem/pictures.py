@@ -221,7 +221,7 @@ def picture_history(
         for label, (time, values) in (rivals or {}).items():
             panel.plot(time, values / scale, color=RIVAL, ls="--", lw=1.1, label=label)
         panel.set(xlabel="time (s)", ylabel=f"{quantity} ({name})")
-        panel.legend(loc="best", ncols=3)
+        panel.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4)
 
 
 def picture_spectrum(
@@ -249,6 +249,9 @@ def picture_spectrum(
             )  # fmt: skip
         shown = max((mode.frequency for mode in modes), default=highest / 4)
         panel.set(xlim=(0, min(2 * shown, highest)), yscale="log")
+        top = max(float(np.max(line.get_ydata())) for line in panel.lines[: len(curves)])
+        if top > 0:
+            panel.set_ylim(1e-7 * top, 3 * top)
         panel.set(xlabel="frequency (Hz)", ylabel=f"amplitude of {quantity} ({unit})")
         panel.legend(loc="upper right")
 
@@ -265,7 +268,7 @@ def picture_energy(path: Path, energy: Mapping[str, FloatArray]) -> None:
         total = (energy["kinetic"] + energy["elastic"]) / scale
         panel.plot(time, total, color="#111111", lw=0.9, ls="--", label="kinetic + elastic")
         panel.set(xlabel="time (s)", ylabel=f"energy ({unit})")
-        panel.legend(loc="best", ncols=4)
+        panel.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4)
 
 
 def unit_of(greatest: float, unit: str) -> tuple[float, str]:

@@ -211,7 +211,8 @@ def _again(manifest: dict[str, Any]) -> Iterator[str]:
     yield "<h2>To compute it again</h2>"
     versions = ", ".join(f"{name} {version}" for name, version in manifest["versions"].items())
     yield f"<pre>{escape(manifest['command'])}</pre>"
-    yield f"<p>{escape(versions)}; {escape(manifest['machine'])}; {escape(manifest['started'])}.</p>"
+    made = "; ".join([versions, manifest["machine"], manifest["started"]])
+    yield f"<p>{escape(made)}.</p>"
     asked = json.dumps(manifest["scene"], indent=1)
     yield f"<details><summary>What was asked, defaults included</summary><pre>{escape(asked)}</pre>"
     for name, digest in manifest["files"].items():

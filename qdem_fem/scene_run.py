@@ -21,8 +21,8 @@ from qdem_fem.run_folder import RunFolder
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import Prepared
 
-CHUNK = 0.3
-"""Time between two looks at the clock, the signals and the progress line [s]."""
+CHUNK_WORK = 50_000_000
+"""Element-steps between two looks at the clock and the signals: a second or a few."""
 ENERGIES = ("kinetic", "elastic", "external")
 COST = "cost.json"
 
@@ -38,17 +38,17 @@ class Plan:
     """[s]"""
     total: int
     sampling: int
+    chunk: int
+    """Steps that are computed at one go; fixed, as sums over them round differently otherwise."""
     energy: int
     fields: int
     every_field: bool
     """Whether fields are written on the way, or only at the end."""
 
-    def next_row(self, done: int) -> int:
-        """Steps at which something but a probe is written next."""
-        marks = [self.total, done - done % self.energy + self.energy]
-        if self.every_field:
-            marks.append(done - done % self.fields + self.fields)
-        return min(marks)
+    def next_stop(self, done: int) -> int:
+        """Steps at which the computation comes back next."""
+        strides = [self.chunk, self.energy, *([self.fields] if self.every_field else [])]
+        return min(self.total, *(done - done % stride + stride for stride in strides))
 
     def field_files(self, done: int) -> list[tuple[int, float, str]]:
         """Step, time [s] and name of all VTU files of a run that has done so many steps."""
@@ -60,6 +60,7 @@ class Plan:
 
 def plan_of(prepared: Prepared, step: float) -> Plan:
     """When what is written; ``step`` is the time step [s]."""
+    elements = sum(len(mesh.elements) for mesh in prepared.meshes.values())
     duration, output = prepared.scene.simulation.duration, prepared.scene.output
     assert duration is not None
 
@@ -71,6 +72,7 @@ def plan_of(prepared: Prepared, step: float) -> Plan:
         step=step,
         total=sampling * max(1, ceil(duration / (sampling * step) - 1e-6)),
         sampling=sampling,
+        chunk=sampling * max(1, CHUNK_WORK // (elements * sampling)),
         energy=multiple(output.energy_interval or duration / 200, sampling),
         fields=multiple(output.vtu_interval or duration, sampling),
         every_field=output.vtu_interval is not None,
@@ -97,13 +99,9 @@ def run_dynamic(prepared: Prepared, folder: RunFolder, *, resume: bool, progress
     and SIGTERM save the state and raise `Interrupted`.
     """
     goes_on = resume and folder.checkpoint.exists()
+    run, bodies = simulation_of(prepared)
     if goes_on:
-        import qdem_fem
-
-        run = qdem_fem.Simulation.load(folder.checkpoint)
-        bodies = {body.name: body for body in run.bodies}
-    else:
-        run, bodies = simulation_of(prepared)
+        run.restore(folder.checkpoint)
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
     plan = plan_of(prepared, run.step)
     rows, energies = _tables(folder.path, probes)
@@ -115,17 +113,12 @@ def run_dynamic(prepared: Prepared, folder: RunFolder, *, resume: bool, progress
     cost = _cost_read(folder.path) if goes_on else {"cpu_s": 0.0, "wall_s": 0.0}
     done = Done(run, bodies, plan, cost)
     saved = time.monotonic()
-    chunk = 1
     with stop_signals() as stop:
         while run.steps_done < plan.total:
-            steps = min(chunk * plan.sampling, plan.next_row(run.steps_done) - run.steps_done)
             started, cpu = time.perf_counter(), time.process_time()
-            record.advance(steps, probes)
-            elapsed = time.perf_counter() - started
-            cost["wall_s"] += elapsed
+            record.advance(plan.next_stop(run.steps_done) - run.steps_done, probes)
+            cost["wall_s"] += time.perf_counter() - started
             cost["cpu_s"] += time.process_time() - cpu
-            if steps == chunk * plan.sampling:
-                chunk = max(1, min(2 * chunk, int(chunk * CHUNK / max(elapsed, 1e-9))))
             progress.at(run.steps_done, plan.total, run.time)
             late = time.monotonic() - saved >= prepared.scene.output.checkpoint_interval
             if stop.name or late or run.steps_done == plan.total:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from qdem_fem import kernel
 from qdem_fem.assembly import NO_LOADS, Assembly
 from qdem_fem.body import Body
+from qdem_fem.checkpoint import checkpoint_read, checkpoint_write
 from qdem_fem.conditions import COMPONENTS, Conditions, Held, NodalLoad, Roller
 from qdem_fem.critical_step import CriticalStep, highest_mode
 from qdem_fem.errors import ConditionError, ElementInverted, Unstable
@@ -239,7 +241,7 @@ class Simulation:
         )
         start = self.steps_done - steps
         first = 0 if start == 0 else stride - start % stride
-        numbers = start + np.arange(first, steps + 1, stride)
+        numbers = start + np.arange(first, steps + 1, stride, dtype=float)
         values, column = {}, 0
         for name, nodes in chosen.items():
             values[name] = recorded[:, column : column + len(nodes)].mean(axis=1)
@@ -259,6 +261,18 @@ class Simulation:
                 gradient, volumes, material.lame_first, material.lame_second, self.strain
             ).sum()
         return Energy(kinetic, float(elastic), float(self.work.sum()) + self._gravity_work)
+
+    def save(self, path: str | Path) -> None:
+        """Write the state to a file (`qdem_fem.checkpoint.checkpoint_write`)."""
+        checkpoint_write(self, path)
+
+    def restore(self, path: str | Path) -> None:
+        """Go on from a state that `save` wrote: to the same bits, as if never interrupted.
+
+        The simulation has the meshes, materials, options and conditions of the saved one; else
+        `CheckpointError` says what differs.
+        """
+        checkpoint_read(self, path)
 
     @property
     def assembly(self) -> Assembly:
@@ -326,7 +340,7 @@ class Simulation:
         most = max(16, min(WINDOW_STEPS, WINDOW_WORK // len(assembly.elements)))
         while self.steps_done < end:
             count = min(most, end - self.steps_done)
-            times = self.step * (self.steps_done + np.arange(count + 1))
+            times = self.step * (self.steps_done + np.arange(count + 1, dtype=float))
             ahead = -(self.steps_done - start - first) % stride or stride
             taken = (
                 (self.steps_done - start - first) // stride + 1
@@ -429,9 +443,7 @@ class Simulation:
         found: list[tuple[float, Body, int]] = []
         for body in self.bodies:
             gradients, volumes = body.gradients
-            moved = mode[
-                self._nodes(body, np.arange(len(body.nodes)), "critical step", all_of=True)
-            ]
+            moved = mode[self._offset(body) : self._offset(body) + len(body.nodes)]
             gradient = displacement_gradient(gradients, body.elements, moved)
             material = body.material
             energy = elastic_energy(
@@ -446,9 +458,8 @@ class Simulation:
             raise ConditionError(f"{body.name} is not in this simulation", where="body")
         return int(self._first_node[[body is member for member in self.bodies].index(True)])
 
-    def _nodes(self, body: Body, nodes: Any, where: str, *, all_of: bool = False) -> Integers:
-        local = np.asarray(nodes) if all_of else body.nodes_select(nodes, where)
-        return local + self._offset(body)
+    def _nodes(self, body: Body, nodes: Any, where: str) -> Integers:
+        return body.nodes_select(nodes, where) + self._offset(body)
 
     def _probe(self, name: str, probe: Any) -> Integers:
         if isinstance(probe, tuple) and len(probe) == 2 and isinstance(probe[0], Body):

@@ -251,6 +251,71 @@ def viscous_current(h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, h
     )
 
 
+def pulls_finger_viscous(
+    h: Nine, w: Nine, g: Nine, lame_first: Any, lame_second: Any, viscous_first: Any,
+    viscous_second: Any, half: Any,
+) -> tuple[Nine, Any]:  # fmt: skip
+    """`element_pulls` of `stress_finger` and `viscous_current` together, with less work.
+
+    With ``c_a = cof(F) grad N_a``, which is ``J`` times the gradient in the current
+    configuration: ``J L = sum_a w_a (x) c_a`` (eq. 5) and ``f_a = -V0 T c_a`` (eqs. 8-10).
+    ``w``: edges of the velocity [m/s], as the edges of `element_gradient`.  Returns the pulls
+    and ``J``.
+    """
+    h0, h1, h2, h3, h4, h5, h6, h7, h8 = h
+    one = half + half
+    f0, f4, f8 = one + h0, one + h4, one + h8
+    c0, c1, c2 = f4 * f8 - h5 * h7, h5 * h6 - h3 * f8, h3 * h7 - f4 * h6
+    c3, c4, c5 = h2 * h7 - h1 * f8, f0 * f8 - h2 * h6, h1 * h6 - f0 * h7
+    c6, c7, c8 = h1 * h5 - h2 * f4, h2 * h3 - f0 * h5, f0 * f4 - h1 * h3
+    jacobian = f0 * c0 + h1 * c1 + h2 * c2
+    inverse = one / jacobian
+    ax, ay, az = (
+        c0 * g[0] + c1 * g[1] + c2 * g[2],
+        c3 * g[0] + c4 * g[1] + c5 * g[2],
+        c6 * g[0] + c7 * g[1] + c8 * g[2],
+    )
+    bx, by, bz = (
+        c0 * g[3] + c1 * g[4] + c2 * g[5],
+        c3 * g[3] + c4 * g[4] + c5 * g[5],
+        c6 * g[3] + c7 * g[4] + c8 * g[5],
+    )
+    cx, cy, cz = (
+        c0 * g[6] + c1 * g[7] + c2 * g[8],
+        c3 * g[6] + c4 * g[7] + c5 * g[8],
+        c6 * g[6] + c7 * g[7] + c8 * g[8],
+    )
+    second = viscous_second * inverse
+    lxx = w[0] * ax + w[3] * bx + w[6] * cx
+    lyy = w[1] * ay + w[4] * by + w[7] * cy
+    lzz = w[2] * az + w[5] * bz + w[8] * cz
+    lxy = w[0] * ay + w[3] * by + w[6] * cy + (w[1] * ax + w[4] * bx + w[7] * cx)
+    lxz = w[0] * az + w[3] * bz + w[6] * cz + (w[2] * ax + w[5] * bx + w[8] * cx)
+    lyz = w[1] * az + w[4] * bz + w[7] * cz + (w[2] * ay + w[5] * by + w[8] * cy)
+    exx = h0 + half * (h0 * h0 + h1 * h1 + h2 * h2)
+    eyy = h4 + half * (h3 * h3 + h4 * h4 + h5 * h5)
+    ezz = h8 + half * (h6 * h6 + h7 * h7 + h8 * h8)
+    exy = (h1 + h3) + (h0 * h3 + h1 * h4 + h2 * h5)
+    exz = (h2 + h6) + (h0 * h6 + h1 * h7 + h2 * h8)
+    eyz = (h5 + h7) + (h3 * h6 + h4 * h7 + h5 * h8)
+    pressure = lame_first * (exx + eyy + ezz) + viscous_first * inverse * (lxx + lyy + lzz)
+    elastic, viscous = lame_second + lame_second, second + second
+    txx = pressure + elastic * exx + viscous * lxx
+    tyy = pressure + elastic * eyy + viscous * lyy
+    tzz = pressure + elastic * ezz + viscous * lzz
+    txy = lame_second * exy + second * lxy
+    txz = lame_second * exz + second * lxz
+    tyz = lame_second * eyz + second * lyz
+    pulls = (
+        txx * ax + txy * ay + txz * az, txy * ax + tyy * ay + tyz * az,
+        txz * ax + tyz * ay + tzz * az, txx * bx + txy * by + txz * bz,
+        txy * bx + tyy * by + tyz * bz, txz * bx + tyz * by + tzz * bz,
+        txx * cx + txy * cy + txz * cz, txy * cx + tyy * cy + tyz * cz,
+        txz * cx + tyz * cy + tzz * cz,
+    )  # fmt: skip
+    return pulls, jacobian
+
+
 def viscous_small(h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, half: Any) -> Nine:
     """``P = lambda_D tr(Hdot) I + mu_D (Hdot + Hdot^T)``: linear viscosity, as `stress_small`."""
     pressure = viscous_first * (d[0] + d[4] + d[8])

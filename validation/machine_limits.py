@@ -122,11 +122,19 @@ def measure(work: Callable[[], object]) -> Interval:
 # --- kernels ------------------------------------------------------------------------------------
 
 
-def _triad(target: Any, first: Any, second: Any, factor: float, rounds: int) -> None:
-    """a = b + s c, ``rounds`` times; three arrays (n,), on the threads that numba is set to."""
-    for _ in range(rounds):
-        for i in prange(target.size):
-            target[i] = first[i] + factor * second[i]
+def _triad(target: Any, first: Any, second: Any, factor: float, threads: int, rounds: int) -> None:
+    """a = b + (s + r) c in rounds r = 0, 1, ...; three arrays (n,), a part of them each thread.
+
+    Threads do not wait for one another between rounds; the factor changes, so that no round is
+    superfluous to a compiler.
+    """
+    for thread in prange(threads):
+        part = slice(thread * target.size // threads, (thread + 1) * target.size // threads)
+        a, b, c = target[part], first[part], second[part]
+        for number in range(rounds):
+            scale = factor + number
+            for i in range(a.size):
+                a[i] = b[i] + scale * c[i]
 
 
 triad: Any = njit(parallel=True, fastmath=True, cache=True)(_triad)
@@ -228,7 +236,7 @@ def machine_limits(threads: int = 2) -> MachineLimits:
             arrays = [np.full(size // 8, value) for value in (0.0, 1.0, 2.0)]
             for count in sorted({1, threads}):
                 set_num_threads(count)
-                rate, share = best_rate(partial(triad, *arrays, 0.5), 24 * len(arrays[0]))
+                rate, share = best_rate(partial(triad, *arrays, 0.5, count), 24 * len(arrays[0]))
                 bandwidth[place][count] = rate / 1e9
                 others.append(share)
         flops = {}

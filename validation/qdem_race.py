@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -51,10 +51,10 @@ class Contestant:
 
     who: str
     """``"qdem"``, ``"mkl"`` or ``"scipy"``."""
-    precision: str = "float64"
+    precision: Literal["float64", "float32"] = "float64"
     threads: int = 1
     viscous: bool = False
-    strain: str = "finger"
+    strain: Literal["finger", "small"] = "finger"
     storage: str = "rows"
 
     @property

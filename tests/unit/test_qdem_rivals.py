@@ -180,11 +180,13 @@ def test_quiet_needs_to_be_known(others: float, quiet: bool) -> None:
     assert Interval(1.0, 1.0, others).quiet is quiet
 
 
-def test_triad_computes_what_it_says() -> None:
-    b, c = np.random.default_rng(2).normal(size=(2, 1000))
-    a = np.zeros(1000)
-    triad(a, b, c, 0.5, 2)
-    np.testing.assert_allclose(a, b + 0.5 * c, rtol=1e-15)
+@pytest.mark.parametrize("threads", [1, 2])
+def test_triad_computes_what_it_says(threads: int) -> None:
+    """The third round is a = b + (s + 2) c."""
+    b, c = np.random.default_rng(2).normal(size=(2, 1001))
+    a = np.zeros(1001)
+    triad(a, b, c, 0.5, threads, 3)
+    np.testing.assert_allclose(a, b + 2.5 * c, rtol=1e-13, atol=1e-15)
 
 
 @pytest.mark.parametrize("kind", [np.float64, np.float32])

@@ -1,0 +1,210 @@
+"""The state of a simulation in a file, from which it goes on to the same bits.
+
+The file is an npz, readable by `numpy.load`; the comment of its archive is the SHA-256 of all
+bytes before it, so that damage anywhere is seen before anything is believed.  Fields are in the
+user's order of nodes and in the kernel's precision.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.critical_step import CriticalStep
+from qdem_fem.errors import CheckpointError
+from qdem_fem.output import write_whole
+from qdem_fem.series import Driver, Series
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+Arrays = dict[str, NDArray[Any]]
+
+FORMAT = 1
+DIGEST = 64
+"""Letters of a SHA-256 in hexadecimal."""
+FUNCTION = "a function, not compared"
+
+
+@dataclass(frozen=True)
+class _Progress:
+    """Scalars of the state."""
+
+    steps_done: int
+    step: float
+    behind: bool
+    put_in: float
+    gravity_work: float
+
+
+def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
+    """Write the state of ``simulation`` to ``path``; a kill leaves the old file or the new one."""
+    assembly, (_, held) = simulation.assembly, simulation._packed_lists()
+    critical = simulation.critical_step
+    progress = _Progress(
+        simulation.steps_done, simulation.step, simulation._behind,
+        float(simulation._put_in), float(simulation._gravity_work),
+    )  # fmt: skip
+    head = {
+        "format": FORMAT,
+        "fingerprint": fingerprint(simulation),
+        "progress": {field.name: getattr(progress, field.name) for field in fields(progress)},
+        "critical_step": {
+            field.name: getattr(critical, field.name)
+            for field in fields(critical)
+            if field.name != "mode"
+        },
+    }
+    arrays: Arrays = {
+        "head": np.array(json.dumps(head)),
+        "work": simulation.work,
+        "previous": held.previous,
+        "critical_mode": critical.mode,
+    }
+    for name in ("displacement", "velocity"):
+        arrays[name] = getattr(assembly.state, name).reshape(-1, 4)[assembly.place, :3]
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes them for its flags
+    write_whole(Path(path), _sealed(stream.getvalue()))
+
+
+def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
+    """Give ``simulation`` the state in ``path``; it then goes on as the one that was saved.
+
+    ``simulation`` is made as the saved one was: same meshes, materials, options and conditions
+    (of conditions that are functions, only that they are).  Raises `CheckpointError` naming what
+    differs, or that the file is damaged; the simulation is then as it was.
+    """
+    where = str(path)
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise CheckpointError(f"can not be read ({error.strerror})", where=where) from error
+    head, arrays = _opened(content, where)
+    _compare(head["fingerprint"], fingerprint(simulation), where)
+    progress = _Progress(**head["progress"])
+    critical = CriticalStep(**head["critical_step"], mode=arrays["critical_mode"])
+
+    assembly, (_, held) = simulation.assembly, simulation._packed_lists()
+    for name in ("displacement", "velocity"):
+        getattr(assembly.state, name).reshape(-1, 4)[assembly.place, :3] = arrays[name]
+    held.previous[:] = arrays["previous"]
+    simulation._critical = critical
+    simulation.steps_done, simulation._behind = progress.steps_done, progress.behind
+    simulation.work[:] = arrays["work"]
+    simulation._put_in, simulation._gravity_work = progress.put_in, progress.gravity_work
+
+
+def fingerprint(simulation: Simulation) -> dict[str, str]:
+    """What makes a simulation this one and no other, by names a user knows."""
+    conditions = simulation.conditions
+    marks = {
+        "bodies": ", ".join(body.name for body in simulation.bodies),
+        "strain": simulation.strain,
+        "precision": simulation.precision,
+        "step": f"given, {simulation._given_step!r} s"
+        if simulation._given_step is not None
+        else f"{simulation.safety!r} of the critical one",
+        "mass_scaling": repr(simulation.mass_scaling),
+        "gravity": "none" if simulation._gravity is None else _driver_mark(simulation._gravity),
+        "loads": _mark(
+            *(
+                part
+                for load in conditions.loads
+                for part in (load.nodes, load.weights, _driver_mark(load.driver))
+            )
+        ),
+        "given displacements": _mark(
+            *(
+                part
+                for held in conditions.held
+                for part in (
+                    held.nodes,
+                    np.array(held.components),
+                    "fixed" if held.driver is None else _driver_mark(held.driver),
+                )
+            )
+        ),
+        "rollers": _mark(
+            *(p for roller in conditions.rollers for p in (roller.nodes, roller.normal))
+        ),
+        "periodic pairs": _mark(simulation._master),
+    }
+    for number, body in enumerate(simulation.bodies):
+        marks[f"mesh of body {number}"] = _mark(body.nodes, body.elements)
+        material = [np.asarray(getattr(body.material, f.name)) for f in fields(body.material)]
+        marks[f"material of body {number}"] = _mark(*material)
+    return marks
+
+
+def _mark(*parts: NDArray[Any] | str) -> str:
+    """A hash of arrays and texts."""
+    digest = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, str):
+            digest.update(f"text {len(part)} {part}".encode())
+        else:
+            digest.update(f"{part.dtype.str} {part.shape}".encode())
+            digest.update(np.ascontiguousarray(part).tobytes())
+    return digest.hexdigest()
+
+
+def _driver_mark(driver: Driver) -> str:
+    if driver.varying is None:
+        return _mark(driver.constant)
+    if isinstance(driver.varying, Series):
+        return _mark(driver.varying.times, driver.varying.values)
+    return FUNCTION
+
+
+def _compare(saved: Mapping[str, str], here: Mapping[str, str], where: str) -> None:
+    different = [name for name in {**here, **saved} if saved.get(name) != here.get(name)]
+    if not different:
+        return
+    name = different[0]
+    told = [marks.get(name, "absent") for marks in (saved, here)]
+    what = f"another simulation was saved: {', '.join(different)} differ"
+    if all(len(text) < DIGEST for text in told):
+        what += f" ({name}: {told[0]!r} in the file, {told[1]!r} here)"
+    raise CheckpointError(
+        what, where=where, remedy="make the simulation as it was when it was saved, or start anew"
+    )
+
+
+def _sealed(archive: bytes) -> bytes:
+    """The archive with its own hash as its comment; the length of that ends the archive."""
+    body = archive[:-2] + DIGEST.to_bytes(2, "little")
+    return body + hashlib.sha256(body).hexdigest().encode()
+
+
+def _opened(content: bytes, where: str) -> tuple[dict[str, Any], Arrays]:
+    """Head and arrays of a sound file."""
+    body, seal = content[:-DIGEST], content[-DIGEST:]
+    if hashlib.sha256(body).hexdigest().encode() != seal:
+        raise CheckpointError(
+            f"this is no whole checkpoint ({len(content)} bytes, and their checksum is wrong)",
+            where=where,
+            remedy="take an earlier checkpoint, or start anew",
+        )
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        head = json.loads(str(arrays["head"]))
+        known = head["format"]
+    except (KeyError, ValueError, OSError, EOFError) as error:
+        raise CheckpointError(f"this is no checkpoint ({error})", where=where) from error
+    if known != FORMAT:
+        raise CheckpointError(
+            f"it is of format {known}, this version reads {FORMAT}",
+            where=where,
+            remedy="go on with the version that wrote it",
+        )
+    return head, arrays

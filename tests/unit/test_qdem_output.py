@@ -1,0 +1,217 @@
+"""Output files: what other programs read in them, and that none is ever half-written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from qdem_fem.errors import UsageError
+from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, vtu_write, write_whole
+from qdem_fem.pictures import (
+    feature_edges,
+    magnification_round,
+    nodal_average,
+    picture_deformed,
+    picture_energy,
+    picture_history,
+    picture_spectrum,
+    unit_of,
+    view_frame,
+)
+from qdem_fem.surface import surface_faces
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+
+
+def body(shift: float = 0.0) -> Any:
+    """What output asks of a `qdem_fem.Body`."""
+    mesh = box_mesh((2.0, 1.0, 1.0), (4, 2, 2), origin=(shift, 0, 0))
+    x = mesh.nodes
+    stress = mesh.nodes[mesh.elements].mean(axis=1)[:, 0] * 1e5
+    return SimpleNamespace(
+        nodes=x, elements=mesh.elements, surface=surface_faces(mesh.elements),
+        displacement=1e-4 * x[:, [1, 2, 0]], velocity=x**2, von_mises=lambda: stress,
+    )  # fmt: skip
+
+
+def test_vtu_is_read_back_by_meshio(tmp_path: Path) -> None:
+    """Two bodies in one file: coordinates, elements and every field, bit by bit."""
+    bodies = [body(), body(5.0)]
+    bodies_vtu_write(tmp_path / "a.vtu", bodies)
+    mesh = meshio.read(tmp_path / "a.vtu")
+    count = len(bodies[0].nodes)
+    assert (mesh.points == np.concatenate([one.nodes for one in bodies])).all()
+    elements = mesh.cells_dict["tetra"]
+    assert (elements == np.concatenate([bodies[0].elements, bodies[1].elements + count])).all()
+    for name in ("displacement", "velocity"):
+        expected = np.concatenate([getattr(one, name) for one in bodies])
+        assert (mesh.point_data[name] == expected).all()
+    expected = np.concatenate([one.von_mises() for one in bodies])
+    assert (mesh.cell_data["von_mises"][0] == expected).all()
+    assert mesh.cell_data["body"][0].tolist() == [0] * 96 + [1] * 96
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, ">f8"])
+def test_fields_of_any_type_and_name(tmp_path: Path, kind: Any) -> None:
+    """Single precision, integers and foreign byte order survive, and so does a strange name."""
+    one = body()
+    field = np.arange(len(one.nodes)).astype(kind)
+    vtu_write(tmp_path / "a.vtu", one.nodes, one.elements, {'<"&>': field}, {})
+    assert (meshio.read(tmp_path / "a.vtu").point_data['<"&>'] == field).all()
+
+
+def test_field_of_another_length_is_refused(tmp_path: Path) -> None:
+    """A field must have a row for each node or element; nothing is written else."""
+    one = body()
+    with pytest.raises(UsageError, match="'wrong' has 3 rows, not 96"):
+        vtu_write(tmp_path / "a.vtu", one.nodes, one.elements, {}, {"wrong": np.zeros(3)})
+    assert not list(tmp_path.iterdir())
+
+
+def test_pvd_names_times_and_files(tmp_path: Path) -> None:
+    """The series is XML that gives each file its time to the last bit."""
+    pvd_write(tmp_path / "f.pvd", [(0.0, "a.vtu"), (0.1 + 0.2, "b&.vtu")])
+    found = ElementTree.parse(tmp_path / "f.pvd").getroot().iter("DataSet")
+    assert [(float(one.attrib["timestep"]), one.attrib["file"]) for one in found] == [
+        (0.0, "a.vtu"),
+        (0.1 + 0.2, "b&.vtu"),
+    ]
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
+    """A writer that dies half-way leaves the file as it was, and no rubbish."""
+    path = tmp_path / "a"
+    write_whole(path, "old")
+
+    def parts() -> Any:
+        yield b"new"
+        raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        write_whole(path, parts())
+    assert [one.name for one in tmp_path.iterdir()] == ["a"]
+    assert path.read_text() == "old"
+
+
+@settings(max_examples=30, deadline=None)
+@given(values=st.lists(FINITE, min_size=1, max_size=20))
+def test_table_keeps_every_bit(
+    tmp_path_factory: pytest.TempPathFactory, values: list[float]
+) -> None:
+    """Numbers are read back as they were written."""
+    table = Table(tmp_path_factory.mktemp("t") / "t.csv", ["time", "a"])
+    table.begin()
+    rows = np.column_stack([np.arange(len(values)), values])
+    table.append(rows[:1])
+    table.append(rows[1:])
+    found = table_read(table.path)
+    assert (np.column_stack([found["time"], found["a"]]) == rows).all()
+
+
+@pytest.mark.parametrize("torn", ["", "4", "4.0,9", "4.0,9.0", "x\n"])
+def test_cut_leaves_sound_rows_up_to_a_time(tmp_path: Path, torn: str) -> None:
+    """Rows behind a time go, and so does a last row that a killed writer left torn."""
+    table = Table(tmp_path / "t.csv", ["time", "a"])
+    table.begin()
+    table.append(np.array([[0.0, 5.0], [1.0, 6.0], [2.0, 7.0], [3.0, 8.0]]))
+    whole = table.path.read_bytes()
+    with table.path.open("a") as stream:
+        stream.write(torn)
+    table.cut(1.5)
+    assert table.path.read_text() == "time,a\n0.0,5.0\n1.0,6.0\n"
+    table.append(np.array([[2.0, 7.0], [3.0, 8.0]]))
+    table.cut(3.0)
+    assert table.path.read_bytes() == whole
+
+
+def test_cut_refuses_another_table(tmp_path: Path) -> None:
+    """A table with other columns, or none at all, is no table to go on with."""
+    (tmp_path / "t.csv").write_text("time,b\n0,1\n")
+    for name in ("t.csv", "none.csv"):
+        with pytest.raises(UsageError, match=name):
+            Table(tmp_path / name, ["time", "a"]).cut(1.0)
+    (tmp_path / "t.csv").write_text("time,a\n0,x\n")
+    with pytest.raises(UsageError, match="no table"):
+        table_read(tmp_path / "t.csv")
+
+
+# ---------------------------------------------------------------------------- pictures
+
+
+def test_feature_edges_of_a_box_are_its_twelve() -> None:
+    """Sharp edges of a 4 x 2 x 2 box: 4 (4 + 2 + 2) mesh edges along its twelve sides."""
+    one = body()
+    edges = feature_edges(one.nodes, one.surface)
+    assert len(edges) == 4 * (4 + 2 + 2)
+    sides = (one.nodes[edges] == np.array([2, 1, 1])) | (one.nodes[edges] == 0)
+    assert (sides.all(axis=1).sum(axis=1) >= 2).all()
+
+
+def test_view_frame_is_right_handed() -> None:
+    """From the front (azimuth -90, elevation 0) x is right, y away, z up; any frame is a rotation."""
+    assert view_frame(-90, 0) == pytest.approx(np.eye(3), abs=1e-15)
+    frame = view_frame(-62, 24)
+    assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-15)
+    assert np.linalg.det(frame) == pytest.approx(1)
+
+
+def test_average_of_nodes_keeps_a_constant_and_unused_nodes() -> None:
+    """A constant stress stays, the average of a node is that of its elements, unused nodes get 0."""
+    elements = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+    assert nodal_average(elements, np.array([2.0, 4.0]), 6).tolist() == [2, 3, 3, 3, 4, 0]
+
+
+@pytest.mark.parametrize("scale", [0.0, 1e-12, 1e-6, 1e-2, 10.0])
+def test_magnification_is_round_and_never_below_one(scale: float) -> None:
+    """1, 2, 5 times a power of ten; 1 for bodies that do not move or move far."""
+    one = body()
+    one.displacement = scale * one.nodes / 2
+    factor = magnification_round([one])
+    assert f"{factor:.0e}"[0] in "125"
+    assert factor == pytest.approx(float(f"{factor:.0e}"))
+    assert factor >= 1
+    if 0 < scale < 1e-2:
+        assert 0.4 * 0.06 <= factor * scale / np.sqrt(6) <= 0.06
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(92e-6, (1e-6, "µm")), (45e3, (1e3, "km")), (0.0, (1.0, "m")), (1e-15, (1e-9, "nm"))],
+)
+def test_units_are_shown_in_a_fitting_multiple(value: float, expected: tuple[float, str]) -> None:
+    """The multiple that leaves one to three digits before the point."""
+    assert unit_of(value, "m") == expected
+
+
+def test_pictures_are_written_and_repeat(tmp_path: Path) -> None:
+    """Every picture is a PNG of the same bytes each time, with nothing else left behind."""
+    time = np.linspace(0, 1, 400)
+    curve = {"tip_z": (time, 1e-4 * np.sin(60 * time)), "flat": (time, np.zeros(400))}
+    energy = {name: time**2 for name in ("time", "kinetic", "elastic", "external")}
+    for _ in range(2):
+        picture_deformed(tmp_path / "a.png", [body(), body(5.0)])
+        picture_history(tmp_path / "b.png", curve, rivals={"FEM": curve["tip_z"]})
+        picture_spectrum(tmp_path / "c.png", curve)
+        picture_energy(tmp_path / "d.png", energy)
+        now = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+        assert sorted(now) == ["a.png", "b.png", "c.png", "d.png"]
+        assert all(content.startswith(b"\x89PNG") for content in now.values())
+        before = now if _ == 0 else before
+    assert now == before
+
+
+def test_motionless_body_is_drawn(tmp_path: Path) -> None:
+    """No displacement and no stress: a picture all the same, of magnification 1."""
+    one = body()
+    one.displacement = np.zeros_like(one.nodes)
+    one.von_mises = lambda: np.zeros(len(one.elements))
+    assert picture_deformed(tmp_path / "a.png", [one]) == 1.0

@@ -1,0 +1,194 @@
+"""Spectra: transforms of known records, the Parzen window's two integrals, fits of damped modes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from qdem_fem.errors import UsageError
+from qdem_fem.spectra import (
+    FloatArray,
+    amplitude_spectrum,
+    fourier_spectrum,
+    frequency_response,
+    parzen_smoothed,
+    peak_frequencies,
+)
+
+
+def damped(
+    time: FloatArray, frequency: float, decay: float = 0.0, amplitude: float = 1.0, phase: float = 0
+) -> FloatArray:
+    """A exp(-decay t) cos(2 pi f t + phase), t from the first sample."""
+    t = time - time[0]
+    return amplitude * np.exp(-decay * t) * np.cos(2 * np.pi * frequency * t + phase)
+
+
+@pytest.mark.parametrize("window", ["hann", "none"])
+def test_amplitude_of_a_cosine(window: str) -> None:
+    """A cosine of whole periods peaks at its amplitude and frequency; its mean is taken off."""
+    time = np.arange(1000) * 1e-3
+    frequency, amplitude = amplitude_spectrum(time, 5 + damped(time, 40, amplitude=3e-4), window)
+    assert frequency[np.argmax(amplitude)] == pytest.approx(40, rel=1e-12)
+    assert amplitude.max() == pytest.approx(3e-4, rel=1e-12)
+    assert amplitude[0] < 1e-12
+
+
+def test_fourier_spectrum_of_an_exponential() -> None:
+    """exp(-a t), t > 0 transforms to 1 / (a + 2 pi i f), up to dt/2 of the rule's first sample."""
+    time, rate = np.arange(200_000) * 1e-5, 60.0
+    values = np.exp(-rate * time)
+    values[0] = 0.5  # trapezoidal rule; its error is dt^2/12 |a + i w|^2 relative
+    frequency, spectrum = fourier_spectrum(time, values)
+    low = frequency < 100
+    exact = 1 / (rate + 2j * np.pi * frequency[low])
+    bound = (1e-5 * np.abs(1 / exact)) ** 2 / 12 + 1e-12
+    assert (np.abs(spectrum[low] / exact - 1) < 1.1 * bound).all()
+
+
+def test_fourier_spectrum_knows_when_it_starts() -> None:
+    """A record that starts later has the same amplitude and a phase of -2 pi f t_0."""
+    time = np.arange(64) * 0.1
+    values = damped(time, 1.25, 0.3)
+    frequency, at_zero = fourier_spectrum(time, values)
+    _, later = fourier_spectrum(time + 0.7, values)
+    assert later == pytest.approx(at_zero * np.exp(-2j * np.pi * frequency * 0.7), abs=1e-12)
+
+
+def test_parzen_window_has_the_bandwidth_it_is_asked_for() -> None:
+    """Of a spectral line it leaves W: integral W df = 1 and 1 / integral W^2 df = bandwidth.
+
+    W(f) = 3/4 u (sin(pi u f/2)/(pi u f/2))^4 with u = 280/(151 b).
+    """
+    frequency = np.arange(40_001) * 0.05
+    line = np.zeros(len(frequency))
+    line[20_000] = 1.0
+    smooth = parzen_smoothed(frequency, line, 20.0) ** 2 / 0.05
+    assert 0.05 * smooth.sum() == pytest.approx(1, rel=1e-6)
+    assert 1 / (0.05 * (smooth**2).sum()) == pytest.approx(20, rel=1e-3)
+    u = 280 / (151 * 20.0)
+    away = frequency - frequency[20_000]
+    assert smooth == pytest.approx(0.75 * u * np.sinc(u * away / 2) ** 4, abs=1e-6)
+
+
+def test_parzen_leaves_white_noise_flat_and_keeps_power() -> None:
+    """A constant spectrum stays; of noise the mean power stays, its scatter falls."""
+    frequency = np.arange(5001) * 0.5
+    assert parzen_smoothed(frequency, np.full(5001, 3.0)) == pytest.approx(3, rel=1e-9)
+    noise = np.abs(np.random.default_rng(2).standard_normal(5001))
+    smooth = parzen_smoothed(frequency, noise)
+    assert (smooth**2).mean() == pytest.approx((noise**2).mean(), rel=0.02)
+    # Power of 1 +- sqrt(2); over 20 Hz / 0.5 Hz = 40 lines its scatter falls by sqrt(40).
+    assert np.std(smooth**2) == pytest.approx(np.sqrt(2 / 40), rel=0.3)
+
+
+@pytest.mark.parametrize("bandwidth", [None, 20.0])
+def test_mobility_of_an_oscillator(bandwidth: float | None) -> None:
+    """|V/F| of m v' + c v + k u = F under a short blow is |i w / (k - m w^2 + i c w)|."""
+    mass, frequency, ratio = 2.0, 150.0, 0.15
+    omega = 2 * np.pi * frequency
+    time = np.arange(0, 2, 2e-5)
+    decay, ringing = ratio * omega, omega * np.sqrt(1 - ratio**2)
+    response = np.exp(-decay * time) * (
+        np.cos(ringing * time) - decay / ringing * np.sin(ringing * time)
+    ) / mass  # fmt: skip
+    response[0] /= 2  # trapezoidal rule
+    force = np.zeros(len(time))
+    force[:11] = np.hanning(11)
+    velocity = np.convolve(force, response)[: len(time)] * 2e-5
+    found_at, mobility = frequency_response(time, force, velocity, bandwidth)
+    band = (found_at > 60) & (found_at < 400)
+    w = 2 * np.pi * found_at[band]
+    exact = np.abs(1j * w / (mass * (omega**2 - w**2 + 2j * ratio * omega * w)))
+    # Sampling: (w dt)^2/12 = 2e-4.  Smoothing averages over 20 Hz, half of the resonance
+    assert np.abs(mobility[band] / exact - 1).max() < (4e-4 if bandwidth is None else 0.05)
+
+
+def test_mobility_is_unknown_where_there_is_no_force() -> None:
+    """A force of one frequency says nothing about the others: nan, without a warning."""
+    time = np.arange(1000) * 1e-3
+    force = damped(time, 50)
+    frequency, mobility = frequency_response(time, force, 0.25 * force, None)
+    assert mobility[frequency == 50] == pytest.approx(0.25)
+    assert np.isnan(mobility[frequency != 50]).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    frequency=st.floats(0.5, 5e3),
+    periods=st.floats(1.5, 12),
+    ratio=st.floats(0, 0.15),
+    phase=st.floats(0, 6.28),
+    offset=st.floats(-3, 3),
+    scale=st.sampled_from([1e-9, 1.0, 1e6]),
+    start=st.sampled_from([0.0, 3.0]),
+    samples=st.integers(60, 900),
+)
+def test_one_damped_cosine_is_found(
+    frequency: float, periods: float, ratio: float, phase: float, offset: float, scale: float,
+    start: float, samples: int,
+) -> None:  # fmt: skip
+    """From 1.5 periods on, any damped cosine about any mean is found to rounding (the goal is
+    0.1 %)."""
+    time = start + np.linspace(0, periods / frequency, samples)
+    decay = 2 * np.pi * frequency * ratio
+    values = scale * (offset + damped(time, frequency, decay, 1.0, phase))
+    (mode,) = peak_frequencies(time, values)
+    rounding = 1e-8 + 1e-15 * start * frequency
+    assert mode.frequency == pytest.approx(frequency, rel=rounding)
+    assert mode.decay == pytest.approx(decay, rel=1e-5, abs=1e-6 * frequency)
+    assert mode.amplitude == pytest.approx(scale, rel=1e-5)
+
+
+def test_noisy_cosine_within_a_thousandth() -> None:
+    """Two periods with noise of 0.1 % of the amplitude: every frequency within 0.1 %.
+
+    Cramer-Rao for f over T with n samples: sqrt(6/n) s/(pi A T) = 1.1e-5 f here, undamped.
+    """
+    generator = np.random.default_rng(3)
+    for _ in range(30):
+        time = np.linspace(0, 2 / 27, 400)
+        values = damped(time, 27, generator.uniform(0, 10), 1e-4, generator.uniform(0, 6))
+        values += 1e-7 * generator.standard_normal(400)
+        (mode,) = peak_frequencies(time, values)
+        assert mode.frequency == pytest.approx(27, rel=1e-3)
+
+
+def test_modes_of_a_beam_are_told_apart() -> None:
+    """Bending modes at 1 : 6.2 : 17 of falling strength, four periods of the first, with noise."""
+    generator = np.random.default_rng(4)
+    time = np.arange(0, 4 / 27, 1e-4)
+    expected = np.array([27.0, 167.4, 459.0])
+    values = 1e-5 * generator.standard_normal(len(time))
+    for frequency, amplitude in zip(expected, (1, 0.1, 0.02), strict=True):
+        values += damped(time, frequency, 0.01 * frequency, amplitude, generator.uniform(0, 6))
+    modes = peak_frequencies(time, values, 3)
+    assert [mode.frequency for mode in modes] == pytest.approx(expected, rel=1e-3)
+    assert [mode.amplitude for mode in modes] == pytest.approx([1, 0.1, 0.02], rel=0.01)
+
+
+def test_nothing_is_found_in_nothing() -> None:
+    """A constant record has no modes; a sum of two cosines has no third."""
+    time = np.linspace(0, 1, 200)
+    assert peak_frequencies(time, np.full(200, 2.0), 2) == []
+    two = damped(time, 7) + damped(time, 23.5, 1.0, 0.3)
+    assert len(peak_frequencies(time, two, 5)) == 2
+
+
+@pytest.mark.parametrize(
+    ("time", "words"),
+    [
+        ([0, 1, 2], "four samples"),
+        ([0, 1, 2, 4], "evenly"),
+        ([0, 1, 2, np.nan], "finite"),
+        ([0, 0, 0, 0], "evenly"),
+    ],
+)
+def test_uneven_records_are_refused(time: list[float], words: str) -> None:
+    """A record that is no even, finite series of four samples is refused."""
+    with pytest.raises(UsageError, match=words):
+        amplitude_spectrum(np.array(time, float), np.ones(len(time)))
+    with pytest.raises(UsageError, match="window"):
+        amplitude_spectrum(np.arange(4.0), np.ones(4), "flat")

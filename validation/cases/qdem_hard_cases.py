@@ -1,0 +1,30 @@
+"""Hard cases of QDEM: slivers, stiff layers, nearly incompressible bodies, five million elements.
+
+placeholder
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+def delaunay_mesh(count: int, seed: int, shape: float = 0.02) -> tuple[Floats, Integers]:
+    """Delaunay tetrahedra of random points in the unit cube: nodes (n, 3) [m], elements (m, 4).
+
+    Elements whose ``6 V / longest edge^3`` is below ``shape`` are left out, so the body has
+    pores and a rough surface, and a few nodes may belong to no element.
+    """
+    nodes = np.random.default_rng(seed).uniform(size=(count, 3))
+    elements = Delaunay(nodes).simplices.astype(np.int64)
+    corner = nodes[elements]
+    six_volumes = np.linalg.det(corner[:, 1:] - corner[:, :1])
+    left = six_volumes < 0
+    elements[left] = elements[left][:, [0, 1, 3, 2]]
+    pairs = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
+    longest = np.linalg.norm(corner[:, pairs[:, 0]] - corner[:, pairs[:, 1]], axis=2).max(axis=1)
+    return nodes, elements[abs(six_volumes) > shape * longest**3]
