@@ -24,7 +24,15 @@ if command -v "$python" >/dev/null; then
         "Install one and run again with PYTHON=/path/to/python3.11."
     "$python" -c 'import ensurepip, venv' 2>/dev/null || lacking="$lacking python3-venv"
 fi
-case ",$extras," in *,test,*) command -v chromium >/dev/null || lacking="$lacking chromium" ;; esac
+case ",$extras," in *,test,*)
+    command -v chromium >/dev/null || lacking="$lacking chromium"
+    # what gmsh's Python wheel is linked to
+    for library in libGLU.so.1:libglu1-mesa libXcursor.so.1:libxcursor1 libXft.so.2:libxft2 \
+        libXinerama.so.1:libxinerama1 libOpenGL.so.0:libopengl0; do
+        /sbin/ldconfig -p | grep -q "${library%%:*}" || lacking="$lacking ${library##*:}"
+    done
+    ;;
+esac
 
 if [ -n "$lacking" ]; then
     command -v apt-get >/dev/null || stop "missing here:$lacking (Debian's names)." \

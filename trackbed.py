@@ -20,6 +20,7 @@ VERBS = {
     "report": (ADAPTERS, "write report.html and the figures of a run"),
     "fit": (ADAPTERS, "fit a residual law to a run, dumps or a CSV series and extrapolate it"),
     "relax": (ADAPTERS, "bring the overlaps of a state back to equilibrium"),
+    "qdem": ("qdem_fem.cli", "vibration and statics of deformable bodies, from a scene file"),
     "validate": ("validation.cli", "measure trackbed against a case with a known answer"),
     "cite": (ADAPTERS, "print what to cite, as BibTeX"),
 }
@@ -39,7 +40,7 @@ def parser_build(verb: str | None) -> argparse.ArgumentParser:
     """The command's parser; only ``verb`` gets its arguments, so only its package is loaded."""
     parser = argparse.ArgumentParser(
         prog="trackbed",
-        description="Settlement of a ballast bed under many load cycles, on your granular engine.",
+        description="Railway ballast: settlement under many load cycles, vibration of its bodies.",
         epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

@@ -73,27 +73,17 @@ def doctor_command(arguments: argparse.Namespace) -> int:
 
 def new_register(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``new``."""
+    from scenes import scene_names
+
     parser.add_argument("name", metavar="NAME", help="; ".join(scene_names()))
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
     parser.set_defaults(command=new_command)
 
 
-def scene_names() -> list[str]:
-    """Names of the shipped scenes."""
-    from importlib.resources import files
-
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in files("scenes").iterdir()
-        if entry.name.endswith(".toml")
-    )
-
-
 def new_command(arguments: argparse.Namespace) -> int:
     """Copy a shipped scene to FOLDER/scene.toml; a scene that is there already is kept."""
-    from importlib.resources import files
-
     from adapters.scene_checks import did_you_mean
+    from scenes import scene_names, scene_template, scene_verb
 
     names = scene_names()
     if arguments.name not in names:
@@ -102,13 +92,15 @@ def new_command(arguments: argparse.Namespace) -> int:
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         with path.open("x", encoding="utf-8") as stream:
-            stream.write((files("scenes") / f"{arguments.name}.toml").read_text("utf-8"))
+            stream.write(scene_template(arguments.name))
     except FileExistsError:
         raise UsageError(
             "this scene is there already and is kept", where=str(path),
             remedy="remove it first, or name another folder",
         ) from None  # fmt: skip
-    print(f"{path}\nnext: trackbed run {shlex.quote(str(path))} --control")
+    verb = scene_verb(arguments.name)
+    control = " --control" if verb == "run" else ""
+    print(f"{path}\nnext: trackbed {verb} {shlex.quote(str(path))}{control}")
     return 0
 
 

@@ -1,15 +1,29 @@
 """QDEM: explicit dynamics of viscoelastic bodies made of linear tetrahedra.
 
 Method: Nishiura, Sakaguchi and Aikawa, Materials 10 (2017) 615.  Start with `Body`, `Material`
-and `Simulation`.
+and `Simulation`.  A name is loaded when it is first used, so that help texts cost nothing.
 """
 
-from qdem_fem.body import Body
-from qdem_fem.errors import QdemError
-from qdem_fem.material import Material
-from qdem_fem.series import Series, ramp
-from qdem_fem.simulation import Energy, History, Simulation
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
+if TYPE_CHECKING:
+    from qdem_fem.body import Body
+    from qdem_fem.errors import QdemError
+    from qdem_fem.material import Material
+    from qdem_fem.series import Series, ramp
+    from qdem_fem.simulation import Energy, History, Simulation
+
+_HOMES = {
+    "Body": "body",
+    "Energy": "simulation",
+    "History": "simulation",
+    "Material": "material",
+    "QdemError": "errors",
+    "Series": "series",
+    "Simulation": "simulation",
+    "ramp": "series",
+}
 __all__ = [
     "Body",
     "Energy",
@@ -20,3 +34,10 @@ __all__ = [
     "Simulation",
     "ramp",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'qdem_fem' has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f"qdem_fem.{_HOMES[name]}"), name)
+    return value

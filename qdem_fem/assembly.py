@@ -18,6 +18,9 @@ from qdem_fem.reference_forces import Strain
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+THREAD_ELEMENTS = 16_384
+"""Fewer elements than this for each thread lose more at barriers than they gain."""
+
 NO_LOADS = kernel.Loads(*(np.zeros(0, np.int64),) * 3, np.zeros(0))
 NO_PROBES = kernel.Probes(np.zeros(0, np.int64), np.zeros((0, 0, 3)), 1, 1)
 
@@ -28,6 +31,9 @@ class Assembly:
     ``master`` (n,): the node that a node moves with, itself unless periodic; ``density_factor``
     (m,) from mass scaling [-].
     """
+
+    window_work = 20_000_000
+    """Element-steps to do before coming back: a fraction of a second."""
 
     def __init__(
         self,
@@ -65,7 +71,8 @@ class Assembly:
         self.viscous = True if viscous else None
         self.law = kernel.LAWS[strain](kind.type(0.5))
         chunks = len(self.packed.layout.chunk_shift)
-        self.threads = min(threads or numba.get_num_threads(), chunks)
+        most = threads or max(1, len(self.elements) // THREAD_ELEMENTS)
+        self.threads = min(most, numba.config.NUMBA_NUM_THREADS, chunks)
         inverse = np.zeros(self.n_nodes)
         used = self.mass > 0
         inverse[self.packed.node_place[used]] = 1 / self.mass[used]

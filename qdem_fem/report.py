@@ -106,7 +106,12 @@ def _claim(summary: dict[str, Any]) -> str:
     elements, nodes = (sum(body[key] for body in bodies) for key in ("elements", "nodes"))
     mesh = f"{elements:,} linear tetrahedra with {nodes:,} nodes"
     if summary["method"] == "static":
-        text = f"Static answer by kinetic damping, {mesh}."
+        answer = summary["static"]
+        text = (
+            f"Static answer by kinetic damping in {answer['steps']:.0f} force evaluations, {mesh}; "
+            f"residual {answer['residual']:.2g} of the loads, estimated relative error of the "
+            f"displacement {answer['error_estimate']:.2g}."
+        )
     else:
         text = (
             f"{summary['time']:.6g} s of motion in {summary['steps']:,} steps of "
@@ -177,12 +182,13 @@ def _step(summary: dict[str, Any]) -> Iterator[str]:
 def _energy(summary: dict[str, Any]) -> Iterator[str]:
     energy = summary["energy"]
     yield "<h2>Energy</h2>"
+    if summary["method"] == "static":
+        yield f"<p>Elastic energy {energy['elastic']:.6g} J.</p>"
+        return
     rows = [(f"{name} at the end", f"{energy[name]:.6g}") for name in energy if name in NAMED]
     imbalance = f"{energy['greatest_imbalance']:.3g} ({100 * energy['relative_imbalance']:.2g} %)"
     rows.append(("greatest external - kinetic - elastic on the way", imbalance))
     yield _table(("energy", "J"), rows)
-    if summary["method"] == "static":
-        yield "<p>Kinetic damping takes energy out on purpose.</p>"
 
 
 NAMED = ("kinetic", "elastic", "external")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import ValidationError
 
 from qdem_fem.errors import MeshError
 from qdem_fem.scene import (
@@ -17,6 +19,7 @@ from qdem_fem.scene import (
     Condition,
     Fix,
     Load,
+    Mesh,
     Nodes,
     Output,
     Periodic,
@@ -120,27 +123,40 @@ def _meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Pro
     meshes: dict[str, TetMesh] = {}
     problems: list[Problem] = []
     seen: dict[str, str] = {}
-    for key, body in _tables(text, BodyTable):
-        if body.name in seen:
-            what = f"{seen[body.name]} has this name already"
+    for key, name, table, regions in _mesh_tables(text):
+        if name in seen:
+            what = f"{seen[name]} has this name already"
             problems.append(Problem(f"{key}.name", what))
             continue
-        seen[body.name] = key
+        seen[name] = key
         try:
-            mesh = mesh_of(body.mesh, folder, f"{key}.mesh")
+            mesh = mesh_of(table, folder, f"{key}.mesh")
         except NoNodes as wrong:
             problems.append(wrong.problem)
             continue
         except MeshError as error:
             problems.append(Problem(f"{key}.mesh", error_told(error), _of_file(error)))
             continue
-        for name in body.regions:
-            if name not in mesh.element_sets:
-                near = did_you_mean(name, mesh.element_sets) or "; the mesh has none"
-                what = f"there is no element set {name!r}{near}"
-                problems.append(Problem(f"{key}.regions.{name}", what))
-        meshes[body.name] = mesh
+        for region in regions:
+            if region not in mesh.element_sets:
+                near = did_you_mean(region, mesh.element_sets) or "; the mesh has none"
+                what = f"there is no element set {region!r}{near}"
+                problems.append(Problem(f"{key}.regions.{region}", what))
+        meshes[name] = mesh
     return meshes, problems
+
+
+def _mesh_tables(text: SceneText) -> Iterator[tuple[str, str, Mesh, list[str]]]:
+    """Key, name, mesh and regions of each body whose mesh is sound, whatever else is wrong."""
+    bodies = text.data.get("body")
+    for index, entry in enumerate(bodies if isinstance(bodies, list) else []):
+        key = f"body.{index}"
+        body = text.tables.get(key)
+        if isinstance(body, BodyTable):
+            yield key, body.name, body.mesh, list(body.regions)
+        elif isinstance(entry, dict) and isinstance(entry.get("name"), str):
+            with suppress(ValidationError):
+                yield key, entry["name"], Mesh.model_validate(entry.get("mesh")), []
 
 
 def _of_file(error: MeshError) -> str:

@@ -19,8 +19,8 @@ def key_lines(text: str) -> dict[str, int]:
     statement: list[str] = []
     for number, line in enumerate(text.split("\n"), 1):
         statement.append(line)
-        if len(statement) > 1 and line.endswith(","):  # inside a long array
-            continue
+        if len(statement) > 1 and line.endswith(",") and "#" not in line:
+            continue  # inside a long array: spares trying it at every line
         try:
             parsed = tomllib.loads("\n".join(statement))
         except (ValueError, RecursionError):

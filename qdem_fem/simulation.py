@@ -17,6 +17,7 @@ from qdem_fem.body import Body
 from qdem_fem.checkpoint import checkpoint_read, checkpoint_write
 from qdem_fem.conditions import COMPONENTS, Conditions, Held, NodalLoad, Roller
 from qdem_fem.critical_step import CriticalStep, highest_mode
+from qdem_fem.dynamic_relaxation import StaticAnswer, relax
 from qdem_fem.errors import ConditionError, ElementInverted, Unstable
 from qdem_fem.mass_scaling import mass_scaling_factor
 from qdem_fem.reference_forces import (
@@ -33,8 +34,7 @@ Integers = NDArray[np.int64]
 
 SAFETY = 0.9
 PRECISIONS = ("float64", "float32")
-WINDOW_WORK = 20_000_000
-"""Element-steps the kernel does before it comes back: a fraction of a second."""
+DEVICES = ("cpu", "cuda")
 WINDOW_STEPS = 4096
 SAMPLES = 1000
 """Samples of an advance whose sampling is not given."""
@@ -66,6 +66,16 @@ class History:
         return self.values[name]
 
 
+def assembly_class(device: str) -> type[Assembly]:
+    """The class that computes on a device; raises `LibraryMissing` where there is no GPU."""
+    if device == "cpu":
+        return Assembly
+    from qdem_fem.cuda_assembly import CudaAssembly, gpu_require
+
+    gpu_require()
+    return CudaAssembly
+
+
 class Simulation:
     """Explicit dynamics of one or several bodies.
 
@@ -73,7 +83,8 @@ class Simulation:
     ``precision``: ``"float64"`` or ``"float32"``; ``step`` [s], or ``safety`` times the critical
     step; ``gravity`` [m/s^2], three components, constant or a series; ``threads``: all by
     default, the result does not depend on it; ``mass_scaling`` [s]: raise the density of
-    elements whose own critical step is shorter than this.
+    elements whose own critical step is shorter than this; ``device``: ``"cpu"``, or ``"cuda"``
+    for a GPU (`qdem_fem.cuda_assembly`), whose results repeat to round-off only.
 
     Velocity Verlet, as in the paper: ``v(k+1/2) = v(k-1/2) + dt f(u(k), v(k-1/2))/m``,
     ``u(k+1) = u(k) + dt v(k+1/2)``.  Not for quasi-static problems over long times, where an
@@ -91,9 +102,11 @@ class Simulation:
         gravity: Value | None = None,
         threads: int | None = None,
         mass_scaling: float | None = None,
+        device: Literal["cpu", "cuda"] = "cpu",
     ) -> None:
         self.bodies = list(bodies)
-        self._check_options(strain, precision, step, safety, threads, mass_scaling)
+        self._check_options(strain, precision, device, step, safety, threads, mass_scaling)
+        self._assembly_class = assembly_class(device)
         self.strain, self.precision, self.safety = strain, precision, safety
         self.threads, self.mass_scaling = threads, mass_scaling
         self._gravity = None if gravity is None else Driver(gravity, 3, "gravity")
@@ -248,6 +261,14 @@ class Simulation:
             column += len(nodes)
         return History(numbers * self.step, values)
 
+    def relax(self, tolerance: float = 1e-8, max_steps: int = 100_000) -> StaticAnswer:
+        """Bring the bodies to rest in equilibrium with the loads of the present time.
+
+        Until the residual is below ``tolerance`` of the loads; time stands still, and `advance`
+        goes on from there.  See `qdem_fem.dynamic_relaxation.relax` for what is raised.
+        """
+        return relax(self, tolerance, max_steps)
+
     def energy(self) -> Energy:
         """Energies now [J]; elastic energy as `qdem_fem.reference_forces.elastic_energy`."""
         velocity = self._velocity_now()
@@ -281,7 +302,7 @@ class Simulation:
             factor = None
             if self.mass_scaling is not None:
                 factor = mass_scaling_factor(self.bodies, self.mass_scaling)
-            self._assembly = Assembly(
+            self._assembly = self._assembly_class(
                 self.bodies, self._master, self.strain, self.precision, self.threads, factor
             )
             for name in ("displacement", "velocity"):
@@ -337,7 +358,7 @@ class Simulation:
         record = np.zeros((max(0, (steps - first) // stride + 1), len(nodes), 3))
         if first == 0 and len(record):
             record[0] = assembly.field("displacement")[nodes]
-        most = max(16, min(WINDOW_STEPS, WINDOW_WORK // len(assembly.elements)))
+        most = max(16, min(WINDOW_STEPS, assembly.window_work // len(assembly.elements)))
         while self.steps_done < end:
             count = min(most, end - self.steps_done)
             times = self.step * (self.steps_done + np.arange(count + 1, dtype=float))
@@ -417,16 +438,21 @@ class Simulation:
         size = PROBE_STRAIN * max(float(np.ptp(body.nodes, axis=0).max()) for body in self.bodies)
         nothing = np.ones((2, 1))
 
+        follows = self._master != np.arange(len(self._master))
+
         def accelerate(u: Floats, v: Floats) -> Floats:
-            largest = max(abs(u).max(), 1e-300)
-            scale = size / largest
+            u, v = u[self._master], v[self._master]
+            scale = size / max(abs(u).max(), 1e-300)
             u, v = (assembly.hold(scale * field, held) for field in (u, v))
             change = assembly.accelerations(u, v, NO_LOADS, held, nothing, None)
-            return assembly.hold(change, held) / scale
+            change = assembly.hold(change, held) / scale
+            change[follows] = 0.0  # no motion of their own: the operator stays symmetric
+            return change
 
         step, stiffness, damping, mode, count = highest_mode(
             accelerate, assembly.mass, viscous=self.viscous
         )
+        mode = mode[self._master]
         body, element = self._governing(mode)
         return CriticalStep(
             value=step,
@@ -513,7 +539,7 @@ class Simulation:
         self._behind = False
 
     def _check_options(
-        self, strain: str, precision: str, step: float | None, safety: float,
+        self, strain: str, precision: str, device: str, step: float | None, safety: float,
         threads: int | None, mass_scaling: float | None,
     ) -> None:  # fmt: skip
         if not self.bodies or not all(isinstance(body, Body) for body in self.bodies):
@@ -521,7 +547,8 @@ class Simulation:
         if len({id(body) for body in self.bodies}) < len(self.bodies):
             raise ConditionError("a body is listed twice", where="simulation")
         for name, value, known in (
-            ("strain", strain, tuple(kernel.LAWS)), ("precision", precision, PRECISIONS)
+            ("strain", strain, tuple(kernel.LAWS)), ("precision", precision, PRECISIONS),
+            ("device", device, DEVICES),
         ):  # fmt: skip
             if value not in known:
                 raise ConditionError(

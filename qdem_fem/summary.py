@@ -46,6 +46,7 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
             label: [vars(mode) for mode in modes]
             for label, modes in modes_of(prepared, rows).items()
         },
+        "static": done.static,
         "left_out": prepared.scene.left_out(),
     }
 

@@ -27,3 +27,8 @@ def scene_template(name: str) -> str:
 def scene_path(name: str) -> Path:
     """File of the scene ``name``."""
     return Path(str(files(__name__) / f"{name}.toml"))
+
+
+def scene_verb(name: str) -> str:
+    """The verb of ``trackbed`` that runs the scene ``name``: ``qdem`` for one of bodies."""
+    return "qdem" if "\n[[body]]" in scene_template(name) else "run"

@@ -90,7 +90,9 @@ def test_data_files_are_packaged() -> None:
         data = {
             path
             for path in folder.rglob("*")
-            if path.is_file() and path.suffix not in {".py", ".pyc", ".md"}
+            if path.is_file()
+            and path.suffix not in {".py", ".pyc", ".md"}
+            and "__pycache__" not in path.parts
         }
         assert data <= packaged, f"{package}: not packaged {data - packaged}"
 

@@ -16,7 +16,7 @@ from adapters.errors import SceneError, TrackbedError, UsageError
 from adapters.load_series import load_series_read
 from adapters.scene import ENGINES, Engine, Loading, Scene
 from adapters.scene_file import key_lines, scene_load
-from scenes import scene_names, scene_template
+from scenes import scene_names, scene_template, scene_verb
 
 KARRECH = scene_template("karrech")
 
@@ -62,8 +62,9 @@ def scene_or_refusal(path: Path) -> Scene | None:
 
 def test_shipped_scenes_load_without_doubts() -> None:
     """Every scene that ships is valid and free of warnings, on LIGGGHTS."""
-    assert scene_names() == ("karrech", "karrech-coarse", "karrech-partial")
-    for name in scene_names():
+    names = [name for name in scene_names() if scene_verb(name) == "run"]
+    assert names == ["karrech", "karrech-coarse", "karrech-partial"]
+    for name in names:
         scene = scene_load(Path(__file__).parents[2] / "scenes" / f"{name}.toml")
         assert scene.warnings == ()
         assert scene.engine.name == "liggghts"

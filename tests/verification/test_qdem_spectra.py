@@ -97,7 +97,7 @@ def test_mobility_of_an_oscillator(bandwidth: float | None) -> None:
     response[0] /= 2  # trapezoidal rule
     force = np.zeros(len(time))
     force[:11] = np.hanning(11)
-    velocity = np.convolve(force, response)[: len(time)] * 2e-5
+    velocity = np.convolve(force[:11], response)[: len(time)] * 2e-5
     found_at, mobility = frequency_response(time, force, velocity, bandwidth)
     band = (found_at > 60) & (found_at < 400)
     w = 2 * np.pi * found_at[band]

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from qdem_fem.mesh_generation import box_mesh
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -28,3 +30,21 @@ def delaunay_mesh(count: int, seed: int, shape: float = 0.02) -> tuple[Floats, I
     pairs = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
     longest = np.linalg.norm(corner[:, pairs[:, 0]] - corner[:, pairs[:, 1]], axis=2).max(axis=1)
     return nodes, elements[abs(six_volumes) > shape * longest**3]
+
+
+def box_with_sliver(altitude: float, cells: int = 4) -> tuple[Floats, Integers, int]:
+    """A unit cube of Kuhn tetrahedra, one of them flattened to ``altitude`` times its own [-].
+
+    An inner node is pushed towards the opposite face of one of its elements.  Returns nodes
+    (n, 3) [m], elements (m, 4) and the number of that element.
+    """
+    mesh = box_mesh((1.0, 1.0, 1.0), (cells, cells, cells))
+    nodes = mesh.nodes.copy()
+    node = int(np.argmin(np.linalg.norm(nodes - 0.5, axis=1)))
+    element = int(np.flatnonzero((mesh.elements == node).any(axis=1))[0])
+    face = nodes[mesh.elements[element][mesh.elements[element] != node]]
+    normal = np.cross(face[1] - face[0], face[2] - face[0])
+    normal /= np.linalg.norm(normal)
+    height = (nodes[node] - face[0]) @ normal
+    nodes[node] -= (1 - altitude) * height * normal
+    return nodes, mesh.elements, element

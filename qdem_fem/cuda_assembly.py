@@ -1,0 +1,257 @@
+"""The bodies of a simulation on a GPU: state and element data stay there from window to window.
+
+`CudaAssembly` answers the calls of `qdem_fem.assembly.Assembly`; ``Simulation(..., device="cuda")``
+takes it in its place.  A window goes to the GPU as launches without a wait in between; what comes
+back at its end is how many steps were done, the count of bad elements, the samples of the probes
+and the work of the few nodes with loads and constraints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from qdem_fem import kernel
+from qdem_fem.assembly import NO_PROBES, Assembly
+from qdem_fem.body import Body
+from qdem_fem.errors import LibraryMissing
+from qdem_fem.lanes import lane_count
+from qdem_fem.reference_forces import Strain
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+def gpu_require() -> None:
+    """Raise `LibraryMissing` unless numba.cuda is installed and finds a GPU and its compiler."""
+    where, remedy = 'device="cuda"', "pip install 'trackbed[cuda]'"
+    try:
+        from qdem_fem.cuda_step import cuda
+    except ImportError as error:
+        raise LibraryMissing(
+            f"numba.cuda can not be imported ({error})", where=where, remedy=remedy
+        ) from error
+    if cuda.is_available():
+        return
+    if cuda.cuda_error() is None:
+        raise LibraryMissing("CUDA's compiler, NVVM, was not found", where=where, remedy=remedy)
+    raise LibraryMissing(
+        "no GPU was found, or its driver does not answer",
+        where=where,
+        remedy='compute with device="cpu", or where an NVIDIA GPU and its driver are at hand',
+    )
+
+
+class NodeActions(NamedTuple):
+    """Loads, rollers, given displacements and probes, sorted by node; columns: `cuda_step`."""
+
+    first: NDArray[np.int32]
+    """The first action of every node, and the end, (n + 1,)."""
+    actions: NDArray[np.int32]
+    """Kind, component, series and place in the list it came from, (A + 1, 4).
+
+    The last row is no node's: an array on a GPU had better not be empty."""
+    weights: Floats
+    """Weight, or the normal of a roller, (A + 1, 3)."""
+    memory: Floats
+    """Work [J] in this window and velocity given in the last step [m/s], (A + 1, 2)."""
+
+    def of_kind(self, kind: int) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
+        """Places of all actions of a kind, and their places in the list they came from."""
+        found = np.flatnonzero(self.actions[:, 0] == kind)
+        return found, self.actions[found, 3]
+
+
+def node_actions(
+    n_nodes: int, loads: kernel.Loads, held: kernel.Constraints, probes: kernel.Probes
+) -> NodeActions:
+    """Sort the kernel's lists by node, so that one thread does all that happens to a node."""
+    from qdem_fem import cuda_step
+
+    kinds = (
+        (cuda_step.LOAD, loads.node_at, loads.series, loads.weight),
+        (cuda_step.ROLLER, held.roller_at, None, held.roller_normal),
+        (cuda_step.HELD, held.node_at, held.series, held.weight),
+        (cuda_step.PROBE, probes.node_at, None, None),
+    )
+    count = sum(len(at) for _, at, _, _ in kinds)
+    node = np.zeros(count, dtype=np.int64)
+    actions = np.full((count + 1, 4), -1, dtype=np.int32)
+    weights, memory = np.zeros((count + 1, 3)), np.zeros((count + 1, 2))
+    start = 0
+    for kind, at, series, weight in kinds:
+        part = slice(start, start + len(at))
+        node[part] = at // 4
+        actions[part, cuda_step.KIND] = kind
+        actions[part, cuda_step.COMPONENT] = at % 4
+        actions[part, cuda_step.SLOT] = np.arange(len(at))
+        if series is not None:
+            actions[part, cuda_step.SERIES] = series
+        if kind == cuda_step.ROLLER:
+            weights[part] = weight
+        elif weight is not None:
+            weights[part, 0] = weight
+        if kind == cuda_step.HELD:
+            memory[part, 1] = held.previous
+        start = part.stop
+    order = np.argsort(node, kind="stable")  # of one node the kinds keep their order
+    first = np.searchsorted(node[order], np.arange(n_nodes + 1)).astype(np.int32)
+    order = np.append(order, count)
+    return NodeActions(first, actions[order], weights[order], memory[order])
+
+
+def sample_numbers(steps: int, probes: kernel.Probes) -> Integers:
+    """Where in the record the samples of the window's steps are written, (steps,), or -1."""
+    since = np.arange(1, steps + 1) - probes.first
+    numbers = np.where((since >= 0) & (since % probes.stride == 0), since // probes.stride, -1)
+    return np.where(numbers < len(probes.record), numbers, -1)
+
+
+class CudaAssembly(Assembly):
+    """`Assembly` on the GPU that numba.cuda takes first; `gpu_require` says whether there is one.
+
+    ``threads`` is of no account.  Sums of forces are in no fixed order: a run repeats to
+    round-off, not to the bit.  Not for a few thousand elements: a step then costs two launches,
+    whatever its size.
+    """
+
+    window_work = 2_000_000_000
+
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        master: Integers,
+        strain: Strain,
+        dtype: DTypeLike,
+        threads: int | None,
+        density_factor: Floats | None = None,
+    ) -> None:
+        gpu_require()
+        super().__init__(bodies, master, strain, dtype, threads, density_factor)
+        from qdem_fem import cuda_step
+        from qdem_fem.cuda_step import cuda
+
+        layout = self.packed.layout
+        lanes = lane_count(self.dtype)
+        width = kernel.ROWS_VISCOUS if self.viscous else kernel.ROWS_ELASTIC
+        by_row = layout.rows.reshape(-1, width, lanes).transpose(1, 0, 2).reshape(width, -1)
+        by_corner = layout.corners.reshape(-1, 4, lanes).transpose(1, 0, 2).reshape(4, -1)
+        self._rows, self._corners = cuda.to_device(by_row), cuda.to_device(by_corner)
+        self._element_blocks = -(-by_row.shape[1] // cuda_step.BLOCK)
+        self._node_blocks = -(-self.n_nodes // cuda_step.BLOCK)
+        self._forces_kernel = cuda_step.element_forces_kernel(strain, bool(self.viscous))
+
+    def _state(self, inverse_mass: Floats) -> kernel.State:
+        from qdem_fem.cuda_step import cuda
+
+        def zeros() -> Any:
+            return cuda.to_device(np.zeros(4 * self.n_nodes, self.dtype))
+
+        masses = cuda.to_device(inverse_mass.astype(self.dtype))
+        return kernel.State(zeros(), zeros(), zeros(), masses)
+
+    def field(self, name: str) -> Floats:
+        """``displacement`` [m] or ``velocity`` [m/s] of all nodes, (n, 3), from the GPU."""
+        return self._read(getattr(self.state, name))
+
+    def field_set(self, name: str, values: Floats) -> None:
+        """Set a field of all nodes, (n, 3); nodes that follow others take their master's."""
+        self._write(getattr(self.state, name), values)
+
+    def _read(self, flat: Any) -> Floats:
+        return flat.copy_to_host().reshape(-1, 4)[self.place, :3].astype(float)
+
+    def _write(self, flat: Any, values: Floats) -> None:
+        rows = np.zeros((self.n_nodes, 4), self.dtype)
+        rows[self.place, :3] = values
+        flat.copy_to_device(rows.ravel())
+
+    def window(
+        self,
+        steps: int,
+        step: float,
+        loads: kernel.Loads,
+        held: kernel.Constraints,
+        probes: kernel.Probes,
+        table: Floats,
+        gravity: Floats | None,
+        work: Floats,
+        *,
+        kinetic: Floats | None = None,
+        state: kernel.State | None = None,
+    ) -> tuple[int, float]:
+        """Launch the steps and wait once, at the end; arguments as of `Assembly.window`.
+
+        ``kinetic`` (steps, pieces): all of a step's energy [J] is written to its first column.
+        """
+        from qdem_fem import cuda_step
+        from qdem_fem.cuda_step import cuda
+
+        acted = node_actions(self.n_nodes, loads, held, probes)
+        samples = sample_numbers(steps, probes)
+        taken = int(samples.max(initial=-1)) + 1
+        now = state or self.state
+        memory = cuda.to_device(acted.memory)
+        record = cuda.to_device(np.zeros((max(taken, 1), max(len(probes.node_at), 1), 3)))
+        energies = cuda.to_device(np.zeros((steps, self._node_blocks) if kinetic is not None
+                                           else (1, 1)))  # fmt: skip
+        accelerations = np.zeros(3) if gravity is None else np.ravel(gravity)
+        status = cuda.to_device(np.array([0, steps], dtype=np.int32))
+        half, dt = self.dtype.type(0.5), self.dtype.type(step)
+        of_elements = (
+            self._corners,
+            self._rows,
+            now.displacement,
+            now.velocity,
+            now.forces,
+            status,
+        )
+        of_nodes = (
+            cuda.to_device(acted.first), cuda.to_device(acted.actions),
+            cuda.to_device(acted.weights), memory, cuda.to_device(np.ascontiguousarray(table)),
+            record, now.displacement, now.velocity, now.forces, now.inverse_mass,
+            cuda.to_device(accelerations.astype(self.dtype)), energies, status, dt,
+        )  # fmt: skip
+        motion = cuda_step.node_motion_kernel(gravity is not None, kinetic is not None)
+        launch_forces = self._forces_kernel[self._element_blocks, cuda_step.BLOCK]
+        launch_motion = motion[self._node_blocks, cuda_step.BLOCK]
+        for k, sample in enumerate(samples.tolist()):
+            launch_forces(*of_elements, half, k)
+            launch_motion(*of_nodes, k, sample)
+
+        bad, done = status.copy_to_host().tolist()
+        remembered = memory.copy_to_host()
+        for total, kind in ((0, cuda_step.LOAD), (1, cuda_step.HELD)):
+            work[total] += remembered[acted.of_kind(kind)[0], 0].sum()
+        place, slot = acted.of_kind(cuda_step.HELD)
+        held.previous[slot] = remembered[place, 1]
+        if taken:
+            kept = int(samples[:done].max(initial=-1)) + 1
+            probes.record[:kept] = record.copy_to_host()[:kept, : len(probes.node_at)]
+        if kinetic is not None:
+            kinetic[:done] = 0.0
+            kinetic[:done, 0] = energies.copy_to_host()[:done].sum(axis=1)
+        return done, float(bad)
+
+    def accelerations(
+        self,
+        displacement: Floats,
+        velocity: Floats,
+        loads: kernel.Loads,
+        held: kernel.Constraints,
+        table: Floats,
+        gravity: Floats | None,
+    ) -> Floats:
+        """``f(u, v)/m`` [m/s^2] of all nodes, (n, 3), as `Assembly.accelerations`."""
+        if self._scratch is None:
+            self._scratch = self._state(self.state.inverse_mass.copy_to_host())
+        scratch = self._scratch
+        self._write(scratch.displacement, displacement)
+        self._write(scratch.velocity, velocity)
+        before = self._read(scratch.velocity)
+        free = kernel.Constraints(*(part[:0] for part in held))
+        self.window(1, 1.0, loads, free, NO_PROBES, table, gravity, np.zeros(2), state=scratch)
+        return self._read(scratch.velocity) - before

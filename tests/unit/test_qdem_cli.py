@@ -1,0 +1,358 @@
+"""``trackbed qdem``: run folders, interruptions to the same bits, refusals, what it prints."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+
+from qdem_fem import cli
+from qdem_fem.errors import Interrupted, SceneError, UsageError
+from qdem_fem.output import table_read
+
+ROOT = Path(__file__).parents[2]
+SCENE = """\
+title = "A short bar & its blow"
+[[body]]
+name = "bar"
+mesh = { box = { size = [0.4, 0.1, 0.1], cells = [8, 2, 2] } }
+material = { young = 1e9, poisson = 0.2, density = 1000.0 }
+[simulation]
+duration = 0.02
+threads = 1
+[[fix]]
+body = "bar"
+nodes = { set = "x-min" }
+[[load]]
+body = "bar"
+nodes = { set = "x-max" }
+force = { csv = "blow.csv", time = "t", value = "p", direction = [0, 0, -1] }
+[output]
+vtu_interval = 0.004
+probes = { tip = { nearest = [0.4, 0.05, 0.05] }, middle = { nearest = [0.2, 0, 0] } }
+"""
+START = (
+    "import sys, argparse; from qdem_fem import cli; p = argparse.ArgumentParser();"
+    "cli.register('qdem', p); a = p.parse_args(sys.argv[1:]); sys.exit(a.command(a))"
+)
+"""The verb in a process of its own, whatever ``trackbed`` lists."""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    """A scene that runs in a second, with a load series beside it."""
+    (tmp_path / "blow.csv").write_text("t,p\n0,0\n0.001,10\n0.002,0\n")
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def command(*words: object) -> int:
+    """The verb in this process."""
+    parser = argparse.ArgumentParser()
+    cli.register("qdem", parser)
+    arguments = parser.parse_args([str(word) for word in words])
+    code: int = arguments.command(arguments)
+    return code
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    """Files of a run that depend on nothing but the scene."""
+    names = ["probes.csv", "energy.csv", "fields.pvd", *(p.name for p in folder.glob("*.vtu"))]
+    return {name: (folder / name).read_bytes() for name in names}
+
+
+def stop_at(monkeypatch: pytest.MonkeyPatch, share: float, stop: Callable[[], None]) -> None:
+    """Call ``stop`` once, when a run has done a share of its steps."""
+    whole, stopped = cli.Progress.at, []
+
+    def at(self: cli.Progress, steps: int, total: int, when: float) -> None:
+        whole(self, steps, total, when)
+        if steps >= share * total and not stopped:
+            stopped.append(True)
+            stop()
+
+    monkeypatch.setattr(cli.Progress, "at", at)
+
+
+def test_the_verb_starts_light() -> None:
+    """The arguments are there before any of the big libraries is loaded."""
+    code = f"{START.partition('a = p.')[0]} print(*sorted(sys.modules))"
+    found = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    heavy = {"numpy", "scipy", "numba", "pydantic", "matplotlib", "meshio", "skfem", "rich"}
+    assert not heavy & set(found.stdout.split())
+
+
+def test_run_writes_what_it_promises(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Tables, fields, manifest, result and a report that loads nothing, for one short run."""
+    assert command(scene, "--json") == 0
+    printed = json.loads(capsys.readouterr().out)
+    folder = scene.with_name("scene-run")
+    assert printed == json.loads((folder / "result.json").read_text()) | {"folder": str(folder)}
+    assert (folder / "scene.toml").read_text() == SCENE
+
+    step, total = printed["step"], printed["steps"]
+    assert step == pytest.approx(0.9 * printed["critical_step"]["value"])
+    assert total * step == pytest.approx(0.02, rel=2e-3)
+    rows, energy = table_read(folder / "probes.csv"), table_read(folder / "energy.csv")
+    assert list(rows)[1:] == [f"{name}_{axis}" for name in ("tip", "middle") for axis in "xyz"]
+    spacing = np.diff(rows["time"])
+    assert spacing == pytest.approx(spacing[0])
+    assert rows["time"][[0, -1]] == pytest.approx([0, total * step], rel=1e-12)
+    assert energy["time"][-1] == rows["time"][-1]
+    assert printed["energy"]["external"] > 0
+
+    fields = sorted(folder.glob("fields_*.vtu"))
+    assert [path.name for path in fields] == [f"fields_{i:06}.vtu" for i in range(len(fields))]
+    last = meshio.read(fields[-1])
+    tip = np.argmin(np.linalg.norm(last.points - [0.4, 0.05, 0.05], axis=1))
+    end = [rows[f"tip_{axis}"][-1] for axis in "xyz"]
+    assert last.point_data["displacement"][tip] == pytest.approx(end, rel=1e-12)
+    assert end == printed["probes"]["tip"]["end"]
+    times = re.findall(r'timestep="([^"]+)"', (folder / "fields.pvd").read_text())
+    assert len(times) == len(fields)
+    assert float(times[-1]) == pytest.approx(total * step)
+
+    report = (folder / "report.html").read_text()
+    assert "A short bar &amp; its blow" in report
+    assert not re.search(r'(src|href)="(?!data:)', report)
+    for words in ("contact and friction", "Critical step", "blow.csv", "turned right-handed"):
+        assert words in report
+    assert report.count("<img") == len(list(folder.glob("picture-*.png"))) == 4
+
+
+def result_of(scene: Path, name: str, *words: str) -> dict[str, Any]:
+    """What a run with some overrides came to."""
+    folder = scene.with_name(name)
+    overrides = [word for override in words for word in ("--set", override)]
+    command(scene, "--run-folder", folder, "--no-pictures", *overrides)
+    return dict(json.loads((folder / "result.json").read_text()))
+
+
+def test_energy_balance_is_that_of_verlet(scene: Path) -> None:
+    """After the blow external - kinetic - elastic oscillates by O(dt^2), as nothing dissipates."""
+
+    def imbalance(name: str, safety: float) -> float:
+        result_of(scene, name, f"simulation.safety={safety}")
+        rows = table_read(scene.with_name(name) / "energy.csv")
+        missing = rows["external"] - rows["kinetic"] - rows["elastic"]
+        return float(np.abs(missing / rows["external"][-1])[rows["time"] > 0.002].max())
+
+    coarse, fine = imbalance("coarse", 0.9), imbalance("fine", 0.225)
+    assert coarse < 1e-3
+    assert 10 < coarse / fine < 25  # 16 for a quarter of the step
+
+
+def stiffness_of(size: tuple[float, float, float]) -> tuple[Any, Any]:
+    """The scene's mesh with other sizes, and its P1 stiffness matrix by scikit-fem [N/m]."""
+    import skfem
+    from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+    from qdem_fem.mesh_generation import box_mesh
+
+    mesh = box_mesh(size, (8, 2, 2))
+    basis = skfem.Basis(
+        skfem.MeshTet(mesh.nodes.T, mesh.elements.T), skfem.ElementVector(skfem.ElementTetP1())
+    )
+    return mesh, linear_elasticity(*lame_parameters(1e9, 0.2)).assemble(basis)
+
+
+def test_frequency_of_the_run_is_that_of_its_own_matrices(scene: Path) -> None:
+    """The mode found is an eigenvalue of K u = w^2 M u, as Verlet sees it.
+
+    K is scikit-fem's.  Verlet moves w to 2 asin(w dt/2)/dt, by 1e-4.  The section is a third as wide as
+    high, so that bending in y and z do not beat.
+    """
+    from scipy.linalg import eigh
+
+    from qdem_fem.mesh import element_gradients, lumped_mass
+
+    size = (0.4, 0.1, 0.3)
+    words = (
+        "body.bar.mesh={box={size=[0.4, 0.1, 0.3], cells=[8, 2, 2]}}",
+        "simulation.duration=0.05",
+    )
+    result = result_of(scene, "run", *words)
+    found, step = result["modes"]["tip_z"][0]["frequency"], result["step"]
+    mesh, stiffness = stiffness_of(size)
+    volumes = element_gradients(mesh.nodes, mesh.elements)[1]
+    mass = np.repeat(lumped_mass(mesh.elements, volumes, 1e3, len(mesh.nodes)), 3)
+    free = np.flatnonzero(np.repeat(mesh.nodes[:, 0] > 0, 3))
+    square = eigh(stiffness.toarray()[np.ix_(free, free)], np.diag(mass[free]), eigvals_only=True)
+    expected = np.arcsin(np.sqrt(square[:4]) * step / 2) / (np.pi * step)
+    assert min(abs(found / expected - 1)) < 1e-5
+
+
+@pytest.mark.parametrize("share", [0.0, 0.13, 0.5, 0.97])
+def test_interrupted_run_goes_on_to_the_same_bits(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, share: float
+) -> None:
+    """SIGTERM saves the state (exit 130); --resume ends with every byte of an uninterrupted run."""
+    whole, parts = scene.with_name("whole"), scene.with_name("parts")
+    command(scene, "--run-folder", whole, "--no-pictures")
+    stop_at(monkeypatch, share, lambda: os.kill(os.getpid(), signal.SIGTERM))
+    with pytest.raises(Interrupted, match=r"SIGTERM.*saved") as caught:
+        command(scene, "--run-folder", parts, "--no-pictures")
+    assert caught.value.exit_code == 130
+    assert not (parts / "result.json").exists()
+    # A writer killed behind the checkpoint leaves rows and fields that do not count.
+    with (parts / "probes.csv").open("a") as stream:
+        stream.write("0.0199,1,2,3,4,5,6\n0.01")
+    (parts / "fields_000099.vtu").write_text("torn")
+    assert command(scene, "--run-folder", parts, "--resume", "--no-pictures") == 0
+    assert results(parts) == results(whole)
+
+
+def test_killed_run_goes_on_to_the_same_bits(scene: Path) -> None:
+    """SIGKILL at any moment, several times: what comes out in the end is the uninterrupted run."""
+    whole, parts = scene.with_name("whole"), scene.with_name("parts")
+    longer = ("--set", "simulation.duration=0.06", "--no-pictures")
+    longer += ("--set", "output.checkpoint_interval=0.0")
+    command(scene, "--run-folder", whole, *longer)
+    kills = 0
+    for attempt in range(12):
+        words = [str(scene), "--run-folder", str(parts), "--resume", *longer]
+        process = subprocess.Popen(
+            [sys.executable, "-c", START, *words], cwd=ROOT, stdout=subprocess.DEVNULL
+        )
+        checkpoint = parts / "checkpoint.npz"
+        before = checkpoint.stat().st_mtime_ns if checkpoint.exists() else 0
+        while process.poll() is None and kills < 3:
+            if checkpoint.exists() and checkpoint.stat().st_mtime_ns != before:
+                time.sleep(0.03 * attempt)
+                process.kill()
+                kills += 1
+                break
+            time.sleep(0.002)
+        if process.wait() == 0:
+            break
+    assert kills
+    assert results(parts) == results(whole)
+
+
+def test_folder_is_never_lost_unasked(scene: Path) -> None:
+    """Another scene, an unfinished or finished run, strange files: each refused in its words."""
+    folder = scene.with_name("scene-run")
+    quick = (
+        "--no-pictures",
+        "--set",
+        "simulation.duration=0.001",
+        "--set",
+        "output.vtu_interval=0.001",
+    )
+    command(scene, *quick)
+    before = results(folder)
+    with pytest.raises(UsageError, match=r"is there already and is finished.*\n.*--force"):
+        command(scene, *quick)
+    with pytest.raises(
+        UsageError, match=r"another scene:\n  scene\.simulation\.safety: 0.9 there, 0.5 now"
+    ):
+        command(scene, *quick, "--set", "simulation.safety=0.5", "--resume")
+    assert command(scene, *quick, "--resume") == 0
+    (folder / "result.json").unlink()
+    with pytest.raises(UsageError, match="is not finished"):
+        command(scene, *quick)
+    scene.with_name("blow.csv").write_text("t,p\n0,0\n0.001,11\n0.002,0\n")
+    with pytest.raises(UsageError, match=r"files\.blow\.csv: "):
+        command(scene, *quick, "--resume")
+    assert results(folder) == before
+    (folder / "mine.txt").write_text("notes")
+    assert command(scene, *quick, "--force") == 0
+    assert results(folder) != before
+    assert (folder / "mine.txt").read_text() == "notes"
+
+    strange = scene.with_name("strange")
+    strange.mkdir()
+    (strange / "thesis.tex").touch()
+    with pytest.raises(UsageError, match=r"other files .thesis\.tex."):
+        command(scene, *quick, "--run-folder", strange, "--force")
+    with pytest.raises(UsageError, match="exclude each other"):
+        command(scene, "--force", "--resume")
+
+
+def test_one_writer_at_a_time(scene: Path) -> None:
+    """A second process is refused while the first one holds the folder."""
+    from qdem_fem.run_folder import RunFolder
+
+    folder = RunFolder(scene.with_name("scene-run"))
+    with folder.locked(), pytest.raises(UsageError, match=f"another process .*pid {os.getpid()}"):
+        command(scene)
+
+
+def test_dry_run_tells_and_writes_nothing(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A dry run names elements, step, steps, cost and what is left out, and leaves no file."""
+    before = sorted(scene.parent.iterdir())
+    assert command(scene, "--dry-run", "--json") == 0
+    outlook: dict[str, Any] = json.loads(capsys.readouterr().out)
+    assert outlook["bodies"]["bar"]["elements"] == 6 * 8 * 2 * 2
+    assert outlook["bodies"]["bar"]["mass"] == pytest.approx(4.0)
+    assert outlook["bodies"]["bar"]["smallest_altitude"] == pytest.approx(0.05 / np.sqrt(2))
+    assert outlook["steps"] * outlook["step"] == pytest.approx(0.02, rel=2e-3)
+    assert outlook["estimated_s"] > 0
+    assert outlook["vtu_files"] == 6
+    assert command(scene, "--dry-run") == 0
+    words = capsys.readouterr().out
+    assert "192 elements" in words
+    assert "not in this run: viscosity" in words
+    assert sorted(scene.parent.iterdir()) == before
+
+
+def test_wrong_scene_makes_no_folder(scene: Path) -> None:
+    """A scene with faults is refused (exit 3) before anything is written."""
+    with pytest.raises(SceneError, match=r"simulation\.duration") as caught:
+        command(scene, "--set", "simulation.duration=-1")
+    assert caught.value.exit_code == 3
+    assert not scene.with_name("scene-run").exists()
+
+
+def test_progress_lines_go_to_standard_error(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Elsewhere than on a terminal: a plain line every ten seconds, with the time left."""
+    clock = iter([0.0, 1.0, 5.0, 12.0, 13.0])
+    monkeypatch.setattr(cli.time, "monotonic", lambda: next(clock))
+    with cli.Progress() as progress:
+        for steps in (100, 200, 320, 330):
+            progress.at(steps, 1000, steps * 1e-3)
+    found = capsys.readouterr()
+    assert found.out == ""
+    assert found.err == "t = 0.32 s, step 320 of 1000, 34 s left\n"
+
+
+def test_static_answer(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A static scene bends the bar to what its stiffness matrix says; each series gives its end."""
+    force = "load.0.force={ramp=1.0, value=[0, 0, -1]}"
+    words = ("--set", 'simulation.method="static"', "--set", force, "--json")
+    assert command(scene, *words) == 0
+    result = json.loads(capsys.readouterr().out)
+    tip = result["probes"]["tip"]["end"][2]
+    assert tip == pytest.approx(-static_tip(), rel=1e-4)
+    assert (scene.with_name("scene-run") / "fields_000000.vtu").exists()
+
+
+def static_tip() -> float:
+    """Deflection of the tip under 1 N by scikit-fem's P1 stiffness on the same mesh [m]."""
+    import skfem
+
+    mesh, stiffness = stiffness_of((0.4, 0.1, 0.1))
+    end = np.flatnonzero(mesh.nodes[:, 0] == 0.4)
+    force = np.zeros(3 * len(mesh.nodes))
+    force[3 * end + 2] = 1 / len(end)
+    fixed = np.flatnonzero(np.repeat(mesh.nodes[:, 0] == 0, 3))
+    moved = skfem.solve(*skfem.condense(stiffness, force, D=fixed))
+    tip = int(np.argmin(np.linalg.norm(mesh.nodes - [0.4, 0.05, 0.05], axis=1)))
+    return float(moved[3 * tip + 2])
