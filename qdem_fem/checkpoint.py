@@ -70,7 +70,7 @@ def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
         "critical_mode": critical.mode,
     }
     for name in ("displacement", "velocity"):
-        arrays[name] = getattr(assembly.state, name).reshape(-1, 4)[assembly.place, :3]
+        arrays[name] = assembly.field(name).astype(assembly.dtype)
     stream = io.BytesIO()
     np.savez(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes them for its flags
     write_whole(Path(path), _sealed(stream.getvalue()))
@@ -95,7 +95,7 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
 
     assembly, (_, held) = simulation.assembly, simulation._packed_lists()
     for name in ("displacement", "velocity"):
-        getattr(assembly.state, name).reshape(-1, 4)[assembly.place, :3] = arrays[name]
+        assembly.field_set(name, arrays[name].astype(float))
     held.previous[:] = arrays["previous"]
     simulation._critical = critical
     simulation.steps_done, simulation._behind = progress.steps_done, progress.behind

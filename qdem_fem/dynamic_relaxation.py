@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.assembly import NO_LOADS, NO_PROBES, Assembly
-from qdem_fem.errors import ConditionError, NotConverged
+from qdem_fem.errors import ConditionError, ElementInverted, NotConverged
 
 if TYPE_CHECKING:
     from qdem_fem.simulation import Simulation
@@ -56,8 +56,9 @@ class StaticAnswer:
     residual: float
     """|f_int + f_ext| on what is free, over |f_ext| or, if larger, the reactions."""
     error_estimate: float
-    """Relative error of the displacement in the energy norm, from the residual and the softest
-    motion that the iteration met; from above while that has been found."""
+    """Bound on the relative error of the displacement in the energy norm: all of the residual is
+    taken to pull the softest motion that the iteration met.  A residual alone says little of a
+    slender body; this says too much, usually by one to three orders of magnitude."""
     steps: int
     """Evaluations of the forces, each the cost of a time step."""
     cpu_s: float
@@ -70,7 +71,8 @@ def relax(simulation: Simulation, tolerance: float, max_steps: int) -> StaticAns
     Begins at the present displacement, works in double precision in any case, and leaves the
     bodies at rest; time stands still.  The account of energies goes on as if the loads had been
     brought up slowly.  Raises `ConditionError` for bodies that are not held against rigid
-    motion, `NotConverged` after ``max_steps`` (the state reached is kept).
+    motion, `NotConverged` after ``max_steps`` (the state reached is kept), `ElementInverted` when given
+    displacements jump so far that elements next to them turn inside out.
     """
     if not 0 < tolerance < 1:
         raise ConditionError(f"a tolerance of {tolerance}", where="relax", remedy="take 1e-8")
@@ -104,10 +106,11 @@ class _Problem:
         own = simulation.assembly
         conditions, now = simulation.conditions, np.full(1, simulation.time)
         self.assembly = own
-        if own.dtype != np.float64:
+        if own.dtype != np.float64 or type(own) is not Assembly:  # single precision, or a GPU
             self.assembly = Assembly(
-                simulation.bodies, simulation._master, simulation.strain, "float64", own.threads
-            )
+                simulation.bodies, simulation._master, simulation.strain, "float64",
+                simulation.threads,
+            )  # fmt: skip
         assembly, place = self.assembly, self.assembly.place
         loads, held = assembly.lists(conditions)
         row = conditions.table(now)[0]
@@ -217,8 +220,8 @@ def _conjugate(problem: _Problem, u: Floats, tolerance: float, max_steps: int) -
     found = _Found(u)
     total, sound = forces(u)
     if not sound:
-        raise ConditionError(
-            "the displacements given turn elements inside out before anything can follow",
+        raise ElementInverted(
+            "the given displacements jump by more than the elements beside them can bear",
             where="relax",
             remedy="bring them up in parts: prescribe a share, relax, prescribe more",
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, isnan, nan
 from pathlib import Path
 from typing import Any, Literal
 
@@ -126,7 +126,8 @@ class Simulation:
         """True while velocities are half a step behind; False: they are at the time itself."""
         self.work = np.zeros(2)
         """Work of the loads and of prescribed motion since the start [J]."""
-        self._put_in = 0.0
+        self._put_in = nan
+        """Energy of the state that the user set [J]; NaN: not known yet."""
         self._gravity_work = 0.0
         for body in self.bodies:
             body._simulation = self
@@ -350,8 +351,9 @@ class Simulation:
         self, steps: int, stride: int, nodes: Integers, progress: Callable[[float], None] | None
     ) -> Floats:
         """Compute steps in windows; returns samples (k, nodes, 3) of the displacement [m]."""
+        if isnan(self._put_in):
+            self._put_in = self._energy_set()
         self._begin()
-        self._put_in = max(self._put_in, self._energy_bound())
         assembly, (loads, held) = self.assembly, self._packed_lists()
         start, end = self.steps_done, self.steps_done + steps
         first = 0 if start == 0 else stride - start % stride
@@ -362,14 +364,9 @@ class Simulation:
         while self.steps_done < end:
             count = min(most, end - self.steps_done)
             times = self.step * (self.steps_done + np.arange(count + 1, dtype=float))
-            ahead = -(self.steps_done - start - first) % stride or stride
-            taken = (
-                (self.steps_done - start - first) // stride + 1
-                if self.steps_done - start >= first
-                else 0
-            )
-            if self.steps_done - start < first:
-                ahead = first - (self.steps_done - start)
+            behind = self.steps_done - start - first  # steps since the first sample
+            taken = behind // stride + 1 if behind >= 0 else 0
+            ahead = taken * stride - behind
             probes = kernel.Probes(4 * assembly.place[nodes], record[taken:], stride, ahead)
             gravity = self._gravity_at(times)
             before = assembly.field("displacement") if gravity is not None else None
@@ -390,9 +387,12 @@ class Simulation:
         velocity = self.assembly.field("velocity")
         return 0.5 * float(self.assembly.mass @ (velocity**2).sum(axis=1))
 
-    def _energy_bound(self) -> float:
+    def _energy_set(self) -> float:
+        """Energy of the state that the march begins with [J]."""
+        if not any(self.assembly.field(name).any() for name in ("displacement", "velocity")):
+            return 0.0
         energy = self.energy()
-        return energy.kinetic + abs(energy.elastic) - energy.external
+        return energy.kinetic + abs(energy.elastic)
 
     def _check_motion(self, bad: float) -> None:
         """Raise when the state can not be right: energy from nothing, or inverted elements."""
@@ -537,6 +537,7 @@ class Simulation:
         for key, field in fields.items():
             self.assembly.field_set(key, field)
         self._behind = False
+        self._put_in = nan
 
     def _check_options(
         self, strain: str, precision: str, device: str, step: float | None, safety: float,

@@ -3,7 +3,7 @@
 An explicit method has a static answer only as the mean of a motion.  The paper ramps the load
 over 1 s and averages from 1 to 2 s, 54 first periods.  `settled` needs four: a smooth step of two
 first periods leaves the first mode at rest and the others nearly so, and a Hann window over two
-more takes off what is left.  `Simulation.relax` needs no period at all.
+more takes off what is left.  `Simulation.relax` takes no time at all.
 """
 
 from __future__ import annotations
@@ -97,10 +97,10 @@ def settled_as_paper(problem: Problem) -> StaticAnswer:
 
 
 def relaxed(problem: Problem, tolerance: float = 1e-8) -> StaticAnswer:
-    """Static answer by kinetic damping."""
+    """Static answer by dynamic relaxation with conjugate directions."""
     body, run = problem.simulation(1.0)
-    run.relax(tolerance=tolerance)
-    return StaticAnswer(problem, body.displacement, run.steps_done)
+    found = run.relax(tolerance=tolerance)
+    return StaticAnswer(problem, body.displacement, found.steps)
 
 
 def answer_checks(name: str, answer: StaticAnswer) -> list[Check]:

@@ -1,0 +1,283 @@
+"""The critical step against dense eigenvalues, at its edge, with slivers, jumps and mass scaling."""
+
+from __future__ import annotations
+
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+from scipy.optimize import brentq
+
+import qdem_fem as q
+from qdem_fem.critical_step import lagged_viscous_step
+from qdem_fem.errors import Unstable
+from qdem_fem.mass_scaling import element_step, mass_scaling_factor
+from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.reference_forces import Strain
+from validation.cases.qdem_hard_cases import SLIVER_STEP, box_with_sliver, delaunay_mesh
+from validation.qdem_judge import lumped_mass, stiffness, stiffness_lame
+
+LAW = pytest.mark.parametrize("law", get_args(Strain))
+YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
+BELOW, ABOVE = 2e-3, 1e-7
+"""Relative bounds on the value: at most 0.2 % below the true one, never above but by round-off
+(the Lanczos value is a Rayleigh quotient, below omega^2; its residual is added)."""
+
+
+def body(seed: int = 1, count: int = 60, **material: Any) -> q.Body:
+    nodes, elements = delaunay_mesh(count, seed)
+    values: dict[str, Any] = {"young": YOUNG, "poisson": POISSON, "density": DENSITY} | material
+    return q.Body((nodes, elements), q.Material(**values))
+
+
+def dense(
+    body: q.Body, free: np.ndarray | None = None, master: np.ndarray | None = None
+) -> tuple[Any, Any, Any]:
+    """Stiffness, viscous matrix and mass by scikit-fem on the free components."""
+    m, n = body.material, len(body.nodes)
+    follow = np.arange(n) if master is None else master
+    join = np.kron(np.eye(n)[follow], np.eye(3))
+    mass = np.bincount(follow, lumped_mass(body.nodes, body.elements, m.density), n)
+    chosen = np.repeat(mass > 0, 3) & (True if free is None else free)
+    shear, bulk = m.shear_viscosity, m.bulk_viscosity
+    both = (
+        stiffness(body.nodes, body.elements, m.young, m.poisson),
+        stiffness_lame(body.nodes, body.elements, bulk - 2 / 3 * shear, shear),
+    )
+    K, C = ((join.T @ matrix @ join)[np.ix_(chosen, chosen)] for matrix in both)
+    return K, C, np.repeat(mass, 3)[chosen]
+
+
+def critical_dense(K: Any, C: Any, mass: Any) -> float:
+    """Largest dt with 4 M - 2 dt C - dt^2 K not negative [s]: stable up to there."""
+    scale = np.sqrt(np.outer(mass, mass))
+
+    def lowest(step: float) -> float:
+        matrix = (4 * np.diag(mass) - 2 * step * C - step**2 * K) / scale
+        return float(eigh(matrix, eigvals_only=True, subset_by_index=(0, 0))[0])
+
+    upper = 2 / np.sqrt(eigh(K / scale, eigvals_only=True)[-1])
+    return float(brentq(lowest, 1e-9 * upper, 1.001 * upper, rtol=1e-13, xtol=1e-300))
+
+
+def within(value: float, expected: float) -> bool:
+    return (1 - BELOW) * expected <= value <= (1 + ABOVE) * expected
+
+
+# --- the value ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+@pytest.mark.parametrize("seed", range(4))
+def test_value_is_the_dense_one(seed: int, precision: Any) -> None:
+    """dt = 2/omega, the largest eigenvalue by scikit-fem and LAPACK; free, then held."""
+    stone = body(seed)
+    run = q.Simulation([stone], precision=precision, threads=1)
+    K, C, mass = dense(stone)
+    above = ABOVE if precision == "float64" else 1e-5
+    found, expected = run.critical_step.value, critical_dense(K, C, mass)
+    assert (1 - BELOW) * expected <= found <= (1 + above) * expected
+    assert run.step == pytest.approx(0.9 * found)
+
+    bottom, wall = stone.nodes[:, 2] < 0.4, stone.nodes[:, 0] < 0.3
+    run.fix(stone, bottom)
+    run.roller(stone, wall & ~bottom, [1, 0, 0])
+    free = np.ones((len(stone.nodes), 3), dtype=bool)
+    free[bottom], free[wall, 0] = False, False
+    expected = critical_dense(*dense(stone, free.ravel()))
+    found = run.critical_step.value
+    assert (1 - BELOW) * expected <= found <= (1 + above) * expected
+    assert run.critical_step.forces_evaluated < 100
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 100.0])
+def test_value_of_a_periodic_body(size: float) -> None:
+    """Joined nodes count once, whatever the scale of the masses is."""
+    mesh = box_mesh((2.0, 1.0, 1.0), (4, 2, 2))
+    nodes = mesh.nodes.copy()
+    inner = (nodes[:, 0] > 0.1) & (nodes[:, 0] < 1.9)
+    nodes[inner] += 0.05 * np.random.default_rng(0).normal(size=(inner.sum(), 3))
+    bar = q.Body((size * nodes, mesh.elements), q.Material(YOUNG, POISSON, DENSITY))
+    run = q.Simulation([bar], threads=1)
+    run.periodic(bar, nodes[:, 0] < 1e-9, nodes[:, 0] > 2 - 1e-9)
+    expected = critical_dense(*dense(bar, master=run._master))
+    assert within(run.critical_step.value, expected)
+
+
+@pytest.mark.parametrize("viscosity", [10.0, 300.0, 1e3, 1e5])
+def test_value_with_viscosity(viscosity: float) -> None:
+    """The viscous force uses the velocity half a step behind: dt^2 k + 2 dt c <= 4 in each mode.
+
+    Modes of K and C differ, and so does the one that governs; damping ratios 0.01 to 90.
+    """
+    stone = body(shear_viscosity=viscosity, bulk_viscosity=viscosity / 2)
+    run = q.Simulation([stone], threads=1)
+    assert within(run.critical_step.value, critical_dense(*dense(stone)))
+
+
+def test_one_mode_with_viscosity() -> None:
+    """(sqrt(1 + xi^2) - xi) 2/omega; 2/c without a spring, infinite without anything."""
+    for xi in (0.0, 0.3, 5.0):
+        expected = (np.sqrt(1 + xi**2) - xi) * 2 / 7
+        assert lagged_viscous_step(49.0, 2 * xi * 7) == pytest.approx(expected, rel=1e-14)
+    assert lagged_viscous_step(0.0, 8.0) == 0.25
+    assert lagged_viscous_step(0.0, 0.0) == np.inf
+
+
+def test_one_element() -> None:
+    """Too small for Lanczos; its own eigenvalue is the bound that mass scaling uses, too."""
+    nodes = np.array([[0.0, 0, 0], [1, 0.1, 0], [0.2, 1, 0], [0.1, 0.3, 1.1]])
+    stone = q.Body((nodes, [[0, 1, 2, 3]]), q.Material(YOUNG, POISSON, DENSITY))
+    run = q.Simulation([stone], threads=1)
+    expected = critical_dense(*dense(stone))
+    assert run.critical_step.value == pytest.approx(expected, rel=1e-6)
+    assert element_step(stone)[0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["young", "density"])
+def test_jumps_of_a_thousand(name: str) -> None:
+    """A stiff or a light half governs; the other is a thousand times slower in omega^2."""
+    nodes, elements = delaunay_mesh(60, 2)
+    right = nodes[elements].mean(axis=1)[:, 0] > 0.5
+    value = {"young": YOUNG, "density": DENSITY}[name]
+    values = np.where(right, value, value / 1000)
+    stone = body(2, **{name: values})
+    critical = q.Simulation([stone], threads=1).critical_step
+    assert within(critical.value, critical_dense(*dense(stone)))
+    assert right[critical.element] == (name == "young")
+
+
+def test_bodies_of_a_simulation_and_the_one_that_governs() -> None:
+    """The step of two bodies is the shorter one, with the name of its body."""
+    slow, fast = body(0), body(1, young=100 * YOUNG)
+    fast.name = "fast"
+    alone = q.Simulation([body(1, young=100 * YOUNG)], threads=1).critical_step
+    both = q.Simulation([slow, fast], threads=1).critical_step
+    assert both.body == "fast"
+    assert both.element == alone.element
+    assert both.value == pytest.approx(alone.value, rel=1e-4)
+
+
+# --- its edge ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("viscosity", [0.0, 2e3], ids=["elastic", "viscous"])
+@LAW
+def test_stable_below_and_stopped_above(law: Strain, viscosity: float) -> None:
+    """1 % below, 3000 steps keep the energy put in; 1 % above, the run stops and says why.
+
+    Above, the fastest mode grows by 1.33 a step (elastic) or 1.02 (overdamped), so energy is
+    10^10 times larger after some 100 or 1500 steps.  Below, kinetic energy in the leapfrog
+    exceeds the true one by at most 1/(1 - (omega dt/2)^2) = 50.
+    """
+    # short of inversion, so that it is the energy that tells
+    speed = 1e-6 * np.random.default_rng(0).normal(size=(60, 3))
+    critical = q.Simulation([body(3, shear_viscosity=viscosity)], threads=1).critical_step
+
+    stone = body(3, shear_viscosity=viscosity)
+    run = q.Simulation([stone], strain=law, step=0.99 * critical.value, threads=1)
+    stone.velocity = speed
+    before = run.energy().kinetic
+    run.advance(3000 * run.step)
+    assert run.energy().kinetic + run.energy().elastic < 50 * before
+
+    stone = body(3, shear_viscosity=viscosity)
+    run = q.Simulation([stone], strain=law, step=1.01 * critical.value, threads=1)
+    stone.velocity = speed
+    with pytest.raises(Unstable) as raised:
+        run.advance(4096 * run.step)
+    assert f"element {critical.element} of body" in str(raised.value)
+    assert "1.010 times the critical one" in str(raised.value)
+
+
+def test_exactly_critical() -> None:
+    """At omega dt = 2 the mode is u(k) = (-1)^k (a + b k): linear growth, no error.
+
+    One element, whose eigenvalue is exact; bound: |u(k)| <= k dt |v| for a start at rest at u = 0.
+    """
+    nodes = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    stone = q.Body((nodes, [[0, 1, 2, 3]]), q.Material(YOUNG, POISSON, DENSITY))
+    run = q.Simulation([stone], strain="small", safety=1.0, threads=1)
+    stone.velocity = 1e-3 * run.critical_step.mode
+    run.advance(500 * run.step)
+    bound = 500 * run.step * 1e-3
+    assert 0.5 * bound < abs(stone.displacement).max() < 1.01 * bound
+
+
+# --- slivers -------------------------------------------------------------------------------------
+
+
+def test_slivers_cost_what_they_did_in_the_first_study() -> None:
+    """Step over that of the even mesh, by the altitude that is left (8^3 and 4^3 cells agree)."""
+
+    def critical(altitude: float) -> Any:
+        nodes, elements = box_with_sliver(altitude)
+        stone = q.Body((nodes, elements), q.Material(45e9, 0.167, 2350.0))
+        found = q.Simulation([stone], threads=1).critical_step
+        return found, stone.gradients[1]
+
+    even, _ = critical(1.0)
+    for altitude, expected in SLIVER_STEP.items():
+        found, volumes = critical(altitude)
+        assert found.value / even.value == pytest.approx(expected, abs=0.01)
+        assert volumes[found.element] < 1.01 * volumes.min()
+
+
+@pytest.mark.parametrize("place", [0, 40, -1])
+def test_a_planted_sliver_is_named(place: int) -> None:
+    """A flat element on a face of the surface governs, and the report names it."""
+    nodes, elements = delaunay_mesh(60, 4)
+    face = q.Body((nodes, elements), q.Material(YOUNG, POISSON, DENSITY)).surface[7]
+    corner = nodes[face]
+    normal = np.cross(corner[1] - corner[0], corner[2] - corner[0])
+    tip = corner.mean(axis=0) + 1e-3 * normal / np.sqrt(np.linalg.norm(normal))
+    number = place % (len(elements) + 1)
+    planted = np.insert(elements, number, [*face, len(nodes)], axis=0)
+    stone = q.Body((np.vstack([nodes, tip]), planted), q.Material(YOUNG, POISSON, DENSITY))
+    assert q.Simulation([stone], threads=1).critical_step.element == number
+
+
+# --- mass scaling --------------------------------------------------------------------------------
+
+
+def test_mass_scaling_factor_makes_each_element_as_slow_as_asked() -> None:
+    """omega^2 goes with one over the density: dt of the element alone becomes the target."""
+    stone = body(5)
+    alone = element_step(stone)
+    target = float(np.quantile(alone, 0.2))
+    factor = mass_scaling_factor([stone], target)
+    assert (factor[alone >= target] == 1).all()
+    heavier = body(5, density=DENSITY * factor)
+    assert element_step(heavier).min() == pytest.approx(target, rel=1e-12)
+
+
+@pytest.mark.parametrize("altitude", [0.1, 0.01])
+def test_mass_scaling_of_a_sliver(altitude: float) -> None:
+    """The step of the even mesh comes back for little mass and little change of the slow modes.
+
+    No assembled mesh is faster than its fastest element, so the critical step is at least the
+    target.  Mass added near a node of the first mode changes its frequency by at most half the
+    share of added mass where the mode is largest.
+    """
+    nodes, elements = box_with_sliver(altitude)
+    even_nodes, _ = box_with_sliver(1.0)
+    material = q.Material(YOUNG, POISSON, DENSITY)
+    target = float(element_step(q.Body((even_nodes, elements), material)).min())
+
+    stone = q.Body((nodes, elements), material)
+    slow = q.Simulation([stone], threads=1).critical_step.value
+    run = q.Simulation([q.Body((nodes, elements), material)], mass_scaling=target, threads=1)
+    assert run.critical_step.value >= target * (1 - ABOVE)
+    assert run.critical_step.value > {0.1: 1.5, 0.01: 5}[altitude] * slow
+
+    K, _, mass = dense(stone)
+    scaled = np.repeat(run.assembly.mass, 3)
+    added = scaled.sum() / mass.sum() - 1
+    assert 0 < added < 0.25
+    lowest, changed = (
+        np.sqrt(eigh(K / np.sqrt(np.outer(m, m)), eigvals_only=True, subset_by_index=(6, 6))[0])
+        for m in (mass, scaled)
+    )
+    assert 1 - 2 * added < changed / lowest <= 1
+    assert run.critical_step.value == pytest.approx(critical_dense(K, 0 * K, scaled), rel=BELOW)
