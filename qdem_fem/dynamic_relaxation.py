@@ -43,8 +43,10 @@ SLOPE_LEFT = 0.3
 """A step is long enough when the slope along it has dropped to this share."""
 TRIALS = 12
 """Lengths tried along one direction."""
-STALLS = 6
-"""Times the residual may rest on rounding before we say so."""
+ROUNDING = 2e-17
+"""Residual over ``|M u|`` where rounding is felt: a tenth of the last bit of the displacement."""
+STALLS = 200
+"""Steps that may be spent there."""
 HELD_SHARE = 1e-9
 """A rigid motion held by less than this share of a body's nodes' mean motion is called free."""
 
@@ -58,7 +60,8 @@ class StaticAnswer:
     error_estimate: float
     """Bound on the relative error of the displacement in the energy norm: all of the residual is
     taken to pull the softest motion that the iteration met.  A residual alone says little of a
-    slender body; this says too much, usually by one to three orders of magnitude."""
+    slender body; this says too much, usually by one to three orders of magnitude.  NaN where no
+    step was needed, so that no motion was met."""
     steps: int
     """Evaluations of the forces, each the cost of a time step."""
     cpu_s: float
@@ -71,8 +74,8 @@ def relax(simulation: Simulation, tolerance: float, max_steps: int) -> StaticAns
     Begins at the present displacement, works in double precision in any case, and leaves the
     bodies at rest; time stands still.  The account of energies goes on as if the loads had been
     brought up slowly.  Raises `ConditionError` for bodies that are not held against rigid
-    motion, `NotConverged` after ``max_steps`` (the state reached is kept), `ElementInverted` when given
-    displacements jump so far that elements next to them turn inside out.
+    motion, `NotConverged` after ``max_steps`` (the state reached is kept), `ElementInverted` when
+    given displacements jump so far that elements next to them turn inside out.
     """
     if not 0 < tolerance < 1:
         raise ConditionError(f"a tolerance of {tolerance}", where="relax", remedy="take 1e-8")
@@ -191,12 +194,16 @@ class _Found:
     lengths: list[float] = field(default_factory=list)
     ratios: list[float] = field(default_factory=list)
 
+    def note(self, u: Floats, r: Floats, size: float, problem: _Problem) -> None:
+        """Keep a displacement with its true residual ``r`` [N], measured by ``size`` [N]."""
+        self.displacement, self.steps = u, problem.steps
+        self.residual = float(np.linalg.norm(r) / size) if size > 0 else 0.0
+        self.energy = float(r @ (problem.inverse_mass * r))
+
     def softest(self) -> float:
         """Lowest eigenvalue of ``M^-1 K`` met: of the iteration's tridiagonal matrix [-]."""
         from scipy.linalg import eigh_tridiagonal
 
-        if not self.lengths:
-            return 1.0
         inverse = 1 / np.array(self.lengths)
         ratio = np.array(self.ratios)[:-1]
         diagonal = inverse.copy()
@@ -211,13 +218,17 @@ class _Found:
         """``|e|_K <= |r|_(M^-1)/sqrt(lowest)``, over ``|u|_K``."""
         if self.energy == 0:
             return 0.0
+        if not self.lengths or twice_energy <= 0:
+            return np.nan
         return float(np.sqrt(self.energy / max(self.softest(), 1e-300) / twice_energy))
 
 
 def _conjugate(problem: _Problem, u: Floats, tolerance: float, max_steps: int) -> _Found:
     """Conjugate gradients from ``u``, with the true residual at the end."""
     project, forces, weight = problem.project, problem.forces, problem.inverse_mass
+    stiff = weight > 0
     found = _Found(u)
+    sure = u
     total, sound = forces(u)
     if not sound:
         raise ElementInverted(
@@ -230,29 +241,41 @@ def _conjugate(problem: _Problem, u: Floats, tolerance: float, max_steps: int) -
     rz, sigma, unchecked, interval, stalls, restart = float(r @ z), 1.0, 0, 1, 0, False
     while True:
         size = _force_scale(problem, total, r)
-        if np.linalg.norm(r) <= tolerance * size or problem.steps >= max_steps:
-            true, _ = forces(u)
-            r = project(true)
-            residual = float(np.linalg.norm(r) / size) if size > 0 else 0.0
-            stalls = stalls + 1 if residual > 0.5 * found.residual else 0
-            found.displacement, found.residual = u, residual
-            found.energy, found.steps = float(r @ (weight * r)), problem.steps
+        small = np.linalg.norm(r)
+        if small <= ROUNDING * np.linalg.norm(u[stiff] / weight[stiff]):
+            stalls += 1
+        if small <= tolerance * size or problem.steps >= max_steps or stalls >= STALLS:
+            total, _ = forces(u)
+            r = project(total)
+            found.note(u, r, size, problem)
+            if found.residual <= tolerance or problem.steps >= max_steps:
+                return found
             if stalls >= STALLS:
                 found.ended = "where rounding keeps it"
-            if residual <= tolerance or problem.steps >= max_steps or stalls >= STALLS:
                 return found
-            total, restart = true, True
+            restart = True
+            if found.ratios:
+                found.ratios[-1] = 0.0
         if restart or direction @ r <= 0:
             z = weight * r
             direction, rz, restart = z, float(r @ z), False
         checked = unchecked + 1 >= interval
         step = _step(forces, project, u, direction, total, r, sigma, checked)
+        if step is None:
+            if u is sure:
+                found.note(u, r, size, problem)
+                found.ended = "where every step along the forces turns an element inside out"
+                return found
+            u, interval, unchecked, restart = sure, 1, 0, True
+            total, _ = forces(u)
+            r = project(total)
+            continue
+        u, total, sigma = u + step.length * direction, step.total, step.length
         unchecked = 0 if checked else unchecked + 1
         if checked:
-            interval = (
-                max(1, interval // 4) if step.drift > DRIFT else min(2 * interval, UNCHECKED_MOST)
-            )
-        u, total, sigma = u + step.length * direction, step.total, step.length
+            sure = u
+            loose = step.drift > DRIFT
+            interval = max(1, interval // 4) if loose else min(2 * interval, UNCHECKED_MOST)
         before, r = r, project(total)
         z = weight * r
         ratio = max(0.0, float(z @ (r - before)) / rz)
@@ -278,10 +301,11 @@ def _step(
     r: Floats,
     sigma: float,
     checked: bool,
-) -> _Step:
+) -> _Step | None:
     """The length along ``direction`` where the force along it vanishes, by secants.
 
-    Unchecked, forces there are those that a straight line through ``sigma`` predicts.
+    Unchecked, forces there are those that a straight line through ``sigma`` predicts.  None when
+    elements turn inside out however short the step is.
     """
     slope = float(direction @ r)
     for _ in range(TRIALS):
@@ -289,6 +313,8 @@ def _step(
         if sound:
             break
         sigma /= 4
+    else:
+        return None
     change = (trial - total) / sigma
     bend = -float(direction @ change)
     length = slope / bend if bend > 0 else 4 * sigma
@@ -304,6 +330,8 @@ def _step(
             length /= 4
         else:
             length *= float(np.clip(slope / (slope - left) if left < slope else 4.0, 0.1, 4.0))
+    if not sound:
+        return None
     drift = float(
         np.linalg.norm(project(true - predicted)) / (np.linalg.norm(project(true)) or 1.0)
     )

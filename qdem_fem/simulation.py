@@ -154,6 +154,7 @@ class Simulation:
                 f"{normal!r} is no direction", where="roller", remedy="give three components"
             )
         roller = Roller(self._nodes(body, nodes, "roller"), direction / length)
+        self._level()
         self.conditions.rollers.append(roller)
         self._changed()
         return roller
@@ -203,6 +204,7 @@ class Simulation:
         )  # fmt: skip
         for conditions in lists:
             if condition in conditions:
+                self._level()
                 conditions.remove(condition)
                 self._changed()
                 return
@@ -282,7 +284,10 @@ class Simulation:
             elastic += elastic_energy(
                 gradient, volumes, material.lame_first, material.lame_second, self.strain
             ).sum()
-        return Energy(kinetic, float(elastic), float(self.work.sum()) + self._gravity_work)
+        external = float(self.work.sum()) + self._gravity_work
+        if self._behind:
+            external += self._half_work(self.assembly.field("velocity"), velocity)
+        return Energy(kinetic, float(elastic), external)
 
     def save(self, path: str | Path) -> None:
         """Write the state to a file (`qdem_fem.checkpoint.checkpoint_write`)."""
@@ -344,8 +349,27 @@ class Simulation:
             displacement = self.assembly.field("displacement")
             velocity = self.assembly.field("velocity")
             change = self._accelerations(displacement, velocity)
-            self.assembly.field_set("velocity", velocity - 0.5 * self.step * change)
+            behind = velocity - 0.5 * self.step * change
+            self.work[0] -= self._half_work(behind, velocity)
+            self.assembly.field_set("velocity", behind)
             self._behind = True
+
+    def _half_work(self, behind: Floats, level: Floats) -> float:
+        """Work of the loads in the half step up to now [J], from both its velocities (n, 3)."""
+        loads, _ = self._packed_lists()
+        table = self.conditions.table(np.array([self.time]))[0]
+        flat = np.zeros((self.assembly.n_nodes, 4))
+        flat[self.assembly.place, :3] = 0.5 * (behind + level)
+        force = loads.weight * table[loads.series]
+        return 0.5 * self.step * float(force @ flat.ravel()[loads.node_at])
+
+    def _level(self) -> None:
+        """Bring the velocities to the time of the displacements: what `_begin` did, undone."""
+        if self._behind:
+            behind, level = self.assembly.field("velocity"), self._velocity_now()
+            self.work[0] += self._half_work(behind, level)
+            self.assembly.field_set("velocity", level)
+            self._behind = False
 
     def _march(
         self, steps: int, stride: int, nodes: Integers, progress: Callable[[float], None] | None
@@ -503,21 +527,19 @@ class Simulation:
         return tuple(sorted({COMPONENTS.index(c) for c in components}))
 
     def _hold(self, held: Held) -> Held:
+        self._level()
         self.conditions.held.append(held)
         self._changed()
         return held
 
     def _load(self, load: NodalLoad) -> NodalLoad:
+        self._level()
         self.conditions.loads.append(load)
         self._changed()
         return load
 
     def _changed(self) -> None:
-        """Conditions changed: lists and critical step are made anew, velocities brought level."""
-        if self._behind:
-            velocity = self._velocity_now()
-            self.assembly.field_set("velocity", velocity)
-            self._behind = False
+        """Conditions changed (after `_level`): lists and critical step are made anew."""
         if self._given_step is None and self._critical is not None and self.steps_done == 0:
             self._critical = None
         self._lists = None
@@ -531,12 +553,10 @@ class Simulation:
         if self._assembly is None:
             return
         start = self._offset(body)
-        velocity = self._velocity_now()
-        fields = {"velocity": velocity, "displacement": self.assembly.field("displacement")}
-        fields[name][start : start + len(body.nodes)] = values
-        for key, field in fields.items():
-            self.assembly.field_set(key, field)
-        self._behind = False
+        self._level()
+        field = self.assembly.field(name)
+        field[start : start + len(body.nodes)] = values
+        self.assembly.field_set(name, field)
         self._put_in = nan
 
     def _check_options(

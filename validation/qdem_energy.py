@@ -51,9 +51,7 @@ def invariant_drift(problem: Problem, steps: int) -> float:
     return float(np.abs(np.array(values) / values[0] - 1).max())
 
 
-def energies(
-    problem: Problem, strain: Strain, safety: float, duration: float
-) -> FloatArray:
+def energies(problem: Problem, strain: Strain, safety: float, duration: float) -> FloatArray:
     """Kinetic and elastic energy [J] at 200 times of a free motion of strains of `STRAIN`."""
     body = Body(problem.mesh, problem.material)
     run = Simulation([body], strain=strain, safety=safety, threads=1)

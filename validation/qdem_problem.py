@@ -1,8 +1,8 @@
 """Problems that QDEM and its judge both solve: one mesh, one material, the same held nodes.
 
-    problem = cantilever((24, 4, 4))
-    body, run = problem.simulation(amplitude=smooth_step(2 * period))       QDEM
-    problem.static, problem.stiffness, problem.mass                          scikit-fem
+problem = cantilever((24, 4, 4))
+body, run = problem.simulation(amplitude=smooth_step(2 * period))       QDEM
+problem.static, problem.stiffness, problem.mass                          scikit-fem
 """
 
 from __future__ import annotations
@@ -113,7 +113,9 @@ class Problem:
             if single.any():
                 run.fix(body, single, letter)
         if isinstance(amplitude, Series):
-            run.load(body, self.loaded, Series(amplitude.times, np.outer(amplitude.values, self.force)))
+            run.load(
+                body, self.loaded, Series(amplitude.times, np.outer(amplitude.values, self.force))
+            )
         elif amplitude is not None:
             run.load(body, self.loaded, self.force)
         return body, run

@@ -47,6 +47,20 @@ class Spin:
     steps: int
 
 
+def block_on_its_axes() -> tuple[TetMesh, FloatArray]:
+    """The block with its centre at the origin and its principal axes along x, y, z; masses [kg].
+
+    About any other axis it would tumble.
+    """
+    block = jitter(box_mesh((1.2, 1.0, 0.6), (2, 2, 2)), 0.2, seed=3)
+    mass = qdem_judge.lumped_mass(block.nodes, block.elements, SOFT.density)
+    place = block.nodes - mass @ block.nodes / mass.sum()
+    _, axes = np.linalg.eigh(place.T @ (mass[:, None] * place))  # largest spread last
+    axes = axes[:, ::-1]
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
+    return TetMesh(place @ axes, block.elements), mass
+
+
 def lagrange_strain(body: Body) -> FloatArray:
     """(F^T F - I)/2 of the elements [-], (m, 3, 3): does not see rotations."""
     gradient = displacement_gradient(body.gradients[0], body.elements, body.displacement)
@@ -89,11 +103,8 @@ def internal_forces(body: Body) -> FloatArray:
 
 
 def spin(turns: float, rim_share: float = RIM_SHARE, samples: int = 50) -> Spin:
-    """A free irregular block of 48 elements spins about the axis z through its centre."""
-    mesh = jitter(box_mesh((1.0, 1.0, 1.0), (2, 2, 2), origin=(-0.5, -0.5, -0.5)), 0.2, seed=3)
-    mass = qdem_judge.lumped_mass(mesh.nodes, mesh.elements, SOFT.density)
-    centre = mass @ mesh.nodes / mass.sum()
-    mesh = TetMesh(mesh.nodes - centre, mesh.elements)
+    """A free irregular block of 48 elements spins about z, its axis of greatest inertia."""
+    mesh, mass = block_on_its_axes()
     omega = rim_share * float(SOFT.wave_speed) / np.sqrt(0.5)
     body = Body(mesh, SOFT)
     run = Simulation([body], threads=1)
@@ -126,7 +137,7 @@ def spin_checks(turns: float) -> list[Check]:
     return [
         between(f"{name}: turns made", found.turns, turns - 0.01, turns + 0.01),
         reported(f"{name}: strain of the spinning shape", found.strain),
-        below(f"{name}: change of strain", found.strain_change, 1e-12),
+        below(f"{name}: change of strain", found.strain_change, 1e-11),
         below(f"{name}: change of angular momentum", found.momentum_change, 1e-10),
         reported(f"{name}: steps", found.steps),
     ]
@@ -144,7 +155,8 @@ def patch(seed: int) -> tuple[float, float]:
     generator = np.random.default_rng(seed)
     mesh = jitter(box_mesh((1.0, 0.8, 0.7), (4, 3, 3)), 0.24, seed)
     body = Body(mesh, SOFT)
-    run = Simulation([body], threads=1, safety=0.1)
+    # so short a step that a hardly changes within it, and v = a dt
+    run = Simulation([body], threads=1, safety=1e-7)
     gradient = 0.1 * generator.standard_normal((3, 3))
     body.displacement = mesh.nodes @ gradient.T + generator.standard_normal(3)
     nominal = stress_finger(gradient[None], SOFT.lame_first, SOFT.lame_second)

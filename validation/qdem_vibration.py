@@ -129,11 +129,15 @@ def frequency_checks(name: str, problem: Problem) -> list[Check]:
         below(f"{name}: first frequency to same mesh", abs(mode.frequency / expected - 1), 1e-3),
         reported(f"{name}: first frequency", mode.frequency, "Hz"),
         below(f"{name}: decay of an elastic motion", abs(mode.decay) / expected, 1e-4),
-        below(f"{name}: decay with viscosity, to phi C phi/2", abs(decay / decay_expected - 1), 1e-2),
+        below(
+            f"{name}: decay with viscosity, to phi C phi/2", abs(decay / decay_expected - 1), 1e-2
+        ),
     ]
     for number, (judge, found) in enumerate(five_frequencies(problem), 1):
         rows.append(
-            below(f"{name}: mode {number}, {judge:.2f} Hz, to same mesh", abs(found / judge - 1), 1e-3)
+            below(
+                f"{name}: mode {number}, {judge:.2f} Hz, to same mesh", abs(found / judge - 1), 1e-3
+            )
         )
     return rows
 
@@ -210,9 +214,7 @@ def motion_checks(problem: Problem) -> list[Check]:
             reported(f"motion, Newmark at {count} steps a period", error)
             for count, error in zip(NEWMARK_STEPS, of_newmark, strict=True)
         ),
-        between(
-            "motion, Newmark: order in its step", -orders(NEWMARK_STEPS, of_newmark), 1.9, 2.1
-        ),
+        between("motion, Newmark: order in its step", -orders(NEWMARK_STEPS, of_newmark), 1.9, 2.1),
         *unloading_checks(problem, duration),
     ]
 

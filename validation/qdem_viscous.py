@@ -139,7 +139,8 @@ def creep_checks() -> list[Check]:
     ):
         time, strain = creep_run(free_sides)
         expected = convolved(
-            lambda t, form=closed: form(t, STRESS, YOUNG_SOFT, VISCOSITY_SOFT), time  # type: ignore[misc]
+            lambda t, form=closed: form(t, STRESS, YOUNG_SOFT, VISCOSITY_SOFT),
+            time,  # type: ignore[misc]
         )
         off = np.abs(strain - expected) / expected.max()
         loaded = time < UNLOADED

@@ -174,8 +174,8 @@ def stiffness_of(size: tuple[float, float, float]) -> tuple[Any, Any]:
 def test_frequency_of_the_run_is_that_of_its_own_matrices(scene: Path) -> None:
     """The mode found is an eigenvalue of K u = w^2 M u, as Verlet sees it.
 
-    K is scikit-fem's.  Verlet moves w to 2 asin(w dt/2)/dt, by 1e-4.  The section is a third as wide as
-    high, so that bending in y and z do not beat.
+    K is scikit-fem's.  Verlet moves w to 2 asin(w dt/2)/dt, by 1e-4 of itself.  The section is a
+    third as wide as high, so that bending in y and z do not beat.
     """
     from scipy.linalg import eigh
 

@@ -1,4 +1,4 @@
-"""The critical step against dense eigenvalues, at its edge, with slivers, jumps and mass scaling."""
+"""The critical step: dense eigenvalues, stable or not, slivers, jumps, mass scaling."""
 
 from __future__ import annotations
 
@@ -252,32 +252,39 @@ def test_mass_scaling_factor_makes_each_element_as_slow_as_asked() -> None:
     assert element_step(heavier).min() == pytest.approx(target, rel=1e-12)
 
 
-@pytest.mark.parametrize("altitude", [0.1, 0.01])
-def test_mass_scaling_of_a_sliver(altitude: float) -> None:
-    """The step of the even mesh comes back for little mass and little change of the slow modes.
+@pytest.mark.parametrize(
+    ("altitude", "share", "gain", "most", "slower"),
+    [(0.1, 1.0, 1.8, 0.14, 0.007), (0.01, 0.5, 2.6, 0.32, 0.043), (0.01, 0.25, 1.5, 0.08, 0.004)],
+)
+def test_mass_scaling_of_a_sliver(
+    altitude: float, share: float, gain: float, most: float, slower: float
+) -> None:
+    """Longer steps for added mass, and what they cost the lowest frequency.
 
-    No assembled mesh is faster than its fastest element, so the critical step is at least the
-    target.  Mass added near a node of the first mode changes its frequency by at most half the
-    share of added mass where the mode is largest.
+    ``share`` of the step of an even element is asked for.  No assembled mesh is faster than its
+    fastest element, so the critical step is at least that.  In a body of 384 elements the added
+    mass is up to a third of all; it sits in the middle, where the lowest mode moves little:
+    d omega/omega = -phi dM phi/(2 phi M phi), at most half of the added share times the
+    square of the mode there.
     """
     nodes, elements = box_with_sliver(altitude)
     even_nodes, _ = box_with_sliver(1.0)
     material = q.Material(YOUNG, POISSON, DENSITY)
-    target = float(element_step(q.Body((even_nodes, elements), material)).min())
+    target = share * float(element_step(q.Body((even_nodes, elements), material)).min())
 
     stone = q.Body((nodes, elements), material)
     slow = q.Simulation([stone], threads=1).critical_step.value
     run = q.Simulation([q.Body((nodes, elements), material)], mass_scaling=target, threads=1)
     assert run.critical_step.value >= target * (1 - ABOVE)
-    assert run.critical_step.value > {0.1: 1.5, 0.01: 5}[altitude] * slow
+    assert run.critical_step.value > gain * slow
 
     K, _, mass = dense(stone)
     scaled = np.repeat(run.assembly.mass, 3)
     added = scaled.sum() / mass.sum() - 1
-    assert 0 < added < 0.25
+    assert 0 < added < most
     lowest, changed = (
         np.sqrt(eigh(K / np.sqrt(np.outer(m, m)), eigvals_only=True, subset_by_index=(6, 6))[0])
         for m in (mass, scaled)
     )
-    assert 1 - 2 * added < changed / lowest <= 1
-    assert run.critical_step.value == pytest.approx(critical_dense(K, 0 * K, scaled), rel=BELOW)
+    assert 1 - slower < changed / lowest < 1 - 0.001 * added
+    assert within(run.critical_step.value, critical_dense(K, 0 * K, scaled))
