@@ -72,7 +72,7 @@ class Assembly:
         self.law = kernel.LAWS[strain](kind.type(0.5))
         chunks = len(self.packed.layout.chunk_shift)
         most = threads or max(1, len(self.elements) // THREAD_ELEMENTS)
-        self.threads = min(most, numba.config.NUMBA_NUM_THREADS, chunks)
+        self.threads = min(most, numba.get_num_threads(), chunks)
         inverse = np.zeros(self.n_nodes)
         used = self.mass > 0
         inverse[self.packed.node_place[used]] = 1 / self.mass[used]

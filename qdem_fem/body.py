@@ -126,6 +126,10 @@ class Body:
                 f"nodes are named by a mask or by whole numbers, not by {chosen.dtype}",
                 where=where,
             )
+        elif chosen.shape == (count,) and count > 2 and np.isin(chosen, (0, 1)).all():
+            raise ConditionError(
+                "these numbers, all 0 or 1, look like a mask", where=where, remedy="make it bool"
+            )
         chosen = np.unique(chosen.ravel().astype(np.int64))
         if not chosen.size:
             raise ConditionError(
@@ -150,7 +154,10 @@ class Body:
         return np.setdiff1d(chosen, unused)
 
     def _checked(self, value: ArrayLike, what: str) -> Floats:
-        field = np.array(value, dtype=float)
+        try:
+            field = np.array(value, dtype=float)
+        except (TypeError, ValueError):
+            raise ConditionError(f"a {what} of numbers is needed", where=self.name) from None
         if field.shape != self.nodes.shape or not np.isfinite(field).all():
             raise ConditionError(
                 f"a {what} is finite and of shape {self.nodes.shape}; this one has {field.shape}",

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.errors import ConditionError
 from qdem_fem.kernel import Constraints, Loads
 from qdem_fem.layout import Packed
 from qdem_fem.series import Driver
@@ -16,6 +17,8 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 COMPONENTS = "xyz"
+PARALLEL = 1e-9
+"""A direction of a normal smaller than this is none."""
 
 
 @dataclass(eq=False)
@@ -96,16 +99,47 @@ class Conditions:
             column += held.driver is not None
         at = np.array(sorted(given), dtype=np.int64)
         values = [given[key] for key in at.tolist()]
-        nodes = [place[roller.nodes] for roller in self.rollers]
-        normals = [np.tile(roller.normal, (len(roller.nodes), 1)) for roller in self.rollers]
+        nodes, normals = self._roller_normals(place, given)
         return Constraints(
             node_at=at,
             series=np.array([series for series, _ in values], dtype=np.int64),
             weight=np.array([weight for _, weight in values], dtype=float),
             previous=np.zeros(len(at)),
-            roller_at=4 * _joined(nodes),
-            roller_normal=np.concatenate([*normals, np.zeros((0, 3))]),
+            roller_at=4 * nodes,
+            roller_normal=normals,
         )
+
+    def _roller_normals(
+        self, place: Integers, given: dict[int, tuple[int, float]]
+    ) -> tuple[Integers, Floats]:
+        """Nodes (R,) and normals (R, 3) of all rollers, by kernel number.
+
+        Normals of one node are made orthogonal to each other and to its held components, so that
+        to take out one after the other is to stay in all planes.
+        """
+        by_node: dict[int, list[Floats]] = {}
+        for roller in self.rollers:
+            for node in np.unique(place[roller.nodes]).tolist():
+                by_node.setdefault(node, []).append(roller.normal)
+        nodes, normals = [], []
+        for node, planes in by_node.items():
+            held = [c for c in range(3) if 4 * node + c in given]
+            kept = [np.eye(3)[c] for c in held]
+            for normal in planes:
+                moved = [c for c in held if given[4 * node + c][1] and abs(normal[c]) > PARALLEL]
+                if moved:
+                    raise ConditionError(
+                        f"a node is moved along {COMPONENTS[moved[0]]} out of its plane of normal "
+                        f"{normal.tolist()}",
+                        where="roller",
+                        remedy="take the node out of the roller or of the prescribed motion",
+                    )
+                left = normal - sum(((normal @ other) * other for other in kept), np.zeros(3))
+                if (length := np.linalg.norm(left)) > PARALLEL:
+                    kept.append(left / length)
+                    nodes.append(node)
+                    normals.append(kept[-1])
+        return np.array(nodes, dtype=np.int64), np.array(normals).reshape(-1, 3)
 
 
 def _joined(parts: Sequence[NDArray[np.generic]]) -> NDArray[np.int64]:

@@ -27,8 +27,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.assembly import NO_LOADS, NO_PROBES, Assembly
 from qdem_fem.errors import ConditionError, ElementInverted, NotConverged
+from qdem_fem.rigid_motions import held_check
+from qdem_fem.static_problem import StaticProblem
 
 if TYPE_CHECKING:
     from qdem_fem.simulation import Simulation
@@ -43,12 +44,10 @@ SLOPE_LEFT = 0.3
 """A step is long enough when the slope along it has dropped to this share."""
 TRIALS = 12
 """Lengths tried along one direction."""
-ROUNDING = 2e-17
-"""Residual over ``|M u|`` where rounding is felt: a tenth of the last bit of the displacement."""
+ROUNDING = 2.2e-16
+"""Residual over ``|M u|`` at which the last bits of the displacement are felt."""
 STALLS = 200
 """Steps that may be spent there."""
-HELD_SHARE = 1e-9
-"""A rigid motion held by less than this share of a body's nodes' mean motion is called free."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +79,9 @@ def relax(simulation: Simulation, tolerance: float, max_steps: int) -> StaticAns
     if not 0 < tolerance < 1:
         raise ConditionError(f"a tolerance of {tolerance}", where="relax", remedy="take 1e-8")
     started = time.process_time()
-    _check_held(simulation)
+    held_check(simulation)
     before = simulation.energy()
-    problem = _Problem(simulation)
+    problem = StaticProblem(simulation)
     found = _conjugate(problem, problem.start(), tolerance, max_steps)
     problem.finish(simulation, found.displacement)
     after = simulation.energy()
@@ -102,85 +101,6 @@ def relax(simulation: Simulation, tolerance: float, max_steps: int) -> StaticAns
     )
 
 
-class _Problem:
-    """Forces, constraints and fictitious masses in the kernel's order, four numbers a node."""
-
-    def __init__(self, simulation: Simulation) -> None:
-        own = simulation.assembly
-        conditions, now = simulation.conditions, np.full(1, simulation.time)
-        self.assembly = own
-        if own.dtype != np.float64 or type(own) is not Assembly:  # single precision, or a GPU
-            self.assembly = Assembly(
-                simulation.bodies, simulation._master, simulation.strain, "float64",
-                simulation.threads,
-            )  # fmt: skip
-        assembly, place = self.assembly, self.assembly.place
-        loads, held = assembly.lists(conditions)
-        row = conditions.table(now)[0]
-        self.external = np.zeros(4 * assembly.n_nodes)
-        np.add.at(self.external, loads.node_at, loads.weight * row[loads.series])
-        gravity = simulation._gravity_at(now)
-        if gravity is not None:
-            # the masses of the simulation itself, with what mass scaling added
-            weight = np.zeros((assembly.n_nodes, 4))
-            weight[place, :3] = own.mass[:, None] * gravity[0]
-            used = own.mass > 0
-            self.external.reshape(-1, 4)[place[used]] += weight[place[used]]
-        self.held_at, self.target = held.node_at, held.weight * row[held.series]
-        self.roller_at = held.roller_at[:, None] + np.arange(3)
-        self.roller_normal = held.roller_normal
-        self.nothing = held._replace(
-            node_at=held.node_at[:0], series=held.series[:0], weight=held.weight[:0],
-            previous=held.previous[:0], roller_at=held.roller_at[:0],
-            roller_normal=held.roller_normal[:0],
-        )  # fmt: skip
-        self.state = assembly._state(np.ones(assembly.n_nodes))
-        self.inverse_mass = _inverse_stiffness(simulation, assembly)
-        self.initial = simulation.assembly.field("displacement")
-        self.steps = 0
-
-    def start(self) -> Floats:
-        """The present displacement with given components at their values."""
-        u = np.zeros(4 * self.assembly.n_nodes)
-        u.reshape(-1, 4)[self.assembly.place, :3] = self.initial
-        u = self.project(u)
-        u[self.held_at] = self.target
-        return u
-
-    def finish(self, simulation: Simulation, u: Floats) -> None:
-        """Leave the bodies of the simulation at rest at ``u``."""
-        moved = u.reshape(-1, 4)[self.assembly.place, :3]
-        simulation.assembly.field_set("displacement", moved)
-        simulation.assembly.field_set("velocity", np.zeros_like(moved))
-        simulation._packed_lists()[1].previous[:] = 0.0
-        simulation._behind = False
-
-    def project(self, field: Floats) -> Floats:
-        """``field`` without what is held: given components and normals of rollers."""
-        field = field.copy()
-        across = np.einsum("rc,rc->r", field[self.roller_at], self.roller_normal)
-        field[self.roller_at] -= across[:, None] * self.roller_normal
-        field[self.held_at] = 0.0
-        return field
-
-    def forces(self, u: Floats) -> tuple[Floats, bool]:
-        """``f_int + f_ext`` [N], reactions included, and whether all elements are sound.
-
-        The kernel's own step of one second with masses of one kilogram, from rest.
-        """
-        self.steps += 1
-        self.state.displacement[:] = u
-        self.state.velocity[:] = 0.0
-        _, bad = self.assembly.window(
-            1, 1.0, NO_LOADS, self.nothing, NO_PROBES, np.ones((2, 1)), None, np.zeros(2),
-            state=self.state,
-        )  # fmt: skip
-        self.state.forces[:] = 0.0
-        return self.state.velocity + self.external, bad == 0 and bool(
-            np.isfinite(self.state.velocity).all()
-        )
-
-
 @dataclass
 class _Found:
     """Where an iteration has come to, and what it learned of the stiffness."""
@@ -194,7 +114,7 @@ class _Found:
     lengths: list[float] = field(default_factory=list)
     ratios: list[float] = field(default_factory=list)
 
-    def note(self, u: Floats, r: Floats, size: float, problem: _Problem) -> None:
+    def note(self, u: Floats, r: Floats, size: float, problem: StaticProblem) -> None:
         """Keep a displacement with its true residual ``r`` [N], measured by ``size`` [N]."""
         self.displacement, self.steps = u, problem.steps
         self.residual = float(np.linalg.norm(r) / size) if size > 0 else 0.0
@@ -223,7 +143,7 @@ class _Found:
         return float(np.sqrt(self.energy / max(self.softest(), 1e-300) / twice_energy))
 
 
-def _conjugate(problem: _Problem, u: Floats, tolerance: float, max_steps: int) -> _Found:
+def _conjugate(problem: StaticProblem, u: Floats, tolerance: float, max_steps: int) -> _Found:
     """Conjugate gradients from ``u``, with the true residual at the end."""
     project, forces, weight = problem.project, problem.forces, problem.inverse_mass
     stiff = weight > 0
@@ -240,7 +160,7 @@ def _conjugate(problem: _Problem, u: Floats, tolerance: float, max_steps: int) -
     direction = z = weight * r
     rz, sigma, unchecked, interval, stalls, restart = float(r @ z), 1.0, 0, 1, 0, False
     while True:
-        size = _force_scale(problem, total, r)
+        size = problem.force_scale(total, r)
         small = np.linalg.norm(r)
         if small <= ROUNDING * np.linalg.norm(u[stiff] / weight[stiff]):
             stalls += 1
@@ -336,79 +256,3 @@ def _step(
         np.linalg.norm(project(true - predicted)) / (np.linalg.norm(project(true)) or 1.0)
     )
     return _Step(length, true, drift)
-
-
-def _force_scale(problem: _Problem, total: Floats, r: Floats) -> float:
-    """What a residual is measured by [N]: the loads, or the reactions where they are larger."""
-    reactions = np.linalg.norm(total - r)
-    return float(max(np.linalg.norm(problem.project(problem.external)), reactions))
-
-
-def _inverse_stiffness(simulation: Simulation, assembly: Assembly) -> Floats:
-    """``1/M`` with fictitious masses M: a third of the trace of ``K_aa`` at every node [N/m].
-
-    ``tr K_aa = sum_e V (lambda + 4 mu) |grad N_a|^2``.
-    """
-    shares = []
-    for body in simulation.bodies:
-        gradients, volumes = body.gradients
-        every = np.concatenate([-gradients.sum(axis=1, keepdims=True), gradients], axis=1)
-        modulus = np.asarray(body.material.lame_first) + 4 * np.asarray(body.material.lame_second)
-        shares.append((modulus * volumes)[:, None] * (every**2).sum(axis=2) / 3)
-    at = assembly.place[assembly.elements]
-    trace = np.bincount(at.ravel(), np.concatenate(shares).ravel(), assembly.n_nodes)
-    inverse = np.divide(1.0, trace, out=np.zeros_like(trace), where=trace > 0)
-    return np.repeat(inverse, 4)
-
-
-def _check_held(simulation: Simulation) -> None:
-    """Raise `ConditionError` naming a part that can move as a rigid body."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    assembly, conditions = simulation.assembly, simulation.conditions
-    n, elements, master = assembly.n_nodes, assembly.elements, simulation._master
-    pairs = np.concatenate(
-        [elements[:, [0, k]] for k in (1, 2, 3)] + [np.stack([np.arange(n), master], 1)]
-    )
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    count, part = connected_components(graph, directed=False)
-    x = np.concatenate([body.nodes for body in simulation.bodies])
-    used = np.zeros(n, dtype=bool)
-    used[elements] = True
-
-    rows: list[tuple[NDArray[np.int64], Floats]] = []
-    for held in conditions.held:
-        rows += [(held.nodes, np.tile(np.eye(3)[c], (len(held.nodes), 1))) for c in held.components]
-    rows += [
-        (roller.nodes, np.tile(roller.normal, (len(roller.nodes), 1)))
-        for roller in conditions.rollers
-    ]
-    followers = np.flatnonzero(master != np.arange(n))
-    for one in range(count):
-        mine = part == one
-        if not (used & mine).any():
-            continue
-        centre, size = x[mine].mean(axis=0), max(float(np.ptp(x[mine], axis=0).max()), 1e-300)
-        gram = np.zeros((6, 6))
-        for nodes, normals in rows:
-            chosen = mine[nodes]
-            arm = np.cross((x[nodes[chosen]] - centre) / size, normals[chosen])
-            motion = np.concatenate([normals[chosen], arm], axis=1)
-            gram += motion.T @ motion
-        apart = (x[followers] - x[master[followers]])[mine[followers]] / size
-        for normal in np.eye(3):  # partners move alike: what turns them apart is held
-            motion = np.concatenate([np.zeros_like(apart), np.cross(apart, normal)], axis=1)
-            gram += motion.T @ motion
-        values = np.linalg.eigvalsh(gram)
-        free = int((values <= HELD_SHARE * max(values[-1], 1.0)).sum())
-        if free:
-            first = int(np.flatnonzero(mine & used)[0])
-            number = int(np.searchsorted(simulation._first_node, first, side="right")) - 1
-            body = simulation.bodies[number]
-            raise ConditionError(
-                f"{body.name} has no static answer: {free} of the 6 rigid motions of the part "
-                f"with node {first - simulation._first_node[number]} are not held",
-                where="relax",
-                remedy="fix nodes or components until it can neither shift nor turn",
-            )

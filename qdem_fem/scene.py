@@ -223,6 +223,7 @@ class SimulationTable(Table):
     """Time step [s]; by default the critical one times ``safety``."""
     safety: Share = 0.9
     threads: Annotated[int, Field(ge=1, le=1024)] | None = None
+    device: Literal["cpu", "cuda"] = "cpu"
     gravity: Vector | None = None
     """Acceleration [m/s^2]; left out of the kernel when not given."""
     mass_scaling: Positive | None = None

@@ -71,6 +71,7 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         safety=table.safety,
         gravity=table.gravity,
         threads=table.threads,
+        device=table.device,
         mass_scaling=table.mass_scaling,
     )
     problems = []

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -67,9 +69,14 @@ class Series:
         return float(value) if np.ndim(value) == 0 else value
 
 
+def is_real(value: object) -> bool:
+    """True for a finite real number."""
+    return isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
+
+
 def ramp(duration: float, value: ArrayLike) -> Series:
     """From zero to ``value`` in ``duration`` [s], then constant: the paper's loading (3.1)."""
-    if not duration > 0:
+    if not (is_real(duration) and duration > 0):
         raise ConditionError(f"a ramp of {duration} s", where="ramp", remedy="give a time above 0")
     end = np.asarray(value, dtype=float)
     return Series([0.0, duration], np.stack([np.zeros_like(end), end]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, isnan, nan
 from pathlib import Path
@@ -26,7 +26,7 @@ from qdem_fem.reference_forces import (
     elastic_energy,
     volume_change,
 )
-from qdem_fem.series import Driver, Value
+from qdem_fem.series import Driver, Value, is_real
 from qdem_fem.surface import faces_within, pressure_forces
 
 Floats = NDArray[np.float64]
@@ -36,6 +36,10 @@ SAFETY = 0.9
 PRECISIONS = ("float64", "float32")
 DEVICES = ("cpu", "cuda")
 WINDOW_STEPS = 4096
+GRAVITY_STEPS = 16
+"""Steps over which the work of a gravity that changes is taken from its mean."""
+STEPS_MOST = 2**53
+"""Numbers of steps are exact as floats up to here."""
 SAMPLES = 1000
 """Samples of an advance whose sampling is not given."""
 GROWTH = 10.0
@@ -104,6 +108,8 @@ class Simulation:
         mass_scaling: float | None = None,
         device: Literal["cpu", "cuda"] = "cpu",
     ) -> None:
+        if not isinstance(bodies, Iterable):
+            raise ConditionError(f"{bodies!r} is no list of bodies", where="simulation")
         self.bodies = list(bodies)
         self._check_options(strain, precision, device, step, safety, threads, mass_scaling)
         self._assembly_class = assembly_class(device)
@@ -147,7 +153,10 @@ class Simulation:
 
     def roller(self, body: Body, nodes: Any, normal: ArrayLike) -> Roller:
         """Keep nodes in the plane through them with this normal, free within it."""
-        direction = np.asarray(normal, dtype=float)
+        try:
+            direction = np.asarray(normal, dtype=float)
+        except (TypeError, ValueError):
+            direction = np.zeros(3)
         length = float(np.linalg.norm(direction)) if direction.shape == (3,) else 0.0
         if not (np.isfinite(length) and length > 0):
             raise ConditionError(
@@ -167,6 +176,7 @@ class Simulation:
 
     def pressure(self, body: Body, nodes: Any, pressure: Value) -> NodalLoad:
         """A ``pressure`` [Pa] along the inward reference normal of the faces within ``nodes``."""
+        self._offset(body)
         local = body.nodes_select(nodes, "pressure")
         mask = np.zeros(len(body.nodes), dtype=bool)
         mask[local] = True
@@ -247,8 +257,14 @@ class Simulation:
         Raises `Unstable` when the motion grows without bound, `ElementInverted` when an element
         turns inside out; the state is then that of the step at fault.
         """
-        if not (np.isfinite(duration) and duration >= 0):
-            raise ConditionError(f"a duration of {duration} s", where="advance")
+        if not (is_real(duration) and 0 <= duration < STEPS_MOST * self.step):
+            raise ConditionError(f"a duration of {duration!r} s", where="advance")
+        if sampling is not None and not (is_real(sampling) and sampling > 0):
+            raise ConditionError(f"a sampling every {sampling!r} s", where="advance")
+        if not isinstance(probes or {}, Mapping):
+            raise ConditionError(
+                "probes have no names", where="advance", remedy='give {"name": nodes}'
+            )
         steps = ceil(duration / self.step * (1 - 1e-12) - 1e-9)
         stride = max(1, round((sampling or duration / SAMPLES) / self.step)) if steps else 1
         chosen = {name: self._probe(name, probe) for name, probe in (probes or {}).items()}
@@ -385,6 +401,8 @@ class Simulation:
         if first == 0 and len(record):
             record[0] = assembly.field("displacement")[nodes]
         most = max(16, min(WINDOW_STEPS, assembly.window_work // len(assembly.elements)))
+        if self._gravity is not None and self._gravity.varying is not None:
+            most = GRAVITY_STEPS
         while self.steps_done < end:
             count = min(most, end - self.steps_done)
             times = self.step * (self.steps_done + np.arange(count + 1, dtype=float))
@@ -505,11 +523,13 @@ class Simulation:
 
     def _offset(self, body: Body) -> int:
         if not any(body is member for member in self.bodies):
-            raise ConditionError(f"{body.name} is not in this simulation", where="body")
+            name = body.name if isinstance(body, Body) else repr(body)
+            raise ConditionError(f"{name} is not in this simulation", where="body")
         return int(self._first_node[[body is member for member in self.bodies].index(True)])
 
     def _nodes(self, body: Body, nodes: Any, where: str) -> Integers:
-        return body.nodes_select(nodes, where) + self._offset(body)
+        start = self._offset(body)
+        return body.nodes_select(nodes, where) + start
 
     def _probe(self, name: str, probe: Any) -> Integers:
         if isinstance(probe, tuple) and len(probe) == 2 and isinstance(probe[0], Body):
@@ -567,6 +587,13 @@ class Simulation:
             raise ConditionError("give a list of at least one Body", where="simulation")
         if len({id(body) for body in self.bodies}) < len(self.bodies):
             raise ConditionError("a body is listed twice", where="simulation")
+        for body in self.bodies:
+            if body._simulation is not None:
+                raise ConditionError(
+                    f"{body.name} is in another simulation, which moves it",
+                    where="simulation",
+                    remedy="make another of the same mesh: Body(body.mesh, body.material)",
+                )
         for name, value, known in (
             ("strain", strain, tuple(kernel.LAWS)), ("precision", precision, PRECISIONS),
             ("device", device, DEVICES),
@@ -578,5 +605,5 @@ class Simulation:
         for name, number in (
             ("step", step), ("safety", safety), ("threads", threads), ("mass_scaling", mass_scaling)
         ):  # fmt: skip
-            if number is not None and not (np.isfinite(number) and number > 0):
+            if number is not None and not (is_real(number) and number > 0):
                 raise ConditionError(f"{number!r} is not above zero", where=f"simulation, {name}")

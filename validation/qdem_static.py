@@ -180,11 +180,21 @@ def full_checks() -> list[Check]:
     ]
 
 
-def paper_size_checks() -> list[Check]:
-    """The paper's number of elements: 488,400 against its 488,361."""
-    answer = settled(cantilever((222, 22, 20), "five"))
+def paper_size() -> Problem:
+    """The cantilever with 488,400 elements, the paper's has 488,361."""
+    return cantilever((222, 22, 20), "five")
+
+
+def paper_size_relaxed_checks() -> list[Check]:
+    """Static answer of the paper's number of elements, and how far the mesh is from the limit."""
+    answer = relaxed(paper_size())
     return [
-        *answer_checks("488,400 elements, settled", answer),
+        *answer_checks("488,400 elements, relaxed", answer),
         near("488,400 elements: tip, the paper's", 1e6 * answer.tip, 1e6 * TIP_PAPER, 0.004, "um"),
         reported("488,400 elements: excess stiffness", 100 * (TIP_P2 / answer.tip - 1), "%"),
     ]
+
+
+def paper_size_settled_checks() -> list[Check]:
+    """The same by motion in time, as the paper does it."""
+    return answer_checks("488,400 elements, settled", settled(paper_size()))

@@ -104,13 +104,16 @@ def load_history() -> Series:
     return smooth_step(RISE, back=UNLOADED)
 
 
-def convolved(creep: Callable[[FloatArray], FloatArray], time: FloatArray) -> FloatArray:
-    """Answer to `load_history` from the answer ``creep(t)`` to a unit step (Boltzmann)."""
+def convolved(creep: Callable[..., FloatArray], time: FloatArray) -> FloatArray:
+    """Answer to `load_history` at times (k,) [s] from that to a jump (Boltzmann's superposition).
+
+    ``creep(t, stress, young, viscosity)`` is a closed form of `qdem_closed_forms`.
+    """
     load = load_history()
     middle = 0.5 * (load.times[1:] + load.times[:-1])
-    change = np.diff(load.values)
     since = time[:, None] - middle
-    return np.asarray((np.where(since > 0, creep(np.maximum(since, 0.0)), 0.0) * change).sum(1))
+    answer = creep(np.maximum(since, 0.0), STRESS, YOUNG_SOFT, VISCOSITY_SOFT)
+    return np.asarray((np.where(since > 0, answer, 0.0) * np.diff(load.values)).sum(axis=1))
 
 
 def creep_run(free_sides: bool) -> tuple[FloatArray, FloatArray]:
@@ -138,10 +141,7 @@ def creep_checks() -> list[Check]:
         ("uniaxial stress", True, creep_uniaxial_stress),
     ):
         time, strain = creep_run(free_sides)
-        expected = convolved(
-            lambda t, form=closed: form(t, STRESS, YOUNG_SOFT, VISCOSITY_SOFT),
-            time,  # type: ignore[misc]
-        )
+        expected = convolved(closed, time)
         off = np.abs(strain - expected) / expected.max()
         loaded = time < UNLOADED
         rows += [
@@ -149,9 +149,7 @@ def creep_checks() -> list[Check]:
             below(f"recovery, {name}, to closed form", 100 * off[~loaded].max(), 0.5, "%"),
         ]
         if not free_sides:
-            wrong = convolved(
-                lambda t: creep_equation_14(t, STRESS, YOUNG_SOFT, VISCOSITY_SOFT), time
-            )
+            wrong = convolved(creep_equation_14, time)
             apart = np.abs(strain - wrong).max() / expected.max()
             rows.append(reported("creep, uniaxial strain, to eq. 14", 100 * apart, "%"))
     return rows
@@ -175,7 +173,7 @@ def no_slip_checks(cells: tuple[int, int, int], steps: int) -> list[Check]:
     problem = slab(cells)
     centre = int(np.argmin(np.linalg.norm(problem.mesh.nodes - [1.2, 0.125, HEIGHT], axis=1)))
     load = load_history()
-    body, run = problem.simulation(load)
+    _, run = problem.simulation(load)
     history = run.advance(END, {"centre": [centre]}, END / 100)
     strain = -history["centre"][:, 2] / HEIGHT
     answers = []

@@ -14,7 +14,7 @@ from validation import qdem_judge
 from validation.case import Check
 from validation.qdem_closed_forms import bar_speed, dilatational_speed
 from validation.qdem_judge import FloatArray
-from validation.qdem_problem import between, below, clamped, orders, reported, tip_node
+from validation.qdem_problem import below, between, clamped, orders, reported, tip_node
 from validation.qdem_static import relaxed
 from validation.qdem_vibration import first_frequency
 
@@ -118,7 +118,7 @@ def free_frequency(body: Body, start: FloatArray, shape: FloatArray, guess: floa
     for _ in range(120):
         values.append(float((mass[:, None] * shape * body.displacement).sum()))
         run.advance(stride * run.step)
-    time = stride * run.step * np.arange(len(values))
+    time = stride * run.step * np.arange(len(values), dtype=np.float64)
     return peak_frequencies(time, np.array(values), count=3, floor=1e-4)[0].frequency
 
 

@@ -141,7 +141,7 @@ def bending_reference(
 
     Modal superposition, each mode exact in time; elements are graded towards the clamp.
     """
-    order = 5 if fine else 4
+    order = 6 if fine else 5
     graded = beam.height * np.array([0.0, 0.02, 0.08, 0.25, 0.6, 1.2])
     lines = (
         line(np.concatenate([graded, np.linspace(2.0 * beam.height, beam.length, 5)]), order),

@@ -46,10 +46,11 @@ def test_twins_agree_under_all_conditions(apart: dict[str, float], variant: str)
         "periodic",
         "kinetic energy",
         "inversion: steps, count and state",
+        "not a number: steps and count",
     ],
 )
 def test_twins_agree_in_special_cases(apart: dict[str, float], variant: str) -> None:
-    """Empty lists, joined nodes, the energies for relaxation, and the stop at an inversion."""
+    """Empty lists, joined nodes, the energies for relaxation, and the stop at a bad element."""
     assert apart[variant] <= 1
 
 

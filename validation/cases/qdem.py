@@ -46,7 +46,9 @@ FULL: dict[str, Part] = {
     "viscous": qdem_viscous.full_checks,
     "static": qdem_static.full_checks,
     "vibration": qdem_vibration.full_checks,
-    "paper size": qdem_static.paper_size_checks,
+    "paper size, relaxed": qdem_static.paper_size_relaxed_checks,
+    "paper size, settled": qdem_static.paper_size_settled_checks,
+    "paper size, vibration": qdem_vibration.paper_size_checks,
 }
 
 
