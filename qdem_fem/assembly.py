@@ -145,6 +145,8 @@ class Assembly:
         if self._scratch is None:
             self._scratch = self._state(np.asarray(self.state.inverse_mass, dtype=float))
         scratch = self._scratch
+        if self.viscous is None:  # no digit of the forces is lost to a velocity they do not need
+            velocity = np.zeros_like(velocity)
         for flat, values in ((scratch.displacement, displacement), (scratch.velocity, velocity)):
             flat.reshape(-1, 4)[self.place, :3] = values
         if held.roller_at.size:

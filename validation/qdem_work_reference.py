@@ -201,9 +201,7 @@ def pulse_reference(
         sparse.diags(box.mass**-0.5) @ box.stiffness @ sparse.diags(box.mass**-0.5),
         k=1, tol=1e-2, return_eigenvectors=False)[0])  # fmt: skip
     steps = int(np.ceil(times[-1] / (0.9 * 2 / np.sqrt(highest))))
-    once, twice = (
-        _march(rate, push, box.probe, length, times, steps * many) for many in (1, 2)
-    )
+    once, twice = (_march(rate, push, box.probe, length, times, steps * many) for many in (1, 2))
     return (4 * twice - once) / 3
 
 

@@ -113,7 +113,7 @@ def test_commented_keys_of_the_specification_are_valid(tmp_path: Path) -> None:
     text = re.sub(r"\[body.regions.core\].*\nyoung = 30e9", "", text)
     text = text.replace('method = "static"', 'method = "dynamic"')
     text = text.replace("cells = [48, 6, 6]", SMALL)
-    assert len(tomllib.loads(text)["simulation"]) == 9
+    assert len(tomllib.loads(text)["simulation"]) == 10
     prepared = load(tmp_path, text)
     verbs = [step.verb for step in prepared.conditions]
     assert sorted(verbs) == ["fix", "load", "periodic", "prescribe", "pressure", "roller"]

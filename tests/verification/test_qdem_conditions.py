@@ -48,7 +48,7 @@ def test_fixed_nodes_do_not_move_and_the_others_do() -> None:
     assert not body.displacement[LEFT].any()
     assert not body.displacement[RIGHT, 1].any()
     assert (body.displacement[RIGHT, 2] > 0).all()
-    assert not body.velocity[LEFT].any()
+    assert abs(body.velocity[LEFT]).max() < 1e-15 * abs(body.velocity).max()
 
 
 @pytest.mark.parametrize(
@@ -295,6 +295,14 @@ def test_bad_selections(verb: str, name: str) -> None:
     assert verb in refused(calls[verb])
 
 
+DIAGONAL = np.argsort(X @ [1, 0.9, 0.3])[-LEFT.sum() :]
+
+
+def periodic(a: Any, b: Any) -> None:
+    body = block()
+    free(body).periodic(body, a, b)
+
+
 BAD_CALLS: dict[str, tuple[str, Callable[[], object]]] = {
     "other body, fix": ("not in this simulation", lambda: RUN.fix(OTHER, LEFT)),
     "other body, pressure": ("not in this", lambda: RUN.pressure(OTHER, RIGHT, 1.0)),
@@ -316,8 +324,8 @@ BAD_CALLS: dict[str, tuple[str, Callable[[], object]]] = {
     "short normal": ("direction", lambda: RUN.roller(BODY, LEFT, [0, 1])),
     "text normal": ("direction", lambda: RUN.roller(BODY, LEFT, "x")),  # type: ignore[arg-type]
     "NaN normal": ("direction", lambda: RUN.roller(BODY, LEFT, [0, 0, nan])),
-    "no partner": ("no partner", lambda: RUN.periodic(BODY, LEFT, FRONT | (X[:, 0] < 0))),
-    "unlike faces": ("on one face", lambda: RUN.periodic(BODY, LEFT, LEFT | RIGHT)),
+    "no partner": ("no partner", lambda: periodic(LEFT, DIAGONAL)),
+    "unlike faces": ("on one face", lambda: periodic(LEFT, LEFT | RIGHT)),
     "no condition": ("none of", lambda: RUN.remove("fix")),  # type: ignore[arg-type]
     "back in time": ("-1", lambda: RUN.advance(-1.0)),
     "NaN seconds": ("nan", lambda: RUN.advance(nan)),

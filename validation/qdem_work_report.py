@@ -1,0 +1,3 @@
+"""x"""
+def plot(a,b=None): ...
+def summary(r): return ""
