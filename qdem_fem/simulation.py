@@ -306,7 +306,7 @@ class Simulation:
             ).sum()
         external = float(self.work.sum()) + self._gravity_work
         if self._behind:
-            external += self._half_work(self.assembly.field("velocity"), velocity).sum()
+            external += float(self._half_work(self.assembly.field("velocity"), velocity).sum())
         return Energy(kinetic, float(elastic), external)
 
     def save(self, path: str | Path) -> None:
@@ -402,7 +402,8 @@ class Simulation:
         if held.weight.any():  # the impulse that moved the nodes as they were told
             free = self._accelerations_free(self.assembly.field("displacement"), behind)
             missing = self._by_place(level - behind - 0.5 * self.step * free)
-            mass = 1 / self.assembly.state.inverse_mass.astype(float)[held.node_at // 4]
+            inverse = np.asarray(self.assembly.state.inverse_mass, dtype=float)
+            mass = 1 / inverse[held.node_at // 4]
             work[1] = mass @ (missing * mean)[held.node_at]
         return work
 

@@ -1,7 +1,7 @@
 """Error against cost of QDEM and of what a user would take instead: the runs and their record.
 
     python -m validation.qdem_work_precision            all runs that the record has not yet
-    python -m validation.qdem_work_precision --quick    the small ones, into a folder of their own
+    python -m validation.qdem_work_precision --quick --out quick.jsonl     the small ones
     python -m validation.qdem_work_precision --plot docs/qdem-cost.png
 
 One JSON line a run in ``validation/results/qdem-cost.jsonl``: error, cost and settings.  A run that
@@ -212,6 +212,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, default=RECORD, help="the record (JSON lines)")
     parser.add_argument("--plot", type=Path, help="draw the record, and make no runs")
     asked = parser.parse_args(arguments)
+    if asked.quick and asked.out == RECORD:
+        parser.error("--quick needs an --out of its own")
     if asked.plot is not None:
         plot(asked.out, asked.plot)
         print(summary(rows_read(asked.out)))

@@ -150,6 +150,12 @@ LOADS: dict[str, tuple[Any, Callable[[q.Simulation, q.Body], Any]]] = {
             body, body.nodes[:, 0] > 0.99, lambda t: 2e3 * np.sin(60 * t)
         ),
     ),
+    "prescribed motion": (
+        None,
+        lambda run, body: run.prescribe(
+            body, body.nodes[:, 0] > 0.99, "x", lambda t: 0.02 * (1 - np.cos(50 * t))
+        ),
+    ),
     "gravity": ([0, 0, -9.81], lambda run, body: None),
     "changing gravity": (q.ramp(0.1, [0, 0, -9.81]), lambda run, body: None),
 }
