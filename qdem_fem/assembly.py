@@ -109,8 +109,6 @@ class Assembly:
         table: Floats,
         gravity: Floats | None,
         work: Floats,
-        *,
-        kinetic: Floats | None = None,
         state: kernel.State | None = None,
     ) -> tuple[int, float]:
         """Run the kernel; ``gravity`` (steps, 3) [m/s^2].  Returns steps done, bad elements."""
@@ -123,7 +121,7 @@ class Assembly:
         try:
             done, bad = kernel.window_kernel(self.threads)(
                 self.law, self.viscous, self.packed.layout, state or self.state, loads, held,
-                probes, table, accelerations, kinetic, work, self.dtype.type(step), steps,
+                probes, table, accelerations, work, self.dtype.type(step), steps,
             )  # fmt: skip
         finally:
             numba.set_num_threads(before)
@@ -163,13 +161,14 @@ class Assembly:
 
     def hold(self, values: Floats, held: kernel.Constraints) -> Floats:
         """``values`` (n, 3) without their parts along held components and roller normals."""
-        flat = np.zeros((self.n_nodes, 4))
-        flat[self.place, :3] = values
-        nodes = held.roller_at // 4
-        across = np.einsum("rc,rc->r", flat[nodes, :3], held.roller_normal)
-        flat[nodes, :3] -= across[:, None] * held.roller_normal
-        flat.reshape(-1)[held.node_at] = 0.0
-        return flat[self.place, :3]
+        flat = np.zeros(4 * self.n_nodes)
+        flat.reshape(-1, 4)[self.place, :3] = values
+        at = held.roller_at[:, None] + np.arange(3)
+        across = np.einsum("rc,rc->r", flat[at], held.roller_normal)
+        # a node of several rollers is there several times; its normals are orthogonal
+        np.subtract.at(flat, at, across[:, None] * held.roller_normal)
+        flat[held.node_at] = 0.0
+        return flat.reshape(-1, 4)[self.place, :3]
 
     def lists(self, conditions: Conditions) -> tuple[kernel.Loads, kernel.Constraints]:
         """The kernel's lists of loads and constraints."""

@@ -47,11 +47,11 @@ class _Progress:
 
 def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
     """Write the state of ``simulation`` to ``path``; a kill leaves the old file or the new one."""
-    assembly, (_, held) = simulation.assembly, simulation._packed_lists()
+    assembly, (_, held) = simulation.assembly, simulation.packed_lists()
     critical = simulation.critical_step
     progress = _Progress(
-        simulation.steps_done, simulation.step, simulation._behind,
-        float(simulation._put_in), float(simulation._gravity_work),
+        simulation.steps_done, simulation.step, simulation.behind,
+        float(simulation.put_in), float(simulation.gravity_work),
     )  # fmt: skip
     head = {
         "format": FORMAT,
@@ -93,14 +93,14 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
     progress = _Progress(**head["progress"])
     critical = CriticalStep(**head["critical_step"], mode=arrays["critical_mode"])
 
-    assembly, (_, held) = simulation.assembly, simulation._packed_lists()
+    assembly, (_, held) = simulation.assembly, simulation.packed_lists()
     for name in ("displacement", "velocity"):
         assembly.field_set(name, arrays[name].astype(float))
     held.previous[:] = arrays["previous"]
     simulation._critical = critical
-    simulation.steps_done, simulation._behind = progress.steps_done, progress.behind
+    simulation.steps_done, simulation.behind = progress.steps_done, progress.behind
     simulation.work[:] = arrays["work"]
-    simulation._put_in, simulation._gravity_work = progress.put_in, progress.gravity_work
+    simulation.put_in, simulation.gravity_work = progress.put_in, progress.gravity_work
 
 
 def fingerprint(simulation: Simulation) -> dict[str, str]:
@@ -114,7 +114,7 @@ def fingerprint(simulation: Simulation) -> dict[str, str]:
         if simulation._given_step is not None
         else f"{simulation.safety!r} of the critical one",
         "mass_scaling": repr(simulation.mass_scaling),
-        "gravity": "none" if simulation._gravity is None else _driver_mark(simulation._gravity),
+        "gravity": "none" if simulation.gravity is None else _driver_mark(simulation.gravity),
         "loads": _mark(
             *(
                 part
@@ -136,7 +136,7 @@ def fingerprint(simulation: Simulation) -> dict[str, str]:
         "rollers": _mark(
             *(p for roller in conditions.rollers for p in (roller.nodes, roller.normal))
         ),
-        "periodic pairs": _mark(simulation._master),
+        "periodic pairs": _mark(simulation.master),
     }
     for number, body in enumerate(simulation.bodies):
         marks[f"mesh of body {number}"] = _mark(body.nodes, body.elements)

@@ -6,15 +6,25 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import inf, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from qdem_fem.assembly import NO_LOADS
+from qdem_fem.body import Body
+from qdem_fem.reference_forces import displacement_gradient, elastic_energy
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
 
 Floats = NDArray[np.float64]
 LANCZOS_TOLERANCE = 1e-3
 """Relative residual; the eigenvalue's own error is of the order of its square."""
 ROUNDS = 20
 ROUND_TOLERANCE = 1e-4
+PROBE_STRAIN = 1e-9
+"""Strain of the motions that are tried."""
 
 
 @dataclass(frozen=True)
@@ -92,3 +102,51 @@ def highest_mode(
         if not viscous or abs(step - before) < ROUND_TOLERANCE * step:
             break
     return step, stiffness, damping, vector.reshape(n, 3) / root, count
+
+
+def critical_step_find(run: Simulation) -> CriticalStep:
+    """`highest_mode` of the kernel's own forces for small motions of a simulation as it is held."""
+    assembly, (_, held) = run.assembly, run.packed_lists()
+    size = PROBE_STRAIN * max(float(np.ptp(body.nodes, axis=0).max()) for body in run.bodies)
+    nothing = np.ones((2, 1))
+    follows = run.master != np.arange(len(run.master))
+
+    def accelerate(u: Floats, v: Floats) -> Floats:
+        u, v = u[run.master], v[run.master]
+        scale = size / max(abs(u).max(), 1e-300)
+        u, v = (assembly.hold(scale * field, held) for field in (u, v))
+        change = assembly.accelerations(u, v, NO_LOADS, held, nothing, None)
+        change = assembly.hold(change, held) / scale
+        change[follows] = 0.0  # no motion of their own: the operator stays symmetric
+        return change
+
+    step, stiffness, damping, mode, count = highest_mode(
+        accelerate, assembly.mass, viscous=run.viscous
+    )
+    mode = mode[run.master]
+    body, element = governing_element(run, mode)
+    return CriticalStep(
+        value=step,
+        omega=float(np.sqrt(max(stiffness, 0.0))),
+        damping_ratio=damping / (2 * np.sqrt(stiffness)) if stiffness > 0 else 0.0,
+        element=element,
+        body=body.name,
+        mode=mode / abs(mode).max(),
+        forces_evaluated=count,
+    )
+
+
+def governing_element(run: Simulation, mode: Floats) -> tuple[Body, int]:
+    """The element with most energy in a motion (n, 3), and its body."""
+    found: list[tuple[float, Body, int]] = []
+    for body, start in zip(run.bodies, run.first_node, strict=False):
+        gradients, volumes = body.gradients
+        moved = mode[start : start + len(body.nodes)]
+        gradient = displacement_gradient(gradients, body.elements, moved)
+        material = body.material
+        energy = elastic_energy(
+            gradient, volumes, material.lame_first, material.lame_second, "small"
+        )
+        found.append((float(energy.max()), body, int(np.argmax(energy))))
+    _, body, element = max(found, key=lambda entry: entry[0])
+    return body, element

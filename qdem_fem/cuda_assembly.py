@@ -179,14 +179,9 @@ class CudaAssembly(Assembly):
         table: Floats,
         gravity: Floats | None,
         work: Floats,
-        *,
-        kinetic: Floats | None = None,
         state: kernel.State | None = None,
     ) -> tuple[int, float]:
-        """Launch the steps and wait once, at the end; arguments as of `Assembly.window`.
-
-        ``kinetic`` (steps, pieces): all of a step's energy [J] is written to its first column.
-        """
+        """Launch the steps and wait once, at the end; arguments as of `Assembly.window`."""
         from qdem_fem import cuda_step
         from qdem_fem.cuda_step import cuda
 
@@ -196,8 +191,6 @@ class CudaAssembly(Assembly):
         now = state or self.state
         memory = cuda.to_device(acted.memory)
         record = cuda.to_device(np.zeros((max(taken, 1), max(len(probes.node_at), 1), 3)))
-        energies = cuda.to_device(np.zeros((steps, self._node_blocks) if kinetic is not None
-                                           else (1, 1)))  # fmt: skip
         accelerations = np.zeros(3) if gravity is None else np.ravel(gravity)
         status = cuda.to_device(np.array([0, steps], dtype=np.int32))
         half, dt = self.dtype.type(0.5), self.dtype.type(step)
@@ -213,9 +206,9 @@ class CudaAssembly(Assembly):
             cuda.to_device(acted.first), cuda.to_device(acted.actions),
             cuda.to_device(acted.weights), memory, cuda.to_device(np.ascontiguousarray(table)),
             record, now.displacement, now.velocity, now.forces, now.inverse_mass,
-            cuda.to_device(accelerations.astype(self.dtype)), energies, status, dt,
+            cuda.to_device(accelerations.astype(self.dtype)), status, dt,
         )  # fmt: skip
-        motion = cuda_step.node_motion_kernel(gravity is not None, kinetic is not None)
+        motion = cuda_step.node_motion_kernel(gravity is not None)
         launch_forces = self._forces_kernel[self._element_blocks, cuda_step.BLOCK]
         launch_motion = motion[self._node_blocks, cuda_step.BLOCK]
         for k, sample in enumerate(samples.tolist()):
@@ -231,9 +224,6 @@ class CudaAssembly(Assembly):
         if taken:
             kept = int(samples[:done].max(initial=-1)) + 1
             probes.record[:kept] = record.copy_to_host()[:kept, : len(probes.node_at)]
-        if kinetic is not None:
-            kinetic[:done] = 0.0
-            kinetic[:done, 0] = energies.copy_to_host()[:done].sum(axis=1)
         return done, float(bad)
 
     def accelerations(

@@ -24,8 +24,6 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from numba import float64
-
 from qdem_fem import stress
 from qdem_fem.reference_forces import Strain
 
@@ -222,26 +220,24 @@ def probes_take(
 
 
 @cache
-def node_motion_kernel(gravity: bool, kinetic: bool) -> Any:
+def node_motion_kernel(gravity: bool) -> Any:
     """The kernel of the nodes; what a simulation does not have is not in its code."""
 
     @cuda.jit
     def node_motion(
         first: Any, actions: Any, weights: Any, memory: Any, amplitudes: Any, record: Any,
         displacement: Any, velocity: Any, forces: Any, inverse_masses: Any, accelerations: Any,
-        energies: Any, status: Any, step: Any, k: Any, sample: Any,
+        status: Any, step: Any, k: Any, sample: Any,
     ) -> None:  # fmt: skip
         """Loads, ``v += dt (f/m + g)``, ``u += dt v`` (eq. 11), constraints and probes.
 
         ``first`` (n + 1,): the node's part of ``actions`` (A, 4), ``weights`` (A, 3) and
         ``memory`` (A, 2); ``amplitudes`` (steps + 1, series); ``accelerations`` (3 (steps + 1),)
-        [m/s^2]; ``energies`` (steps, blocks): kinetic energies after the motion [J]; ``sample``:
-        where in ``record`` (samples, probes, 3) this step is written, or -1.
+        [m/s^2]; ``sample``: where in ``record`` (samples, probes, 3) this step is written, or -1.
         """
         if k >= status[LIMIT]:
             return
         node = cuda.grid(1)
-        energy = 0.0
         if node < inverse_masses.size:
             at = 4 * node
             begin, end = first[node], first[node + 1]
@@ -257,8 +253,6 @@ def node_motion_kernel(gravity: bool, kinetic: bool) -> Any:
                 faster = velocity[at + c] + change
                 velocity[at + c] = faster
                 displacement[at + c] += faster * step
-                if kinetic and inverse_mass > 0:
-                    energy += 0.5 * faster * faster / inverse_mass
             if begin < end:
                 constraints_apply(
                     begin, end, actions, weights, memory, amplitudes, k, displacement, velocity,
@@ -269,18 +263,5 @@ def node_motion_kernel(gravity: bool, kinetic: bool) -> Any:
                     probes_take(begin, end, actions, record, sample, displacement, at)
         if node == 0 and status[BAD] > 0:
             status[LIMIT] = k + 1
-        if kinetic:
-            sums = cuda.shared.array(BLOCK, float64)
-            thread = cuda.threadIdx.x
-            sums[thread] = energy
-            cuda.syncthreads()
-            left = BLOCK // 2
-            while left > 0:
-                if thread < left:
-                    sums[thread] += sums[thread + left]
-                cuda.syncthreads()
-                left //= 2
-            if thread == 0:
-                energies[k, cuda.blockIdx.x] = sums[0]
 
     return node_motion

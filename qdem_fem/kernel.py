@@ -206,19 +206,18 @@ def _block_size(viscous: Any) -> Any:
 @compiled()
 def piece_motion(
     start: int, stop: int, shifts: Any, first: int, last: int, forces: Any, inverse_mass: Any,
-    displacement: Any, velocity: Any, step: Any, gravity: Any, kinetic: Any, k: int, piece: int,
+    displacement: Any, velocity: Any, step: Any, gravity: Any, k: int,
 ) -> None:  # fmt: skip
     """Velocity Verlet for the nodes ``start`` to ``stop``: ``v += dt f/m``, ``u += dt v``.
 
     ``shifts[first:last]`` are the windows of forces that hold these nodes; they are summed
-    (eq. 11) and emptied.  With ``kinetic`` the piece's kinetic energy [J] is written there.
+    (eq. 11) and emptied.
     """
     for window in range(first + 1, last):
         for at in range(4 * start, 4 * stop, 4):
             here, there = at + shifts[first], at + shifts[window]
             row_store(forces, here, row_load(forces, here) + row_load(forces, there))
             row_clear(forces, there)
-    energy = 0.0
     for node in range(start, stop):
         at = 4 * node
         here = at + shifts[first]
@@ -229,10 +228,6 @@ def piece_motion(
         faster = row_load(velocity, at) + change
         row_store(velocity, at, faster)
         row_store(displacement, at, row_load(displacement, at) + faster * step)
-        if kinetic is not None:
-            energy += lanes_sum(faster * faster) / inverse_mass[node]
-    if kinetic is not None:
-        kinetic[k, piece] = 0.5 * energy
 
 
 class Layout(NamedTuple):
@@ -370,14 +365,14 @@ def window_build(variant: str) -> Any:
     @compiled(parallel=variant == "threads", cache=True)
     def window(
         law: Any, viscous: Any, layout: Any, state: Any, loads: Any, held: Any, probes: Any,
-        table: Any, gravity: Any, kinetic: Any, work: Any, step: Any, steps: int,
+        table: Any, gravity: Any, work: Any, step: Any, steps: int,
     ) -> tuple[int, float]:  # fmt: skip
         """Compute up to ``steps`` time steps; returns how many, and the count of bad elements.
 
         ``law``: one of `LAWS`; ``viscous``: True or None; ``table`` (steps + 1, series):
         amplitudes at the times of the steps; ``gravity`` (4 (steps + 1),) [m/s^2] or None;
-        ``kinetic`` (steps, pieces) [J] or None; ``work`` (2,) [J], of the loads and of
-        prescribed motion, is added to.  Stops after a step that met an inverted element or NaN.
+        ``work`` (2,) [J], of the loads and of prescribed motion, is added to.  Stops after a step
+        that met an inverted element or NaN.
         """
         stamp = made_from  # noqa: F841  (makes it a part of the key)
         corners, rows, chunk_block, chunk_shift = layout[0], layout[1], layout[2], layout[3]
@@ -396,7 +391,7 @@ def window_build(variant: str) -> Any:
                 piece_motion(
                     piece_node[p], piece_node[p + 1], window_shift, piece_window[p],
                     piece_window[p + 1], forces, inverse_mass, displacement, velocity, step,
-                    gravity, kinetic, k, p,
+                    gravity, k,
                 )  # fmt: skip
             work[1] += constraints_apply(held, table[k + 1], state, step)
             work[0] += 0.5 * step * loads_power(loads, table[k], velocity)

@@ -108,9 +108,9 @@ def _claim(summary: dict[str, Any]) -> str:
     if summary["method"] == "static":
         answer = summary["static"]
         text = (
-            f"Static answer by kinetic damping in {answer['steps']:.0f} force evaluations, {mesh}; "
-            f"residual {answer['residual']:.2g} of the loads, estimated relative error of the "
-            f"displacement {answer['error_estimate']:.2g}."
+            f"Static answer by conjugate gradients, {answer['steps']:.0f} evaluations of the "
+            f"forces, {mesh}; residual {answer['residual']:.2g} of the loads, estimated relative "
+            f"error of the displacement {answer['error_estimate']:.2g}."
         )
     else:
         text = (

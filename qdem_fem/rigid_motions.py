@@ -24,7 +24,7 @@ def held_check(simulation: Simulation) -> None:
     from scipy.sparse.csgraph import connected_components
 
     assembly, conditions = simulation.assembly, simulation.conditions
-    n, elements, master = assembly.n_nodes, assembly.elements, simulation._master
+    n, elements, master = assembly.n_nodes, assembly.elements, simulation.master
     pairs = np.concatenate(
         [elements[:, [0, k]] for k in (1, 2, 3)] + [np.stack([np.arange(n), master], 1)]
     )
@@ -61,11 +61,11 @@ def held_check(simulation: Simulation) -> None:
         free = int((values <= HELD_SHARE * max(values[-1], 1.0)).sum())
         if free:
             first = int(np.flatnonzero(mine & used)[0])
-            number = int(np.searchsorted(simulation._first_node, first, side="right")) - 1
+            number = int(np.searchsorted(simulation.first_node, first, side="right")) - 1
             body = simulation.bodies[number]
             raise ConditionError(
                 f"{body.name} has no static answer: {free} of the 6 rigid motions of the part "
-                f"with node {first - simulation._first_node[number]} are not held",
+                f"with node {first - simulation.first_node[number]} are not held",
                 where="relax",
                 remedy="fix nodes or components until it can neither shift nor turn",
             )

@@ -135,7 +135,7 @@ def run_dynamic(prepared: Prepared, folder: RunFolder, *, resume: bool, progress
 
 
 def run_static(prepared: Prepared, folder: RunFolder) -> Done:
-    """Find the static answer of a scene by kinetic damping; it leaves nothing to resume from.
+    """Find the static answer of a scene by conjugate gradients; it leaves nothing to resume from.
 
     Raises `NotConverged` when the tolerance is not reached.
     """

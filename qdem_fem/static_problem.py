@@ -29,7 +29,7 @@ class StaticProblem:
         self.assembly = own
         if own.dtype != np.float64 or type(own) is not Assembly:  # single precision, or a GPU
             self.assembly = Assembly(
-                simulation.bodies, simulation._master, simulation.strain, "float64",
+                simulation.bodies, simulation.master, simulation.strain, "float64",
                 simulation.threads,
             )  # fmt: skip
         assembly, place = self.assembly, self.assembly.place
@@ -37,7 +37,7 @@ class StaticProblem:
         row = conditions.table(now)[0]
         self.external = np.zeros(4 * assembly.n_nodes)
         np.add.at(self.external, loads.node_at, loads.weight * row[loads.series])
-        gravity = simulation._gravity_at(now)
+        gravity = simulation.gravity_at(now)
         if gravity is not None:
             # the masses of the simulation itself, with what mass scaling added
             weight = np.zeros((assembly.n_nodes, 4))
@@ -69,8 +69,8 @@ class StaticProblem:
         moved = u.reshape(-1, 4)[self.assembly.place, :3]
         simulation.assembly.field_set("displacement", moved)
         simulation.assembly.field_set("velocity", np.zeros_like(moved))
-        simulation._packed_lists()[1].previous[:] = 0.0
-        simulation._behind = False
+        simulation.packed_lists()[1].previous[:] = 0.0
+        simulation.behind = False
 
     def project(self, field: Floats) -> Floats:
         """``field`` without what is held: given components and normals of rollers."""

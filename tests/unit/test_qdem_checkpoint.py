@@ -41,9 +41,9 @@ def state_of(run: q.Simulation) -> list[Any]:
     """Everything a step reads and every sum it adds to, in the kernel's own bits."""
     state = run.assembly.state
     return [
-        run.steps_done, run._behind, run.time, repr(run._put_in), run._gravity_work,
+        run.steps_done, run.behind, run.time, repr(run.put_in), run.gravity_work,
         *(a.tobytes() for a in (state.displacement, state.velocity, run.work)),
-        run._packed_lists()[1].previous.tobytes(), run.energy(), run.critical_step.value,
+        run.packed_lists()[1].previous.tobytes(), run.energy(), run.critical_step.value,
     ]  # fmt: skip
 
 

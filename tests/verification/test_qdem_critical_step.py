@@ -101,7 +101,7 @@ def test_value_of_a_periodic_body(size: float) -> None:
     bar = q.Body((size * nodes, mesh.elements), q.Material(YOUNG, POISSON, DENSITY))
     run = q.Simulation([bar], threads=1)
     run.periodic(bar, nodes[:, 0] < 1e-9, nodes[:, 0] > 2 - 1e-9)
-    expected = critical_dense(*dense(bar, master=run._master))
+    expected = critical_dense(*dense(bar, master=run.master))
     assert within(run.critical_step.value, expected)
 
 

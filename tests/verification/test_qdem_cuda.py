@@ -44,7 +44,6 @@ def test_twins_agree_under_all_conditions(apart: dict[str, float], variant: str)
     [
         "no condition at all",
         "periodic",
-        "kinetic energy",
         "inversion: steps, count and state",
         "not a number: steps and count",
     ],

@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from qdem_fem import kernel
 from qdem_fem.assembly import NO_PROBES
 from qdem_fem.errors import LibraryMissing
 from qdem_fem.mesh_generation import box_mesh
@@ -102,7 +101,6 @@ def twins_compare() -> dict[str, float]:
         found[name] = twins_apart(strain, precision, viscous, all_conditions)
     found["no condition at all"] = twins_apart("finger", "float64", False, no_condition)
     found["periodic"] = twins_apart("finger", "float64", False, periodic_sides)
-    found["kinetic energy"] = kinetic_apart()
     found["inversion: steps, count and state"] = stop_apart(-80.0, 12)
     found["not a number: steps and count"] = stop_apart(np.nan, 12)
     return found
@@ -189,28 +187,12 @@ def twins_apart(strain: Any, precision: Precision, viscous: bool, conditions: Co
     )
 
 
-def kinetic_apart() -> float:
-    """Kinetic energies that the kernel gives for relaxation, against the velocities, over 1e-13."""
-    run, _ = twin("cuda", "finger", "float64", False, all_conditions)
-    assembly, (loads, held) = run.assembly, run._packed_lists()
-    free = kernel.Constraints(*(part[:0] for part in held))
-    kinetic = np.full((2, 3), np.nan)
-    table = np.ones((3, run.conditions.table(np.zeros(1)).shape[1]))
-    assembly.window(
-        2, run.step, loads, free, NO_PROBES, table, None, np.zeros(2),
-        kinetic=kinetic,
-    )  # fmt: skip
-    velocity = assembly.field("velocity")
-    expected = 0.5 * assembly.mass @ (velocity**2).sum(axis=1)
-    return float(abs(kinetic[1].sum() / expected - 1) / 1e-13)
-
-
 def stop_apart(speed: float, steps: int) -> float:
     """A window whose elements turn bad as a corner is driven in; inf unless both stop at once."""
     results = []
     for device in DEVICES:
         run, body = twin(device, "finger", "float64", False, no_condition)
-        assembly, (loads, held) = run.assembly, run._packed_lists()
+        assembly, (loads, held) = run.assembly, run.packed_lists()
         velocity = np.zeros(body.nodes.shape)
         velocity[np.argmax(body.nodes.sum(axis=1))] = speed
         assembly.field_set("velocity", velocity)

@@ -1,0 +1,95 @@
+"""Velocities level with the displacements, and half a step behind them, as the kernel takes them.
+
+Velocity Verlet in its leapfrog form: ``v(k+1/2) = v(k-1/2) + dt f(u(k), v(k-1/2))/m``.  What the
+user sets and sees is ``v(k)``; `velocities_behind` and `velocities_level` go from one to the other.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+Floats = NDArray[np.float64]
+
+
+def velocity_now(run: Simulation) -> Floats:
+    """Velocity at the time of the displacement [m/s], (n, 3)."""
+    velocity = run.assembly.field("velocity")
+    if run.behind:
+        displacement = run.assembly.field("displacement")
+        change = 0.5 * run.step * _accelerations(run, displacement, velocity)
+        _, held = run.packed_lists()
+        table = run.conditions.table(run.time + run.step * np.arange(2.0))
+        ahead = held.weight * (table[1] - table[0])[held.series] / run.step
+        flat = _by_place(run, velocity + change)
+        flat[held.node_at] = 0.5 * (_by_place(run, velocity)[held.node_at] + ahead)
+        velocity = flat.reshape(-1, 4)[run.assembly.place, :3]
+    return velocity
+
+
+def velocities_behind(run: Simulation) -> None:
+    """Take the velocities half a step back, if they are not there yet."""
+    if not run.behind:
+        displacement = run.assembly.field("displacement")
+        velocity = run.assembly.field("velocity")
+        behind = velocity - 0.5 * run.step * _accelerations(run, displacement, velocity)
+        run.work -= half_work(run, behind, velocity)
+        _, held = run.packed_lists()
+        held.previous[:] = _by_place(run, behind)[held.node_at]
+        run.assembly.field_set("velocity", behind)
+        run.behind = True
+
+
+def velocities_level(run: Simulation) -> None:
+    """Bring the velocities to the time of the displacements, if they are behind."""
+    if run.behind:
+        behind, level = run.assembly.field("velocity"), velocity_now(run)
+        run.work += half_work(run, behind, level)
+        run.assembly.field_set("velocity", level)
+        run.behind = False
+
+
+def half_work(run: Simulation, behind: Floats, level: Floats) -> Floats:
+    """Work in the half step up to now [J], (2,): of loads, of prescribed motion.
+
+    ``behind`` and ``level``: velocities (n, 3) [m/s] half a step ago and now.
+    """
+    loads, held = run.packed_lists()
+    table = run.conditions.table(np.array([run.time]))[0]
+    mean = _by_place(run, 0.5 * (behind + level))
+    force = loads.weight * table[loads.series]
+    work = np.array([0.5 * run.step * float(force @ mean[loads.node_at]), 0.0])
+    if held.weight.any():  # the impulse that moved the nodes as they were told
+        free = accelerations_free(run, run.assembly.field("displacement"), behind)
+        missing = _by_place(run, level - behind - 0.5 * run.step * free)
+        inverse = np.asarray(run.assembly.state.inverse_mass, dtype=float)
+        mass = 1 / inverse[held.node_at // 4]
+        work[1] = mass @ (missing * mean)[held.node_at]
+    return work
+
+
+def accelerations_free(run: Simulation, displacement: Floats, velocity: Floats) -> Floats:
+    """What the forces would make of all nodes now if none were held [m/s^2], (n, 3)."""
+    loads, held = run.packed_lists()
+    now = np.full(2, run.time)
+    return run.assembly.accelerations(
+        displacement, velocity, loads, held, run.conditions.table(now), run.gravity_at(now)
+    )
+
+
+def _accelerations(run: Simulation, displacement: Floats, velocity: Floats) -> Floats:
+    """Accelerations now [m/s^2], (n, 3), zero where held."""
+    change = accelerations_free(run, displacement, velocity)
+    return run.assembly.hold(change, run.packed_lists()[1])
+
+
+def _by_place(run: Simulation, field: Floats) -> Floats:
+    """A nodal field (n, 3) in the kernel's order, four numbers a node."""
+    flat = np.zeros((run.assembly.n_nodes, 4))
+    flat[run.assembly.place, :3] = field
+    return flat.ravel()
