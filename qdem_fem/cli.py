@@ -6,8 +6,9 @@ import argparse
 import json
 import sys
 import time
+import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from qdem_fem.scene_checks import Prepared
@@ -83,7 +84,8 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
         if prepared.scene.simulation.method == "static":
             done = run_static(prepared, folder)
         else:
-            with Progress() as progress:
+            with Progress() as progress, warnings.catch_warnings():
+                warnings.showwarning = _warning_show
                 done = run_dynamic(prepared, folder, resume=goes_on, progress=progress)
         summary = summary_of(prepared, done, folder)
         report_write(folder, manifest, summary, None if arguments.no_pictures else done)
@@ -91,8 +93,21 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
     return summary | {"folder": str(path)}
 
 
+def _warning_show(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """A warning as a sentence, without the line of code it comes from."""
+    print(f"warning: {message}", file=sys.stderr, flush=True)
+
+
 def _outlook(prepared: Prepared) -> dict[str, Any]:
     """What a run would be: bodies, steps, and the cost as a short trial tells it."""
+    from qdem_fem.errors import StepWarning
     from qdem_fem.scene_build import simulation_of
     from qdem_fem.scene_run import plan_of
     from qdem_fem.summary import body_facts, critical_step_of
@@ -107,7 +122,9 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
     }
     if prepared.scene.simulation.method == "dynamic":
         plan = plan_of(prepared, float(run.step))
-        seconds = _seconds_a_step(run, plan.total)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", StepWarning)  # the outlook has its text
+            seconds = _seconds_a_step(run, plan.total)
         outlook |= {
             "step": plan.step,
             "steps": plan.total,
@@ -147,6 +164,8 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
         f"critical step {critical['value']:.4g} s, governed by element {critical['element']} "
         f"of {critical['body']}"
     )
+    if critical["remark"]:
+        print(f"warning: {critical['remark']}")
     if content["method"] == "dynamic":
         print(
             f"{content['steps']} steps of {content['step']:.4g} s, "

@@ -81,6 +81,10 @@ class NotConverged(QdemError):
     exit_code = 7
 
 
+class StepWarning(UserWarning):
+    """One element makes the time step much shorter than the others need."""
+
+
 class Interrupted(KeyboardInterrupt):
     """The user or the system asked us to stop; everything finished is saved.
 

@@ -81,7 +81,6 @@ def layout_build(
     rows = aligned_zeros(blocks * width * lanes, dtype)
     by_block = rows.reshape(blocks, width, lanes)
     by_block[:] = element_rows[filled].reshape(blocks, lanes, width).transpose(0, 2, 1)
-    by_block.transpose(0, 2, 1).reshape(-1, width)[m:]
     by_block[-1, 9:, lanes - (blocks * lanes - m) :] = 0.0
 
     chunks = min(chunk_count(m), blocks)

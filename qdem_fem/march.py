@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from math import isnan
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem import kernel
-from qdem_fem.errors import ElementInverted, Unstable
+from qdem_fem.errors import ElementInverted, StepWarning, Unstable
 from qdem_fem.leapfrog import velocities_behind
 from qdem_fem.reference_forces import displacement_gradient, volume_change
 
@@ -37,10 +38,12 @@ def march(
     """Compute ``steps``; returns the displacement [m] of ``nodes`` every ``stride``, (k, nodes, 3).
 
     Samples are at step numbers that are multiples of ``stride``.  Raises `Unstable` and
-    `ElementInverted`.
+    `ElementInverted`; warns once of an element that makes the step short (`StepWarning`).
     """
     if isnan(run.put_in):
         run.put_in = energy_set(run)
+    if run.steps_done == 0 and run.critical_step.remark and not run.step_is_given:
+        warnings.warn(run.critical_step.remark, StepWarning, stacklevel=3)
     velocities_behind(run)
     assembly, (loads, held) = run.assembly, run.packed_lists()
     start, end = run.steps_done, run.steps_done + steps

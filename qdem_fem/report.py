@@ -176,6 +176,8 @@ def _step(summary: dict[str, Any]) -> Iterator[str]:
     )
     if summary["method"] != "static":
         text += f"Used: {summary['step']:.4g} s, {100 * critical['share_used']:.1f} % of it."
+    if critical["remark"]:
+        text += f" Remarkably short: {critical['remark']}."
     yield f"<p>{escape(text)}</p>"
 
 

@@ -234,6 +234,11 @@ class Simulation:
         )
 
     @property
+    def step_is_given(self) -> bool:
+        """Whether the user gave the step."""
+        return self._given_step is not None
+
+    @property
     def critical_step(self) -> CriticalStep:
         """The largest stable step, for small motions about the reference configuration."""
         if self._critical is None:

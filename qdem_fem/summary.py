@@ -59,6 +59,7 @@ def critical_step_of(run: Any) -> dict[str, Any]:
         "omega": float(critical.omega),
         "body": str(critical.body),
         "element": int(critical.element),
+        "remark": str(critical.remark),
         "share_used": float(run.step) / float(critical.value),
     }
 

@@ -8,11 +8,14 @@ more takes off what is left.  `Simulation.relax` takes no time at all.
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from qdem_fem import Body, ramp
+from qdem_fem.mesh_generation import Pattern
 from validation import qdem_judge
 from validation.case import Check
 from validation.qdem_closed_forms import euler_bernoulli_tip, timoshenko_tip
@@ -28,12 +31,17 @@ from validation.qdem_problem import (
     smooth_step,
     tip_node,
 )
+from validation.qdem_record import Outcome, Table
 
 TIP_P2 = 92.655e-6
 """Tip by quadratic tetrahedra, 72 x 8 x 8 cells (`qdem_judge.cantilever_p2`) [m]."""
 TIP_PAPER = 91.94e-6
 """Tip that the paper gives for 488,361 elements, QDEM and FEM alike [m]."""
+TIP_EULER_BERNOULLI = 92.32156e-6
+"""Tip that the paper gives for eq. 12 [m]."""
 SAMPLES = 200
+P2_CELLS = ((12, 2, 2), (24, 4, 4), (48, 8, 8))
+"""Of quadratic tetrahedra; each has half the size of the one before."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,8 @@ class StaticAnswer:
     displacement: FloatArray
     """By QDEM [m], (n, 3)."""
     steps: int
+    cpu_s: float
+    """Processor time of QDEM, its set-up included [s]."""
 
     @property
     def tip(self) -> float:
@@ -74,6 +84,7 @@ class StaticAnswer:
 def settled(problem: Problem, ramped: int = 2, averaged: int = 2) -> StaticAnswer:
     """Static answer from whole first periods: a smooth step, then a mean under a Hann window."""
     period = 1 / problem.modes().frequency[0]
+    started = time.process_time()
     body, run = problem.simulation(smooth_step(ramped * period))
     run.advance(ramped * period)
     stride = max(1, round(averaged * period / SAMPLES / run.step))
@@ -82,25 +93,27 @@ def settled(problem: Problem, ramped: int = 2, averaged: int = 2) -> StaticAnswe
     for share in weight / weight.sum():
         total += share * body.displacement
         run.advance(stride * run.step)
-    return StaticAnswer(problem, total, run.steps_done)
+    return StaticAnswer(problem, total, run.steps_done, time.process_time() - started)
 
 
 def settled_as_paper(problem: Problem) -> StaticAnswer:
     """Static answer as in the paper: a linear ramp of 1 s, then the mean from 1 to 2 s."""
+    started = time.process_time()
     body, run = problem.simulation(ramp(1.0, 1.0))
     run.advance(1.0)
     total, count = np.zeros_like(problem.mesh.nodes), 1000
     for _ in range(count):
         total += body.displacement / count
         run.advance(max(1, round(1.0 / count / run.step)) * run.step)
-    return StaticAnswer(problem, total, run.steps_done)
+    return StaticAnswer(problem, total, run.steps_done, time.process_time() - started)
 
 
 def relaxed(problem: Problem, tolerance: float = 1e-8) -> StaticAnswer:
     """Static answer by dynamic relaxation with conjugate directions."""
+    started = time.process_time()
     body, run = problem.simulation(1.0)
     found = run.relax(tolerance=tolerance)
-    return StaticAnswer(problem, body.displacement, found.steps)
+    return StaticAnswer(problem, body.displacement, found.steps, time.process_time() - started)
 
 
 def answer_checks(name: str, answer: StaticAnswer) -> list[Check]:
@@ -112,12 +125,13 @@ def answer_checks(name: str, answer: StaticAnswer) -> list[Check]:
         below(f"{name}: von Mises, greatest difference", 100 * stress.max(), 0.12, "%"),
         reported(f"{name}: tip", 1e6 * answer.tip, "um"),
         reported(f"{name}: steps", answer.steps),
+        reported(f"{name}: processor time of QDEM", answer.cpu_s, "s"),
     ]
 
 
-def convergence(meshes: list[tuple[tuple[int, int, int], str]]) -> list[StaticAnswer]:
+def convergence(cells: Sequence[tuple[int, int, int]], pattern: Pattern) -> list[StaticAnswer]:
     """The settled answers on a row of meshes."""
-    return [settled(cantilever(cells, pattern)) for cells, pattern in meshes]  # type: ignore[arg-type]
+    return [settled(cantilever(each, pattern)) for each in cells]
 
 
 def convergence_checks(name: str, answers: list[StaticAnswer], reference: float) -> list[Check]:
@@ -134,24 +148,15 @@ def convergence_checks(name: str, answers: list[StaticAnswer], reference: float)
 
 def closed_form_checks() -> list[Check]:
     """Beam theory, for the reader: no solution in three dimensions converges to either."""
+    slender, with_shear = euler_bernoulli_tip(200), timoshenko_tip(200)
     return [
-        reported("tip by Euler-Bernoulli", 1e6 * euler_bernoulli_tip(200), "um"),
-        reported("tip by Timoshenko", 1e6 * timoshenko_tip(200), "um"),
+        near(
+            "tip by Euler-Bernoulli, eq. 12", 1e6 * slender, 1e6 * TIP_EULER_BERNOULLI, 1e-6, "um"
+        ),
+        reported("tip by Timoshenko", 1e6 * with_shear, "um"),
         reported("tip by quadratic tetrahedra", 1e6 * TIP_P2, "um"),
-    ]
-
-
-def quick_checks() -> list[Check]:
-    """Meshes to 18,000 elements, about half a minute."""
-    coarse = cantilever((24, 4, 4))
-    row = convergence([((24, 4, 4), "kuhn"), ((36, 6, 6), "kuhn"), ((48, 8, 8), "kuhn")])
-    as_paper = settled_as_paper(coarse)
-    return [
-        *answer_checks("2,304 elements, settled", row[0]),
-        *answer_checks("2,304 elements, relaxed", relaxed(coarse)),
-        paper_check("2,304 elements", as_paper),
-        *convergence_checks("cantilever to 18,432 elements", row, TIP_P2),
-        *closed_form_checks(),
+        reported("Euler-Bernoulli to quadratic tetrahedra", 100 * (slender / TIP_P2 - 1), "%"),
+        reported("Timoshenko to quadratic tetrahedra", 100 * (with_shear / TIP_P2 - 1), "%"),
     ]
 
 
@@ -162,22 +167,89 @@ def paper_check(name: str, answer: StaticAnswer) -> Check:
     return below(f"{name}, as the paper averages: tip to scikit-fem", answer.difference, bar)
 
 
-def full_checks() -> list[Check]:
-    """Meshes to 62,208 elements."""
-    cells = [(24, 4, 4), (36, 6, 6), (48, 8, 8), (72, 12, 12)]
-    row = convergence([(each, "kuhn") for each in cells])
-    five = convergence([((each[0], each[1], each[2]), "five") for each in cells])
-    reference = -qdem_judge.cantilever_p2((72, 8, 8), -200.0)
-    middle = cantilever((96, 10, 8))
+def quick_checks() -> list[Check]:
+    """Meshes to 18,432 elements, about 20 s."""
+    coarse = cantilever((24, 4, 4))
+    row = convergence([(24, 4, 4), (36, 6, 6), (48, 8, 8)], "kuhn")
     return [
+        *answer_checks("2,304 elements, settled", row[0]),
+        *answer_checks("2,304 elements, relaxed", relaxed(coarse)),
+        paper_check("2,304 elements", settled_as_paper(coarse)),
+        *convergence_checks("cantilever to 18,432 elements", row, TIP_P2),
+        *closed_form_checks(),
+    ]
+
+
+# --- the full form ----------------------------------------------------------------------------
+
+
+def full() -> Outcome:
+    """Meshes to 62,208 elements, and what static answers cost by each method."""
+    cells = [(24, 4, 4), (36, 6, 6), (48, 8, 8), (72, 12, 12)]
+    reference = -qdem_judge.cantilever_p2((72, 8, 8), -200.0)
+    six, five = convergence(cells, "kuhn"), convergence(cells, "five")
+    middle = cantilever((96, 10, 8))
+    checks = [
         near("tip by quadratic tetrahedra", 1e6 * reference, 1e6 * TIP_P2, 1e-4, "um"),
         *answer_checks("46,080 elements, settled", settled(middle)),
         *answer_checks("46,080 elements, relaxed", relaxed(middle)),
-        *convergence_checks("six tetrahedra a cell, to 62,208", row, reference),
+        *convergence_checks("six tetrahedra a cell, to 62,208", six, reference),
         *convergence_checks("five tetrahedra a cell, to 51,840", five, reference),
         paper_check("2,304 elements", settled_as_paper(cantilever(cells[0]))),
         *closed_form_checks(),
     ]
+    rows = [
+        row
+        for pattern, answers in (("six", six), ("five", five))
+        for answer in answers
+        for row in cost_rows(
+            pattern, {"QDEM, settled": answer, "QDEM, relaxed": relaxed(answer.problem)}
+        )
+    ]
+    second_order = quadratic_rows()
+    tips = [row[3] for row in second_order]
+    limit = tips[2] - (tips[2] - tips[1]) ** 2 / (tips[2] - 2 * tips[1] + tips[0])
+    checks.append(reported("tip by quadratic tetrahedra, Aitken's limit", limit, "um"))
+    return Outcome(checks, {"static": static_table([*rows, *second_order])})
+
+
+Row = tuple[str, str, int, float, float]
+"""Method, tetrahedra a cell, elements, tip [um], processor time [s]."""
+
+
+def static_table(rows: Sequence[Row]) -> Table:
+    """Tips and costs as a table."""
+    titles = ("method", "tetrahedra a cell", "elements", "tip [um]", "processor time [s]")
+    return dict(zip(titles, (list(column) for column in zip(*rows, strict=True)), strict=True))
+
+
+def cost_rows(pattern: str, answers: dict[str, StaticAnswer]) -> list[Row]:
+    """Of one mesh: answers of QDEM by name, and scikit-fem from the mesh to the answer."""
+    problem = next(iter(answers.values())).problem
+    mesh, material = problem.mesh, problem.material
+    count, tip = len(mesh.elements), tip_node(mesh)
+    started = time.process_time()
+    stiffness = qdem_judge.stiffness(mesh.nodes, mesh.elements, material.young, material.poisson)
+    # as accurate as the answer on a mesh deserves, not refined to the last digits
+    judge = qdem_judge.static_solve(
+        stiffness, problem.free, problem.load, mesh.nodes, problem.method, tolerance=1e-5
+    )
+    spent = time.process_time() - started
+    rows: list[Row] = [
+        (name, pattern, count, 1e6 * answer.tip, answer.cpu_s) for name, answer in answers.items()
+    ]
+    return [*rows, ("scikit-fem, linear", pattern, count, -1e6 * judge.displacement[tip, 2], spent)]
+
+
+def quadratic_rows() -> list[Row]:
+    """Quadratic tetrahedra by scikit-fem."""
+    rows: list[Row] = []
+    for cells in P2_CELLS:
+        started = time.process_time()
+        tip = -1e6 * qdem_judge.cantilever_p2(cells, -200.0)
+        spent = time.process_time() - started
+        rows.append(("scikit-fem, quadratic", "six", 6 * int(np.prod(cells)), tip, spent))
+    return rows
 
 
 def paper_size() -> Problem:
@@ -185,16 +257,18 @@ def paper_size() -> Problem:
     return cantilever((222, 22, 20), "five")
 
 
-def paper_size_relaxed_checks() -> list[Check]:
+def paper_size_relaxed() -> Outcome:
     """Static answer of the paper's number of elements, and how far the mesh is from the limit."""
     answer = relaxed(paper_size())
-    return [
+    checks = [
         *answer_checks("488,400 elements, relaxed", answer),
         near("488,400 elements: tip, the paper's", 1e6 * answer.tip, 1e6 * TIP_PAPER, 0.004, "um"),
         reported("488,400 elements: excess stiffness", 100 * (TIP_P2 / answer.tip - 1), "%"),
     ]
+    rows = cost_rows("five", {"QDEM, relaxed": answer})
+    return Outcome(checks, {"static-paper-size": static_table(rows)})
 
 
-def paper_size_settled_checks() -> list[Check]:
+def paper_size_settled() -> Outcome:
     """The same by motion in time, as the paper does it."""
-    return answer_checks("488,400 elements, settled", settled(paper_size()))
+    return Outcome(answer_checks("488,400 elements, settled", settled(paper_size())))

@@ -1,4 +1,4 @@
-"""References of the work-precision report: spectral elements on a box, independent of QDEM's meshes.
+"""References of the work-precision report: spectral elements on a box, not on QDEM's meshes.
 
 A quarter of the bar is computed, by symmetry in y and z.  Shape functions of order p on
 Gauss-Lobatto points make the mass diagonal and every matrix a sum of Kronecker products of those
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import reduce
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sparse
@@ -74,7 +75,7 @@ def line(breaks: FloatArray, order: int) -> Line:
     count = order * (len(breaks) - 1) + 1
     points = np.zeros(count)
     mass, slope, stiffness = (np.zeros((count, count)) for _ in range(3))
-    for k, (left, right) in enumerate(zip(breaks[:-1], breaks[1:], strict=True)):
+    for k, (left, right) in enumerate(pairwise(breaks)):
         part, half = slice(order * k, order * (k + 1) + 1), (right - left) / 2
         points[part] = left + half * (1 + local)
         mass[part, part] += half * np.diag(weights)

@@ -1,0 +1,89 @@
+"""The picture of the record of `qdem_work_precision`: error against cost, a panel a question."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from validation.qdem_work_report import LEVELS, Row, family, frontier, rows_read
+
+STYLE = {
+    "QDEM float64": ("o", "#0b5394"),
+    "QDEM float32": ("^", "#3d9be9"),
+    "QDEM, shorter steps": ("x", "#0b5394"),
+    "QDEM on gmsh's meshes": ("P", "#8e7cc3"),
+    "P1 central difference": ("s", "#6aa84f"),
+    "P1 Newmark": ("D", "#cc7a00"),
+    "P2 Newmark": ("*", "#cc0000"),
+}
+JOINED = ("QDEM float64", "QDEM float32", "P1 central difference", "P1 Newmark", "P2 Newmark")
+"""Families whose frontier is drawn as a line: their runs differ in what a user would choose."""
+TITLES = {
+    "bending": "Slow bending of the cantilever, three periods",
+    "pulse": "A 50 µs pulse through the bar",
+}
+
+
+def plot(record: Path, picture: Path) -> None:
+    """Draw error against cost, a panel a question, all runs and each family's frontier."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    rows = rows_read(record)
+    figure = Figure(figsize=(13, 6.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    for axes, question in zip(figure.subplots(1, 2), LEVELS, strict=True):
+        _panel(axes, rows, question)
+    axes.legend(fontsize=8, loc="best")
+    temporary = picture.with_name(picture.name + ".partial")
+    figure.savefig(temporary, dpi=130, format="png")
+    temporary.replace(picture)
+
+
+def _panel(axes: Any, rows: Sequence[Row], question: str) -> None:
+    for name, (marker, colour) in STYLE.items():
+        every = family(rows, question, name)
+        if not every:
+            continue
+        joined = name in JOINED
+        best = frontier(every) if joined else every
+        axes.plot(
+            [r["cost_s"] for r in every], [r["error"] for r in every], marker, color=colour,
+            alpha=0.35 if joined else 0.8, markersize=4,
+        )  # fmt: skip
+        axes.plot(
+            *([r[key] for r in best] for key in ("cost_s", "error")), marker=marker,
+            linestyle="-" if joined else "none", color=colour, label=name, markersize=6,
+        )  # fmt: skip
+        if name in ("QDEM float64", "P1 Newmark", "P2 Newmark"):
+            for row in best:
+                axes.annotate(
+                    _label(row, question), (row["cost_s"], row["error"]), fontsize=6, color=colour,
+                    xytext=(4, 4), textcoords="offset points",
+                )  # fmt: skip
+    reference = next(
+        (r for r in rows if r["case"] == f"qdem-cost-{question}" and r["method"] == "reference"),
+        None,
+    )
+    axes.set(
+        xscale="log", yscale="log", title=TITLES[question],
+        xlabel="processor time of one thread, set-up included [s]",
+        ylabel=f"error: {next(r['error_kind'] for r in rows if question in r['case'])}",
+    )  # fmt: skip
+    if reference is not None:
+        low = axes.get_ylim()[0]
+        axes.axhspan(low / 2, max(reference["error"], low), color="0.8", zorder=0)
+        axes.text(
+            0.02, 0.01, f"reference uncertain by {reference['error']:.1g}", fontsize=7,
+            transform=axes.transAxes,
+        )  # fmt: skip
+        axes.set_ylim(low / 2, None)
+    axes.grid(True, which="both", alpha=0.25)
+
+
+def _label(row: Row, question: str) -> str:
+    count = row["elements"]
+    size = f"{count}" if count < 1000 else f"{count / 1000:.0f}k"
+    steps = row["setting"].get("steps_per_unit")
+    return size if steps is None else f"{size}, {'T' if question == 'bending' else 'pulse'}/{steps}"
