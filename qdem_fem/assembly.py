@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numba
@@ -11,6 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from qdem_fem import kernel
 from qdem_fem.body import Body
+from qdem_fem.body_frames import BodyFrames
 from qdem_fem.conditions import Conditions
 from qdem_fem.layout import aligned_zeros, layout_build
 from qdem_fem.reference_forces import Strain
@@ -21,7 +22,15 @@ Integers = NDArray[np.int64]
 THREAD_ELEMENTS = 16_384
 """Fewer elements than this for each thread lose more at barriers than they gain."""
 
+FIELDS = ("displacement", "velocity")
+FRAME_ARRAYS = ("rotation", "shift", "velocity")
+EDGE = 2.0
+"""Edge of a regular tetrahedron over the cube root of its volume."""
+
 NO_LOADS = kernel.Loads(*(np.zeros(0, np.int64),) * 3, np.zeros(0))
+NO_CONSTRAINTS = kernel.Constraints(
+    *(np.zeros(0, np.int64),) * 2, np.zeros(0), np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3))
+)
 NO_PROBES = kernel.Probes(np.zeros(0, np.int64), np.zeros((0, 0, 3)), 1, 1)
 
 
@@ -47,8 +56,10 @@ class Assembly:
         self.n_nodes = len(master)
         kind: Any = np.dtype(dtype)
         self.dtype = kind
-        starts = np.cumsum([0] + [len(body.nodes) for body in bodies])
-        shifted = [body.elements + start for body, start in zip(bodies, starts, strict=False)]
+        self._first_node = np.cumsum([0] + [len(body.nodes) for body in bodies])
+        shifted = [
+            body.elements + start for body, start in zip(bodies, self._first_node, strict=False)
+        ]
         self.elements = master[np.concatenate(shifted)]
         volumes = np.concatenate([body.gradients[1] for body in bodies])
         materials = [body.material for body in bodies]
@@ -78,6 +89,13 @@ class Assembly:
         inverse[self.packed.node_place[used]] = 1 / self.mass[used]
         self.state = self._state(inverse)
         self._scratch: kernel.State | None = None
+        self.frames: BodyFrames | None = None
+        """Of free bodies in single precision."""
+        self._nodes = np.concatenate([body.nodes for body in bodies])
+        self._sizes = np.array([EDGE * np.median(body.gradients[1]) ** (1 / 3) for body in bodies])
+        self._turning = strain != "small"
+        self._joined = master != np.arange(self.n_nodes)
+        self._joined[master[self._joined]] = True
 
     def _state(self, inverse_mass: Floats) -> kernel.State:
         numbers = 4 * self.n_nodes
@@ -90,14 +108,84 @@ class Assembly:
             inverse,
         )
 
+    def _read(self, flat: Any) -> Floats:
+        """A field of the state by the user's numbers, (n, 3), as the kernel has it."""
+        return np.asarray(flat).reshape(-1, 4)[self.place, :3].astype(float)
+
+    def _write(self, flat: Any, values: Floats) -> None:
+        flat.reshape(-1, 4)[self.place, :3] = values
+
     def field(self, name: str) -> Floats:
         """``displacement`` [m] or ``velocity`` [m/s] of all nodes, (n, 3)."""
-        flat = getattr(self.state, name)
-        return flat.reshape(-1, 4)[self.place, :3].astype(float)
+        own = self._read(getattr(self.state, name))
+        if self.frames is None:
+            return own
+        to_world = {
+            "displacement": self.frames.displacement_world,
+            "velocity": self.frames.velocity_world,
+        }
+        return to_world[name](own)
 
     def field_set(self, name: str, values: Floats) -> None:
         """Set a field of all nodes, (n, 3); nodes that follow others take their master's."""
-        getattr(self.state, name).reshape(-1, 4)[self.place, :3] = values
+        if self.frames is None:
+            self._write(getattr(self.state, name), values)
+        else:
+            fields = {each: self.field(each) for each in FIELDS} | {name: values}
+            self._fields_frame(**fields)
+
+    def _fields_frame(self, displacement: Floats, velocity: Floats) -> None:
+        """Renew the frames for these fields of all nodes, (n, 3)."""
+        assert self.frames is not None
+        if np.isfinite(displacement).all() and np.isfinite(velocity).all():
+            self.frames.fit(displacement, velocity)
+        self._write(self.state.displacement, self.frames.displacement_own(displacement))
+        self._write(self.state.velocity, self.frames.velocity_own(velocity))
+
+    def _frames_choose(self, conditions: Conditions, gravity: bool) -> None:
+        """Give frames to the bodies that are free, and take them from those that no longer are."""
+        displacement, velocity = self.field("displacement"), self.field("velocity")
+        tied = self._joined.copy()
+        for nodes in [each.nodes for each in conditions.held + conditions.rollers]:
+            tied[nodes] = True
+        if np.logical_or.reduceat(tied, self._first_node[:-1]).all():
+            self.frames = None
+            self._write(self.state.displacement, displacement)
+            self._write(self.state.velocity, velocity)
+            return
+        self.frames = BodyFrames(
+            self._nodes, self.mass, self._first_node, self._sizes, self._turning
+        )
+        self.frames.choose(tied, gravity)
+        self._fields_frame(displacement, velocity)
+
+    def steps_most(self, step: float) -> int:
+        """Steps to take before frames are looked at again."""
+        if self.frames is None:
+            return self.window_work
+        return self.frames.steps_near(self._read(self.state.velocity), step)
+
+    def frames_renew(self) -> None:
+        """Take new frames where a body has moved far in its own."""
+        if self.frames is not None and self.frames.is_far(self._read(self.state.displacement)):
+            self._fields_frame(**{name: self.field(name) for name in FIELDS})
+
+    def stored(self) -> dict[str, NDArray[Any]]:
+        """The state as it is kept, to the bit: fields by the user's numbers, and frames."""
+        arrays: dict[str, NDArray[Any]] = {
+            name: self._read(getattr(self.state, name)).astype(self.dtype) for name in FIELDS
+        }
+        if self.frames is not None:
+            arrays |= {f"frame_{name}": getattr(self.frames, name) for name in FRAME_ARRAYS}
+        return arrays
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take the state that `stored` gave, under the same conditions."""
+        for name in FIELDS:
+            self._write(getattr(self.state, name), arrays[name].astype(float))
+        if self.frames is not None:
+            for name in FRAME_ARRAYS:
+                setattr(self.frames, name, arrays[f"frame_{name}"].copy())
 
     def window(
         self,
@@ -109,9 +197,36 @@ class Assembly:
         table: Floats,
         gravity: Floats | None,
         work: Floats,
-        state: kernel.State | None = None,
     ) -> tuple[int, float]:
-        """Run the kernel; ``gravity`` (steps, 3) [m/s^2].  Returns steps done, bad elements."""
+        """Compute steps; ``gravity`` (steps + 1, 3) [m/s^2].  Returns steps done, bad elements."""
+        frames, user_node = self.frames, self.packed.node_order
+        if frames is None:
+            return self.kernel_run(
+                self.state, steps, step, loads, held, probes, table, gravity, work
+            )
+        journey = frames.journey(steps, step, gravity)
+        done, bad = self.kernel_run(
+            self.state, steps, step, frames.loads_turned(loads, user_node), held, probes, table,
+            None if frames.falls else gravity, work,
+        )  # fmt: skip
+        frames.probes_world(probes, user_node, done, step, journey)
+        work[0] += frames.carried_work(loads, user_node, table[:done], step, journey)
+        frames.advance(done, step, journey)
+        return done, bad
+
+    def kernel_run(
+        self,
+        state: kernel.State,
+        steps: int,
+        step: float,
+        loads: kernel.Loads,
+        held: kernel.Constraints,
+        probes: kernel.Probes,
+        table: Floats,
+        gravity: Floats | None,
+        work: Floats,
+    ) -> tuple[int, float]:
+        """Run the kernel on a state as it is, in the frames of the bodies."""
         accelerations = None
         if gravity is not None:
             accelerations = aligned_zeros(4 * len(gravity), self.dtype)
@@ -120,8 +235,8 @@ class Assembly:
         numba.set_num_threads(self.threads)
         try:
             done, bad = kernel.window_kernel(self.threads)(
-                self.law, self.viscous, self.packed.layout, state or self.state, loads, held,
-                probes, table, accelerations, work, self.dtype.type(step), steps,
+                self.law, self.viscous, self.packed.layout, state, loads, held, probes, table,
+                accelerations, work, self.dtype.type(step), steps,
             )  # fmt: skip
         finally:
             numba.set_num_threads(before)
@@ -132,32 +247,43 @@ class Assembly:
         displacement: Floats,
         velocity: Floats,
         loads: kernel.Loads,
-        held: kernel.Constraints,
         table: Floats,
         gravity: Floats | None,
     ) -> Floats:
-        """``f(u, v)/m`` [m/s^2] of all nodes, (n, 3), loads included, zero where held.
+        """``f(u, v)/m`` [m/s^2] of all nodes, (n, 3), loads included, held or not."""
+        frames = self.frames
+        if frames is None:
+            return self.accelerations_own(displacement, velocity, loads, table, gravity)
+        own = self.accelerations_own(
+            frames.displacement_own(displacement), frames.velocity_own(velocity),
+            frames.loads_turned(loads, self.packed.node_order), table,
+            None if frames.falls else gravity,
+        )  # fmt: skip
+        seen = frames.turned(own)
+        return seen if gravity is None or not frames.falls else seen + gravity[0]
 
-        Made by the kernel itself: one step of one second from a copy of the state.
-        """
+    def accelerations_own(
+        self,
+        displacement: Floats,
+        velocity: Floats,
+        loads: kernel.Loads,
+        table: Floats,
+        gravity: Floats | None,
+    ) -> Floats:
+        """`accelerations` within the frames, by the kernel: one step of one second of a copy."""
         if self._scratch is None:
             self._scratch = self._state(np.asarray(self.state.inverse_mass, dtype=float))
         scratch = self._scratch
         if self.viscous is None:  # no digit of the forces is lost to a velocity they do not need
             velocity = np.zeros_like(velocity)
-        for flat, values in ((scratch.displacement, displacement), (scratch.velocity, velocity)):
-            flat.reshape(-1, 4)[self.place, :3] = values
-        if held.roller_at.size:
-            held = held._replace(roller_at=held.roller_at[:0], roller_normal=held.roller_normal[:0])
-        free = held._replace(
-            node_at=held.node_at[:0], series=held.series[:0], weight=held.weight[:0],
-            previous=held.previous[:0],
-        )  # fmt: skip
-        before = scratch.velocity.astype(float)
-        self.window(1, 1.0, loads, free, NO_PROBES, table, gravity, np.zeros(2), state=scratch)
-        change = (scratch.velocity - before).reshape(-1, 4)[self.place, :3].astype(float)
+        self._write(scratch.displacement, displacement)
+        self._write(scratch.velocity, velocity)
+        before = self._read(scratch.velocity)
+        self.kernel_run(
+            scratch, 1, 1.0, loads, NO_CONSTRAINTS, NO_PROBES, table, gravity, np.zeros(2)
+        )
         scratch.forces[:] = 0.0
-        return change
+        return self._read(scratch.velocity) - before
 
     def hold(self, values: Floats, held: kernel.Constraints) -> Floats:
         """``values`` (n, 3) without their parts along held components and roller normals."""
@@ -170,8 +296,12 @@ class Assembly:
         flat[held.node_at] = 0.0
         return flat.reshape(-1, 4)[self.place, :3]
 
-    def lists(self, conditions: Conditions) -> tuple[kernel.Loads, kernel.Constraints]:
-        """The kernel's lists of loads and constraints."""
+    def lists(
+        self, conditions: Conditions, gravity: bool
+    ) -> tuple[kernel.Loads, kernel.Constraints]:
+        """The kernel's lists of loads and constraints; in single precision, frames to suit."""
+        if self.dtype == np.float32:
+            self._frames_choose(conditions, gravity)
         return (
             conditions.loads_packed(self.packed, self.place),
             conditions.constraints_packed(self.place),

@@ -69,8 +69,7 @@ def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
         "previous": held.previous,
         "critical_mode": critical.mode,
     }
-    for name in ("displacement", "velocity"):
-        arrays[name] = assembly.field(name).astype(assembly.dtype)
+    arrays |= assembly.stored()
     stream = io.BytesIO()
     np.savez(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes them for its flags
     write_whole(Path(path), _sealed(stream.getvalue()))
@@ -94,8 +93,7 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
     critical = CriticalStep(**head["critical_step"], mode=arrays["critical_mode"])
 
     assembly, (_, held) = simulation.assembly, simulation.packed_lists()
-    for name in ("displacement", "velocity"):
-        assembly.field_set(name, arrays[name].astype(float))
+    assembly.restore(arrays)
     held.previous[:] = arrays["previous"]
     simulation._critical = critical
     simulation.steps_done, simulation.behind = progress.steps_done, progress.behind

@@ -123,7 +123,7 @@ def critical_step_find(run: Simulation) -> CriticalStep:
         u, v = u[run.master], v[run.master]
         scale = size / max(abs(u).max(), 1e-300)
         u, v = (assembly.hold(scale * field, held) for field in (u, v))
-        change = assembly.accelerations(u, v, NO_LOADS, held, nothing, None)
+        change = assembly.accelerations_own(u, v, NO_LOADS, nothing, None)
         change = assembly.hold(change, held) / scale
         change[follows] = 0.0  # no motion of their own: the operator stays symmetric
         return change

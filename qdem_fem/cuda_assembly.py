@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from qdem_fem import kernel
-from qdem_fem.assembly import NO_PROBES, Assembly
+from qdem_fem.assembly import Assembly
 from qdem_fem.body import Body
 from qdem_fem.errors import LibraryMissing
 from qdem_fem.lanes import lane_count
@@ -153,14 +153,6 @@ class CudaAssembly(Assembly):
         masses = cuda.to_device(inverse_mass.astype(self.dtype))
         return kernel.State(zeros(), zeros(), zeros(), masses)
 
-    def field(self, name: str) -> Floats:
-        """``displacement`` [m] or ``velocity`` [m/s] of all nodes, (n, 3), from the GPU."""
-        return self._read(getattr(self.state, name))
-
-    def field_set(self, name: str, values: Floats) -> None:
-        """Set a field of all nodes, (n, 3); nodes that follow others take their master's."""
-        self._write(getattr(self.state, name), values)
-
     def _read(self, flat: Any) -> Floats:
         return flat.copy_to_host().reshape(-1, 4)[self.place, :3].astype(float)
 
@@ -169,8 +161,9 @@ class CudaAssembly(Assembly):
         rows[self.place, :3] = values
         flat.copy_to_device(rows.ravel())
 
-    def window(
+    def kernel_run(
         self,
+        state: kernel.State,
         steps: int,
         step: float,
         loads: kernel.Loads,
@@ -179,16 +172,14 @@ class CudaAssembly(Assembly):
         table: Floats,
         gravity: Floats | None,
         work: Floats,
-        state: kernel.State | None = None,
     ) -> tuple[int, float]:
-        """Launch the steps and wait once, at the end; arguments as of `Assembly.window`."""
+        """Launch the steps and wait once, at the end; arguments as of `Assembly.kernel_run`."""
         from qdem_fem import cuda_step
         from qdem_fem.cuda_step import cuda
 
         acted = node_actions(self.n_nodes, loads, held, probes)
         samples = sample_numbers(steps, probes)
         taken = int(samples.max(initial=-1)) + 1
-        now = state or self.state
         memory = cuda.to_device(acted.memory)
         record = cuda.to_device(np.zeros((max(taken, 1), max(len(probes.node_at), 1), 3)))
         accelerations = np.zeros(3) if gravity is None else np.ravel(gravity)
@@ -197,15 +188,15 @@ class CudaAssembly(Assembly):
         of_elements = (
             self._corners,
             self._rows,
-            now.displacement,
-            now.velocity,
-            now.forces,
+            state.displacement,
+            state.velocity,
+            state.forces,
             status,
         )
         of_nodes = (
             cuda.to_device(acted.first), cuda.to_device(acted.actions),
             cuda.to_device(acted.weights), memory, cuda.to_device(np.ascontiguousarray(table)),
-            record, now.displacement, now.velocity, now.forces, now.inverse_mass,
+            record, state.displacement, state.velocity, state.forces, state.inverse_mass,
             cuda.to_device(accelerations.astype(self.dtype)), status, dt,
         )  # fmt: skip
         motion = cuda_step.node_motion_kernel(gravity is not None)
@@ -225,23 +216,3 @@ class CudaAssembly(Assembly):
             kept = int(samples[:done].max(initial=-1)) + 1
             probes.record[:kept] = record.copy_to_host()[:kept, : len(probes.node_at)]
         return done, float(bad)
-
-    def accelerations(
-        self,
-        displacement: Floats,
-        velocity: Floats,
-        loads: kernel.Loads,
-        held: kernel.Constraints,
-        table: Floats,
-        gravity: Floats | None,
-    ) -> Floats:
-        """``f(u, v)/m`` [m/s^2] of all nodes, (n, 3), as `Assembly.accelerations`."""
-        if self._scratch is None:
-            self._scratch = self._state(self.state.inverse_mass.copy_to_host())
-        scratch = self._scratch
-        self._write(scratch.displacement, displacement)
-        self._write(scratch.velocity, velocity)
-        before = self._read(scratch.velocity)
-        free = kernel.Constraints(*(part[:0] for part in held))
-        self.window(1, 1.0, loads, free, NO_PROBES, table, gravity, np.zeros(2), state=scratch)
-        return self._read(scratch.velocity) - before

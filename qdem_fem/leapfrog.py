@@ -75,10 +75,10 @@ def half_work(run: Simulation, behind: Floats, level: Floats) -> Floats:
 
 def accelerations_free(run: Simulation, displacement: Floats, velocity: Floats) -> Floats:
     """What the forces would make of all nodes now if none were held [m/s^2], (n, 3)."""
-    loads, held = run.packed_lists()
+    loads, _ = run.packed_lists()
     now = np.full(2, run.time)
     return run.assembly.accelerations(
-        displacement, velocity, loads, held, run.conditions.table(now), run.gravity_at(now)
+        displacement, velocity, loads, run.conditions.table(now), run.gravity_at(now)
     )
 
 

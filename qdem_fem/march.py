@@ -55,7 +55,8 @@ def march(
     if run.gravity is not None and run.gravity.varying is not None:
         most = GRAVITY_STEPS
     while run.steps_done < end:
-        count = min(most, end - run.steps_done)
+        assembly.frames_renew()
+        count = min(most, end - run.steps_done, assembly.steps_most(run.step))
         times = run.step * (run.steps_done + np.arange(count + 1, dtype=float))
         behind = run.steps_done - start - first  # steps since the first sample
         taken = behind // stride + 1 if behind >= 0 else 0

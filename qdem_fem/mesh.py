@@ -64,13 +64,14 @@ def mesh_read(source: Any, *, where: str = "") -> TetMesh:
 
     - a pair ``(nodes, elements)``: coordinates (n, 3) [m], and node numbers (m, 4) from 0;
     - a ``skfem.MeshTet``: its boundaries become node sets, its subdomains element sets;
-    - a ``meshio.Mesh``: its blocks of tetrahedra are joined, other cells only make node sets;
+    - a ``meshio.Mesh``: its blocks of tetrahedra are joined, cells of surfaces and lines only make
+      node sets, hexahedra and other solid cells are refused;
       cell sets, point sets and gmsh's physical groups keep their names, a group without a name
       has its number;
     - the path of a file that meshio reads;
     - a `TetMesh`, which is checked again.
 
-    ``where`` names the mesh in errors; a path names itself.  The arrays are copied.  Left-handed
+    ``where`` names the mesh in errors, a path also names itself.  The arrays are copied.  Left-handed
     elements are mended and listed in ``flipped``, nodes of no element are listed in ``unused``;
     nodes at the same place are no error, as cracks are made of them.
 
@@ -80,7 +81,7 @@ def mesh_read(source: Any, *, where: str = "") -> TetMesh:
     tetrahedra, elements of higher order, a file that can not be read.
     """
     if isinstance(source, (str, os.PathLike)):
-        where = where or f"mesh file {os.fspath(source)!r}"
+        where = f"{where}, " * bool(where) + f"mesh file {os.fspath(source)!r}"
     where = where or "mesh"
     if isinstance(source, TetMesh):
         parts = MeshParts(source.nodes, source.elements, source.node_sets, source.element_sets)

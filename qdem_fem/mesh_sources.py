@@ -28,6 +28,8 @@ _KEEP_CORNERS = (
     "mesh with linear elements (gmsh: Mesh.ElementOrder = 1), or keep the four corners of each "
     "element, `elements[:, :4]`"
 )
+_OTHER_SOLIDS = ("hexahedron", "wedge", "pyramid", "polyhedron", "VTK_LAGRANGE_HEX")
+"""How meshio's names of solid cells with other shapes begin."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,14 @@ def _parts_of_skfem(mesh: Any, where: str) -> MeshParts:
 def _parts_of_meshio(mesh: Any, where: str) -> MeshParts:
     """All blocks of tetrahedra joined; sets and physical groups of every block by name."""
     kinds = [block.type for block in mesh.cells]
+    others = sorted({kind for kind in kinds if kind.startswith(_OTHER_SOLIDS)})
+    if others:
+        raise MeshError(
+            f"the mesh holds solid cells that are no tetrahedra ({', '.join(others)}); without "
+            "them the body would have holes",
+            where=where,
+            remedy="split them into tetrahedra, or remove their blocks if they are no part of it",
+        )
     curved = sorted({kind for kind in kinds if kind.startswith("tetra") and kind != "tetra"})
     if curved:
         raise MeshError(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -26,7 +27,10 @@ VTK_TYPES = {"float64": "Float64", "float32": "Float32", "int64": "Int64", "uint
 
 
 def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
-    """Write a file: whatever kills the writer leaves the old file or the new, never a part."""
+    """Write a file: whatever kills the writer leaves the old file or the new, never a part.
+
+    Raises `UsageError` when the system refuses.
+    """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
     parts: Iterable[bytes]
     if isinstance(content, str):
@@ -40,8 +44,20 @@ def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         temporary.replace(path)
+    except OSError as error:
+        raise can_not_write(path, error) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def can_not_write(path: Path, error: OSError) -> UsageError:
+    """What to raise when the system refuses to write: no space, no permission, no folder."""
+    return UsageError(
+        f"can not be written ({error.strerror or error})",
+        where=str(path),
+        remedy="make room or leave to write there, or give another folder",
+    )
 
 
 def vtu_write(
@@ -144,7 +160,7 @@ def bodies_vtu_write(path: Path, bodies: Sequence[Any]) -> None:
 def pvd_write(path: Path, files: Sequence[tuple[float, str]]) -> None:
     """Write the PVD file that strings VTU files (time [s], file name beside it) together."""
     entries = (
-        f'<DataSet timestep="{time!r}" group="" part="0" file={quoteattr(name)}/>'
+        f'<DataSet timestep="{float(time)!r}" group="" part="0" file={quoteattr(name)}/>'
         for time, name in files
     )
     lines = [
@@ -171,21 +187,25 @@ class Table:
     def append(self, rows: npt.NDArray[Any]) -> None:
         """Append rows (k, columns); digits enough to read the same numbers back."""
         text = "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist())
-        with self.path.open("a", encoding="ascii") as stream:
-            stream.write(text)
+        try:
+            with self.path.open("a", encoding="ascii") as stream:
+                stream.write(text)
+        except OSError as error:
+            raise can_not_write(self.path, error) from error
 
     def sync(self) -> None:
         """Have the system write everything to the disk."""
         with self.path.open("rb+") as stream:
             os.fsync(stream.fileno())
 
-    def cut(self, time: float) -> None:
+    def cut(self, time: float, count: int) -> None:
         """Keep the sound rows up to ``time`` [s], as they were when the run had come there.
 
-        Raises `UsageError` when the file has other columns or is not there.
+        Raises `UsageError` when the file has other columns, is not there, or has not the
+        ``count`` rows that were written by then; it is left as it is.
         """
         header = (",".join(self.columns) + "\n").encode()
-        kept = len(header)
+        kept, rows = len(header), 0
         try:
             with self.path.open("rb+") as stream:
                 if stream.readline() != header:
@@ -193,7 +213,13 @@ class Table:
                 for line in stream:
                     if not line.endswith(b"\n") or float(line.partition(b",")[0]) > time:
                         break
-                    kept += len(line)
+                    kept, rows = kept + len(line), rows + 1
+                if rows != count:
+                    raise UsageError(
+                        f"{count} rows up to {time:.6g} s were written, {rows} are there",
+                        where=str(self.path),
+                        remedy="start anew: --force",
+                    )
                 stream.truncate(kept)
         except (OSError, ValueError) as error:
             raise UsageError(

@@ -118,6 +118,8 @@ def _from_csv(table: SeriesTable, key: str, folder: Path) -> TimeSeries:
         if column not in header:
             near = did_you_mean(column, header)
             raise refuse(f"there is no column {column!r} in its first line{near}")
+        if header.count(column) > 1:
+            raise refuse(f"{header.count(column)} columns are named {column!r}")
     places = [header.index(column) for column in columns]
     samples: list[tuple[float, float]] = []
     for line, row in rows[1:]:

@@ -78,7 +78,10 @@ def ramp(duration: float, value: ArrayLike) -> Series:
     """From zero to ``value`` in ``duration`` [s], then constant: the paper's loading (3.1)."""
     if not (is_real(duration) and duration > 0):
         raise ConditionError(f"a ramp of {duration} s", where="ramp", remedy="give a time above 0")
-    end = np.asarray(value, dtype=float)
+    try:
+        end = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ConditionError(f"the value is no number: {value!r}", where="ramp") from None
     return Series([0.0, duration], np.stack([np.zeros_like(end), end]))
 
 
@@ -92,6 +95,12 @@ class Driver:
         self.where, self.components = where, components
         if isinstance(value, tuple) and len(value) == 2 and np.ndim(value[0]) == 1:
             value = Series(*value)
+        if hasattr(value, "iloc"):  # pandas; a record of three rows would pass for a vector
+            raise ConditionError(
+                "a pandas object does not say what its times are",
+                where=where,
+                remedy="give Series(record.index, record), or a constant vector as a list",
+            )
         self.varying: Series | Callable[[float], Any] | None = None
         self.constant = np.zeros(components)
         if isinstance(value, Series) or callable(value):
@@ -106,20 +115,39 @@ class Driver:
             return np.broadcast_to(self.constant, (len(times), self.components))
         if isinstance(self.varying, Series):
             return self._columns(self.varying.at(times), len(times), None)
-        rows = [self._columns(self.varying(float(t)), 1, float(t)) for t in times]
+        rows = [self._columns(self._called(float(t)), 1, float(t)) for t in times]
         return np.concatenate(rows)
+
+    def _called(self, time: float) -> Any:
+        """Value of a function at one time [s]; what goes wrong in it is told with the time."""
+        assert callable(self.varying)
+        try:
+            return self.varying(time)
+        except Exception as error:
+            raise ConditionError(
+                f"the function failed at t = {time:g} s ({type(error).__name__}: {error})",
+                where=self.where,
+                remedy="give a function of one number, the time in s",
+            ) from error
 
     def _columns(self, value: Any, rows: int, time: float | None) -> Floats:
         when = "" if time is None else f" at t = {time:g} s"
         try:
-            array = np.asarray(value, dtype=float).reshape(rows, -1)
-        except (TypeError, ValueError):
+            given = np.asarray(value)
+        except ValueError:  # rows of different lengths
+            given = np.array(None)
+        if given.dtype.kind not in "iuf":
             raise ConditionError(
-                f"the value{when} is no number: {value!r}", where=self.where
-            ) from None
+                f"the value{when} is no number: {value!r}",
+                where=self.where,
+                remedy="give a number or a vector, a function of time, or times and values as "
+                "Series(times, values)",
+            )
+        array = given.astype(float).reshape(rows, -1)
         if array.shape[1] != self.components:
             raise ConditionError(
-                f"the value{when} has {array.shape[1]} components, not {self.components}",
+                f"the value{when} has {array.shape[1]} "
+                f"component{'s' * (array.shape[1] != 1)}, not {self.components}",
                 where=self.where,
             )
         if not np.isfinite(array).all():

@@ -341,7 +341,7 @@ class Simulation:
     def packed_lists(self) -> tuple[kernel.Loads, kernel.Constraints]:
         """The kernel's lists of the present conditions."""
         if self._lists is None:
-            self._lists = self.assembly.lists(self.conditions)
+            self._lists = self.assembly.lists(self.conditions, self.gravity is not None)
         return self._lists
 
     def gravity_at(self, times: Floats) -> Floats | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.assembly import NO_LOADS, NO_PROBES, Assembly
+from qdem_fem.assembly import NO_CONSTRAINTS, NO_LOADS, NO_PROBES, Assembly
 from qdem_fem.kernel import Constraints
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class StaticProblem:
                 simulation.threads,
             )  # fmt: skip
         assembly, place = self.assembly, self.assembly.place
-        loads, held = assembly.lists(conditions)
+        loads, held = assembly.lists(conditions, gravity=False)
         row = conditions.table(now)[0]
         self.external = np.zeros(4 * assembly.n_nodes)
         np.add.at(self.external, loads.node_at, loads.weight * row[loads.series])
@@ -46,11 +46,6 @@ class StaticProblem:
             self.external.reshape(-1, 4)[place[used]] += weight[place[used]]
         self.held_at, self.target = held.node_at, held.weight * row[held.series]
         self.turned_at, self.turned = roller_projections(held)
-        self.nothing = held._replace(
-            node_at=held.node_at[:0], series=held.series[:0], weight=held.weight[:0],
-            previous=held.previous[:0], roller_at=held.roller_at[:0],
-            roller_normal=held.roller_normal[:0],
-        )  # fmt: skip
         self.state = assembly._state(np.ones(assembly.n_nodes))
         self.inverse_mass = inverse_stiffness(simulation, assembly)
         self.initial = simulation.assembly.field("displacement")
@@ -87,9 +82,9 @@ class StaticProblem:
         self.steps += 1
         self.state.displacement[:] = u
         self.state.velocity[:] = 0.0
-        _, bad = self.assembly.window(
-            1, 1.0, NO_LOADS, self.nothing, NO_PROBES, np.ones((2, 1)), None, np.zeros(2),
-            state=self.state,
+        _, bad = self.assembly.kernel_run(
+            self.state, 1, 1.0, NO_LOADS, NO_CONSTRAINTS, NO_PROBES, np.ones((2, 1)), None,
+            np.zeros(2),
         )  # fmt: skip
         self.state.forces[:] = 0.0
         return self.state.velocity + self.external, bad == 0 and bool(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import eigsh
 
-from qdem_fem import Body, Material
+from qdem_fem import Material
+from qdem_fem.errors import StepWarning
 from qdem_fem.mass_scaling import element_step
 from qdem_fem.mesh import altitudes, mesh_read
 from validation.case import Check
@@ -20,16 +22,17 @@ from validation.qdem_hard_meshes import (
 )
 from validation.qdem_judge import FloatArray, free_dof
 from validation.qdem_judge_modes import modes
+from validation.qdem_motion import error_norm, exact_motion
 from validation.qdem_problem import Problem, below, between, clamped, near, reported, tip_node
 from validation.qdem_static import StaticAnswer, relaxed
-from validation.qdem_vibration import error_norm, exact_motion, let_go
+from validation.qdem_vibration import let_go
 
 CONCRETE = Material(45e9, 0.167, 2350.0)
 FORCE = (0.0, 0.0, -0.2)
 """So small [N] that QDEM's strain measure differs from the judge's by less than is compared."""
 STEP_BELOW, STEP_ABOVE = 2e-3, 1e-6
 """Share by which a critical step may be below the true one (its margin) and above (rounding)."""
-SIZES_RATIO = 4000.0
+SIZES_RATIO = 2000.0
 """Outer over inner edge of the graded box; its longest edges then differ 1000-fold."""
 
 
@@ -93,6 +96,8 @@ def sliver_checks(altitude: float = 0.01) -> list[Check]:
         reported(f"{name}: steps, times those of the even mesh", loss),
         below(f"{name}: flatness of the element named, over the flattest",
               flat[critical.element] / flat.min(), 1.01),
+        below(f"{name}: warnings that name it, more or less than one",
+              abs(1 - warnings_naming(problem, critical.element)), 0.5),
         reported(f"{name}: critical step over that of the fastest element alone",
                  critical.value / element_step(body).min()),
         motion_check(name, problem),
@@ -100,12 +105,25 @@ def sliver_checks(altitude: float = 0.01) -> list[Check]:
     ]  # fmt: skip
 
 
+def warnings_naming(problem: Problem, element: int) -> int:
+    """How many warnings of the first two steps name an element as the one that governs."""
+    body, run = problem.simulation()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run.advance(run.step)
+        run.advance(run.step)
+    text = f"element {element} of {body.name} governs"
+    return sum(text in str(one.message) for one in caught)
+
+
 def motion_check(name: str, problem: Problem) -> Check:
     """Two first periods from the static shape at 0.9 of the step, to the sum over all modes."""
     node = tip_node(problem.mesh)
     exact = exact_motion(problem, problem.static, node)
     period = 2 * np.pi / exact.omega[0]
-    record = let_go(problem, 2 * period, problem.static, node, sampling=period / 100)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)  # that the step is short is why we are here
+        record = let_go(problem, 2 * period, problem.static, node, sampling=period / 100)
     error = error_norm(record.value, exact.at(record.time))
     return below(f"{name}: motion over two periods, to the exact one", error, 2e-3)
 
@@ -129,7 +147,7 @@ def mass_scaling_checks(name: str, problem: Problem, shares: tuple[float, ...]) 
             between(f"{what}: fewer steps by", step / before, 1.0, 1e4),
             reported(f"{what}: mass added", 100 * (mass.sum() / problem.mass.sum() - 1), "%"),
             between(f"{what}: change of the first frequency", 100 * (changed / lowest - 1),
-                    -10.0, 1e-6, "%"),
+                    -20.0, 1e-6, "%"),
         ]  # fmt: skip
     return rows
 

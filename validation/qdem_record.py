@@ -160,7 +160,10 @@ def _source(module: str) -> Path | None:
 def _imported(file: Path | None) -> set[str]:
     """Names after ``import`` at the head of a file, those of modules among them."""
     names = set()
-    for statement in _tree(file).body:
+    tree = _tree(file).body
+    # what stands under ``if TYPE_CHECKING`` is loaded later, on use
+    later = [inner for outer in tree if isinstance(outer, ast.If) for inner in outer.body]
+    for statement in [*tree, *later]:
         if isinstance(statement, ast.ImportFrom) and statement.module:
             names |= {f"{statement.module}.{alias.name}" for alias in statement.names}
             names.add(statement.module)

@@ -25,6 +25,7 @@ from validation import qdem_judge
 from validation.case import Check
 from validation.qdem_judge import FloatArray
 from validation.qdem_problem import below, between, reported
+from validation.qdem_record import Outcome
 
 SOFT = Material(young=1e6, poisson=0.25, density=1000.0)
 RIM_SHARE = 1e-3
@@ -183,6 +184,6 @@ def quick_checks() -> list[Check]:
     return [*spin_checks(10), *patch_checks(5)]
 
 
-def full_checks() -> list[Check]:
+def full() -> Outcome:
     """A hundred turns; 50 meshes."""
-    return [*spin_checks(100), *patch_checks(50)]
+    return Outcome([*spin_checks(100), *patch_checks(50)])

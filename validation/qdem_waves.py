@@ -15,6 +15,7 @@ from validation.case import Check
 from validation.qdem_closed_forms import bar_speed, dilatational_speed
 from validation.qdem_judge import FloatArray
 from validation.qdem_problem import below, between, clamped, orders, reported, tip_node
+from validation.qdem_record import Outcome
 from validation.qdem_static import relaxed
 from validation.qdem_vibration import first_frequency
 
@@ -98,13 +99,14 @@ def ring_checks(cells: tuple[int, int, int], exact: bool) -> list[Check]:
         "breathing": radial,
         "bending": np.cos(2 * angle)[:, None] * radial - 0.5 * np.sin(2 * angle)[:, None] * around,
     }
+    ring = f"ring of {len(mesh.elements):,} elements"
     rows = []
     for (name, shape), thin in zip(shapes.items(), ring_frequencies(), strict=True):
         found = free_frequency(Body(mesh, STEEL), 1e-6 * shape, shape, thin)
         if exact:
             expected = nearest_eigenfrequency(Body(mesh, STEEL), shape)
-            rows.append(below(f"ring, {name}: to same mesh", abs(found / expected - 1), 1e-3))
-        rows.append(reported(f"ring, {name}: over the thin ring", found / thin))
+            rows.append(below(f"{ring}, {name}: to same mesh", abs(found / expected - 1), 1e-3))
+        rows.append(reported(f"{ring}, {name}: over the thin ring", found / thin))
     return rows
 
 
@@ -123,14 +125,20 @@ def free_frequency(body: Body, start: FloatArray, shape: FloatArray, guess: floa
 
 
 def nearest_eigenfrequency(body: Body, shape: FloatArray) -> float:
-    """Frequency [Hz] of the mode of the same mesh that holds most of ``shape``; all by LAPACK."""
+    """Frequency [Hz] of the modes of the same mesh that hold most of ``shape``; all by LAPACK.
+
+    Modes of a ring come in pairs of one frequency, whose vectors are any two of their plane: what
+    counts is the share of the pair.
+    """
     material = body.material
     mass = qdem_judge.lumped_mass(body.nodes, body.elements, material.density)
     matrix = qdem_judge.stiffness(body.nodes, body.elements, material.young, material.poisson)
     root = np.sqrt(np.repeat(mass, 3))
     value, vector = eigh(matrix.toarray() / np.outer(root, root))
     share = (vector.T @ (root * shape.ravel())) ** 2
-    return float(np.sqrt(value[np.argmax(share)]) / (2 * np.pi))
+    first = np.flatnonzero(np.diff(value, prepend=-np.inf) > 1e-6 * value)
+    most = first[np.argmax(np.add.reduceat(share, first))]
+    return float(np.sqrt(value[most]) / (2 * np.pi))
 
 
 # --- a block with holes -----------------------------------------------------------------------
@@ -160,11 +168,13 @@ def quick_checks() -> list[Check]:
     return [*wave_checks([10, 20, 40]), *ring_checks((2, 72, 1), True), *holes_checks(0.03)]
 
 
-def full_checks() -> list[Check]:
+def full() -> Outcome:
     """Bars of up to 80 cells a wave, a ring of 13,824 elements besides, a finer block."""
-    return [
-        *wave_checks([10, 20, 40, 80]),
-        *ring_checks((2, 72, 1), True),
-        *ring_checks((4, 288, 4), False),
-        *holes_checks(0.015),
-    ]
+    return Outcome(
+        [
+            *wave_checks([10, 20, 40, 80]),
+            *ring_checks((2, 72, 1), True),
+            *ring_checks((4, 288, 4), False),
+            *holes_checks(0.015),
+        ]
+    )

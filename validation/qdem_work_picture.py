@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from validation.qdem_work_report import LEVELS, Row, family, frontier, rows_read
+from validation.qdem_work_report import COMPARED, LEVELS, Row, family, frontier, rows_read
 
 STYLE = {
     "QDEM float64": ("o", "#0b5394"),
@@ -17,8 +17,6 @@ STYLE = {
     "P1 Newmark": ("D", "#cc7a00"),
     "P2 Newmark": ("*", "#cc0000"),
 }
-JOINED = ("QDEM float64", "QDEM float32", "P1 central difference", "P1 Newmark", "P2 Newmark")
-"""Families whose frontier is drawn as a line: their runs differ in what a user would choose."""
 TITLES = {
     "bending": "Slow bending of the cantilever, three periods",
     "pulse": "A 50 µs pulse through the bar",
@@ -46,7 +44,7 @@ def _panel(axes: Any, rows: Sequence[Row], question: str) -> None:
         every = family(rows, question, name)
         if not every:
             continue
-        joined = name in JOINED
+        joined = name in COMPARED  # their frontier is a line: runs differ by what a user chooses
         best = frontier(every) if joined else every
         axes.plot(
             [r["cost_s"] for r in every], [r["error"] for r in every], marker, color=colour,

@@ -81,11 +81,11 @@ def _linear(name: str, cells: tuple[int, int, int], quick: bool) -> list[Run]:
         runs.append((name, "P1 central difference", mesh))
     if not quick and level in ((1, 2) if name == "bending" else (1, 3, 5)):
         runs += [(name, "QDEM", mesh | {"safety": safety}) for safety in SHORTER]
-    chosen = STEPS[name]
+    chosen: tuple[int, ...] = STEPS[name]
     if quick:
         chosen = chosen[:2]
     elif name == "bending" and level > 2:
-        chosen = chosen[:3] if level < 5 else chosen[:2]
+        chosen = chosen[:3] if level < 5 else chosen[1:3]
     elif name == "pulse" and level > 3:
         chosen = chosen[2:] if level == 4 else ()
     runs += [

@@ -136,13 +136,13 @@ def quarter_box(beam: Beam, lines: tuple[Line, Line, Line], bending: bool) -> Bo
 
 
 def bending_reference(
-    beam: Beam, load: float, rise: float, times: FloatArray, fine: bool
+    beam: Beam, load: float, rise: float, times: FloatArray, order: int
 ) -> FloatArray:
     """Deflection of the end's middle [m] under ``load`` [N], raised by sin^2 in ``rise`` [s].
 
-    Modal superposition, each mode exact in time; elements are graded towards the clamp.
+    Modal superposition, each mode exact in time; elements of ``order`` along the bar, of two
+    less across, are graded towards the clamp.
     """
-    order = 6 if fine else 5
     graded = beam.height * np.array([0.0, 0.02, 0.08, 0.25, 0.6, 1.2])
     lines = (
         line(np.concatenate([graded, np.linspace(2.0 * beam.height, beam.length, 5)]), order),
@@ -157,7 +157,7 @@ def bending_reference(
     value, vector = eigsh(scaled.tocsc(), k=MODES, sigma=0.0)
     shape = vector / root[:, None]
     omega, share = np.sqrt(value), shape[box.probe] * (force @ shape)
-    dynamic = np.sum(share * _mode_response(times[:, None], omega, rise), axis=1)
+    dynamic = np.sum(share * mode_response(times[:, None], omega, rise), axis=1)
     return dynamic + (static - np.sum(share / value)) * raised(times, rise)
 
 
@@ -166,7 +166,7 @@ def raised(times: FloatArray, rise: float) -> FloatArray:
     return np.where(times < rise, np.sin(np.pi * times / rise / 2) ** 2, 1.0)
 
 
-def _mode_response(t: FloatArray, omega: FloatArray, rise: float) -> FloatArray:
+def mode_response(t: FloatArray, omega: FloatArray, rise: float) -> FloatArray:
     """q of q'' + omega^2 q = `raised`, from rest."""
     a = np.pi / rise
 
@@ -182,14 +182,13 @@ def _mode_response(t: FloatArray, omega: FloatArray, rise: float) -> FloatArray:
 
 
 def pulse_reference(
-    beam: Beam, pressure: float, length: float, times: FloatArray, fine: bool
+    beam: Beam, pressure: float, length: float, times: FloatArray, order: int, count: int
 ) -> FloatArray:
     """Velocity of the far end's middle [m/s] after a sin^2 pulse of ``pressure`` [Pa] at the other.
 
-    ``length`` [s] of the pulse.  Central differences, the two leading errors in time removed by
-    a second run with half the step (Richardson).
+    ``length`` [s] of the pulse; ``count`` elements along the bar.  Central differences, the leading
+    error in time removed by a second run with half the step (Richardson).
     """
-    order, count = (6, 48) if fine else (5, 40)
     lines = (
         line(np.linspace(0, beam.length, count + 1), order),
         line(np.linspace(0, beam.width / 2, 3), order),

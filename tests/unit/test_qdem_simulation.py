@@ -10,7 +10,7 @@ import pytest
 
 import qdem_fem as q
 from qdem_fem.mesh_generation import box_mesh
-from validation.cases.qdem_hard_cases import delaunay_mesh
+from validation.qdem_hard_meshes import delaunay_mesh
 
 YOUNG, POISSON, DENSITY = 1e6, 0.25, 1000.0
 CORNERS = np.array([[0.0, 0, 0], [1, 0.1, 0], [0.2, 1, 0], [0.1, 0.3, 1.1]])

@@ -15,7 +15,7 @@ from qdem_fem.errors import Unstable
 from qdem_fem.mass_scaling import element_step, mass_scaling_factor
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.reference_forces import Strain
-from validation.cases.qdem_hard_cases import SLIVER_STEP, box_with_sliver, delaunay_mesh
+from validation.qdem_hard_meshes import SLIVER_STEP, box_with_sliver, delaunay_mesh
 from validation.qdem_judge import lumped_mass, stiffness, stiffness_lame
 
 LAW = pytest.mark.parametrize("law", get_args(Strain))

@@ -43,6 +43,7 @@ def test_twins_agree_under_all_conditions(apart: dict[str, float], variant: str)
     "variant",
     [
         "no condition at all",
+        "in frames of its own",
         "periodic",
         "inversion: steps, count and state",
         "not a number: steps and count",

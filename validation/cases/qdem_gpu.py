@@ -100,6 +100,7 @@ def twins_compare() -> dict[str, float]:
         name = f"{strain}, {precision}" + ", viscous" * viscous
         found[name] = twins_apart(strain, precision, viscous, all_conditions)
     found["no condition at all"] = twins_apart("finger", "float64", False, no_condition)
+    found["in frames of its own"] = twins_apart("finger", "float32", False, loads_alone)
     found["periodic"] = twins_apart("finger", "float64", False, periodic_sides)
     found["inversion: steps, count and state"] = stop_apart(-80.0, 12)
     found["not a number: steps and count"] = stop_apart(np.nan, 12)
@@ -122,6 +123,13 @@ def all_conditions(run: q.Simulation, body: q.Body) -> None:
     run.pressure(body, body.nodes[:, 2] == 0.5, 2e3)
     for normal in ((0, 1, 1), (1, 2, 0)):
         run.roller(body, (body.nodes[:, 0] == 0.5) & (body.nodes[:, 1] == 0), normal)
+
+
+def loads_alone(run: q.Simulation, body: q.Body) -> None:
+    """Loads and gravity on a body that is free, and so has a frame in single precision."""
+    run.load(
+        body, body.nodes[:, 0] == 1, lambda t: (30.0, 20.0, -100 * np.cos(500 * np.asarray(t)))
+    )
 
 
 def periodic_sides(run: q.Simulation, body: q.Body) -> None:

@@ -1,54 +1,54 @@
-"""Hard cases of QDEM: slivers, stiff layers, nearly incompressible bodies, five million elements.
+"""Hard cases of QDEM: slivers, nearly incompressible bodies, jumps, steps near the critical one.
 
-placeholder
+    trackbed validate qdem-hard-cases            five million elements among them: some minutes
+    trackbed validate qdem-hard-cases --quick    meshes to 10,368 elements: under a minute
+
+What happens in each, and the figures: ``docs/qdem-hard-cases.md``.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import Delaunay
+from collections.abc import Callable
 
-from qdem_fem.mesh_generation import box_mesh
+from validation.case import Check
+from validation.qdem_hard_bodies import (
+    inverted_checks,
+    left_handed_checks,
+    loose_nodes_checks,
+    parts_checks,
+    single_element_checks,
+)
+from validation.qdem_hard_materials import Property, Where, jump_checks, locking_checks
+from validation.qdem_hard_shapes import graded_checks, sliver_checks
+from validation.qdem_hard_size import large_body_checks
+from validation.qdem_hard_steps import near_critical_checks
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+Part = Callable[[], list[Check]]
 
+JUMPS: list[tuple[Property, Where]] = [
+    ("young", "tip half"), ("young", "core"), ("young", "random"),
+    ("density", "tip half"), ("density", "core"), ("density", "random"),
+]  # fmt: skip
 
-def delaunay_mesh(count: int, seed: int, shape: float = 0.02) -> tuple[Floats, Integers]:
-    """Delaunay tetrahedra of random points in the unit cube: nodes (n, 3) [m], elements (m, 4).
-
-    Elements whose ``6 V / longest edge^3`` is below ``shape`` are left out, so the body has
-    pores and a rough surface, and a few nodes may belong to no element.
-    """
-    nodes = np.random.default_rng(seed).uniform(size=(count, 3))
-    elements = Delaunay(nodes).simplices.astype(np.int64)
-    corner = nodes[elements]
-    six_volumes = np.linalg.det(corner[:, 1:] - corner[:, :1])
-    left = six_volumes < 0
-    elements[left] = elements[left][:, [0, 1, 3, 2]]
-    pairs = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
-    longest = np.linalg.norm(corner[:, pairs[:, 0]] - corner[:, pairs[:, 1]], axis=2).max(axis=1)
-    return nodes, elements[abs(six_volumes) > shape * longest**3]
-
-
-def box_with_sliver(altitude: float, cells: int = 4) -> tuple[Floats, Integers]:
-    """A unit cube of Kuhn tetrahedra, some of them flattened to ``altitude`` times their own [-].
-
-    The middle node is pushed towards the face opposite to it in one of its elements; four of
-    them share that plane.  Returns nodes (n, 3) [m] and elements (m, 4).
-    """
-    mesh = box_mesh((1.0, 1.0, 1.0), (cells, cells, cells))
-    nodes = mesh.nodes.copy()
-    node = int(np.argmin(np.linalg.norm(nodes - 0.5, axis=1)))
-    corners = mesh.elements[np.flatnonzero((mesh.elements == node).any(axis=1))[0]]
-    face = nodes[corners[corners != node]]
-    normal = np.cross(face[1] - face[0], face[2] - face[0])
-    normal /= np.linalg.norm(normal)
-    height = (nodes[node] - face[0]) @ normal
-    nodes[node] -= (1 - altitude) * height * normal
-    return nodes, mesh.elements
+SHARED: list[Part] = [
+    sliver_checks,
+    graded_checks,
+    single_element_checks,
+    parts_checks,
+    loose_nodes_checks,
+    left_handed_checks,
+]
 
 
-SLIVER_STEP = {0.3: 0.83, 0.1: 0.51, 0.03: 0.28, 0.01: 0.16}
-"""Critical step of `box_with_sliver` over that of the undisturbed mesh, by altitude."""
+def run(quick: bool) -> list[Check]:
+    """All checks, hard case after hard case."""
+    checks = [check for part in SHARED for check in part()]
+    checks += inverted_checks(range(5 if quick else 40))
+    checks += near_critical_checks(100_000 if quick else 1_000_000)
+    cells = (8, 2, 2) if quick else (12, 4, 4)
+    for name, where in JUMPS:
+        checks += jump_checks(name, where, cells, 20_000 if quick else 100_000)
+    if quick:
+        return checks + locking_checks(((12, 2, 2), (24, 4, 4)), (24, 4, 4))
+    checks += locking_checks(((12, 2, 2), (24, 4, 4), (48, 8, 8)), (36, 6, 6))
+    return checks + large_body_checks()
