@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from qdem_fem.errors import ConditionError
+from qdem_fem.errors import ConditionError, MaterialError
 from qdem_fem.material import Material
 from qdem_fem.mesh import TetMesh, element_gradients, mesh_read
 from qdem_fem.reference_forces import (
@@ -37,6 +37,14 @@ class Body:
     """
 
     def __init__(self, mesh: Any, material: Material, name: str = "body") -> None:
+        if not isinstance(name, str):
+            raise ConditionError(f"{name!r} is no name", where="body", remedy="give a text")
+        if not isinstance(material, Material):
+            raise MaterialError(
+                f"a {type(material).__name__} is no material",
+                where=name,
+                remedy="give Material(young, poisson, density)",
+            )
         self.name = name
         self.mesh = mesh if isinstance(mesh, TetMesh) else mesh_read(mesh, where=name)
         self.material = material.per_element(len(self.mesh.elements))
@@ -66,7 +74,10 @@ class Body:
 
     @property
     def displacement(self) -> Floats:
-        """Displacement of the nodes [m], (n, 3), a copy; may be set before or between advances."""
+        """Displacement of the nodes [m], (n, 3), a copy: a part of it that is set changes nothing.
+
+        Set all of it, before or between advances: ``body.displacement = ...``.
+        """
         if self._simulation is not None:
             return self._simulation._field_of(self, "displacement")
         return self._displacement.copy()
@@ -113,7 +124,10 @@ class Body:
         Raises `ConditionError` for a selection that is empty, out of range or of another type.
         """
         count = len(self.nodes)
-        chosen = np.asarray(nodes)
+        try:
+            chosen = np.asarray(nodes)
+        except ValueError as error:
+            raise ConditionError(f"no selection of nodes ({error})", where=where) from None
         if chosen.dtype == bool:
             if chosen.shape != (count,):
                 raise ConditionError(
@@ -158,9 +172,14 @@ class Body:
             field = np.array(value, dtype=float)
         except (TypeError, ValueError):
             raise ConditionError(f"a {what} of numbers is needed", where=self.name) from None
-        if field.shape != self.nodes.shape or not np.isfinite(field).all():
+        if field.shape != self.nodes.shape:
             raise ConditionError(
-                f"a {what} is finite and of shape {self.nodes.shape}; this one has {field.shape}",
+                f"a {what} has the shape {self.nodes.shape}; this one has {field.shape}",
                 where=self.name,
+            )
+        if not np.isfinite(field).all():
+            node = int(np.flatnonzero(~np.isfinite(field).all(axis=1))[0])
+            raise ConditionError(
+                f"the {what} of node {node} is {field[node].tolist()}", where=self.name
             )
         return field

@@ -96,6 +96,7 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
     assembly.restore(arrays)
     held.previous[:] = arrays["previous"]
     simulation._critical = critical
+    simulation.step_keep(progress.step)
     simulation.steps_done, simulation.behind = progress.steps_done, progress.behind
     simulation.work[:] = arrays["work"]
     simulation.put_in, simulation.gravity_work = progress.put_in, progress.gravity_work

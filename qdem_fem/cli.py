@@ -64,9 +64,11 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
     from qdem_fem.output import write_whole
     from qdem_fem.report import report_write
     from qdem_fem.run_folder import RESULT, RunFolder, manifest_of
+    from qdem_fem.scene_build import simulation_of
     from qdem_fem.scene_run import run_dynamic, run_static
     from qdem_fem.summary import summary_of
 
+    run, bodies = simulation_of(prepared)  # what it refuses must not leave a folder behind
     folder = RunFolder(path)
     manifest = manifest_of(
         prepared.scene.parameters(),
@@ -82,11 +84,11 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
             summary = json.loads((path / RESULT).read_text(encoding="utf-8"))
             return dict(summary) | {"folder": str(path)}
         if prepared.scene.simulation.method == "static":
-            done = run_static(prepared, folder)
+            done = run_static(prepared, run, bodies, folder)
         else:
             with Progress() as progress, warnings.catch_warnings():
                 warnings.showwarning = _warning_show
-                done = run_dynamic(prepared, folder, resume=goes_on, progress=progress)
+                done = run_dynamic(prepared, run, bodies, folder, resume=goes_on, progress=progress)
         summary = summary_of(prepared, done, folder)
         report_write(folder, manifest, summary, None if arguments.no_pictures else done)
         write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
@@ -110,7 +112,7 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
     from qdem_fem.errors import StepWarning
     from qdem_fem.scene_build import simulation_of
     from qdem_fem.scene_run import plan_of
-    from qdem_fem.summary import body_facts, critical_step_of
+    from qdem_fem.summary import body_facts, critical_step_of, mass_scaling_facts
 
     run, bodies = simulation_of(prepared)
     outlook: dict[str, Any] = {
@@ -118,6 +120,7 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
         "method": prepared.scene.simulation.method,
         "bodies": {name: body_facts(body) for name, body in bodies.items()},
         "critical_step": critical_step_of(run),
+        "mass_scaling": mass_scaling_facts(run),
         "left_out": prepared.scene.left_out(),
     }
     if prepared.scene.simulation.method == "dynamic":
@@ -170,6 +173,11 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
         print(
             f"{content['steps']} steps of {content['step']:.4g} s, "
             f"{100 * critical['share_used']:.1f} % of the critical one"
+        )
+    if scaled := content["mass_scaling"]:
+        print(
+            f"mass scaling adds {scaled['added_mass']:.4g} kg, "
+            f"{100 * scaled['share']:.3g} % of the bodies' own mass"
         )
     if "estimated_s" in content:
         print(f"estimated time {content['estimated_s']:.3g} s on this machine")

@@ -25,7 +25,7 @@ LANCZOS_TOLERANCE = 1e-3
 ROUNDS = 20
 ROUND_TOLERANCE = 1e-4
 SHORT = 1 / 3
-"""Share of the median element's own step below which the step is remarkably short: even meshes
+"""Share of the median element's own step below which ``2/omega`` is remarkably short: even meshes
 are at 1.3, random points' at 0.6 to 0.8, one element of a thirtieth of its altitude at 0.35."""
 SAMPLE = 4096
 """Elements of a body that are looked at for the median."""
@@ -91,6 +91,8 @@ def highest_mode(
 
     start = np.random.default_rng(seed).normal(size=3 * n)
     step, rate = inf, 0.0
+    if not (product(start, 0.0).any() or (viscous and product(start, 1.0).any())):
+        return inf, 0.0, 0.0, np.zeros((n, 3)), count  # all is held
     for _ in range(ROUNDS):
         operator = LinearOperator((3 * n, 3 * n), matvec=partial(product, rate=rate), dtype=float)
         if 3 * n <= 24:  # too small for Lanczos
@@ -139,25 +141,29 @@ def critical_step_find(run: Simulation) -> CriticalStep:
         damping_ratio=damping / (2 * np.sqrt(stiffness)) if stiffness > 0 else 0.0,
         element=element,
         body=body.name,
-        mode=mode / abs(mode).max(),
+        mode=mode / (abs(mode).max() or 1.0),
         forces_evaluated=count,
-        remark=short_step_remark(run, step, body, element),
+        remark=short_step_remark(run, stiffness, body, element),
     )
 
 
-def short_step_remark(run: Simulation, step: float, governing: Body, element: int) -> str:
-    """Which element makes ``step`` [s] short, where it is `SHORT`; else nothing."""
+def short_step_remark(run: Simulation, stiffness: float, governing: Body, element: int) -> str:
+    """Which element makes the step short, where ``2/sqrt(stiffness)`` is `SHORT`; else nothing.
+
+    ``stiffness`` [1/s^2]: of the governing motion, without what viscosity takes from the step.
+    """
     samples = (
         element_step(body, slice(None, None, 1 + len(body.elements) // SAMPLE))
         for body in run.bodies
     )
     usual = float(np.median(np.concatenate(list(samples))))
-    if not step < SHORT * usual:
+    own = 2 / sqrt(stiffness) if stiffness > 0 else inf
+    if not own < SHORT * usual:
         return ""
     return (
-        f"element {element} of {governing.name} governs the critical step: {step:.3g} s, "
-        f"{step / usual:.2g} of what the median element would allow; mend the mesh there, or "
-        "see mass_scaling"
+        f"element {element} of {governing.name} makes the critical step {own / usual:.2g} times "
+        "what the median element would allow; mesh anew there if it is a sliver, see "
+        "mass_scaling if it is stiff or light"
     )
 
 

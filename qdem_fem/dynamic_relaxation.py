@@ -20,15 +20,18 @@ begin anew when they no longer descend (Polak and Ribiere's rule, cut at zero).
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.body import Body
 from qdem_fem.errors import ConditionError, ElementInverted, NotConverged
+from qdem_fem.march import inverted_find
 from qdem_fem.rigid_motions import held_check
+from qdem_fem.series import is_real
 from qdem_fem.static_problem import StaticProblem
 
 if TYPE_CHECKING:
@@ -76,13 +79,15 @@ def relax(simulation: Simulation, tolerance: float, max_steps: int) -> StaticAns
     motion, `NotConverged` after ``max_steps`` (the state reached is kept), `ElementInverted` when
     given displacements jump so far that elements next to them turn inside out.
     """
-    if not 0 < tolerance < 1:
-        raise ConditionError(f"a tolerance of {tolerance}", where="relax", remedy="take 1e-8")
+    if not (is_real(tolerance) and 0 < tolerance < 1):
+        raise ConditionError(f"a tolerance of {tolerance!r}", where="relax", remedy="take 1e-8")
+    if not (is_real(max_steps) and max_steps > 0):
+        raise ConditionError(f"max_steps of {max_steps!r}", where="relax", remedy="take 100000")
     started = time.process_time()
     held_check(simulation)
     before = simulation.energy()
     problem = StaticProblem(simulation)
-    found = _conjugate(problem, problem.start(), tolerance, max_steps)
+    found = _conjugate(problem, simulation.bodies, tolerance, max_steps)
     problem.finish(simulation, found.displacement)
     after = simulation.energy()
     simulation.work[0] += after.elastic - before.elastic - before.kinetic
@@ -143,18 +148,24 @@ class _Found:
         return float(np.sqrt(self.energy / max(self.softest(), 1e-300) / twice_energy))
 
 
-def _conjugate(problem: StaticProblem, u: Floats, tolerance: float, max_steps: int) -> _Found:
-    """Conjugate gradients from ``u``, with the true residual at the end."""
+def _conjugate(
+    problem: StaticProblem, bodies: Sequence[Body], tolerance: float, max_steps: int
+) -> _Found:
+    """Conjugate gradients, with the true residual at the end."""
+    u = problem.start()
     project, forces, weight = problem.project, problem.forces, problem.inverse_mass
     stiff = weight > 0
     found = _Found(u)
     sure = u
     total, sound = forces(u)
     if not sound:
+        moved = u.reshape(-1, 4)[problem.assembly.place, :3]
+        _, element, said = inverted_find(bodies, moved) or ("", -1, "forces are not finite")
         raise ElementInverted(
-            "the given displacements jump by more than the elements beside them can bear",
+            f"the given displacements jump by more than the elements beside them can bear: {said}",
             where="relax",
             remedy="bring them up in parts: prescribe a share, relax, prescribe more",
+            element=element,
         )
     r = project(total)
     direction = z = weight * r

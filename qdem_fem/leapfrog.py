@@ -54,6 +54,21 @@ def velocities_level(run: Simulation) -> None:
         run.behind = False
 
 
+def state_admit(run: Simulation) -> None:
+    """Put a state that the user set into the conditions: held components, planes of rollers."""
+    _, held = run.packed_lists()
+    table = run.conditions.table(run.time + run.step * np.arange(2.0))
+    given = held.weight * table[:, held.series]
+    rate = (given[1] - given[0]) / run.step
+    for name, values in (("displacement", given[0]), ("velocity", rate)):
+        field = run.assembly.field(name)
+        flat = _by_place(run, run.assembly.hold(field, held))
+        flat[held.node_at] = values
+        admitted = flat.reshape(-1, 4)[run.assembly.place, :3]
+        if not np.array_equal(admitted, field):
+            run.assembly.field_set(name, admitted)
+
+
 def half_work(run: Simulation, behind: Floats, level: Floats) -> Floats:
     """Work in the half step up to now [J], (2,): of loads, of prescribed motion.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import isnan
 from typing import TYPE_CHECKING
 
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem import kernel
+from qdem_fem.body import Body
 from qdem_fem.errors import ElementInverted, StepWarning, Unstable
-from qdem_fem.leapfrog import velocities_behind
+from qdem_fem.leapfrog import state_admit, velocities_behind
 from qdem_fem.reference_forces import displacement_gradient, volume_change
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ Integers = NDArray[np.int64]
 
 WINDOW_STEPS = 4096
 GRAVITY_STEPS = 16
-"""Steps over which the work of a gravity that changes is taken from its mean."""
+"""Steps over which the momentum is interpolated for the work of a gravity that changes."""
 GROWTH = 10.0
 """Kinetic energy over all energy ever put in, above which a motion is called unstable."""
 
@@ -38,12 +39,12 @@ def march(
     """Compute ``steps``; returns the displacement [m] of ``nodes`` every ``stride``, (k, nodes, 3).
 
     Samples are at step numbers that are multiples of ``stride``.  Raises `Unstable` and
-    `ElementInverted`; warns once of an element that makes the step short (`StepWarning`).
+    `ElementInverted`; `StepWarning` when an element makes the step short, or it is too long.
     """
     if isnan(run.put_in):
+        state_admit(run)
         run.put_in = energy_set(run)
-    if run.steps_done == 0 and run.critical_step.remark and not run.step_is_given:
-        warnings.warn(run.critical_step.remark, StepWarning, stacklevel=3)
+    step_check(run)
     velocities_behind(run)
     assembly, (loads, held) = run.assembly, run.packed_lists()
     start, end = run.steps_done, run.steps_done + steps
@@ -63,18 +64,32 @@ def march(
         ahead = taken * stride - behind
         probes = kernel.Probes(4 * assembly.place[nodes], record[taken:], stride, ahead)
         gravity = run.gravity_at(times)
-        before = assembly.field("displacement") if gravity is not None else None
+        before = moment(run) if gravity is not None else None
         done, bad = assembly.window(
             count, run.step, loads, held, probes, run.conditions.table(times), gravity, run.work
         )
         run.steps_done += done
-        if gravity is not None and before is not None:
-            moved = assembly.field("displacement") - before
-            run.gravity_work += float(assembly.mass @ (moved @ gravity.mean(axis=0)))
+        if gravity is not None and before is not None and done:
+            run.gravity_work += gravity_work(gravity[: done + 1], before, moment(run), run.step)
         motion_check(run, bad)
         if progress is not None:
             progress(run.time)
     return record
+
+
+def step_check(run: Simulation) -> None:
+    """Warn, once for the present conditions, of a step that is above the critical one or short."""
+    critical = run.critical_step
+    remark = "" if run.step_is_given else critical.remark
+    if run.step > critical.value:
+        remark = (
+            f"the step of {run.step:.4g} s is {run.step / critical.value:.4g} times the critical "
+            f"one, which element {critical.element} of {critical.body} governs: the motion will "
+            "grow without bound"
+        )
+    if remark and run.warned != critical.value:
+        run.warned = critical.value
+        warnings.warn(remark, StepWarning, stacklevel=4)
 
 
 def energy_set(run: Simulation) -> float:
@@ -83,6 +98,39 @@ def energy_set(run: Simulation) -> float:
         return 0.0
     energy = run.energy()
     return energy.kinetic + abs(energy.elastic)
+
+
+def moment(run: Simulation) -> tuple[Floats, Floats]:
+    """``sum m u`` [kg m] and ``sum m v`` [kg m/s] half a step before, (3,) each."""
+    assembly = run.assembly
+    return assembly.mass @ assembly.field("displacement"), assembly.mass @ assembly.field(
+        "velocity"
+    )
+
+
+def gravity_work(
+    gravity: Floats,
+    before: tuple[Floats, Floats],
+    after: tuple[Floats, Floats],
+    step: float,
+) -> float:
+    """Work of gravity (k + 1, 3) [m/s^2] in a window of k steps [J], from `moment` at its ends.
+
+    ``sum dt (g(t_k) + g(t_k+1))/2 P(k+1/2)``: its mean multiplies the way of the centre of mass,
+    exactly; for the rest the momentum P within the window is the derivative of the cubic through
+    places and momenta at its ends.
+    """
+    acting = 0.5 * (gravity[:-1] + gravity[1:])
+    mean = acting.mean(axis=0)
+    work = float(mean @ (after[0] - before[0]))
+    if not (acting - mean).any():
+        return work
+    (start, first), (end, last) = ((m - 0.5 * step * p, p) for m, p in (before, after))
+    count = len(acting)
+    s = np.arange(1, count + 1)[:, None] / count
+    way = (end - start) / (count * step)
+    momentum = 6 * s * (1 - s) * way + (1 - s) * (1 - 3 * s) * first + s * (3 * s - 2) * last
+    return work + float(step * ((acting - mean) * momentum).sum())
 
 
 def motion_check(run: Simulation, bad: float) -> None:
@@ -106,23 +154,40 @@ def motion_check(run: Simulation, bad: float) -> None:
 
 
 def inverted_raise(run: Simulation) -> None:
-    """Raise `ElementInverted` with the first element that is inside out."""
-    where = f"t = {run.time:.6g} s, step {run.steps_done}"
-    for body in run.bodies:
-        gradient = displacement_gradient(body.gradients[0], body.elements, body.displacement)
-        jacobian = 1 + volume_change(gradient)
+    """Raise `ElementInverted` with the element that is most inside out.
+
+    The kernel met it at the displacement before the last step, and may have left it sound.
+    """
+    now = run.assembly.field("displacement")
+    before = now - run.step * run.assembly.field("velocity")
+    found = inverted_find(run.bodies, before) or inverted_find(run.bodies, now)
+    name, element, said = found or ("a body", -1, "an element was turned inside out")
+    raise ElementInverted(
+        said,
+        where=f"t = {run.time:.6g} s, step {run.steps_done}",
+        remedy=f"what moves {name} crushes it: lower the load or the speed, mesh finer there, or "
+        "take a shorter step",
+        element=element,
+    )
+
+
+def inverted_find(bodies: Sequence[Body], displacement: Floats) -> tuple[str, int, str] | None:
+    """The body and element whose volume is most negative, and a sentence; None if none is."""
+    found: list[tuple[float, str, int, int]] = []
+    start = 0
+    for body in bodies:
+        moved = displacement[start : start + len(body.nodes)]
+        start += len(body.nodes)
+        jacobian = 1 + volume_change(displacement_gradient(body.gradients[0], body.elements, moved))
         wrong = np.flatnonzero(~(jacobian > 0))
         if wrong.size:
-            raise ElementInverted(
-                f"element {wrong[0]} of {body.name} was turned inside out (its volume is "
-                f"{jacobian[wrong[0]]:.3g} times what it was; {wrong.size} such elements)",
-                where=where,
-                remedy="the load crushes it: lower the load, mesh finer there, or take a "
-                "shorter step",
-                element=int(wrong[0]),
-            )
-    raise ElementInverted(
-        "an element was turned inside out within one step and back",
-        where=where,
-        remedy="take a shorter step",
+            worst = int(wrong[np.argmin(np.nan_to_num(jacobian[wrong], nan=-np.inf))])
+            found.append((float(jacobian[worst]), body.name, worst, wrong.size))
+    if not found:
+        return None
+    volume, name, element, count = min(found)
+    said = (
+        f"element {element} of {name} was turned inside out (its volume is {volume:.3g} times "
+        f"what it was; {count} such elements)"
     )
+    return name, element, said

@@ -71,9 +71,9 @@ def mesh_read(source: Any, *, where: str = "") -> TetMesh:
     - the path of a file that meshio reads;
     - a `TetMesh`, which is checked again.
 
-    ``where`` names the mesh in errors, a path also names itself.  The arrays are copied.  Left-handed
-    elements are mended and listed in ``flipped``, nodes of no element are listed in ``unused``;
-    nodes at the same place are no error, as cracks are made of them.
+    ``where`` names the mesh in errors, a path also names itself.  The arrays are copied.
+    Left-handed elements are mended and listed in ``flipped``, nodes of no element are listed in
+    ``unused``; nodes at the same place are no error, as cracks are made of them.
 
     Raises `MeshError`, which names all problems found: shape or type, coordinates that are not
     finite, indices out of range, a node twice in an element, elements that repeat, elements

@@ -20,7 +20,7 @@ BoolArray = npt.NDArray[np.bool_]
 FLAT = 1e-12
 """Volume over the cube of the longest edge at and below which an element counts as flat; a
 regular tetrahedron has 0.118.  Round-off of the volume itself is about 1e-16."""
-EXTENT_MOST = 1e60
+EXTENT_MOST = 1e100
 """Largest extent of a mesh [m], and one over the smallest: volumes stay within float64."""
 _BLOCK = 1 << 16
 _SHOWN = 5
@@ -72,7 +72,7 @@ def nodes_taken(raw: Any) -> tuple[FloatArray, list[Problem]]:
         extent = float(np.ptp(nodes, axis=0).max()) if len(nodes) else 1.0
     if extent > EXTENT_MOST or 0 < extent < 1 / EXTENT_MOST:
         what = f"the nodes span {extent:.3g} m, of which no volume can be computed"
-        return nodes, [Problem(what, "check the unit of length: coordinates are in metres")]
+        return none, [Problem(what, "check the unit of length: coordinates are in metres")]
     return nodes, []
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.errors import ConditionError
+from qdem_fem.series import is_real
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -21,6 +22,13 @@ def partners(
     """
     from scipy.spatial import cKDTree
 
+    if not (is_real(tolerance) and tolerance >= 0):
+        raise ConditionError(f"a tolerance of {tolerance!r}", where="periodic", remedy="take 1e-6")
+    if both := np.intersect1d(a, b).tolist():
+        raise ConditionError(
+            f"node {both[0]} of {name} is named on both faces", where="periodic",
+            remedy="name two opposite faces",
+        )  # fmt: skip
     if len(a) != len(b):
         raise ConditionError(
             f"{len(a)} nodes on one face of {name} and {len(b)} on the other",

@@ -178,6 +178,11 @@ def _step(summary: dict[str, Any]) -> Iterator[str]:
         text += f"Used: {summary['step']:.4g} s, {100 * critical['share_used']:.1f} % of it."
     if critical["remark"]:
         text += f" Remarkably short: {critical['remark']}."
+    if scaled := summary["mass_scaling"]:
+        text += (
+            f" Mass scaling added {scaled['added_mass']:.4g} kg, {100 * scaled['share']:.3g} % of "
+            "the bodies' own mass: inertia that they do not have."
+        )
     yield f"<p>{escape(text)}</p>"
 
 

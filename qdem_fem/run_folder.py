@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from qdem_fem.errors import UsageError
-from qdem_fem.output import write_whole
+from qdem_fem.output import can_not_write, write_whole
 
 MANIFEST, RESULT, CHECKPOINT = "manifest.json", "result.json", "checkpoint.npz"
 OURS = (
@@ -26,6 +26,11 @@ OURS = (
 """Files of a run; what starts anew removes these and no other."""
 COMPARED = ("scene", "files")
 """Parts of the manifest that must be the same for a run to go on."""
+FREE = (
+    "scene.title", "scene.simulation.threads", "scene.output.checkpoint_interval",
+    "scene.output.modes",
+)  # fmt: skip
+"""Keys that may change: no number of the record depends on them."""
 
 
 class RunFolder:
@@ -46,12 +51,17 @@ class RunFolder:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the lock of the folder's only writer; `UsageError` when another process has it.
+        """Hold the lock of the folder's only writer.
 
-        The system drops the lock with the process, however it ends.
+        Raises `UsageError` when another process has it, or the folder can not be written.  The
+        system drops the lock with the process, however it ends.
         """
-        self.path.mkdir(parents=True, exist_ok=True)
-        with (self.path / ".lock").open("a+", encoding="utf-8") as stream:
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            lock = (self.path / ".lock").open("a+", encoding="utf-8")
+        except OSError as error:
+            raise can_not_write(self.path, error) from error
+        with lock as stream:
             try:
                 fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
@@ -128,7 +138,7 @@ def differences(there: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[st
 
 
 def _different(key: str, before: Any, after: Any) -> Iterator[str]:
-    if before == after:
+    if before == after or key in FREE:
         return
     if isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
         before, after = (dict(enumerate(one)) for one in (before, after))

@@ -236,7 +236,7 @@ class Output(Table):
     sampling: Positive | None = None
     """Between rows of probes.csv [s]; by default a 2000th of the duration."""
     energy_interval: Positive | None = None
-    """Between rows of energy.csv [s]; by default a 200th of the duration."""
+    """Between rows of energy.csv [s]; by default a 200th of the duration, at least 100 steps."""
     vtu_interval: Positive | None = None
     """Between VTU files [s]; by default only the end is written."""
     checkpoint_interval: Interval = 300.0
@@ -269,6 +269,10 @@ class Scene(Table):
         missing = [
             (not viscous, "viscosity: the material is elastic"),
             (self.simulation.gravity is None, "gravity"),
+            (
+                not self._is_driven(),
+                "any cause of motion: no load, pressure, gravity, displacement",
+            ),
             (self.simulation.mass_scaling is None, "mass scaling: every mass is the material's"),
             (
                 self.simulation.strain == "small",
@@ -279,6 +283,9 @@ class Scene(Table):
             (True, "plasticity, damage and fracture"),
         ]
         return [text for absent, text in missing if absent]
+
+    def _is_driven(self) -> bool:
+        return bool(self.load or self.pressure or self.prescribe or self.simulation.gravity)
 
     def parameters(self) -> dict[str, Any]:
         """Every effective value, defaults included, as JSON would hold it."""

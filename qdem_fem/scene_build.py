@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from qdem_fem.errors import QdemError
+from qdem_fem.errors import ConditionError, QdemError
 from qdem_fem.scene import BodyTable, Mesh
 from qdem_fem.scene_file import Problem, error_told
 from qdem_fem.scene_nodes import NoNodes
@@ -55,6 +55,7 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     that the simulation refuses.
     """
     import qdem_fem
+    from qdem_fem.rigid_motions import held_check
 
     scene, table = prepared.scene, prepared.scene.simulation
     bodies = {
@@ -82,6 +83,12 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         except QdemError as error:
             problems.append(Problem(step.key, error_told(error)))
     prepared.text.refuse(problems)
+    try:
+        run.packed_lists()  # rollers against prescribed motions
+        if table.method == "static":
+            held_check(run)
+    except ConditionError as error:
+        prepared.text.refuse([Problem(error.where.replace("relax", "fix"), error_told(error))])
     return run, bodies
 
 

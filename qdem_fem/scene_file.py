@@ -17,9 +17,10 @@ from pydantic_core import ErrorDetails
 from qdem_fem.errors import QdemError, SceneError, UsageError
 from qdem_fem.scene import Scene
 from qdem_fem.scene_lines import key_lines
-from qdem_fem.scene_types import LEAST
+from qdem_fem.scene_types import LEAST, NAME_PATTERN
 
 REMEDY = "correct these keys; scenes/cantilever.toml explains every key"
+NAME_WORDS = "a name has 1 to 60 letters, digits and _ . + -"
 
 BOUNDS = {
     "greater_than": ("gt", "above"),
@@ -160,6 +161,14 @@ def _problem(table: str, model: type[BaseModel], error: ErrorDetails) -> Problem
         return Problem(key, f"must be a table{value}")
     if kind == "greater_than_equal" and context["ge"] == LEAST:
         return Problem(key, f"must be above 0 (and at least {LEAST:g}){value}")
+    if kind == "tuple_type":
+        return Problem(key, f"must be a list in [...]{value}")
+    if kind == "too_long":
+        return Problem(key, f"must have {context['max_length']} entries{value}")
+    if kind == "string_too_short":
+        return Problem(key, "must not be empty")
+    if kind == "string_pattern_mismatch" and context["pattern"] == NAME_PATTERN:
+        return Problem(key.removesuffix(".[key]"), f"{NAME_WORDS}{value}")
     if kind in BOUNDS:
         name, words = BOUNDS[kind]
         return Problem(key, f"must be {words} {context[name]:.6g}{value}")

@@ -18,11 +18,12 @@ import numpy as np
 from qdem_fem.errors import Interrupted
 from qdem_fem.output import Table, bodies_vtu_write, pvd_write, write_whole
 from qdem_fem.run_folder import RunFolder
-from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import Prepared
 
 CHUNK_WORK = 50_000_000
 """Element-steps between two looks at the clock and the signals: a second or a few."""
+ENERGY = 100
+"""Least steps between rows of energies, unless asked otherwise: a row costs as much as twenty."""
 ENERGIES = ("kinetic", "elastic", "external")
 COST = "cost.json"
 
@@ -73,7 +74,7 @@ def plan_of(prepared: Prepared, step: float) -> Plan:
         total=sampling * max(1, ceil(duration / (sampling * step) - 1e-6)),
         sampling=sampling,
         chunk=sampling * max(1, CHUNK_WORK // (elements * sampling)),
-        energy=multiple(output.energy_interval or duration / 200, sampling),
+        energy=multiple(output.energy_interval or max(duration / 200, ENERGY * step), sampling),
         fields=multiple(output.vtu_interval or duration, sampling),
         every_field=output.vtu_interval is not None,
     )
@@ -94,18 +95,26 @@ class Done:
     """``residual`` and ``error_estimate`` of a static answer [-], ``steps`` it took."""
 
 
-def run_dynamic(prepared: Prepared, folder: RunFolder, *, resume: bool, progress: Any) -> Done:
+def run_dynamic(
+    prepared: Prepared,
+    run: Any,
+    bodies: dict[str, Any],
+    folder: RunFolder,
+    *,
+    resume: bool,
+    progress: Any,
+) -> Done:
     """Advance a scene to its duration, from its start or from the last checkpoint.
 
+    ``run`` and ``bodies`` are those of `simulation_of`, ``progress`` is a `qdem_fem.cli.Progress`.
     Every row and field is the same, bit by bit, however often the run was interrupted.  SIGINT
     and SIGTERM save the state and raise `Interrupted`.
     """
     goes_on = resume and folder.checkpoint.exists()
-    run, bodies = simulation_of(prepared)
     if goes_on:
         run.restore(folder.checkpoint)
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
-    plan = plan_of(prepared, run.step)
+    plan = plan_of(prepared, float(run.step))
     rows, energies = _tables(folder.path, probes)
     record = _Record(run, list(bodies.values()), plan, folder.path, rows, energies)
     if goes_on:
@@ -113,14 +122,12 @@ def run_dynamic(prepared: Prepared, folder: RunFolder, *, resume: bool, progress
     else:
         record.begin(probes)
     cost = _cost_read(folder.path) if goes_on else {"cpu_s": 0.0, "wall_s": 0.0}
+    record.cost = cost
     done = Done(run, bodies, plan, cost)
     saved = time.monotonic()
     with stop_signals() as stop:
         while run.steps_done < plan.total:
-            started, cpu = time.perf_counter(), time.process_time()
             record.advance(plan.next_stop(run.steps_done) - run.steps_done, probes)
-            cost["wall_s"] += time.perf_counter() - started
-            cost["cpu_s"] += time.process_time() - cpu
             progress.at(run.steps_done, plan.total, run.time)
             late = time.monotonic() - saved >= prepared.scene.output.checkpoint_interval
             if stop.name or late or run.steps_done == plan.total:
@@ -134,12 +141,11 @@ def run_dynamic(prepared: Prepared, folder: RunFolder, *, resume: bool, progress
     return done
 
 
-def run_static(prepared: Prepared, folder: RunFolder) -> Done:
+def run_static(prepared: Prepared, run: Any, bodies: dict[str, Any], folder: RunFolder) -> Done:
     """Find the static answer of a scene by conjugate gradients; it leaves nothing to resume from.
 
     Raises `NotConverged` when the tolerance is not reached.
     """
-    run, bodies = simulation_of(prepared)
     started, cpu = time.perf_counter(), time.process_time()
     answer = run.relax(tolerance=prepared.scene.simulation.tolerance)
     cost = {
@@ -172,6 +178,8 @@ class _Record:
     path: Path
     rows: Table
     energies: Table
+    cost: dict[str, float] = field(default_factory=dict)
+    """``cpu_s`` and ``wall_s`` of advancing so far [s]."""
 
     def begin(self, probes: dict[str, Any]) -> None:
         """First rows and fields, at t = 0."""
@@ -184,8 +192,10 @@ class _Record:
     def go_on(self) -> None:
         """Take back what was written behind the checkpoint."""
         now = (self.run.steps_done + 0.5) * self.plan.step
-        self.rows.cut(now)
-        self.energies.cut(now)
+        done, plan = self.run.steps_done, self.plan
+        self.rows.cut(now, done // plan.sampling + 1)
+        at_end = done == plan.total and done % plan.energy > 0
+        self.energies.cut(now, done // plan.energy + 1 + at_end)
         kept = {name for _, _, name in self.plan.field_files(self.run.steps_done)}
         for path in self.path.glob("fields_*.vtu"):
             if path.name not in kept:
@@ -195,7 +205,10 @@ class _Record:
         """Advance and write the rows, energies and fields that fall due."""
         run, plan = self.run, self.plan
         start = run.steps_done
+        started, cpu = time.perf_counter(), time.process_time()
         history = run.advance(steps * plan.step, probes=probes, sampling=plan.sampling * plan.step)
+        self.cost["wall_s"] += time.perf_counter() - started
+        self.cost["cpu_s"] += time.process_time() - cpu
         new = history.time > (start + 0.5) * plan.step
         number = np.rint(history.time[new] / plan.step)
         columns = [history[name][new] for name in probes]

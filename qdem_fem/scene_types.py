@@ -18,7 +18,8 @@ Vector = Annotated[tuple[Real, Real, Real], Field(strict=False)]
 Size = Annotated[tuple[Positive, Positive, Positive], Field(strict=False)]
 CellCount = Annotated[int, Field(ge=1, le=2000)]
 Cells = Annotated[tuple[CellCount, CellCount, CellCount], Field(strict=False)]
-Name = Annotated[str, Field(pattern=r"^[\w.+-]{1,60}$")]
+NAME_PATTERN = r"^[\w.+-]{1,60}$"
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 Text = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"^[^\x00]*$")]
 Interval = Annotated[float, Field(ge=0, le=1e18, allow_inf_nan=False)]
 

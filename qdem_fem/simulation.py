@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, nan
+from math import ceil, isfinite, nan
 from pathlib import Path
 from typing import Any, Literal
 
@@ -28,7 +28,13 @@ from qdem_fem.reference_forces import (
     elastic_energy,
 )
 from qdem_fem.series import Driver, Value, is_real
-from qdem_fem.simulation_options import bodies_check, numbers_check, words_check
+from qdem_fem.simulation_options import (
+    bodies_check,
+    bodies_number,
+    bounds_check,
+    numbers_check,
+    words_check,
+)
 from qdem_fem.surface import faces_within, pressure_forces
 
 Floats = NDArray[np.float64]
@@ -105,13 +111,16 @@ class Simulation:
             raise ConditionError(f"{bodies!r} is no list of bodies", where="simulation")
         self.bodies = list(bodies)
         bodies_check(self.bodies)
+        bodies_number(self.bodies)
         words_check(strain=strain, precision=precision, device=device)
         numbers_check(step=step, safety=safety, threads=threads, mass_scaling=mass_scaling)
+        bounds_check(safety=safety, threads=threads)
         self._assembly_class = assembly_class(device)
         self.strain, self.precision, self.safety = strain, precision, safety
         self.threads, self.mass_scaling = threads, mass_scaling
         self.gravity = None if gravity is None else Driver(gravity, 3, "gravity")
         self._given_step = None if step is None else float(step)
+        self._kept_step: float | None = None
         self.conditions = Conditions()
         self.steps_done = 0
         self.viscous = any(body.material.is_viscous for body in self.bodies)
@@ -127,6 +136,8 @@ class Simulation:
         """True while velocities are half a step behind; False: they are at the time itself."""
         self.work = np.zeros(2)
         """Work of the loads and of prescribed motion since the start [J]."""
+        self.warned = nan
+        """The critical step of which a warning was given [s]."""
         self.put_in = nan
         """Energy of the state that the user set [J]; NaN: not known yet."""
         self.gravity_work = 0.0
@@ -160,7 +171,7 @@ class Simulation:
         roller = Roller(self._nodes(body, nodes, "roller"), direction / length)
         velocities_level(self)
         self.conditions.rollers.append(roller)
-        self._changed()
+        self._ties_changed()
         return roller
 
     def load(self, body: Body, nodes: Any, force: Value) -> NodalLoad:
@@ -215,7 +226,7 @@ class Simulation:
             if condition in conditions:
                 velocities_level(self)
                 conditions.remove(condition)
-                self._changed()
+                self._changed() if isinstance(condition, NodalLoad) else self._ties_changed()
                 return
         raise ConditionError("it is none of the simulation's conditions", where="remove")
 
@@ -228,15 +239,38 @@ class Simulation:
 
     @property
     def step(self) -> float:
-        """Time step [s]."""
-        return (
-            self.safety * self.critical_step.value if self._given_step is None else self._given_step
-        )
+        """Time step [s]; once steps were done it stays, as time is counted in steps."""
+        for step in (self._given_step, self._kept_step):
+            if step is not None:
+                return step
+        step = self.safety * self.critical_step.value
+        if not isfinite(step):
+            raise ConditionError(
+                "every component of every node is held: no motion limits the step",
+                where="simulation, step",
+                remedy="give step=",
+            )
+        return step
+
+    def step_keep(self, step: float) -> None:
+        """Keep the step [s] that the march began with."""
+        self._kept_step = step
 
     @property
     def step_is_given(self) -> bool:
         """Whether the user gave the step."""
         return self._given_step is not None
+
+    @property
+    def added_mass(self) -> dict[str, float]:
+        """What mass scaling added to each body, over its own mass [-]: the error it may make."""
+        mass = self.assembly.mass
+        added = {}
+        for body, start in zip(self.bodies, self.first_node, strict=False):
+            own = float((body.material.density * body.gradients[1]).sum())
+            nodes = np.unique(self.master[start : start + len(body.nodes)])
+            added[body.name] = float(mass[nodes].sum()) / own - 1 if self.mass_scaling else 0.0
+        return added
 
     @property
     def critical_step(self) -> CriticalStep:
@@ -265,12 +299,14 @@ class Simulation:
             raise ConditionError(f"a duration of {duration!r} s", where="advance")
         if sampling is not None and not (is_real(sampling) and sampling > 0):
             raise ConditionError(f"a sampling every {sampling!r} s", where="advance")
-        if not isinstance(probes or {}, Mapping):
+        if probes is not None and not isinstance(probes, Mapping):
             raise ConditionError(
                 "probes have no names", where="advance", remedy='give {"name": nodes}'
             )
         steps = ceil(duration / self.step * (1 - 1e-12) - 1e-9)
         stride = max(1, round((sampling or duration / SAMPLES) / self.step)) if steps else 1
+        if steps:
+            self.step_keep(self.step)
         chosen = {name: self._probe(name, probe) for name, probe in (probes or {}).items()}
         recorded = march(
             self, steps, stride, np.concatenate([*chosen.values(), np.zeros(0, int)]), progress
@@ -350,8 +386,12 @@ class Simulation:
 
     def _offset(self, body: Body) -> int:
         if not any(body is member for member in self.bodies):
-            name = body.name if isinstance(body, Body) else repr(body)
-            raise ConditionError(f"{name} is not in this simulation", where="body")
+            name = body.name if isinstance(body, Body) else f"a {type(body).__name__}"
+            raise ConditionError(
+                f"{name} is not a body of this simulation",
+                where="body",
+                remedy="the first argument is one of the bodies it was made of",
+            )
         return int(self.first_node[[body is member for member in self.bodies].index(True)])
 
     def _nodes(self, body: Body, nodes: Any, where: str) -> Integers:
@@ -369,14 +409,14 @@ class Simulation:
 
     @staticmethod
     def _components(components: str, where: str) -> tuple[int, ...]:
-        if not components or not set(components) <= set(COMPONENTS):
+        if not isinstance(components, str) or not components or set(components) - set(COMPONENTS):
             raise ConditionError(f"components are of 'xyz', not {components!r}", where=where)
         return tuple(sorted({COMPONENTS.index(c) for c in components}))
 
     def _hold(self, held: Held) -> Held:
         velocities_level(self)
         self.conditions.held.append(held)
-        self._changed()
+        self._ties_changed()
         return held
 
     def _load(self, load: NodalLoad) -> NodalLoad:
@@ -386,10 +426,13 @@ class Simulation:
         return load
 
     def _changed(self) -> None:
-        """Conditions changed (after `_level`): lists and critical step are made anew."""
-        if self._given_step is None and self._critical is not None and self.steps_done == 0:
-            self._critical = None
+        """Conditions changed (after `velocities_level`): the kernel's lists are made anew."""
         self._lists = None
+
+    def _ties_changed(self) -> None:
+        """What is held changed: the critical step too."""
+        self._critical = None
+        self._changed()
 
     def _field_of(self, body: Body, name: str) -> Floats:
         every = velocity_now(self) if name == "velocity" else self.assembly.field(name)

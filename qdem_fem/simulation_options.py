@@ -29,6 +29,14 @@ def bodies_check(bodies: Sequence[Body]) -> None:
             )
 
 
+def bodies_number(bodies: Sequence[Body]) -> None:
+    """Give bodies of one name numbers, "body 0", "body 1", ..., as messages name bodies."""
+    names = [body.name for body in bodies]
+    for number, body in enumerate(bodies):
+        if names.count(body.name) > 1:
+            body.name = f"{body.name} {number}"
+
+
 def words_check(**given: Any) -> None:
     """Raise `ConditionError` for a ``strain``, ``precision`` or ``device`` that there is not."""
     known = {"strain": tuple(kernel.LAWS), "precision": PRECISIONS, "device": DEVICES}
@@ -37,6 +45,18 @@ def words_check(**given: Any) -> None:
             raise ConditionError(
                 f"{value!r} is none of {', '.join(known[name])}", where=f"simulation, {name}"
             )
+
+
+def bounds_check(*, safety: float, threads: int | None) -> None:
+    """Raise `ConditionError` for a share of the critical step above 1, or part of a thread."""
+    if safety > 1:
+        raise ConditionError(
+            f"{safety!r} of the critical step is not stable",
+            where="simulation, safety",
+            remedy="take at most 1, or give step= to see what happens",
+        )
+    if threads is not None and threads != int(threads):
+        raise ConditionError(f"{threads!r} is no number of threads", where="simulation, threads")
 
 
 def numbers_check(**given: Any) -> None:

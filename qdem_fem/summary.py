@@ -36,6 +36,7 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
         "step": None if static else float(run.step),
         "steps": 0 if done.plan is None else done.plan.total,
         "critical_step": critical_step_of(run),
+        "mass_scaling": mass_scaling_facts(run),
         "bodies": {name: body_facts(body) for name, body in done.bodies.items()},
         "cost": {**cost, "million_elements_per_s": element_steps / 1e6 / cost["wall_s"]}
         if element_steps and cost["wall_s"]
@@ -62,6 +63,15 @@ def critical_step_of(run: Any) -> dict[str, Any]:
         "remark": str(critical.remark),
         "share_used": float(run.step) / float(critical.value),
     }
+
+
+def mass_scaling_facts(run: Any) -> dict[str, float]:
+    """Mass that scaling added [kg], and its share of the bodies' own; empty without scaling."""
+    if run.mass_scaling is None:
+        return {}
+    own = sum(float((b.gradients[1] * b.material.density).sum()) for b in run.bodies)
+    added = float(run.assembly.mass.sum()) - own
+    return {"added_mass": added, "share": added / own}
 
 
 def body_facts(body: Any) -> dict[str, Any]:

@@ -28,6 +28,8 @@ STRAIN = 1e-2
 SAFETIES = (0.8, 0.4, 0.2)
 LAWS: tuple[Strain, ...] = ("finger", "svk", "corotational")
 STEPS = 100_000
+LONG_SAMPLES, TENTH = 400, 40
+"""Samples of the energy over that many steps, and a tenth of them."""
 POISSON_CONCRETE = 0.167
 """Of section 3.1, where the Finger law has no potential."""
 
@@ -108,9 +110,9 @@ def long_checks(steps: int = STEPS) -> list[Check]:
     """
     rows = []
     for law in LAWS:
-        value = energies(block(), law, 0.4, 1000, steps // 1000)
+        value = energies(block(), law, 0.4, LONG_SAMPLES, steps // LONG_SAMPLES)
         change = np.abs(value / value[0] - 1)
-        band = float(change.max() / change[:100].max())
+        band = float(change.max() / change[:TENTH].max())
         rows += [
             below(f"energy, {law}: band over {steps:.0e} steps, to their first tenth", band, 1.5),
             reported(f"energy, {law}: greatest change over {steps:.0e} steps", change.max()),
@@ -124,8 +126,8 @@ def without_potential_checks(steps: int = STEPS) -> list[Check]:
     problem = replace(problem, material=replace(problem.material, poisson=POISSON_CONCRETE))
     rows = []
     for strain in (1e-2, 1e-3, 1e-4):
-        value = energies(problem, "finger", 0.4, 1000, steps // 1000, strain)
-        gained = float(value[-100:].mean() / value[:100].mean() - 1)
+        value = energies(problem, "finger", 0.4, LONG_SAMPLES, steps // LONG_SAMPLES, strain)
+        gained = float(value[-TENTH:].mean() / value[:TENTH].mean() - 1)
         name = f"energy, finger at nu = 0.167, strains of {strain:.0e}: gained in {steps:.0e} steps"
         rows.append(reported(name, gained))
     return rows

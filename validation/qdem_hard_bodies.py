@@ -151,16 +151,21 @@ def pushed_until_inverted(seed: int) -> tuple[int, float]:
 
 
 def impact_names_wrong() -> float:
-    """A soft end thrown at a held one: is the element named one that has turned over?"""
+    """One half thrown at the other, which is held: is the element named one that has turned over?
+
+    At the displacement before the last step, whose forces can not be right.
+    """
     mesh = box_mesh((1.0, 1.0, 1.0), (4, 4, 4))
     body = Body(mesh, CONCRETE)
     run = Simulation([body], threads=1)
     run.fix(body, mesh.nodes[:, 0] < 0.01)
     body.velocity = np.where(mesh.nodes[:, :1] > 0.6, [-8000.0, 0.0, 0.0], 0.0)
     try:
-        run.advance(1000 * run.step)
+        for _ in range(1000):
+            before = body.displacement
+            run.advance(run.step)
     except ElementInverted as error:
-        corner = (body.nodes + body.displacement)[body.elements[error.element]]
+        corner = (body.nodes + before)[body.elements[error.element]]
         turned = np.linalg.det(corner[1:] - corner[0]) <= 0
         return float(not (turned and f"element {error.element} of {body.name}" in str(error)))
     return 1.0

@@ -19,8 +19,7 @@ from validation.qdem_closed_forms import CONCRETE_BEAM
 from validation.qdem_hard_shapes import (
     CONCRETE,
     FORCE,
-    critical_check,
-    critical_judge,
+    critical_checks,
     motion_check,
     static_checks,
 )
@@ -142,7 +141,7 @@ def jump_checks(name: Property, where: Where, cells: Cells, steps: int) -> list[
     named = high[critical.element] == (name == "young")
     rows = [
         *(static_checks(title, problem) if name == "young" else []),
-        critical_check(title, critical.value, critical_judge(problem)),
+        *critical_checks(title, problem, critical),
         below(f"{title}: the element named is in the slow part, 0 is no", float(not named), 0.5),
         motion_check(title, problem),
     ]

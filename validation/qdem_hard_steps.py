@@ -16,7 +16,7 @@ from qdem_fem.errors import QdemError, StepWarning, Unstable
 from qdem_fem.mesh_generation import box_mesh, jitter
 from qdem_fem.reference_forces import Strain
 from validation.case import Check
-from validation.qdem_hard_shapes import CONCRETE, STEP_ABOVE, STEP_BELOW, critical_judge
+from validation.qdem_hard_shapes import CONCRETE, critical_checks, critical_judge
 from validation.qdem_judge import FloatArray
 from validation.qdem_problem import Problem, below, between, clamped
 
@@ -36,8 +36,7 @@ def near_critical_checks(steps: int) -> list[Check]:
     energy = energies(problem, 1.0, steps)
     share = run_share(problem)
     rows += [
-        between("irregular cube: critical step over the judge's, less one", share - 1, -STEP_BELOW,
-                STEP_ABOVE),
+        *critical_checks("irregular cube", problem, problem.simulation()[1].critical_step),
         # the reported step is short of the true one, so the bound of the stable motion holds
         below(f"irregular cube, 1 of the critical step, {steps:.0e} steps: greatest energy over "
               "the first", energy.max() / energy[0], 1 / max(1e-12, 1 - share**2)),
@@ -54,23 +53,35 @@ def run_share(problem: Problem) -> float:
 
 
 def above_checks(problem: Problem, law: Strain) -> list[Check]:
-    """1 % above the critical step: stopped, with the step, the ratio and the element named."""
+    """1 % above the critical step: a warning before the first step, and the end soon after.
+
+    Both name the element, the end comes as `Unstable`.
+    """
     name = f"irregular cube, 1.01 of the critical step, {law}"
-    body, run = problem.simulation(strain=law, safety=1.01)
+    critical = problem.simulation()[1].critical_step
+    body, run = problem.simulation(strain=law, step=1.01 * critical.value)
     body.velocity = rough_velocity(problem)
-    element = run.critical_step.element
     raised: QdemError | None = None
-    try:
-        run.advance(10 * STEPS_MOST * run.step)
-    except QdemError as error:
-        raised = error
-    text = str(raised)
-    said = isinstance(raised, Unstable) and f"element {element} of {body.name}" in text
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            run.advance(10 * STEPS_MOST * run.step)
+        except QdemError as error:
+            raised = error
+    named = f"element {critical.element} of {body.name}"
+    warned = [str(one.message) for one in caught if issubclass(one.category, StepWarning)]
+    lacking = {
+        "one warning with element and ratio": not (
+            len(warned) == 1 and named in warned[0] and "1.01 times the critical" in warned[0]
+        ),
+        "Unstable": not isinstance(raised, Unstable),
+        "its element": named not in str(raised),
+        "its ratio": "1.010 times the critical" not in str(raised),
+    }
     return [
         between(f"{name}: steps until it is stopped", run.steps_done, 1, STEPS_MOST + 1),
-        below(f"{name}: what the message lacks (Unstable, ratio, element)",
-              2.0 - said - ("1.010 times the critical" in text), 0.5),
-    ]  # fmt: skip
+        below(f"{name}: of warning, error, element and ratio not said", sum(lacking.values()), 0.5),
+    ]
 
 
 def rough_velocity(problem: Problem) -> FloatArray:
@@ -91,9 +102,13 @@ def long_run_checks(name: str, problem: Problem, safety: float, steps: int) -> l
     ]  # fmt: skip
 
 
-def energies(problem: Problem, safety: float, steps: int, samples: int = 200) -> FloatArray:
-    """Kinetic and elastic energy [J] of a free motion, at ``samples`` times and the end."""
-    body, run = problem.simulation(safety=safety)
+def energies(problem: Problem, share: float, steps: int, samples: int = 200) -> FloatArray:
+    """Kinetic and elastic energy [J] of a free motion, at ``samples`` times and the end.
+
+    ``share``: step over the critical one.
+    """
+    step = share * problem.simulation()[1].critical_step.value
+    body, run = problem.simulation(step=step)
     body.velocity = rough_velocity(problem)
     values = []
     with warnings.catch_warnings():

@@ -114,6 +114,7 @@ def test_run_writes_what_it_promises(scene: Path, capsys: pytest.CaptureFixture[
     assert spacing == pytest.approx(spacing[0])
     assert rows["time"][[0, -1]] == pytest.approx([0, total * step], rel=1e-12)
     assert energy["time"][-1] == rows["time"][-1]
+    assert np.diff(energy["time"])[:-1].min() > 99.5 * step  # a row costs as much as many steps
     assert printed["energy"]["external"] > 0
 
     fields = sorted(folder.glob("fields_*.vtu"))
@@ -266,6 +267,14 @@ def test_folder_is_never_lost_unasked(scene: Path) -> None:
     (folder / "result.json").unlink()
     with pytest.raises(UsageError, match="is not finished"):
         command(scene, *quick)
+    rest = ("--set", "simulation.threads=2", "--set", "output.modes=1", "--resume")
+    assert command(scene, *quick, *rest) == 0  # nothing of the record depends on these
+    (folder / "result.json").unlink()
+    lines = (folder / "probes.csv").read_text().splitlines(keepends=True)
+    (folder / "probes.csv").write_text("".join(lines[:-1]))
+    with pytest.raises(UsageError, match=rf"probes.csv: {len(lines) - 1} rows .* were written"):
+        command(scene, *quick, "--resume")
+    (folder / "probes.csv").write_text("".join(lines))
     scene.with_name("blow.csv").write_text("t,p\n0,0\n0.001,11\n0.002,0\n")
     with pytest.raises(UsageError, match=r"files\.blow\.csv: "):
         command(scene, *quick, "--resume")
@@ -316,7 +325,33 @@ def test_wrong_scene_makes_no_folder(scene: Path) -> None:
     with pytest.raises(SceneError, match=r"simulation\.duration") as caught:
         command(scene, "--set", "simulation.duration=-1")
     assert caught.value.exit_code == 3
+    with pytest.raises(SceneError, match="no static answer"):
+        command(scene, "--set", 'simulation.method="static"', "--set", 'fix.0.components="x"')
     assert not scene.with_name("scene-run").exists()
+
+
+def test_folder_that_can_not_be_made_is_a_sentence(scene: Path) -> None:
+    """A file where the folder should be: refused with its name and what to do."""
+    with pytest.raises(UsageError, match=r"scene\.toml: can not be written \(.+\)\n  -> make room"):
+        command(scene, "--run-folder", scene)
+
+
+def test_mass_scaling_is_told(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What scaling adds to the mass is in the outlook, the result and the report."""
+    assert command(scene, "--dry-run", "--json") == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert plain["mass_scaling"] == {}
+    scaled = ("--set", f"simulation.mass_scaling={2 * plain['step']}", "--no-pictures")
+    folder = scene.with_name("scaled")
+    assert command(scene, "--run-folder", folder, *scaled) == 0
+    result = json.loads((folder / "result.json").read_text())
+    added = result["mass_scaling"]
+    assert added["added_mass"] == pytest.approx(4.0 * added["share"])
+    # Elements are congruent, so that all masses grow alike: the step by the root of the factor.
+    longer = result["critical_step"]["value"] / plain["critical_step"]["value"]
+    assert added["share"] > 1
+    assert longer == pytest.approx(np.sqrt(1 + added["share"]), rel=1e-4)
+    assert "Mass scaling added" in (folder / "report.html").read_text()
 
 
 def test_progress_lines_go_to_standard_error(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from itertools import combinations
@@ -206,9 +207,9 @@ DAMAGES: dict[str, tuple[Any, str]] = {
     "too large": ((NODES.astype(np.longdouble) * np.longdouble(10) ** 400, ELEMENTS), "not finite"),
     "flat": ((FLAT_NODES, [[0, 1, 2, 3]]), "no volume: element 0; element 0 of nodes [0, 1, 2, 3]"),
     "one point": ((np.zeros((4, 3)), [[0, 1, 2, 3]]), "no volume"),
-    "too small to have mass": ((UNIT * 1e-105, [[0, 1, 2, 3]]), "no volume"),
-    "volume overflows": ((UNIT * 1e105, [[0, 1, 2, 3]]), "no volume"),
-    "edge overflows": (((2 * UNIT - 1) * 1.7e308, [[0, 1, 2, 3]]), "no volume"),
+    "too small to have mass": ((UNIT * 1e-105, [[0, 1, 2, 3]]), "span 1e-105 m"),
+    "volume overflows": ((UNIT * 1e105, [[0, 1, 2, 3]]), "span 1e+105 m"),
+    "edge overflows": (((2 * UNIT - 1) * 1.7e308, [[0, 1, 2, 3]]), "span inf m"),
     "lost in rounding": ((UNIT * 1e-9 + 1e7, [[0, 1, 2, 3]]), "no volume"),
     "repeated": ((NODES, np.vstack([ELEMENTS, ELEMENTS[9, ::-1]])), "element 48 repeats element 9"),
     "no elements": ((NODES, []), "no tetrahedra"),
@@ -224,6 +225,10 @@ DAMAGES: dict[str, tuple[Any, str]] = {
     "meshio surface": (
         meshio.Mesh(UNIT, {"triangle": [[0, 1, 2]], "line": [[0, 1]]}),
         "no tetrahedra, only 1 of type triangle, 1 of type line",
+    ),
+    "meshio other solids": (
+        meshio.Mesh(NODES, {"tetra": ELEMENTS, "hexahedron": [range(8)], "wedge": [range(6)]}),
+        "no tetrahedra (hexahedron, wedge)",
     ),
     "meshio empty": (meshio.Mesh(UNIT, []), "no cells"),
     "meshio set": (
@@ -336,6 +341,8 @@ def test_files_that_can_not_be_read(tmp_path: Path, capfd: pytest.CaptureFixture
         (tmp_path / name).write_bytes(content)
     for path in [tmp_path / "absent.msh", tmp_path, *(tmp_path / name for name in contents)]:
         assert str(path) in refused(path)
+        with pytest.raises(MeshError, match=f"^beam, mesh file '{re.escape(str(path))}'"):
+            mesh_read(path, where="beam")
     assert capfd.readouterr() == ("", "")
 
 

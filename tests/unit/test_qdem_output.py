@@ -79,7 +79,7 @@ def test_field_of_another_length_is_refused(tmp_path: Path) -> None:
 
 def test_pvd_names_times_and_files(tmp_path: Path) -> None:
     """The series is XML that gives each file its time to the last bit."""
-    pvd_write(tmp_path / "f.pvd", [(0.0, "a.vtu"), (0.1 + 0.2, "b&.vtu")])
+    pvd_write(tmp_path / "f.pvd", [(0.0, "a.vtu"), (np.float64(0.1 + 0.2), "b&.vtu")])
     found = ElementTree.parse(tmp_path / "f.pvd").getroot().iter("DataSet")
     assert [(float(one.attrib["timestep"]), one.attrib["file"]) for one in found] == [
         (0.0, "a.vtu"),
@@ -126,10 +126,10 @@ def test_cut_leaves_sound_rows_up_to_a_time(tmp_path: Path, torn: str) -> None:
     whole = table.path.read_bytes()
     with table.path.open("a") as stream:
         stream.write(torn)
-    table.cut(1.5)
+    table.cut(1.5, 2)
     assert table.path.read_text() == "time,a\n0.0,5.0\n1.0,6.0\n"
     table.append(np.array([[2.0, 7.0], [3.0, 8.0]]))
-    table.cut(3.0)
+    table.cut(3.0, 4)
     assert table.path.read_bytes() == whole
 
 
@@ -138,10 +138,23 @@ def test_cut_refuses_another_table(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_text("time,b\n0,1\n")
     for name in ("t.csv", "none.csv"):
         with pytest.raises(UsageError, match=name):
-            Table(tmp_path / name, ["time", "a"]).cut(1.0)
+            Table(tmp_path / name, ["time", "a"]).cut(1.0, 1)
+    (tmp_path / "t.csv").write_text("time,a\n0.0,1.0\n1.0,")
+    with pytest.raises(UsageError, match="2 rows up to 1 s were written, 1 are there"):
+        Table(tmp_path / "t.csv", ["time", "a"]).cut(1.0, 2)
+    assert (tmp_path / "t.csv").read_text() == "time,a\n0.0,1.0\n1.0,"
     (tmp_path / "t.csv").write_text("time,a\n0,x\n")
     with pytest.raises(UsageError, match="no table"):
         table_read(tmp_path / "t.csv")
+
+
+def test_no_space_is_a_sentence_with_the_file(tmp_path: Path) -> None:
+    """What the system refuses to write is told with the file and a remedy, not by a number."""
+    with pytest.raises(UsageError, match=r"full.csv: can not be written \(.+\)\n  -> make room"):
+        Table(tmp_path / "none" / "full.csv", ["time"]).begin()
+    full = Table(Path("/dev/full"), ["time"])
+    with pytest.raises(UsageError, match=r"/dev/full: can not be written \(No space left"):
+        full.append(np.zeros((1, 1)))
 
 
 # ---------------------------------------------------------------------------- pictures

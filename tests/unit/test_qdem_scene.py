@@ -200,6 +200,10 @@ def test_left_out_names_what_the_scene_does_not(tmp_path: Path) -> None:
     assert "viscosity" not in words
     assert "gravity" not in words
     assert "contact" in words
+    assert "cause of motion" not in words
+    still = BASE.replace("[0, 0, -1]", "[0, 0, 0]").replace("[[load]]", "[[roller]]")
+    still = still.replace("force = ", "normal = [1, 0, 0] #")
+    assert "any cause of motion" in " ".join(load(tmp_path, still).scene.left_out())
 
 
 # ---------------------------------------------------------------------------- wrong scenes
@@ -223,7 +227,10 @@ WRONG = [
     ('set = "x-max"', "", "15: load.0.nodes: give exactly one of"),
     ('body = "beam"\nnodes = { set = "x-max"', 'body = "bean"\nnodes = { set = "x-max"', "14: load.0.body: there is no body 'bean'; did you mean beam?"),
     ("force = [0, 0, -1]", "force = [0, 0]", "16: load.0.force.2: missing"),
-    ("force = [0, 0, -1]", "force = 5", "16: load.0.force: must be a valid tuple"),
+    ("force = [0, 0, -1]", "force = 5", "16: load.0.force: must be a list in"),
+    ("force = [0, 0, -1]", "force = [0, 0, -1, 0]", "16: load.0.force: must have 3 entries, not"),
+    ('set = "x-max"', 'set = ""', "15: load.0.nodes.set: must not be empty"),
+    ('name = "beam"', 'name = "a beam"', "2: body.0.name: a name has 1 to 60 letters"),
     ("force = [0, 0, -1]", "force = { ramp = 1 }", "16: load.0.force.value: missing"),
     ("force = [0, 0, -1]", "force = { ramp = 1, value = 2 }", "16: load.0.force: a force is a vector"),
     ("force = [0, 0, -1]", "force = { ramp = 1, times = [1] }", "16: load.0.force: give one of ramp, times or csv"),
@@ -284,6 +291,7 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(tmp_path: Path) ->
         ("t,q\n0,1\n", "p.csv: load.0.force.csv: there is no column 'p'"),
         ("t,p\n", "p.csv: load.0.force.csv: it has no rows"),
         ("", "p.csv: load.0.force.csv: there is no column 't'"),
+        ("t,p,p\n0,1,2\n", "p.csv: load.0.force.csv: 2 columns are named 'p'"),
         ("t,p\n0,\udcff\n", "p.csv: load.0.force.csv: can not read it"),
     ],
 )
@@ -311,6 +319,20 @@ def test_what_the_simulation_refuses_has_its_key(tmp_path: Path) -> None:
     pressure = '[[pressure]]\nbody = "beam"\nnodes = { nearest = [1, 0, 0] }\npressure = 5\n[output.probes]'
     prepared = load(tmp_path, BASE.replace("[output.probes]", pressure))
     with pytest.raises(SceneError, match=r"scene.toml:17: pressure.0: no surface face"):
+        simulation_of(prepared)
+
+
+def test_conditions_that_contradict_one_another_are_problems_of_the_scene(tmp_path: Path) -> None:
+    """A roller against a prescribed motion; a static scene that can turn: told before any run."""
+    moved = (
+        '[[prescribe]]\nbody = "beam"\nnodes = { set = "x-max" }\ncomponent = "x"\nvalue = 1.0\n'
+    )
+    roller = '[[roller]]\nbody = "beam"\nnodes = { set = "x-max" }\nnormal = [1, 0, 0]\n'
+    prepared = load(tmp_path, BASE.replace("[output.probes]", moved + roller + "[output.probes]"))
+    with pytest.raises(SceneError, match=r"roller: a node is moved along x out of its plane"):
+        simulation_of(prepared)
+    prepared = load(tmp_path, BASE, 'simulation.method="static"', 'fix.0.components="xy"')
+    with pytest.raises(SceneError, match=r"fix: beam has no static answer: 1 of the 6"):
         simulation_of(prepared)
 
 

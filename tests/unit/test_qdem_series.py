@@ -92,6 +92,38 @@ def test_driver_samples_a_table_and_a_function_alike(times: list[float]) -> None
     np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (True, "no number: True"),
+        ("5", "no number: '5'"),
+        (None, "no number: None"),
+        ([[0, 1], [2]], "no number"),
+        (np.zeros(2), "2 components, not 1"),
+        (lambda: 1.0, r"the function failed at t = 0 s \(TypeError: .*\)\n  -> give a function"),
+        (lambda t: 1 / t, r"the function failed at t = 0 s \(ZeroDivisionError: "),
+        (lambda t: "x", "the value at t = 0 s is no number: 'x'"),
+    ],
+)
+def test_driver_refuses_what_is_no_value(value: Any, words: str) -> None:
+    with pytest.raises(ConditionError, match=f"force: .*{words}"):
+        Driver(value, 1, "force")
+
+
+def test_driver_tells_when_a_function_raises() -> None:
+    driver = Driver(lambda t: 1 / (t - 2), 1, "force")
+    with pytest.raises(ConditionError, match=r"failed at t = 2 s \(ZeroDivisionError"):
+        driver.sample(np.array([1.0, 2.0]))
+
+
+def test_a_record_of_pandas_is_no_vector() -> None:
+    """Three rows of a record would pass for the three components of a force."""
+    record = pytest.importorskip("pandas").Series([0.0, 1.0, 2.0], index=[0.0, 0.1, 0.2])
+    with pytest.raises(ConditionError, match="pandas object does not say what its times are"):
+        Driver(record, 3, "load")
+    assert q.Series(record.index, record)(0.05) == pytest.approx(0.5)
+
+
 def test_driver_says_when_a_function_fails() -> None:
     driver = Driver(lambda t: 1.0 if t < 2 else [1.0, 2.0], 1, "force")
     with pytest.raises(ConditionError, match=r"force: the value at t = 3 s has 2 components"):

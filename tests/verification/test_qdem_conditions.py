@@ -304,17 +304,17 @@ def periodic(a: Any, b: Any) -> None:
 
 
 BAD_CALLS: dict[str, tuple[str, Callable[[], object]]] = {
-    "other body, fix": ("not in this simulation", lambda: RUN.fix(OTHER, LEFT)),
-    "other body, pressure": ("not in this", lambda: RUN.pressure(OTHER, RIGHT, 1.0)),
-    "other body, probe": ("not in this", lambda: RUN.advance(1e-3, {"a": (OTHER, LEFT)})),
-    "no body": ("not in this simulation", lambda: RUN.fix("body", LEFT)),  # type: ignore[arg-type]
+    "other body, fix": ("not a body of this simulation", lambda: RUN.fix(OTHER, LEFT)),
+    "other body, pressure": ("not a body of this", lambda: RUN.pressure(OTHER, RIGHT, 1.0)),
+    "other body, probe": ("not a body of this", lambda: RUN.advance(1e-3, {"a": (OTHER, LEFT)})),
+    "no body": ("not a body of this simulation", lambda: RUN.fix("body", LEFT)),  # type: ignore[arg-type]
     "component w": ("'w'", lambda: RUN.fix(BODY, LEFT, "w")),
     "no component": ("''", lambda: RUN.fix(BODY, LEFT, "")),
     "component 0": ("not 0", lambda: RUN.fix(BODY, LEFT, 0)),  # type: ignore[arg-type]
     "NaN": ("not finite", lambda: RUN.prescribe(BODY, LEFT, "z", nan)),
     "vector": ("3 components", lambda: RUN.prescribe(BODY, LEFT, "z", [1, 2, 3])),
     "NaN function": ("t = 0", lambda: RUN.prescribe(BODY, LEFT, "z", lambda t: nan)),
-    "scalar force": ("1 components", lambda: RUN.load(BODY, LEFT, 5.0)),
+    "scalar force": ("1 component", lambda: RUN.load(BODY, LEFT, 5.0)),
     "infinite force": ("not finite", lambda: RUN.load(BODY, LEFT, [0, 0, inf])),
     "scalar series": ("1 comp", lambda: RUN.load(BODY, LEFT, q.Series([0, 1], [0, 1]))),
     "text force": ("no number", lambda: RUN.load(BODY, LEFT, ["a", "b", "c"])),
@@ -325,7 +325,7 @@ BAD_CALLS: dict[str, tuple[str, Callable[[], object]]] = {
     "text normal": ("direction", lambda: RUN.roller(BODY, LEFT, "x")),  # type: ignore[arg-type]
     "NaN normal": ("direction", lambda: RUN.roller(BODY, LEFT, [0, 0, nan])),
     "no partner": ("no partner", lambda: periodic(LEFT, DIAGONAL)),
-    "unlike faces": ("on one face", lambda: periodic(LEFT, LEFT | RIGHT)),
+    "unlike faces": ("on one face", lambda: periodic(LEFT, (RIGHT | BACK) & ~LEFT)),
     "no condition": ("none of", lambda: RUN.remove("fix")),  # type: ignore[arg-type]
     "back in time": ("-1", lambda: RUN.advance(-1.0)),
     "NaN seconds": ("nan", lambda: RUN.advance(nan)),
@@ -336,7 +336,7 @@ BAD_CALLS: dict[str, tuple[str, Callable[[], object]]] = {
     "no sampling": ("0.0", lambda: RUN.advance(1.0, {"a": LEFT}, 0.0)),
     "list of probes": ("names", lambda: RUN.advance(1.0, [LEFT])),  # type: ignore[arg-type]
     "velocity": ("shape", lambda: setattr(BODY, "velocity", np.zeros(3))),
-    "NaN velocity": ("finite", lambda: setattr(BODY, "velocity", np.full(X.shape, nan))),
+    "NaN velocity": ("node 0", lambda: setattr(BODY, "velocity", np.full(X.shape, nan))),
     "text velocity": ("numbers", lambda: setattr(BODY, "velocity", "fast")),
     "strain": ("green", lambda: free(OTHER, strain="green")),
     "precision": ("float16", lambda: free(OTHER, precision="float16")),
@@ -344,7 +344,7 @@ BAD_CALLS: dict[str, tuple[str, Callable[[], object]]] = {
     "text step": ("'1'", lambda: free(OTHER, step="1")),
     "safety": ("-1", lambda: free(OTHER, safety=-1)),
     "mass scaling": ("nan", lambda: free(OTHER, mass_scaling=nan)),
-    "gravity": ("1 components", lambda: free(OTHER, gravity=9.81)),
+    "gravity": ("1 component", lambda: free(OTHER, gravity=9.81)),
     "no bodies": ("at least one", lambda: q.Simulation([])),
     "a bare body": ("list", lambda: q.Simulation(OTHER)),  # type: ignore[arg-type]
     "twice": ("twice", lambda: q.Simulation([OTHER, OTHER])),

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import qdem_fem as q
 from qdem_fem.critical_step import lagged_viscous_step
-from qdem_fem.errors import Unstable
+from qdem_fem.errors import StepWarning, Unstable
 from qdem_fem.mass_scaling import element_step, mass_scaling_factor
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.reference_forces import Strain
@@ -185,7 +185,7 @@ def test_stable_below_and_stopped_above(law: Strain, viscosity: float) -> None:
     stone = body(3, shear_viscosity=viscosity)
     run = q.Simulation([stone], strain=law, step=1.01 * critical.value, threads=1)
     stone.velocity = speed
-    with pytest.raises(Unstable) as raised:
+    with pytest.warns(StepWarning, match="1.01 times"), pytest.raises(Unstable) as raised:
         run.advance(4096 * run.step)
     assert f"element {critical.element} of body" in str(raised.value)
     assert "1.010 times the critical one" in str(raised.value)
