@@ -142,6 +142,20 @@ class Assembly:
         self._write(self.state.displacement, self.frames.displacement_own(displacement))
         self._write(self.state.velocity, self.frames.velocity_own(velocity))
 
+    def kinetic(self) -> float:
+        """Kinetic energy of the velocities as they are [J].
+
+        No BLAS here, in what is called between windows: its threads go on spinning for a while
+        where the kernel's threads want to compute.
+        """
+        if self.frames is not None:
+            speed = (self.field("velocity") ** 2).sum(axis=1)
+            return 0.5 * float((self.mass * speed).sum())
+        own = np.asarray(self.state.velocity).reshape(-1, 4)
+        return 0.5 * float(
+            (self.mass * np.einsum("nc,nc->n", own, own, dtype=float)[self.place]).sum()
+        )
+
     def _frames_choose(self, conditions: Conditions, gravity: bool) -> None:
         """Give frames to the bodies that are free, and take them from those that no longer are."""
         displacement, velocity = self.field("displacement"), self.field("velocity")

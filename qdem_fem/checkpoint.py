@@ -128,6 +128,7 @@ def fingerprint(simulation: Simulation) -> dict[str, str]:
                 for part in (
                     held.nodes,
                     np.array(held.components),
+                    np.zeros(0) if held.factor is None else held.factor,
                     "fixed" if held.driver is None else _driver_mark(held.driver),
                 )
             )

@@ -39,6 +39,8 @@ class Held:
     nodes: Integers
     components: tuple[int, ...]
     driver: Driver | None = None
+    factor: Floats | None = None
+    """Of the driver, by node, (k,); None: 1."""
 
 
 @dataclass(eq=False)
@@ -93,18 +95,24 @@ class Conditions:
         column = 1 + sum(load.driver.components for load in self.loads)
         given: dict[int, tuple[int, float]] = {}
         for held in self.held:
-            series, weight = (0, 0.0) if held.driver is None else (column, 1.0)
+            series = 0 if held.driver is None else column
+            weights = np.full(len(held.nodes), float(held.driver is not None))
+            if held.factor is not None:
+                weights = held.factor
             for c in held.components:
-                given.update(dict.fromkeys((4 * place[held.nodes] + c).tolist(), (series, weight)))
+                at = (4 * place[held.nodes] + c).tolist()
+                given.update(
+                    {key: (series, w) for key, w in zip(at, weights.tolist(), strict=True)}
+                )
             column += held.driver is not None
-        at = np.array(sorted(given), dtype=np.int64)
-        values = [given[key] for key in at.tolist()]
+        order = np.array(sorted(given), dtype=np.int64)
+        values = [given[key] for key in order.tolist()]
         nodes, normals = self._roller_normals(place, given)
         return Constraints(
-            node_at=at,
+            node_at=order,
             series=np.array([series for series, _ in values], dtype=np.int64),
             weight=np.array([weight for _, weight in values], dtype=float),
-            previous=np.zeros(len(at)),
+            previous=np.zeros(len(order)),
             roller_at=4 * nodes,
             roller_normal=normals,
         )

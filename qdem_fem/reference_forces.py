@@ -240,10 +240,10 @@ def elastic_energy(
     """
     lam, mu = np.asarray(lame_first, float), np.asarray(lame_second, float)
     if strain == "finger":
-        first, j = trace(H)[..., 0, 0], volume_change(H)
+        first, minors = trace(H)[..., 0, 0], cofactor(H)
         spread = first + contraction(H, H) / 2  # tr(eps)
-        minors = cofactor(H)
-        beyond_first = trace(minors)[..., 0, 0] + contraction(H, minors) / 3  # j - tr H
+        beyond_first = trace(minors)[..., 0, 0] + contraction(H, minors) / 3
+        j = first + beyond_first  # volume_change(H)
         # (1 + j) tr(eps) - j, its first order tr H - tr H left out
         density = mu * (contraction(H, H) / 2 - beyond_first + j * spread)
         return volume * (density + (lam - mu) / 2 * spread**2)

@@ -151,11 +151,23 @@ class Simulation:
         chosen = self._components(components, "fix")
         return self._hold(Held(self._nodes(body, nodes, "fix"), chosen))
 
-    def prescribe(self, body: Body, nodes: Any, component: str, displacement: Value) -> Held:
-        """Give one component of the displacement [m], constant or changing with time."""
+    def prescribe(
+        self,
+        body: Body,
+        nodes: Any,
+        component: str,
+        displacement: Value,
+        profile: ArrayLike | None = None,
+    ) -> Held:
+        """Give one component of the displacement [m], constant or changing with time.
+
+        ``profile`` (n,) [-], one number for every node of the body, multiplies it.
+        """
         chosen = self._components(component, "prescribe")
         driver = Driver(displacement, 1, "prescribe")
-        return self._hold(Held(self._nodes(body, nodes, "prescribe"), chosen, driver))
+        here = self._nodes(body, nodes, "prescribe")
+        factor = self._profile(body, here, profile, 1.0, "prescribe")
+        return self._hold(Held(here, chosen, driver, factor))
 
     def roller(self, body: Body, nodes: Any, normal: ArrayLike) -> Roller:
         """Keep nodes in the plane through them with this normal, free within it."""
@@ -174,11 +186,17 @@ class Simulation:
         self._ties_changed()
         return roller
 
-    def load(self, body: Body, nodes: Any, force: Value) -> NodalLoad:
-        """A total ``force`` [N], three components, shared equally by the nodes (section 3.1)."""
+    def load(
+        self, body: Body, nodes: Any, force: Value, profile: ArrayLike | None = None
+    ) -> NodalLoad:
+        """A total ``force`` [N], three components, shared equally by the nodes (section 3.1).
+
+        With ``profile`` (n,) [-], one number for every node of the body, a node bears that share.
+        """
         chosen = self._nodes(body, nodes, "load")
-        share = np.full((len(chosen), 3), 1 / len(chosen))
-        return self._load(NodalLoad(chosen, share, Driver(force, 3, "load")))
+        share = self._profile(body, chosen, profile, 1 / len(chosen), "load")
+        weights = np.repeat(share[:, None], 3, axis=1)
+        return self._load(NodalLoad(chosen, weights, Driver(force, 3, "load")))
 
     def pressure(self, body: Body, nodes: Any, pressure: Value) -> NodalLoad:
         """A ``pressure`` [Pa] along the inward reference normal of the faces within ``nodes``."""
@@ -331,7 +349,7 @@ class Simulation:
     def energy(self) -> Energy:
         """Energies now [J]; elastic energy as `qdem_fem.reference_forces.elastic_energy`."""
         velocity = velocity_now(self)
-        kinetic = 0.5 * float(self.assembly.mass @ (velocity**2).sum(axis=1))
+        kinetic = 0.5 * float((self.assembly.mass * (velocity**2).sum(axis=1)).sum())
         elastic = 0.0
         for body in self.bodies:
             gradients, volumes = body.gradients
@@ -412,6 +430,24 @@ class Simulation:
         if not isinstance(components, str) or not components or set(components) - set(COMPONENTS):
             raise ConditionError(f"components are of 'xyz', not {components!r}", where=where)
         return tuple(sorted({COMPONENTS.index(c) for c in components}))
+
+    def _profile(
+        self, body: Body, nodes: Integers, profile: ArrayLike | None, default: float, where: str
+    ) -> Floats:
+        """Factors of the chosen nodes, (k,)."""
+        if profile is None:
+            return np.full(len(nodes), default)
+        try:
+            every = np.asarray(profile, dtype=float)
+        except (TypeError, ValueError):
+            every = np.zeros(0)
+        if every.shape != (len(body.nodes),) or not np.isfinite(every).all():
+            raise ConditionError(
+                f"a profile has one finite number for each of the {len(body.nodes)} nodes of "
+                f"{body.name}",
+                where=where,
+            )
+        return every[nodes - self._offset(body)]
 
     def _hold(self, held: Held) -> Held:
         velocities_level(self)

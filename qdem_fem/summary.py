@@ -69,9 +69,9 @@ def mass_scaling_facts(run: Any) -> dict[str, float]:
     """Mass that scaling added [kg], and its share of the bodies' own; empty without scaling."""
     if run.mass_scaling is None:
         return {}
-    own = sum(float((b.gradients[1] * b.material.density).sum()) for b in run.bodies)
-    added = float(run.assembly.mass.sum()) - own
-    return {"added_mass": added, "share": added / own}
+    own = {body.name: body_facts(body)["mass"] for body in run.bodies}
+    added = sum(own[name] * share for name, share in run.added_mass.items())
+    return {"added_mass": float(added), "share": float(added / sum(own.values()))}
 
 
 def body_facts(body: Any) -> dict[str, Any]:

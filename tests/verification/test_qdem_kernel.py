@@ -379,3 +379,34 @@ def test_a_new_process_starts_fast(tmp_path: Path) -> None:
     assert min(cached) < 1.5
     assert min(imports, *again) < 1
     assert list(tmp_path.rglob("*.nbc"))
+
+
+ALONE = """
+import time
+import numpy as np
+import qdem_fem as q
+from qdem_fem.mesh_generation import box_mesh
+
+body = q.Body(box_mesh((2.4, 0.25, 0.22), (72, 12, 11), "five"), q.Material(45e9, 0.167, 2350.0))
+run = q.Simulation([body], threads=1, gravity=lambda t: (0, 0, np.sin(1e3 * t)))
+run.fix(body, body.nodes[:, 0] == 0)
+run.advance(run.step)
+clock, cpu = time.perf_counter(), time.process_time()
+run.advance(300 * run.step)
+print((time.process_time() - cpu) / (time.perf_counter() - clock))
+"""
+
+
+def test_no_thread_computes_beside_those_asked_for() -> None:
+    """A march on one thread takes no more processor time than time.
+
+    BLAS between windows would wake its own threads, which spin on for a while and stand in the
+    way of the kernel's: that once halved the speed of two threads.  Other processes can only
+    lower the ratio.
+    """
+    unwanted = ("OMP_", "MKL_", "OPENBLAS_", "NUMBA_NUM_THREADS")
+    environment = {name: v for name, v in os.environ.items() if not name.startswith(unwanted)}
+    ran = subprocess.run(
+        [sys.executable, "-c", ALONE], env=environment, check=True, capture_output=True, text=True
+    )
+    assert float(ran.stdout) < 1.1

@@ -63,8 +63,7 @@ def test_all_held() -> None:
     body = block()
     run = q.Simulation([body], threads=1, step=1e-5)
     for axis, stretch in zip("xyz", (1e-3, -2e-4, 0.0), strict=True):
-        for k, x in enumerate(X):
-            run.prescribe(body, k, axis, stretch * x["xyz".index(axis)])
+        run.prescribe(body, range(len(X)), axis, stretch, profile=X[:, "xyz".index(axis)])
     run.advance(1e-4)
     expected = X * [1e-3, -2e-4, 0.0]
     np.testing.assert_allclose(body.displacement, expected, rtol=0, atol=1e-15)
@@ -145,6 +144,22 @@ def test_work_of_a_gravity_that_changes(frequency: float) -> None:
     assert errors[1] < max(1e-12, errors[0] / 3.5)
 
 
+def test_a_force_by_node() -> None:
+    """A profile that grows along y, over a face: the body turns as its resultant tells."""
+    body = block()
+    run = q.Simulation([body], threads=1)
+    shares = np.where(RIGHT, X[:, 1], 0.0)
+    run.load(body, RIGHT, [100.0, 0, 0], profile=shares)
+    run.advance(20 * run.step)
+    mass = run.assembly.mass
+    momentum = mass @ body.velocity
+    np.testing.assert_allclose(momentum, [100 * shares.sum() * run.time, 0, 0], atol=1e-9)
+    spin = (mass[:, None] * np.cross(X + body.displacement, body.velocity)).sum(axis=0)
+    # the arm moves with the nodes, by 1e-6 of it
+    expected = run.time * np.cross(X, 100 * shares[:, None] * [1.0, 0, 0]).sum(axis=0)
+    np.testing.assert_allclose(spin, expected, atol=1e-4 * abs(expected).max())
+
+
 MISUSE: dict[str, tuple[str, Callable[[q.Simulation, q.Body], Any]]] = {
     "components by number": ("of 'xyz'", lambda r, b: r.fix(b, LEFT, 2)),  # type: ignore[arg-type]
     "ragged nodes": ("no selection", lambda r, b: r.fix(b, [[1, 2], [3]])),
@@ -156,6 +171,11 @@ MISUSE: dict[str, tuple[str, Callable[[q.Simulation, q.Body], Any]]] = {
     "NaN tolerance": ("tolerance", lambda r, b: r.periodic(b, LEFT, RIGHT, np.nan)),
     "material": ("no material", lambda r, b: q.Body(MESH, "steel")),  # type: ignore[arg-type]
     "name": ("no name", lambda r, b: q.Body(MESH, b.material, name=5)),  # type: ignore[arg-type]
+    "profile": ("one finite number", lambda r, b: r.load(b, LEFT, [1.0, 0, 0], profile=[1.0])),
+    "NaN profile": (
+        "one finite number",
+        lambda r, b: r.prescribe(b, LEFT, "x", 1.0, profile=np.full(len(X), np.nan)),
+    ),
     "safety": ("not stable", lambda r, b: q.Simulation([block()], safety=2)),
     "threads": ("threads", lambda r, b: q.Simulation([block()], threads=1.5)),  # type: ignore[arg-type]
 }
