@@ -55,18 +55,18 @@ def velocities_level(run: Simulation) -> None:
 
 
 def state_admit(run: Simulation) -> None:
-    """Put a state that the user set into the conditions: held components, planes of rollers."""
+    """Put a displacement that the user set where the conditions allow: else they would in a step.
+
+    Velocities are left to the first step, which counts the work of giving them.
+    """
     _, held = run.packed_lists()
-    table = run.conditions.table(run.time + run.step * np.arange(2.0))
-    given = held.weight * table[:, held.series]
-    rate = (given[1] - given[0]) / run.step
-    for name, values in (("displacement", given[0]), ("velocity", rate)):
-        field = run.assembly.field(name)
-        flat = _by_place(run, run.assembly.hold(field, held))
-        flat[held.node_at] = values
-        admitted = flat.reshape(-1, 4)[run.assembly.place, :3]
-        if not np.array_equal(admitted, field):
-            run.assembly.field_set(name, admitted)
+    table = run.conditions.table(np.array([run.time]))[0]
+    set_by_user = run.assembly.field("displacement")
+    flat = _by_place(run, run.assembly.hold(set_by_user, held))
+    flat[held.node_at] = held.weight * table[held.series]
+    admitted = flat.reshape(-1, 4)[run.assembly.place, :3]
+    if not np.array_equal(admitted, set_by_user):
+        run.assembly.field_set("displacement", admitted)
 
 
 def half_work(run: Simulation, behind: Floats, level: Floats) -> Floats:

@@ -41,8 +41,10 @@ def march(
     Samples are at step numbers that are multiples of ``stride``.  Raises `Unstable` and
     `ElementInverted`; `StepWarning` when an element makes the step short, or it is too long.
     """
-    if isnan(run.put_in):
+    if run.displacement_set:
         state_admit(run)
+        run.displacement_set = False
+    if isnan(run.put_in):
         run.put_in = energy_set(run)
     step_check(run)
     velocities_behind(run)

@@ -136,6 +136,8 @@ class Simulation:
         """True while velocities are half a step behind; False: they are at the time itself."""
         self.work = np.zeros(2)
         """Work of the loads and of prescribed motion since the start [J]."""
+        self.displacement_set = False
+        """Whether the user set a displacement since the last march."""
         self.warned = nan
         """The critical step of which a warning was given [s]."""
         self.put_in = nan
@@ -388,6 +390,7 @@ class Simulation:
             for name in ("displacement", "velocity"):
                 fields = [getattr(body, f"_{name}") for body in self.bodies]
                 self._assembly.field_set(name, np.concatenate(fields))
+            self.displacement_set = any(body._displacement.any() for body in self.bodies)
         return self._assembly
 
     # --- for the march and the files -----------------------------------------------------------
@@ -483,4 +486,5 @@ class Simulation:
         field = self.assembly.field(name)
         field[start : start + len(body.nodes)] = values
         self.assembly.field_set(name, field)
+        self.displacement_set |= name == "displacement"
         self.put_in = nan

@@ -74,7 +74,7 @@ POINTS = (
     Point("decay of an elastic motion, over its frequency", "vibration",
           ("46,080 elements: decay of an elastic",), "fit; exact: 0"),
     Point("decay with viscosity, of the first bending mode", "vibration",
-          ("46,080 elements: decay with viscosity",), "phi C phi/2 of the same mesh"),
+          ("2,304 elements: decay with viscosity",), "phi C phi/2 of the same mesh"),
     Point("history after unloading to Newmark's", "protocol",
           ("as the paper, 10,800 elements: history",), "200 steps a period, average acceleration"),
     Point("history to the exact one (all modes)", "motion",

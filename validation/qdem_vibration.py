@@ -134,16 +134,12 @@ def first_decay(problem: Problem, share: float = 0.002) -> tuple[float, float]:
 
 
 def frequency_checks(name: str, problem: Problem, five: Frequencies) -> list[Check]:
-    """First frequency within 0.1 %, five within 0.1 %, decay within 1 %."""
+    """First frequency within 0.1 %, and all five."""
     mode, expected = first_frequency(problem)
-    decay_expected, decay = first_decay(problem)
     rows = [
         below(f"{name}: first frequency to same mesh", abs(mode.frequency / expected - 1), 1e-3),
         reported(f"{name}: first frequency", mode.frequency, "Hz"),
         below(f"{name}: decay of an elastic motion", abs(mode.decay) / expected, 1e-4),
-        below(
-            f"{name}: decay with viscosity, to phi C phi/2", abs(decay / decay_expected - 1), 1e-2
-        ),
     ]
     for number, (judge, found) in enumerate(zip(five.judge, five.found, strict=True), 1):
         label = f"{name}: mode {number}, {judge:.2f} Hz, to same mesh"
@@ -151,13 +147,21 @@ def frequency_checks(name: str, problem: Problem, five: Frequencies) -> list[Che
     return rows
 
 
+def decay_check(name: str, problem: Problem) -> Check:
+    """Decay of the first mode by viscosity within 1 %."""
+    expected, decay = first_decay(problem)
+    label = f"{name}: decay with viscosity, to phi C phi/2"
+    return below(label, abs(decay / expected - 1), 1e-2)
+
+
 # --- the forms --------------------------------------------------------------------------------
 
 
 def quick_checks() -> list[Check]:
     """2,304 elements."""
-    problem = cantilever((24, 4, 4))
-    return frequency_checks("2,304 elements", problem, five_frequencies(problem))
+    problem, name = cantilever((24, 4, 4)), "2,304 elements"
+    five = five_frequencies(problem)
+    return [*frequency_checks(name, problem, five), decay_check(name, problem)]
 
 
 def full() -> Outcome:

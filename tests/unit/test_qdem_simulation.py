@@ -156,6 +156,12 @@ LOADS: dict[str, tuple[Any, Callable[[q.Simulation, q.Body], Any]]] = {
             body, body.nodes[:, 0] > 0.99, "x", lambda t: 0.02 * (1 - np.cos(50 * t))
         ),
     ),
+    "prescribed motion from a velocity": (
+        None,
+        lambda run, body: run.prescribe(
+            body, body.nodes[:, 0] > 0.99, "x", lambda t: 0.02 * np.sin(50 * t)
+        ),
+    ),
     "gravity": ([0, 0, -9.81], lambda run, body: None),
     "changing gravity": (q.ramp(0.1, [0, 0, -9.81]), lambda run, body: None),
 }

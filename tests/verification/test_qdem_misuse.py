@@ -190,3 +190,18 @@ def test_wrong_types_get_a_sentence(name: str) -> None:
         call(run, body)
     assert word in str(raised.value)
     assert run.steps_done == 0
+
+
+def test_a_motion_that_starts_at_speed_is_paid_for() -> None:
+    """Kinetic + elastic - external from rest: second order in dt, as the scheme's energy is."""
+    left = []
+    for share in (0.8, 0.4, 0.2):
+        body = block()
+        run = q.Simulation([body], threads=1, strain="svk", safety=share)
+        run.fix(body, LEFT)
+        run.prescribe(body, RIGHT, "z", lambda t: 2.0 * t)
+        run.advance(0.02)
+        energy = run.energy()
+        left.append((energy.kinetic + energy.elastic) / energy.external - 1)
+    assert abs(left[0]) < 5e-3
+    assert abs(left[2]) < abs(left[0]) / 8
