@@ -1,7 +1,8 @@
 """QDEM: explicit dynamics of viscoelastic bodies made of linear tetrahedra.
 
 Method: Nishiura, Sakaguchi and Aikawa, Materials 10 (2017) 615.  Start with `Body`, `Material`
-and `Simulation`.  A name is loaded when it is first used, so that help texts cost nothing.
+and `Simulation`; errors a user can act on are in `qdem_fem.errors`.  A name is loaded when it is
+first used, so that help texts cost nothing.
 """
 
 from importlib import import_module
@@ -9,29 +10,37 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from qdem_fem.body import Body
-    from qdem_fem.errors import QdemError
+    from qdem_fem.critical_step import CriticalStep
+    from qdem_fem.dynamic_relaxation import StaticAnswer
+    from qdem_fem.errors import QdemError, StepWarning
     from qdem_fem.material import Material
     from qdem_fem.series import Series, ramp
     from qdem_fem.simulation import Energy, History, Simulation
 
 _HOMES = {
     "Body": "body",
+    "CriticalStep": "critical_step",
     "Energy": "simulation",
     "History": "simulation",
     "Material": "material",
     "QdemError": "errors",
     "Series": "series",
     "Simulation": "simulation",
+    "StaticAnswer": "dynamic_relaxation",
+    "StepWarning": "errors",
     "ramp": "series",
 }
 __all__ = [
     "Body",
+    "CriticalStep",
     "Energy",
     "History",
     "Material",
     "QdemError",
     "Series",
     "Simulation",
+    "StaticAnswer",
+    "StepWarning",
     "ramp",
 ]
 

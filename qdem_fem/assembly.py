@@ -41,8 +41,8 @@ class Assembly:
     (m,) from mass scaling [-].
     """
 
-    window_work = 20_000_000
-    """Element-steps to do before coming back: a fraction of a second."""
+    window_work = 100_000_000
+    """Element-steps to do before coming back: about a second."""
 
     def __init__(
         self,
@@ -195,11 +195,13 @@ class Assembly:
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take the state that `stored` gave, under the same conditions."""
-        for name in FIELDS:
-            self._write(getattr(self.state, name), arrays[name].astype(float))
+        fields = {name: arrays[name].astype(float) for name in FIELDS}
         if self.frames is not None:
-            for name in FRAME_ARRAYS:
-                setattr(self.frames, name, arrays[f"frame_{name}"].copy())
+            frames = {name: arrays[f"frame_{name}"].copy() for name in FRAME_ARRAYS}
+            for name, values in frames.items():
+                setattr(self.frames, name, values)
+        for name, values in fields.items():
+            self._write(getattr(self.state, name), values)
 
     def window(
         self,

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT = 1
+FORMAT = 2
 DIGEST = 64
 """Letters of a SHA-256 in hexadecimal."""
 FUNCTION = "a function, not compared"
@@ -89,16 +89,19 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
         raise CheckpointError(f"can not be read ({error.strerror})", where=where) from error
     head, arrays = _opened(content, where)
     _compare(head["fingerprint"], fingerprint(simulation), where)
-    progress = _Progress(**head["progress"])
-    critical = CriticalStep(**head["critical_step"], mode=arrays["critical_mode"])
-
     assembly, (_, held) = simulation.assembly, simulation.packed_lists()
-    assembly.restore(arrays)
-    held.previous[:] = arrays["previous"]
+    try:
+        progress = _Progress(**head["progress"])
+        critical = CriticalStep(**head["critical_step"], mode=arrays["critical_mode"])
+        previous, work = arrays["previous"], arrays["work"]
+        assembly.restore(arrays)
+    except (KeyError, TypeError) as error:
+        raise CheckpointError(f"a part of the state is not there ({error})", where=where) from error
+    held.previous[:] = previous
     simulation._critical = critical
     simulation.step_keep(progress.step)
     simulation.steps_done, simulation.behind = progress.steps_done, progress.behind
-    simulation.work[:] = arrays["work"]
+    simulation.work[:] = work
     simulation.put_in, simulation.gravity_work = progress.put_in, progress.gravity_work
 
 

@@ -1,9 +1,9 @@
 """SIMD lanes as a numba type: the element functions, written for one number, run on several.
 
 ``Lanes(float64, 4)`` is a vector register of four numbers, one of each of four tetrahedra.
-It knows ``+ - * /``, comparison by `larger`, and the two moves of memory that an element needs:
-`gather_edges` reads the nodal vectors of a block of elements, `scatter_forces` subtracts their
-forces from the nodes.  So nothing is left to the good will of a loop vectoriser, and one
+It knows ``+ - * /``, the test `lanes_not_positive`, and the two moves of memory that an element
+needs: `gather_edges` reads the nodal vectors of a block of elements, `scatter_pulls` subtracts
+their forces from the nodes.  So nothing is left to the good will of a loop vectoriser, and one
 source serves vectors, plain numbers and, in `qdem_fem.cuda_step`, the threads of a GPU.
 
 Nodal arrays hold four numbers a node (x, y, z and an unused one), so that a node is one load.

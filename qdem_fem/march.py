@@ -168,7 +168,7 @@ def inverted_raise(run: Simulation) -> None:
         said,
         where=f"t = {run.time:.6g} s, step {run.steps_done}",
         remedy=f"what moves {name} crushes it: lower the load or the speed, mesh finer there, or "
-        "take a shorter step",
+        "take a shorter step (the critical one is that of the undeformed mesh)",
         element=element,
     )
 

@@ -22,6 +22,7 @@ from qdem_fem.errors import ConditionError
 from qdem_fem.leapfrog import half_work, velocities_level, velocity_now
 from qdem_fem.march import march
 from qdem_fem.mass_scaling import mass_scaling_factor
+from qdem_fem.reactions import reaction
 from qdem_fem.reference_forces import (
     Strain,
     displacement_gradient,
@@ -54,7 +55,9 @@ class Energy:
     kinetic: float
     elastic: float
     external: float
-    """Work of loads, gravity and prescribed motion since the start."""
+    """Work of loads, gravity and prescribed motion since the start.
+
+    What it takes to hold a node that a user's state had moved away is not counted."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,10 @@ class Simulation:
     default, the result does not depend on it; ``mass_scaling`` [s]: raise the density of
     elements whose own critical step is shorter than this; ``device``: ``"cpu"``, or ``"cuda"``
     for a GPU (`qdem_fem.cuda_assembly`), whose results repeat to round-off only.
+
+    Bodies of one name are numbered, as messages name them.  In single precision a free body has
+    a frame of its own (`qdem_fem.body_frames`), renewed when an advance begins: bits then depend
+    on how a march is divided into advances.
 
     Velocity Verlet, as in the paper: ``v(k+1/2) = v(k-1/2) + dt f(u(k), v(k-1/2))/m``,
     ``u(k+1) = u(k) + dt v(k+1/2)``.  Not for quasi-static problems over long times, where an
@@ -347,6 +354,10 @@ class Simulation:
         goes on from there.  See `qdem_fem.dynamic_relaxation.relax` for what is raised.
         """
         return relax(self, tolerance, max_steps)
+
+    def reaction(self, condition: Held | Roller) -> Floats:
+        """Total force [N], (3,), that `fix`, `prescribe` or `roller` exerts on the body now."""
+        return reaction(self, condition)
 
     def energy(self) -> Energy:
         """Energies now [J]; elastic energy as `qdem_fem.reference_forces.elastic_energy`."""

@@ -10,7 +10,7 @@ median of five runs below two seconds and of three above, so that a busy machine
 little; all of them are recorded.
 
 Questions are in `qdem_work_problems`, methods in `qdem_work_methods`, what follows from the record
-in `qdem_work_report`.
+in `qdem_work_report`, and in words in `qdem_work_words`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ import numpy as np
 from adapters.provenance import provenance
 from validation.qdem_work_methods import Answer, answer
 from validation.qdem_work_problems import QUESTIONS, RESULTS, Question
-from validation.qdem_work_report import Row, rows_read, summary
+from validation.qdem_work_report import Row, rows_read
+from validation.qdem_work_words import summary
 
 RECORD = RESULTS / "qdem-cost.jsonl"
 LEVELS = {

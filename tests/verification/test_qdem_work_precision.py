@@ -25,6 +25,7 @@ from validation.qdem_work_reference import (
     pulse_reference,
     raised,
 )
+from validation.qdem_work_words import table
 
 Row = dict[str, Any]
 
@@ -117,7 +118,7 @@ def test_table_marks_the_cheapest_and_what_is_extrapolated() -> None:
     newmark = [
         r | {"method": "P1 Newmark", "cost_s": 10 * r["cost_s"]} for r in power_law([0.3, 0.03])
     ]
-    lines = report.table(power_law([0.3, 0.1]) + newmark, "bending").splitlines()
+    lines = table(power_law([0.3, 0.1]) + newmark, "bending").splitlines()
     assert lines[0].startswith("| error | QDEM float64 | QDEM float32 |")
     assert lines[2] == "| 30% | **0.11** | none | none | 1.1 | none |"
     assert lines[5] == "| 3% | **(11)** | none | none | 110 | none |"

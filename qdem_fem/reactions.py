@@ -1,0 +1,51 @@
+"""Forces of the supports, from the equation of motion of what they hold."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.conditions import Held, Roller
+from qdem_fem.errors import ConditionError
+from qdem_fem.leapfrog import accelerations_free, velocity_now
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+Floats = NDArray[np.float64]
+
+
+def reaction(run: Simulation, condition: Held | Roller) -> Floats:
+    """Total force of a support on the body now [N], (3,): ``sum m a - f`` over what it holds.
+
+    ``f``: what elements, loads and gravity do to its nodes; ``a``: of the motion it prescribes.
+    Of two conditions on one component both are told all of it.  Raises `ConditionError` for what
+    holds nothing in this simulation.
+    """
+    if not any(condition is known for known in (*run.conditions.held, *run.conditions.rollers)):
+        raise ConditionError(
+            "it holds nothing in this simulation",
+            where="reaction",
+            remedy="give what fix, prescribe or roller returned",
+        )
+    # the kernel's accelerations of what no element moves are none
+    forces = run.assembly.mass[:, None] * accelerations_free(
+        run, run.assembly.field("displacement"), velocity_now(run)
+    )
+    if isinstance(condition, Roller):
+        nodes = np.unique(run.master[condition.nodes])
+        return np.asarray(-(forces[nodes] @ condition.normal).sum() * condition.normal)
+    nodes, first = np.unique(run.master[condition.nodes], return_index=True)
+    total = np.zeros(3)
+    chosen = list(condition.components)
+    total[chosen] = -forces[nodes][:, chosen].sum(axis=0)
+    if condition.driver is not None:
+        before, now, after = condition.driver.sample(run.time + run.step * np.arange(-1.0, 2.0))[
+            :, 0
+        ]
+        bend = (after - 2 * now + before) / run.step**2
+        factor = np.ones(len(first)) if condition.factor is None else condition.factor[first]
+        total[chosen] += bend * (run.assembly.mass[nodes] * factor).sum()
+    return total
