@@ -80,9 +80,14 @@ def contraction(first: FloatArray, second: FloatArray) -> FloatArray:
 
 
 def cofactor(matrix: FloatArray) -> FloatArray:
-    """cof A = det(A) A^-T of every matrix, also where A has no inverse: products of its rows."""
-    rows = [matrix[..., k, :] for k in range(3)]
-    return np.stack([np.cross(rows[k - 2], rows[k - 1]) for k in range(3)], axis=-2)
+    """cof A = det(A) A^-T of every matrix, also where A has no inverse: cyclic minors."""
+    minors = np.empty_like(matrix)
+    for i, j in np.ndindex(3, 3):
+        (a, b), (c, d) = ((i - 2, i - 1), (j - 2, j - 1))
+        minors[..., i, j] = (
+            matrix[..., a, c] * matrix[..., b, d] - matrix[..., a, d] * matrix[..., b, c]
+        )
+    return minors
 
 
 def volume_change(H: FloatArray) -> FloatArray:
