@@ -11,7 +11,7 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from qdem_fem.critical_step import CriticalStep
 from qdem_fem.errors import CheckpointError
+from qdem_fem.motion import Motion
 from qdem_fem.output import write_whole
 from qdem_fem.series import Driver, Series
 
@@ -34,29 +35,14 @@ DIGEST = 64
 FUNCTION = "a function, not compared"
 
 
-@dataclass(frozen=True)
-class _Progress:
-    """Scalars of the state."""
-
-    steps_done: int
-    step: float
-    behind: bool
-    put_in: float
-    gravity_work: float
-
-
 def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
     """Write the state of ``simulation`` to ``path``; a kill leaves the old file or the new one."""
     assembly, (_, held) = simulation.assembly, simulation.packed_lists()
     critical = simulation.critical_step
-    progress = _Progress(
-        simulation.steps_done, simulation.step, simulation.behind,
-        float(simulation.put_in), float(simulation.gravity_work),
-    )  # fmt: skip
     head = {
         "format": FORMAT,
         "fingerprint": fingerprint(simulation),
-        "progress": {field.name: getattr(progress, field.name) for field in fields(progress)},
+        "motion": asdict(simulation.motion) | {"work": None},
         "critical_step": {
             field.name: getattr(critical, field.name)
             for field in fields(critical)
@@ -65,7 +51,7 @@ def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
     }
     arrays: Arrays = {
         "head": np.array(json.dumps(head)),
-        "work": simulation.work,
+        "work": simulation.motion.work,
         "previous": held.previous,
         "critical_mode": critical.mode,
     }
@@ -91,18 +77,15 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
     _compare(head["fingerprint"], fingerprint(simulation), where)
     assembly, (_, held) = simulation.assembly, simulation.packed_lists()
     try:
-        progress = _Progress(**head["progress"])
+        motion = Motion(**(head["motion"] | {"work": arrays["work"].copy()}))
         critical = CriticalStep(**head["critical_step"], mode=arrays["critical_mode"])
-        previous, work = arrays["previous"], arrays["work"]
+        previous = arrays["previous"]
         assembly.restore(arrays)
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"a part of the state is not there ({error})", where=where) from error
     held.previous[:] = previous
     simulation._critical = critical
-    simulation.step_keep(progress.step)
-    simulation.steps_done, simulation.behind = progress.steps_done, progress.behind
-    simulation.work[:] = work
-    simulation.put_in, simulation.gravity_work = progress.put_in, progress.gravity_work
+    simulation.motion = motion
 
 
 def fingerprint(simulation: Simulation) -> dict[str, str]:

@@ -136,7 +136,7 @@ def critical_step_find(run: Simulation) -> CriticalStep:
     mode = mode[run.master]
     body, element = governing_element(run, mode)
     return CriticalStep(
-        value=step,
+        value=float(step),
         omega=float(np.sqrt(max(stiffness, 0.0))),
         damping_ratio=damping / (2 * np.sqrt(stiffness)) if stiffness > 0 else 0.0,
         element=element,

@@ -90,7 +90,7 @@ def relax(simulation: Simulation, tolerance: float, max_steps: int) -> StaticAns
     found = _conjugate(problem, simulation.bodies, tolerance, max_steps)
     problem.finish(simulation, found.displacement)
     after = simulation.energy()
-    simulation.work[0] += after.elastic - before.elastic - before.kinetic
+    simulation.motion.work[0] += after.elastic - before.elastic - before.kinetic
     if not found.residual <= tolerance:
         raise NotConverged(
             f"the residual is {found.residual:.2e} after {found.steps} steps, {found.ended}; "

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 def velocity_now(run: Simulation) -> Floats:
     """Velocity at the time of the displacement [m/s], (n, 3)."""
     velocity = run.assembly.field("velocity")
-    if run.behind:
+    if run.motion.behind:
         displacement = run.assembly.field("displacement")
         change = 0.5 * run.step * _accelerations(run, displacement, velocity)
         _, held = run.packed_lists()
@@ -34,24 +34,24 @@ def velocity_now(run: Simulation) -> Floats:
 
 def velocities_behind(run: Simulation) -> None:
     """Take the velocities half a step back, if they are not there yet."""
-    if not run.behind:
+    if not run.motion.behind:
         displacement = run.assembly.field("displacement")
         velocity = run.assembly.field("velocity")
         behind = velocity - 0.5 * run.step * _accelerations(run, displacement, velocity)
-        run.work -= half_work(run, behind, velocity)
+        run.motion.work -= half_work(run, behind, velocity)
         _, held = run.packed_lists()
         held.previous[:] = _by_place(run, behind)[held.node_at]
         run.assembly.field_set("velocity", behind)
-        run.behind = True
+        run.motion.behind = True
 
 
 def velocities_level(run: Simulation) -> None:
     """Bring the velocities to the time of the displacements, if they are behind."""
-    if run.behind:
+    if run.motion.behind:
         behind, level = run.assembly.field("velocity"), velocity_now(run)
-        run.work += half_work(run, behind, level)
+        run.motion.work += half_work(run, behind, level)
         run.assembly.field_set("velocity", level)
-        run.behind = False
+        run.motion.behind = False
 
 
 def state_admit(run: Simulation) -> None:

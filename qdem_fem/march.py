@@ -35,48 +35,71 @@ def march(
     stride: int,
     nodes: Integers,
     progress: Callable[[float], None] | None,
-) -> Floats:
-    """Compute ``steps``; returns the displacement [m] of ``nodes`` every ``stride``, (k, nodes, 3).
+) -> Samples:
+    """Compute ``steps``; returns the displacement of ``nodes`` every ``stride`` steps.
 
-    Samples are at step numbers that are multiples of ``stride``.  Raises `Unstable` and
+    Raises `Unstable` and
     `ElementInverted`; `StepWarning` when an element makes the step short, or it is too long.
     """
-    if run.displacement_set:
+    motion, assembly = run.motion, run.assembly
+    if motion.displacement_set:
         state_admit(run)
-        run.displacement_set = False
-    if isnan(run.put_in):
-        run.put_in = energy_set(run)
+        motion.displacement_set = False
+    if isnan(motion.put_in):
+        motion.put_in = energy_set(run)
     step_check(run)
     velocities_behind(run)
-    assembly, (loads, held) = run.assembly, run.packed_lists()
-    start, end = run.steps_done, run.steps_done + steps
-    first = 0 if start == 0 else stride - start % stride
-    record = np.zeros((max(0, (steps - first) // stride + 1), len(nodes), 3))
-    if first == 0 and len(record):
-        record[0] = assembly.field("displacement")[nodes]
+    loads, held = run.packed_lists()
+    samples = Samples(motion.steps_done, steps, stride, len(nodes))
+    if samples.first_step == motion.steps_done and len(samples.record):
+        samples.record[0] = assembly.field("displacement")[nodes]
     most = max(16, min(WINDOW_STEPS, assembly.window_work // len(assembly.elements)))
     if run.gravity is not None and run.gravity.varying is not None:
         most = GRAVITY_STEPS
-    while run.steps_done < end:
+    end = motion.steps_done + steps
+    while motion.steps_done < end:
         assembly.frames_renew()
-        count = min(most, end - run.steps_done, assembly.steps_most(run.step))
-        times = run.step * (run.steps_done + np.arange(count + 1, dtype=float))
-        behind = run.steps_done - start - first  # steps since the first sample
-        taken = behind // stride + 1 if behind >= 0 else 0
-        ahead = taken * stride - behind
-        probes = kernel.Probes(4 * assembly.place[nodes], record[taken:], stride, ahead)
+        count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
+        times = run.step * (motion.steps_done + np.arange(count + 1, dtype=float))
+        probes = samples.probes(4 * assembly.place[nodes], motion.steps_done)
         gravity = run.gravity_at(times)
         before = moment(run) if gravity is not None else None
         done, bad = assembly.window(
-            count, run.step, loads, held, probes, run.conditions.table(times), gravity, run.work
+            count, run.step, loads, held, probes, run.conditions.table(times), gravity, motion.work
         )
-        run.steps_done += done
+        motion.steps_done += done
         if gravity is not None and before is not None and done:
-            run.gravity_work += gravity_work(gravity[: done + 1], before, moment(run), run.step)
+            after = moment(run)
+            motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
         motion_check(run, bad)
         if progress is not None:
             progress(run.time)
-    return record
+    return samples
+
+
+class Samples:
+    """Displacements at the step numbers of a march that are multiples of ``stride``.
+
+    Of the state that the march begins with only at time zero: an earlier march has it else.
+    """
+
+    def __init__(self, start: int, steps: int, stride: int, nodes: int) -> None:
+        self.stride = stride
+        self.first_step = (start // stride + 1) * stride if start else 0
+        count = max(0, (start + steps - self.first_step) // stride + 1)
+        self.record = np.zeros((count, nodes, 3))
+        """(samples, nodes, 3) [m]"""
+
+    @property
+    def step_numbers(self) -> Floats:
+        """(samples,)"""
+        return self.first_step + self.stride * np.arange(len(self.record), dtype=float)
+
+    def probes(self, node_at: Integers, steps_done: int) -> kernel.Probes:
+        """What the kernel writes from step ``steps_done`` on: the samples after it."""
+        taken = max(0, (steps_done - self.first_step) // self.stride + 1)
+        ahead = self.first_step + taken * self.stride - steps_done
+        return kernel.Probes(node_at, self.record[taken:], self.stride, ahead)
 
 
 def step_check(run: Simulation) -> None:
@@ -139,7 +162,7 @@ def gravity_work(
 def motion_check(run: Simulation, bad: float) -> None:
     """Raise when the state can not be right: energy from nothing, or ``bad`` elements."""
     kinetic = run.assembly.kinetic()
-    put_in = run.put_in + abs(run.work).sum() + abs(run.gravity_work)
+    put_in = run.motion.put_in + abs(run.motion.work).sum() + abs(run.motion.gravity_work)
     ratio = run.step / run.critical_step.value
     if not kinetic <= GROWTH * put_in and (ratio > 1 or not np.isfinite(kinetic)):
         critical = run.critical_step

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, isfinite, nan
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from qdem_fem import kernel
 from qdem_fem.assembly import Assembly
 from qdem_fem.body import Body
 from qdem_fem.checkpoint import checkpoint_read, checkpoint_write
-from qdem_fem.conditions import COMPONENTS, Conditions, Held, NodalLoad, Roller
+from qdem_fem.conditioned_bodies import ConditionedBodies
+from qdem_fem.conditions import Held, Roller
 from qdem_fem.critical_step import CriticalStep, critical_step_find
 from qdem_fem.dynamic_relaxation import StaticAnswer, relax
 from qdem_fem.errors import ConditionError
 from qdem_fem.leapfrog import half_work, velocities_level, velocity_now
 from qdem_fem.march import march
 from qdem_fem.mass_scaling import mass_scaling_factor
+from qdem_fem.motion import Motion
 from qdem_fem.reactions import reaction
 from qdem_fem.reference_forces import (
     Strain,
@@ -30,13 +32,10 @@ from qdem_fem.reference_forces import (
 )
 from qdem_fem.series import Driver, Value, is_real
 from qdem_fem.simulation_options import (
-    bodies_check,
-    bodies_number,
     bounds_check,
     numbers_check,
     words_check,
 )
-from qdem_fem.surface import faces_within, pressure_forces
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -82,7 +81,7 @@ def assembly_class(device: str) -> type[Assembly]:
     return CudaAssembly
 
 
-class Simulation:
+class Simulation(ConditionedBodies):
     """Explicit dynamics of one or several bodies.
 
     ``strain``: ``"finger"`` (the paper), ``"small"``, ``"svk"`` or ``"corotational"``;
@@ -114,11 +113,7 @@ class Simulation:
         mass_scaling: float | None = None,
         device: Literal["cpu", "cuda"] = "cpu",
     ) -> None:
-        if not isinstance(bodies, Iterable):
-            raise ConditionError(f"{bodies!r} is no list of bodies", where="simulation")
-        self.bodies = list(bodies)
-        bodies_check(self.bodies)
-        bodies_number(self.bodies)
+        super().__init__(bodies)
         words_check(strain=strain, precision=precision, device=device)
         numbers_check(step=step, safety=safety, threads=threads, mass_scaling=mass_scaling)
         bounds_check(safety=safety, threads=threads)
@@ -127,137 +122,22 @@ class Simulation:
         self.threads, self.mass_scaling = threads, mass_scaling
         self.gravity = None if gravity is None else Driver(gravity, 3, "gravity")
         self._given_step = None if step is None else float(step)
-        self._kept_step: float | None = None
-        self.conditions = Conditions()
-        self.steps_done = 0
+        self.motion = Motion()
         self.viscous = any(body.material.is_viscous for body in self.bodies)
-        counts = [len(body.nodes) for body in self.bodies]
-        self.first_node = np.concatenate([[0], np.cumsum(counts)])
-        counts = [len(body.elements) for body in self.bodies]
-        self._first_element = np.concatenate([[0], np.cumsum(counts)])
-        self.master = np.arange(self.first_node[-1])
         self._assembly: Assembly | None = None
         self._lists: tuple[kernel.Loads, kernel.Constraints] | None = None
         self._critical: CriticalStep | None = None
-        self.behind = False
-        """True while velocities are half a step behind; False: they are at the time itself."""
-        self.work = np.zeros(2)
-        """Work of the loads and of prescribed motion since the start [J]."""
-        self.displacement_set = False
-        """Whether the user set a displacement since the last march."""
         self.warned = nan
         """The critical step of which a warning was given [s]."""
-        self.put_in = nan
-        """Energy of the state that the user set [J]; NaN: not known yet."""
-        self.gravity_work = 0.0
         for body in self.bodies:
             body._simulation = self
 
-    # --- conditions ----------------------------------------------------------------------------
-
-    def fix(self, body: Body, nodes: Any, components: str = "xyz") -> Held:
-        """Hold components of nodes where they are in the reference configuration."""
-        chosen = self._components(components, "fix")
-        return self._hold(Held(self._nodes(body, nodes, "fix"), chosen))
-
-    def prescribe(
-        self,
-        body: Body,
-        nodes: Any,
-        component: str,
-        displacement: Value,
-        profile: ArrayLike | None = None,
-    ) -> Held:
-        """Give one component of the displacement [m], constant or changing with time.
-
-        ``profile`` (n,) [-], one number for every node of the body, multiplies it.
-        """
-        chosen = self._components(component, "prescribe")
-        driver = Driver(displacement, 1, "prescribe")
-        here = self._nodes(body, nodes, "prescribe")
-        factor = self._profile(body, here, profile, 1.0, "prescribe")
-        return self._hold(Held(here, chosen, driver, factor))
-
-    def roller(self, body: Body, nodes: Any, normal: ArrayLike) -> Roller:
-        """Keep nodes in the plane through them with this normal, free within it."""
-        try:
-            direction = np.asarray(normal, dtype=float)
-        except (TypeError, ValueError):
-            direction = np.zeros(3)
-        length = float(np.linalg.norm(direction)) if direction.shape == (3,) else 0.0
-        if not (np.isfinite(length) and length > 0):
-            raise ConditionError(
-                f"{normal!r} is no direction", where="roller", remedy="give three components"
-            )
-        roller = Roller(self._nodes(body, nodes, "roller"), direction / length)
-        velocities_level(self)
-        self.conditions.rollers.append(roller)
-        self._ties_changed()
-        return roller
-
-    def load(
-        self, body: Body, nodes: Any, force: Value, profile: ArrayLike | None = None
-    ) -> NodalLoad:
-        """A total ``force`` [N], three components, shared equally by the nodes (section 3.1).
-
-        With ``profile`` (n,) [-], one number for every node of the body, a node bears that share.
-        """
-        chosen = self._nodes(body, nodes, "load")
-        share = self._profile(body, chosen, profile, 1 / len(chosen), "load")
-        weights = np.repeat(share[:, None], 3, axis=1)
-        return self._load(NodalLoad(chosen, weights, Driver(force, 3, "load")))
-
-    def pressure(self, body: Body, nodes: Any, pressure: Value) -> NodalLoad:
-        """A ``pressure`` [Pa] along the inward reference normal of the faces within ``nodes``."""
-        self._offset(body)
-        local = body.nodes_select(nodes, "pressure")
-        mask = np.zeros(len(body.nodes), dtype=bool)
-        mask[local] = True
-        faces = faces_within(body.surface, mask)
-        if not len(faces):
-            raise ConditionError(
-                f"no surface face of {body.name} has all three nodes in the selection",
-                where="pressure",
-            )
-        areas = pressure_forces(body.nodes, faces, len(body.nodes))[local]
-        chosen = self._nodes(body, local, "pressure")
-        return self._load(NodalLoad(chosen, areas, Driver(pressure, 1, "pressure")))
-
-    def periodic(self, body: Body, nodes_a: Any, nodes_b: Any, tolerance: float = 1e-6) -> None:
-        """Join opposite faces: every node of ``nodes_b`` moves as its partner of ``nodes_a``.
-
-        The faces differ by one shift along an axis; partners are found by the other two
-        coordinates within ``tolerance`` of the body's size.  Before the first advance only.
-        """
-        from qdem_fem.periodic import partners
-
-        if self._assembly is not None:
-            raise ConditionError(
-                "the simulation has begun",
-                where="periodic",
-                remedy="join faces before the first advance and before asking for its step",
-            )
-        a, b = (body.nodes_select(nodes, "periodic") for nodes in (nodes_a, nodes_b))
-        first = self._offset(body)
-        one, other = partners(body.nodes, a, b, tolerance, body.name)
-        for i, j in zip(one + first, other + first, strict=True):
-            i, j = self.master[i], self.master[j]
-            self.master[self.master == max(i, j)] = min(i, j)
-
-    def remove(self, condition: NodalLoad | Held | Roller) -> None:
-        """Take back a condition that `fix`, `prescribe`, `roller`, `load`, `pressure` returned."""
-        lists: tuple[list[Any], ...] = (
-            self.conditions.loads, self.conditions.held, self.conditions.rollers
-        )  # fmt: skip
-        for conditions in lists:
-            if condition in conditions:
-                velocities_level(self)
-                conditions.remove(condition)
-                self._changed() if isinstance(condition, NodalLoad) else self._ties_changed()
-                return
-        raise ConditionError("it is none of the simulation's conditions", where="remove")
-
     # --- time ----------------------------------------------------------------------------------
+
+    @property
+    def steps_done(self) -> int:
+        """Time steps since the start."""
+        return self.motion.steps_done
 
     @property
     def time(self) -> float:
@@ -267,7 +147,7 @@ class Simulation:
     @property
     def step(self) -> float:
         """Time step [s]; once steps were done it stays, as time is counted in steps."""
-        for step in (self._given_step, self._kept_step):
+        for step in (self._given_step, self.motion.step):
             if step is not None:
                 return step
         step = self.safety * self.critical_step.value
@@ -278,10 +158,6 @@ class Simulation:
                 remedy="give step=",
             )
         return step
-
-    def step_keep(self, step: float) -> None:
-        """Keep the step [s] that the march began with."""
-        self._kept_step = step
 
     @property
     def step_is_given(self) -> bool:
@@ -333,19 +209,15 @@ class Simulation:
         steps = ceil(duration / self.step * (1 - 1e-12) - 1e-9)
         stride = max(1, round((sampling or duration / SAMPLES) / self.step)) if steps else 1
         if steps:
-            self.step_keep(self.step)
+            self.motion.step = self.step
         chosen = {name: self._probe(name, probe) for name, probe in (probes or {}).items()}
-        recorded = march(
-            self, steps, stride, np.concatenate([*chosen.values(), np.zeros(0, int)]), progress
-        )
-        start = self.steps_done - steps
-        first = 0 if start == 0 else stride - start % stride
-        numbers = start + np.arange(first, steps + 1, stride, dtype=float)
+        every = np.concatenate([*chosen.values(), np.zeros(0, int)])
+        samples = march(self, steps, stride, every, progress)
         values, column = {}, 0
         for name, nodes in chosen.items():
-            values[name] = recorded[:, column : column + len(nodes)].mean(axis=1)
+            values[name] = samples.record[:, column : column + len(nodes)].mean(axis=1)
             column += len(nodes)
-        return History(numbers * self.step, values)
+        return History(samples.step_numbers * self.step, values)
 
     def relax(self, tolerance: float = 1e-8, max_steps: int = 100_000) -> StaticAnswer:
         """Bring the bodies to rest in equilibrium with the loads of the present time.
@@ -371,8 +243,8 @@ class Simulation:
             elastic += elastic_energy(
                 gradient, volumes, material.lame_first, material.lame_second, self.strain
             ).sum()
-        external = float(self.work.sum()) + self.gravity_work
-        if self.behind:
+        external = float(self.motion.work.sum()) + self.motion.gravity_work
+        if self.motion.behind:
             external += float(half_work(self, self.assembly.field("velocity"), velocity).sum())
         return Energy(kinetic, float(elastic), external)
 
@@ -401,7 +273,7 @@ class Simulation:
             for name in ("displacement", "velocity"):
                 fields = [getattr(body, f"_{name}") for body in self.bodies]
                 self._assembly.field_set(name, np.concatenate(fields))
-            self.displacement_set = any(body._displacement.any() for body in self.bodies)
+            self.motion.displacement_set = any(body._displacement.any() for body in self.bodies)
         return self._assembly
 
     # --- for the march and the files -----------------------------------------------------------
@@ -416,73 +288,16 @@ class Simulation:
         """Gravity [m/s^2], (k, 3), at ``times`` (k,) [s]; None without."""
         return None if self.gravity is None else self.gravity.sample(times)
 
-    def _offset(self, body: Body) -> int:
-        if not any(body is member for member in self.bodies):
-            name = body.name if isinstance(body, Body) else f"a {type(body).__name__}"
-            raise ConditionError(
-                f"{name} is not a body of this simulation",
-                where="body",
-                remedy="the first argument is one of the bodies it was made of",
-            )
-        return int(self.first_node[[body is member for member in self.bodies].index(True)])
+    def _begun(self) -> bool:
+        return self._assembly is not None
 
-    def _nodes(self, body: Body, nodes: Any, where: str) -> Integers:
-        start = self._offset(body)
-        return body.nodes_select(nodes, where) + start
-
-    def _probe(self, name: str, probe: Any) -> Integers:
-        if isinstance(probe, tuple) and len(probe) == 2 and isinstance(probe[0], Body):
-            return self._nodes(probe[0], probe[1], f"probe {name}")
-        if len(self.bodies) > 1:
-            raise ConditionError(
-                "with several bodies a probe is a pair (body, nodes)", where=f"probe {name}"
-            )
-        return self._nodes(self.bodies[0], probe, f"probe {name}")
-
-    @staticmethod
-    def _components(components: str, where: str) -> tuple[int, ...]:
-        if not isinstance(components, str) or not components or set(components) - set(COMPONENTS):
-            raise ConditionError(f"components are of 'xyz', not {components!r}", where=where)
-        return tuple(sorted({COMPONENTS.index(c) for c in components}))
-
-    def _profile(
-        self, body: Body, nodes: Integers, profile: ArrayLike | None, default: float, where: str
-    ) -> Floats:
-        """Factors of the chosen nodes, (k,)."""
-        if profile is None:
-            return np.full(len(nodes), default)
-        try:
-            every = np.asarray(profile, dtype=float)
-        except (TypeError, ValueError):
-            every = np.zeros(0)
-        if every.shape != (len(body.nodes),) or not np.isfinite(every).all():
-            raise ConditionError(
-                f"a profile has one finite number for each of the {len(body.nodes)} nodes of "
-                f"{body.name}",
-                where=where,
-            )
-        return every[nodes - self._offset(body)]
-
-    def _hold(self, held: Held) -> Held:
+    def _before_change(self) -> None:
         velocities_level(self)
-        self.conditions.held.append(held)
-        self._ties_changed()
-        return held
 
-    def _load(self, load: NodalLoad) -> NodalLoad:
-        velocities_level(self)
-        self.conditions.loads.append(load)
-        self._changed()
-        return load
-
-    def _changed(self) -> None:
-        """Conditions changed (after `velocities_level`): the kernel's lists are made anew."""
+    def _changed(self, ties: bool) -> None:
         self._lists = None
-
-    def _ties_changed(self) -> None:
-        """What is held changed: the critical step too."""
-        self._critical = None
-        self._changed()
+        if ties:
+            self._critical = None
 
     def _field_of(self, body: Body, name: str) -> Floats:
         every = velocity_now(self) if name == "velocity" else self.assembly.field(name)
@@ -497,5 +312,5 @@ class Simulation:
         field = self.assembly.field(name)
         field[start : start + len(body.nodes)] = values
         self.assembly.field_set(name, field)
-        self.displacement_set |= name == "displacement"
-        self.put_in = nan
+        self.motion.displacement_set |= name == "displacement"
+        self.motion.put_in = nan

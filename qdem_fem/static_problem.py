@@ -65,7 +65,7 @@ class StaticProblem:
         simulation.assembly.field_set("displacement", moved)
         simulation.assembly.field_set("velocity", np.zeros_like(moved))
         simulation.packed_lists()[1].previous[:] = 0.0
-        simulation.behind = False
+        simulation.motion.behind = False
 
     def project(self, field: Floats) -> Floats:
         """``field`` without what is held: given components and normals of rollers."""

@@ -169,7 +169,7 @@ def quick_checks() -> list[Check]:
 
 
 def full() -> Outcome:
-    """Bars of up to 80 cells a wave, a ring of 13,824 elements besides, a finer block."""
+    """Bars of up to 80 cells a wave, a ring of 27,648 elements besides, a finer block."""
     return Outcome(
         [
             *wave_checks([10, 20, 40, 80]),

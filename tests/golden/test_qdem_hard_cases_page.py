@@ -22,7 +22,7 @@ QUOTED: list[tuple[str, tuple[str, ...]]] = [
     (f"motion over two periods {NUMBER}; ", ("sliver", "motion over two")),
     (f"; {NUMBER} times as many steps", ("sliver", "steps, times those")),
     (f"a step {NUMBER} times the element bound", ("sliver", "fastest element alone")),
-    (f"the fastest element alone, would be {NUMBER} times", ("sliver", "fastest element alone")),
+    (f"the fastest element alone would be {NUMBER} times", ("sliver", "fastest element alone")),
     (f"static field {NUMBER}; ", ("sizes 1 to 1000", "static field")),
     (f"; {NUMBER} times fewer steps for", ("sizes 1 to 1000", "scaled to 0.2 ", "fewer steps")),
     (f"times fewer steps for {NUMBER} % of mass", ("sizes", "scaled to 0.2 ", "mass added")),

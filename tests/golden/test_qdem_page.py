@@ -44,3 +44,15 @@ def test_tips_of_the_table_follow_the_reference() -> None:
         tips = table["tip [um]"][chosen][table["elements"][chosen].argsort()]
         assert (tips[1:] > tips[:-1]).all()
         assert tips.max() < limit
+
+
+def test_what_the_page_says_of_costs() -> None:
+    """Relaxation costs about what multigrid costs; quadratic elements are far ahead of both."""
+    large, table = table_read("static-paper-size"), table_read("static")
+    cost = dict(zip(large["method"], large["processor time [s]"], strict=True))
+    assert 0.5 < cost["QDEM, relaxed"] / cost["scikit-fem, linear"] < 2
+    limit = quadratic_limit(table)
+    dear = large["tip [um]"][large["method"] == "QDEM, relaxed"][0]
+    middle = (table["method"] == "scikit-fem, quadratic") & (table["elements"] == 2304)
+    assert table["processor time [s]"][middle] < 0.2 * cost["QDEM, relaxed"]
+    assert abs(table["tip [um]"][middle][0] / limit - 1) < 0.2 * abs(dear / limit - 1)

@@ -41,8 +41,8 @@ def state_of(run: q.Simulation) -> list[Any]:
     """Everything a step reads and every sum it adds to, in the kernel's own bits."""
     state = run.assembly.state
     return [
-        run.steps_done, run.behind, run.time, repr(run.put_in), run.gravity_work,
-        *(a.tobytes() for a in (state.displacement, state.velocity, run.work)),
+        repr(run.motion), run.time,
+        *(a.tobytes() for a in (state.displacement, state.velocity, run.motion.work)),
         run.packed_lists()[1].previous.tobytes(), run.energy(), run.critical_step.value,
     ]  # fmt: skip
 

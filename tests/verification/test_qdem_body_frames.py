@@ -172,7 +172,7 @@ def test_loads_act_as_they_do_in_double_precision(scene: str, gravity: Any) -> N
         body, run = thrown(precision, (1, 2, 3), (300, 0, 400), gravity=gravity)
         SCENES[scene](run, body)
         history = run.advance(1e-3, {"one": 7}, sampling=5e-5)
-        results.append((body.displacement, history["one"], run.work[0], run.energy()))
+        results.append((body.displacement, history["one"], run.motion.work[0], run.energy()))
     (u, path, work, energy), (u2, path2, work2, energy2) = results
     np.testing.assert_allclose(u2, u, rtol=0, atol=20 * EPS * abs(u).max())
     np.testing.assert_allclose(path2, path, rtol=0, atol=20 * EPS * abs(u).max())

@@ -2,7 +2,7 @@
 
     trackbed validate qdem --quick      meshes to 18,432 elements: a minute
     trackbed validate qdem              meshes to the paper's 488,400: what the record holds, and
-                                        what is missing there is computed, three quarters of an hour
+                                        what is missing there is computed, half an hour in all
     python -m validation.cases.qdem     the parts of the record, and the code that made them
     python -m validation.cases.qdem --redo [PART ...]     compute parts again, or those made by
                                         earlier code

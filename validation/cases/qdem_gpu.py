@@ -179,7 +179,7 @@ def twins_apart(strain: Any, precision: Precision, viscous: bool, conditions: Co
             for n in (TWIN_STEPS // 2 + 1, TWIN_STEPS - TWIN_STEPS // 2 - 1)
         ]
         samples = np.concatenate([history["all"] for history in histories])
-        results.append((body.displacement, body.velocity, samples, run.work.copy(), run))
+        results.append((body.displacement, body.velocity, samples, run.motion.work.copy(), run))
     (u, v, samples, work, run), (u2, v2, samples2, work2, _) = results
     fastest = max(abs(v).max(), abs(u).max() / run.step)
     energy = 0.5 * run.assembly.mass.sum() * fastest**2

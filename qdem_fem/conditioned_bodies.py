@@ -1,0 +1,210 @@
+"""Bodies and the conditions that a user gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from qdem_fem.body import Body
+from qdem_fem.conditions import COMPONENTS, Conditions, Held, NodalLoad, Roller
+from qdem_fem.errors import ConditionError
+from qdem_fem.series import Driver, Value
+from qdem_fem.simulation_options import bodies_check, bodies_number
+from qdem_fem.surface import faces_within, pressure_forces
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class ConditionedBodies:
+    """Bodies side by side, numbered through, and what holds, moves and loads them.
+
+    Base of `qdem_fem.Simulation`.  A selection of nodes is a mask (n,), an index or indices.
+    """
+
+    def __init__(self, bodies: Sequence[Body]) -> None:
+        if not isinstance(bodies, Iterable):
+            raise ConditionError(f"{bodies!r} is no list of bodies", where="simulation")
+        self.bodies = list(bodies)
+        bodies_check(self.bodies)
+        bodies_number(self.bodies)
+        self.conditions = Conditions()
+        counts = [len(body.nodes) for body in self.bodies]
+        self.first_node = np.concatenate([[0], np.cumsum(counts)])
+        """First node of every body in the numbers of all, and their count, (bodies + 1,)."""
+        self.master = np.arange(self.first_node[-1])
+        """The node that a node moves with: itself unless periodic, (n,)."""
+
+    def fix(self, body: Body, nodes: Any, components: str = "xyz") -> Held:
+        """Hold components of nodes where they are in the reference configuration."""
+        chosen = self._components(components, "fix")
+        return self._hold(Held(self._nodes(body, nodes, "fix"), chosen))
+
+    def prescribe(
+        self,
+        body: Body,
+        nodes: Any,
+        component: str,
+        displacement: Value,
+        profile: ArrayLike | None = None,
+    ) -> Held:
+        """Give one component of the displacement [m], constant or changing with time.
+
+        ``profile`` (n,) [-], one number for every node of the body, multiplies it.
+        """
+        chosen = self._components(component, "prescribe")
+        driver = Driver(displacement, 1, "prescribe")
+        here = self._nodes(body, nodes, "prescribe")
+        factor = self._profile(body, here, profile, 1.0, "prescribe")
+        return self._hold(Held(here, chosen, driver, factor))
+
+    def roller(self, body: Body, nodes: Any, normal: ArrayLike) -> Roller:
+        """Keep nodes in the plane through them with this normal, free within it."""
+        try:
+            direction = np.asarray(normal, dtype=float)
+        except (TypeError, ValueError):
+            direction = np.zeros(3)
+        length = float(np.linalg.norm(direction)) if direction.shape == (3,) else 0.0
+        if not (np.isfinite(length) and length > 0):
+            raise ConditionError(
+                f"{normal!r} is no direction", where="roller", remedy="give three components"
+            )
+        roller = Roller(self._nodes(body, nodes, "roller"), direction / length)
+        self._before_change()
+        self.conditions.rollers.append(roller)
+        self._changed(ties=True)
+        return roller
+
+    def load(
+        self, body: Body, nodes: Any, force: Value, profile: ArrayLike | None = None
+    ) -> NodalLoad:
+        """A total ``force`` [N], three components, shared equally by the nodes (section 3.1).
+
+        With ``profile`` (n,) [-], one number for every node of the body, a node bears that share.
+        """
+        chosen = self._nodes(body, nodes, "load")
+        share = self._profile(body, chosen, profile, 1 / len(chosen), "load")
+        weights = np.repeat(share[:, None], 3, axis=1)
+        return self._load(NodalLoad(chosen, weights, Driver(force, 3, "load")))
+
+    def pressure(self, body: Body, nodes: Any, pressure: Value) -> NodalLoad:
+        """A ``pressure`` [Pa] along the inward reference normal of the faces within ``nodes``."""
+        self._offset(body)
+        local = body.nodes_select(nodes, "pressure")
+        mask = np.zeros(len(body.nodes), dtype=bool)
+        mask[local] = True
+        faces = faces_within(body.surface, mask)
+        if not len(faces):
+            raise ConditionError(
+                f"no surface face of {body.name} has all three nodes in the selection",
+                where="pressure",
+            )
+        areas = pressure_forces(body.nodes, faces, len(body.nodes))[local]
+        chosen = self._nodes(body, local, "pressure")
+        return self._load(NodalLoad(chosen, areas, Driver(pressure, 1, "pressure")))
+
+    def periodic(self, body: Body, nodes_a: Any, nodes_b: Any, tolerance: float = 1e-6) -> None:
+        """Join opposite faces: every node of ``nodes_b`` moves as its partner of ``nodes_a``.
+
+        The faces differ by one shift along an axis; partners are found by the other two
+        coordinates within ``tolerance`` of the body's size.  Before the first advance only.
+        """
+        from qdem_fem.periodic import partners
+
+        if self._begun():
+            raise ConditionError(
+                "the simulation has begun",
+                where="periodic",
+                remedy="join faces before the first advance and before asking for its step",
+            )
+        a, b = (body.nodes_select(nodes, "periodic") for nodes in (nodes_a, nodes_b))
+        first = self._offset(body)
+        one, other = partners(body.nodes, a, b, tolerance, body.name)
+        for i, j in zip(one + first, other + first, strict=True):
+            i, j = self.master[i], self.master[j]
+            self.master[self.master == max(i, j)] = min(i, j)
+
+    def remove(self, condition: NodalLoad | Held | Roller) -> None:
+        """Take back a condition that `fix`, `prescribe`, `roller`, `load`, `pressure` returned."""
+        lists: tuple[list[Any], ...] = (
+            self.conditions.loads, self.conditions.held, self.conditions.rollers
+        )  # fmt: skip
+        for conditions in lists:
+            if condition in conditions:
+                self._before_change()
+                conditions.remove(condition)
+                self._changed(ties=not isinstance(condition, NodalLoad))
+                return
+        raise ConditionError("it is none of the simulation's conditions", where="remove")
+
+    def _offset(self, body: Body) -> int:
+        if not any(body is member for member in self.bodies):
+            name = body.name if isinstance(body, Body) else f"a {type(body).__name__}"
+            raise ConditionError(
+                f"{name} is not a body of this simulation",
+                where="body",
+                remedy="the first argument is one of the bodies it was made of",
+            )
+        return int(self.first_node[[body is member for member in self.bodies].index(True)])
+
+    def _nodes(self, body: Body, nodes: Any, where: str) -> Integers:
+        start = self._offset(body)
+        return body.nodes_select(nodes, where) + start
+
+    def _probe(self, name: str, probe: Any) -> Integers:
+        if isinstance(probe, tuple) and len(probe) == 2 and isinstance(probe[0], Body):
+            return self._nodes(probe[0], probe[1], f"probe {name}")
+        if len(self.bodies) > 1:
+            raise ConditionError(
+                "with several bodies a probe is a pair (body, nodes)", where=f"probe {name}"
+            )
+        return self._nodes(self.bodies[0], probe, f"probe {name}")
+
+    @staticmethod
+    def _components(components: str, where: str) -> tuple[int, ...]:
+        if not isinstance(components, str) or not components or set(components) - set(COMPONENTS):
+            raise ConditionError(f"components are of 'xyz', not {components!r}", where=where)
+        return tuple(sorted({COMPONENTS.index(c) for c in components}))
+
+    def _profile(
+        self, body: Body, nodes: Integers, profile: ArrayLike | None, default: float, where: str
+    ) -> Floats:
+        """Factors of the chosen nodes, (k,)."""
+        if profile is None:
+            return np.full(len(nodes), default)
+        try:
+            every = np.asarray(profile, dtype=float)
+        except (TypeError, ValueError):
+            every = np.zeros(0)
+        if every.shape != (len(body.nodes),) or not np.isfinite(every).all():
+            raise ConditionError(
+                f"a profile has one finite number for each of the {len(body.nodes)} nodes of "
+                f"{body.name}",
+                where=where,
+            )
+        return every[nodes - self._offset(body)]
+
+    def _hold(self, held: Held) -> Held:
+        self._before_change()
+        self.conditions.held.append(held)
+        self._changed(ties=True)
+        return held
+
+    def _load(self, load: NodalLoad) -> NodalLoad:
+        self._before_change()
+        self.conditions.loads.append(load)
+        self._changed(ties=False)
+        return load
+
+    def _begun(self) -> bool:
+        """Whether nodes can no longer be joined."""
+        return False
+
+    def _before_change(self) -> None:
+        """Called before the conditions change."""
+
+    def _changed(self, ties: bool) -> None:
+        """Called when they have changed; ``ties``: in what is held."""
