@@ -96,8 +96,8 @@ def test_order_of_convergence() -> None:
 
 def test_failed_runs_are_not_counted() -> None:
     """Neither in a family, nor in a cost."""
-    good, failed = row(0.1, 1.0), row(None, None, 2000)
-    assert report.family([good, failed], "bending", "QDEM float64") == [good]
+    good, failed, wrong = row(0.1, 1.0), row(None, None, 2000), row(0.01, 0.1, 3000, ok=False)
+    assert report.family([good, failed, wrong], "bending", "QDEM float64") == [good]
 
 
 def test_families_keep_settings_apart() -> None:
