@@ -24,6 +24,11 @@ lint:
 bench:
 	@./setup.sh bench
 	$(bin)/trackbed validate dump-speed
+	$(bin)/trackbed validate qdem-speed
 
-validate: setup
+validate:
+	@./setup.sh test
 	$(bin)/trackbed validate settlement --quick
+	$(bin)/trackbed validate qdem --quick
+	$(bin)/trackbed validate qdem-cost --quick
+	$(bin)/trackbed validate qdem-hard-cases --quick

@@ -13,6 +13,8 @@ from qdem_fem.ordering import order_for_locality
 
 ALIGNMENT = 64
 """Bytes of a cache line: a node's four numbers never straddle two of them."""
+LARGE_PAGE = 1 << 21
+"""Bytes of a large page of memory."""
 CHUNK_ELEMENTS = 32_768
 CHUNKS_LEAST, CHUNKS_MOST = 4, 256
 PARALLEL_ELEMENTS = 2_048
@@ -26,11 +28,19 @@ Integers = NDArray[np.int64]
 
 
 def aligned_zeros(count: int, dtype: DTypeLike) -> Floats:
-    """Zeros that begin on a cache line."""
+    """Zeros that begin on a cache line, or, if there are many, on a large page.
+
+    NumPy asks for large pages where it does not clear the memory itself.  In small pages the
+    speed of a run hangs on where the system happens to put them.
+    """
     kind = np.dtype(dtype)
-    raw = np.zeros(count * kind.itemsize + ALIGNMENT, dtype=np.uint8)
-    start = -raw.ctypes.data % ALIGNMENT
-    return raw[start : start + count * kind.itemsize].view(kind)
+    size = count * kind.itemsize
+    alignment = ALIGNMENT if size < LARGE_PAGE // 2 else LARGE_PAGE
+    raw = np.empty(size + 2 * alignment, dtype=np.uint8)
+    start = -raw.ctypes.data % alignment
+    zeros = raw[start : start + size].view(kind)
+    zeros[:] = 0
+    return zeros
 
 
 def chunk_count(n_elements: int) -> int:
