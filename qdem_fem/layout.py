@@ -30,8 +30,8 @@ Integers = NDArray[np.int64]
 def aligned_zeros(count: int, dtype: DTypeLike) -> Floats:
     """Zeros that begin on a cache line, or, if there are many, on a large page.
 
-    NumPy asks for large pages where it does not clear the memory itself.  In small pages the
-    speed of a run hangs on where the system happens to put them.
+    NumPy asks the system for large pages where it does not clear the memory itself; they spare
+    translations of addresses.
     """
     kind = np.dtype(dtype)
     size = count * kind.itemsize
