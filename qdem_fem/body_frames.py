@@ -106,9 +106,9 @@ class BodyFrames:
             left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
             self.rotation[:-1][moving] = (left @ right)[moving]
 
-    def displacement_world(self, own: Floats, shift: Floats | None = None) -> Floats:
+    def displacement_world(self, own: Floats) -> Floats:
         """``u`` of ``u'`` (n, 3) [m]; in the laboratory's frame to the same bits."""
-        return self._displacement_at(slice(None), own, self.shift if shift is None else shift)
+        return self._displacement_at(slice(None), own, self.shift)
 
     def _displacement_at(self, nodes: slice | Integers, own: Floats, shift: Floats) -> Floats:
         frame = self.of_node[nodes]
