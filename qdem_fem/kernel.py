@@ -33,6 +33,7 @@ from qdem_fem.lanes import (
     row_load,
     row_store,
     scatter_pulls,
+    stack_align,
 )
 
 MATHEMATICS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "reassoc"}}
@@ -155,6 +156,7 @@ def chunk_forces(
     ``displacement`` [m], ``velocity`` [m/s], ``forces`` [N]: flat, four numbers a node.
     Returns how many of its elements are inverted or not finite.
     """
+    stack_align()
     width = lane_count_of(rows)
     bad: Any = lanes_zero(rows)
     for block in range(first_block, stop_block):
@@ -241,8 +243,13 @@ class Layout(NamedTuple):
     """First block of every chunk, and the end, (chunks + 1,)."""
     chunk_shift: Any
     """Place of a node's force in the chunk's window, less 4 x its number, (chunks,)."""
-    piece_node: Any
-    """First node of every piece of the motion, and the end, (pieces + 1,)."""
+    piece_first: Any
+    """First node of every piece of the motion, (pieces,)."""
+    piece_stop: Any
+    """The node after its last, (pieces,)."""
+    chunk_piece: Any
+    """First of the pieces whose forces are in this chunk's window alone, (chunks + 1,); the
+    pieces from the last entry on are in several windows."""
     piece_window: Any
     """First of the piece's entries in ``window_shift``, and the end, (pieces + 1,)."""
     window_shift: Any
@@ -376,22 +383,31 @@ def window_build(variant: str) -> Any:
         """
         stamp = made_from  # noqa: F841  (makes it a part of the key)
         corners, rows, chunk_block, chunk_shift = layout[0], layout[1], layout[2], layout[3]
-        piece_node, piece_window, window_shift = layout[4], layout[5], layout[6]
+        piece_first, piece_stop, chunk_piece = layout[4], layout[5], layout[6]
+        piece_window, window_shift = layout[7], layout[8]
         displacement, velocity, forces, inverse_mass = state[0], state[1], state[2], state[3]
         bad = np.zeros(chunk_shift.size)
+        shared = chunk_piece[-1]
         for k in range(steps):
+            loads_apply(loads, table[k], forces)
+            work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
             for c in prange(chunk_shift.size):
                 bad[c] = chunk_forces(
                     law, viscous, corners, rows, chunk_block[c], chunk_block[c + 1], displacement,
                     velocity, forces, chunk_shift[c],
                 )  # fmt: skip
-            loads_apply(loads, table[k], forces)
-            work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
-            for p in prange(piece_node.size - 1):
+                # no other chunk needs these nodes; while they are in the cache, they move
+                for p in range(chunk_piece[c], chunk_piece[c + 1]):
+                    piece_motion(
+                        piece_first[p], piece_stop[p], window_shift, piece_window[p],
+                        piece_window[p + 1], forces, inverse_mass, displacement, velocity, step,
+                        gravity, k,
+                    )  # fmt: skip
+            for s in prange(piece_first.size - shared):
                 piece_motion(
-                    piece_node[p], piece_node[p + 1], window_shift, piece_window[p],
-                    piece_window[p + 1], forces, inverse_mass, displacement, velocity, step,
-                    gravity, k,
+                    piece_first[shared + s], piece_stop[shared + s], window_shift,
+                    piece_window[shared + s], piece_window[shared + s + 1], forces, inverse_mass,
+                    displacement, velocity, step, gravity, k,
                 )  # fmt: skip
             work[1] += constraints_apply(held, table[k + 1], state, step)
             work[0] += 0.5 * step * loads_power(loads, table[k], velocity)

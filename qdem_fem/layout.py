@@ -108,18 +108,22 @@ def layout_build(
         np.concatenate([window_low, window_stop, np.arange(0, used, PIECE_NODES), [0, used]])
     )
     holds = (window_low <= cuts[:-1, None]) & (window_stop >= cuts[1:, None])
-    piece, window = np.nonzero(holds)
+    chunk_of = np.where(holds.sum(axis=1) == 1, np.argmax(holds, axis=1), chunks)
     held = np.flatnonzero(holds.any(axis=1))  # a node between two windows is in no element
+    order = held[np.argsort(chunk_of[held], kind="stable")]
+    piece, window = np.nonzero(holds[order])
     node_window = np.full(n_nodes, -1, dtype=np.int64)
-    for k in held[::-1]:
+    for k in held:
         node_window[cuts[k] : cuts[k + 1]] = chunk_shift[np.argmax(holds[k])]
     layout = Layout(
         corners=np.ascontiguousarray(4 * corners.transpose(0, 2, 1)).astype(np.int32).ravel(),
         rows=rows,
         chunk_block=chunk_block.astype(np.int64),
         chunk_shift=chunk_shift.astype(np.int64),
-        piece_node=cuts.astype(np.int64),
-        piece_window=np.searchsorted(piece, np.arange(len(cuts))).astype(np.int64),
+        piece_first=cuts[:-1][order].astype(np.int64),
+        piece_stop=cuts[1:][order].astype(np.int64),
+        chunk_piece=np.searchsorted(chunk_of[order], np.arange(chunks + 1)).astype(np.int64),
+        piece_window=np.searchsorted(piece, np.arange(len(order) + 1)).astype(np.int64),
         window_shift=chunk_shift[window].astype(np.int64),
     )
     return Packed(layout, node_order, node_place, element_order, int(starts[-1]), node_window)

@@ -2,7 +2,8 @@
 
 Threads of MKL and of OpenMP that wait for work spin, for 0.2 s or without end, and would take the
 processors from whoever comes next.  So a contestant's process is stopped by a signal between its
-turns.  They take turns in several rounds, so that a change of the machine's speed hits all alike.
+turns.  They take turns in several rounds, so that a change of the machine's speed hits all alike,
+in new processes in every round, so that none is judged by where its memory happened to lie.
 """
 
 from __future__ import annotations
@@ -148,16 +149,16 @@ class Runner:
             text=True,
             env=environment(contestant),
         )
-        self.name, self.turns = contestant.name, list[Turn]()
+        self.name = contestant.name
         self.ready = self._answer()
 
-    def turn(self, seconds: float) -> None:
+    def turn(self, seconds: float) -> Turn:
         """Let it compute for about so long."""
         assert self.process.stdin is not None
         self.process.send_signal(signal.SIGCONT)
         self.process.stdin.write(f"{seconds}\n")
         self.process.stdin.flush()
-        self.turns.append(Turn(**self._answer()))
+        return Turn(**self._answer())
 
     def _answer(self) -> Any:
         assert self.process.stdout is not None
@@ -176,26 +177,36 @@ class Runner:
 def race(
     contestants: list[Contestant], folder: Path, rounds: int, seconds: float
 ) -> dict[Contestant, Result]:
-    """Turns of all contestants, A, B, C, A, B, C, ...; repeated up to twice while not quiet."""
-    runners: dict[Contestant, Runner] = {}
-    try:
-        for contestant in contestants:
-            runners[contestant] = Runner(contestant, folder)
-        for number in range(3 * rounds):
-            results = {c: _result(runner) for c, runner in runners.items()}
-            late = [c for c, result in results.items() if result.quiet_turns < QUIET_ROUNDS]
-            if number >= rounds and not late:
-                break
-            for contestant in contestants if number < rounds else late:
-                runners[contestant].turn(seconds)
-        return {c: _result(runner) for c, runner in runners.items()}
-    finally:
-        for runner in runners.values():
-            runner.end()
+    """Turns of all contestants, A, B, C, A, B, C, ..., in processes that are new in every round.
 
+    Where the system puts a process's memory can cost it a third of its speed as long as it lives,
+    so a median over turns of one process would be a judgement on that place.  Up to twice as many
+    rounds more for those without enough quiet turns.
+    """
+    answers: dict[Contestant, list[Any]] = {contestant: [] for contestant in contestants}
+    turns: dict[Contestant, list[Turn]] = {contestant: [] for contestant in contestants}
 
-def _result(runner: Runner) -> Result:
-    return Result(runner.ready["elements"], tuple(runner.turns), runner.ready["tip"])
+    def results() -> dict[Contestant, Result]:
+        return {
+            c: Result(answers[c][-1]["elements"], tuple(turns[c]), answers[c][-1]["tip"])
+            for c in contestants
+        }
+
+    racing = contestants
+    for number in range(3 * rounds):
+        if number >= rounds:
+            racing = [c for c, result in results().items() if result.quiet_turns < QUIET_ROUNDS]
+        runners: dict[Contestant, Runner] = {}
+        try:
+            for contestant in racing:
+                runners[contestant] = Runner(contestant, folder)
+            for contestant, runner in runners.items():
+                turns[contestant].append(runner.turn(seconds))
+                answers[contestant].append(runner.ready)
+        finally:
+            for runner in runners.values():
+                runner.end()
+    return results()
 
 
 def environment(contestant: Contestant) -> dict[str, str]:

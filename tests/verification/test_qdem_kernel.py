@@ -307,6 +307,15 @@ def test_the_loop_over_elements_is_packed(precision: str, viscous: bool) -> None
 
 
 @pytest.mark.skipif(not hasattr(os, "uname") or os.uname().machine != "x86_64", reason="x86 only")
+@VISCOUS
+@PRECISION
+def test_registers_are_spilled_to_an_aligned_stack(precision: str, viscous: bool) -> None:
+    """Else a process is slower or not by where its stack happens to lie, by 6 % and more."""
+    code = machine_code(kernel.chunk_forces, *chunk_arguments(precision, viscous))
+    assert any(re.match(rf"andq\s+\$-{lanes.REGISTER_BITS // 8}, %rsp", line) for line in code)
+
+
+@pytest.mark.skipif(not hasattr(os, "uname") or os.uname().machine != "x86_64", reason="x86 only")
 def test_a_scalar_kernel_would_be_seen() -> None:
     """The same element functions in a loop over plain numbers do not pass the test above."""
     gradient, stress_of = (

@@ -1,0 +1,217 @@
+"""The friction problem: relative velocities ``u = W r + q`` under Coulomb's law, and its answer.
+
+The same form serves forces and accelerations (eq. 26), impulses and velocities of a time step,
+and collisions (eq. 35).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.cones import natural_residual
+from rigid_lcp.errors import ProblemError
+
+Floats = NDArray[np.float64]
+Status = Literal["solved", "not converged", "no solution", "cycled", "singular"]
+"""What became of a problem: ``no solution`` is a proof (a ray), the others are not."""
+
+
+@dataclass(frozen=True)
+class BodySpace:
+    """W by its factors, ``W = J M^-1 J^T``: small where W fills in, as bodies have many contacts.
+
+    ``jacobian`` J (nc * dim, ndof) CSR: relative velocities of the contacts from those of the
+    bodies; ``inverse_mass`` M^-1 (ndof, ndof) sparse, symmetric, block diagonal [1/kg, 1/(kg m^2)];
+    a body that can not move has no columns in J.  ``body_size``: freedoms of a body, 3 in 2D and
+    6 in 3D.
+    """
+
+    jacobian: sp.csr_array
+    inverse_mass: sp.csr_array
+    body_size: int
+
+    @cached_property
+    def matrix(self) -> sp.csr_array:
+        """W, (nc * dim, nc * dim)."""
+        return sp.csr_array(self.jacobian @ self.inverse_mass @ self.jacobian.T)
+
+    @cached_property
+    def diagonal(self) -> Floats:
+        """The diagonal of W, without W."""
+        half = self.jacobian @ self.inverse_mass
+        return np.asarray(half.multiply(self.jacobian).sum(axis=1)).ravel()
+
+    def product(self, force: Floats) -> Floats:
+        """``W r``."""
+        return np.asarray(self.jacobian @ (self.inverse_mass @ (self.jacobian.T @ force)))
+
+
+@dataclass(frozen=True)
+class FrictionProblem:
+    """``u = W r + q`` with K* containing ``u + mu |u_T| n``, orthogonal to r in K.
+
+    ``matrix`` W (nc * dim, nc * dim) CSR, or None where ``bodies`` has its factors; it need be
+    neither regular nor quite symmetric.  ``offset`` q (nc * dim,); ``friction`` mu (nc,).
+    Made by `friction_problem`, which checks all of it.
+    """
+
+    matrix: sp.csr_array | None
+    offset: Floats
+    friction: Floats
+    dim: int
+    bodies: BodySpace | None = None
+
+    @property
+    def contacts(self) -> int:
+        """Number of contacts nc."""
+        return len(self.friction)
+
+    @cached_property
+    def delassus(self) -> sp.csr_array:
+        """W itself, made from its factors if need be."""
+        if self.matrix is not None:
+            return self.matrix
+        assert self.bodies is not None
+        return self.bodies.matrix
+
+    @cached_property
+    def rho(self) -> float:
+        """``1 / mean(diag W)``: force per velocity that makes the two comparable."""
+        diagonal = self.bodies.diagonal if self.bodies is not None else self.delassus.diagonal()
+        mean = float(diagonal.mean()) if len(diagonal) else 1.0
+        return 1.0 / mean if mean > 0 else 1.0
+
+    def velocity(self, force: Floats) -> Floats:
+        """``u = W r + q``, (nc * dim,)."""
+        if self.matrix is None and self.bodies is not None:
+            return self.bodies.product(force) + self.offset
+        return np.asarray(self.delassus @ force) + self.offset
+
+    def residual(self, force: Floats) -> float:
+        """Scale-free natural residual of forces r (nc * dim,), see `rigid_lcp.cones`."""
+        shape = (self.contacts, self.dim)
+        velocity = self.velocity(force).reshape(shape)
+        return natural_residual(
+            np.ascontiguousarray(force).reshape(shape), velocity, self.friction, self.rho
+        )
+
+
+@dataclass(frozen=True)
+class FrictionSolution:
+    """What a solver found: always its best point, with the residual that says how good it is."""
+
+    r: Floats
+    """Forces or impulses, (nc * dim,)."""
+    u: Floats
+    """Relative accelerations or velocities ``W r + q``, (nc * dim,)."""
+    residual: float
+    """Scale-free natural residual [-]."""
+    status: Status
+    method: str
+    """The method that found it."""
+    work: dict[str, float] = field(default_factory=dict)
+    """Counts that do not depend on the machine: sweeps, pivots, factorisations, ..."""
+    message: str = ""
+    """Empty if solved; else what happened, and what to do."""
+
+    @property
+    def solved(self) -> bool:
+        """The tolerance was reached."""
+        return self.status == "solved"
+
+
+def friction_solution(
+    problem: FrictionProblem,
+    force: Floats,
+    tolerance: float,
+    method: str,
+    work: dict[str, float] | None = None,
+    *,
+    status: Status = "not converged",
+    message: str = "",
+) -> FrictionSolution:
+    """Judge forces by their residual: ``solved`` at or below ``tolerance``, else ``status``."""
+    residual = problem.residual(force)
+    solved = residual <= tolerance
+    if not solved and not message:
+        message = (
+            f"{method} stopped at a residual of {residual:.2g} (asked: {tolerance:.2g})"
+            "\n  -> ask for less, start from another point, or try another method"
+        )
+    return FrictionSolution(
+        force, problem.velocity(force), residual, "solved" if solved else status, method,
+        work or {}, "" if solved else message,
+    )  # fmt: skip
+
+
+def friction_problem(matrix: Any, offset: ArrayLike, friction: ArrayLike, dim: int) -> Any:
+    """Check W, q and mu and make a `FrictionProblem` of them.
+
+    ``matrix``: W as a scipy sparse or dense array (nc * dim, nc * dim), or a `BodySpace`;
+    ``offset`` q (nc * dim,); ``friction`` mu (nc,), or one number for all; ``dim`` 2 or 3.
+    Raises `ProblemError`, which names what is wrong and where.
+    """
+    if dim not in (2, 3):
+        raise ProblemError(f"dim is {dim!r}", where="dim", remedy="give 2 or 3")
+    q = _finite(offset, "q").ravel()
+    if len(q) % dim:
+        raise ProblemError(
+            f"q has {len(q)} numbers, which are not {dim} a contact", where="q",
+            remedy="order it contact after contact: n, t" + ", t2" * (dim - 2),
+        )  # fmt: skip
+    contacts = len(q) // dim
+    mu = np.broadcast_to(_finite(friction, "mu"), (contacts,)) if np.ndim(friction) == 0 else (
+        _finite(friction, "mu")
+    )  # fmt: skip
+    if mu.shape != (contacts,):
+        raise ProblemError(
+            f"mu has shape {mu.shape} for {contacts} contacts", where="mu",
+            remedy="give one number, or one a contact",
+        )  # fmt: skip
+    if (mu < 0).any():
+        worst = int(np.argmin(mu))
+        raise ProblemError(
+            f"friction is negative ({mu[worst]:g})", where=f"mu, contact {worst}",
+            remedy="give a coefficient of friction of zero or more",
+        )  # fmt: skip
+    bodies = matrix if isinstance(matrix, BodySpace) else None
+    w = None if bodies is not None else _matrix(matrix)
+    shape = (bodies.jacobian.shape[0],) * 2 if bodies is not None else w.shape  # type: ignore[union-attr]
+    if shape != (len(q), len(q)):
+        raise ProblemError(
+            f"W is {shape[0]} x {shape[1]} and q has {len(q)} numbers", where="W",
+            remedy="give a square W with a row for every number of q",
+        )  # fmt: skip
+    return FrictionProblem(w, q, np.ascontiguousarray(mu, dtype=float), dim, bodies)
+
+
+def _finite(values: ArrayLike, name: str) -> Floats:
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ProblemError(f"{name} is not made of numbers ({error})", where=name) from error
+    bad = np.flatnonzero(~np.isfinite(array))
+    if len(bad):
+        raise ProblemError(
+            f"{len(bad)} of its numbers are not finite, first number {bad[0]}", where=name,
+            remedy="look for a mass of zero or a division by zero where it was made",
+        )  # fmt: skip
+    return array
+
+
+def _matrix(matrix: Any) -> sp.csr_array:
+    if not sp.issparse(matrix):
+        dense = _finite(matrix, "W")
+        if dense.ndim != 2:
+            raise ProblemError(f"it has {dense.ndim} dimensions, not 2", where="W")
+        return sp.csr_array(dense)
+    w = sp.csr_array(matrix, dtype=float)
+    w.sum_duplicates()
+    _finite(w.data, "W")
+    return w
