@@ -21,6 +21,7 @@ VERBS = {
     "fit": (ADAPTERS, "fit a residual law to a run, dumps or a CSV series and extrapolate it"),
     "relax": (ADAPTERS, "bring the overlaps of a state back to equilibrium"),
     "qdem": ("qdem_fem.cli", "vibration and statics of deformable bodies, from a scene file"),
+    "rigid": ("rigid_lcp.cli", "rigid, sharp-edged grains with friction, from a scene file"),
     "validate": ("validation.cli", "measure trackbed against a case with a known answer"),
     "cite": (ADAPTERS, "print what to cite, as BibTeX"),
 }
@@ -40,7 +41,7 @@ def parser_build(verb: str | None) -> argparse.ArgumentParser:
     """The command's parser; only ``verb`` gets its arguments, so only its package is loaded."""
     parser = argparse.ArgumentParser(
         prog="trackbed",
-        description="Railway ballast: settlement under many load cycles, vibration of its bodies.",
+        description="Railway ballast: settlement under load cycles, vibration, hard grains.",
         epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

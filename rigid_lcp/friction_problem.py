@@ -37,6 +37,22 @@ class BodySpace:
     body_size: int
 
     @cached_property
+    def mass(self) -> sp.csr_array:
+        """M, (ndof, ndof): the blocks of ``inverse_mass``, one a body, inverted [kg, kg m^2]."""
+        size = self.body_size
+        bodies = self.inverse_mass.shape[0] // size
+        here = self.inverse_mass.tocoo()
+        blocks = np.zeros((bodies, size, size))
+        np.add.at(blocks, (here.row // size, here.row % size, here.col % size), here.data)
+        inverse = np.linalg.inv(blocks)
+        rows = np.arange(bodies * size).reshape(bodies, size)
+        where = np.repeat(rows[:, :, None], size, 2), np.repeat(rows[:, None, :], size, 1)
+        kept = inverse != 0.0
+        return sp.csr_array(
+            (inverse[kept], (where[0][kept], where[1][kept])), self.inverse_mass.shape
+        )
+
+    @cached_property
     def matrix(self) -> sp.csr_array:
         """W, (nc * dim, nc * dim)."""
         return sp.csr_array(self.jacobian @ self.inverse_mass @ self.jacobian.T)

@@ -1,0 +1,125 @@
+"""The verb ``trackbed rigid SCENE``: what it computes with is loaded when it runs."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rigid_lcp.scene_file import SceneFile
+    from rigid_lcp.simulation import Simulation
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``rigid`` to its parser."""
+    assert verb == "rigid"
+    parser.add_argument("scene", metavar="SCENE", type=Path, help="a scene of rigid bodies (TOML)")
+    parser.add_argument(
+        "--run-folder", type=Path, metavar="FOLDER", help="default: SCENE-run beside the scene"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change a key of the scene, such as run.duration=0.1; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--dry-run", action="store_true", help="check the scene and tell what would run"
+    )
+    parser.add_argument("--resume", action="store_true", help="go on from the last frame")
+    parser.add_argument(
+        "--force", action="store_true", help="lose the run that is in the folder and start anew"
+    )
+    parser.add_argument("--no-pictures", action="store_true", help="write the report without any")
+    parser.add_argument("--json", action="store_true", help="print JSON on standard output")
+    parser.set_defaults(command=rigid_command)
+
+
+def rigid_command(arguments: argparse.Namespace) -> int:
+    """Run a scene, or tell what would run."""
+    from rigid_lcp.errors import UsageError
+    from rigid_lcp.scene_file import scene_read
+
+    if arguments.resume and arguments.force:
+        raise UsageError("--resume and --force exclude each other", remedy="give one of them")
+    file = scene_read(arguments.scene, arguments.overrides)
+    answer = _outlook(file) if arguments.dry_run else _run(file, arguments)
+    if arguments.json:
+        print(json.dumps(answer, indent=1))
+    else:
+        for key, value in answer.items():
+            print(f"{key.replace('_', ' '):22} {_shown(value)}")
+    return 0
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return "; ".join(_shown(each) for each in value)
+    if isinstance(value, dict):
+        return "; ".join(f"{key} ({_shown(each)})" for key, each in value.items())
+    return str(value)
+
+
+def _outlook(file: SceneFile) -> dict[str, Any]:
+    """What a run would be: bodies, steps, what is left out."""
+    from rigid_lcp.scene_run import left_out, simulation_of
+
+    _, run = simulation_of(file)
+    tables = file.tables.run
+    return {
+        "title": file.tables.title,
+        "method": tables.method,
+        "bodies": int(run.world.movable.sum()),
+        "steps": round(tables.duration / tables.step),
+        "step": tables.step,
+        "frames": tables.frames,
+        "left_out": left_out(file),
+    }
+
+
+def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
+    """The whole run with its report; its summary."""
+    from rigid_lcp.provenance import provenance
+    from rigid_lcp.report import report_write
+    from rigid_lcp.run_folder import RESULT, RunFolder, write_whole
+    from rigid_lcp.scene_run import scene_run, simulation_of, summary_of
+
+    scene, run = simulation_of(file)  # what it refuses must not leave a folder behind
+    path = arguments.run_folder or arguments.scene.with_name(f"{arguments.scene.stem}-run")
+    folder = RunFolder(path)
+    manifest = {
+        "scene": file.tables.model_dump(mode="json"),
+        "provenance": provenance(["trackbed", *sys.argv[1:]]),
+    }
+    with folder.locked():
+        goes_on = folder.settle(manifest, file.text, resume=arguments.resume, force=arguments.force)
+        if goes_on and folder.finished:
+            summary = json.loads((path / RESULT).read_text(encoding="utf-8"))
+            return dict(summary) | {"folder": str(path)}
+        scene_run(file, run, folder, resume=goes_on, progress=_progress())
+        summary = summary_of(file, scene, run, folder)
+        report_write(folder, scene, manifest, summary, draw=not arguments.no_pictures)
+        write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
+    return summary | {"folder": str(path)}
+
+
+def _progress() -> Any:
+    """A line on standard error after every frame: time reached, contacts, time left."""
+    began = time.monotonic()
+    first: list[float] = []
+
+    def show(now: float, duration: float, run: Simulation) -> None:
+        if not first:
+            first.append(now)
+        spent = time.monotonic() - began
+        left = spent / max(now - first[0] / 2, 1e-12) * (duration - now)
+        print(
+            f"{now:.4g} of {duration:.4g} s, {len(run.contacts)} contacts, about {left:.0f} s left",
+            file=sys.stderr, flush=True,
+        )  # fmt: skip
+
+    return show

@@ -1,0 +1,125 @@
+"""A friction problem laid out contact after contact for kernels that visit one at a time.
+
+`BodyBlocks`: each contact knows its two bodies and two small Jacobians, so that a visit costs the
+same however many neighbours there are.  `MatrixBlocks`: the rows of W in dim x dim blocks, where
+only W is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from rigid_lcp.friction_problem import BodySpace, FrictionProblem
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class BodyBlocks:
+    """``W = B B^T`` with ``B = J L`` and ``M^-1 = L L^T``, two blocks of B a contact.
+
+    Scaled so, a body's velocities ``w = L^-1 v`` take up an impulse r as ``w += B^T r``: no mass
+    is left to multiply with.  The two bodies of contact c are ``body[c]`` (nc, 2),
+    the number ``bodies`` for none; ``block`` (nc, 2, dim, body_size); ``local`` (nc, dim, dim)
+    has the blocks on W's diagonal.
+    """
+
+    body: Integers
+    block: Floats
+    local: Floats
+    bodies: int
+
+    def body_velocity(self, force: Floats) -> Floats:
+        """``w = B^T r``, (bodies + 1, body_size); the last row stands for no body. r: (nc, dim)."""
+        contacts, dim, size = len(self.body), self.block.shape[2], self.block.shape[3]
+        velocity = np.zeros((self.bodies + 1, size))
+        for side in (0, 1):
+            impulse = np.einsum("cij,ci->cj", self.block[:, side], force.reshape(contacts, dim))
+            np.add.at(velocity, self.body[:, side], impulse)
+        return velocity
+
+
+@dataclass(frozen=True)
+class MatrixBlocks:
+    """Rows of W in blocks: ``block[start[c]:start[c + 1]]`` at the contacts ``column``."""
+
+    start: Integers
+    column: Integers
+    block: Floats
+    local: Floats
+
+
+def body_blocks(problem: FrictionProblem) -> BodyBlocks | None:
+    """Blocks in body space; None if the factors of W are unknown or not those of pairs of bodies.
+
+    None too if M^-1 is not positive semi-definite.
+    """
+    space = problem.bodies
+    size, dim, contacts = 3 * problem.dim - 3, problem.dim, problem.contacts
+    if space is None or space.body_size != size or space.jacobian.shape[1] % size or not contacts:
+        return None
+    root = inverse_mass_root(space)
+    if root is None:
+        return None
+    pattern = sp.bsr_array(space.jacobian, blocksize=(dim, size))
+    pattern.eliminate_zeros()
+    count = np.diff(pattern.indptr)
+    if count.max() > 2:
+        return None
+    body = np.full((contacts, 2), len(root), dtype=np.int64)
+    block = np.zeros((contacts, 2, dim, size))
+    contact = np.repeat(np.arange(contacts), count)
+    side = np.arange(len(contact)) - pattern.indptr[contact]
+    body[contact, side] = pattern.indices
+    block[contact, side] = pattern.data @ root[pattern.indices]
+    local = np.einsum("csik,csjk->cij", block, block)
+    return BodyBlocks(body, block, local, len(root))
+
+
+def inverse_mass_root(space: BodySpace) -> Floats | None:
+    """L of every body with ``M^-1 = L L^T``, (bodies, size, size); None if M^-1 is no such thing.
+
+    By eigenvectors, as a body that is held has zeros there.
+    """
+    size = space.body_size
+    blocks = sp.bsr_array(space.inverse_mass, blocksize=(size, size))
+    blocks.eliminate_zeros()
+    row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
+    if (row != blocks.indices).any():
+        return None
+    mass = np.zeros((len(blocks.indptr) - 1, size, size))
+    mass[row] = blocks.data
+    diagonal = np.einsum("bii->bi", mass)
+    if np.count_nonzero(mass) == np.count_nonzero(diagonal):
+        if (diagonal < 0).any():
+            return None
+        root = np.zeros_like(mass)
+        np.einsum("bii->bi", root)[:] = np.sqrt(diagonal)
+        return root
+    scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(mass / (scale[:, :, None] * scale[:, None, :]))
+    if values.min() < -1e-12:
+        return None
+    return scale[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+
+
+def matrix_blocks(problem: FrictionProblem) -> MatrixBlocks:
+    """W in blocks, with one on the diagonal of every row, of zeros if need be."""
+    dim, contacts = problem.dim, problem.contacts
+    blocks = sp.bsr_array(problem.delassus, blocksize=(dim, dim)) if contacts else None
+    if blocks is None:
+        empty = np.zeros((0, dim, dim))
+        return MatrixBlocks(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), empty, empty)
+    row = np.repeat(np.arange(contacts), np.diff(blocks.indptr))
+    own = row == blocks.indices
+    local = np.zeros((contacts, dim, dim))
+    local[row[own]] = blocks.data[own]
+    return MatrixBlocks(
+        blocks.indptr.astype(np.int64), blocks.indices.astype(np.int64),
+        np.ascontiguousarray(blocks.data), local,
+    )  # fmt: skip

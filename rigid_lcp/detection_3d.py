@@ -1,0 +1,204 @@
+"""Contacts in space: which pairs are near, and the point contacts of every pair (eq. 9).
+
+Polyhedra: corners on faces and crossing edges, at most four a pair (`rigid_lcp.manifold_3d`);
+spheres: the nearest point of the other body (`rigid_lcp.sphere_contact`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigid_lcp.contacts import Contacts
+from rigid_lcp.manifold_3d import (
+    COLUMNS,
+    CORNER_FACE,
+    EDGES,
+    ROOM,
+    TIE,
+    add_candidate,
+    four_of,
+    solids_contacts,
+)
+from rigid_lcp.placed_solids import (
+    BODY_BITS,
+    FEATURE_BITS,
+    HALF_SPACE,
+    MOST_EDGES,
+    POLYHEDRON,
+    SPHERE,
+    Shapes3D,
+    place_solids,
+    shapes_3d,
+)
+from rigid_lcp.separation_3d import Solids, dot
+from rigid_lcp.sphere_contact import sphere_on_plane, sphere_on_solid, sphere_on_sphere
+
+__all__ = ["detect_3d", "shapes_3d"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+def detect_3d(
+    shapes: Shapes3D, position: Floats, quaternion: Floats, margin: Floats | float
+) -> Contacts:
+    """All point contacts with ``gap <= margin[a] + margin[b]``.
+
+    ``position`` (n, 3) [m], ``quaternion`` (n, 4), unit; ``margin`` [m] one number or (n,).  The
+    order of the contacts depends on the numbers of the bodies only.  Friction and restitution are
+    zero: they belong to the scene.  Bodies that meet corner to corner have no contact until they
+    overlap: no face or edge names its normal.
+    """
+    margins = np.ascontiguousarray(np.broadcast_to(np.asarray(margin, float), (len(shapes.kind),)))
+    position = np.ascontiguousarray(position, dtype=float)
+    solids = place_solids(shapes, position, quaternion)
+    boxes = bounding_boxes(shapes.kind, solids, shapes.reach, position, margins)
+    pairs = near_pairs(shapes.kind, boxes, shapes.movable)
+    bodies, numbers, key = pair_contacts(
+        pairs, shapes.kind, solids, shapes.reach, position, margins, boxes
+    )
+    zero = np.zeros(len(key))
+    return Contacts(
+        bodies[:, 0], bodies[:, 1], numbers[:, 0:3], numbers[:, 3:6], numbers[:, 6], key,
+        numbers[:, 7], numbers[:, 8], zero, zero.copy(),
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def bounding_boxes(
+    kind: Ints, solids: Solids, reach: Floats, position: Floats, margin: Floats
+) -> Floats:
+    """Boxes (x0, y0, z0, x1, y1, z1) around polyhedra and spheres with their margins, (n, 6)."""
+    boxes = np.empty((len(kind), 6))
+    for body in range(len(kind)):
+        for axis in range(3):
+            low, high = position[body, axis] - reach[body], position[body, axis] + reach[body]
+            if kind[body] == POLYHEDRON:
+                low, high = np.inf, -np.inf
+                for v in range(solids.first_vertex[body], solids.first_vertex[body + 1]):
+                    low = min(low, solids.vertex[v, axis])
+                    high = max(high, solids.vertex[v, axis])
+            boxes[body, axis] = low - margin[body]
+            boxes[body, 3 + axis] = high + margin[body]
+    return boxes
+
+
+@njit(cache=True)
+def near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
+    """Pairs (i < j) whose boxes overlap and every half-space with every movable body, (m, 2).
+
+    Boxes sorted by their lower ends along the axis in which the bodies spread most, and swept.
+    """
+    solid = np.flatnonzero(kind != HALF_SPACE)
+    sweep, spread = 0, -1.0
+    for axis in range(3):
+        deviation = np.std(boxes[solid, axis]) if len(solid) else 0.0
+        if deviation > spread:
+            sweep, spread = axis, deviation
+    order = solid[np.argsort(boxes[solid, sweep], kind="mergesort")]
+    others = np.array([(sweep + 1) % 3, (sweep + 2) % 3])
+    pairs = np.empty((0, 2), dtype=np.int64)
+    for store in range(2):  # first count, then store
+        count = 0
+        for place in range(len(order)):
+            i = order[place]
+            for later in range(place + 1, len(order)):
+                j = order[later]
+                if boxes[j, sweep] > boxes[i, 3 + sweep]:
+                    break
+                apart = not (movable[i] or movable[j])
+                for axis in others:
+                    if boxes[i, axis] > boxes[j, 3 + axis] or boxes[j, axis] > boxes[i, 3 + axis]:
+                        apart = True
+                if apart:
+                    continue
+                if store:
+                    pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
+                count += 1
+        for wall in np.flatnonzero(kind == HALF_SPACE):
+            for i in solid:
+                if movable[i]:
+                    if store:
+                        pairs[count, 0], pairs[count, 1] = i, wall
+                    count += 1
+        if not store:
+            pairs = np.empty((count, 2), dtype=np.int64)
+    size = len(kind)
+    return pairs[np.argsort(pairs[:, 0] * size + pairs[:, 1], kind="mergesort")]
+
+
+@njit(cache=True)
+def contact_key(a: int, b: int, feature_a: int, feature_b: int) -> int:
+    """One number for a feature of a on a feature of b; crossing edges count from `MOST_EDGES`."""
+    return ((((a << BODY_BITS) | b) << FEATURE_BITS) | feature_a) << FEATURE_BITS | feature_b
+
+
+@njit(cache=True)
+def pair_contacts(
+    pairs: Ints, kind: Ints, solids: Solids, reach: Floats, position: Floats, margins: Floats,
+    boxes: Floats,
+) -> tuple[Ints, Floats, Ints]:  # fmt: skip
+    """Contacts of the pairs: bodies (nc, 2), numbers (nc, 9), keys (nc,).
+
+    A row of numbers: point (3), normal (3), gap, radii of curvature of a and b.
+    """
+    bodies, numbers = np.empty((4 * len(pairs), 2), np.int64), np.empty((4 * len(pairs), 9))
+    key = np.empty(4 * len(pairs), np.int64)
+    found = np.empty((ROOM, COLUMNS))
+    c = 0
+    for i, j in pairs:
+        margin = margins[i] + margins[j]
+        if kind[i] == SPHERE or kind[j] == SPHERE:
+            sphere, other = (i, j) if kind[i] == SPHERE else (j, i)
+            x, radius, row = position[sphere], reach[sphere], numbers[c]
+            if kind[other] == SPHERE:
+                feature = sphere_on_sphere(x, radius, position[other], reach[other], row)
+            elif kind[other] == HALF_SPACE:
+                feature = sphere_on_plane(solids, other, x, radius, row)
+            else:
+                feature = sphere_on_solid(solids, other, x, radius, row)
+            if row[6] <= margin:
+                bodies[c] = (sphere, other)
+                key[c] = contact_key(sphere, other, 0, 0) + feature
+                c += 1
+            continue
+        if kind[j] == HALF_SPACE:
+            count = corners_on_plane(solids, i, j, margin, reach[i], found)
+        else:
+            size = min(reach[i], reach[j])
+            count = solids_contacts(solids, i, j, boxes[i], boxes[j], margin, size, found)
+        for k in range(count):
+            form, first, second = int(found[k, 0]), int(found[k, 1]), int(found[k, 2])
+            a, b, sign = i, j, 1.0
+            if form == EDGES:
+                first, second = first + MOST_EDGES, second + MOST_EDGES
+            elif form != CORNER_FACE:  # the corner is body j's
+                a, b, sign, first, second = j, i, -1.0, second, first
+            bodies[c], key[c] = (a, b), contact_key(a, b, first, second)
+            for axis in range(3):
+                numbers[c, axis] = found[k, 7 + axis]
+                numbers[c, 3 + axis] = sign * found[k, 4 + axis]
+            numbers[c, 6], numbers[c, 7], numbers[c, 8] = found[k, 3], 0.0, np.inf
+            c += 1
+    return bodies[:c], numbers[:c], key[:c]
+
+
+@njit(cache=True)
+def corners_on_plane(
+    solids: Solids, body: int, plane: int, margin: float, size: float, found: Floats
+) -> int:
+    """Corners of a polyhedron near a half-space, at most four; returns how many."""
+    count = 0
+    face = solids.first_face[plane]
+    n, level, first = solids.normal[face], solids.offset[face], solids.first_vertex[body]
+    for v in range(first, solids.first_vertex[body + 1]):
+        x = solids.vertex[v]
+        gap = dot(n, x) - level
+        if gap <= margin:
+            count = add_candidate(
+                found, count, CORNER_FACE, v - first, 0, gap, n, 1.0, x, TIE * size
+            )
+    return four_of(found, count, size)

@@ -1,0 +1,179 @@
+"""Islands: groups of contacts that can not feel each other, and so are solved apart.
+
+Two contacts feel each other if W has an entry between them: if they share a body that can move.
+A heap and a grain that flies off it are two islands; the ground joins nothing.  Methods whose
+cost grows faster than the number of contacts gain most.
+
+Islands come in the order of their smallest contact, and their contacts in the order of the
+problem, so that nothing depends on how bodies were numbered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from rigid_lcp.friction_problem import (
+    BodySpace,
+    FrictionProblem,
+    FrictionSolution,
+    friction_solution,
+)
+from rigid_lcp.local_contact import NONE, contacts_apart
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Method = Callable[..., FrictionSolution]
+
+ROUNDS = 4
+"""Times the islands are solved again, ten times finer each, until the whole is fine enough."""
+
+
+def islands(problem: FrictionProblem) -> list[Integers]:
+    """Contacts of every island, (contacts of it,) each, by W's pattern or by shared bodies."""
+    contacts, dim = problem.contacts, problem.dim
+    if contacts == 0:
+        return []
+    if problem.bodies is not None:
+        links = contact_bodies(problem.bodies, dim)
+        graph = sp.block_array([[None, links], [links.T, None]], format="csr")
+    else:
+        graph = blocks_nonzero(problem.delassus, dim, dim)
+    _, label = connected_components(graph, directed=False)
+    _, first, island = np.unique(label[:contacts], return_index=True, return_inverse=True)
+    by_first = np.argsort(np.argsort(first))[island]
+    order = np.argsort(by_first, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(by_first[order])) + 1)
+
+
+def contact_bodies(space: BodySpace, dim: int) -> sp.csr_array:
+    """Which bodies a contact moves, (nc, bodies), entries 1; a body with M^-1 = 0 is not moved."""
+    return blocks_nonzero(sp.csr_array(space.jacobian @ space.inverse_mass), dim, space.body_size)
+
+
+def blocks_nonzero(matrix: sp.csr_array, rows: int, columns: int) -> sp.csr_array:
+    """1 wherever a block (rows, columns) of the matrix has an entry that is not zero."""
+    entries = sp.coo_array(matrix)
+    kept = entries.data != 0
+    row, column = entries.coords[0][kept] // rows, entries.coords[1][kept] // columns
+    shape = (-(-matrix.shape[0] // rows), -(-matrix.shape[1] // columns))
+    return sp.csr_array((np.ones(len(row)), (row, column)), shape=shape)
+
+
+def island_problem(problem: FrictionProblem, contacts: Integers) -> FrictionProblem:
+    """The problem of some contacts alone: their rows, and of the bodies only those they touch."""
+    dim = problem.dim
+    rows = contact_rows(contacts, dim)
+    matrix = None if problem.matrix is None else sp.csr_array(problem.matrix[rows][:, rows])
+    space = None
+    if problem.bodies is not None:
+        size = problem.bodies.body_size
+        jacobian = sp.csr_array(problem.bodies.jacobian[rows])
+        touched = np.unique(jacobian.indices // size)
+        freedoms = contact_rows(touched, size)
+        inverse_mass = problem.bodies.inverse_mass[freedoms][:, freedoms]
+        space = BodySpace(sp.csr_array(jacobian[:, freedoms]), sp.csr_array(inverse_mass), size)
+    return FrictionProblem(matrix, problem.offset[rows], problem.friction[contacts], dim, space)
+
+
+def contact_rows(contacts: Integers, dim: int) -> Integers:
+    """Rows of W that belong to some contacts (or freedoms that belong to bodies), in order."""
+    return (np.asarray(contacts)[:, None] * dim + np.arange(dim)).ravel()
+
+
+def islands_join(
+    problem: FrictionProblem,
+    parts: Sequence[Integers],
+    solutions: Sequence[FrictionSolution],
+    tolerance: float,
+) -> FrictionSolution:
+    """One solution from those of the islands, judged as a whole; their work is summed.
+
+    The status is the worst of the islands': ``no solution`` of one is that of all.
+    """
+    force = np.zeros(problem.contacts * problem.dim)
+    work: dict[str, float] = {"islands": float(len(parts))}
+    for contacts, solution in zip(parts, solutions, strict=True):
+        force[contact_rows(contacts, problem.dim)] = solution.r
+        for name, count in solution.work.items():
+            work[name] = work.get(name, 0.0) + count
+    failed = [k for k, solution in enumerate(solutions) if not solution.solved]
+    worst = next((k for k in failed if solutions[k].status == "no solution"), (failed or [-1])[0])
+    method = max((solution.method for solution in solutions), default="islands")
+    if not failed:
+        return friction_solution(problem, force, tolerance, method, work)
+    message = (
+        f"{len(failed)} of {len(parts)} islands, that of contact {parts[worst][0]}: "
+        + solutions[worst].message
+    )
+    status = solutions[worst].status
+    return friction_solution(
+        problem, force, tolerance, method, work, status=status, message=message
+    )  # fmt: skip
+
+
+def solve_islands(
+    problem: FrictionProblem,
+    method: Method,
+    start: Floats | None = None,
+    tolerance: float = 1e-12,
+    **options: Any,
+) -> FrictionSolution:
+    """Solve every island apart by ``method(problem, start, tolerance, **options)``, and join them.
+
+    Contacts that are islands of their own are solved exactly, without ``method``.  An island
+    measures its residual by its own forces, the whole by all: where the whole comes out above
+    ``tolerance`` although the islands did not, they are solved finer from where they are.
+    """
+    parts = islands(problem)
+    if len(parts) == 1:
+        return method(problem, start, tolerance, **options)
+    force = np.zeros(problem.contacts * problem.dim) if start is None else np.array(start, float)
+    single = np.array([part[0] for part in parts if len(part) == 1], dtype=np.int64)
+    larger = [part for part in parts if len(part) > 1]
+    problems = [island_problem(problem, part) for part in larger]
+    alone = singles_solution(problem, single, tolerance)
+    work: dict[str, float] = {}
+    for round_ in range(ROUNDS):
+        finer = tolerance * 0.1**round_
+        solutions = [
+            method(island, force[contact_rows(part, problem.dim)], finer, **options)
+            for island, part in zip(problems, larger, strict=True)
+        ]
+        joined = islands_join(problem, [single, *larger], [alone, *solutions], tolerance)
+        joined.work["islands"] = float(len(parts))
+        for name, count in joined.work.items():
+            work[name] = count if name == "islands" else work.get(name, 0.0) + count
+        if joined.solved or not all(solution.solved for solution in solutions):
+            break
+        force = joined.r
+    joined.work.update(work)
+    return joined
+
+
+def singles_solution(
+    problem: FrictionProblem, contacts: Integers, tolerance: float
+) -> FrictionSolution:
+    """Exact forces of contacts that feel no other, put together as a problem of their own."""
+    dim = problem.dim
+    apart = island_problem(problem, contacts)
+    offset = apart.offset.reshape(-1, dim)
+    whole = apart.delassus
+    local = np.zeros((len(contacts), dim, dim))
+    for i in range(dim):
+        for j in range(dim):
+            local[:, i, j] = np.asarray(whole[i::dim][:, j::dim].diagonal())
+    force, status = contacts_apart(local, offset, apart.friction)
+    lost = contacts[status == NONE]
+    if len(lost) == 0:
+        return friction_solution(apart, force.ravel(), tolerance, "local contact")
+    return friction_solution(
+        apart, force.ravel(), tolerance, "local contact", status="no solution",
+        message=f"contact {lost[0]} has no force that obeys Coulomb's law, nor {len(lost) - 1} "
+        "others\n  -> it is jammed (Painleve) or bears on no mass: solve at velocity level",
+    )  # fmt: skip

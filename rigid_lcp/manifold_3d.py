@@ -1,0 +1,260 @@
+"""Point contacts of two polyhedra: corners on faces and crossing edges, at most four a pair.
+
+Two faces upon each other share a polygon.  Its corners are corners of one body on the face of
+the other, or crossings of their edges; each is a contact with the normal and the gap of its own
+two features (eq. 9), also while the faces are slightly tilted.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigid_lcp.separation_3d import (
+    NEARLY,
+    Solids,
+    cross,
+    dot,
+    edge_crossing,
+    edge_separation,
+    edges_near,
+    face_separation,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+TIE = 1e-9
+"""Share of a body's reach below which lengths are equal: round-off never renames a contact."""
+SAME = 1e-6
+"""Contacts of a pair nearer than this share of the reach are one."""
+CORNER_FACE, FACE_CORNER, EDGES = 0, 1, 2
+"""Corner of a on a face of b; corner of b on a face of a; an edge of a across one of b."""
+ROOM = 256
+"""Candidates looked at for one pair; there are a few dozen for grains of a hundred corners."""
+COLUMNS = 10
+"""Row of a candidate: kind, feature of a, feature of b, gap, normal from b to a (3), point (3)."""
+
+
+@njit(cache=True)
+def within_face(solids: Solids, body: int, face: int, x: Floats, slack: float) -> bool:
+    """The point projects into the face, or no farther outside than ``slack`` [m]."""
+    base = solids.first_vertex[body]
+    n = solids.normal[face]
+    start, stop = solids.first_corner[face], solids.first_corner[face + 1]
+    for k in range(start, stop):
+        p = solids.vertex[base + solids.loop[k]]
+        q = solids.vertex[base + solids.loop[k + 1 if k + 1 < stop else start]]
+        u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        o0, o1, o2 = u1 * n[2] - u2 * n[1], u2 * n[0] - u0 * n[2], u0 * n[1] - u1 * n[0]
+        outside = o0 * (x[0] - p[0]) + o1 * (x[1] - p[1]) + o2 * (x[2] - p[2])
+        if outside > slack * np.sqrt(o0 * o0 + o1 * o1 + o2 * o2):
+            return False
+    return True
+
+
+@njit(cache=True)
+def add_candidate(
+    found: Floats, count: int, kind: int, feature_a: int, feature_b: int, gap: float,
+    normal: Floats, sign: float, point: Floats, same: float,
+) -> int:  # fmt: skip
+    """Store a candidate, unless one is there within ``same`` [m]; returns how many there are.
+
+    Of two in one place a corner on a face stays before crossing edges, and a's before b's: their
+    normals differ by no more than the tilt of the faces, and names must not change with round-off.
+    """
+    place = count
+    for k in range(count):
+        d0, d1, d2 = (
+            found[k, 7] - point[0], found[k, 8] - point[1], found[k, 9] - point[2],
+        )  # fmt: skip
+        if d0 * d0 + d1 * d1 + d2 * d2 < same * same:
+            if found[k, 0] <= kind:
+                return count
+            place = k
+            break
+    if place >= len(found):
+        return count
+    found[place, 0], found[place, 1], found[place, 2] = kind, feature_a, feature_b
+    found[place, 3] = gap
+    for axis in range(3):
+        found[place, 4 + axis] = sign * normal[axis]
+        found[place, 7 + axis] = point[axis]
+    return max(count, place + 1)
+
+
+@njit(cache=True)
+def face_candidates(
+    solids: Solids, face: int, own: int, other: int, own_is_b: bool, edges_other: Ints,
+    margin: float, size: float, found: Floats,
+) -> int:  # fmt: skip
+    """All point contacts of ``other`` with one face of ``own``; returns how many."""
+    count = 0
+    n = solids.normal[face]
+    level = solids.offset[face]
+    first_own, first_other = solids.first_vertex[own], solids.first_vertex[other]
+    sign = 1.0 if own_is_b else -1.0
+    for v in range(first_other, solids.first_vertex[other + 1]):
+        x = solids.vertex[v]
+        gap = dot(n, x) - level
+        if gap <= margin and within_face(solids, own, face, x, TIE * size):
+            here, there = v - first_other, face - solids.first_face[own]
+            if own_is_b:
+                count = add_candidate(
+                    found, count, CORNER_FACE, here, there, gap, n, sign, x, SAME * size
+                )
+            else:
+                count = add_candidate(
+                    found, count, FACE_CORNER, there, here, gap, n, sign, x, SAME * size
+                )
+    opposite = np.cos(NEARLY)
+    start, stop = solids.first_corner[face], solids.first_corner[face + 1]
+    for g in range(solids.first_face[other], solids.first_face[other + 1]):
+        m = solids.normal[g]
+        if -dot(m, n) < opposite:
+            continue
+        for k in range(start, stop):
+            x = solids.vertex[first_own + solids.loop[k]]
+            gap = dot(m, x) - solids.offset[g]
+            if gap <= margin and within_face(solids, other, g, x, TIE * size):
+                here, there = g - solids.first_face[other], solids.loop[k]
+                if own_is_b:
+                    count = add_candidate(
+                        found, count, FACE_CORNER, here, there, gap, m, -sign, x, SAME * size
+                    )
+                else:
+                    count = add_candidate(
+                        found, count, CORNER_FACE, there, here, gap, m, -sign, x, SAME * size
+                    )
+    a, b = (other, own) if own_is_b else (own, other)
+    crossing = np.empty(9)
+    towards = sign * n
+    for f in range(solids.first_edge[own], solids.first_edge[own + 1]):
+        if not edge_of_face(solids, f, start, stop):
+            continue
+        for e in edges_other:
+            edge_a, edge_b = (e, f) if own_is_b else (f, e)
+            if not edge_crossing(solids, a, edge_a, b, edge_b, towards, crossing):
+                continue
+            if not (0.0 < crossing[0] < 1.0 and 0.0 < crossing[1] < 1.0):
+                continue
+            normal = crossing[3:6]
+            if crossing[2] > margin or dot(normal, towards) < opposite:
+                continue
+            if -sign * dot(normal, solids.bisector[e]) < solids.seen_about[e]:
+                continue
+            count = add_candidate(
+                found, count, EDGES, edge_a - solids.first_edge[a], edge_b - solids.first_edge[b],
+                crossing[2], normal, 1.0, crossing[6:9], SAME * size,
+            )  # fmt: skip
+    return count
+
+
+@njit(cache=True)
+def edge_of_face(solids: Solids, edge: int, start: int, stop: int) -> bool:
+    """Both corners of the edge belong to the face whose corners are ``loop[start:stop]``."""
+    ends = 0
+    for k in range(start, stop):
+        if solids.loop[k] == solids.edge[edge, 0] or solids.loop[k] == solids.edge[edge, 1]:
+            ends += 1
+    return ends == 2
+
+
+@njit(cache=True)
+def four_of(found: Floats, count: int, size: float) -> int:
+    """Keep at most four candidates in the first rows of ``found``: returns how many.
+
+    The farthest from the middle, the farthest from that, the one that spans the largest triangle
+    with both, and the one that adds most area; the deepest replaces the nearest of them if it is
+    deeper than all.  Lengths within `TIE` of each other count as equal: the first is taken.
+    """
+    if count <= 4:
+        return count
+    tie = TIE * size
+    middle = np.zeros(3)
+    for k in range(count):
+        middle += found[k, 7:10] / count
+    chosen = np.full(4, -1)
+    for turn in range(2):
+        origin, farthest = middle, -1.0
+        if turn == 1:
+            origin = found[chosen[0], 7:10].copy()
+        for k in range(count):
+            distance = np.linalg.norm(found[k, 7:10] - origin)
+            if distance > farthest + tie:
+                chosen[turn], farthest = k, distance
+    n = found[chosen[0], 4:7].copy()
+    p, q = found[chosen[0], 7:10].copy(), found[chosen[1], 7:10].copy()
+    across = np.array(cross(n, q - p))
+    across /= np.linalg.norm(across) + 1e-300
+    kept = 2
+    for side in (1.0, -1.0):
+        best, farthest = -1, 10.0 * tie
+        for k in range(count):
+            distance = side * dot(across, found[k, 7:10] - p)
+            if distance > farthest + tie:
+                best, farthest = k, distance
+        if best >= 0:
+            chosen[kept] = best
+            kept += 1
+    lowest = found[chosen[0], 3]
+    for k in range(1, kept):
+        lowest = min(lowest, found[chosen[k], 3])
+    deepest = np.argmin(found[:count, 3])
+    if found[deepest, 3] < lowest - tie:
+        nearest, least = 0, np.inf
+        for k in range(kept):
+            distance = np.linalg.norm(found[chosen[k], 7:10] - found[deepest, 7:10])
+            if distance < least:
+                nearest, least = k, distance
+        chosen[nearest] = deepest
+    rows = found[chosen[:kept]].copy()
+    found[:kept] = rows
+    return kept
+
+
+@njit(cache=True)
+def solids_contacts(
+    solids: Solids, a: int, b: int, box_a: Floats, box_b: Floats, margin: float, size: float,
+    found: Floats,
+) -> int:  # fmt: skip
+    """Point contacts of two polyhedra with a gap up to ``margin`` [m]; returns how many.
+
+    ``box_a``, ``box_b``: bounding boxes swollen by the margin; ``size``: the smaller reach of the
+    two [m].  Rows of ``found`` as `COLUMNS` says.
+    """
+    face_a, gap_a = face_separation(solids, a, b, margin)
+    if gap_a > margin:
+        return 0
+    face_b, gap_b = face_separation(solids, b, a, margin)
+    if gap_b > margin:
+        return 0
+    edge_a, edge_b, gap_edges = edge_separation(solids, a, b, box_a, box_b, margin)
+    if gap_edges > margin:
+        return 0
+    own_is_b = gap_b >= gap_a - TIE * size
+    face, own, other = (face_b, b, a) if own_is_b else (face_a, a, b)
+    crossing = np.empty(9)
+    towards = solids.normal[face] * (1.0 if own_is_b else -1.0)
+    crosses = (
+        edge_a >= 0
+        and edge_crossing(solids, a, edge_a, b, edge_b, towards, crossing)
+        and 0.0 <= crossing[0] <= 1.0
+        and 0.0 <= crossing[1] <= 1.0
+    )
+    alone = (
+        crosses
+        and gap_edges > max(gap_a, gap_b) + TIE * size
+        and dot(crossing[3:6], towards) < np.cos(NEARLY)
+    )
+    count = 0
+    if not alone:
+        near = edges_near(solids, other, box_b if own_is_b else box_a)
+        count = face_candidates(solids, face, own, other, own_is_b, near, margin, size, found)
+    if alone or (crosses and count == 0):
+        count = add_candidate(
+            found, count, EDGES, edge_a - solids.first_edge[a], edge_b - solids.first_edge[b],
+            crossing[2], crossing[3:6], 1.0, crossing[6:9], SAME * size,
+        )  # fmt: skip
+    return four_of(found, count, size)

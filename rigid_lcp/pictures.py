@@ -1,0 +1,165 @@
+"""Pictures of a run: bodies with force chains, histories, a movie of the frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.contacts import ContactForces
+from rigid_lcp.motion import Motion
+from rigid_lcp.scene import Scene
+from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
+
+Floats = NDArray[np.float64]
+
+STONE, EDGE, FIXED = "#e9e4da", "#8a8174", "#c9ced6"
+STICK, SLIDE = "#0b5fa5", "#d1495b"
+WIDEST = 7.0
+"""Line width of the largest normal force [points]."""
+
+
+def placed_outline(shape: Any, position: Floats, angle: Any) -> Floats:
+    """Outline of a plane shape where it is [m], (k, 2); of a disc 48 points."""
+    if isinstance(shape, Disc):
+        turn = np.linspace(0, 2 * np.pi, 48, endpoint=False) + float(angle)
+        own = shape.radius * np.column_stack([np.cos(turn), np.sin(turn)])
+        return np.asarray(position + own)
+    c, s = np.cos(float(angle)), np.sin(float(angle))
+    return np.asarray(position + shape.vertices @ np.array([[c, s], [-s, c]]))
+
+
+def window_of(scene: Scene, positions: list[Floats]) -> tuple[Floats, Floats]:
+    """Corners of the box that holds all bodies in all of these states [m], (dim,) each."""
+    reach = np.array([min(body.shape.reach, 1e30) for body in scene.bodies])
+    shown = np.array([not isinstance(body.shape, HalfSpace) for body in scene.bodies])
+    stacked = np.array(positions)[:, shown]
+    low = (stacked - reach[shown, None]).min(axis=(0, 1))
+    high = (stacked + reach[shown, None]).max(axis=(0, 1))
+    return low, high
+
+
+def draw_chains(
+    axes: Any, motion: Motion, contacts: ContactForces, scale: float, plane: tuple[int, int]
+) -> None:
+    """Lines from the bodies' centres to their contacts, as wide as the normal force.
+
+    ``scale`` [N]: force of the widest line; ``plane``: the two axes that are drawn.  Blue sticks,
+    red slides.  Floors and walls have no centre: there the line ends at the contact.
+    """
+    from matplotlib.collections import LineCollection
+
+    lines, widths, colours = [], [], []
+    place = motion.position[:, plane]
+    shown = contacts.normal_force > 1e-3 * scale
+    for c in np.flatnonzero(shown):
+        point = contacts.point[c, plane]
+        for body in (contacts.body_a[c], contacts.body_b[c]):
+            if body >= 0:
+                lines.append([place[body], point])
+                widths.append(WIDEST * contacts.normal_force[c] / scale)
+                colours.append(SLIDE if contacts.status[c] == "slide" else STICK)
+    axes.add_collection(
+        LineCollection(lines, linewidths=widths, colors=colours, capstyle="round", alpha=0.85)
+    )
+
+
+def draw_bodies_2d(axes: Any, scene: Scene, motion: Motion) -> None:
+    """All bodies of a plane scene where they are; half-spaces as their faces."""
+    from matplotlib.patches import Polygon as Patch
+
+    for body, position, angle in zip(scene.bodies, motion.position, motion.angle, strict=True):
+        if isinstance(body.shape, HalfSpace):
+            face = body.shape.normal * body.shape.offset
+            along = np.array([-body.shape.normal[1], body.shape.normal[0]])
+            axes.axline(tuple(face), tuple(face + along), color=EDGE, linewidth=1.5)
+        elif isinstance(body.shape, Polygon | Disc):
+            outline = placed_outline(body.shape, position, angle)
+            colour = STONE if body.movable else FIXED
+            axes.add_patch(Patch(outline, closed=True, fc=colour, ec=EDGE, linewidth=0.7))
+
+
+def draw_bodies_3d(axes: Any, scene: Scene, motion: Motion) -> None:
+    """Bodies of a scene in space from the side (x and z), the nearest drawn last."""
+    from matplotlib.patches import Circle
+    from matplotlib.patches import Polygon as Patch
+    from scipy.spatial import ConvexHull
+
+    from rigid_lcp.rotations import rotation_matrix
+
+    frames = rotation_matrix(motion.angle)
+    for n in np.argsort(-motion.position[:, 1]):
+        shape, position = scene.bodies[n].shape, motion.position[n]
+        if isinstance(shape, HalfSpace):
+            continue
+        points = getattr(shape, "vertices", None)
+        if points is None:
+            axes.add_patch(Circle(tuple(position[[0, 2]]), shape.reach, fc=STONE, ec=EDGE, lw=0.7))
+            continue
+        seen = (position + points @ frames[n].T)[:, [0, 2]]
+        outline = seen[ConvexHull(seen).vertices]
+        axes.add_patch(Patch(outline, closed=True, fc=STONE, ec=EDGE, linewidth=0.7))
+
+
+def picture_state(
+    scene: Scene, motion: Motion, contacts: ContactForces, window: tuple[Floats, Floats],
+    scale: float, title: str,
+) -> Any:  # fmt: skip
+    """A matplotlib figure of one state with its force chains; the caller saves it."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    plane = (0, 1) if scene.dim == 2 else (0, 2)
+    low, high = (corner[list(plane)] for corner in window)
+    size = np.maximum(high - low, 1e-12)
+    low, high = low - 0.05 * size.max(), high + 0.05 * size.max()
+    width = 7.0
+    height = float(np.clip(width * (high - low)[1] / (high - low)[0], 2.5, 9.0))
+    figure = Figure(figsize=(width, height + 0.4), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    (draw_bodies_2d if scene.dim == 2 else draw_bodies_3d)(axes, scene, motion)
+    draw_chains(axes, motion, contacts, scale, plane)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    axes.set_title(title, fontsize=10, loc="left")
+    axes.set(xlabel="x [m]", ylabel="y [m]" if scene.dim == 2 else "z [m]")
+    return figure
+
+
+def force_scale(forces: list[Floats]) -> float:
+    """Normal force of the widest line [N]: what 99.5 % of all contacts in all frames stay below."""
+    carried = np.concatenate([np.zeros(0), *forces])
+    carried = carried[carried > 0]
+    return float(np.quantile(carried, 0.995)) if len(carried) else 1.0
+
+
+def picture_history(path: Path, history: dict[str, Floats]) -> None:
+    """Energy, greatest overlap and number of contacts against time."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7, 4.6), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    rows = figure.subplots(3, 1, sharex=True)
+    for axes, (name, label) in zip(
+        rows,
+        [("energy", "energy [J]"), ("contacts", "contacts"), ("overlap", "overlap [m]")],
+        strict=True,
+    ):
+        axes.plot(history["time"], history[name], color=STICK, marker=".", markersize=4)
+        axes.set_ylabel(label, fontsize=9)
+        axes.grid(alpha=0.3)
+    rows[-1].set_xlabel("time [s]")
+    figure.savefig(path)
+
+
+def movie_write(path: Path, pictures: list[Path]) -> None:
+    """Put pictures of equal size together as an animated GIF."""
+    from PIL import Image
+
+    frames = [
+        Image.open(picture).convert("P", palette=Image.Palette.ADAPTIVE) for picture in pictures
+    ]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=120, loop=0)

@@ -1,0 +1,305 @@
+"""A problem as the pivoting methods hold it, the shift that makes it regular, and its answer.
+
+Redundant contacts make the reduced equations (28) singular, and nearly redundant ones make the
+way to a solution long.  So ``A + shift`` is solved, and the shift taken out by proximal steps
+
+    a = (A + shift) f - shift f_before + b,
+
+each of which drives the change of b that it makes, all contacts kept consistent.  A fixed point
+knows no shift (Rockafellar, SIAM J. Control Optim. 14 (1976) 877, for monotone problems; with
+friction it is judged by its residual).  The shift falls as long as that takes few pivots.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog
+
+from rigid_lcp.cones import natural_residual
+from rigid_lcp.dantzig_drive import (
+    CYCLED,
+    DONE,
+    OFFSET,
+    RAY,
+    RETURNED,
+    SINGULAR,
+    TOO_MANY,
+    drive,
+    settle_values,
+)
+from rigid_lcp.errors import ProblemError
+from rigid_lcp.factor_updates import (
+    BREAKING,
+    LIST_NAMES,
+    STATIC,
+    Geometry,
+    Reduced,
+    geometry_product,
+    reduced_empty,
+    reduced_refresh,
+)
+from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, Status
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SHIFT_LEAST = 1e-6
+"""Relative shift below which round-off in the inverse would make events up."""
+PROXIMAL_STEPS = 60
+"""Most proximal steps that take the shift out,"""
+PROXIMAL_PATIENCE = 12
+"""and most without a better residual: self-stress moves on for a while before it settles."""
+
+
+class Pivots(NamedTuple):
+    """A problem in the kernels' arrays, and where its solution stands."""
+
+    geometry: Geometry
+    reduced: Reduced
+    b: Floats
+    f: Floats
+    a: Floats
+    rows: Ints
+    """Numbers of the kept rows in the problem: all but tangential ones without friction."""
+    unit: float
+    """The mean of the diagonal of A."""
+    shift: Floats
+    """(1,) what is added to the diagonal of A now."""
+    diagonal: tuple[Ints, Ints]
+    """Where the diagonal of A stands among its values by rows and by columns."""
+    codes: Ints
+    trace: Floats
+    count: Ints
+
+
+def pivots_state(
+    problem: FrictionProblem,
+    shift: float,
+    perturbation: float,
+    tangential_velocity: ArrayLike | None,
+    traced: bool,
+) -> Pivots:
+    """The kernels' arrays of a 2D problem, or of normal equations alone where mu = 0."""
+    nc, dim = problem.contacts, problem.dim
+    mu = problem.friction
+    if dim == 3 and mu.any():
+        raise ProblemError(
+            "pivoting knows two directions of sliding, in 3D there is a circle of them",
+            where="dim", remedy="use a Newton or interior-point method",
+        )  # fmt: skip
+    velocity = np.zeros(nc) if tangential_velocity is None else np.asarray(
+        tangential_velocity, dtype=float
+    )  # fmt: skip
+    if velocity.shape != (nc,) or not np.isfinite(velocity).all():
+        raise ProblemError(
+            f"u_T is not {nc} finite numbers", where="tangential_velocity",
+            remedy="give one tangential velocity a contact",
+        )  # fmt: skip
+    keep = np.zeros((nc, dim), dtype=bool)
+    keep[:, 0] = True
+    keep[:, 1] |= mu > 0
+    rows = np.flatnonzero(keep)
+    number = np.full(nc * dim, -1)
+    number[rows] = np.arange(len(rows))
+    w = problem.delassus[rows][:, rows]
+    diagonal = w.diagonal()
+    unit = float(diagonal.mean()) if len(rows) else 0.0
+    w = sp.csr_array(w + shift * unit * sp.eye_array(len(rows)))
+    wc = sp.csc_array(w)
+    inside = (diagonal_places(w), diagonal_places(wc))
+    generator = np.random.default_rng(0)
+    b = problem.offset[rows]
+    # by forces, as only what lies in the range of A leaves redundant contacts at rest
+    size = problem.rho * (float(np.abs(b).max(initial=0.0)) or 1.0)
+    b = b + perturbation * size * (w @ generator.uniform(-1.0, 1.0, len(rows)))
+    geometry = Geometry(
+        w.indptr.astype(np.int64), w.indices.astype(np.int64), w.data,
+        wc.indptr.astype(np.int64), wc.indices.astype(np.int64), wc.data,
+        number.reshape(nc, dim)[:, 0].copy(), number.reshape(nc, dim)[:, 1].copy(),
+        rows // dim, mu, (-np.sign(velocity) * (mu > 0)).astype(np.int64),
+    )  # fmt: skip
+    return Pivots(
+        geometry, reduced_empty(nc, len(rows)), b, np.zeros(len(rows)), b.copy(), rows, unit,
+        np.array([shift * unit]), inside,
+        generator.integers(2**62, size=(nc, len(LIST_NAMES))),
+        np.zeros((200 * nc + 1000 if traced else 0, 7)), np.zeros(1, dtype=np.int64),
+    )  # fmt: skip
+
+
+def offset_drive(state: Pivots, change: Floats, goal: float, reversal: bool, limit: int) -> int:
+    """Add ``goal`` times ``change`` to b, all contacts kept consistent; returns how it ended."""
+    if not len(state.b):
+        return DONE
+    target = state.b + goal * change
+    ended, _ = drive(
+        state.geometry, state.reduced, state.b, state.f, state.a, change, OFFSET, 0, goal,
+        reversal, max(limit - int(state.count[0]), 0), state.codes, state.trace, state.count,
+    )  # fmt: skip
+    if ended == DONE:
+        state.b[:] = target
+        settle_values(
+            state.geometry, state.reduced, state.b, np.zeros_like(target), state.f, state.a
+        )
+    return ended
+
+
+def diagonal_places(matrix: sp.csr_array | sp.csc_array) -> Ints:
+    """Where the values of the diagonal are stored."""
+    line = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+    return np.flatnonzero(matrix.indices == line)
+
+
+def shift_change(state: Pivots, shift: float) -> bool:
+    """Another shift [that of A]; b takes the difference up, f and a and the lists stay."""
+    geometry, by = state.geometry, shift - state.shift[0]
+    geometry.row_value[state.diagonal[0]] += by
+    geometry.column_value[state.diagonal[1]] += by
+    state.shift[0] = shift
+    product = np.zeros_like(state.b)
+    geometry_product(geometry, state.f, product)
+    state.b[:] = state.a - product
+    return bool(reduced_refresh(geometry, state.reduced))
+
+
+def shift_remove(problem: FrictionProblem, state: Pivots, tolerance: float, few: int) -> Floats:
+    """Proximal steps, the shift falling tenfold as long as one takes no more than ``few`` pivots.
+
+    A step that takes more is done again with the shift of before, which then stays longer.
+    """
+    exact, best = problem.offset[state.rows], pivots_force(problem, state)
+    least, idle, pace = pivots_residual(problem, state, best), 0, 0.1
+    floor = SHIFT_LEAST * state.unit
+    for _ in range(PROXIMAL_STEPS if state.shift[0] > 0.0 else 0):
+        if least <= tolerance or idle == PROXIMAL_PATIENCE:
+            break
+        before, shift = state_copy(state), float(state.shift[0])
+        smaller = min(shift, max(pace * shift, floor))
+        if smaller < shift:
+            shift_change(state, smaller)
+        change = exact - smaller * state.f - state.b
+        ended = offset_drive(state, change, 1.0, True, int(state.count[0]) + few)
+        if ended != DONE:
+            if smaller == shift and pace == 1.0:
+                break
+            state_restore(state, before, shift)
+            pace = 1.0 if pace > 0.5 else pace**0.5
+            continue
+        force = pivots_force(problem, state)
+        residual = pivots_residual(problem, state, force)
+        idle = 0 if residual < least else idle + 1
+        if residual < least:
+            best, least = force, residual
+    return best
+
+
+def state_copy(state: Pivots) -> tuple[Ints, Floats, Floats]:
+    """The lists, f and a, to come back to."""
+    return state.reduced.kind.copy(), state.f.copy(), state.a.copy()
+
+
+def state_restore(state: Pivots, kept: tuple[Ints, Floats, Floats], shift: float) -> None:
+    """Come back to lists, f and a, with the shift they belong to."""
+    lists_set(state, kept[0])
+    state.f[:], state.a[:] = kept[1], kept[2]
+    shift_change(state, shift)
+
+
+def lists_set(state: Pivots, kinds: Ints) -> None:
+    """Put every contact on a list; the inverse has then to be made anew."""
+    geometry, reduced = state.geometry, state.reduced
+    reduced.kind[:] = kinds
+    reduced.place[:] = -1
+    inside = np.zeros(len(state.rows), dtype=bool)
+    inside[geometry.normal[kinds != BREAKING]] = True
+    inside[geometry.tangent[kinds == STATIC]] = True
+    members = np.flatnonzero(inside)
+    reduced.members[: len(members)] = members
+    reduced.place[members] = np.arange(len(members))
+    reduced.size[0] = len(members)
+
+
+def pivots_force(problem: FrictionProblem, state: Pivots) -> Floats:
+    """Forces of all rows (nc * dim,): no round-off outside the cones."""
+    force = np.zeros(len(problem.offset))
+    force[state.rows] = state.f
+    normal = np.maximum(force[:: problem.dim], 0.0)
+    force[:: problem.dim] = normal
+    if problem.dim == 2:
+        bound = problem.friction * normal
+        force[1::2] = np.clip(force[1::2], -bound, bound)
+    return force
+
+
+def pivots_residual(problem: FrictionProblem, state: Pivots, force: Floats) -> float:
+    """Scale-free residual; contacts that slide already have a friction force of known sign."""
+    if not state.geometry.slip.any():
+        return problem.residual(force)
+    velocity = problem.velocity(force)
+    # as a fast sliding acceleration of that sign: the projection then falls on that edge alone
+    far = 10.0 * (np.abs(velocity).max() + np.abs(force).max() / problem.rho)
+    slides = state.geometry.slip != 0
+    velocity[1::2][slides] = -state.geometry.slip[slides] * far
+    shape = (problem.contacts, problem.dim)
+    return natural_residual(
+        force.reshape(shape), velocity.reshape(shape), problem.friction, problem.rho
+    )
+
+
+_ENDS: dict[int, tuple[Status, str]] = {
+    DONE: ("not converged", "the lists are consistent, but round-off leaves a residual of {res:.2g}"
+           "\n  -> ask for less, or polish with a Newton method"),
+    RAY: ("not converged", "the driven quantity at contact {where} grows without bound (a ray)"
+          "\n  -> use `pivoting`, or another order of contacts"),
+    CYCLED: ("cycled", "the lists repeat without progress at contact {where}"
+             "\n  -> use `pivoting`; this happens from a friction of about 0.2 on"),
+    RETURNED: ("not converged", "the force driven at contact {where} came back to zero"
+               "\n  -> use `pivoting`, or another order of contacts"),
+    SINGULAR: ("singular", "the reduced equations (28) became singular at contact {where}"
+               "\n  -> raise `shift`, or use `pivoting`"),
+    TOO_MANY: ("not converged", "the pivots were used up at contact {where}"
+               "\n  -> raise `max_pivots`, or use `pivoting`"),
+}  # fmt: skip
+
+
+def pivots_solution(
+    problem: FrictionProblem, state: Pivots, force: Floats, tolerance: float, method: str,
+    ended: int, where: int,
+) -> FrictionSolution:  # fmt: skip
+    """Judge the forces; a ray becomes ``no solution`` if a linear programme proves that."""
+    residual = pivots_residual(problem, state, force)
+    work = {"pivots": float(state.count[0])}
+    velocity = problem.velocity(force)
+    if residual <= tolerance:
+        return FrictionSolution(force, velocity, residual, "solved", method, work)
+    status, text = _ENDS[ended]
+    if ended == RAY and forces_impossible(problem, state.geometry.slip):
+        status = "no solution"
+        text = (
+            "no finite forces keep the contacts from approaching (Painleve); the ray was met at"
+            " contact {where}\n  -> use impulses: a velocity-level time step or a collision"
+        )
+    message = f"{method}: " + text.format(where=where, res=residual)
+    return FrictionSolution(force, velocity, residual, status, method, work, message)
+
+
+def forces_impossible(problem: FrictionProblem, slip: Ints) -> bool:
+    """Whether no forces of the allowed signs and sizes at all give ``a_N >= 0``: a proof by LP."""
+    nc, mu = problem.contacts, problem.friction
+    unit = sp.eye_array(nc)
+    # f = columns f_N, and two edges of the cone where the contact does not slide yet
+    edges = [
+        sp.kron(unit, [[1.0], [0.0]])
+        + sp.kron(sp.diags_array(np.where(slip == 0, sign, slip) * mu), [[0.0], [1.0]])
+        for sign in (1, -1)
+    ]
+    normal = sp.csr_array(problem.delassus)[::2] @ sp.hstack(edges)
+    scale = float(np.abs(problem.offset).max()) or 1.0
+    found = linprog(
+        np.zeros(2 * nc), A_ub=-normal / problem.delassus.diagonal().mean(),
+        b_ub=problem.offset[::2] / scale, bounds=(0, None), method="highs",
+    )  # fmt: skip
+    return bool(found.status == 2)

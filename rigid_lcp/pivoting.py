@@ -1,0 +1,201 @@
+"""A pivoting method that does not cycle: a path of exact solutions from an easy problem to ours.
+
+Lemke's idea (Cottle, Pang and Stone, The Linear Complementarity Problem, 1992, 4.4) on the lists
+of the seed's section 6 in place of the three or four unknowns a contact of Stewart and Trinkle
+(Int. J. Numer. Methods Eng. 39 (1996) 2673): Coulomb's law in 2D with a covering vector d,
+
+    u = W r + q + lambda d,    lambda from large (or 1) down to 0.
+
+The solutions r(lambda) form a path of straight pieces; at each corner one contact changes its list
+(events 3a to 3d).  Unlike the driven force of `rigid_lcp.dantzig`, lambda may grow again: after a
+corner the path goes on in the sense in which the contact that moved stays consistent.  A path
+never meets itself, so nothing cycles.
+
+From no forces, d = n: for large lambda all contacts part.  Along a ray that ends the path,
+``dr . du = -mu dr_N |du_T| <= 0`` and ``dr . du = dr . W dr + dlambda dr . d``.  With W positive
+definite (it is shifted a little, and the shift removed) and d inside K*, ``dr . d > 0``, so there
+is no such ray: the path ends in a solution for every coefficient of friction.
+
+From forces near a solution (of the last step, of Gauss-Seidel, of Newton): the lists are read off
+them, and d is what is missing to make them a solution of the problem at lambda = 1.  A few corners
+are left.  There d need not be inside K*; should a ray end the path, the method starts from no
+forces.
+
+2D friction, or 3D without friction.  In 3D friction sliding has a circle of directions, which a
+pivoting method can only replace by a polygon (an error of ``1 - cos(pi / k)`` for k edges).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigid_lcp.dantzig_drive import DONE, TOO_MANY
+from rigid_lcp.factor_updates import (
+    BREAKING,
+    SLIDING_DOWN,
+    SLIDING_UP,
+    STATIC,
+    Geometry,
+    Ints,
+    geometry_product,
+    reduced_refresh,
+    reduced_solve,
+    slide_sign,
+)
+from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
+from rigid_lcp.pivot_state import (
+    Pivots,
+    lists_set,
+    offset_drive,
+    pivots_force,
+    pivots_solution,
+    pivots_state,
+    shift_remove,
+)
+
+Floats = NDArray[np.float64]
+
+
+def pivoting(
+    problem: FrictionProblem,
+    start: Floats | None = None,
+    tolerance: float = 1e-12,
+    *,
+    tangential_velocity: Floats | None = None,
+    shift: float = 1e-2,
+    max_pivots: int | None = None,
+) -> FrictionSolution:
+    """Solve a 2D friction problem, or a frictionless one, exactly by following a path of pivots.
+
+    ``start`` r (nc * dim,): forces near the solution; the nearer, the fewer pivots.
+    ``tangential_velocity`` u_T (nc,) [m/s]: where not zero the contact slides already and friction
+    opposes u_T; only then can there be no solution (Painleve).  ``shift``: added to the diagonal
+    of W, relative to its mean, while pivoting.  ``max_pivots``: default 60 a contact.
+
+    ``work``: ``pivots``, changes of lists; ``paths``, 2 where the path from ``start`` was given up.
+    Status ``no solution`` is proved by a linear programme.  Raises `ProblemError` in 3D with
+    friction.  Takes memory for (2 nc)^2 numbers and O(k^2) work a pivot for k unknown forces: not
+    for above some 2,000 contacts.
+    """
+    most = 60 * problem.contacts + 100 if max_pivots is None else max_pivots
+    few = problem.contacts + 50
+    attempts = [(shift, False, 4 * few), (10.0 * shift, False, 4 * few), (shift, False, most)]
+    if start is not None and problem.contacts:
+        if tangential_velocity is None and problem.residual(start) <= tolerance:
+            work = {"pivots": 0.0, "paths": 0.0}
+            return friction_solution(problem, np.array(start), tolerance, "pivoting", work)
+        attempts = [(shift, True, few), (10.0 * shift, True, few), *attempts]
+    spent = 0
+    for paths, (amount, warm, limit) in enumerate(attempts, 1):
+        state = pivots_state(problem, amount, 0.0, tangential_velocity, False)
+        if warm:
+            assert start is not None
+            ended = path_from_forces(problem, state, start, min(limit, most - spent))
+        else:
+            ended = path_from_nothing(problem, state, min(limit, most - spent))
+        force = shift_remove(problem, state, tolerance, few) if ended == DONE else pivots_force(
+            problem, state
+        )  # fmt: skip
+        spent += int(state.count[0])
+        state.count[0] = spent
+        solution = pivots_solution(problem, state, force, tolerance, "pivoting", ended, -1)
+        solution.work["paths"] = float(paths)
+        if solution.status in ("solved", "no solution") or spent >= most:
+            break
+    return solution
+
+
+def path_from_nothing(problem: FrictionProblem, state: Pivots, limit: int) -> int:
+    """Lemke's path: at lambda = 1 all contacts part, with d = n but for a little against ties."""
+    geometry, b = state.geometry, state.b
+    if not len(b):
+        return DONE
+    normal = geometry.normal
+    covering = np.zeros(len(b))
+    generator = np.random.default_rng(1)
+    covering[normal] = generator.uniform(0.9, 1.1, problem.contacts)
+    covering *= 1.01 * max(float((-b[normal] / covering[normal]).max()), 0.0)
+    exact = b.copy()
+    ties = state.geometry.tangent[geometry.tangent >= 0]
+    if len(ties):  # which way a contact would slide where q does not say: inside K*
+        least = 1e-3 * covering[normal][geometry.tangent >= 0]
+        covering[ties] = least * generator.uniform(-1.0, 1.0, len(ties))
+    state.reduced.kind[:] = BREAKING
+    b += covering
+    state.a[:] = b
+    return offset_drive(state, exact - b, 1.0, True, limit)
+
+
+def path_from_forces(problem: FrictionProblem, state: Pivots, start: Floats, limit: int) -> int:
+    """The path from a start: lists from its natural map, d from what it lacks."""
+    nc, dim = problem.contacts, problem.dim
+    force = np.ascontiguousarray(start, dtype=float).reshape(nc, dim)
+    velocity = problem.velocity(force.ravel()).reshape(nc, dim)
+    kinds = lists_of(force, velocity, problem.friction, problem.rho, state.geometry.slip)
+    reduced, geometry = state.reduced, state.geometry
+    lists_set(state, kinds)
+    members = reduced.members[: reduced.size[0]]
+    if not reduced_refresh(geometry, reduced):
+        return TOO_MANY
+    exact = state.b - state.shift[0] * force.ravel()[state.rows]  # a proximal step from the start
+    state.f[members] = reduced_solve(reduced, exact)
+    little = 1e-3 * float(np.abs(state.f).mean()) or 1.0
+    noise = np.random.default_rng(2).uniform(0.5, 1.5, (nc, 2))
+    make_consistent(geometry, kinds, state.f, state.a, exact, little, problem.rho, noise)
+    product = np.zeros_like(exact)
+    geometry_product(geometry, state.f, product)
+    state.b[:] = state.a - product
+    return offset_drive(state, exact - state.b, 1.0, True, limit)
+
+
+@njit(cache=True)
+def lists_of(force: Floats, velocity: Floats, mu: Floats, rho: float, slip: Ints) -> Ints:
+    """List of each contact: on which face of its cone the natural map projects it."""
+    kinds = np.full(len(mu), BREAKING)
+    for c in range(len(mu)):
+        tangential = force[c, 1] - rho * velocity[c, 1] if mu[c] > 0.0 else 0.0
+        normal = force[c, 0] - rho * (velocity[c, 0] + mu[c] * abs(velocity[c, 1]))
+        if slip[c] != 0:
+            if force[c, 0] > rho * velocity[c, 0]:
+                kinds[c] = SLIDING_UP if slip[c] > 0 else SLIDING_DOWN
+        elif mu[c] * abs(tangential) > -normal:
+            if mu[c] > 0.0 and abs(tangential) <= mu[c] * normal:
+                kinds[c] = STATIC
+            else:
+                kinds[c] = SLIDING_UP if tangential >= 0.0 else SLIDING_DOWN
+    return kinds
+
+
+@njit(cache=True)
+def make_consistent(
+    geometry: Geometry, kinds: Ints, f: Floats, a: Floats, b: Floats, little: float, rho: float,
+    noise: Floats,
+) -> None:  # fmt: skip
+    """Move f and a, as little as need be, to where every contact obeys the rules of its list."""
+    for c in range(len(kinds)):
+        n, t, mu, sign = (
+            geometry.normal[c],
+            geometry.tangent[c],
+            geometry.mu[c],
+            slide_sign(kinds[c]),
+        )
+        if kinds[c] == BREAKING:
+            f[n] = 0.0
+        else:
+            f[n] = max(f[n], little * noise[c, 0])
+        if t >= 0:
+            f[t] = sign * mu * f[n] if kinds[c] != STATIC else f[t]
+            bound = mu * f[n] * (1.0 - 1e-3 * noise[c, 1])
+            if kinds[c] == STATIC:
+                f[t] = min(max(f[t], -bound), bound)
+    a[:] = b
+    geometry_product(geometry, f, a)
+    for c in range(len(kinds)):
+        n, t, sign = geometry.normal[c], geometry.tangent[c], slide_sign(kinds[c])
+        a[n] = max(a[n], little / rho * noise[c, 0]) if kinds[c] == BREAKING else 0.0
+        if t >= 0 and kinds[c] == STATIC:
+            a[t] = 0.0
+        elif t >= 0 and sign != 0.0 and geometry.slip[c] == 0:
+            a[t] = -sign * max(-sign * a[t], little / rho * noise[c, 1])

@@ -1,0 +1,112 @@
+"""The report of a run: one page, ``report.html``, that loads nothing, its pictures and a movie."""
+
+from __future__ import annotations
+
+import base64
+import json
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from rigid_lcp import pictures
+from rigid_lcp.run_folder import RunFolder, frame_read, write_whole
+from rigid_lcp.scene import Scene
+from rigid_lcp.scene_run import history_of, history_write
+
+STYLE = """
+:root { color-scheme: light; }
+body { font: 16px/1.5 Charter, Georgia, serif; color: #1a1a1a; background: #fff;
+  max-width: 54rem; margin: 2.5rem auto; padding: 0 1.25rem; }
+h1 { font-size: 1.6rem; line-height: 1.2; margin: 0 0 .3rem; }
+h2 { font-size: 1.15rem; margin: 2.2rem 0 .5rem; border-top: 1px solid #ccc; padding-top: .6rem; }
+.claim { font-size: 1.1rem; border-left: 4px solid #0b5fa5; padding: .1rem 0 .1rem 1rem; }
+figure { margin: 1rem 0; break-inside: avoid; }
+figure img { max-width: 100%; height: auto; display: block; margin: auto; }
+figcaption { font-size: .87rem; color: #444; }
+table { border-collapse: collapse; font: .86rem/1.4 Helvetica, Arial, sans-serif; }
+th, td { padding: .25rem .8rem .25rem 0; text-align: left; border-bottom: 1px solid #e4e4e4; }
+pre { background: #f5f5f5; padding: .7rem .9rem; white-space: pre-wrap; overflow-wrap: anywhere; }
+"""
+ROWS = (
+    ("bodies that move", "bodies", "{:,}"),
+    ("time", "time", "{:.6g} s"),
+    ("steps", "steps", "{:,}"),
+    ("length of a step", "step", "{:.4g} s"),
+    ("contacts that carry at the end", "contacts", "{:,}"),
+    ("of these sliding", "sliding", "{:,}"),
+    ("largest normal force at the end", "largest_normal_force", "{:.4g} N"),
+    ("largest speed at the end", "speed_largest", "{:.3g} m/s"),
+    ("largest overlap in any frame", "overlap_largest", "{:.3g} m"),
+    ("worst residual of any step", "residual_worst", "{:.2g}"),
+    ("processor time", "cpu_s", "{:.3g} s"),
+    ("processor time a step", "cpu_a_step", "{:.3g} s"),
+)
+
+
+def report_write(
+    folder: RunFolder, scene: Scene, manifest: dict[str, Any], summary: dict[str, Any],
+    *, draw: bool,
+) -> Path:  # fmt: skip
+    """Write the report of a finished run, with pictures of its frames if ``draw``; its path."""
+    history = history_of(folder)
+    history_write(folder.path / "history.csv", history)
+    figures = []
+    if draw:
+        drawn = frames_draw(folder, scene, summary["title"])
+        figures.append((drawn[-1], "Force chains at the end: width by normal force, blue contacts "
+                        "stick, red ones slide."))  # fmt: skip
+        balance = folder.path / "picture-history.png"
+        pictures.picture_history(balance, history)
+        figures.append((balance, "Energy (kinetic and potential), contacts that carry, and the "
+                        "greatest overlap, at the frames."))  # fmt: skip
+    title = summary["title"] or "Rigid grains"
+    claim = (
+        f"{summary['bodies']:,} rigid bodies, {summary['time']:.4g} s in {summary['steps']:,} "
+        f"steps by {summary['method']}; contact forces to a residual of "
+        f"{summary['residual_worst']:.1g}, overlaps below {summary['overlap_largest']:.1g} m, {summary['cpu_s']:.3g} s of processor "
+        "time."
+    )
+    rows = "".join(
+        f"<tr><td>{name}</td><td>{form.format(summary[key])}</td></tr>" for name, key, form in ROWS
+    )
+    absent = "".join(f"<li>{escape(text)}</li>" for text in summary["left_out"])
+    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    page = [
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"/>',
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}"/>',
+        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>",
+        f'<h1>{escape(title)}</h1><p class="claim">{escape(claim)}</p>',
+        *(_figure(path, caption) for path, caption in figures),
+        f"<h2>Figures</h2><table>{rows}</table>",
+        f"<h2>Left out</h2><ul>{absent}</ul>",
+        f"<h2>Again</h2><pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>",
+        "</body></html>\n",
+    ]
+    path = folder.path / "report.html"
+    write_whole(path, "\n".join(page))
+    return path
+
+
+def frames_draw(folder: RunFolder, scene: Scene, title: str) -> list[Path]:
+    """Draw every frame as ``picture-NUMBER.png`` with one scale, and all as ``movie.gif``."""
+    frames = [frame_read(path) for path in folder.frames()]
+    window = pictures.window_of(scene, [frame["motion"].position for frame in frames])
+    scale = pictures.force_scale([frame["contacts"].normal_force for frame in frames])
+    drawn = []
+    for number, frame in enumerate(frames):
+        head = f"{title}   t = {float(frame['time']):.3f} s, widest line {scale:.3g} N"
+        figure = pictures.picture_state(
+            scene, frame["motion"], frame["contacts"], window, scale, head
+        )
+        drawn.append(folder.path / f"picture-{number:06d}.png")
+        figure.savefig(drawn[-1])
+    pictures.movie_write(folder.path / "movie.gif", drawn)
+    return drawn
+
+
+def _figure(path: Path, caption: str) -> str:
+    data = base64.b64encode(path.read_bytes()).decode()
+    return (
+        f'<figure><img src="data:image/png;base64,{data}" alt="{escape(caption)}"/>'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+    )

@@ -1,0 +1,199 @@
+"""The folder of one run: its scene, its frames (states to go on from), its table, its lock.
+
+A frame is written whole or not at all, and the table of energies is made anew from the frames, so
+whatever kills a run costs at most the time since its last frame.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import io
+import json
+import os
+import socket
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigid_lcp.contacts import ContactForces
+from rigid_lcp.errors import SceneError, UsageError
+from rigid_lcp.motion import Motion
+from rigid_lcp.simulation import Simulation
+
+FRAME = "frame_{:06d}.npz"
+RESULT, MANIFEST = "result.json", "manifest.json"
+OURS = (
+    "scene.toml", MANIFEST, RESULT, "frame_*.npz", "history.csv", "report.html", "picture-*.png",
+    "movie.gif", ".*.partial",
+)  # fmt: skip
+"""Files of a run; what starts anew removes these and no other."""
+COUNTERS = ("time", "steps", "worst_residual")
+
+
+def write_whole(path: Path, content: bytes | str) -> None:
+    """Write a file: whatever kills the writer leaves the old file or the new, never a part.
+
+    Raises `UsageError` when the system refuses.
+    """
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        with partial.open("wb") as stream:
+            stream.write(content.encode() if isinstance(content, str) else content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        partial.replace(path)
+    except OSError as error:
+        raise UsageError(
+            f"can not be written ({error.strerror or error})", where=str(path),
+            remedy="make room or leave to write there, or give another folder",
+        ) from error  # fmt: skip
+    finally:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+
+
+class RunFolder:
+    """The folder ``path``; made when it is locked first."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run came to its end, report and all."""
+        return (self.path / RESULT).exists()
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Hold the lock of the folder's only writer; the system drops it with the process.
+
+        Raises `UsageError` when another process has it, or the folder can not be written.
+        """
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            stream = (self.path / ".lock").open("a+", encoding="utf-8")
+        except OSError as error:
+            raise UsageError(
+                f"can not be written ({error.strerror or error})", where=str(self.path),
+                remedy="give another --run-folder",
+            ) from error  # fmt: skip
+        with stream:
+            try:
+                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                stream.seek(0)
+                raise UsageError(
+                    f"another process writes to this run ({stream.read().strip()})",
+                    where=str(self.path), remedy="wait for it, or stop it; nothing was changed",
+                ) from error  # fmt: skip
+            stream.truncate(0)
+            stream.write(f"pid {os.getpid()} on {socket.gethostname()}")
+            stream.flush()
+            yield
+
+    def settle(self, manifest: dict[str, Any], scene: str, *, resume: bool, force: bool) -> bool:
+        """Make the folder ready for a run of ``manifest``; whether a run that is there goes on.
+
+        Another scene's run, or an unfinished one without ``resume``, raises `UsageError` and is
+        left as it is, unless ``force``: then the run's own files are removed.  So does a folder
+        with other people's files, always.
+        """
+        strangers = [
+            path.name
+            for path in self.path.iterdir()
+            if path.name != ".lock" and not any(path.match(pattern) for pattern in OURS)
+        ]
+        if strangers:
+            raise UsageError(
+                f"this folder has files that are no run's ({', '.join(sorted(strangers)[:3])})",
+                where=str(self.path), remedy="give an empty --run-folder",
+            )  # fmt: skip
+        there = self._manifest()
+        if there is not None and not force:
+            if there.get("scene") != manifest["scene"]:
+                raise UsageError(
+                    "this folder holds the run of another scene", where=str(self.path),
+                    remedy="give another --run-folder, or --force to lose that run",
+                )  # fmt: skip
+            if resume:
+                return True
+            state = "is finished" if self.finished else "is not finished"
+            raise UsageError(
+                f"this run is there already and {state}", where=str(self.path),
+                remedy="--resume to go on with it, or --force to compute it anew",
+            )  # fmt: skip
+        for pattern in OURS:
+            for path in self.path.glob(pattern):
+                path.unlink()
+        write_whole(self.path / "scene.toml", scene)
+        write_whole(self.path / MANIFEST, json.dumps(manifest, indent=1) + "\n")
+        return False
+
+    def _manifest(self) -> dict[str, Any] | None:
+        """The manifest that is there; None without one, empty when it can not be read."""
+        try:
+            content = json.loads((self.path / MANIFEST).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError):
+            return {}
+        return content if isinstance(content, dict) else {}
+
+    # --- frames ---------------------------------------------------------------------------------
+
+    def frame_write(self, number: int, run: Simulation, cpu: float) -> None:
+        """Keep the state of a run as frame ``number``; ``cpu``: processor time so far [s]."""
+        arrays = {f"motion_{f.name}": getattr(run.motion, f.name) for f in fields(Motion)}
+        arrays |= {
+            f"contact_{f.name}": getattr(run.contacts, f.name) for f in fields(ContactForces)
+        }
+        arrays |= {name: np.asarray(getattr(run, name)) for name in COUNTERS}
+        arrays |= {"energy": np.asarray(run.energy), "overlap": np.asarray(run.overlap)}
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, cpu=np.asarray(cpu), **arrays)
+        write_whole(self.path / FRAME.format(number), buffer.getvalue())
+
+    def frames(self) -> list[Path]:
+        """Frames that can be read, in order, up to the first that is missing or damaged."""
+        sound: list[Path] = []
+        while (path := self.path / FRAME.format(len(sound))).exists():
+            try:
+                with np.load(path) as file:
+                    file["cpu"]
+            except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+                break
+            sound.append(path)
+        return sound
+
+
+def frame_read(path: Path) -> dict[str, Any]:
+    """Arrays of a frame by name, with ``motion`` and ``contacts`` put together."""
+    with np.load(path) as file:
+        arrays = {name: file[name] for name in file.files}
+    arrays["motion"] = Motion(**{f.name: arrays[f"motion_{f.name}"] for f in fields(Motion)})
+    arrays["contacts"] = ContactForces(
+        **{f.name: arrays[f"contact_{f.name}"] for f in fields(ContactForces)}
+    )
+    return arrays
+
+
+def frame_restore(path: Path, run: Simulation) -> float:
+    """Put a run into a frame's state; returns the processor time that it had taken [s].
+
+    Raises `SceneError` if the frame is of other bodies.
+    """
+    frame = frame_read(path)
+    if frame["motion"].position.shape != run.motion.position.shape:
+        raise SceneError(
+            f"the frame has {len(frame['motion'].position)} bodies, the scene "
+            f"{len(run.motion.position)}", where=str(path), remedy="--force to compute it anew",
+        )  # fmt: skip
+    run.motion, run.contacts = frame["motion"], frame["contacts"]
+    run.time, run.steps = float(frame["time"]), int(frame["steps"])
+    run.worst_residual = float(frame["worst_residual"])
+    return float(frame["cpu"])

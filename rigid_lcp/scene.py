@@ -1,0 +1,245 @@
+"""A scene: bodies with shape, mass and surface, gravity; and what the equations need of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.contacts import Contacts
+from rigid_lcp.detection_2d import detect_2d, shapes_2d
+from rigid_lcp.errors import SceneError
+from rigid_lcp.motion import Motion
+from rigid_lcp.shapes_2d import HalfSpace
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Loads = Callable[[float, Motion], ArrayLike]
+"""Forces and torques (n, 3) in 2D, (n, 6) in 3D [N, N m] at a time [s] and state."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """One body of a scene, as it starts."""
+
+    shape: Any
+    mass: float
+    """Mass [kg], inf for a fixed body."""
+    inertia: Any
+    """Moment of inertia [kg m^2]: a number in 2D, a tensor (3, 3) in the body's frame in 3D."""
+    position: Floats
+    angle: Any
+    velocity: Floats
+    spin: Any
+    friction: float | None
+    restitution: float | None
+    name: str
+
+    @property
+    def movable(self) -> bool:
+        """It follows from forces where the body goes."""
+        return isfinite(self.mass)
+
+
+class Scene:
+    """Bodies and gravity.  ``gravity`` (dim,) [m/s^2]; the default pulls along the last axis."""
+
+    def __init__(self, dim: int = 2, gravity: ArrayLike | None = None) -> None:
+        if dim not in (2, 3):
+            raise SceneError(f"dim is {dim!r}", where="scene", remedy="give 2 or 3")
+        self.dim = dim
+        default = np.zeros(dim)
+        default[-1] = -9.81
+        self.gravity = default if gravity is None else _vector(gravity, dim, "gravity", "scene")
+        self.bodies: list[Body] = []
+
+    def add(
+        self, shape: Any, *, density: float | None = None, position: ArrayLike | None = None,
+        angle: Any = None, velocity: ArrayLike | None = None, spin: Any = None,
+        friction: float | None = None, restitution: float | None = None, fixed: bool = False,
+        name: str = "",
+    ) -> int:  # fmt: skip
+        """Add a body; returns its number.
+
+        ``density`` [kg/m^3], in 2D [kg/m^2]: of a body that moves; ``fixed`` ones need none, keep
+        the ``velocity`` they are given, and half-spaces always are.  ``position`` of the centre of
+        mass [m]; without it, the body stays where its vertices were given.  ``angle`` [rad], in 3D
+        a quaternion (w, x, y, z).  ``velocity`` [m/s], ``spin`` [rad/s].  ``friction`` and
+        ``restitution`` of a contact are the smaller of its two bodies'; a body without a value
+        leaves it to the other; without any both are zero.  Raises `SceneError`.
+        """
+        where = name or f"body {len(self.bodies)}"
+        if getattr(shape, "dim", None) != self.dim:
+            raise SceneError(
+                f"{type(shape).__name__} is no shape of {self.dim} dimensions", where=where,
+                remedy=f"use a shape with dim {self.dim}",
+            )  # fmt: skip
+        fixed = fixed or isinstance(shape, HalfSpace)
+        if not fixed and not (density is not None and isfinite(density) and density > 0):
+            raise SceneError(
+                f"the density is {density}", where=where,
+                remedy="give a positive density, or fixed=True for a body that does not move",
+            )  # fmt: skip
+        mass, inertia = (np.inf, np.inf) if fixed else shape.mass_properties(density)
+        if friction is not None and not (isfinite(friction) and friction >= 0):
+            raise SceneError(f"friction is {friction}", where=where, remedy="give zero or more")
+        if restitution is not None and not 0 <= restitution <= 1:
+            raise SceneError(f"restitution is {restitution}", where=where, remedy="give 0 to 1")
+        origin = getattr(shape, "centroid", np.zeros(self.dim))
+        turn = 3 if self.dim == 3 else 1
+        upright = [1.0, 0.0, 0.0, 0.0] if self.dim == 3 else 0.0
+        angle = _vector(upright if angle is None else angle, 1 if self.dim == 2 else 4, "angle", where)
+        length = float(np.linalg.norm(angle))
+        if self.dim == 3 and length == 0:
+            raise SceneError("the quaternion is zero", where=where, remedy="give (1, 0, 0, 0)")
+        rest = np.zeros(self.dim)
+        self.bodies.append(Body(
+            shape, mass, inertia,
+            _vector(origin if position is None else position, self.dim, "position", where),
+            angle / length if self.dim == 3 else angle,
+            _vector(rest if velocity is None else velocity, self.dim, "velocity", where),
+            _vector(np.zeros(turn) if spin is None else spin, turn, "spin", where),
+            friction, restitution, name,
+        ))  # fmt: skip
+        return len(self.bodies) - 1
+
+
+@dataclass(frozen=True)
+class World:
+    """The unchanging part of a simulation: what does not depend on the state."""
+
+    scene: Scene
+    columns: Ints
+    """Number of each body among the movable ones, -1 for a fixed one, (n,)."""
+    mass: Floats
+    """Masses [kg], (n,), inf for a fixed body."""
+    inertia: Floats
+    """Moments of inertia [kg m^2], (n,) in 2D, tensors in the bodies' frames (n, 3, 3) in 3D."""
+    reach: Floats
+    """Greatest distance of a body's points from its centre of mass [m], (n,); 0 if infinite."""
+    length: float
+    """Size of the smallest movable body [m]: the unit of all tolerances."""
+    detect: Callable[[Motion, Any], Contacts]
+    """Contacts of a state within a margin [m], one number or (n,)."""
+
+    @property
+    def movable(self) -> NDArray[np.bool_]:
+        """Bodies whose motion follows from forces, (n,)."""
+        return self.columns >= 0
+
+    @property
+    def size(self) -> int:
+        """Freedoms of a body: 3 in 2D, 6 in 3D."""
+        return 3 if self.scene.dim == 2 else 6
+
+    def inverse_mass(self, motion: Motion) -> sp.csr_array:
+        """M^-1 of the movable bodies (eq. 12), in the world frame."""
+        moving = self.movable
+        if self.scene.dim == 2:
+            mass = self.mass[moving]
+            diagonal = np.column_stack([mass, mass, self.inertia[moving]])
+            return sp.diags_array(1.0 / diagonal.ravel(), format="csr")
+        blocks = np.zeros((moving.sum(), 6, 6))
+        blocks[:, range(3), range(3)] = 1.0 / self.mass[moving][:, None]
+        blocks[:, 3:, 3:] = np.linalg.inv(self._inertia_placed(motion)[moving])
+        return sp.csr_array(sp.block_diag(blocks, format="csr"))
+
+    def accelerations(self, motion: Motion, loads: ArrayLike | None) -> Floats:
+        """Generalised accelerations of gravity, loads and gyroscopic torque alone, (n, size)."""
+        dim = self.scene.dim
+        result = np.zeros((len(self.mass), self.size))
+        moving = self.movable
+        result[moving, :dim] = self.scene.gravity
+        if loads is not None:
+            force = np.asarray(loads, dtype=float)
+            result[moving, :dim] += force[moving, :dim] / self.mass[moving][:, None]
+        if dim == 2:
+            if loads is not None:
+                result[moving, 2] += force[moving, 2] / self.inertia[moving]
+            return result
+        inertia, spin = self._inertia_placed(motion)[moving], motion.spin[moving]
+        torque = -np.cross(spin, np.einsum("nij,nj->ni", inertia, spin))
+        if loads is not None:
+            torque += force[moving, 3:]
+        result[moving, 3:] = np.linalg.solve(inertia, torque[..., None])[..., 0]
+        return result
+
+    def contacts(self, motion: Motion, margin: Any) -> Contacts:
+        """Contacts of a state with friction and restitution of their surfaces."""
+        found = self.detect(motion, margin)
+        pick = np.fmin  # the smaller; a body without a value leaves it to the other
+        bodies = self.scene.bodies
+        surface = {}
+        for name in ("friction", "restitution"):
+            values = [getattr(body, name) for body in bodies]
+            value = np.array([np.nan if v is None else v for v in [*values, None]], dtype=float)
+            surface[name] = np.nan_to_num(pick(value[found.body_a], value[found.body_b]))
+        return replace(found, **surface)
+
+    def energy(self, motion: Motion) -> float:
+        """Kinetic and potential energy of the movable bodies [J]."""
+        moving = self.movable
+        mass, velocity = self.mass[moving], motion.velocity[moving]
+        linear = 0.5 * float((mass * (velocity**2).sum(axis=1)).sum())
+        height = float((mass * (motion.position[moving] @ self.scene.gravity)).sum())
+        if self.scene.dim == 2:
+            angular = 0.5 * float((self.inertia[moving] * motion.spin[moving] ** 2).sum())
+        else:
+            inertia, spin = self._inertia_placed(motion)[moving], motion.spin[moving]
+            angular = 0.5 * float(np.einsum("ni,nij,nj->", spin, inertia, spin))
+        return linear + angular - height
+
+    def _inertia_placed(self, motion: Motion) -> Floats:
+        from rigid_lcp.rotations import rotation_matrix
+
+        frame = rotation_matrix(motion.angle)
+        return np.einsum("nij,njk,nlk->nil", frame, self.inertia, frame)
+
+
+def world_of(scene: Scene) -> tuple[World, Motion]:
+    """Arrays of a scene and its state at the start.  Raises `SceneError` for an empty scene."""
+    bodies = scene.bodies
+    movable = np.array([body.movable for body in bodies], dtype=bool)
+    if not movable.any():
+        raise SceneError("no body can move", where="scene", remedy="add a body with a density")
+    columns = np.where(movable, np.cumsum(movable) - 1, -1)
+    shapes = [body.shape for body in bodies]
+    reach = np.array([shape.reach if isfinite(shape.reach) else 0.0 for shape in shapes])
+    mass = np.array([body.mass for body in bodies])
+    if scene.dim == 2:
+        arrays = shapes_2d(shapes, movable)
+        inertia = np.array([body.inertia for body in bodies])
+
+        def detect(motion: Motion, margin: Any) -> Contacts:
+            return detect_2d(arrays, motion.position, motion.angle, margin)
+    else:
+        from rigid_lcp.detection_3d import detect_3d, shapes_3d
+
+        solids = shapes_3d(shapes, movable)
+        inertia = np.array([body.inertia if body.movable else np.eye(3) for body in bodies])
+
+        def detect(motion: Motion, margin: Any) -> Contacts:
+            return detect_3d(solids, motion.position, motion.angle, margin)
+
+    angle = np.array([body.angle for body in bodies])
+    spin = np.array([body.spin for body in bodies])
+    start = Motion(
+        np.array([body.position for body in bodies]), angle[:, 0] if scene.dim == 2 else angle,
+        np.array([body.velocity for body in bodies]), spin[:, 0] if scene.dim == 2 else spin,
+    )  # fmt: skip
+    length = float(reach[movable].min())
+    return World(scene, columns, mass, inertia, reach, length, detect), start
+
+
+def _vector(values: ArrayLike, size: int, what: str, where: str) -> Floats:
+    vector = np.atleast_1d(np.asarray(values, dtype=float))
+    if vector.shape != (size,) or not np.isfinite(vector).all():
+        raise SceneError(
+            f"{what} is {values!r}", where=where, remedy=f"give {size} finite number(s)"
+        )
+    return vector

@@ -1,0 +1,172 @@
+"""Tables of a rigid scene file, as pydantic checks them; SI units throughout."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+Vector = Annotated[list[FiniteFloat], Field(min_length=2, max_length=3)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]{0,59}$")]
+
+
+class Table(BaseModel):
+    """A table that knows all its keys."""
+
+    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)
+
+
+class Surface(Table):
+    """What bodies without values of their own get."""
+
+    friction: NotNegative = 0.0
+    restitution: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.0
+
+
+class Run(Table):
+    """How long, and how."""
+
+    duration: Positive
+    """[s]"""
+    step: Positive = 1e-3
+    """Length of a step, the longest one at acceleration level [s]."""
+    method: Literal["time-stepping", "acceleration"] = "time-stepping"
+    tolerance: Annotated[FiniteFloat, Field(ge=1e-14, le=1e-3)] = 1e-10
+    """Scale-free residual of the contact forces [-]."""
+    frames: Annotated[int, Field(ge=1, le=100_000)] = 20
+    """States that are kept, at equal times."""
+
+
+class Ground(Table):
+    """A half-space: everything with ``normal . x <= offset``."""
+
+    normal: Vector
+    offset: FiniteFloat = 0.0
+    friction: NotNegative | None = None
+    restitution: Annotated[FiniteFloat, Field(ge=0, le=1)] | None = None
+
+
+class BodyTable(Table):
+    """One body; exactly one of the shapes."""
+
+    name: Name
+    box: Vector | None = None
+    """Edge lengths [m]."""
+    radius: Positive | None = None
+    """Of a disc or a sphere [m]."""
+    vertices: list[Vector] | None = None
+    """Of a convex polygon (anticlockwise) or polyhedron [m]."""
+    density: Positive | None = None
+    """[kg/m^3]; in 2D [kg/m^2], or per metre of depth."""
+    fixed: bool = False
+    position: Vector | None = None
+    angle: FiniteFloat | Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)] | None = (
+        None
+    )
+    """[rad]; in 3D a quaternion w, x, y, z."""
+    velocity: Vector | None = None
+    spin: FiniteFloat | Vector | None = None
+    friction: NotNegative | None = None
+    restitution: Annotated[FiniteFloat, Field(ge=0, le=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> BodyTable:
+        given = [k for k in ("box", "radius", "vertices") if getattr(self, k) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of box, radius and vertices, not {len(given)} of them")
+        if not self.fixed and self.density is None:
+            raise ValueError("give a density, or fixed = true")
+        return self
+
+
+class Grains(Table):
+    """Many irregular stones on a loose grid inside a region, to be poured."""
+
+    count: Annotated[int, Field(ge=1, le=100_000)]
+    size: Annotated[list[Positive], Field(min_length=2, max_length=2)]
+    """Smallest and largest diameter [m], uniform in between."""
+    region_low: Vector
+    region_high: Vector
+    """Corners of the region that the grid fills from below [m]; higher if it does not suffice."""
+    density: Positive
+    corners: Annotated[list[int], Field(min_length=2, max_length=2)] = [5, 9]
+    """Fewest and most corners of a stone."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    friction: NotNegative | None = None
+    restitution: Annotated[FiniteFloat, Field(ge=0, le=1)] | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Grains:
+        if self.size[0] > self.size[1]:
+            raise ValueError("size is [smallest, largest]")
+        if not 3 <= self.corners[0] <= self.corners[1]:
+            raise ValueError("corners is [fewest, most], at least 3")
+        if len(self.region_low) != len(self.region_high) or any(
+            low >= high for low, high in zip(self.region_low, self.region_high, strict=True)
+        ):
+            raise ValueError("region_high must lie beyond region_low in every direction")
+        return self
+
+
+class Load(Table):
+    """A force on a named body, constant or cyclic between two values."""
+
+    body: Name
+    force: Vector
+    """[N]; the greatest one of a cyclic load."""
+    least: Vector | None = None
+    """The smallest force of a cyclic load [N]; zero if not given."""
+    frequency: Positive | None = None
+    """[Hz]; without it the load is constant."""
+    begin: NotNegative = 0.0
+    end: Positive | None = None
+
+
+class SceneTables(Table):
+    """A whole scene file."""
+
+    title: str = ""
+    dimensions: Literal[2, 3]
+    gravity: Vector | None = None
+    run: Run
+    surface: Surface = Surface()
+    ground: list[Ground] = []
+    body: list[BodyTable] = []
+    grains: list[Grains] = []
+    load: list[Load] = []
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_lists_of_one(cls, data: Any) -> Any:
+        for name in ("ground", "body", "grains", "load"):
+            if isinstance(data, dict) and isinstance(data.get(name), dict):
+                raise ValueError(f"write [[{name}]], with two brackets")
+        return data
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> SceneTables:
+        vectors = [
+            (f"{kind}.{i}.{key}", value)
+            for kind in ("ground", "body", "grains", "load")
+            for i, table in enumerate(getattr(self, kind))
+            for key in (
+                "normal", "position", "velocity", "box", "region_low", "region_high", "force",
+                "least",
+            )
+            if (value := getattr(table, key, None)) is not None
+        ]  # fmt: skip
+        for key, value in [("gravity", self.gravity or [0.0] * self.dimensions), *vectors]:
+            if len(value) != self.dimensions:
+                raise ValueError(f"{key} has {len(value)} numbers in {self.dimensions} dimensions")
+        names = [body.name for body in self.body]
+        if len(set(names)) < len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            raise ValueError(f"two bodies have the name {twice}")
+        for i, load in enumerate(self.load):
+            if load.body not in names:
+                raise ValueError(f"load.{i}.body: there is no body {load.body}")
+        if not self.grains and all(body.fixed for body in self.body):
+            raise ValueError("no body can move: add a [[body]] with a density, or [[grains]]")
+        return self

@@ -1,0 +1,204 @@
+"""Shapes of rigid grains in the plane: convex polygons, discs, half-spaces.
+
+A shape knows its own frame only: its centroid is the origin.  Where it is, and how fast, is a
+matter of the scene and of `rigid_lcp.motion`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import hypot, inf, isfinite, pi
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.errors import ShapeError
+
+Floats = NDArray[np.float64]
+
+FLAT = 1e-12
+"""Sine of the turn at a vertex below which three vertices count as one line [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon:
+    """Convex polygon, given by its vertices (n, 2) in metres, anticlockwise.
+
+    ``vertices`` are kept relative to the centroid, which is at ``centroid`` (2,) in the frame they
+    were given in.  Raises `ShapeError` for fewer than three vertices, numbers that are not finite,
+    clockwise or crossing outlines, corners that point inwards, repeated or collinear vertices.
+    A grain that is not convex is a matter of several bodies.
+    """
+
+    vertices: Floats
+    centroid: Floats
+
+    dim = 2
+
+    def __init__(self, vertices: ArrayLike) -> None:
+        outline = _outline(vertices)
+        start = outline.mean(axis=0)
+        area, first, _ = _moments(outline - start)
+        centroid = start + first / area
+        object.__setattr__(self, "vertices", outline - centroid)
+        object.__setattr__(self, "centroid", centroid)
+
+    @classmethod
+    def rectangle(cls, width: float, height: float) -> Polygon:
+        """Rectangle of ``width`` along x and ``height`` along y [m]."""
+        x, y = width / 2, height / 2
+        return cls([(-x, -y), (x, -y), (x, y), (-x, y)])
+
+    @classmethod
+    def regular(cls, corners: int, radius: float) -> Polygon:
+        """Regular polygon with ``corners`` vertices on a circle of ``radius`` [m]."""
+        angle = 2 * pi * np.arange(corners) / corners
+        return cls(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+    @cached_property
+    def area(self) -> float:
+        """Area [m^2]."""
+        return _moments(self.vertices)[0]
+
+    @cached_property
+    def face_normals(self) -> Floats:
+        """Outward unit normals (n, 2); face k runs from vertex k to vertex k + 1."""
+        along = np.roll(self.vertices, -1, axis=0) - self.vertices
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        return np.column_stack([along[:, 1], -along[:, 0]])
+
+    @cached_property
+    def reach(self) -> float:
+        """Distance of the farthest vertex from the centroid [m]."""
+        return float(np.linalg.norm(self.vertices, axis=1).max())
+
+    def mass_properties(self, density: float) -> tuple[float, float]:
+        """Mass [kg] and moment of inertia about the centroid [kg m^2] at ``density`` [kg/m^2]."""
+        area, _, second = _moments(self.vertices)
+        return density * area, density * second
+
+
+@dataclass(frozen=True)
+class Disc:
+    """Disc of ``radius`` [m].  Raises `ShapeError` for a radius that is not positive."""
+
+    radius: float
+
+    dim = 2
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.radius) and self.radius > 0):
+            raise ShapeError(
+                f"the radius is {self.radius}", where="disc", remedy="give a positive length"
+            )
+
+    @property
+    def area(self) -> float:
+        """Area [m^2]."""
+        return pi * self.radius**2
+
+    @property
+    def reach(self) -> float:
+        """Radius [m]."""
+        return self.radius
+
+    def mass_properties(self, density: float) -> tuple[float, float]:
+        """Mass [kg] and moment of inertia [kg m^2] at ``density`` [kg/m^2]."""
+        mass = density * self.area
+        return mass, mass * self.radius**2 / 2
+
+
+@dataclass(frozen=True, eq=False)
+class HalfSpace:
+    """Everything with ``normal . x <= offset``: floors and walls, in 2D or 3D, always fixed.
+
+    ``normal`` (dim,) points out of the solid and is normalised; ``offset`` [m] is the distance of
+    its face from the origin along it.  Raises `ShapeError` for a normal of length zero.
+    """
+
+    normal: Floats
+    offset: float
+
+    reach = inf
+
+    def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
+        direction = np.asarray(normal, dtype=float)
+        length = float(np.linalg.norm(direction))
+        if direction.shape not in ((2,), (3,)) or not isfinite(length) or length == 0:
+            raise ShapeError(
+                f"the normal is {normal!r}", where="half-space",
+                remedy="give two or three numbers that are not all zero",
+            )  # fmt: skip
+        if not isfinite(offset):
+            raise ShapeError(f"the offset is {offset}", where="half-space", remedy="give metres")
+        object.__setattr__(self, "normal", direction / length)
+        object.__setattr__(self, "offset", float(offset))
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space it halves."""
+        return len(self.normal)
+
+
+def _outline(vertices: ArrayLike) -> Floats:
+    """The vertices (n, 2) if they are a convex polygon, anticlockwise; else a `ShapeError`."""
+    where = "polygon"
+    try:
+        outline = np.array(vertices, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"vertices are not numbers ({error})", where=where) from error
+    if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
+        raise ShapeError(
+            f"vertices have shape {outline.shape}", where=where,
+            remedy="give at least three vertices of two coordinates",
+        )  # fmt: skip
+    if not np.isfinite(outline).all():
+        raise ShapeError("a vertex is not finite", where=where, remedy="give metres")
+    side = np.roll(outline, -1, axis=0) - outline
+    length = np.hypot(side[:, 0], side[:, 1])
+    if (length <= FLAT * length.max()).any():
+        twice = int(np.argmin(length))
+        raise ShapeError(
+            "it is there twice", where=f"{where}, vertex {twice}", remedy="leave one of them out"
+        )
+    before, after = np.roll(side, 1, axis=0), side
+    scale = np.roll(length, 1) * length
+    turn_sine = (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / scale
+    turn = np.arctan2(turn_sine, (before * after).sum(axis=1) / scale)
+    if np.isclose(turn.sum(), -2 * pi):
+        raise ShapeError(
+            "the vertices run clockwise", where=where, remedy="give them in reverse order"
+        )
+    if (np.abs(turn_sine) <= FLAT).any():
+        flat = int(np.argmin(np.abs(turn_sine)))
+        raise ShapeError(
+            "it lies on a line with its neighbours", where=f"{where}, vertex {flat}",
+            remedy="leave it out; a polygon needs an area",
+        )  # fmt: skip
+    if (turn < 0).any() or not np.isclose(turn.sum(), 2 * pi):
+        inward = int(np.argmin(turn))
+        raise ShapeError(
+            "the polygon is not convex or crosses itself", where=f"{where}, vertex {inward}",
+            remedy="divide it into convex polygons, or take its convex hull",
+        )  # fmt: skip
+    return outline
+
+
+def _moments(outline: Floats) -> tuple[float, Floats, float]:
+    """Area [m^2], first moment (2,) [m^3] and polar second moment [m^4] about the origin.
+
+    Green's theorem over the sides (exact).
+    """
+    x, y = outline.T
+    x1, y1 = np.roll(outline, -1, axis=0).T
+    cross = x * y1 - x1 * y
+    first = np.array([((x + x1) * cross).sum(), ((y + y1) * cross).sum()]) / 6
+    second = ((x * x + x * x1 + x1 * x1 + y * y + y * y1 + y1 * y1) * cross).sum() / 12
+    return float(cross.sum() / 2), first, float(second)
+
+
+def longest_side(polygon: Polygon) -> float:
+    """Length of the longest side [m]."""
+    side = np.roll(polygon.vertices, -1, axis=0) - polygon.vertices
+    return max(hypot(x, y) for x, y in side)

@@ -1,0 +1,170 @@
+"""Velocity-level time stepping (Moreau and Jean): impulses instead of forces.
+
+One step of length h, with the geometry of the midpoint ``q_m = q + h/2 v``:
+
+    M (v+ - v) = h f + J^T p        K* contains u + mu |u_T| n, orthogonal to p in K   (eq. 27)
+    q+ = q_m + h/2 v+
+
+where u is J v+ with the normal part shifted by the contact's own law: Newton's restitution
+``u_N+ + e u_N-`` where two bodies are about to collide, else ``u_N+ + 2 g_m / h``: a contact that
+is open by g_m at the midpoint may close, not more (Moreau, Eur. J. Mech. 13 (1994) 93; Jean,
+CMAME 177 (1999) 235).  Without friction and overlap no step adds energy: the mean of ``u_N-`` and
+``u_N+`` is never positive where p_N is; with restitution 1 a bounce keeps it to round-off.  With
+friction a body that comes to rest within a step may gain up to ``m (h |f/m|)^2 / 8``.
+
+What curvature and rotation leave of overlap is taken out by moving the bodies apart by the
+smallest mass-weighted displacement; it changes no velocity (split impulse).
+
+Use it where forces do not exist (Painleve) or where events are too many to be met one by one; it
+is of first order in h where contacts open and close, of second order in between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.contacts import ContactForces, Contacts, contact_frames, contact_rows
+from rigid_lcp.equations import body_space, relative_velocity
+from rigid_lcp.friction_problem import BodySpace, FrictionSolution
+from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
+from rigid_lcp.scene import World
+from rigid_lcp.solver import solve_friction
+
+Floats = NDArray[np.float64]
+
+OVERLAP = 1e-12
+"""Overlap that is left alone, as a share of the smallest body's size."""
+PROJECTION_TOLERANCE = 1e-9
+"""Residual of the displacements that take overlaps out; what is left is seen in the next step."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step that was made: the state after it, the forces in it, how well they were found."""
+
+    motion: Motion
+    contacts: ContactForces
+    solution: FrictionSolution | None
+
+
+def moreau_step(
+    world: World, motion: Motion, loads: ArrayLike | None, h: float,
+    known: ContactForces | None, tolerance: float,
+) -> Step:  # fmt: skip
+    """One step of length ``h`` [s].
+
+    ``loads`` (n, 3) or (n, 6) [N, N m] at the midpoint, or None; ``known``: contacts of the last
+    step, whose forces the solver starts from; ``tolerance``: scale-free residual.
+    """
+    middle = motion_displaced(motion, 0.5 * h * motion.rates)
+    accelerations = world.accelerations(middle, loads)
+    free = motion_with_rates(middle, middle.rates + h * accelerations)
+    contacts = world.contacts(middle, moreau_margin(world, motion, accelerations, h))
+    if len(contacts) == 0:
+        end = motion_displaced(free, 0.5 * h * free.rates)
+        return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), None)
+    inverse_mass = world.inverse_mass(middle)
+    bodies = body_space(contacts, middle.position, world.columns, inverse_mass)
+    before = relative_velocity(contacts, middle)[:, 0]
+    offset = relative_velocity(contacts, free)
+    scale = float(np.linalg.norm(world.scene.gravity)) * h
+    shift = contact_shift(contacts, before, offset[:, 0], scale, h)
+    shifted = offset.copy()
+    shifted[:, 0] += shift
+    solution = solve_friction(
+        bodies, shifted.ravel(), contacts.friction, dim=motion.dim,
+        start=known_impulses(contacts, known, h), tolerance=tolerance,
+    )  # fmt: skip
+    impulse = solution.r.reshape(-1, motion.dim)
+    after = solution.u.reshape(-1, motion.dim) - np.column_stack(
+        [shift, np.zeros((len(shift), motion.dim - 1))]
+    )
+    free_rates = free.rates
+    free_rates[world.movable] += _velocities(bodies, impulse, world.size)
+    end = motion_with_rates(middle, free_rates)
+    end = motion_displaced(end, 0.5 * h * end.rates)
+    end = overlap_removed(world, end, contacts, bodies, contacts.gap + 0.5 * h * after[:, 0])
+    return Step(end, contact_forces(contacts, impulse, after, h), solution)
+
+
+def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float) -> Floats:
+    """How far each body's points can get within a step [m], (n,)."""
+    dim = motion.dim
+    rates = np.abs(motion.rates) + h * np.abs(accelerations)
+    speed = np.linalg.norm(rates[:, :dim], axis=1)
+    return h * (speed + np.linalg.norm(rates[:, dim:], axis=1) * world.reach) + (
+        OVERLAP * world.length
+    )
+
+
+def contact_shift(
+    contacts: Contacts, before: Floats, free: Floats, slow: float, h: float
+) -> Floats:
+    """What is added to ``u_N+`` so that it may not be negative, (nc,) [m/s].
+
+    ``before`` and ``free``: normal velocities at the start of the step, and at its end without
+    impulses.  Restitution acts on contacts that close within the step and approach faster than
+    ``slow``, the velocity that gravity gives in a step: what is slower can not be told from rest.
+    """
+    closing = contacts.gap + 0.5 * h * free <= 0
+    bounce = closing & (before < -slow) & (contacts.restitution > 0)
+    return np.where(bounce, contacts.restitution * before, np.maximum(contacts.gap, 0.0) * 2 / h)
+
+
+def known_impulses(contacts: Contacts, known: ContactForces | None, h: float) -> Floats | None:
+    """Impulses (nc * dim,) that the contacts of the last step had, zero for new ones [N s]."""
+    if known is None or len(known) == 0:
+        return None
+    rows, there = contact_rows(known.key, contacts.key)
+    force = np.where(there[:, None], known.force[rows], 0.0)
+    return np.einsum("cij,cj->ci", contact_frames(contacts.normal), h * force).ravel()
+
+
+def contact_forces(
+    contacts: Contacts, impulse: Floats, velocity: Floats | None, h: float
+) -> ContactForces:
+    """Contacts with the mean forces of a step of length ``h``: impulse (nc, dim) [N s] over h."""
+    force = impulse / h
+    normal, tangential = force[:, 0], force[:, 1:]
+    amount = np.linalg.norm(tangential, axis=1)
+    sliding = amount >= contacts.friction * normal * (1 - 1e-9)
+    if velocity is not None:
+        slip = np.linalg.norm(velocity[:, 1:], axis=1)
+        sliding &= slip > 1e-9 * np.abs(velocity).max(initial=0.0)
+    status = np.where(normal <= 0, "open", np.where(sliding, "slide", "stick"))
+    if contacts.dim == 3:
+        frames = contact_frames(contacts.normal)
+        tangential = np.einsum("ci,cij->cj", tangential, frames[:, 1:])
+    else:
+        tangential = tangential[:, 0]
+    given = {name: getattr(contacts, name) for name in Contacts.__dataclass_fields__}
+    return ContactForces(**given, normal_force=normal, tangential_force=tangential, status=status)
+
+
+def overlap_removed(
+    world: World, motion: Motion, contacts: Contacts, bodies: BodySpace, gap: Floats
+) -> Motion:
+    """Bodies moved apart until no ``gap`` (nc,) [m] is negative, to first order in the move.
+
+    The smallest displacement weighted with mass, ``M^-1 J_N^T lambda`` with ``lambda >= 0``; the
+    motion itself where there is no overlap to speak of.
+    """
+    if gap.min() >= -OVERLAP * world.length:
+        return motion
+    offset = np.zeros((len(gap), motion.dim))
+    offset[:, 0] = gap
+    apart = solve_friction(
+        bodies, offset.ravel(), np.zeros(len(gap)), dim=motion.dim, tolerance=PROJECTION_TOLERANCE
+    )
+    move = np.zeros_like(motion.rates)
+    move[world.movable] = _velocities(bodies, apart.r.reshape(-1, motion.dim), world.size)
+    return motion_displaced(motion, move)
+
+
+def _velocities(bodies: BodySpace, impulse: Floats, size: int) -> Floats:
+    """``M^-1 J^T p`` of the movable bodies, (nb, size)."""
+    change = bodies.inverse_mass @ (bodies.jacobian.T @ impulse.ravel())
+    return np.asarray(change).reshape(-1, size)

@@ -1,0 +1,179 @@
+"""Gauss-Seidel: kernels against plain NumPy, both spaces agree, towers, real problems, misuse."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from rigid_lcp.contact_blocks import body_blocks
+from rigid_lcp.errors import UsageError
+from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.local_contact import local_solution
+from validation.rigid_packings import tower
+
+Floats = NDArray[np.float64]
+
+
+def random_problem(dim: int, seed: int, bodies: int = 6, contacts: int = 12) -> FrictionProblem:
+    """Random contacts between random bodies with full inverse masses, and the ground."""
+    generator, size = np.random.default_rng(seed), 3 * dim - 3
+    jacobian = np.zeros((contacts * dim, bodies * size))
+    for c in range(contacts):
+        for body in generator.choice(bodies + 1, 2, replace=False):
+            if body < bodies:
+                block = generator.normal(size=(dim, size))
+                jacobian[c * dim : (c + 1) * dim, body * size : (body + 1) * size] = block
+    roots = generator.normal(size=(bodies, size, size))
+    mass = sp.block_diag([root @ root.T + np.eye(size) for root in roots])
+    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(mass), size)
+    offset = jacobian @ generator.normal(size=bodies * size)
+    problem = friction_problem(space, offset, 0.4, dim)
+    assert isinstance(problem, FrictionProblem)
+    return problem
+
+
+def as_matrix(problem: FrictionProblem) -> FrictionProblem:
+    """The same problem with W only."""
+    return FrictionProblem(problem.delassus, problem.offset, problem.friction, problem.dim)
+
+
+def plain_sweep(problem: FrictionProblem, force: Floats, visit: list[int]) -> Floats:
+    """The definition: every contact in turn, with all of W."""
+    matrix, dim, force = problem.delassus.toarray(), problem.dim, force.copy()
+    for c in visit:
+        rows = slice(c * dim, (c + 1) * dim)
+        block = matrix[rows, rows]
+        others = matrix[rows] @ force + problem.offset[rows] - block @ force[rows]
+        force[rows], status = local_solution(block, others, problem.friction[c])
+        assert status != "no solution"
+    return force
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("factors", [True, False])
+def test_sweeps_are_those_of_the_definition(dim: int, factors: bool) -> None:
+    """Two sweeps, there and back, in body space and by rows, from a start, to round-off."""
+    problem = random_problem(dim, 2)
+    start = plain_sweep(problem, np.zeros(12 * dim), list(range(12)))
+    order = list(range(12))
+    expected = plain_sweep(problem, plain_sweep(problem, start, order), order[::-1])
+    problem = problem if factors else as_matrix(problem)
+    assert (body_blocks(problem) is not None) == factors
+    found = gauss_seidel(problem, start, 0.0, 1, order="symmetric")
+    found = gauss_seidel(problem, found.r, 0.0, 1, order=np.array(order[::-1]))
+    np.testing.assert_allclose(found.r, expected, atol=1e-11 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_solves_both_forms(dim: int) -> None:
+    for seed in range(5):
+        problem = random_problem(dim, seed)
+        for form in (problem, as_matrix(problem)):
+            found = gauss_seidel(form, tolerance=1e-11, sweeps=20_000)
+            assert found.solved
+            assert problem.residual(found.r) <= 1.1e-11
+            np.testing.assert_allclose(found.u, problem.velocity(found.r), atol=1e-10)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_tower_carries_its_weight(dim: int) -> None:
+    """Three boxes: the impulses of each face sum to the weight above it times the step."""
+    problem = tower(3, dim)
+    found = gauss_seidel(problem, tolerance=1e-11, sweeps=5000)
+    assert found.solved
+    face = found.r.reshape(3, -1, dim)[:, :, 0].sum(axis=1)
+    np.testing.assert_allclose(face, np.array([3, 2, 1]) * 9.81e-3, rtol=1e-9)
+
+
+def test_units_change_nothing() -> None:
+    """Metres to millimetres and kg to g: the forces scale, sweeps and residual stay."""
+    problem = tower(4, 3, top_mass=10.0)
+    space = problem.bodies
+    assert space is not None
+    length = np.tile([1e3, 1e3, 1e3, 1, 1, 1], 4)
+    scaled = BodySpace(
+        sp.csr_array(1e3 * space.jacobian @ sp.diags(1 / length)),
+        sp.csr_array(sp.diags(length) @ space.inverse_mass @ sp.diags(length) * 1e-9), 6,
+    )  # fmt: skip
+    first = gauss_seidel(problem, sweeps=50, tolerance=0.0)
+    again = gauss_seidel(
+        FrictionProblem(None, problem.offset * 1e3, problem.friction, 3, scaled),
+        sweeps=50, tolerance=0.0,
+    )  # fmt: skip
+    assert again.residual == pytest.approx(first.residual, rel=1e-6)
+    np.testing.assert_allclose(again.r, first.r * 1e6, rtol=1e-9, atol=1e-9 * again.r.max())
+
+
+def test_warm_start_at_the_answer_does_nothing() -> None:
+    problem = random_problem(3, 1)
+    first = gauss_seidel(problem, tolerance=1e-10, sweeps=20_000)
+    again = gauss_seidel(problem, first.r, tolerance=1e-9)
+    assert again.work["sweeps"] == 0
+    np.testing.assert_array_equal(again.r, first.r)
+
+
+def test_best_point_and_a_message_without_convergence() -> None:
+    problem = tower(20, 2)
+    short, long = (gauss_seidel(problem, tolerance=1e-14, sweeps=n) for n in (5, 50))
+    assert short.status == long.status == "not converged"
+    assert long.residual < short.residual
+    assert short.residual == problem.residual(short.r)
+    assert "->" in short.message
+
+
+def test_contacts_without_a_solution_are_counted() -> None:
+    """Nothing moves and the contacts approach: W = 0, said in words, with finite forces."""
+    problem = friction_problem(np.zeros((4, 4)), [-1.0, 0.0, -1.0, 0.0], 0.3, 2)
+    found = gauss_seidel(problem)
+    assert not found.solved
+    assert "2 contacts" in found.message
+    assert np.isfinite(found.r).all()
+
+
+def test_no_contacts_and_no_forces() -> None:
+    empty = friction_problem(np.zeros((0, 0)), [], 0.3, 3)
+    assert gauss_seidel(empty).solved
+    parting = friction_problem(np.eye(3), [1.0, 5.0, -2.0], 0.3, 3)
+    assert gauss_seidel(parting).solved
+    assert not gauss_seidel(parting).r.any()
+
+
+def test_factors_that_are_none_of_pairs_fall_back_to_the_matrix() -> None:
+    """A joint of three bodies, a mass that couples bodies: solved by the rows of W."""
+    jacobian = np.random.default_rng(1).normal(size=(4, 9))
+    three = BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.eye(9)), 3)
+    coupled = sp.csr_array(np.eye(9) + np.diag(np.full(6, 0.2), 3) + np.diag(np.full(6, 0.2), -3))
+    for space in (three, BodySpace(three.jacobian, coupled, 3)):
+        problem = friction_problem(space, jacobian @ np.ones(9), 0.3, 2)
+        assert body_blocks(problem) is None
+        assert gauss_seidel(problem, tolerance=1e-10, sweeps=5000).solved
+
+
+def test_orders_that_are_none() -> None:
+    problem = tower(2, 2)
+    for order in ("backward", np.array([0, 1]), np.array([0, 0, 1, 2])):
+        with pytest.raises(UsageError):
+            gauss_seidel(problem, order=order)  # type: ignore[arg-type]
+
+
+REAL = {"Confeti-ex13-Fc3D-SBM.dat": 1e-12, "FrictionContactProblem00237.dat": 1e-12,
+        "LMGC_100_PR_PerioBox-i00361-60-03000.hdf5": 1e-8, "Rover1040.dat": 1e-12}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_problems(name: str) -> None:
+    """Problems that Gauss-Seidel is good at, to what it reaches in a thousand sweeps."""
+    folder = os.environ.get("TRACKBED_DATA")
+    if not folder:
+        pytest.skip("TRACKBED_DATA does not name the folder of the real problems")
+    path = Path(folder) / "friction_problems"
+    data = np.load(path / f"{name}.npz")
+    matrix = sp.load_npz(path / f"{name}_W.npz")
+    problem = friction_problem(matrix, data["q"], data["mu"], int(data["dim"]))
+    assert gauss_seidel(problem, tolerance=REAL[name], sweeps=1000).solved

@@ -1,0 +1,366 @@
+"""Other people's solvers of the same friction problem: W, q and mu in, r and its cost out.
+
+Every peer starts from zero, is asked for a tolerance of its own error measure, keeps its other
+settings, and is timed in processor seconds of the solve alone.  What is not timed: turning the
+problem into the peer's types.  Where a peer stops at its number of iterations, and time is left, it
+is run again with more, and both runs are recorded.
+
+``siconos`` (Acary et al.)  by `rigid_siconos`, in a process of its own, as it may abort.
+``Clarabel``                convex cone programs, |u_T| frozen, again and again (Acary, Cadoux,
+                            Lemarechal and Malick, ZAMM 91 (2011) 155), in body space if possible.
+``Clarabel + Newton``       the same to 1e-8 without freezing again, then semismooth Newton steps.
+``OSQP``                    without friction, the linear complementarity problem, polished.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from rigid_lcp.errors import LibraryMissing
+from rigid_lcp.friction_problem import FrictionProblem
+from validation.rigid_newton_polish import newton_polish
+
+Floats = NDArray[np.float64]
+SYSTEM_PYTHON = "/usr/bin/python3"
+SICONOS = {
+    2: ("2D_NSGS", "2D_CPG", "2D_LEMKE"),
+    3: ("3D_NSGS", "3D_ADMM", "3D_NSN_AC", "3D_NSN_FB", "3D_PROX"),
+}
+"""Solvers by dimension; the others are slower or worse on all stored problems."""
+ONE_THREAD = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+REPEATS = 4
+"""Further runs where a run is short; their median is the cost."""
+OUTER = 50
+"""Programs that Clarabel solves for one answer, at most."""
+
+
+@dataclass(frozen=True)
+class PeerRun:
+    """What a peer made of a problem with one setting."""
+
+    setting: dict[str, Any]
+    force: Floats | None
+    """r (nc * dim,), or None where the peer died."""
+    cost_s: float | None = None
+    repeats_s: tuple[float, ...] = ()
+    work: float | None = None
+    work_unit: str = ""
+    claims: bool = False
+    """The peer says that it has solved the problem."""
+    why: str = ""
+    """What it says otherwise, or how it died."""
+
+
+# --- Siconos ----------------------------------------------------------------------------------
+
+
+@cache
+def siconos_missing() -> str:
+    """Why Siconos can not be run; empty if it can."""
+    if shutil.which(SYSTEM_PYTHON) is None:
+        return f"there is no {SYSTEM_PYTHON}"
+    found = subprocess.run(
+        [SYSTEM_PYTHON, "-c", "import scipy, siconos.numerics"], capture_output=True, text=True
+    )
+    return "" if found.returncode == 0 else "apt-get install python3-siconos python3-scipy"
+
+
+def siconos(
+    problem: FrictionProblem, solver: str, tolerances: Sequence[float], budget_s: float
+) -> list[PeerRun]:
+    """Run a solver of Siconos, ``"3D_NSGS"``, at several tolerances of its own error.
+
+    ``budget_s``: processor seconds of a run.  A run that kills the process is reported, and the
+    next tolerance tried.  Raises `LibraryMissing` without Siconos.
+    """
+    if siconos_missing():
+        raise LibraryMissing("Siconos is not installed", remedy=siconos_missing())
+    jobs = [
+        {"solver": solver, "tolerance": t, "iterations": None, "repeats": REPEATS,
+         "budget_s": budget_s}
+        for t in tolerances
+    ]  # fmt: skip
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        w = problem.delassus
+        np.savez(
+            folder / "problem.npz", dim=problem.dim, q=problem.offset, mu=problem.friction,
+            data=w.data, indices=w.indices, indptr=w.indptr,
+        )  # fmt: skip
+        runs: list[PeerRun] = []
+        left = list(enumerate(jobs))
+        while left:
+            (folder / "results.jsonl").unlink(missing_ok=True)
+            (folder / "jobs.json").write_text(json.dumps(left))
+            death = _siconos_process(folder)
+            done = _siconos_results(folder, jobs)
+            runs += [run for _, run in done]
+            if not death:
+                break
+            ended = {number for number, _ in done}
+            dead = next((n for n, _ in left if n not in ended), max(ended, default=left[0][0]))
+            setting = {"tolerance": jobs[dead]["tolerance"], "iterations": "default"}
+            if dead in ended:  # it died in a second run, with more iterations
+                setting["iterations"] = "more"
+            runs.append(PeerRun(setting, None, why=death))
+            left = [job for job in left if job[0] > dead]
+    return runs
+
+
+def _siconos_process(folder: Path) -> str:
+    """Run the process; how it died, or nothing."""
+    worker = Path(__file__).with_name("rigid_siconos.py")
+    found = subprocess.run(
+        [SYSTEM_PYTHON, str(worker), str(folder)],
+        capture_output=True, text=True, errors="replace", stdin=subprocess.DEVNULL,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        | ONE_THREAD,
+    )  # fmt: skip
+    return death_words(found.returncode, found.stdout + found.stderr)
+
+
+def death_words(code: int, said: str) -> str:
+    """How a process ended, from its exit code and its output; nothing if it ended well."""
+    if code == 0:
+        return ""
+    if code == -signal.SIGXCPU:
+        return "out of time"
+    last = next((line.strip() for line in reversed(said.splitlines()) if line.strip()), "")
+    if code < 0:
+        return f"died of {signal.Signals(-code).name}: {last}"[:200]
+    return f"ended with code {code}: {last}"[:200]
+
+
+def _siconos_results(folder: Path, jobs: list[dict[str, Any]]) -> list[tuple[int, PeerRun]]:
+    path = folder / "results.jsonl"
+    if not path.exists():
+        return []
+    found = []
+    for row in map(json.loads, path.read_text().splitlines()):
+        costs = [row["cost_s"], *row.get("repeats_s", ())]
+        setting = {"tolerance": jobs[row["number"]]["tolerance"], "iterations": row["allowed"]}
+        run = PeerRun(
+            setting, np.load(folder / f"force-{row['number']}-{row['allowed']}.npy"),
+            float(np.median(costs)), tuple(costs), row["iterations"], "iterations",
+            row["info"] == 0, "" if row["info"] == 0 else f"info = {row['info']}",
+        )  # fmt: skip
+        found.append((row["number"], run))
+    return found
+
+
+# --- convex programs --------------------------------------------------------------------------
+
+
+@dataclass
+class Stopwatch:
+    """Processor seconds of what is timed, and how often it was."""
+
+    seconds: float = 0.0
+    calls: int = 0
+    words: list[str] = field(default_factory=list)
+
+    def __call__(self, job: Callable[[], Any]) -> Any:
+        """Do a job and add its time."""
+        start = time.process_time()
+        try:
+            return job()
+        finally:
+            self.seconds += time.process_time() - start
+            self.calls += 1
+
+
+def clarabel(
+    problem: FrictionProblem, tolerance: float, budget_s: float, *, outer: int = OUTER
+) -> PeerRun:
+    """Coulomb's law by convex programs with ``mu |u_T|`` frozen, until the residual is small.
+
+    Stops at the ``tolerance`` of the residual, after ``outer`` programs, after five that do not
+    better the best answer, or out of time.  Each program is solved to a hundredth of the tolerance,
+    1e-8 at the loosest.  Raises `LibraryMissing` without Clarabel.
+    """
+    watch = Stopwatch()
+    shape = (problem.contacts, problem.dim)
+    program = (_program_bodies if problem.bodies is not None else _program_contacts)(problem)
+    frozen = np.zeros(problem.contacts)
+    best, least, since = np.zeros(len(problem.offset)), np.inf, 0
+    while watch.calls < outer and watch.seconds < budget_s and since < 5:
+        force = program(frozen, min(1e-8, 0.01 * tolerance), watch)
+        error = problem.residual(force) if np.isfinite(force).all() else np.inf
+        since = 0 if error < 0.9 * least else since + 1
+        if error < least:
+            best, least = force, error
+        if error <= tolerance:
+            break
+        velocity = problem.velocity(force).reshape(shape)
+        frozen = problem.friction * np.linalg.norm(velocity[:, 1:], axis=1)
+        if not np.isfinite(frozen).all():
+            break
+    solved = least <= tolerance
+    why = "" if solved else f"{watch.calls} programs, last: {watch.words[-1]}"
+    return PeerRun(
+        {"tolerance": tolerance}, best, watch.seconds, (), watch.calls, "convex programs",
+        solved, why,
+    )  # fmt: skip
+
+
+def clarabel_newton(problem: FrictionProblem, tolerance: float, budget_s: float) -> PeerRun:
+    """One convex program to 1e-8, then semismooth Newton steps on the natural map."""
+    begun = clarabel(problem, 1e-8, budget_s, outer=1)
+    start, spent = begun.force, begun.cost_s or 0.0
+    assert start is not None
+    watch = Stopwatch()
+    force, steps = watch(lambda: newton_polish(problem, start, tolerance, budget_s - spent))
+    solved = problem.residual(force) <= tolerance
+    return PeerRun(
+        {"tolerance": tolerance}, force, spent + watch.seconds, (), steps, "Newton steps",
+        solved, "" if solved else "Newton's steps stopped",
+    )  # fmt: skip
+
+
+Program = Callable[[Floats, float, Stopwatch], Floats]
+
+
+def _program_contacts(problem: FrictionProblem) -> Program:
+    """``min r.W r/2 + (q + frozen n).r`` over r in K; W by its symmetric part."""
+    library = _library("clarabel")
+    w = problem.delassus
+    upper = sp.csc_matrix(sp.triu((w + w.T) / 2, format="csc"))
+    cones: list[Any] = []
+    scale = np.ones((problem.contacts, problem.dim))
+    for contact, mu in enumerate(problem.friction):
+        if mu > 0:
+            cones.append(library.SecondOrderConeT(problem.dim))
+            scale[contact, 0] = mu
+        else:
+            cones += [library.NonnegativeConeT(1), library.ZeroConeT(problem.dim - 1)]
+    rows = sp.csc_matrix(sp.diags_array(-scale.ravel()))
+
+    def solve(frozen: Floats, tolerance: float, watch: Stopwatch) -> Floats:
+        linear = problem.offset.copy()
+        linear[:: problem.dim] += frozen
+        found = _clarabel_solve(
+            library, upper, linear, rows, np.zeros(len(linear)), cones, tolerance, watch
+        )
+        return np.asarray(found.x)
+
+    return solve
+
+
+def _program_bodies(problem: FrictionProblem) -> Program:
+    """Its dual, ``min |y|^2/2`` with ``J L y + q + frozen n`` in K*, where ``M^-1 = L L^T``."""
+    library = _library("clarabel")
+    bodies = problem.bodies
+    assert bodies is not None
+    scale = np.ones((problem.contacts, problem.dim))
+    scale[:, 1:] = problem.friction[:, None]
+    factor = inverse_mass_factor(bodies.inverse_mass, bodies.body_size)
+    rows = sp.csc_matrix(-(sp.diags_array(scale.ravel()) @ bodies.jacobian @ factor))
+    identity = sp.csc_matrix(sp.eye_array(rows.shape[1]))
+    cones = [
+        library.SecondOrderConeT(problem.dim) if mu > 0 else library.NonnegativeConeT(problem.dim)
+        for mu in problem.friction
+    ]
+
+    def solve(frozen: Floats, tolerance: float, watch: Stopwatch) -> Floats:
+        offset = problem.offset.copy()
+        offset[:: problem.dim] += frozen
+        found = _clarabel_solve(
+            library, identity, np.zeros(rows.shape[1]), rows, scale.ravel() * offset, cones,
+            tolerance, watch,
+        )  # fmt: skip
+        return np.asarray(found.z) * scale.ravel()
+
+    return solve
+
+
+def inverse_mass_factor(inverse_mass: Any, size: int) -> sp.csr_array:
+    """L with ``M^-1 = L L^T``, block after block."""
+    blocks = sp.bsr_array(inverse_mass, blocksize=(size, size)).tobsr()
+    if (blocks.indices != np.arange(len(blocks.indices))).any():
+        raise ValueError("the inverse mass matrix is not block diagonal")
+    return sp.csr_array(
+        sp.bsr_array((np.linalg.cholesky(blocks.data), blocks.indices, blocks.indptr))
+    )
+
+
+def _clarabel_solve(
+    library: Any, quadratic: Any, linear: Floats, rows: Any, bound: Floats, cones: list[Any],
+    tolerance: float, watch: Stopwatch,
+) -> Any:  # fmt: skip
+    settings = library.DefaultSettings()
+    settings.verbose = False
+    settings.max_threads = 1
+    for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
+        setattr(settings, name, tolerance)
+    found = watch(
+        lambda: library.DefaultSolver(quadratic, linear, rows, bound, cones, settings).solve()
+    )
+    watch.words.append(str(found.status))
+    return found
+
+
+def osqp(problem: FrictionProblem, tolerance: float) -> PeerRun:
+    """Without friction: ``min f.A f/2 + b.f`` over f >= 0, polished; A and b are W's and q's normal
+    parts.  Raises `LibraryMissing` without OSQP, `ValueError` with friction."""
+    if problem.friction.any():
+        raise ValueError("OSQP's problem has no friction")
+    library = _library("osqp")
+    normal = slice(None, None, problem.dim)
+    a = sp.csc_matrix(problem.delassus[normal, normal])
+    b = np.ascontiguousarray(problem.offset[normal])
+    identity = sp.csc_matrix(sp.eye_array(len(b)))
+    watch = Stopwatch()
+
+    def solve() -> Any:
+        solver = library.OSQP()
+        solver.setup(
+            sp.triu(a, format="csc"), b, identity, np.zeros(len(b)), np.full(len(b), np.inf),
+            verbose=False, polishing=True, eps_abs=tolerance, eps_rel=tolerance, max_iter=100_000,
+        )  # fmt: skip
+        return solver.solve(raise_error=False)
+
+    found = watch(solve)
+    force = np.zeros(len(problem.offset))
+    force[normal] = np.maximum(np.nan_to_num(found.x), 0.0)
+    solved = found.info.status == "solved"
+    return PeerRun(
+        {"tolerance": tolerance}, force, watch.seconds, (), found.info.iter, "iterations", solved,
+        "" if solved else found.info.status,
+    )  # fmt: skip
+
+
+def library_missing(name: str) -> bool:
+    """True where a Python package of a peer is not installed."""
+    try:
+        _library(name)
+    except LibraryMissing:
+        return True
+    return False
+
+
+def _library(name: str) -> Any:
+    from importlib import import_module
+
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise LibraryMissing(
+            f"this peer needs the Python package {name}", remedy=f"pip install {name}"
+        ) from error

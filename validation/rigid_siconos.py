@@ -1,0 +1,82 @@
+"""Siconos on one friction problem, in a process of its own: its solvers may abort it.
+
+    /usr/bin/python3 validation/rigid_siconos.py FOLDER
+
+Started by `rigid_peers` with the system's Python, for which ``apt-get install python3-siconos
+python3-scipy`` installs Siconos.  FOLDER holds ``problem.npz`` and ``jobs.json``; a line is added
+to ``results.jsonl`` for every run as it ends, and its forces are ``force-N.npy``.  A run that takes
+more processor time than it may ends the process with the signal SIGXCPU.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+import warnings
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+GROWTH, WORTH = 10.0, 2.0
+"""A run that stopped at its number of iterations is made again with up to ten times as many, if
+there is time for twice as many."""
+
+
+def run(numerics: Any, problem: Any, job: dict[str, Any]) -> tuple[dict[str, Any], Any]:
+    """One solve from zero: what Siconos says of it, and its forces."""
+    dim, matrix, q, mu = problem
+    option = numerics.SolverOptions(getattr(numerics, f"SICONOS_FRICTION_{job['solver']}"))
+    option.dparam[numerics.SICONOS_DPARAM_TOL] = job["tolerance"]
+    if job["iterations"] is not None:
+        option.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = job["iterations"]
+    allowed = int(option.iparam[numerics.SICONOS_IPARAM_MAX_ITER])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it converts indices to 64 bits, and says so
+        posed = numerics.FrictionContactProblem(dim, len(mu), matrix, q, mu)
+    force, velocity = np.zeros(len(q)), np.zeros(len(q))
+    driver = numerics.fc2d_driver if dim == 2 else numerics.fc3d_driver
+    start = time.process_time()
+    info = driver(posed, force, velocity, option)
+    cost = time.process_time() - start
+    done = int(option.iparam[numerics.SICONOS_IPARAM_ITER_DONE])
+    return {"info": int(info), "cost_s": cost, "iterations": done, "allowed": allowed}, force
+
+
+def matrix_of(arrays: Any, dim: int) -> Any:
+    """W as the drivers take it: dense in 2D, where they refuse sparse ones, columns in 3D."""
+    import scipy.sparse as sp
+
+    sparse = sp.csr_matrix((arrays["data"], arrays["indices"], arrays["indptr"]))
+    return np.asfortranarray(sparse.toarray()) if dim == 2 else sparse.tocsc()
+
+
+def main(folder: Path) -> None:
+    """Make the runs of the folder, those that have a result already left out."""
+    numerics = import_module("siconos.numerics")
+    arrays = np.load(folder / "problem.npz")
+    dim = int(arrays["dim"])
+    problem = dim, matrix_of(arrays, dim), arrays["q"], arrays["mu"]
+    for number, job in json.loads((folder / "jobs.json").read_text()):
+        budget = job["budget_s"]
+        while True:
+            limit = time.process_time() + (1 + job["repeats"]) * budget
+            resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, resource.RLIM_INFINITY))
+            result, force = run(numerics, problem, job)
+            if result["cost_s"] < budget / 10:
+                costs = [run(numerics, problem, job)[0]["cost_s"] for _ in range(job["repeats"])]
+                result["repeats_s"] = costs
+            np.save(folder / f"force-{number}-{result['allowed']}.npy", force)
+            with (folder / "results.jsonl").open("a") as stream:
+                stream.write(json.dumps({"number": number} | result) + "\n")
+            more = min(GROWTH, budget / max(result["cost_s"], 1e-6))
+            if result["info"] == 0 or result["iterations"] < result["allowed"] - 1 or more < WORTH:
+                break
+            job = job | {"iterations": int(more * result["allowed"])}
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
