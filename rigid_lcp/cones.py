@@ -21,10 +21,10 @@ Floats = NDArray[np.float64]
 @njit(cache=True)
 def project_cone(normal: float, tangential: float, mu: float) -> tuple[float, float]:
     """Nearest point of the cone ``t <= mu n`` to ``(n, t)``, ``t = |r_T| >= 0``; returns it."""
+    if mu * tangential <= -normal:  # first: with mu = 0 the other test holds below the cone too
+        return 0.0, 0.0
     if tangential <= mu * normal:
         return normal, tangential
-    if mu * tangential <= -normal:
-        return 0.0, 0.0
     nearest = (normal + mu * tangential) / (1.0 + mu * mu)
     return nearest, mu * nearest
 

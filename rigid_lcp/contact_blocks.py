@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem
@@ -36,12 +37,37 @@ class BodyBlocks:
 
     def body_velocity(self, force: Floats) -> Floats:
         """``w = B^T r``, (bodies + 1, body_size); the last row stands for no body. r: (nc, dim)."""
-        contacts, dim, size = len(self.body), self.block.shape[2], self.block.shape[3]
-        velocity = np.zeros((self.bodies + 1, size))
-        for side in (0, 1):
-            impulse = np.einsum("cij,ci->cj", self.block[:, side], force.reshape(contacts, dim))
-            np.add.at(velocity, self.body[:, side], impulse)
+        velocity = np.zeros((self.bodies + 1, self.block.shape[3]))
+        add_impulses(self.body, self.block, force, velocity)
         return velocity
+
+    def contact_velocity(self, velocity: Floats) -> Floats:
+        """``B w``, (nc, dim), of the velocities w (bodies + 1, body_size)."""
+        return velocities_relative(self.body, self.block, velocity)
+
+
+@njit(cache=True)
+def add_impulses(body: Integers, block: Floats, force: Floats, velocity: Floats) -> None:
+    """``w += B^T r``: changes ``velocity`` (bodies + 1, size) by the forces (nc, dim)."""
+    for c in range(len(body)):
+        for side in range(2):
+            target = velocity[body[c, side]]
+            for i in range(force.shape[1]):
+                for k in range(len(target)):
+                    target[k] += block[c, side, i, k] * force[c, i]
+
+
+@njit(cache=True)
+def velocities_relative(body: Integers, block: Floats, velocity: Floats) -> Floats:
+    """``B w`` of every contact, (nc, dim)."""
+    relative = np.zeros((len(body), block.shape[2]))
+    for c in range(len(body)):
+        for side in range(2):
+            source = velocity[body[c, side]]
+            for i in range(relative.shape[1]):
+                for k in range(len(source)):
+                    relative[c, i] += block[c, side, i, k] * source[k]
+    return relative
 
 
 @dataclass(frozen=True)

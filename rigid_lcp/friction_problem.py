@@ -97,10 +97,14 @@ class FrictionProblem:
         return self.bodies.matrix
 
     @cached_property
+    def diagonal(self) -> Floats:
+        """The diagonal of W, (nc * dim,)."""
+        return self.bodies.diagonal if self.bodies is not None else self.delassus.diagonal()
+
+    @cached_property
     def rho(self) -> float:
         """``1 / mean(diag W)``: force per velocity that makes the two comparable."""
-        diagonal = self.bodies.diagonal if self.bodies is not None else self.delassus.diagonal()
-        mean = float(diagonal.mean()) if len(diagonal) else 1.0
+        mean = float(self.diagonal.mean()) if len(self.diagonal) else 1.0
         return 1.0 / mean if mean > 0 else 1.0
 
     def velocity(self, force: Floats) -> Floats:

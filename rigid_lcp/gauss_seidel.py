@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rigid_lcp.cones import natural_residual
 from rigid_lcp.contact_blocks import body_blocks, matrix_blocks
 from rigid_lcp.errors import UsageError
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
@@ -53,13 +54,13 @@ def gauss_seidel(
     force = np.zeros((contacts, dim)) if start is None else np.array(start, dtype=float)
     force = np.ascontiguousarray(force.reshape(contacts, dim))
     sweep = Sweeper(problem, visit, isinstance(order, str) and order == "symmetric")
-    best, best_residual = force.copy(), problem.residual(force.ravel())
+    best, best_residual = force.copy(), sweep.residual(force)
     done = stuck = 0
     while best_residual > tolerance and done < sweeps:
         batch = min(sweeps - done, max(1, math.ceil(CHECK_EVERY * done)))
         stuck = sweep(force, batch, done)
         done += batch
-        residual = problem.residual(force.ravel())
+        residual = sweep.residual(force)
         if not np.isfinite(residual):
             break
         if residual < best_residual:
@@ -80,6 +81,7 @@ class Sweeper:
 
     def __init__(self, problem: FrictionProblem, visit: Integers, symmetric: bool) -> None:
         self.visit, self.symmetric, self.friction = visit, symmetric, problem.friction
+        self.problem = problem
         self.offset = np.ascontiguousarray(problem.offset.reshape(-1, problem.dim))
         self.bodies = body_blocks(problem)
         self.rows = matrix_blocks(problem) if self.bodies is None else None
@@ -100,6 +102,14 @@ class Sweeper:
             self.bodies.body, self.bodies.block, self.bodies.local, self.offset, self.friction,
             force, self.bodies.body_velocity(force), self.visit, sweeps, done, self.symmetric,
         )  # fmt: skip
+
+    def residual(self, force: Floats) -> float:
+        """Scale-free natural residual of forces (nc, dim), by the blocks where there are any."""
+        if self.bodies is None:
+            return self.problem.residual(force.ravel())
+        velocity = self.bodies.contact_velocity(self.bodies.body_velocity(force))
+        velocity += self.offset
+        return natural_residual(force, velocity, self.friction, self.problem.rho)
 
 
 def contact_order(order: Order | Integers, contacts: int) -> Integers:

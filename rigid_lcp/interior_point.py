@@ -2,241 +2,203 @@
 
 Forces and velocities of a contact are scaled into Lorentz cones, which are their own duals:
 
-    x = (mu r_N, r_T),   s = (u_N / mu + |u_T|, u_T),   x_N >= |x_T|,  s_N >= |s_T|,  x.s = 0
+    x = (mu r_N, r_T),    s = (u_N / mu + |u_T|, u_T),    x, s in the cone,    x . s = 0
 
-The path ``x o s = sigma e`` (Jordan product) leads to ``r_T = -mu r_N u_T / (u_N / mu + |u_T|)``,
-``r_N u_N > 0``: friction that is viscous far from the answer, Coulomb's at its end.  One Newton
-step, scaled after Nesterov and Todd (``H`` maps x to s), is a system ``(W + C) dr = b`` with
+and followed along ``x o s = sigma e`` (Jordan product).  On that path
 
-    C = U H X,  X = diag(mu, 1, 1),  U = d(u)/d(s) = [[mu, -mu s_T / |s_T|], [0, 1]].
+    r_T = -mu r_N u_T / (u_N / mu + |u_T|),    u_N > 0:
 
-Without the term |u_T| (``convex``) U is X and the problem is the convex one of Tasora and
-Anitescu (CMAME 200 (2011) 439); then C is symmetric and the method can hardly fail, and its
-answer is right where nothing slides.  The term itself makes it Coulomb's law; |s_T| is smoothed
-by ``sqrt(s_T^2 + eps^2) - eps`` with eps falling with sigma.  Predictor and corrector: Mehrotra;
-cones: Vandenberghe, The CVXOPT linear and quadratic cone program solvers (2010).
+friction that is viscous far from the answer and Coulomb's at its end.  One Newton step, scaled
+after Nesterov and Todd (``H x = s``), is a system ``(C + W) dr = b`` (`rigid_lcp.body_factorisation`)
 
-Where there is no friction the cone is a half line and r_T stays zero.
+    C = U H X,    X = dx/dr = diag(mu, 1, 1),    U = du/ds = [[mu, -mu s_T / |s_T|], [0, 1]]
+
+Without the term |u_T| (``convex``) U is X, C is symmetric, and the problem is the convex one of
+Anitescu and Tasora (Comput. Optim. Appl. 47 (2010) 207): it can hardly fail, and its answer is
+right where nothing slides.  The term makes it Coulomb's law (De Saxce), non-convex, and the path
+may fold back; |s_T| is rounded to ``sqrt(s_T^2 + eps^2) - eps``, eps falling with sigma, and
+another ``rounding`` is another path.  Predictor and corrector after Mehrotra.
+
+A contact without friction is a half line: r_T stays zero.  For a problem that has no solution
+the steps become ever smaller, and the best point is given back.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factorisation
+from rigid_lcp.body_factorisation import (
+    Factorisation,
+    SingularSystem,
+    factorisation,
+    multiply_blocks,
+)
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
+from rigid_lcp.lorentz_cones import (
+    cone_divide,
+    cone_product,
+    cone_scale,
+    cone_scaling,
+    cone_scaling_square,
+    cone_step,
+)
 
 Floats = NDArray[np.float64]
 
 ITERATIONS = 60
-STEP_TO_BOUNDARY = 0.99
+WL=0; EXPO=3; SMIN=0.1; RETRY=0; STARTMODE=0
+BOUNDARY_SHARE = 0.99
+"""Part of the way to the nearest cone's boundary that a step may go."""
+LEAST_CENTRING = 1e-6
+"""The predictor never aims lower than so many times the present gap."""
+SHORT_STEP, SHORT_STEPS = 0.03, 4
+"""So many steps in a row shorter than this: the path has folded, or there is no solution."""
 
 
-@njit(cache=True)
-def determinant(x):
-    return max((x[0] - np.sqrt(np.sum(x[1:] ** 2))) * (x[0] + np.sqrt(np.sum(x[1:] ** 2))), 1e-30 * x[0] ** 2)
+@dataclass(frozen=True)
+class Path:
+    """Which path is followed to the answer."""
 
-@njit(cache=True)
-def scale_contacts(x: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
-    """Nesterov-Todd scaling of every contact: eta (nc,), point w (nc, dim), lambda (nc, dim)."""
-    nc, dim = x.shape
-    eta = np.empty(nc)
-    point = np.empty((nc, dim))
-    scaled = np.empty((nc, dim))
-    for c in range(nc):
-        dx = np.sqrt(determinant(x[c]))
-        ds = np.sqrt(determinant(s[c]))
-        eta[c] = np.sqrt(ds / dx)
-        inner = 0.0
-        for k in range(dim):
-            inner += x[c, k] * s[c, k] / (dx * ds)
-        gamma = np.sqrt(0.5 * (1.0 + inner))
-        point[c, 0] = (s[c, 0] / ds + x[c, 0] / dx) / (2 * gamma)
-        for k in range(1, dim):
-            point[c, k] = (s[c, k] / ds - x[c, k] / dx) / (2 * gamma)
-    scaled = scale(eta, point, x)
-    return eta, point, scaled
+    rounding: float = 0.01
+    """eps over ``sqrt(sigma / rho)``, the velocity at which a contact's forces turn over [-]."""
+    cautious: bool = False
+    """Centre fully, and correct in part, where the predictor is stopped short."""
+    convex: bool = False
+    """Leave out the term |u_T|: the answer is Coulomb's only where nothing slides."""
 
 
-@njit(cache=True)
-def scale(eta: Floats, point: Floats, z: Floats) -> Floats:
-    """``W_c z``: eta (2 v v^T - J) z with v = (w + e) / sqrt(2 (w_0 + 1))."""
-    out = np.empty_like(z)
-    nc, dim = z.shape
-    for c in range(nc):
-        inner = (point[c, 0] + 1.0) * z[c, 0]
-        for k in range(1, dim):
-            inner += point[c, k] * z[c, k]
-        inner /= point[c, 0] + 1.0
-        out[c, 0] = eta[c] * (inner * (point[c, 0] + 1.0) - z[c, 0])
-        for k in range(1, dim):
-            out[c, k] = eta[c] * (inner * point[c, k] + z[c, k])
-    return out
+def interior_point(
+    problem: FrictionProblem,
+    start: Floats | None = None,
+    tolerance: float = 1e-8,
+    path: Path = Path(),  # noqa: B008  (frozen)
+    *,
+    linear: Factorisation | None = None,
+    iterations: int = ITERATIONS,
+) -> FrictionSolution:
+    """Follow the path until the residual is at or below ``tolerance``.
 
-
-@njit(cache=True)
-def unscale(eta: Floats, point: Floats, z: Floats) -> Floats:
-    out = np.empty_like(z)
-    nc, dim = z.shape
-    for c in range(nc):
-        inner = (point[c, 0] + 1.0) * z[c, 0]
-        for k in range(1, dim):
-            inner -= point[c, k] * z[c, k]
-        inner /= point[c, 0] + 1.0
-        out[c, 0] = (inner * (point[c, 0] + 1.0) - z[c, 0]) / eta[c]
-        for k in range(1, dim):
-            out[c, k] = (-inner * point[c, k] + z[c, k]) / eta[c]
-    return out
-
-
-@njit(cache=True)
-def jordan_product(a, b):
-    out = np.empty_like(a)
-    for c in range(a.shape[0]):
-        inner = a[c, 0] * b[c, 0]
-        for k in range(1, a.shape[1]):
-            inner += a[c, k] * b[c, k]
-            out[c, k] = a[c, 0] * b[c, k] + b[c, 0] * a[c, k]
-        out[c, 0] = inner
-    return out
-
-
-@njit(cache=True)
-def jordan_divide(a, b):
-    """x with a o x = b"""
-    out = np.empty_like(a)
-    for c in range(a.shape[0]):
-        inner = 0.0
-        for k in range(1, a.shape[1]):
-            inner += a[c, k] * b[c, k]
-        det = determinant(a[c])
-        out[c, 0] = (a[c, 0] * b[c, 0] - inner) / det
-        for k in range(1, a.shape[1]):
-            out[c, k] = (b[c, k] - out[c, 0] * a[c, k]) / a[c, 0]
-    return out
-
-
-@njit(cache=True)
-def step_to_boundary(x, dx):
-    """Greatest step t with x + t dx in every cone."""
-    step = 1e30
-    for c in range(x.shape[0]):
-        a = dx[c, 0] ** 2
-        b = x[c, 0] * dx[c, 0]
-        cc = determinant(x[c])
-        for k in range(1, x.shape[1]):
-            a -= dx[c, k] ** 2
-            b -= x[c, k] * dx[c, k]
-        # cc + 2 b t + a t^2 = 0, smallest positive root
-        disc = b * b - a * cc
-        if dx[c, 0] < 0:
-            step = min(step, -x[c, 0] / dx[c, 0])
-        if disc >= 0:
-            root = np.sqrt(disc)
-            # stable: roots cc/(-b + root), cc/(-b - root)
-            d1 = -b + root
-            d2 = -b - root
-            if d1 > 0:
-                t = cc / d1
-                if t > 0:
-                    step = min(step, t)
-            if d2 > 0:
-                t = cc / d2
-                if t > 0:
-                    step = min(step, t)
-    return step
-
-
-@njit(cache=True)
-def coulomb_velocity(s, mu, smooth, share):
-    out = s.copy()
-    for c in range(s.shape[0]):
-        t2 = np.sum(s[c, 1:] ** 2)
-        out[c, 0] = mu[c] * (s[c, 0] - share * (t2 / (np.sqrt(t2 + smooth[c] ** 2) + smooth[c])))
-    return out
-
-
-@njit(cache=True)
-def coulomb_derivative(s, mu, smooth, share):
-    nc, dim = s.shape
-    out = np.zeros((nc, dim, dim))
-    for c in range(nc):
-        t = np.sqrt(np.sum(s[c, 1:] ** 2) + smooth[c] ** 2)
-        out[c, 0, 0] = mu[c]
-        for k in range(1, dim):
-            out[c, k, k] = 1.0
-            out[c, 0, k] = -share * mu[c] * s[c, k] / t
-    return out
-
-@njit(cache=True)
-def local_blocks(derivative, eta, point, mu):
-    """C = U H X,  H = eta^2 (2 w w^T - J)"""
-    nc, dim = point.shape
-    out = np.empty((nc, dim, dim))
-    h = np.empty((dim, dim))
-    for c in range(nc):
-        for i in range(dim):
-            for j in range(dim):
-                h[i, j] = 2 * point[c, i] * point[c, j]
-            h[i, i] += -1.0 if i == 0 else 1.0
-        h *= eta[c] ** 2
-        h[:, 0] *= mu[c]
-        out[c] = derivative[c] @ h
-    return out
-
-from rigid_lcp.body_factorisation import multiply_blocks
-def interior_point(problem, start, tolerance, *, share=1.0, iterations=ITERATIONS, solver=None, verbose=False, kappa=1.0, floor=1e-12, guard=0, wl=1):
-    nc, dim = problem.contacts, problem.dim
-    mu = problem.friction
-    solver = solver or factorisation(problem)
-    q = problem.offset.reshape(nc, dim)
-    rho = problem.rho
-    speed = np.sqrt(np.mean(q**2) )
-    X = np.ones((nc, dim)); X[:, 0] = mu
-    I = np.broadcast_to(np.eye(dim), (nc, dim, dim)).copy()
-    e = np.zeros((nc, dim)); e[:, 0] = 1
-    x = e * rho * speed; s = e * speed
-    r = (x / X).ravel()
-    best, best_res = None, np.inf
-    for it in range(iterations):
-        u = problem.velocity(r).reshape(nc, dim)
-        gap = np.sum(x * s) / nc
-        eps = np.full(nc, kappa * np.sqrt(gap / rho))
-        lack = u - coulomb_velocity(s, mu, eps, share)
-        res = problem.residual(r)
-        if verbose:
-            print(it, f"gap {gap/(rho*speed**2):.2e} lack {np.linalg.norm(lack)/np.linalg.norm(q):.2e} res {res:.2e}", end=' ')
-        if res < best_res: best, best_res = r.copy(), res
-        if res < floor: break
-        eta, point, lam = scale_contacts(x, s)
-        U = coulomb_derivative(s, mu, eps, share)
-        C = local_blocks(U, eta, point, mu)
-        try:
-            solve = solver.factor(C, I)
-        except SingularSystem:
+    ``start`` is not used: a point on the boundary is a bad one for this method.  ``linear``:
+    factorisations of this problem's W, made if not given.  About 1e-10 is what it can reach,
+    as its matrices become singular; `rigid_lcp.newton` goes on from there.
+    """
+    contacts, dim = problem.contacts, problem.dim
+    linear = linear or factorisation(problem)
+    step = PathStep(problem, path)
+    best, best_residual, done, short = np.zeros(contacts * dim), np.inf, 0, 0
+    while True:
+        force = step.force()
+        residual = problem.residual(force)
+        if residual < best_residual:
+            best, best_residual = force, residual
+        if not residual > tolerance or done == iterations or short == SHORT_STEPS:
             break
-        def direction(target, part_of_lack=1.0):
-            part = scale(eta, point, jordan_divide(lam, target))
-            b = multiply_blocks(U, part.ravel()) - part_of_lack * lack.ravel()
-            dr = solve(b)
-            dx = dr.reshape(nc, dim) * X
-            ds = part - scale(eta, point, scale(eta, point, dx))
-            return dx, ds
-        ll = jordan_product(lam, lam)
-        dx, ds = direction(-ll)
-        a = min(1.0, step_to_boundary(x, dx), step_to_boundary(s, ds))
-        mu_aff = np.sum((x + a * dx) * (s + a * ds)) / nc
-        sigma = min(1.0, max(mu_aff / gap, 0)) ** 3
-        sigma = max(sigma, 1e-6)
-        if guard and a < 0.1: sigma = 1.0
-        corr = (1.0 if not guard else a if guard==1 else a*a) * jordan_product(scale(eta, point, dx), unscale(eta, point, ds))
-        dx, ds = direction(sigma * gap * e - ll - corr, 1 - sigma if wl else 1.0)
-        ax, as_ = step_to_boundary(x, dx), step_to_boundary(s, ds)
-        a = min(1.0, STEP_TO_BOUNDARY * min(ax, as_))
-        if verbose: print(f"sigma {sigma:.1e} step {a:.3f}")
-        x = x + a * dx; s = s + a * ds
-        r = (x / X).ravel()
-        if a < 1e-8: break
-    return best, best_res, it
+        try:
+            length = step.take(linear)
+        except (SingularSystem, FloatingPointError):
+            break
+        done, short = done + 1, short + 1 if length < SHORT_STEP else 0
+    return friction_solution(
+        problem, best, tolerance, "interior-point",
+        {"iterations": float(done), "factorisations": float(done)},
+    )  # fmt: skip
+
+
+class PathStep:
+    """The point x, s (nc, dim) on its way, and how it goes one step."""
+
+    def __init__(self, problem: FrictionProblem, path: Path) -> None:
+        contacts, dim = problem.contacts, problem.dim
+        self.problem, self.path = problem, path
+        self.slides = problem.friction > 0.0
+        self.mu = np.where(self.slides, problem.friction, 1.0)
+        self.unit = np.zeros((contacts, dim))
+        self.unit[:, 0] = 1.0
+        self.tangent = np.where(self.slides[:, None], 1.0, self.unit)  # r_T = 0 without friction
+        speed = float(np.sqrt(np.mean(problem.offset**2))) or 1.0
+        self.x = self.unit * (problem.rho * speed)
+        self.s = self.unit * speed
+        if STARTMODE:
+            self.x = self.unit * (problem.rho * speed * self.mu[:, None]); self.s = self.unit * speed / self.mu[:, None]
+        self.stretch = np.ones((contacts, dim))
+        self.stretch[:, 0] = self.mu
+
+    def force(self) -> Floats:
+        """r of the point x."""
+        return (self.x / self.stretch).ravel()
+
+    def take(self, linear: Factorisation) -> float:
+        """One predictor-corrector step; returns its length.  Raises `SingularSystem`."""
+        x, s, path, contacts = self.x, self.s, self.path, self.problem.contacts
+        gap = float(np.sum(x * s)) / contacts
+        eps = path.rounding * np.sqrt(gap / self.problem.rho)
+        share = 0.0 if path.convex else 1.0
+        at = self.problem.velocity(self.force()).reshape(x.shape)
+        velocity, slope = coulomb_velocity(s, self.mu, eps, share)
+        lack = (at - velocity) * self.tangent
+        eta, point = cone_scaling(x, s)
+        scaled = cone_scale(eta, point, x, False)
+        blocks = np.matmul(slope, cone_scaling_square(eta, point) * self.stretch[:, None, :])
+        identity = np.zeros_like(blocks)
+        each = np.arange(x.shape[1])
+        identity[:, each, each] = self.tangent
+        blocks[~self.slides] *= self.unit[0, :, None] * self.unit[0]
+        blocks[:, each, each] += 1.0 - self.tangent
+        solve = linear.factor(blocks, identity)
+
+        def direction(target: Floats, wl=1.0) -> tuple[Floats, Floats]:
+            """dx, ds that bring ``x o s`` to the target and ``W r + q`` to u(s), linearised."""
+            part = cone_scale(eta, point, cone_divide(scaled, target), False)
+            right = multiply_blocks(slope, part.ravel()) - wl * lack.ravel()
+            dx = solve(right * self.tangent.ravel()).reshape(x.shape) * self.stretch
+            there = cone_scale(eta, point, cone_scale(eta, point, dx, False), False)
+            return dx, (part - there) * self.tangent
+
+        square = cone_product(scaled, scaled)
+        dx, ds = direction(-square)
+        length = min(1.0, cone_step(x, dx), cone_step(s, ds))
+        ahead = float(np.sum((x + length * dx) * (s + length * ds))) / contacts
+        centring = max(LEAST_CENTRING, min(1.0, max(0.0, ahead / gap) ** EXPO))
+        if path.cautious and length < 0.1:
+            centring = 1.0
+        second = cone_product(
+            cone_scale(eta, point, dx, False), cone_scale(eta, point, ds, True)
+        ) * (length if path.cautious else 1.0)
+        dx, ds = direction(centring * gap * self.unit - square - second, 1 - centring if WL else 1.0)
+        length = min(1.0, BOUNDARY_SHARE * min(cone_step(x, dx), cone_step(s, ds)))
+        if RETRY and length < SMIN:
+            dx, ds = direction(RETRY * gap * self.unit - square, 0.0 if RETRY >= 1 else 1 - RETRY)
+            length = min(1.0, BOUNDARY_SHARE * min(cone_step(x, dx), cone_step(s, ds)))
+        if not np.isfinite(length) or not (np.isfinite(dx).all() and np.isfinite(ds).all()):
+            raise SingularSystem
+        self.x, self.s = x + length * dx, s + length * ds
+        return length
+
+
+@njit(cache=True)
+def coulomb_velocity(s: Floats, mu: Floats, eps: float, share: float) -> tuple[Floats, Floats]:
+    """u(s) = ``(mu (s_N - share s_T^2 / sqrt(s_T^2 + eps^2)), s_T)`` and U = du/ds.
+
+    ``s`` (nc, dim), ``mu`` (nc,), ``eps`` a velocity; ``share`` 1 for Coulomb, 0 for convex.
+    """
+    nc, dim = s.shape
+    velocity, slope = s.copy(), np.zeros((nc, dim, dim))
+    for c in range(nc):
+        squares = 0.0
+        for k in range(1, dim):
+            squares += s[c, k] ** 2
+        rounded = np.sqrt(squares + eps**2)
+        if rounded > 0.0:
+            velocity[c, 0] -= share * squares / rounded
+        velocity[c, 0] *= mu[c]
+        slope[c, 0, 0] = mu[c]
+        for k in range(1, dim):
+            slope[c, k, k] = 1.0
+            if rounded > 0.0:
+                turn = (squares + 2.0 * eps**2) / rounded**2
+                slope[c, 0, k] = -share * mu[c] * turn * s[c, k] / rounded
+    return velocity, slope

@@ -23,6 +23,12 @@ from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, fricti
 Floats = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
+ITERATIONS = 50
+SHIFTS = (1e-9, 1e-6, 1e-4)
+"""Proximal shifts over mean(diag W), tried in turn: the smaller, the faster near the end."""
+PATIENCE = 5
+"""Steps that may fail to halve the best residual: contacts change status before it falls."""
+
 
 @njit(cache=True)
 def alart_curnier(
@@ -73,33 +79,52 @@ def alart_curnier(
                 b[c, i, j] = rho[c] * turn
     return f, a, b, status
 
-def newton(problem, start, tolerance, *, solver=None, iterations=40, shifts=(1e-9,1e-6,1e-4), patience=5, verbose=False):
-    nc, dim = problem.contacts, problem.dim
-    mu = problem.friction
-    solver = solver or factorisation(problem)
-    r = np.zeros(nc*dim) if start is None else start.copy()
-    diag = (problem.bodies.diagonal if problem.bodies is not None else problem.delassus.diagonal()).reshape(nc, dim)
-    rho = 1 / np.maximum(diag.max(axis=1), 1e-9*diag.max())
-    best, best_res, since = r, problem.residual(r), 0
-    it = 0
-    for shift in shifts:
-        r, since, ref = best, 0, best_res
-        while it < iterations and best_res > tolerance:
-            it += 1
-            u = problem.velocity(r).reshape(nc, dim)
-            f, a, b, st = alart_curnier(r.reshape(nc, dim), u, mu, rho)
-            if verbose: print('  N', it, shift, f"{problem.residual(r):.2e}", np.bincount(st, minlength=3))
+
+
+def newton(
+    problem: FrictionProblem,
+    start: Floats | None = None,
+    tolerance: float = 1e-12,
+    *,
+    linear: Factorisation | None = None,
+    iterations: int = ITERATIONS,
+) -> FrictionSolution:
+    """Newton steps from ``start`` (zero forces if None) until the residual is small enough.
+
+    Converges fast near a solution, and may go anywhere from a poor start: give it the point of
+    another method.  Where it does not better its best point in `PATIENCE` steps it goes back to
+    it and on with a greater shift, which is slower and steadier.  ``linear``: factorisations of
+    this problem's W, made if not given.
+    """
+    shape = (problem.contacts, problem.dim)
+    linear = linear or factorisation(problem)
+    rho = contact_rho(problem)
+    scale = (problem.rho / rho)[:, None, None]
+    best = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
+    best_residual, done = problem.residual(best), 0
+    for shift in SHIFTS:
+        force, waited, mark = best, 0, best_residual
+        while best_residual > tolerance and done < iterations and waited < PATIENCE:
+            velocity = problem.velocity(force).reshape(shape)
+            f, a, b, _ = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
+            done, waited = done + 1, waited + 1
             try:
-                dr = solver.factor(a + shift * problem.rho / rho[:, None, None]  * b, b)(-f.ravel())
+                force = force - linear.factor(a + (shift * scale) * b, b)(f.ravel())
             except SingularSystem:
                 break
-            r = r + dr
-            res = problem.residual(r)
-            if not np.isfinite(res): break
-            since += 1
-            if res < best_res:
-                best, best_res = r, res
-            if best_res < 0.5 * ref:
-                since, ref = 0, best_res
-            if since >= patience: break
-    return best, best_res, it
+            residual = problem.residual(force)
+            if not np.isfinite(residual):
+                break
+            if residual < best_residual:
+                best, best_residual = force, residual
+            if best_residual < 0.5 * mark:
+                waited, mark = 0, best_residual
+    return friction_solution(
+        problem, best, tolerance, "newton", {"iterations": float(done), "factorisations": float(done)}
+    )
+
+
+def contact_rho(problem: FrictionProblem) -> Floats:
+    """``1 / max(diag W_cc)`` of every contact: force per velocity of it alone, (nc,)."""
+    diagonal = problem.diagonal.reshape(-1, problem.dim).max(axis=1)
+    return 1.0 / np.maximum(diagonal, 1e-9 / problem.rho)

@@ -51,6 +51,8 @@ SHIFT_LEAST = 1e-6
 """Relative shift below which round-off in the inverse would make events up."""
 PROXIMAL_STEPS = 60
 """Most proximal steps that take the shift out,"""
+HARDLY = 10
+"""Pivots of a proximal step after which the shift can fall faster."""
 PROXIMAL_PATIENCE = 12
 """and most without a better residual: self-stress moves on for a while before it settles."""
 
@@ -166,27 +168,29 @@ def shift_change(state: Pivots, shift: float) -> bool:
 
 
 def shift_remove(problem: FrictionProblem, state: Pivots, tolerance: float, few: int) -> Floats:
-    """Proximal steps, the shift falling tenfold as long as one takes no more than ``few`` pivots.
+    """Proximal steps; the shift falls tenfold each, a hundredfold after a step of hardly a pivot.
 
-    A step that takes more is done again with the shift of before, which then stays longer.
+    A step of more than ``few`` pivots is done again with the shift of before, which then falls
+    more slowly.
     """
     exact, best = problem.offset[state.rows], pivots_force(problem, state)
-    least, idle, pace = pivots_residual(problem, state, best), 0, 0.1
-    floor = SHIFT_LEAST * state.unit
+    least, idle, pace = pivots_residual(problem, state, best), 0, 1.0
+    taken, floor = 0, SHIFT_LEAST * state.unit
     for _ in range(PROXIMAL_STEPS if state.shift[0] > 0.0 else 0):
         if least <= tolerance or idle == PROXIMAL_PATIENCE:
             break
-        before, shift = state_copy(state), float(state.shift[0])
-        smaller = min(shift, max(pace * shift, floor))
+        before, shift, spent = state_copy(state), float(state.shift[0]), int(state.count[0])
+        smaller = min(shift, max((0.1 if taken > HARDLY else 0.01) ** pace * shift, floor))
         if smaller < shift:
             shift_change(state, smaller)
         change = exact - smaller * state.f - state.b
-        ended = offset_drive(state, change, 1.0, True, int(state.count[0]) + few)
+        ended = offset_drive(state, change, 1.0, True, spent + few)
+        taken = int(state.count[0]) - spent
         if ended != DONE:
-            if smaller == shift and pace == 1.0:
+            if smaller == shift or pace < 0.1:
                 break
             state_restore(state, before, shift)
-            pace = 1.0 if pace > 0.5 else pace**0.5
+            pace *= 0.5
             continue
         force = pivots_force(problem, state)
         residual = pivots_residual(problem, state, force)

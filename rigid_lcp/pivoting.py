@@ -18,8 +18,7 @@ is no such ray: the path ends in a solution for every coefficient of friction.
 
 From forces near a solution (of the last step, of Gauss-Seidel, of Newton): the lists are read off
 them, and d is what is missing to make them a solution of the problem at lambda = 1.  A few corners
-are left.  There d need not be inside K*; should a ray end the path, the method starts from no
-forces.
+are left.  There d need not be inside K*, so a ray or a detour can end the path.
 
 2D friction, or 3D without friction.  In 3D friction sliding has a circle of directions, which a
 pivoting method can only replace by a polygon (an error of ``1 - cos(pi / k)`` for k edges).
@@ -45,7 +44,9 @@ from rigid_lcp.factor_updates import (
     slide_sign,
 )
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
+from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.pivot_state import (
+    SHIFT_LEAST,
     Pivots,
     lists_set,
     offset_drive,
@@ -63,45 +64,55 @@ def pivoting(
     start: Floats | None = None,
     tolerance: float = 1e-12,
     *,
+    sweeps: int = 300,
     tangential_velocity: Floats | None = None,
     shift: float = 1e-2,
     max_pivots: int | None = None,
 ) -> FrictionSolution:
     """Solve a 2D friction problem, or a frictionless one, exactly by following a path of pivots.
 
-    ``start`` r (nc * dim,): forces near the solution; the nearer, the fewer pivots.
+    ``start`` r (nc * dim,): forces near the solution; the nearer, the fewer pivots.  Without it
+    ``sweeps`` of Gauss-Seidel make one; ``sweeps=0`` begins with no forces, as Lemke does.  A path
+    that takes too many pivots is given up: Gauss-Seidel betters its start, or Lemke's is taken.
     ``tangential_velocity`` u_T (nc,) [m/s]: where not zero the contact slides already and friction
-    opposes u_T; only then can there be no solution (Painleve).  ``shift``: added to the diagonal
-    of W, relative to its mean, while pivoting.  ``max_pivots``: default 60 a contact.
+    opposes u_T; only then can there be no solution (Painleve); begins with no forces.  ``shift``:
+    added to the diagonal of W, relative to its mean, at first; removed in the end.
+    ``max_pivots``: of all paths together, default 60 a contact.
 
-    ``work``: ``pivots``, changes of lists; ``paths``, 2 where the path from ``start`` was given up.
+    ``work``: ``pivots``, changes of lists; ``paths``, how many were begun; ``sweeps``.
     Status ``no solution`` is proved by a linear programme.  Raises `ProblemError` in 3D with
     friction.  Takes memory for (2 nc)^2 numbers and O(k^2) work a pivot for k unknown forces: not
     for above some 2,000 contacts.
     """
     most = 60 * problem.contacts + 100 if max_pivots is None else max_pivots
-    few = problem.contacts + 50
-    attempts = [(shift, False, 4 * few), (10.0 * shift, False, 4 * few), (shift, False, most)]
-    if start is not None and problem.contacts:
-        if tangential_velocity is None and problem.residual(start) <= tolerance:
-            work = {"pivots": 0.0, "paths": 0.0}
-            return friction_solution(problem, np.array(start), tolerance, "pivoting", work)
-        attempts = [(shift, True, few), (10.0 * shift, True, few), *attempts]
-    spent = 0
+    few, spent, swept = problem.contacts + 50, 0, 0
+    attempts: list[tuple[float, bool, int]] = [(shift, False, 4 * few), (shift, False, most)]
+    if (start is not None or sweeps > 0) and tangential_velocity is None:
+        attempts = [(shift, True, few), (shift, True, few), (10.0 * shift, True, few), *attempts]
+    near = start
     for paths, (amount, warm, limit) in enumerate(attempts, 1):
         state = pivots_state(problem, amount, 0.0, tangential_velocity, False)
         if warm:
-            assert start is not None
-            ended = path_from_forces(problem, state, start, min(limit, most - spent))
+            if near is None or paths > 1:
+                count = sweeps if near is None else 2000
+                swept += count
+                near = gauss_seidel(problem, near, 1e-10, count).r
+            if problem.residual(near) <= tolerance:
+                work = {"pivots": float(spent), "paths": paths - 1.0, "sweeps": float(swept)}
+                return friction_solution(problem, np.array(near), tolerance, "pivoting", work)
+            if paths == 1:
+                amount = min(max(10.0 * problem.residual(near), SHIFT_LEAST), shift)
+                state = pivots_state(problem, amount, 0.0, None, False)
+            ended = path_from_forces(problem, state, near, min(limit, most - spent))
         else:
             ended = path_from_nothing(problem, state, min(limit, most - spent))
-        force = shift_remove(problem, state, tolerance, few) if ended == DONE else pivots_force(
-            problem, state
-        )  # fmt: skip
+        force = pivots_force(problem, state)
+        if ended == DONE:
+            force = shift_remove(problem, state, tolerance, few)
         spent += int(state.count[0])
         state.count[0] = spent
         solution = pivots_solution(problem, state, force, tolerance, "pivoting", ended, -1)
-        solution.work["paths"] = float(paths)
+        solution.work.update(paths=float(paths), sweeps=float(swept))
         if solution.status in ("solved", "no solution") or spent >= most:
             break
     return solution

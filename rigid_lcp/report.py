@@ -63,8 +63,8 @@ def report_write(
     claim = (
         f"{summary['bodies']:,} rigid bodies, {summary['time']:.4g} s in {summary['steps']:,} "
         f"steps by {summary['method']}; contact forces to a residual of "
-        f"{summary['residual_worst']:.1g}, overlaps below {summary['overlap_largest']:.1g} m, {summary['cpu_s']:.3g} s of processor "
-        "time."
+        f"{summary['residual_worst']:.1g}, overlaps below {summary['overlap_largest']:.1g} m, "
+        f"{summary['cpu_s']:.3g} s of processor time."
     )
     rows = "".join(
         f"<tr><td>{name}</td><td>{form.format(summary[key])}</td></tr>" for name, key, form in ROWS

@@ -31,7 +31,7 @@ from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
 from rigid_lcp.pivoting import pivoting
 from rigid_lcp.scene import Loads, World
 from rigid_lcp.solver import solve_friction
-from rigid_lcp.time_stepping import contact_forces
+from rigid_lcp.time_stepping import contact_forces, forces_error
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -192,8 +192,9 @@ def state_rate(
         return Rate(motion.velocity, turning, free, contacts, none, none)
     bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     offset = contact_offset(contacts, motion, motion_with_rates(motion, free))
-    solution = forces_found(bodies, offset, contacts.friction, slip, tolerance)
-    pace.worst_residual = max(pace.worst_residual, solution.residual)
+    gravity = float(np.linalg.norm(world.scene.gravity))
+    solution, error = forces_found(bodies, offset, contacts.friction, slip, tolerance, gravity)
+    pace.worst_residual = max(pace.worst_residual, error)
     change = bodies.inverse_mass @ (bodies.jacobian.T @ solution.r)
     free[world.movable] += np.asarray(change).reshape(-1, world.size)
     shape = (-1, motion.dim)
@@ -204,9 +205,10 @@ def state_rate(
 
 
 def forces_found(
-    bodies: BodySpace, offset: Floats, friction: Floats, slip: Floats, tolerance: float
-) -> FrictionSolution:
-    """Contact forces (eqs 26, 27).
+    bodies: BodySpace, offset: Floats, friction: Floats, slip: Floats, tolerance: float,
+    gravity: float,
+) -> tuple[FrictionSolution, float]:  # fmt: skip
+    """Contact forces (eqs 26, 27), and their error over the forces that ``gravity`` [m/s^2] asks.
 
     Where ``slip`` (nc, dim - 1) is not zero, friction opposes it: ``f_T = -mu f_N slip/|slip|``;
     elsewhere it opposes the tangential acceleration.  Raises `NoSolution` or `NotConverged`.
@@ -224,13 +226,14 @@ def forces_found(
             "no finite contact forces obey Coulomb's law (Painleve)", where="contact forces",
             remedy='use method="time-stepping", whose impulses always exist',
         )  # fmt: skip
-    if not solution.residual <= ACCEPTED:
+    error = forces_error(bodies, solution, gravity)
+    if not error <= ACCEPTED:
         raise NotConverged(
-            f"the contact forces have a residual of {solution.residual:.2g}",
+            f"the contact forces have a residual of {error:.2g}",
             where=f"{len(friction)} contacts",
             remedy='use method="time-stepping"; ' + solution.message,
         )
-    return solution
+    return solution, error
 
 
 def _sliding_forces(
@@ -316,9 +319,10 @@ def collided(world: World, motion: Motion, pace: Pace, tolerance: float) -> Moti
     solution = solve_friction(
         bodies, excess.ravel(), contacts.friction, dim=motion.dim, tolerance=tolerance
     )
-    if not solution.residual <= ACCEPTED:
+    error = forces_error(bodies, solution, STILL * scale)
+    if not error <= ACCEPTED:
         raise NotConverged(
-            f"the impulses of a collision have a residual of {solution.residual:.2g}",
+            f"the impulses of a collision have a residual of {error:.2g}",
             where=f"{len(contacts)} contacts", remedy=solution.message,
         )  # fmt: skip
     pace.collisions += 1

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,8 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from rigid_lcp.contacts import Contacts
 from rigid_lcp.detection_2d import detect_2d, shapes_2d
 from rigid_lcp.errors import SceneError
-from rigid_lcp.motion import Motion
+from rigid_lcp.motion import Motion, motion_displaced
 from rigid_lcp.shapes_2d import HalfSpace
+
+if TYPE_CHECKING:
+    from rigid_lcp.gyroscopic import PrincipalInertia
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -149,8 +153,27 @@ class World:
         blocks[:, 3:, 3:] = np.linalg.inv(self._inertia_placed(motion)[moving])
         return sp.csr_array(sp.block_diag(blocks, format="csr"))
 
-    def accelerations(self, motion: Motion, loads: ArrayLike | None) -> Floats:
-        """Generalised accelerations of gravity, loads and gyroscopic torque alone, (n, size)."""
+    @cached_property
+    def principal(self) -> PrincipalInertia:
+        """Principal moments and axes of inertia of all bodies; 3D only."""
+        from rigid_lcp.gyroscopic import principal_inertia
+
+        return principal_inertia(self.inertia)
+
+    def drifted(self, motion: Motion, seconds: float) -> Motion:
+        """The state after ``seconds`` [s] without any force; in 3D spins change as bodies turn."""
+        if self.scene.dim == 2:
+            return motion_displaced(motion, seconds * motion.rates)
+        from rigid_lcp.gyroscopic import free_rotation
+
+        angle, spin = free_rotation(self.principal, motion.angle, motion.spin, seconds)
+        return Motion(motion.position + seconds * motion.velocity, angle, motion.velocity, spin)
+
+    def accelerations(
+        self, motion: Motion, loads: ArrayLike | None, gyroscopic: bool = True
+    ) -> Floats:
+        """Generalised accelerations of gravity and loads, (n, size), in 3D with those of the
+        gyroscopic torque, unless `drifted` accounts for it (``gyroscopic`` False)."""
         dim = self.scene.dim
         result = np.zeros((len(self.mass), self.size))
         moving = self.movable
@@ -163,7 +186,9 @@ class World:
                 result[moving, 2] += force[moving, 2] / self.inertia[moving]
             return result
         inertia, spin = self._inertia_placed(motion)[moving], motion.spin[moving]
-        torque = -np.cross(spin, np.einsum("nij,nj->ni", inertia, spin))
+        torque = np.zeros_like(spin)
+        if gyroscopic:
+            torque -= np.cross(spin, np.einsum("nij,nj->ni", inertia, spin))
         if loads is not None:
             torque += force[moving, 3:]
         result[moving, 3:] = np.linalg.solve(inertia, torque[..., None])[..., 0]

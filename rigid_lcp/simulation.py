@@ -112,8 +112,7 @@ class Simulation:
         made = moreau_step(
             self.world, self.motion, loads, h, self.contacts, self.tolerance
         )
-        if made.solution is not None:
-            self._judge(made.solution.residual, made.solution.message)
+        self._judge(made.residual, made.message)
         self.motion, self.contacts = made.motion, made.contacts
         self.time += h
         self.steps += 1

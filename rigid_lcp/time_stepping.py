@@ -47,7 +47,10 @@ class Step:
 
     motion: Motion
     contacts: ContactForces
-    solution: FrictionSolution | None
+    residual: float
+    """Error of the impulses (scale-free natural residual), see `forces_error` [-]."""
+    message: str = ""
+    """What the solver has to say of impulses that it did not find."""
 
 
 def moreau_step(
@@ -59,13 +62,13 @@ def moreau_step(
     ``loads`` (n, 3) or (n, 6) [N, N m] at the midpoint, or None; ``known``: contacts of the last
     step, whose forces the solver starts from; ``tolerance``: scale-free residual.
     """
-    middle = motion_displaced(motion, 0.5 * h * motion.rates)
-    accelerations = world.accelerations(middle, loads)
+    middle = world.drifted(motion, 0.5 * h)
+    accelerations = world.accelerations(middle, loads, gyroscopic=False)
     free = motion_with_rates(middle, middle.rates + h * accelerations)
     contacts = world.contacts(middle, moreau_margin(world, motion, accelerations, h))
     if len(contacts) == 0:
-        end = motion_displaced(free, 0.5 * h * free.rates)
-        return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), None)
+        end = world.drifted(free, 0.5 * h)
+        return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
     inverse_mass = world.inverse_mass(middle)
     bodies = body_space(contacts, middle.position, world.columns, inverse_mass)
     before = relative_velocity(contacts, middle)[:, 0]
@@ -84,10 +87,25 @@ def moreau_step(
     )
     free_rates = free.rates
     free_rates[world.movable] += _velocities(bodies, impulse, world.size)
-    end = motion_with_rates(middle, free_rates)
-    end = motion_displaced(end, 0.5 * h * end.rates)
+    end = world.drifted(motion_with_rates(middle, free_rates), 0.5 * h)
     end = overlap_removed(world, end, contacts, bodies, contacts.gap + 0.5 * h * after[:, 0])
-    return Step(end, contact_forces(contacts, impulse, after, h), solution)
+    error = forces_error(bodies, solution, scale)
+    return Step(end, contact_forces(contacts, impulse, after, h), error, solution.message)
+
+
+def forces_error(bodies: BodySpace, solution: FrictionSolution, free: float) -> float:
+    """The residual of a solution over the forces that matter [-].
+
+    The natural map over ``|r|``, or over what the velocities (accelerations) ``free`` of gravity
+    would need at every contact where r is smaller: contacts that carry next to nothing have no
+    scale of their own.
+    """
+    if len(solution.r) == 0 or solution.residual == 0.0:
+        return 0.0
+    rho = 1.0 / float(bodies.diagonal.mean())
+    size = float(np.linalg.norm(solution.r))
+    own = size or rho * float(np.linalg.norm(solution.u))
+    return solution.residual * own / max(size, rho * free * len(solution.r) ** 0.5, 1e-300)
 
 
 def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float) -> Floats:

@@ -25,10 +25,10 @@ def bed_poured(radius: Floats, width: float, drop: Floats) -> Floats:
     """
     count, planar = len(radius), drop[0, 1] < 0
     centre = np.zeros((count, 3))
-    cell = 2.0 * radius.max()
+    cell = 3.0 * radius.max()  # the sum of two radii and two strides
     across = max(1, int(width / cell))
-    layers = 4 + int(8.0 * np.sum(radius ** (2 if planar else 3)) / width ** (1 if planar else 2)
-                     / cell) * 4  # fmt: skip
+    grains = np.pi * np.sum(radius**2 / width if planar else 4.0 / 3.0 * radius**3 / width**2)
+    layers = 4 + int(2.5 * grains / cell)  # the height of a bed that fills 40 % of its box
     head = np.full((across, 1 if planar else across, layers), -1)
     following = np.full(count, -1)
     near = np.zeros(256, dtype=np.int64)
@@ -40,18 +40,26 @@ def bed_poured(radius: Floats, width: float, drop: Floats) -> Floats:
             point[axis] = r + drop[i, axis] * (width - 2.0 * r)
         point[2] = top + 2.0 * r
         stride = 0.5 * r
-        while stride > 1e-7 * r:
-            found = neighbours_near(point, r + stride, radius, centre, head, following, cell, near)
-            height = point[2]
+        while stride > 1e-6 * r:
+            reach = r + 2.0 * stride
+            found = neighbours_near(point, reach, radius, centre, head, following, cell, near)
             trial = point.copy()
             trial[2] -= stride
-            for _ in range(20):
-                if not pushed_out(trial, r, radius, centre, near, found, width, planar, stride):
-                    break
-            if trial[2] < height - 0.05 * stride and free(
-                trial, r, radius, centre, near, found, 0.2 * stride
+            pushed_out(trial, r, radius, centre, near, found, width, planar, stride)
+            way = trial - point  # down the slope; as long as a stride even where it is gentle
+            length = np.sqrt(np.sum(way**2))
+            if length > 0.0:
+                trial = point + way * (stride / length)
+                pushed_out(trial, r, radius, centre, near, found, width, planar, stride)
+            moved = np.sqrt(np.sum((trial - point) ** 2))
+            if (
+                length > 1e-3 * stride
+                and moved < 2.0 * stride
+                and trial[2] < point[2] - 1e-3 * stride
+                and free(trial, r, radius, centre, near, found, 0.01 * stride)
             ):
                 point = trial
+                stride = min(1.5 * stride, 0.5 * r)
             else:
                 stride *= 0.5
         centre[i] = point
@@ -99,23 +107,25 @@ def neighbours_near(
 def pushed_out(
     point: Floats, r: float, radius: Floats, centre: Floats, near: Integers, found: int,
     width: float, planar: bool, stride: float,
-) -> bool:  # fmt: skip
-    """Push a grain out of those it overlaps, one after another; True if any overlapped by much."""
-    much = False
-    for index in range(found):
-        j = near[index]
-        apart = 0.0
-        for k in range(3):
-            apart += (point[k] - centre[j, k]) ** 2
-        apart, touch = np.sqrt(apart), r + radius[j]
-        if apart < touch:
-            much = much or touch - apart > 0.01 * stride
+) -> None:  # fmt: skip
+    """Push a grain out of those it overlaps and into the box, one after another and again."""
+    for _ in range(30):
+        much = False
+        for index in range(found):
+            j = near[index]
+            apart = 0.0
             for k in range(3):
-                point[k] += (point[k] - centre[j, k]) * (touch / apart - 1.0)
-    for axis in range(1 if planar else 2):
-        point[axis] = min(max(point[axis], r), width - r)
-    point[2] = max(point[2], r)
-    return much
+                apart += (point[k] - centre[j, k]) ** 2
+            apart, touch = np.sqrt(apart), r + radius[j]
+            if apart < touch:
+                much = much or touch - apart > 1e-3 * stride
+                for k in range(3):
+                    point[k] += (point[k] - centre[j, k]) * (touch / apart - 1.0)
+        for axis in range(1 if planar else 2):
+            point[axis] = min(max(point[axis], r), width - r)
+        point[2] = max(point[2], r)
+        if not much:
+            return
 
 
 @njit(cache=True)

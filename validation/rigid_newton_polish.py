@@ -2,7 +2,8 @@
 
 The rival of our own solver, on purpose plain: Newton's method on the natural map
 ``F(r) = r - P_K(r - rho (u + mu |u_T| n))`` with its derivative by blocks, W scaled and shifted by
-1e-9, SuperLU, and steps halved until |F| falls.  Nothing of `rigid_lcp` but the problem is used.
+1e-9, SuperLU, and steps halved until |F| falls, taken whole where no half does.  Nothing of
+`rigid_lcp` but the problem is used.
 """
 
 from __future__ import annotations
@@ -34,18 +35,22 @@ def newton_polish(
     rho = np.repeat(1.0 / w.diagonal().reshape(-1, dim).mean(axis=1), dim)
     shifted = w + sp.diags_array(SHIFT / rho)
     end = time.process_time() + budget_s
-    r = force.copy()
+    r = best = force.copy()
+    least = np.inf
     value, derivative = _natural_map(problem, r, rho)
     for step in range(STEPS):
-        if problem.residual(r) <= tolerance or time.process_time() > end:
-            return r, step
+        error = problem.residual(r)
+        if error < least:
+            best, least = r, error
+        if least <= tolerance or time.process_time() > end:
+            return best, step
         projection, dual = derivative
         blocks = projection @ dual
         matrix = sp.eye_array(len(r)) - projection + sp.diags_array(rho) @ blocks @ shifted
         try:
             move = splu(sp.csc_array(matrix)).solve(-value)
         except RuntimeError:  # exactly singular
-            return r, step
+            return best, step
         size = np.linalg.norm(value / np.sqrt(rho))
         share = 1.0
         for _ in range(HALVINGS):
@@ -55,9 +60,10 @@ def newton_polish(
                 break
             share /= 2
         else:
-            return r, step
+            trial = r + move
+            new, new_derivative = _natural_map(problem, trial, rho)
         r, value, derivative = trial, new, new_derivative
-    return r, STEPS
+    return best, STEPS
 
 
 def _natural_map(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,9 +31,11 @@ RADII = (0.035, 0.065)
 """Range of the grains' radii [m], uniform."""
 TOUCH = 1e-3
 """Grains nearer than this part of the mean radius touch: their gap is taken for closed."""
-SETTLE_STEP = 5e-3
-"""Time step [s] of the settling: a free grain falls ``g h^2``, half a percent of its radius."""
+SETTLE_STEPS = (2e-2, 2e-3)
+"""First and last time step [s] of the settling: a free grain falls ``g h^2``, 4 mm to 40 um."""
 SETTLE_SWEEPS = 40
+OVERLAP_MENDED = 0.2
+"""Part of an overlap that a step of the settling takes back."""
 
 
 @dataclass(frozen=True)
@@ -113,11 +116,12 @@ def bed(
     width = 2.0 * float(radius.mean()) * max(2.0, grains ** (1 / dim))
     centre = bed_poured(radius, width, drop)
     made = Bed(centre, radius, width, dim, friction, np.zeros((0, 2), int), np.zeros((0, 3)), 1.0)
-    for _ in range(settle):
-        made = bed_settled(made, SETTLE_STEP)
+    for k in range(settle):
+        step = SETTLE_STEPS[0] * (SETTLE_STEPS[1] / SETTLE_STEPS[0]) ** (k / settle)
+        made = bed_settled(replace(made, friction=0.0 if 2 * k < settle else friction), step)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        arrays = {key: np.asarray(value) for key, value in vars(made).items()}
+        arrays: dict[str, Any] = vars(made)
         np.savez_compressed(folder / name, **arrays)
     return made
 
@@ -151,17 +155,17 @@ def bed_settled(made: Bed, step: float) -> Bed:
 def bed_pairs(made: Bed, margin: float) -> Bed:
     """Find the pairs within ``margin`` [m]; those known before keep their impulse."""
     pairs = pairs_touching(made.centre, made.radius, made.width, made.dim == 2, margin)
-    known = {(a, b): k for k, (a, b) in enumerate(made.pairs.tolist())}
-    old = np.array([known.get((a, b), -1) for a, b in pairs.tolist()], dtype=int)
+    keys, known = (each @ [len(made.radius) + 5, 1] for each in (pairs, made.pairs))
     impulse = np.zeros((len(pairs), 3))
-    impulse[old >= 0] = made.impulse[old[old >= 0]]
+    _, new, old = np.intersect1d(keys, known, assume_unique=True, return_indices=True)
+    impulse[new] = made.impulse[old]
     return replace(made, pairs=pairs, impulse=impulse)
 
 
 def bed_problem(made: Bed, step: float, *, gaps: bool = False) -> FrictionProblem:
     """The problem of a step [s]: of the pairs that touch, or of all with what gaps they have.
 
-    A gap g leaves ``u_N >= -g / h``; overlaps count as closed.
+    A gap g leaves ``u_N >= -g / h``, and an overlap asks for a part of it back.
     """
     apart = bed_gaps(made)
     if not gaps:
@@ -179,7 +183,7 @@ def bed_problem(made: Bed, step: float, *, gaps: bool = False) -> FrictionProble
     problem = step_problem(body_space(jacobian, mass, inertia, made.dim), step, made.friction,
                            made.dim)  # fmt: skip
     if gaps:
-        problem.offset[:: made.dim] += np.maximum(apart, 0.0) / step
+        problem.offset[:: made.dim] += np.where(apart > 0, apart, OVERLAP_MENDED * apart) / step
     return problem
 
 
@@ -230,10 +234,8 @@ def contact_jacobian(
     block = np.zeros((contacts, 2, dim, size))
     for side, arm, sign in ((0, arm_first, 1.0), (1, arm_second, -1.0)):
         turn = np.cross(arm[:, None, :], frames)
-        if dim == 2:
-            parts = [frames[..., [0, 2]], -turn[..., [1]]]  # phi turns x to z, against y
-        else:
-            parts = [frames, turn]
+        # in the plane phi turns x to z, against y
+        parts = [frames[..., [0, 2]], -turn[..., [1]]] if dim == 2 else [frames, turn]
         block[:, side] = sign * np.concatenate(parts, axis=2)
     kept = pairs.ravel() >= 0
     start = np.concatenate([[0], np.cumsum(kept.reshape(-1, 2).sum(axis=1))])

@@ -47,6 +47,8 @@ ONE_THREAD = dict.fromkeys(
 )
 REPEATS = 4
 """Further runs where a run is short; their median is the cost."""
+FINEST = 1e-10
+"""What Clarabel is asked for at the most: beyond, it stops with worse answers on singular W."""
 OUTER = 50
 """Programs that Clarabel solves for one answer, at most."""
 
@@ -193,7 +195,7 @@ def clarabel(
 
     Stops at the ``tolerance`` of the residual, after ``outer`` programs, after five that do not
     better the best answer, or out of time.  Each program is solved to a hundredth of the tolerance,
-    1e-8 at the loosest.  Raises `LibraryMissing` without Clarabel.
+    between `FINEST` and 1e-8, W and q scaled to order one.  Raises `LibraryMissing` without Clarabel.
     """
     watch = Stopwatch()
     shape = (problem.contacts, problem.dim)
@@ -201,7 +203,7 @@ def clarabel(
     frozen = np.zeros(problem.contacts)
     best, least, since = np.zeros(len(problem.offset)), np.inf, 0
     while watch.calls < outer and watch.seconds < budget_s and since < 5:
-        force = program(frozen, min(1e-8, 0.01 * tolerance), watch)
+        force = program(frozen, float(np.clip(0.01 * tolerance, FINEST, 1e-8)), watch)
         error = problem.residual(force) if np.isfinite(force).all() else np.inf
         since = 0 if error < 0.9 * least else since + 1
         if error < least:
@@ -240,7 +242,7 @@ Program = Callable[[Floats, float, Stopwatch], Floats]
 def _program_contacts(problem: FrictionProblem) -> Program:
     """``min r.W r/2 + (q + frozen n).r`` over r in K; W by its symmetric part."""
     library = _library("clarabel")
-    w = problem.delassus
+    w = problem.delassus * problem.rho
     upper = sp.csc_matrix(sp.triu((w + w.T) / 2, format="csc"))
     cones: list[Any] = []
     scale = np.ones((problem.contacts, problem.dim))
@@ -255,10 +257,11 @@ def _program_contacts(problem: FrictionProblem) -> Program:
     def solve(frozen: Floats, tolerance: float, watch: Stopwatch) -> Floats:
         linear = problem.offset.copy()
         linear[:: problem.dim] += frozen
+        size = float(np.linalg.norm(linear)) or 1.0
         found = _clarabel_solve(
-            library, upper, linear, rows, np.zeros(len(linear)), cones, tolerance, watch
+            library, upper, linear / size, rows, np.zeros(len(linear)), cones, tolerance, watch
         )
-        return np.asarray(found.x)
+        return np.asarray(found.x) * size * problem.rho
 
     return solve
 
@@ -272,6 +275,7 @@ def _program_bodies(problem: FrictionProblem) -> Program:
     scale[:, 1:] = problem.friction[:, None]
     factor = inverse_mass_factor(bodies.inverse_mass, bodies.body_size)
     rows = sp.csc_matrix(-(sp.diags_array(scale.ravel()) @ bodies.jacobian @ factor))
+    rows *= np.sqrt(problem.rho)
     identity = sp.csc_matrix(sp.eye_array(rows.shape[1]))
     cones = [
         library.SecondOrderConeT(problem.dim) if mu > 0 else library.NonnegativeConeT(problem.dim)
@@ -281,11 +285,12 @@ def _program_bodies(problem: FrictionProblem) -> Program:
     def solve(frozen: Floats, tolerance: float, watch: Stopwatch) -> Floats:
         offset = problem.offset.copy()
         offset[:: problem.dim] += frozen
+        size = float(np.linalg.norm(offset)) or 1.0
         found = _clarabel_solve(
-            library, identity, np.zeros(rows.shape[1]), rows, scale.ravel() * offset, cones,
+            library, identity, np.zeros(rows.shape[1]), rows, scale.ravel() * offset / size, cones,
             tolerance, watch,
         )  # fmt: skip
-        return np.asarray(found.z) * scale.ravel()
+        return np.asarray(found.z) * scale.ravel() * size * problem.rho
 
     return solve
 

@@ -23,7 +23,8 @@ import numpy as np
 
 GROWTH, WORTH = 10.0, 2.0
 """A run that stopped at its number of iterations is made again with up to ten times as many, if
-there is time for twice as many."""
+there is time for twice as many and the forces were not the same as before."""
+SAME = 1e-14
 
 
 def run(numerics: Any, problem: Any, job: dict[str, Any]) -> tuple[dict[str, Any], Any]:
@@ -61,7 +62,7 @@ def main(folder: Path) -> None:
     dim = int(arrays["dim"])
     problem = dim, matrix_of(arrays, dim), arrays["q"], arrays["mu"]
     for number, job in json.loads((folder / "jobs.json").read_text()):
-        budget = job["budget_s"]
+        budget, last = job["budget_s"], np.full(len(problem[2]), np.nan)
         while True:
             limit = time.process_time() + (1 + job["repeats"]) * budget
             resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, resource.RLIM_INFINITY))
@@ -73,8 +74,14 @@ def main(folder: Path) -> None:
             with (folder / "results.jsonl").open("a") as stream:
                 stream.write(json.dumps({"number": number} | result) + "\n")
             more = min(GROWTH, budget / max(result["cost_s"], 1e-6))
-            if result["info"] == 0 or result["iterations"] < result["allowed"] - 1 or more < WORTH:
+            short = result["info"] != 0 and result["iterations"] >= result["allowed"] - 1
+            if (
+                not short
+                or more < WORTH
+                or np.allclose(force, last, rtol=0, atol=SAME * max(abs(force)))
+            ):
                 break
+            last = force
             job = job | {"iterations": int(more * result["allowed"])}
 
 

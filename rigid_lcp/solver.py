@@ -1,0 +1,281 @@
+"""`solve_friction`: one call for friction problems, and the default that chooses and falls back.
+
+``auto`` takes the first point that is exact enough, and otherwise the best of all:
+
+    no forces        where nothing approaches
+    the start given  Newton from it, and from some sweeps of Gauss-Seidel on it
+    interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
+                     goes to Newton, and if that is not enough to Gauss-Seidel and Newton again
+    Gauss-Seidel     many sweeps, and Newton
+    islands          what is still not solved, each island apart, by all of this
+
+Every method alone can fail on real problems: Newton far from a solution, the interior point where
+its path folds back, Gauss-Seidel on tall piles.  Together they have not been seen to fail on a
+problem that has a solution, but there is no proof: read ``status`` and ``residual``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, get_args
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.body_factorisation import Factorisation, factorisation
+from rigid_lcp.errors import ProblemError, UsageError
+from rigid_lcp.friction_problem import (
+    BodySpace,
+    FrictionProblem,
+    FrictionSolution,
+    Status,
+    friction_problem,
+    friction_solution,
+)
+from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.interior_point import Path, interior_point
+from rigid_lcp.islands import islands, solve_islands
+from rigid_lcp.newton import newton
+
+Floats = NDArray[np.float64]
+Method = Literal["auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig"]
+
+HAND_OVER = 1e-7
+"""Residual at which Newton takes over from the interior point."""
+PATHS = (
+    (Path(rounding=0.01), 100),
+    (Path(rounding=1e-4, cautious=True), 100),
+    (Path(rounding=0.1), 300),
+    (Path(rounding=1e-8, cautious=True), 300),
+    (Path(convex=True), 300),
+)
+"""Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
+WARM_SWEEPS = 30
+LAST_SWEEPS = 2000
+PROOF_CONTACTS = 3000
+"""Up to so many contacts a linear programme looks for the proof that there is no solution."""
+
+
+def solve_friction(
+    W: ArrayLike | sp.sparray | sp.spmatrix | BodySpace,  # noqa: N803  (its name in the field)
+    q: ArrayLike,
+    mu: ArrayLike,
+    dim: int,
+    start: ArrayLike | None = None,
+    tolerance: float = 1e-12,
+    method: Method = "auto",
+) -> FrictionSolution:
+    """Forces r and velocities u with ``u = W r + q`` under unilateral contact and Coulomb friction.
+
+    ``W`` (nc * dim, nc * dim): dense, sparse, or its factors as a `BodySpace`; may be singular
+    and slightly non-symmetric.  ``q`` (nc * dim,), contact after contact: (n, t) or (n, t1, t2);
+    r in N and u in m/s^2, or in N s and m/s, with W to match.  ``mu`` (nc,) or one number [-].
+    ``start`` r (nc * dim,): forces of the step before.  ``tolerance``: on the scale-free residual
+    (`rigid_lcp.cones`); round-off ends near 1e-15 times the condition of W.
+
+    ``method``: ``auto`` (module docstring); ``interior-point`` and ``newton`` are polished by
+    Newton; ``pivoting`` and ``dantzig`` (2D) are in the modules of their names.
+
+    Never fails silently: see ``status`` and ``message`` of the `FrictionSolution`, which holds
+    the best point found.  Raises `ProblemError` for input that poses no problem, `UsageError` for
+    an unknown method or a tolerance that is not positive.  Forces, and sometimes velocities, are
+    not unique: compare residuals.
+    """
+    problem: FrictionProblem = friction_problem(W, q, mu, dim)
+    if method not in get_args(Method):
+        raise UsageError(
+            f"there is no method {method!r}", where="method",
+            remedy="one of " + ", ".join(get_args(Method)),
+        )  # fmt: skip
+    if not 0.0 < tolerance < np.inf:
+        raise UsageError(
+            f"the tolerance is {tolerance!r}", where="tolerance", remedy="give one above zero"
+        )
+    begin = None if start is None else _start(start, problem)
+    if problem.contacts == 0:
+        return friction_solution(problem, problem.offset.copy(), tolerance, method)
+    return _methods()[method](problem, begin, tolerance)
+
+
+def solve_auto(
+    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12
+) -> FrictionSolution:
+    """The default of `solve_friction` on a problem that is made already."""
+    trial = _attempts(problem, start, tolerance)
+    if trial.best.solved:
+        return trial.solution()
+    parts = islands(problem)
+    if len(parts) > 1:
+        trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
+    if not trial.best.solved and (
+        trial.best.status == "no solution" or no_forces_suffice(problem)
+    ):
+        return trial.solution(
+            "no solution",
+            "no forces within the cones of friction keep all contacts from approaching (proved by"
+            " a linear programme)\n  -> use impulses: a velocity-level time step, or look for"
+            " contacts that bear on no mass",
+        )
+    return trial.solution()
+
+
+class _Trial:
+    """The best point so far, who found it, and the work of all."""
+
+    def __init__(self, problem: FrictionProblem, start: Floats | None, tolerance: float) -> None:
+        zero = np.zeros(len(problem.offset))
+        self.problem, self.tolerance, self.work = problem, tolerance, dict[str, float]()
+        self.best = friction_solution(problem, zero, tolerance, "no forces")
+        self.linear: Factorisation | None = None
+        if start is not None:
+            self.keep(friction_solution(problem, start, tolerance, "start"))
+
+    def keep(self, found: FrictionSolution, after: str = "") -> FrictionSolution:
+        """Count the work of a solution and keep it if it is the best; gives it back."""
+        for name, count in found.work.items():
+            key = name if found.method == "gauss-seidel" or name == "factorisations" else (
+                f"{found.method} {name}"
+            )  # fmt: skip
+            self.work[key] = self.work.get(key, 0.0) + count
+        if found.residual < self.best.residual or not np.isfinite(self.best.residual):
+            name = f"{after} + {found.method}" if after else found.method
+            status = "not converged" if found.status == "solved" else found.status
+            self.best = friction_solution(
+                self.problem, found.r, self.tolerance, name, status=status, message=found.message
+            )
+        return found
+
+    def polish(self, found: FrictionSolution, after: str = "") -> bool:
+        """Newton from a point of another method; whether the tolerance is reached."""
+        if self.best.solved or not np.isfinite(found.residual):
+            return self.best.solved
+        self.linear = self.linear or factorisation(self.problem)
+        self.keep(
+            newton(self.problem, found.r, self.tolerance, linear=self.linear),
+            after or found.method,
+        )
+        return self.best.solved
+
+    def sweep(self, start: Floats | None, sweeps: int, after: str = "") -> bool:
+        """Gauss-Seidel and Newton; whether the tolerance is reached."""
+        found = self.keep(gauss_seidel(self.problem, start, self.tolerance, sweeps), after)
+        name = f"{after} + gauss-seidel" if after else "gauss-seidel"
+        return self.best.solved or self.polish(found, name)
+
+    def solution(self, status: Status | None = None, message: str = "") -> FrictionSolution:
+        """The best point, with the work of all attempts."""
+        best = self.best
+        if not best.solved and not message:
+            message = (
+                f"no method reached {self.tolerance:.2g}; the best residual is {best.residual:.2g}"
+                f" by {best.method}\n  -> look at W (a mass of zero? an entry of the wrong sign?),"
+                " ask for less, or give forces near the solution as start"
+            )
+        return FrictionSolution(
+            best.r, best.u, best.residual, status or best.status, best.method, self.work,
+            "" if best.solved else message,
+        )  # fmt: skip
+
+
+def _attempts(problem: FrictionProblem, start: Floats | None, tolerance: float) -> _Trial:
+    trial = _Trial(problem, start, tolerance)
+    if trial.best.solved:
+        return trial
+    if start is not None and (
+        trial.polish(trial.best) or trial.sweep(start, WARM_SWEEPS, "start")
+    ):
+        return trial
+    for path, sweeps in PATHS:
+        trial.linear = trial.linear or factorisation(problem)
+        found = trial.keep(
+            interior_point(problem, None, max(HAND_OVER, tolerance), path, linear=trial.linear)
+        )
+        if trial.polish(found) or trial.sweep(found.r, sweeps, "interior-point"):
+            return trial
+    trial.sweep(None, LAST_SWEEPS)
+    return trial
+
+
+def _solve_island(
+    problem: FrictionProblem, start: Floats | None, tolerance: float
+) -> FrictionSolution:
+    return _attempts(problem, start, tolerance).solution()
+
+
+def _interior_point(
+    problem: FrictionProblem, start: Floats | None, tolerance: float
+) -> FrictionSolution:
+    trial = _Trial(problem, None, tolerance)
+    trial.linear = factorisation(problem)
+    found = interior_point(
+        problem, None, max(HAND_OVER, tolerance), PATHS[0][0], linear=trial.linear
+    )
+    trial.keep(found)
+    trial.polish(found)
+    return trial.solution()
+
+
+def _methods() -> dict[str, Callable[..., FrictionSolution]]:
+    from rigid_lcp.dantzig import dantzig  # compiled when they are asked for
+    from rigid_lcp.pivoting import pivoting
+
+    return {
+        "auto": solve_auto,
+        "newton": newton,
+        "interior-point": _interior_point,
+        "gauss-seidel": gauss_seidel,
+        "pivoting": pivoting,
+        "dantzig": dantzig,
+    }
+
+
+def no_forces_suffice(problem: FrictionProblem) -> bool:
+    """Whether a linear programme proves that no r in K gives ``u_N >= 0`` at every contact.
+
+    In 3D the disc of friction is replaced by the square around it, so that a proof stays one.
+    """
+    from scipy.optimize import linprog
+
+    contacts, dim, mu = problem.contacts, problem.dim, problem.friction
+    if contacts > PROOF_CONTACTS:
+        return False
+    normal = np.arange(contacts) * dim
+    # |r_T| <= mu r_N in every tangential direction, as rows: +-r_T - mu r_N <= 0
+    rows, columns, values = [], [], []
+    for k in range(1, dim):
+        for sign in (1.0, -1.0):
+            row = contacts * len(rows) + np.arange(contacts)
+            rows.append(np.concatenate([row, row]))
+            columns.append(np.concatenate([normal + k, normal]))
+            values.append(np.concatenate([np.full(contacts, sign), -mu]))
+    cones = sp.csr_array(
+        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+        shape=(2 * (dim - 1) * contacts, contacts * dim),
+    )
+    scale = float(np.abs(problem.offset).max()) or 1.0
+    approach = sp.csr_array(problem.delassus[normal] * (-problem.rho))
+    lower = np.full(contacts * dim, -np.inf)
+    lower[normal] = 0.0
+    found = linprog(
+        np.zeros(contacts * dim),
+        A_ub=sp.vstack([approach, cones]),
+        b_ub=np.concatenate([problem.offset[normal] / scale, np.zeros(cones.shape[0])]),
+        bounds=np.column_stack([lower, np.full(contacts * dim, np.inf)]),
+        method="highs",
+    )
+    return bool(found.status == 2)
+
+
+def _start(start: ArrayLike, problem: FrictionProblem) -> Floats:
+    force = np.asarray(start, dtype=float).ravel()
+    if force.shape != problem.offset.shape:
+        raise ProblemError(
+            f"it has {len(force)} numbers and q has {len(problem.offset)}", where="start",
+            remedy="give the forces of all contacts, in the order of q",
+        )  # fmt: skip
+    if not np.isfinite(force).all():
+        raise ProblemError(
+            "some of its numbers are not finite", where="start", remedy="leave the start out"
+        )
+    return force

@@ -1,0 +1,120 @@
+"""The verb ``trackbed rigid``: runs, resumes, refuses; nothing is lost."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trackbed
+from rigid_lcp.run_folder import RunFolder, frame_read
+
+SCENE = """\
+title = "A block slides and stops"
+dimensions = 2
+
+[run]
+duration = 0.06
+step = 2e-3
+frames = 3
+
+[surface]
+friction = 0.5
+
+[[ground]]
+normal = [0, 1]
+
+[[body]]
+name = "block"
+box = [0.2, 0.1]
+density = 2000.0
+position = [0.0, 0.05]
+velocity = [0.1, 0.0]
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "slide.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    return path
+
+
+def test_a_run_ends_where_friction_stops_the_block(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """``s = v^2 / (2 mu g)``; a step of h stops it within ``v h`` of that."""
+    assert trackbed.main(["rigid", str(scene), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    stopped = 0.1**2 / (2 * 0.5 * 9.81)
+    assert answer["positions"]["block"][0] == pytest.approx(stopped, abs=0.1 * 2e-3)
+    assert answer["overlap_largest"] < 1e-12
+    assert answer["residual_worst"] < 1e-9
+    folder = scene.with_name("slide-run")
+    for name in ("report.html", "history.csv", "movie.gif", "result.json", "picture-000003.png"):
+        assert (folder / name).stat().st_size > 0
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    assert "A block slides and stops" in text
+    assert "restitution: every impact is inelastic" in text
+    assert "http" not in text.replace("http-equiv", "")
+
+
+def test_a_run_goes_on_from_its_last_sound_frame_to_the_same_end(scene: Path) -> None:
+    assert trackbed.main(["rigid", str(scene), "--no-pictures"]) == 0
+    folder = RunFolder(scene.with_name("slide-run"))
+    last = frame_read(folder.frames()[-1])
+    (folder.path / "result.json").unlink()
+    (folder.path / "frame_000003.npz").unlink()
+    (folder.path / "frame_000002.npz").write_bytes(b"PK cut short")
+    assert trackbed.main(["rigid", str(scene), "--no-pictures"]) == 2
+    assert trackbed.main(["rigid", str(scene), "--no-pictures", "--resume"]) == 0
+    again = frame_read(folder.frames()[-1])
+    np.testing.assert_array_equal(again["motion"].position, last["motion"].position)
+    np.testing.assert_array_equal(again["motion"].rates, last["motion"].rates)
+
+
+def test_a_folder_is_never_taken_from_others(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = scene.with_name("slide-run")
+    folder.mkdir()
+    (folder / "thesis.tex").write_text("mine", encoding="utf-8")
+    assert trackbed.main(["rigid", str(scene), "--force"]) == 2
+    assert "thesis.tex" in capsys.readouterr().err
+    assert (folder / "thesis.tex").read_text(encoding="utf-8") == "mine"
+
+
+def test_another_scene_needs_force(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = ["rigid", str(scene), "--no-pictures"]
+    assert trackbed.main(run) == 0
+    assert trackbed.main([*run, "--set", "run.step=1e-3"]) == 2
+    assert "another scene" in capsys.readouterr().err
+    assert trackbed.main([*run, "--set", "run.step=1e-3", "--force"]) == 0
+
+
+def test_a_dry_run_writes_nothing(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert trackbed.main(["rigid", str(scene), "--dry-run", "--json"]) == 0
+    outlook = json.loads(capsys.readouterr().out)
+    assert (outlook["bodies"], outlook["steps"]) == (1, 30)
+    assert not scene.with_name("slide-run").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    [("density = 2000.0", 3), ("position = [0.0, 0.02]", 6), ("step = -1", 3)],
+)
+def test_bad_scenes_have_their_exit_codes(scene: Path, change: str, code: int) -> None:
+    key = change.partition(" ")[0]
+    kept = [line for line in SCENE.splitlines() if not line.startswith(f"{key} =")]
+    if key != "density":
+        table = "[run]" if key == "step" else "[[body]]"
+        kept.insert(kept.index(table) + 1, change)
+    scene.write_text("\n".join(kept), encoding="utf-8")
+    assert trackbed.main(["rigid", str(scene)]) == code
+    assert not scene.with_name("slide-run").exists()
+
+
+def test_resume_and_force_exclude_each_other(scene: Path) -> None:
+    assert trackbed.main(["rigid", str(scene), "--resume", "--force"]) == 2

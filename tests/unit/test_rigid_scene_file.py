@@ -1,0 +1,181 @@
+"""Scene files of rigid bodies: what they become, and what is said of bad ones."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from rigid_lcp.errors import RigidError, SceneError, ShapeError, UsageError
+from rigid_lcp.pouring import stone_2d
+from rigid_lcp.scene_file import force_at, key_line, loads_of, scene_build, scene_read
+from rigid_lcp.scene_types import Load
+
+PILE = Path(__file__).parents[2] / "scenes" / "pile.toml"
+SMALL = """\
+dimensions = 2
+
+[run]
+duration = 0.01
+
+[[ground]]
+normal = [0, 1]
+
+[[body]]
+name = "block"
+box = [0.2, 0.1]
+density = 2000.0
+position = [0.0, 0.05]
+"""
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_block_on_the_ground_has_the_mass_of_its_area(tmp_path: Path) -> None:
+    scene = scene_build(scene_read(written(tmp_path, SMALL)))
+    block = scene.bodies[1]
+    assert block.mass == pytest.approx(2000 * 0.2 * 0.1)
+    assert block.inertia == pytest.approx(block.mass * (0.2**2 + 0.1**2) / 12)
+    assert block.friction == 0.0
+
+
+def test_surface_serves_bodies_without_values_of_their_own(tmp_path: Path) -> None:
+    text = SMALL + "friction = 0.2\n\n[surface]\nfriction = 0.7\nrestitution = 0.1\n"
+    scene = scene_build(scene_read(written(tmp_path, text)))
+    assert [body.friction for body in scene.bodies] == [0.7, 0.2]
+    assert [body.restitution for body in scene.bodies] == [0.1, 0.1]
+
+
+def test_overrides_reach_tables_and_entries(tmp_path: Path) -> None:
+    path = written(tmp_path, SMALL)
+    file = scene_read(path, ["run.step=1e-4", "body.0.density=1000", "title=a word"])
+    assert file.tables.run.step == 1e-4
+    assert file.tables.body[0].density == 1000
+    assert file.tables.title == "a word"
+
+
+def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
+    text = SMALL.replace("duration = 0.01", "duration = -1\nstpe = 1").replace("2000.0", "0")
+    with pytest.raises(SceneError) as caught:
+        scene_read(written(tmp_path, text))
+    message = str(caught.value)
+    assert "3 problems" in message
+    assert "scene.toml:4: run.duration" in message
+    assert "scene.toml:5: run.stpe" in message
+    assert "density" in message
+    assert caught.value.exit_code == 3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("box = [0.2, 0.1]", "", "give one of box, radius and vertices"),
+        ("density = 2000.0", "", "give a density, or fixed = true"),
+        ("position = [0.0, 0.05]", "position = [0.0, 0.05, 1.0]", "3 numbers in 2 dimensions"),
+        ('name = "block"', 'name = ""', "name"),
+        ("dimensions = 2", "dimensions = 4", "dimensions"),
+        ("[[body]]", "[body]", "two brackets"),
+        ("density = 2000.0", "density = nan", "finite"),
+        ("duration = 0.01", 'duration = "long"', "duration"),
+        ("density = 2000.0", "fixed = true", "no body can move"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
+    with pytest.raises(SceneError, match=r"(?s)" + said):
+        scene_read(written(tmp_path, SMALL.replace(old, new)))
+
+
+def test_a_polygon_that_is_not_convex_is_named_by_its_body(tmp_path: Path) -> None:
+    text = SMALL.replace("box = [0.2, 0.1]", "vertices = [[0,0],[1,0],[0.2,0.2],[0,1]]")
+    with pytest.raises(ShapeError, match="body block"):
+        scene_build(scene_read(written(tmp_path, text)))
+
+
+def test_a_load_on_nobody_is_refused(tmp_path: Path) -> None:
+    text = SMALL + '\n[[load]]\nbody = "train"\nforce = [0, -1]\n'
+    with pytest.raises(SceneError, match="no body train"):
+        scene_read(written(tmp_path, text))
+
+
+@pytest.mark.parametrize("override", ["run.step", "=3", "body.7.density=1"])
+def test_bad_overrides_are_usage_errors(tmp_path: Path, override: str) -> None:
+    with pytest.raises(UsageError):
+        scene_read(written(tmp_path, SMALL), [override])
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"[run\n", b"a = 1\n" * 3])
+def test_files_that_are_no_scenes(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_bytes(content)
+    with pytest.raises(RigidError, match=r"scene\.toml"):
+        scene_read(path)
+    with pytest.raises(UsageError):
+        scene_read(tmp_path / "none.toml")
+
+
+def test_damaged_scenes_give_sentences_only(tmp_path: Path) -> None:
+    """Cut, doubled and changed lines: a scene or one of our own errors, never a traceback."""
+    lines = PILE.read_text(encoding="utf-8").splitlines()
+    random = Random(3)
+    for _ in range(150):
+        damaged = lines.copy()
+        for _ in range(random.randint(1, 3)):
+            at = random.randrange(len(damaged))
+            kind = random.randrange(4)
+            if kind == 0:
+                del damaged[at]
+            elif kind == 1:
+                damaged.insert(at, damaged[random.randrange(len(damaged))])
+            elif kind == 2:
+                damaged[at] = damaged[at].replace("0", random.choice(["-1", "1e9", "x", "nan"]))
+            else:
+                damaged[at] = damaged[at][: random.randint(0, len(damaged[at]))]
+        path = written(tmp_path, "\n".join(damaged))
+        with suppress(RigidError):
+            scene_build(scene_read(path))
+
+
+def test_cyclic_load_runs_between_its_forces() -> None:
+    load = Load(body="a", force=[0, -8], least=[0, -2], frequency=5, begin=1.0, end=3.0)
+    np.testing.assert_allclose(force_at(load, 1.0), [0, -2])
+    np.testing.assert_allclose(force_at(load, 1.1), [0, -8])
+    np.testing.assert_allclose(force_at(load, 1.2), [0, -2], atol=1e-12)
+    np.testing.assert_array_equal(force_at(load, 0.999), [0, 0])
+    np.testing.assert_array_equal(force_at(load, 3.001), [0, 0])
+
+
+def test_a_load_acts_on_the_named_body_alone() -> None:
+    file = scene_read(PILE)
+    scene = scene_build(file)
+    loads = loads_of(file)
+    assert loads is not None
+    from rigid_lcp.scene import world_of
+
+    _, motion = world_of(scene)
+    forces = np.asarray(loads(1.1, motion))
+    loaded = np.flatnonzero(np.abs(forces).sum(axis=1))
+    assert [scene.bodies[n].name for n in loaded] == ["sleeper"]
+    np.testing.assert_allclose(forces[loaded[0]], [0, -8000, 0])
+
+
+def test_the_same_seed_gives_the_same_stones() -> None:
+    first, again = (stone_2d(np.random.default_rng(5), 0.05, 7) for _ in range(2))
+    np.testing.assert_array_equal(first.vertices, again.vertices)
+    assert len(first.vertices) == 7
+    assert first.reach < 0.05
+
+
+def test_lines_of_keys() -> None:
+    text = "a = 1\n[run]\nb = 2\n[[body]]\nc = 1\n[[body]]\n\nc = 2\n"
+    assert key_line(text, ["a"]) == 1
+    assert key_line(text, ["run", "b"]) == 3
+    assert key_line(text, ["body", "1", "c"]) == 8
+    assert key_line(text, ["body", "1", "d"]) == 6
+    assert key_line(text, ["none"]) == 0

@@ -1,0 +1,89 @@
+"""Projection on Coulomb's cones and the natural map, against their definitions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rigid_lcp.cones import dual_velocity, natural_residual, project_cones
+
+ROUND_OFF = 1e-12
+"""Ten times 2e-16 (mu + 1) (push + rho speed) / push at the ends of the ranges below."""
+NUMBER = st.floats(-1e3, 1e3, allow_nan=False).map(lambda x: 0.0 if abs(x) < 1e-9 else x)
+FRICTION = st.one_of(st.sampled_from([0.0, 1.0, 1e6]), st.floats(0, 2))
+
+
+@settings(deadline=None)
+@given(NUMBER, NUMBER, NUMBER, FRICTION)
+def test_projection_is_the_nearest_point(n: float, s: float, t: float, mu: float) -> None:
+    """Moreau: ``x = P_K(x) + P_K°(x)``, the two orthogonal, the second in the polar cone -K*."""
+    point = np.array([[n, s, t]])
+    nearest = project_cones(point, np.array([mu]))[0]
+    rest = point[0] - nearest
+    size = 1e-9 * (1 + np.abs(point).max()) * (1 + mu)
+    assert nearest[0] >= 0
+    assert np.hypot(*nearest[1:]) <= mu * nearest[0] + size
+    assert abs(nearest @ rest) <= size * (1 + np.abs(point).max())
+    assert -rest[0] >= mu * np.hypot(*rest[1:]) - size
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_a_contact_that_parts_needs_no_force(mu: float) -> None:
+    """``u_N >= 0``, r = 0: the natural map is zero, with mu = 0 as well."""
+    force, velocity = np.zeros((1, 2)), np.array([[0.09, 0.0]])
+    assert natural_residual(force, velocity, np.array([mu]), 1.0) == 0.0
+
+
+@settings(deadline=None)
+@given(st.floats(0.01, 10), st.floats(0, 2), st.floats(0.01, 5), st.floats(0, 6.28), NUMBER)
+def test_coulombs_three_cases_have_no_residual(
+    push: float, mu: float, speed: float, angle: float, share: float
+) -> None:
+    """Open, stick and slide as eq. 27 has them are zeros of the map; the wrong sign is none."""
+    along = np.array([np.cos(angle), np.sin(angle)])
+    share = abs(share) / 1e3
+
+    def residual(force: list[float], velocity: list[float]) -> float:
+        return natural_residual(np.array([force]), np.array([velocity]), np.array([mu]), 1.0)
+
+    assert residual([0, 0, 0], [speed, *(speed * along)]) == 0.0
+    assert residual([push, *(share * mu * push * along)], [0, 0, 0]) <= ROUND_OFF
+    assert residual([push, *(-mu * push * along)], [0, *(speed * along)]) <= ROUND_OFF
+    if mu > 0.01:
+        assert residual([push, *(mu * push * along)], [0, *(speed * along)]) > 1e-4
+
+
+@settings(deadline=None)
+@given(st.floats(1e-6, 1e6), st.floats(1e-6, 1e6))
+def test_the_residual_has_no_units(mass: float, length: float) -> None:
+    """Scaling forces and velocities changes it by round-off only."""
+    rng = np.random.default_rng(1)
+    force, velocity = rng.normal(size=(2, 5, 3))
+    mu = rng.uniform(0, 1, 5)
+    once = natural_residual(force, velocity, mu, 0.7)
+    scaled = natural_residual(force * mass, velocity * length, mu, 0.7 * mass / length)
+    assert scaled == pytest.approx(once, rel=1e-12)
+
+
+def twin(points: NDArray[np.float64], mu: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The projection in plain NumPy."""
+    n, t = points[:, 0], np.linalg.norm(points[:, 1:], axis=1)
+    nearest = np.maximum((n + mu * t) / (1 + mu**2), 0)
+    inside = (t <= mu * n) & (n >= 0)
+    normal = np.where(inside, n, nearest)
+    allowed = np.where(inside, t, mu * nearest)
+    direction = points[:, 1:] / np.where(t > 0, t, 1)[:, None]
+    return np.column_stack([normal, allowed[:, None] * direction])
+
+
+def test_kernels_are_their_numpy_twins() -> None:
+    rng = np.random.default_rng(2)
+    for dim in (2, 3):
+        points, mu = rng.normal(size=(500, dim)), rng.uniform(0, 1, 500)
+        np.testing.assert_allclose(project_cones(points, mu), twin(points, mu), atol=1e-15)
+        shifted = points.copy()
+        shifted[:, 0] += mu * np.linalg.norm(points[:, 1:], axis=1)
+        np.testing.assert_allclose(dual_velocity(points, mu), shifted, atol=1e-15)

@@ -1,0 +1,217 @@
+"""Velocity-level time stepping: ballistics, rolling, sliding, impacts, energy, order, units."""
+
+from __future__ import annotations
+
+from math import radians, sqrt, tan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rigid_lcp.contacts import Contacts, contact_frames
+from rigid_lcp.scene import Scene
+from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
+from rigid_lcp.simulation import Simulation
+from rigid_lcp.time_stepping import contact_shift
+from validation.rigid_scenes import (
+    G,
+    block_on_incline,
+    bouncing_disc,
+    bouncing_time,
+    disc_on_incline,
+    disc_on_incline_acceleration,
+    poured,
+    stack,
+)
+
+
+def test_free_flight_is_exact() -> None:
+    """The midpoint rule is exact for constant gravity: a parabola, at a constant spin."""
+    scene = Scene(2)
+    scene.add(Polygon.rectangle(1, 2), density=3.0, velocity=(3, 4), spin=2.0)
+    run = Simulation(scene, step=0.05)
+    energy = run.energy
+    run.advance(1.0)
+    np.testing.assert_allclose(run.positions[0], [3, 4 - G / 2], rtol=1e-13)
+    np.testing.assert_allclose(run.angles, 2.0, rtol=1e-13)
+    assert run.energy == pytest.approx(energy, rel=1e-14)
+    assert run.time == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("mu", [0.02, 0.5])
+def test_disc_rolls_or_slides(mu: float) -> None:
+    """``2/3 g sin`` or ``g (sin - mu cos)``: constant accelerations, so exact at any step."""
+    slope = radians(20)
+    run = disc_on_incline(slope, mu, step=2e-3)
+    run.advance(0.1)
+    expected = disc_on_incline_acceleration(slope, mu)
+    assert run.velocities[0, 0] == pytest.approx(expected * 0.1, rel=1e-11)
+    assert run.positions[0, 0] == pytest.approx(expected * 0.005, rel=1e-11)
+    assert run.contacts.status[0] == ("stick" if mu > tan(slope) / 3 else "slide")
+    assert run.contacts.normal_force.sum() == pytest.approx(
+        run.world.mass[0] * G * np.cos(slope), rel=1e-11
+    )
+
+
+def test_block_slides_to_rest() -> None:
+    """It stops after ``v^2 / (2 mu g)``, to first order: within half a step's way at the end."""
+    run = block_on_incline(0.0, 0.5, step=1e-3)
+    run.motion.velocity[0, 0] = 1.0
+    run.advance(0.3)
+    assert run.positions[0, 0] == pytest.approx(1 / G, abs=0.5 * (0.5 * G * 1e-3) * 1e-3)
+    assert np.abs(run.velocities).max() < 1e-12
+    assert (run.contacts.status == "stick").all()
+
+
+def test_zeno_bounce() -> None:
+    """It has stopped by ``sqrt(2h/g) (1+e)/(1-e)``, up to the steps that hold several bounces."""
+    errors = []
+    for step in (4e-3, 5e-4):
+        run = bouncing_disc(0.1, 0.5, step=step)
+        seconds = bouncing_time(0.1, 0.5)
+        while np.abs(run.velocities[0, 1]) > 1e-9 or run.positions[0, 1] > 0.1 + 1e-9:
+            run.advance(step)
+            assert run.time < 2 * seconds
+        errors.append(abs(run.time - seconds))
+    assert errors[0] < 0.1 * seconds
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_energy_of_many_bounces() -> None:
+    """Restitution 1: a bounce keeps the energy to round-off, whatever the step."""
+    run = bouncing_disc(0.02, 1.0, step=3e-3)
+    energy, bounces, falling = run.energy, 0, True
+    for _ in range(4500):
+        run.advance(3e-3)
+        bounces += falling and run.velocities[0, 1] > 0
+        falling = run.velocities[0, 1] <= 0
+    assert bounces > 100
+    assert abs(run.energy / energy - 1) < 1e-13 * bounces
+
+
+def test_energy_never_grows_without_friction() -> None:
+    """Boxes and discs that fall into a heap: no step adds energy but by overlaps removed."""
+    scene = Scene(2)
+    for k in range(8):
+        shape = Disc(0.3) if k % 2 else Polygon.regular(5, 0.35)
+        scene.add(
+            shape, density=10.0 ** (k % 3), position=(0.2 * (k % 3), 0.5 + 0.8 * k), angle=0.3 * k,
+            restitution=0.4,
+        )  # fmt: skip
+    for normal, offset in (((0, 1), 0), ((1, 0), -1.5), ((-1, 0), -1.5)):
+        scene.add(HalfSpace(normal, offset))
+    run = Simulation(scene, step=2e-3)
+    energy = [run.energy]
+    for _ in range(700):
+        run.advance(2e-3)
+        energy.append(run.energy)
+    weight = run.world.mass[:8].sum() * G
+    # An overlap of a turning corner is (h w)^2 R / 8 ~ 1e-5 m: its removal lifts bodies by that.
+    assert np.diff(energy).max() < weight * 1e-5
+    assert energy[-1] < 0.6 * energy[0]
+    assert run.overlap < 1e-5
+
+
+@given(st.floats(0, 1), st.floats(0, 1e-3), st.floats(-2, 2), st.floats(-2, 2))
+def test_normal_work_is_never_positive(e: float, start: float, before: float, free: float) -> None:
+    """Where an impulse acts, ``u_N+ = -shift`` and ``(u_N- + u_N+)/2 <= 0``.
+
+    ``start >= 0``: gap at the start of the step, ``start + h/2 u_N-`` at its midpoint.
+    """
+    h, one, number = 1e-3, np.ones(1), np.zeros(1, np.int64)
+    contacts = Contacts(
+        number, number, np.zeros((1, 2)), np.array([[0.0, 1.0]]), one * (start + h / 2 * before),
+        number, 0 * one, np.inf * one, 0 * one, e * one,
+    )  # fmt: skip
+    shift = contact_shift(contacts, before * one, free * one, 0.0, h)[0]
+    assert before - shift <= 1e-12
+
+
+def test_convergence_to_the_smooth_solution() -> None:
+    """A needle falls over on a frictionless floor: second order while the contact lasts."""
+    ends = []
+    for step in (8e-3, 4e-3, 2e-3, 1e-3):
+        scene = Scene(2)
+        scene.add(
+            Polygon([(-1, 0), (0, -0.01), (1, 0), (0, 0.01)]), density=1.0,
+            position=(0, np.sin(1.0)), angle=1.0,
+        )  # fmt: skip
+        scene.add(HalfSpace((0, 1)))
+        run = Simulation(scene, step=step)
+        run.advance(0.32)
+        ends.append(run.angles[0])
+    change = np.abs(np.diff(ends))
+    order = np.log2(change[:-1] / change[1:])
+    assert (order > 1.7).all()
+
+
+def test_units_do_not_matter() -> None:
+    """Metres and kilograms or millimetres and grams: the same motion, to the solver's residual."""
+    ends = []
+    for length, density in ((1.0, 2000.0), (1e3, 2000.0 * 1e3 / 1e6)):
+        scene = Scene(2, (0, -9.81 * length))
+        for k in range(3):
+            scene.add(
+                Polygon.regular(5, 0.5 * length), density=density, friction=0.4,
+                position=(0.1 * length * k, length * (0.6 + 1.1 * k)), angle=0.2 * k,
+            )  # fmt: skip
+        scene.add(HalfSpace((0, 1)))
+        run = Simulation(scene)
+        run.advance(0.3)
+        ends.append((run.positions / length, run.angles))
+    np.testing.assert_allclose(ends[0][0], ends[1][0], atol=1e-9)
+    np.testing.assert_allclose(ends[0][1], ends[1][1], atol=1e-9)
+
+
+def test_slope_of_the_frame_does_not_matter() -> None:
+    """A half-space tilted under vertical gravity, or gravity tilted over a level one."""
+    slope, mu = radians(25), 0.3
+    level = block_on_incline(slope, mu)
+    level.advance(0.1)
+    normal = np.array([np.sin(slope), np.cos(slope)])
+    scene = Scene(2)
+    scene.add(
+        Polygon.rectangle(1, 1), density=2700.0, position=0.5 * normal, angle=-slope, friction=mu
+    )
+    scene.add(HalfSpace(normal))
+    tilted = Simulation(scene)
+    tilted.advance(0.1)
+    down = tilted.positions[0] @ np.array([np.cos(slope), -np.sin(slope)])
+    assert down == pytest.approx(level.positions[0, 0], rel=1e-10)
+
+
+def test_forces_are_in_balance() -> None:
+    """At rest the forces on every body sum to its weight (eq. 22), whatever their distribution."""
+    run = stack(5, 10.0)
+    run.advance(5e-3)
+    contacts, total = run.contacts, np.zeros((6, 2))
+    np.add.at(total, contacts.body_a, contacts.force)
+    np.add.at(total, contacts.body_b, -contacts.force)
+    weight = run.world.mass[:5] * G
+    np.testing.assert_allclose(total[:5, 1], weight, rtol=1e-9)
+    np.testing.assert_allclose(total[:5, 0], 0, atol=1e-9 * weight.max())
+    assert contact_frames(contacts.normal).shape == (10, 2, 2)
+
+
+def test_driven_body_carries_another_along() -> None:
+    """A box on a belt that starts with 1 m/s: it slides for ``v / (mu g)``, then sticks."""
+    scene = Scene(2)
+    box = scene.add(Polygon.rectangle(0.2, 0.2), density=1.0, position=(0, 0.1), friction=0.5)
+    scene.add(Polygon.rectangle(10, 1), fixed=True, position=(0, -0.5), velocity=(1, 0))
+    run = Simulation(scene)
+    run.advance(0.1)
+    assert run.velocities[box, 0] == pytest.approx(0.05 * G, rel=1e-9)
+    run.advance(0.2)
+    assert run.velocities[box, 0] == pytest.approx(1.0, rel=1e-9)
+    assert run.positions[box, 0] == pytest.approx(0.3 - 1 / G, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_poured_grains_come_to_rest(seed: int) -> None:
+    """A small heap loses its energy, and its overlaps stay below 1e-4 of a grain."""
+    run = poured(25, seed=seed, step=2e-3)
+    run.advance(0.8)
+    assert np.abs(run.velocities).max() < 0.05 * sqrt(G * 0.02)
+    assert run.overlap < 1e-4 * run.world.length
+    assert run.worst_residual < 1e-9

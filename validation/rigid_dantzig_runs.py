@@ -1,0 +1,92 @@
+"""Where the seed's modified Dantzig algorithm works: its success by friction, and a cycle of it.
+
+The same settled packing of discs with other friction and its contacts in random order, as the
+seed drives them and with reversal.  Rows for the record of `rigid_runs`.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from rigid_lcp.dantzig import Event, dantzig
+from rigid_lcp.friction_problem import FrictionProblem, friction_problem
+from validation.rigid_packings import packing, tower
+
+Row = dict[str, Any]
+FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.5, 0.8)
+ORDERS = 10
+GRAINS = 60
+SHOWN = 60
+"""Events of a cycling run that are kept, its last ones."""
+
+
+def warm() -> None:
+    """Compile, or load, what is timed later: each method in 2D and 3D, by bodies and by W."""
+    from rigid_lcp.solver import solve_friction
+
+    for dim in (2, 3):
+        small = tower(2, dim)
+        methods: tuple[Any, ...] = ("auto", "newton", "interior-point", "gauss-seidel")
+        methods += ("pivoting", "dantzig") if dim == 2 else ()
+        for method in methods:
+            for w in (small.bodies, small.delassus):
+                solve_friction(w, small.offset, small.friction, dim, method=method)
+
+
+def bed(friction: float) -> FrictionProblem:
+    """The packing, settled with friction 0.5, with other friction."""
+    made = packing(GRAINS, 2, seed=1)
+    problem: FrictionProblem = friction_problem(made.bodies, made.offset, friction, 2)
+    return problem
+
+
+def dantzig_rows(quick: bool) -> list[Row]:
+    """A row for every friction, order and drive; and one with the trace of a cycle."""
+    frictions = FRICTIONS[:4:3] if quick else FRICTIONS
+    orders = 2 if quick else ORDERS
+    dantzig(tower(2, 2))  # compiled before it is timed
+    rows = [
+        _row(bed(friction), friction, order, reversal)
+        for friction in frictions
+        for reversal in (False, True)
+        for order in range(orders)
+    ]
+    return [*rows, *_trace_rows(rows)]
+
+
+def _row(problem: FrictionProblem, friction: float, seed: int, reversal: bool) -> Row:
+    order = np.random.default_rng(seed).permutation(problem.contacts)
+    start = time.process_time()
+    found = dantzig(problem, order=order, reversal=reversal)
+    cost = time.process_time() - start
+    method = "dantzig, reversal" if reversal else "dantzig"
+    return {
+        "case": "rigid-dantzig", "method": method, "setting": {"friction": friction},
+        "contacts": problem.contacts, "seed": seed, "error": found.residual,
+        "error_kind": "natural residual", "cost_s": cost, "work": found.work.get("pivots"),
+        "work_unit": "pivots", "ok": found.solved, "why": "" if found.solved else found.status,
+    }  # fmt: skip
+
+
+def _trace_rows(rows: list[Row]) -> list[Row]:
+    """The last events of the first run that cycled."""
+    cycled = next((r for r in rows if r["why"] == "cycled" and r["method"] == "dantzig"), None)
+    if cycled is None:
+        return []
+    events: list[Event] = []
+    problem = bed(cycled["setting"]["friction"])
+    order = np.random.default_rng(cycled["seed"]).permutation(problem.contacts)
+    dantzig(problem, order=order, trace=events)
+    kept = [
+        [e.driven, e.force, e.contact, e.origin, e.target, e.step, e.travelled]
+        for e in events[-SHOWN:]
+    ]
+    same = {key: cycled[key] for key in ("method", "setting", "contacts", "seed")}
+    return [
+        {"case": "rigid-dantzig-trace", **same, "error": cycled["error"],
+         "error_kind": "natural residual", "cost_s": cycled["cost_s"], "work": len(events),
+         "work_unit": "pivots", "ok": True, "why": "", "events": kept}
+    ]  # fmt: skip

@@ -1,0 +1,257 @@
+"""The race of friction solvers: which runs are made, and their record.
+
+    python -m validation.rigid_runs                       all runs that the record has not yet
+    python -m validation.rigid_runs --methods rigid_lcp --problems stored --fresh     some again
+    python -m validation.rigid_runs --quick --out quick.jsonl     small generated problems only
+
+One JSON line a run in ``validation/results/rigid-solvers.jsonl``: problem, method, what it was
+asked for, its error and its cost.  Every answer is judged by the same residual (`rigid_lcp.cones`),
+with the tolerance asked for, other settings as they come, cold start, one thread.  A run that
+fails is a line that says how.  Costs are processor seconds, the median of five runs where one takes
+less than a tenth of the time that a run may take.  With the variable TRACKBED_DATA set, the stored
+problems are raced too (`rigid_problems`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adapters.provenance import provenance
+from rigid_lcp.errors import RigidError
+from rigid_lcp.friction_problem import FrictionProblem
+from validation import rigid_peers as peers
+from validation.rigid_dantzig_runs import dantzig_rows, warm
+from validation.rigid_peers import PeerRun
+from validation.rigid_problems import NamedProblem, all_problems
+
+Row = dict[str, Any]
+RECORD = Path(__file__).parent / "results" / "rigid-solvers.jsonl"
+TOLERANCES = (1e-4, 1e-8, 1e-12)
+"""What every method is asked for."""
+BUDGET_S = 10.0
+"""Processor seconds of a run, unless told otherwise."""
+LEMKE_MOST, DANTZIG_MOST, PIVOTING_MOST = 300, 500, 1000
+"""Contacts above which dense pivoting is not tried: its cost grows with the fourth power."""
+OURS = ("auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig")
+REPEATS, SHORT = 4, 0.1
+ORIGIN = ("commit", "command", "machine", "started")
+
+
+class OutOfTime(Exception):
+    """A run took more processor time than it may."""
+
+
+# --- methods ----------------------------------------------------------------------------------
+
+
+def methods(problem: FrictionProblem, quick: bool) -> dict[str, Callable[[float], list[PeerRun]]]:
+    """What is run on a problem, by name; each makes all its runs with a budget [s]."""
+    runs: dict[str, Callable[[float], list[PeerRun]]] = {}
+    for name in OURS:
+        if _fits(name, problem):
+            title = "rigid_lcp" if name == "auto" else f"rigid_lcp {name}"
+            runs[title] = _ours(problem, name)
+    frictionless = not problem.friction.any()
+    if not peers.library_missing("clarabel"):
+        runs["Clarabel"] = _each(problem, lambda t, s: peers.clarabel(problem, t, s))
+        runs["Clarabel + Newton"] = _each(
+            problem, lambda t, s: peers.clarabel_newton(problem, t, s)
+        )
+    if frictionless and not peers.library_missing("osqp"):
+        runs["OSQP polished"] = _each(problem, lambda t, s: peers.osqp(problem, t))
+    if not quick and not peers.siconos_missing():
+        for solver in peers.SICONOS[problem.dim]:
+            if solver != "2D_LEMKE" or problem.contacts <= LEMKE_MOST:
+                runs[f"Siconos {solver}"] = _siconos(problem, solver)
+    return runs
+
+
+def _fits(name: str, problem: FrictionProblem) -> bool:
+    most = {"dantzig": DANTZIG_MOST, "pivoting": PIVOTING_MOST}.get(name, 10**9)
+    return problem.contacts <= most and not (most < 10**9 and problem.dim == 3)
+
+
+def _ours(problem: FrictionProblem, name: str) -> Callable[[float], list[PeerRun]]:
+    from rigid_lcp.solver import solve_friction
+
+    method: Any = name
+
+    def solve(tolerance: float, _: float) -> PeerRun:
+        w = problem.bodies if problem.bodies is not None else problem.matrix
+        start = time.process_time()
+        found = solve_friction(
+            w, problem.offset, problem.friction, problem.dim, tolerance=tolerance, method=method
+        )
+        cost = time.process_time() - start
+        unit, count = max(found.work.items(), key=lambda each: each[1], default=("", 0.0))
+        why = "" if found.solved else f"{found.status}: {found.message.splitlines()[0]}"
+        return PeerRun({"tolerance": tolerance}, found.r, cost, (), count, unit, found.solved, why)
+
+    return _each(problem, solve)
+
+
+def _each(
+    problem: FrictionProblem, solve: Callable[[float, float], PeerRun]
+) -> Callable[[float], list[PeerRun]]:
+    """All tolerances, within the budget each, repeated where short."""
+
+    def runs(budget_s: float) -> list[PeerRun]:
+        return [_repeated(solve, tolerance, budget_s) for tolerance in TOLERANCES]
+
+    return runs
+
+
+def _repeated(
+    solve: Callable[[float, float], PeerRun], tolerance: float, budget_s: float
+) -> PeerRun:
+    setting = {"tolerance": tolerance}
+    try:
+        first = _limited(lambda: solve(tolerance, budget_s), 2 * budget_s)
+        costs = [first.cost_s or 0.0]
+        if costs[0] < SHORT * budget_s:
+            costs += [solve(tolerance, budget_s).cost_s or 0.0 for _ in range(REPEATS)]
+    except OutOfTime:
+        return PeerRun(setting, None, why="out of time")
+    except RigidError as error:
+        return PeerRun(setting, None, why=f"{type(error).__name__}: {error.what}")
+    except Exception as error:  # a failure is a result: it is recorded, and the race goes on
+        return PeerRun(setting, None, why=f"{type(error).__name__}: {error}"[:200])
+    return PeerRun(
+        setting, first.force, float(np.median(costs)), tuple(costs), first.work, first.work_unit,
+        first.claims, first.why,
+    )  # fmt: skip
+
+
+def _limited(job: Callable[[], PeerRun], seconds: float) -> PeerRun:
+    """Do a job; raises `OutOfTime` when it has used so many processor seconds."""
+
+    def stop(*_: Any) -> None:
+        raise OutOfTime
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        return job()
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def _siconos(problem: FrictionProblem, solver: str) -> Callable[[float], list[PeerRun]]:
+    return lambda budget_s: peers.siconos(problem, solver, TOLERANCES, budget_s)
+
+
+# --- rows -------------------------------------------------------------------------------------
+
+
+def row_of(named: NamedProblem, problem: FrictionProblem, method: str, run: PeerRun) -> Row:
+    """A line of the record.  ``ok``: the residual is the one that was asked for, or less."""
+    error = None
+    if run.force is not None and np.isfinite(run.force).all():
+        error = problem.residual(run.force)
+    ok = error is not None and error <= max(run.setting["tolerance"], named.bar)
+    why = run.why
+    if error is None and not why:
+        why = "its forces are not finite"
+    return {
+        "case": "rigid-solvers", "problem": named.name, "family": named.family,
+        "contacts": problem.contacts, "dim": problem.dim, "bar": named.bar, "method": method,
+        "setting": run.setting, "seed": named.seed, "error": error,
+        "error_kind": "natural residual", "cost_s": run.cost_s, "repeats_s": list(run.repeats_s),
+        "work": run.work, "work_unit": run.work_unit, "ok": ok, "claims": run.claims, "why": why,
+    }  # fmt: skip
+
+
+def rows_read(path: Path = RECORD) -> list[Row]:
+    """The rows of a record, none if there is no file."""
+    if not path.exists():
+        return []
+    return [json.loads(text) for text in path.read_text(encoding="utf-8").splitlines() if text]
+
+
+def rows_write(path: Path, rows: Sequence[Row]) -> None:
+    """Write a record, whole or not at all."""
+    temporary = path.with_name(path.name + ".partial")
+    temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+    temporary.replace(path)
+
+
+# --- the race ---------------------------------------------------------------------------------
+
+
+def race(
+    path: Path, quick: bool, *, only_problems: str = "", only_methods: str = "",
+    fresh: bool = False, budget_s: float = BUDGET_S, command: Sequence[str] = (),
+) -> list[Row]:  # fmt: skip
+    """Make the runs that ``path`` has not, all methods of a problem after another; all rows.
+
+    ``only_problems``: words, with commas, of which the name of the problem or of its family holds
+    one; ``only_methods``: how names of methods begin.  Both empty for all.
+    """
+    origin = {key: value for key, value in provenance(command).items() if key in ORIGIN}
+    rows = rows_read(path)
+    some_problems, some_methods = (
+        [word for word in words.split(",") if word] for words in (only_problems, only_methods)
+    )
+    warm()
+    for named in all_problems(quick):
+        title = f"{named.family} {named.name}"
+        if some_problems and not any(word in title for word in some_problems):
+            continue
+        problem = named.make()
+        for method, runs in methods(problem, quick).items():
+            if some_methods and not any(method.startswith(word) for word in some_methods):
+                continue
+            have = [r for r in rows if (r.get("problem"), r["method"]) == (named.name, method)]
+            if have and not fresh:
+                continue
+            made = [row_of(named, problem, method, run) | origin for run in runs(budget_s)]
+            rows = [row for row in rows if row not in have] + made
+            rows_write(path, rows)
+            best = min((r["error"] for r in made if r["error"] is not None), default=None)
+            print(f"{time.strftime('%H:%M:%S')} {named.name} {method}: {best}", flush=True)
+    have = [row for row in rows if row["case"].startswith("rigid-dantzig")]
+    if not some_problems and not some_methods and (fresh or not have):
+        rows = [row for row in rows if row not in have]
+        rows += [row | origin for row in dantzig_rows(quick)]
+        rows_write(path, rows)
+    return rows
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command line above."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="small generated problems, no Siconos")
+    parser.add_argument("--problems", default="", help="words in names of problems or families")
+    parser.add_argument("--methods", default="", help="how the names of methods begin")
+    parser.add_argument("--fresh", action="store_true", help="make recorded runs again")
+    parser.add_argument("--budget", type=float, default=BUDGET_S, help="seconds of a run")
+    parser.add_argument("--out", type=Path, default=RECORD, help="the record (JSON lines)")
+    asked = parser.parse_args(arguments)
+    if asked.quick and asked.out == RECORD:
+        parser.error("--quick needs an --out of its own")
+    for name in peers.ONE_THREAD:
+        if os.environ.get(name) != "1":
+            raise SystemExit(f"set {', '.join(peers.ONE_THREAD)} to 1: costs are of one thread")
+    words = sys.argv[1:] if arguments is None else arguments
+    command = ["python", "-m", "validation.rigid_runs", *map(str, words)]
+    race(
+        asked.out, asked.quick, only_problems=asked.problems, only_methods=asked.methods,
+        fresh=asked.fresh, budget_s=asked.budget, command=command,
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
