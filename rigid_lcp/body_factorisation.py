@@ -36,6 +36,10 @@ DENSE_SIZE = 150
 DENSE_SHARE = 0.3
 """Fuller matrices are factored dense: their sparse LU would be full anyway."""
 
+LEAST_PIVOT = 1e-8
+"""A diagonal entry so many times smaller than another of its column is still taken as pivot: the
+shifts and barriers keep it good enough, and other pivots double or triple the fill."""
+
 
 class SingularSystem(ArithmeticError):
     """The matrix of a step could not be factored; the caller shifts it, or ends."""
@@ -107,7 +111,7 @@ class SparseSystem:
         matrix = sp.csc_array((data, self.indices, self.indptr), self.shape)
         try:
             factors: SuperLU = splu(
-                matrix, permc_spec="NATURAL", diag_pivot_thresh=0.01,
+                matrix, permc_spec="NATURAL", diag_pivot_thresh=LEAST_PIVOT,
                 options={"SymmetricMode": True},
             )  # fmt: skip
         except RuntimeError as error:  # exactly singular

@@ -93,7 +93,7 @@ def contact_frames(normal: Floats) -> Floats:
 
 
 def contact_rows(old: Ints, new: Ints) -> tuple[Ints, Bools]:
-    """Where each key of ``new`` stands in ``old`` (row 0 where it does not), and whether it does."""
+    """Where each key of ``new`` stands in ``old`` (any row if it does not), and if it does."""
     if len(old) == 0:
         return np.zeros(len(new), dtype=np.int64), np.zeros(len(new), dtype=bool)
     order = np.argsort(old, kind="stable")

@@ -131,14 +131,14 @@ def dantzig(
     limit = 40 * problem.contacts + 100 if max_pivots is None else max_pivots
     ended, where = contacts_consider(
         state.geometry, state.reduced, state.b, state.f, state.a, sequence, reversal, limit,
-        state.codes, state.trace, state.count,
+        state.codes, state.trace, state.events,
     )  # fmt: skip
     if ended == DONE and perturbation > 0:
         exact = problem.offset[state.rows]
         ended = offset_drive(state, exact - state.b, 1.0, reversal, limit)
-    force = shift_remove(problem, state, tolerance, problem.contacts + 50) if ended == DONE else pivots_force(
-        problem, state
-    )  # fmt: skip
+    force = pivots_force(problem, state)
+    if ended == DONE:
+        force = shift_remove(problem, state, tolerance, problem.contacts + 50)
     if trace is not None:
         trace += trace_events(state)
     return pivots_solution(problem, state, force, tolerance, "dantzig", ended, where)
@@ -190,7 +190,7 @@ def trace_events(state: Pivots) -> list[Event]:
     """The events a drive has written down."""
     names: tuple[Literal["normal"], Literal["tangential"], Literal["offset"]]
     names = ("normal", "tangential", "offset")
-    count = min(int(state.count[0]), len(state.trace))
+    count = min(int(state.events[0]), len(state.trace))
     return [
         Event(
             int(row[0]), names[int(row[1])], int(row[2]), LIST_NAMES[int(row[3])],

@@ -88,7 +88,7 @@ def first_event(
                 if step < first:
                     first, who, event = step, c, SLIDES
                     to = SLIDING_UP if sign > 0.0 else SLIDING_DOWN
-        elif kind == SLIDING_UP or kind == SLIDING_DOWN:
+        elif slide_sign(kind) != 0.0:
             step = reach_zero(f[n], df[n], ahead)
             if step < first:
                 first, who, event, to = step, c, PARTS, BREAKING
@@ -131,7 +131,7 @@ def move_contact(geometry: Geometry, reduced: Reduced, contact: int, to: int) ->
     elif reduced.kind[contact] != STATIC:
         reduced.kind[contact] = to
         fine = reduced_enter(geometry, reduced, n)
-    if fine and (to == SLIDING_UP or to == SLIDING_DOWN) and t >= 0 and reduced.place[t] >= 0:
+    if fine and slide_sign(to) != 0.0 and t >= 0 and reduced.place[t] >= 0:
         reduced_couple(geometry, reduced, contact, slide_sign(to) * mu)
         fine = reduced_leave(reduced, t)
     reduced.kind[contact] = to

@@ -86,20 +86,24 @@ def bounding_boxes(
     return boxes
 
 
-@njit(cache=True)
 def near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
     """Pairs (i < j) whose boxes overlap and every half-space with every movable body, (m, 2).
 
     Boxes sorted by their lower ends along the axis in which the bodies spread most, and swept.
     """
     solid = np.flatnonzero(kind != HALF_SPACE)
-    sweep, spread = 0, -1.0
-    for axis in range(3):
-        deviation = np.std(boxes[solid, axis]) if len(solid) else 0.0
-        if deviation > spread:
-            sweep, spread = axis, deviation
-    order = solid[np.argsort(boxes[solid, sweep], kind="mergesort")]
-    others = np.array([(sweep + 1) % 3, (sweep + 2) % 3])
+    axis = int(np.argmax(boxes[solid, :3].std(axis=0))) if len(solid) else 0
+    order = solid[np.argsort(boxes[solid, axis], kind="stable")]
+    swept = swept_pairs(order, axis, boxes, movable)
+    walls, moving = np.flatnonzero(kind == HALF_SPACE), solid[movable[solid]]
+    on_walls = np.column_stack([np.tile(moving, len(walls)), np.repeat(walls, len(moving))])
+    pairs = np.vstack([swept, on_walls])
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+@njit(cache=True)
+def swept_pairs(order: Ints, sweep: int, boxes: Floats, movable: Bools) -> Ints:
+    """Pairs (i < j) of overlapping boxes, which are given in the order of their lower ends."""
     pairs = np.empty((0, 2), dtype=np.int64)
     for store in range(2):  # first count, then store
         count = 0
@@ -110,7 +114,7 @@ def near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
                 if boxes[j, sweep] > boxes[i, 3 + sweep]:
                     break
                 apart = not (movable[i] or movable[j])
-                for axis in others:
+                for axis in range(3):
                     if boxes[i, axis] > boxes[j, 3 + axis] or boxes[j, axis] > boxes[i, 3 + axis]:
                         apart = True
                 if apart:
@@ -118,16 +122,9 @@ def near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
                 if store:
                     pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
                 count += 1
-        for wall in np.flatnonzero(kind == HALF_SPACE):
-            for i in solid:
-                if movable[i]:
-                    if store:
-                        pairs[count, 0], pairs[count, 1] = i, wall
-                    count += 1
         if not store:
             pairs = np.empty((count, 2), dtype=np.int64)
-    size = len(kind)
-    return pairs[np.argsort(pairs[:, 0] * size + pairs[:, 1], kind="mergesort")]
+    return pairs
 
 
 @njit(cache=True)
@@ -161,7 +158,7 @@ def pair_contacts(
             else:
                 feature = sphere_on_solid(solids, other, x, radius, row)
             if row[6] <= margin:
-                bodies[c] = (sphere, other)
+                bodies[c, 0], bodies[c, 1] = sphere, other
                 key[c] = contact_key(sphere, other, 0, 0) + feature
                 c += 1
             continue
@@ -177,7 +174,8 @@ def pair_contacts(
                 first, second = first + MOST_EDGES, second + MOST_EDGES
             elif form != CORNER_FACE:  # the corner is body j's
                 a, b, sign, first, second = j, i, -1.0, second, first
-            bodies[c], key[c] = (a, b), contact_key(a, b, first, second)
+            bodies[c, 0], bodies[c, 1] = a, b
+            key[c] = contact_key(a, b, first, second)
             for axis in range(3):
                 numbers[c, axis] = found[k, 7 + axis]
                 numbers[c, 3 + axis] = sign * found[k, 4 + axis]

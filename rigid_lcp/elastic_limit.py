@@ -35,6 +35,7 @@ from rigid_lcp.micro_displacements import (
     coulomb_spring,
     free_motion,
     mass_free_jacobian,
+    start_displacement,
     stiffest_mode,
 )
 
@@ -45,20 +46,21 @@ LONGEST_STEP = 1e6
 """Longest h in units of the stiffest mode's time while bodies move: h times the acceleration
 enters xi, and with it round-off of ``LONGEST_STEP * 1e-16`` in the forces."""
 LONGEST_STEP_AT_REST = 1e10
+STEPS_MAX = 200
 
 
 def elastic_limit(
     problem: FrictionProblem,
     stiffness: ArrayLike = 1.0,
     *,
-    start: ArrayLike | None = None,
+    start: ElasticForces | ArrayLike | None = None,
     tolerance: float = 1e-12,
     iterations_max: int = 2000,
 ) -> ElasticForces:
     """Forces that springs at the contacts choose, in the limit of stiff springs.
 
     ``problem`` with bodies; ``stiffness`` [N/m], see `contact_stiffness` (ratios matter only);
-    ``start``: deformations xi (nc, dim) to begin with (default: none); ``tolerance``: on the
+    ``start``: an earlier answer, or displacements (ndof,) [m, rad]; ``tolerance``: on the
     scale-free residual and on the relative change of the forces in a last step (where bodies
     accelerate, the change may stall at 1e-11 by round-off and is then accepted).
     ``iterations_max`` counts Newton steps.  Never raises for want of convergence.
@@ -72,15 +74,18 @@ def elastic_limit(
     mode = stiffest_mode(jacobian, k) or 1.0
     network = ElasticNetwork(jacobian, free, k / mode, problem.friction)
     nil = np.zeros(shape)
-    deformation = nil if start is None else np.asarray(start, dtype=float).reshape(shape)
-
+    # starting deformations are those of displacements: others would be a self-stress for good
+    begun, _ = start_displacement(start, bodies, shape)
+    deformation = -mode * (bodies.jacobian @ begun).reshape(shape)
     displacement, force = np.zeros(jacobian.shape[1]), nil
-    residual, change, h = np.inf, np.inf, FIRST_STEP
+    residual, change, h, longest = np.inf, np.inf, FIRST_STEP, LONGEST_STEP
     allowed: Floats | None = None
     solved = shape[0] == 0
     if solved:
         residual = 0.0
-    while not solved and network.newton_steps < iterations_max and h > 1e-3:
+    for _ in range(STEPS_MAX):
+        if solved or network.newton_steps >= iterations_max or h <= 1e-3:
+            break
         move, converged = network.implicit_step(deformation, h, allowed)
         if not converged:
             h /= 30.0
@@ -93,9 +98,14 @@ def elastic_limit(
         residual = problem.residual(force.ravel())
         size = float(np.linalg.norm(force))
         change = float(np.linalg.norm(force - previous)) / size if size > 0 else 0.0
-        settled = change <= tolerance or (change < 1e-9 and change > 0.5 * earlier)
+        stalled = change < 1e-8 and change > 0.5 * earlier
+        settled = change <= tolerance or (stalled and change < 1e-11)
         solved = residual <= tolerance and settled
-        h = min(4.0 * h, _longest_step(network, move / h))
+        if stalled:
+            # what is left is round-off, which a shorter step makes smaller
+            longest /= 10.0
+        moving = float(np.linalg.norm(move)) / (h * network.load)
+        h = min(10.0 * h, LONGEST_STEP_AT_REST, longest / max(moving, 1e-300))
     spent = network.newton_steps
     message = "" if solved else (
         f"no equilibrium of elastic contacts was found in {spent} Newton steps (residual "
@@ -104,7 +114,7 @@ def elastic_limit(
         "in more ways than one"
     )  # fmt: skip
     return ElasticForces(
-        force.ravel(), root @ displacement / mode, nil, residual,
+        force.ravel(), begun + root @ displacement / mode, nil, residual,
         "solved" if solved else "not converged", spent, message,
     )  # fmt: skip
 
@@ -122,9 +132,3 @@ def minimum_norm_forces(problem: FrictionProblem, stiffness: ArrayLike = 1.0) ->
     free = free_motion(jacobian, problem.offset)
     least, *_ = np.linalg.lstsq(scaled.T, -free, rcond=1e-12)
     return np.asarray(weight * least)
-
-
-def _longest_step(network: ElasticNetwork, acceleration: Floats) -> float:
-    """Longest useful h: long where bodies rest, short enough where round-off would enter."""
-    moving = float(np.linalg.norm(acceleration)) / network.load
-    return min(LONGEST_STEP_AT_REST, LONGEST_STEP / max(moving, 1e-300))

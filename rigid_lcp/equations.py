@@ -50,9 +50,7 @@ def jacobian(contacts: Contacts, position: Floats, columns: Ints, movable: int) 
     swap = place[:, 0] > place[:, 1]  # columns in ascending order
     values[swap], place[swap] = values[swap][:, :, ::-1], place[swap][:, ::-1]
     there = np.broadcast_to((place >= 0)[:, None, :, None], values.shape)
-    column = np.broadcast_to(
-        place[:, None, :, None] * size + np.arange(size), values.shape
-    )
+    column = np.broadcast_to(place[:, None, :, None] * size + np.arange(size), values.shape)
     counts = there.sum(axis=(2, 3)).ravel()
     pointer = np.concatenate([[0], np.cumsum(counts)])
     shape = (nc * dim, movable * size)

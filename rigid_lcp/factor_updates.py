@@ -88,10 +88,11 @@ def inverse_border(inverse: Floats, size: int, column: Floats, row: Floats, corn
     left, right = np.zeros(size), np.zeros(size)
     filled = np.flatnonzero(column)
     for i in range(size):
-        for j in filled:
-            left[i] += inverse[i, j] * column[j]
-    for i in np.flatnonzero(row):
-        right += row[i] * inverse[i, :size]
+        for k in range(len(filled)):
+            left[i] += inverse[i, filled[k]] * column[filled[k]]
+    for i in range(size):
+        if row[i] != 0.0:
+            right += row[i] * inverse[i, :size]
     complement, terms = corner, abs(corner)
     for i in range(size):
         complement -= row[i] * left[i]
@@ -231,11 +232,12 @@ def reduced_refresh(geometry: Geometry, reduced: Reduced) -> bool:
 @njit(cache=True)
 def inverse_anew(matrix: Floats) -> Floats:
     """The inverse, or NaN where LAPACK meets an exact zero pivot."""
-    bad = np.full(matrix.shape, np.nan)
+    found = np.full(matrix.shape, np.nan)
     try:
-        return np.linalg.inv(matrix)
+        found[:] = np.linalg.inv(matrix)
     except Exception:
-        return bad
+        return found
+    return found
 
 
 @njit(cache=True)
@@ -249,8 +251,8 @@ def reduced_solve(reduced: Reduced, rate: Floats) -> Floats:
     filled = np.flatnonzero(right)
     if 8 * len(filled) < size:
         for i in range(size):
-            for j in filled:
-                found[i] += reduced.inverse[i, j] * right[j]
+            for k in range(len(filled)):
+                found[i] += reduced.inverse[i, filled[k]] * right[filled[k]]
     else:
         for i in range(size):
             found[i] = np.dot(reduced.inverse[i, :size], right)

@@ -53,19 +53,23 @@ class BodySpace:
         )
 
     @cached_property
+    def spread(self) -> sp.csr_array:
+        """``M^-1 J^T`` (ndof, nc * dim): what forces do to the bodies."""
+        return sp.csr_array(self.inverse_mass @ self.jacobian.T)
+
+    @cached_property
     def matrix(self) -> sp.csr_array:
         """W, (nc * dim, nc * dim)."""
-        return sp.csr_array(self.jacobian @ self.inverse_mass @ self.jacobian.T)
+        return sp.csr_array(self.jacobian @ self.spread)
 
     @cached_property
     def diagonal(self) -> Floats:
         """The diagonal of W, without W."""
-        half = self.jacobian @ self.inverse_mass
-        return np.asarray(half.multiply(self.jacobian).sum(axis=1)).ravel()
+        return np.asarray(self.spread.T.multiply(self.jacobian).sum(axis=1)).ravel()
 
     def product(self, force: Floats) -> Floats:
         """``W r``."""
-        return np.asarray(self.jacobian @ (self.inverse_mass @ (self.jacobian.T @ force)))
+        return np.asarray(self.jacobian @ (self.spread @ force))
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,7 @@ def principal_inertia(inertia: ArrayLike) -> PrincipalInertia:
 def world_inertia(inertia: Floats, quaternion: Floats) -> Floats:
     """``R I R^T``, (..., 3, 3), of body tensors (..., 3, 3) [kg m^2]."""
     turn = rotation_matrix(quaternion)
-    return turn @ np.asarray(inertia, dtype=float) @ np.swapaxes(turn, -1, -2)
+    return np.einsum("...ij,...jk,...lk->...il", turn, inertia, turn)
 
 
 def angular_momentum(inertia: Floats, quaternion: Floats, spin: Floats) -> Floats:
@@ -68,7 +68,7 @@ def gyroscopic_acceleration(inertia: Floats, quaternion: Floats, spin: Floats) -
     """``-I^-1 (w x I w)`` [rad/s^2], (..., 3): how the spin of a free body changes (eq. 17)."""
     placed = world_inertia(inertia, quaternion)
     torque = -np.cross(spin, np.einsum("...ij,...j->...i", placed, spin))
-    return np.linalg.solve(placed, torque[..., None])[..., 0]
+    return np.asarray(np.linalg.solve(placed, torque[..., None])[..., 0], dtype=float)
 
 
 def free_rotation(

@@ -16,8 +16,8 @@ after Nesterov and Todd (``H x = s``), is a system ``(C + W) dr = b`` (`rigid_lc
 Without the term |u_T| (``convex``) U is X, C is symmetric, and the problem is the convex one of
 Anitescu and Tasora (Comput. Optim. Appl. 47 (2010) 207): it can hardly fail, and its answer is
 right where nothing slides.  The term makes it Coulomb's law (De Saxce), non-convex, and the path
-may fold back; |s_T| is rounded to ``sqrt(s_T^2 + eps^2) - eps``, eps falling with sigma, and
-another ``rounding`` is another path.  Predictor and corrector after Mehrotra.
+may fold back; |s_T| is rounded to ``s_T^2 / sqrt(s_T^2 + eps^2)``, which is right to eps^2 where
+a contact slides; eps falls with sigma, and another ``rounding`` is another path.  Predictor and corrector after Mehrotra.
 
 A contact without friction is a half line: r_T stays zero.  For a problem that has no solution
 the steps become ever smaller, and the best point is given back.
@@ -49,12 +49,14 @@ from rigid_lcp.lorentz_cones import (
 
 Floats = NDArray[np.float64]
 
-ITERATIONS = 60
-WL=0; EXPO=3; SMIN=0.1; RETRY=0; STARTMODE=0
+ITERATIONS = 50
 BOUNDARY_SHARE = 0.99
 """Part of the way to the nearest cone's boundary that a step may go."""
 LEAST_CENTRING = 1e-6
 """The predictor never aims lower than so many times the present gap."""
+BACK_OFF_STEP, BACK_OFF_GAP = 0.05, 3.0
+"""A step shorter than this is replaced by one towards the middle, with a gap so many times as
+large and the lack left as it is."""
 SHORT_STEP, SHORT_STEPS = 0.03, 4
 """So many steps in a row shorter than this: the path has folded, or there is no solution."""
 
@@ -63,10 +65,10 @@ SHORT_STEP, SHORT_STEPS = 0.03, 4
 class Path:
     """Which path is followed to the answer."""
 
-    rounding: float = 0.01
+    rounding: float = 0.3
     """eps over ``sqrt(sigma / rho)``, the velocity at which a contact's forces turn over [-]."""
-    cautious: bool = False
-    """Centre fully, and correct in part, where the predictor is stopped short."""
+    compliance: float = 0.01
+    """The path begins at forces as large as those of springs, ``(W + compliance / rho) r = -q``."""
     convex: bool = False
     """Leave out the term |u_T|: the answer is Coulomb's only where nothing slides."""
 
@@ -88,8 +90,11 @@ def interior_point(
     """
     contacts, dim = problem.contacts, problem.dim
     linear = linear or factorisation(problem)
-    step = PathStep(problem, path)
     best, best_residual, done, short = np.zeros(contacts * dim), np.inf, 0, 0
+    try:
+        step = PathStep(problem, path, linear)
+    except SingularSystem:
+        return friction_solution(problem, best, tolerance, "interior-point", status="singular")
     while True:
         force = step.force()
         residual = problem.residual(force)
@@ -98,32 +103,34 @@ def interior_point(
         if not residual > tolerance or done == iterations or short == SHORT_STEPS:
             break
         try:
-            length = step.take(linear)
-        except (SingularSystem, FloatingPointError):
+            length = step.take()
+        except SingularSystem:
             break
         done, short = done + 1, short + 1 if length < SHORT_STEP else 0
     return friction_solution(
         problem, best, tolerance, "interior-point",
-        {"iterations": float(done), "factorisations": float(done)},
+        {"iterations": float(done), "factorisations": float(done + 1)},
     )  # fmt: skip
 
 
 class PathStep:
     """The point x, s (nc, dim) on its way, and how it goes one step."""
 
-    def __init__(self, problem: FrictionProblem, path: Path) -> None:
+    def __init__(self, problem: FrictionProblem, path: Path, linear: Factorisation) -> None:
         contacts, dim = problem.contacts, problem.dim
-        self.problem, self.path = problem, path
+        self.problem, self.path, self.linear = problem, path, linear
         self.slides = problem.friction > 0.0
         self.mu = np.where(self.slides, problem.friction, 1.0)
         self.unit = np.zeros((contacts, dim))
         self.unit[:, 0] = 1.0
         self.tangent = np.where(self.slides[:, None], 1.0, self.unit)  # r_T = 0 without friction
         speed = float(np.sqrt(np.mean(problem.offset**2))) or 1.0
-        self.x = self.unit * (problem.rho * speed)
+        # forces of the size that contacts would have as springs, soft enough to share the load
+        identity = np.broadcast_to(np.eye(dim), (contacts, dim, dim)).copy()
+        springs = linear.factor(identity * (path.compliance / problem.rho), identity)
+        size = float(np.sqrt(np.mean(springs(-problem.offset) ** 2))) or problem.rho * speed
+        self.x = self.unit * size
         self.s = self.unit * speed
-        if STARTMODE:
-            self.x = self.unit * (problem.rho * speed * self.mu[:, None]); self.s = self.unit * speed / self.mu[:, None]
         self.stretch = np.ones((contacts, dim))
         self.stretch[:, 0] = self.mu
 
@@ -131,14 +138,13 @@ class PathStep:
         """r of the point x."""
         return (self.x / self.stretch).ravel()
 
-    def take(self, linear: Factorisation) -> float:
+    def take(self) -> float:
         """One predictor-corrector step; returns its length.  Raises `SingularSystem`."""
         x, s, path, contacts = self.x, self.s, self.path, self.problem.contacts
         gap = float(np.sum(x * s)) / contacts
         eps = path.rounding * np.sqrt(gap / self.problem.rho)
-        share = 0.0 if path.convex else 1.0
         at = self.problem.velocity(self.force()).reshape(x.shape)
-        velocity, slope = coulomb_velocity(s, self.mu, eps, share)
+        velocity, slope = coulomb_velocity(s, self.mu, eps, path.convex)
         lack = (at - velocity) * self.tangent
         eta, point = cone_scaling(x, s)
         scaled = cone_scale(eta, point, x, False)
@@ -148,12 +154,12 @@ class PathStep:
         identity[:, each, each] = self.tangent
         blocks[~self.slides] *= self.unit[0, :, None] * self.unit[0]
         blocks[:, each, each] += 1.0 - self.tangent
-        solve = linear.factor(blocks, identity)
+        solve = self.linear.factor(blocks, identity)
 
-        def direction(target: Floats, wl=1.0) -> tuple[Floats, Floats]:
-            """dx, ds that bring ``x o s`` to the target and ``W r + q`` to u(s), linearised."""
+        def direction(target: Floats, share: float = 1.0) -> tuple[Floats, Floats]:
+            """dx, ds that bring ``x o s`` to the target and ``W r + q`` nearer to u(s)."""
             part = cone_scale(eta, point, cone_divide(scaled, target), False)
-            right = multiply_blocks(slope, part.ravel()) - wl * lack.ravel()
+            right = multiply_blocks(slope, part.ravel()) - share * lack.ravel()
             dx = solve(right * self.tangent.ravel()).reshape(x.shape) * self.stretch
             there = cone_scale(eta, point, cone_scale(eta, point, dx, False), False)
             return dx, (part - there) * self.tangent
@@ -162,17 +168,16 @@ class PathStep:
         dx, ds = direction(-square)
         length = min(1.0, cone_step(x, dx), cone_step(s, ds))
         ahead = float(np.sum((x + length * dx) * (s + length * ds))) / contacts
-        centring = max(LEAST_CENTRING, min(1.0, max(0.0, ahead / gap) ** EXPO))
-        if path.cautious and length < 0.1:
-            centring = 1.0
+        centring = max(LEAST_CENTRING, min(1.0, max(0.0, ahead / gap) ** 2))
         second = cone_product(
             cone_scale(eta, point, dx, False), cone_scale(eta, point, ds, True)
-        ) * (length if path.cautious else 1.0)
-        dx, ds = direction(centring * gap * self.unit - square - second, 1 - centring if WL else 1.0)
-        length = min(1.0, BOUNDARY_SHARE * min(cone_step(x, dx), cone_step(s, ds)))
-        if RETRY and length < SMIN:
-            dx, ds = direction(RETRY * gap * self.unit - square, 0.0 if RETRY >= 1 else 1 - RETRY)
-            length = min(1.0, BOUNDARY_SHARE * min(cone_step(x, dx), cone_step(s, ds)))
+        )
+        dx, ds = direction(centring * gap * self.unit - square - second)
+        length = BOUNDARY_SHARE * min(cone_step(x, dx), cone_step(s, ds))
+        if length < BACK_OFF_STEP:  # off the path: back to its middle, higher up
+            dx, ds = direction(BACK_OFF_GAP * gap * self.unit - square, 0.0)
+            length = BOUNDARY_SHARE * min(cone_step(x, dx), cone_step(s, ds))
+        length = min(1.0, length)
         if not np.isfinite(length) or not (np.isfinite(dx).all() and np.isfinite(ds).all()):
             raise SingularSystem
         self.x, self.s = x + length * dx, s + length * ds
@@ -180,12 +185,13 @@ class PathStep:
 
 
 @njit(cache=True)
-def coulomb_velocity(s: Floats, mu: Floats, eps: float, share: float) -> tuple[Floats, Floats]:
-    """u(s) = ``(mu (s_N - share s_T^2 / sqrt(s_T^2 + eps^2)), s_T)`` and U = du/ds.
+def coulomb_velocity(s: Floats, mu: Floats, eps: float, convex: bool) -> tuple[Floats, Floats]:
+    """u(s) = ``(mu (s_N - s_T^2 / sqrt(s_T^2 + eps^2)), s_T)`` and U = du/ds.
 
-    ``s`` (nc, dim), ``mu`` (nc,), ``eps`` a velocity; ``share`` 1 for Coulomb, 0 for convex.
+    ``s`` (nc, dim), ``mu`` (nc,), ``eps`` a velocity; ``convex`` leaves out the term in s_T.
     """
     nc, dim = s.shape
+    share = 0.0 if convex else 1.0
     velocity, slope = s.copy(), np.zeros((nc, dim, dim))
     for c in range(nc):
         squares = 0.0

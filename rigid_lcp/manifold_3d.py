@@ -47,7 +47,7 @@ def within_face(solids: Solids, body: int, face: int, x: Floats, slack: float) -
         p = solids.vertex[base + solids.loop[k]]
         q = solids.vertex[base + solids.loop[k + 1 if k + 1 < stop else start]]
         u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-        o0, o1, o2 = u1 * n[2] - u2 * n[1], u2 * n[0] - u0 * n[2], u0 * n[1] - u1 * n[0]
+        o0, o1, o2 = cross(u0, u1, u2, n[0], n[1], n[2])
         outside = o0 * (x[0] - p[0]) + o1 * (x[1] - p[1]) + o2 * (x[2] - p[2])
         if outside > slack * np.sqrt(o0 * o0 + o1 * o1 + o2 * o2):
             return False
@@ -162,56 +162,81 @@ def edge_of_face(solids: Solids, edge: int, start: int, stop: int) -> bool:
 
 
 @njit(cache=True)
+def farthest_from(found: Floats, count: int, x: float, y: float, z: float, tie: float) -> int:
+    """Row of the candidate farthest from a point; the first of those within ``tie`` [m]."""
+    best, most = 0, -1.0
+    for k in range(count):
+        away = np.sqrt(
+            (found[k, 7] - x) ** 2 + (found[k, 8] - y) ** 2 + (found[k, 9] - z) ** 2
+        )  # fmt: skip
+        if away > most + tie:
+            best, most = k, away
+    return best
+
+
+@njit(cache=True)
+def farthest_along(
+    found: Floats, count: int, start: int, d0: float, d1: float, d2: float, tie: float
+) -> int:
+    """Row of the candidate farthest from row ``start`` along d, -1 if none is beyond ``tie``."""
+    best, most = -1, tie * np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    step = most
+    for k in range(count):
+        along = (
+            d0 * (found[k, 7] - found[start, 7])
+            + d1 * (found[k, 8] - found[start, 8])
+            + d2 * (found[k, 9] - found[start, 9])
+        )
+        if along > most + step:
+            best, most = k, along
+    return best
+
+
+@njit(cache=True)
 def four_of(found: Floats, count: int, size: float) -> int:
     """Keep at most four candidates in the first rows of ``found``: returns how many.
 
-    The farthest from the middle, the farthest from that, the one that spans the largest triangle
-    with both, and the one that adds most area; the deepest replaces the nearest of them if it is
-    deeper than all.  Lengths within `TIE` of each other count as equal: the first is taken.
+    The farthest from the middle, the farthest from that, and on either side of the line through
+    both the farthest; the deepest of all takes the place of the nearest of them if it is deeper.
+    Lengths within `TIE` of each other count as equal: the first is taken.
     """
     if count <= 4:
         return count
     tie = TIE * size
     middle = np.zeros(3)
+    deepest = 0
     for k in range(count):
-        middle += found[k, 7:10] / count
-    chosen = np.full(4, -1)
-    for turn in range(2):
-        origin, farthest = middle, -1.0
-        if turn == 1:
-            origin = found[chosen[0], 7:10].copy()
-        for k in range(count):
-            distance = np.linalg.norm(found[k, 7:10] - origin)
-            if distance > farthest + tie:
-                chosen[turn], farthest = k, distance
-    n = found[chosen[0], 4:7].copy()
-    p, q = found[chosen[0], 7:10].copy(), found[chosen[1], 7:10].copy()
-    across = np.array(cross(n, q - p))
-    across /= np.linalg.norm(across) + 1e-300
-    kept = 2
-    for side in (1.0, -1.0):
-        best, farthest = -1, 10.0 * tie
-        for k in range(count):
-            distance = side * dot(across, found[k, 7:10] - p)
-            if distance > farthest + tie:
-                best, farthest = k, distance
-        if best >= 0:
-            chosen[kept] = best
-            kept += 1
-    lowest = found[chosen[0], 3]
-    for k in range(1, kept):
-        lowest = min(lowest, found[chosen[k], 3])
-    deepest = np.argmin(found[:count, 3])
+        for axis in range(3):
+            middle[axis] += found[k, 7 + axis] / count
+        if found[k, 3] < found[deepest, 3] - tie:
+            deepest = k
+    p = farthest_from(found, count, middle[0], middle[1], middle[2], tie)
+    q = farthest_from(found, count, found[p, 7], found[p, 8], found[p, 9], tie)
+    u0, u1, u2 = found[q, 7] - found[p, 7], found[q, 8] - found[p, 8], found[q, 9] - found[p, 9]
+    d0, d1, d2 = cross(found[p, 4], found[p, 5], found[p, 6], u0, u1, u2)
+    left = farthest_along(found, count, p, d0, d1, d2, tie)
+    right = farthest_along(found, count, p, -d0, -d1, -d2, tie)
+    kept = np.empty((4, COLUMNS))
+    number, nearest, least, lowest = 0, 0, np.inf, np.inf
+    for row in (p, q, left, right):
+        if row < 0:
+            continue
+        squares = 0.0
+        for column in range(COLUMNS):
+            kept[number, column] = found[row, column]
+            if column >= 7:
+                squares += (found[row, column] - found[deepest, column]) ** 2
+        if squares < least:
+            nearest, least = number, squares
+        lowest = min(lowest, found[row, 3])
+        number += 1
     if found[deepest, 3] < lowest - tie:
-        nearest, least = 0, np.inf
-        for k in range(kept):
-            distance = np.linalg.norm(found[chosen[k], 7:10] - found[deepest, 7:10])
-            if distance < least:
-                nearest, least = k, distance
-        chosen[nearest] = deepest
-    rows = found[chosen[:kept]].copy()
-    found[:kept] = rows
-    return kept
+        for column in range(COLUMNS):
+            kept[nearest, column] = found[deepest, column]
+    for row in range(number):
+        for column in range(COLUMNS):
+            found[row, column] = kept[row, column]
+    return number
 
 
 @njit(cache=True)

@@ -214,11 +214,11 @@ def micro_displacements(
     free = root @ free_motion(jacobian, problem.offset)
     if step is None:
         step = stable_step(jacobian, k)
-    displacement, slip = _start(start, bodies, shape)
+    displacement, slip = start_displacement(start, bodies, shape)
     lost = problem.offset - bodies.jacobian @ free
 
     best = (np.inf, np.zeros(shape), displacement, slip)
-    for iterations in range(iterations_max + 1):
+    for iterations in range(iterations_max + 1):  # noqa: B007 (its last value is reported)
         deformation = -(bodies.jacobian @ displacement).reshape(shape)
         force, slip = law(deformation, slip, k, problem.friction)
         motion = bodies.inverse_mass @ (bodies.jacobian.T @ force.ravel()) + free
@@ -241,7 +241,7 @@ def micro_displacements(
     )  # fmt: skip
 
 
-def _start(
+def start_displacement(
     start: ElasticForces | ArrayLike | None, bodies: BodySpace, shape: tuple[int, int]
 ) -> tuple[Floats, Floats]:
     """Displacements (ndof,) and slip (nc, dim) to begin with; raises `ProblemError`."""

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
 
-from rigid_lcp.cones import natural_residual
+from rigid_lcp.cones import natural_map
 from rigid_lcp.dantzig_drive import (
     CYCLED,
     DONE,
@@ -75,7 +75,8 @@ class Pivots(NamedTuple):
     """Where the diagonal of A stands among its values by rows and by columns."""
     codes: Ints
     trace: Floats
-    count: Ints
+    events: Ints
+    """(1,) changes of lists so far."""
 
 
 def pivots_state(
@@ -139,7 +140,7 @@ def offset_drive(state: Pivots, change: Floats, goal: float, reversal: bool, lim
     target = state.b + goal * change
     ended, _ = drive(
         state.geometry, state.reduced, state.b, state.f, state.a, change, OFFSET, 0, goal,
-        reversal, max(limit - int(state.count[0]), 0), state.codes, state.trace, state.count,
+        reversal, max(limit - int(state.events[0]), 0), state.codes, state.trace, state.events,
     )  # fmt: skip
     if ended == DONE:
         state.b[:] = target
@@ -177,15 +178,17 @@ def shift_remove(problem: FrictionProblem, state: Pivots, tolerance: float, few:
     least, idle, pace = pivots_residual(problem, state, best), 0, 1.0
     taken, floor = 0, SHIFT_LEAST * state.unit
     for _ in range(PROXIMAL_STEPS if state.shift[0] > 0.0 else 0):
-        if least <= tolerance or idle == PROXIMAL_PATIENCE:
+        if idle == PROXIMAL_PATIENCE:
             break
-        before, shift, spent = state_copy(state), float(state.shift[0]), int(state.count[0])
+        before, shift, spent = state_copy(state), float(state.shift[0]), int(state.events[0])
         smaller = min(shift, max((0.1 if taken > HARDLY else 0.01) ** pace * shift, floor))
+        if least <= tolerance:
+            smaller = shift  # what comes now is cheap, and free where no list changes
         if smaller < shift:
             shift_change(state, smaller)
         change = exact - smaller * state.f - state.b
         ended = offset_drive(state, change, 1.0, True, spent + few)
-        taken = int(state.count[0]) - spent
+        taken = int(state.events[0]) - spent
         if ended != DONE:
             if smaller == shift or pace < 0.1:
                 break
@@ -195,6 +198,8 @@ def shift_remove(problem: FrictionProblem, state: Pivots, tolerance: float, few:
         force = pivots_force(problem, state)
         residual = pivots_residual(problem, state, force)
         idle = 0 if residual < least else idle + 1
+        if least <= tolerance and (taken or not residual < 0.5 * least):
+            break
         if residual < least:
             best, least = force, residual
     return best
@@ -240,22 +245,24 @@ def pivots_force(problem: FrictionProblem, state: Pivots) -> Floats:
 
 def pivots_residual(problem: FrictionProblem, state: Pivots, force: Floats) -> float:
     """Scale-free residual; contacts that slide already have a friction force of known sign."""
-    if not state.geometry.slip.any():
+    slip = state.geometry.slip
+    if not slip.any():
         return problem.residual(force)
     velocity = problem.velocity(force)
-    # as a fast sliding acceleration of that sign: the projection then falls on that edge alone
+    size = float(np.linalg.norm(force)) or problem.rho * float(np.linalg.norm(velocity))
+    # as a fast sliding of that sign: the projection then falls on that edge of the cone alone
     far = 10.0 * (np.abs(velocity).max() + np.abs(force).max() / problem.rho)
-    slides = state.geometry.slip != 0
-    velocity[1::2][slides] = -state.geometry.slip[slides] * far
+    velocity[1::2][slip != 0] = -slip[slip != 0] * far
     shape = (problem.contacts, problem.dim)
-    return natural_residual(
+    error = natural_map(
         force.reshape(shape), velocity.reshape(shape), problem.friction, problem.rho
     )
+    return float(np.linalg.norm(error)) / size if size > 0.0 else 0.0
 
 
 _ENDS: dict[int, tuple[Status, str]] = {
-    DONE: ("not converged", "the lists are consistent, but round-off leaves a residual of {res:.2g}"
-           "\n  -> ask for less, or polish with a Newton method"),
+    DONE: ("not converged", "the shift of the diagonal came out to a residual of {res:.2g} only"
+           "\n  -> ask for less, allow more pivots, or polish with a Newton method"),
     RAY: ("not converged", "the driven quantity at contact {where} grows without bound (a ray)"
           "\n  -> use `pivoting`, or another order of contacts"),
     CYCLED: ("cycled", "the lists repeat without progress at contact {where}"
@@ -275,7 +282,7 @@ def pivots_solution(
 ) -> FrictionSolution:  # fmt: skip
     """Judge the forces; a ray becomes ``no solution`` if a linear programme proves that."""
     residual = pivots_residual(problem, state, force)
-    work = {"pivots": float(state.count[0])}
+    work = {"pivots": float(state.events[0])}
     velocity = problem.velocity(force)
     if residual <= tolerance:
         return FrictionSolution(force, velocity, residual, "solved", method, work)

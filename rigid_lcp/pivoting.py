@@ -108,9 +108,9 @@ def pivoting(
             ended = path_from_nothing(problem, state, min(limit, most - spent))
         force = pivots_force(problem, state)
         if ended == DONE:
-            force = shift_remove(problem, state, tolerance, few)
-        spent += int(state.count[0])
-        state.count[0] = spent
+            force = shift_remove(problem, state, tolerance, max(few, limit // 4))
+        spent += int(state.events[0])
+        state.events[0] = spent
         solution = pivots_solution(problem, state, force, tolerance, "pivoting", ended, -1)
         solution.work.update(paths=float(paths), sweeps=float(swept))
         if solution.status in ("solved", "no solution") or spent >= most:

@@ -97,7 +97,9 @@ class Scene:
         origin = getattr(shape, "centroid", np.zeros(self.dim))
         turn = 3 if self.dim == 3 else 1
         upright = [1.0, 0.0, 0.0, 0.0] if self.dim == 3 else 0.0
-        angle = _vector(upright if angle is None else angle, 1 if self.dim == 2 else 4, "angle", where)
+        angle = _vector(
+            upright if angle is None else angle, 1 if self.dim == 2 else 4, "angle", where
+        )
         length = float(np.linalg.norm(angle))
         if self.dim == 3 and length == 0:
             raise SceneError("the quaternion is zero", where=where, remedy="give (1, 0, 0, 0)")

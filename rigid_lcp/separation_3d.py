@@ -62,13 +62,11 @@ def dot(a: Floats, b: Floats) -> float:
 
 
 @njit(cache=True)
-def cross(a: Floats, b: Floats) -> tuple[float, float, float]:
-    """Vector product of two vectors (3,)."""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
+def cross(
+    a0: float, a1: float, a2: float, b0: float, b1: float, b2: float
+) -> tuple[float, float, float]:
+    """Vector product of two vectors, by components: small arrays would cost more than it."""
+    return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
 @njit(cache=True)
@@ -134,7 +132,7 @@ def edge_separation(
             r = solids.vertex[base_b + solids.edge[f, 0]]
             s = solids.vertex[base_b + solids.edge[f, 1]]
             w0, w1, w2 = s[0] - r[0], s[1] - r[1], s[2] - r[2]
-            c0, c1, c2 = u1 * w2 - u2 * w1, u2 * w0 - u0 * w2, u0 * w1 - u1 * w0
+            c0, c1, c2 = cross(u0, u1, u2, w0, w1, w2)
             squares = c0 * c0 + c1 * c1 + c2 * c2
             if squares <= PARALLEL**2 * length_a * (w0 * w0 + w1 * w1 + w2 * w2):
                 continue
@@ -165,25 +163,28 @@ def edge_crossing(
     normal (3) on the side of ``towards``, point on a (3).  False for parallel edges.
     """
     base_a, base_b = solids.first_vertex[a], solids.first_vertex[b]
-    p, r = (
-        solids.vertex[base_a + solids.edge[edge_a, 0]],
-        solids.vertex[base_b + solids.edge[edge_b, 0]],
-    )
-    u = solids.vertex[base_a + solids.edge[edge_a, 1]] - p
-    w = solids.vertex[base_b + solids.edge[edge_b, 1]] - r
-    c0, c1, c2 = cross(u, w)
+    p = solids.vertex[base_a + solids.edge[edge_a, 0]]
+    q = solids.vertex[base_a + solids.edge[edge_a, 1]]
+    r = solids.vertex[base_b + solids.edge[edge_b, 0]]
+    s = solids.vertex[base_b + solids.edge[edge_b, 1]]
+    u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    w0, w1, w2 = s[0] - r[0], s[1] - r[1], s[2] - r[2]
+    x0, x1, x2 = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+    c0, c1, c2 = cross(u0, u1, u2, w0, w1, w2)
     squares = c0 * c0 + c1 * c1 + c2 * c2
-    if squares <= PARALLEL**2 * dot(u, u) * dot(w, w):
+    lengths = (u0 * u0 + u1 * u1 + u2 * u2) * (w0 * w0 + w1 * w1 + w2 * w2)
+    if squares <= PARALLEL**2 * lengths:
         return False
-    between = r - p
-    x0, x1, x2 = cross(between, w)
-    crossing[0] = (x0 * c0 + x1 * c1 + x2 * c2) / squares
-    x0, x1, x2 = cross(between, u)
-    crossing[1] = (x0 * c0 + x1 * c1 + x2 * c2) / squares
+    y0, y1, y2 = cross(x0, x1, x2, w0, w1, w2)
+    crossing[0] = (y0 * c0 + y1 * c1 + y2 * c2) / squares
+    y0, y1, y2 = cross(x0, x1, x2, u0, u1, u2)
+    crossing[1] = (y0 * c0 + y1 * c1 + y2 * c2) / squares
     scale = 1.0 / np.sqrt(squares)
     if c0 * towards[0] + c1 * towards[1] + c2 * towards[2] < 0.0:
         scale = -scale
+    crossing[2] = -scale * (c0 * x0 + c1 * x1 + c2 * x2)
     crossing[3], crossing[4], crossing[5] = c0 * scale, c1 * scale, c2 * scale
-    crossing[2] = -dot(crossing[3:6], between)
-    crossing[6:9] = p + crossing[0] * u
+    crossing[6] = p[0] + crossing[0] * u0
+    crossing[7] = p[1] + crossing[0] * u1
+    crossing[8] = p[2] + crossing[0] * u2
     return True

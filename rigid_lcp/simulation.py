@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from rigid_lcp.contacts import ContactForces
 from rigid_lcp.errors import NotConverged, Overlapping, UsageError
-from rigid_lcp.motion import Motion
 from rigid_lcp.runge_kutta import Pace, runge_kutta_advance
 from rigid_lcp.scene import Loads, Scene, world_of
 from rigid_lcp.time_stepping import contact_forces, moreau_step
@@ -109,9 +108,7 @@ class Simulation:
 
     def _time_step(self, h: float) -> None:
         loads = None if self.loads is None else self.loads(self.time + h / 2, self.motion)
-        made = moreau_step(
-            self.world, self.motion, loads, h, self.contacts, self.tolerance
-        )
+        made = moreau_step(self.world, self.motion, loads, h, self.contacts, self.tolerance)
         self._judge(made.residual, made.message)
         self.motion, self.contacts = made.motion, made.contacts
         self.time += h

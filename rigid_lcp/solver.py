@@ -44,11 +44,11 @@ Method = Literal["auto", "newton", "interior-point", "gauss-seidel", "pivoting",
 HAND_OVER = 1e-7
 """Residual at which Newton takes over from the interior point."""
 PATHS = (
-    (Path(rounding=0.01), 100),
-    (Path(rounding=1e-4, cautious=True), 100),
-    (Path(rounding=0.1), 300),
-    (Path(rounding=1e-8, cautious=True), 300),
-    (Path(convex=True), 300),
+    (Path(rounding=0.3, compliance=0.01), 100),
+    (Path(rounding=0.03, compliance=1.0), 100),
+    (Path(rounding=1e-3, compliance=1e-3), 300),
+    (Path(rounding=0.1, compliance=0.1), 300),
+    (Path(convex=True, compliance=1e-4), 300),
 )
 """Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
 WARM_SWEEPS = 30

@@ -18,10 +18,7 @@ def sphere_on_sphere(x: Floats, radius: float, y: Floats, other: float, row: Flo
 
     Fills ``row`` as `sphere_on_solid` does; returns 0, the only feature a sphere has.
     """
-    away = x - y
-    distance = np.sqrt(dot(away, away))
-    normal = away / distance if distance > 0.0 else np.array([0.0, 0.0, 1.0])
-    _fill(row, x, radius, normal, distance - radius - other, other)
+    _fill_round(row, x, radius, y[0], y[1], y[2], other)
     return 0
 
 
@@ -57,23 +54,37 @@ def sphere_on_solid(solids: Solids, body: int, x: Floats, radius: float, row: Fl
         return best - first_face
     feature, nearest = 0, np.inf
     base = solids.first_vertex[body]
-    foot, away = np.zeros(3), np.zeros(3)
+    f0, f1, f2 = 0.0, 0.0, 0.0
     for e in range(first_edge, first_edge + edges):
         p, q = solids.vertex[base + solids.edge[e, 0]], solids.vertex[base + solids.edge[e, 1]]
-        along = q - p
-        place = dot(x - p, along) / dot(along, along)
-        place = min(max(place, 0.0), 1.0)
-        foot[:] = p + place * along
-        squares = dot(x - foot, x - foot)
+        u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        along = u0 * (x[0] - p[0]) + u1 * (x[1] - p[1]) + u2 * (x[2] - p[2])
+        place = min(max(along / (u0 * u0 + u1 * u1 + u2 * u2), 0.0), 1.0)
+        y0, y1, y2 = p[0] + place * u0, p[1] + place * u1, p[2] + place * u2
+        squares = (x[0] - y0) ** 2 + (x[1] - y1) ** 2 + (x[2] - y2) ** 2
         if squares < nearest:
-            nearest = squares
-            away[:] = x - foot
+            nearest, f0, f1, f2 = squares, y0, y1, y2
             feature = faces + e - first_edge
             if place == 0.0 or place == 1.0:
                 feature = faces + edges + solids.edge[e, int(place)]
-    distance = np.sqrt(nearest)
-    _fill(row, x, radius, away / distance, distance - radius, 0.0)
+    _fill_round(row, x, radius, f0, f1, f2, 0.0)
     return feature
+
+
+@njit(cache=True)
+def _fill_round(
+    row: Floats, x: Floats, radius: float, y0: float, y1: float, y2: float, other: float
+) -> None:
+    """Store the contact with a sphere, or a point of radius 0, about y; parted along z if at x."""
+    away = np.empty(3)
+    away[0], away[1], away[2] = x[0] - y0, x[1] - y1, x[2] - y2
+    distance = np.sqrt(dot(away, away))
+    if distance > 0.0:
+        for axis in range(3):
+            away[axis] /= distance
+    else:
+        away[2] = 1.0
+    _fill(row, x, radius, away, distance - radius - other, other)
 
 
 @njit(cache=True)

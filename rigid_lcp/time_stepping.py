@@ -5,12 +5,14 @@ One step of length h, with the geometry of the midpoint ``q_m = q + h/2 v``:
     M (v+ - v) = h f + J^T p        K* contains u + mu |u_T| n, orthogonal to p in K   (eq. 27)
     q+ = q_m + h/2 v+
 
-where u is J v+ with the normal part shifted by the contact's own law: Newton's restitution
-``u_N+ + e u_N-`` where two bodies are about to collide, else ``u_N+ + 2 g_m / h``: a contact that
-is open by g_m at the midpoint may close, not more (Moreau, Eur. J. Mech. 13 (1994) 93; Jean,
-CMAME 177 (1999) 235).  Without friction and overlap no step adds energy: the mean of ``u_N-`` and
-``u_N+`` is never positive where p_N is; with restitution 1 a bounce keeps it to round-off.  With
-friction a body that comes to rest within a step may gain up to ``m (h |f/m|)^2 / 8``.
+where u is J v+ at the end of the step, ``J(q_m) v+ + h/2 J' v`` (the inertial terms of eq. 24),
+with the normal part shifted by the contact's own law: Newton's restitution ``u_N+ + e u_N-`` where
+two bodies are about to collide, else ``u_N+ + 2 g / h`` for a contact that is open at the midpoint,
+by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur. J. Mech. 13 (1994)
+93; Jean, CMAME 177 (1999) 235).  Where J does not turn and there is no friction, no step adds
+energy: the mean of ``u_N-`` and ``u_N+`` is never positive where p_N is not zero; with restitution
+1 a bounce keeps it to round-off.  With friction a body that comes to rest within a step may gain
+up to ``m (h |f/m|)^2 / 8``.
 
 What curvature and rotation leave of overlap is taken out by moving the bodies apart by the
 smallest mass-weighted displacement; it changes no velocity (split impulse).
@@ -27,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.contacts import ContactForces, Contacts, contact_frames, contact_rows
-from rigid_lcp.equations import body_space, relative_velocity
+from rigid_lcp.equations import body_space, inertial_acceleration, relative_velocity
 from rigid_lcp.friction_problem import BodySpace, FrictionSolution
 from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
 from rigid_lcp.scene import World
@@ -71,25 +73,25 @@ def moreau_step(
         return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
     inverse_mass = world.inverse_mass(middle)
     bodies = body_space(contacts, middle.position, world.columns, inverse_mass)
-    before = relative_velocity(contacts, middle)[:, 0]
-    offset = relative_velocity(contacts, free)
-    scale = float(np.linalg.norm(world.scene.gravity)) * h
-    shift = contact_shift(contacts, before, offset[:, 0], scale, h)
-    shifted = offset.copy()
-    shifted[:, 0] += shift
+    turning = 0.5 * h * inertial_acceleration(contacts, middle)
+    before = relative_velocity(contacts, middle)[:, 0] - turning[:, 0]
+    offset = relative_velocity(contacts, free) + turning
+    gap = contacts.gap - 0.25 * h * turning[:, 0]
+    slow = float(np.linalg.norm(world.scene.gravity)) * h
+    shift = np.zeros_like(offset)
+    shift[:, 0] = contact_shift(contacts.restitution, gap, before, offset[:, 0], slow, h)
     solution = solve_friction(
-        bodies, shifted.ravel(), contacts.friction, dim=motion.dim,
+        bodies, (offset + shift).ravel(), contacts.friction, dim=motion.dim,
         start=known_impulses(contacts, known, h), tolerance=tolerance,
     )  # fmt: skip
     impulse = solution.r.reshape(-1, motion.dim)
-    after = solution.u.reshape(-1, motion.dim) - np.column_stack(
-        [shift, np.zeros((len(shift), motion.dim - 1))]
-    )
-    free_rates = free.rates
-    free_rates[world.movable] += _velocities(bodies, impulse, world.size)
-    end = world.drifted(motion_with_rates(middle, free_rates), 0.5 * h)
-    end = overlap_removed(world, end, contacts, bodies, contacts.gap + 0.5 * h * after[:, 0])
-    error = forces_error(bodies, solution, scale)
+    after = solution.u.reshape(-1, motion.dim) - shift
+    rates = free.rates
+    rates[world.movable] += _velocities(bodies, impulse, world.size)
+    end = motion_with_rates(middle, rates)
+    end = motion_displaced(end, 0.5 * h * rates)
+    end = overlap_removed(world, end, bodies, gap + 0.5 * h * after[:, 0])
+    error = forces_error(bodies, solution, slow)
     return Step(end, contact_forces(contacts, impulse, after, h), error, solution.message)
 
 
@@ -119,17 +121,17 @@ def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float)
 
 
 def contact_shift(
-    contacts: Contacts, before: Floats, free: Floats, slow: float, h: float
+    restitution: Floats, gap: Floats, before: Floats, free: Floats, slow: float, h: float
 ) -> Floats:
     """What is added to ``u_N+`` so that it may not be negative, (nc,) [m/s].
 
-    ``before`` and ``free``: normal velocities at the start of the step, and at its end without
-    impulses.  Restitution acts on contacts that close within the step and approach faster than
-    ``slow``, the velocity that gravity gives in a step: what is slower can not be told from rest.
+    ``gap`` at the midpoint; ``before`` and ``free``: normal velocities at the start of the step,
+    and at its end without impulses.  Restitution acts on contacts that close within the step and
+    approach faster than ``slow``, the velocity that gravity gives in a step: what is slower can
+    not be told from rest.
     """
-    closing = contacts.gap + 0.5 * h * free <= 0
-    bounce = closing & (before < -slow) & (contacts.restitution > 0)
-    return np.where(bounce, contacts.restitution * before, np.maximum(contacts.gap, 0.0) * 2 / h)
+    bounce = (gap + 0.5 * h * free <= 0) & (before < -slow) & (restitution > 0)
+    return np.where(bounce, restitution * before, np.maximum(gap, 0.0) * 2 / h)
 
 
 def known_impulses(contacts: Contacts, known: ContactForces | None, h: float) -> Floats | None:
@@ -162,9 +164,7 @@ def contact_forces(
     return ContactForces(**given, normal_force=normal, tangential_force=tangential, status=status)
 
 
-def overlap_removed(
-    world: World, motion: Motion, contacts: Contacts, bodies: BodySpace, gap: Floats
-) -> Motion:
+def overlap_removed(world: World, motion: Motion, bodies: BodySpace, gap: Floats) -> Motion:
     """Bodies moved apart until no ``gap`` (nc,) [m] is negative, to first order in the move.
 
     The smallest displacement weighted with mass, ``M^-1 J_N^T lambda`` with ``lambda >= 0``; the

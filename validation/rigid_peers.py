@@ -45,8 +45,10 @@ SICONOS = {
 ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
-REPEATS = 4
-"""Further runs where a run is short; their median is the cost."""
+REPEATS = 5
+"""Where a run is short, the cost is the median of so many means over `batch_size` runs."""
+BATCH_S, BATCH_MOST = 0.02, 20
+"""A mean is over runs of so much time, as clocks of processor time may tick every 4 ms."""
 FINEST = 1e-10
 """What Clarabel is asked for at the most: beyond, it stops with worse answers on singular W."""
 OUTER = 50
@@ -73,6 +75,11 @@ class PeerRun:
 # --- Siconos ----------------------------------------------------------------------------------
 
 
+def batch_size(wall_s: float) -> int:
+    """Number of runs whose mean cost is one measurement, from the time of a run [s]."""
+    return int(np.clip(np.ceil(BATCH_S / max(wall_s, 1e-6)), 1, BATCH_MOST))
+
+
 @cache
 def siconos_missing() -> str:
     """Why Siconos can not be run; empty if it can."""
@@ -89,16 +96,17 @@ def siconos(
 ) -> list[PeerRun]:
     """Run a solver of Siconos, ``"3D_NSGS"``, at several tolerances of its own error.
 
+    ``tolerances``: loose ones first; those beyond one that is not reached in time are not tried.
     ``budget_s``: processor seconds of a run.  A run that kills the process is reported, and the
     next tolerance tried.  Raises `LibraryMissing` without Siconos.
     """
     if siconos_missing():
         raise LibraryMissing("Siconos is not installed", remedy=siconos_missing())
     jobs = [
-        {"solver": solver, "tolerance": t, "iterations": None, "repeats": REPEATS,
-         "budget_s": budget_s}
+        {"solver": solver, "tolerance": t, "iterations": None, "budget_s": budget_s}
+        | {"repeats": REPEATS, "batch_s": BATCH_S, "batch_most": BATCH_MOST}
         for t in tolerances
-    ]  # fmt: skip
+    ]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         w = problem.delassus
@@ -122,7 +130,7 @@ def siconos(
             if dead in ended:  # it died in a second run, with more iterations
                 setting["iterations"] = "more"
             runs.append(PeerRun(setting, None, why=death))
-            left = [job for job in left if job[0] > dead]
+            left = [] if death == "out of time" else [job for job in left if job[0] > dead]
     return runs
 
 
@@ -156,7 +164,7 @@ def _siconos_results(folder: Path, jobs: list[dict[str, Any]]) -> list[tuple[int
         return []
     found = []
     for row in map(json.loads, path.read_text().splitlines()):
-        costs = [row["cost_s"], *row.get("repeats_s", ())]
+        costs = row.get("repeats_s", [row["cost_s"]])
         setting = {"tolerance": jobs[row["number"]]["tolerance"], "iterations": row["allowed"]}
         run = PeerRun(
             setting, np.load(folder / f"force-{row['number']}-{row['allowed']}.npy"),
@@ -195,7 +203,7 @@ def clarabel(
 
     Stops at the ``tolerance`` of the residual, after ``outer`` programs, after five that do not
     better the best answer, or out of time.  Each program is solved to a hundredth of the tolerance,
-    between `FINEST` and 1e-8, W and q scaled to order one.  Raises `LibraryMissing` without Clarabel.
+    between `FINEST` and 1e-8, W and q scaled to order one.  Raises `LibraryMissing`.
     """
     watch = Stopwatch()
     shape = (problem.contacts, problem.dim)

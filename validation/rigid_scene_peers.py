@@ -1,9 +1,9 @@
 """The same planar scenes in MuJoCo, ODE and LMGC90, each in a process of its own.
 
 A scene of `rigid_lcp` is written as plain data (`scene_data`), from which every engine builds its
-own; `validation.rigid_scene_worker` says how, and that bodies become slabs.  Nothing of an engine is
-imported here: one that is not installed, has no such shape, takes too long or dies gives a row that
-says so.
+own; `validation.rigid_scene_worker` says how, and that bodies become slabs.  Nothing of an engine
+is imported here: one that is not installed, has no such shape, takes too long or dies gives a row
+that says so.
 """
 
 from __future__ import annotations

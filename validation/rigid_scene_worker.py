@@ -154,7 +154,9 @@ def run_ode(scene: Data, step: float, steps: int) -> tuple[list[list[float]], st
     world.setCFM(1e-12)  # of 1e-12 to 1e-6 the value that keeps stacks best
     world.setGravity((*scene["gravity"], 0.0))
     depth, bodies = scene["depth"], scene["bodies"]
-    placed, geometries, planes = [], [], []
+    placed: list[Any] = []
+    geometries: list[Any] = []
+    planes: list[Any] = []  # Python must hold what ODE uses
     for k, body in enumerate(bodies):
         if body["kind"] == "half-space":
             geometry = ode.GeomPlane(space, (*body["normal"], 0.0), body["offset"])

@@ -166,21 +166,21 @@ def sliding_rod(
 ) -> Simulation:  # fmt: skip
     """Painleve's rod (body 0): its lower tip slides on a floor, ``lean`` from the horizontal.
 
-    The tip is the pointed end of a needle; it slides away from the side the rod leans to, so that
-    friction turns the tip into the floor.
+    It slides away from the side the rod leans to, so that friction turns the tip into the floor.
     """
-    along = half_length * np.array([cos(lean), sin(lean)])
-    across = 1e-4 * half_length * np.array([-sin(lean), cos(lean)])
-    shape = Polygon([-along, across, along, -across][::-1])
+    shape = Polygon.rectangle(2 * half_length, 2e-6 * half_length)
+    turn = np.array([[cos(lean), -sin(lean)], [sin(lean), cos(lean)]])
+    height = -(shape.vertices @ turn.T)[:, 1].min()
     scene = Scene(2)
-    scene.add(shape, density=DENSITY, position=along, velocity=(-speed, 0))
+    scene.add(shape, density=DENSITY, position=(0, height), angle=lean, velocity=(-speed, 0))
     scene.add(FLOOR, friction=mu)
     return Simulation(scene, method, step=step)
 
 
 def sliding_rod_limit(run: Simulation) -> float:
     """Friction at which ``1/m + x^2/J - mu |x y|/J`` is zero: above, no finite force exists."""
-    x, y = -run.positions[0]
+    contact = run.world.contacts(run.motion, 1e-9 * run.world.length)
+    x, y = (contact.point - run.positions[0])[0]
     mass, inertia = run.world.mass[0], run.world.inertia[0]
     return float((1 / mass + x * x / inertia) / (abs(x * y) / inertia))
 
@@ -189,9 +189,7 @@ def light_on_heavy(ratio: float, *, step: float = 1e-3) -> Simulation:
     """Light on heavy on light boxes, the middle one ``ratio`` times denser."""
     scene = Scene(2)
     for k, density in enumerate((DENSITY, ratio * DENSITY, DENSITY)):
-        scene.add(
-            Polygon.rectangle(1, 1), density=density, position=(0, k + 0.5), friction=0.5
-        )
+        scene.add(Polygon.rectangle(1, 1), density=density, position=(0, k + 0.5), friction=0.5)
     scene.add(FLOOR)
     return Simulation(scene, step=step)
 

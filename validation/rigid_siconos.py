@@ -56,7 +56,7 @@ def matrix_of(arrays: Any, dim: int) -> Any:
 
 
 def main(folder: Path) -> None:
-    """Make the runs of the folder, those that have a result already left out."""
+    """Make the runs of the folder, loose tolerances first, until one is not reached."""
     numerics = import_module("siconos.numerics")
     arrays = np.load(folder / "problem.npz")
     dim = int(arrays["dim"])
@@ -64,12 +64,17 @@ def main(folder: Path) -> None:
     for number, job in json.loads((folder / "jobs.json").read_text()):
         budget, last = job["budget_s"], np.full(len(problem[2]), np.nan)
         while True:
-            limit = time.process_time() + (1 + job["repeats"]) * budget
+            limit = time.process_time() + 2 * budget + job["repeats"] * job["batch_s"]
             resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, resource.RLIM_INFINITY))
+            start = time.perf_counter()
             result, force = run(numerics, problem, job)
-            if result["cost_s"] < budget / 10:
-                costs = [run(numerics, problem, job)[0]["cost_s"] for _ in range(job["repeats"])]
-                result["repeats_s"] = costs
+            wall = time.perf_counter() - start
+            if wall < budget / 10:
+                batch = int(np.clip(np.ceil(job["batch_s"] / wall), 1, job["batch_most"]))
+                result["repeats_s"] = [
+                    float(np.mean([run(numerics, problem, job)[0]["cost_s"] for _ in range(batch)]))
+                    for _ in range(job["repeats"])
+                ]
             np.save(folder / f"force-{number}-{result['allowed']}.npy", force)
             with (folder / "results.jsonl").open("a") as stream:
                 stream.write(json.dumps({"number": number} | result) + "\n")
@@ -83,6 +88,8 @@ def main(folder: Path) -> None:
                 break
             last = force
             job = job | {"iterations": int(more * result["allowed"])}
+        if result["info"] != 0:
+            break  # what it could not reach, it can not better
 
 
 if __name__ == "__main__":

@@ -64,6 +64,17 @@ def test_import_reader_sees_hidden_imports(source: str) -> None:
     assert imported(source) & {"rigid_lcp", "qdem_fem"}
 
 
+def test_rigid_lcp_loads_no_library_for_one_job() -> None:
+    """What only one job of `rigid_lcp` needs is imported in the function that does it."""
+    for_one_job = {"clarabel", "coal", "h5py", "matplotlib", "meshio", "osqp", "rich", "shapely"}
+    for path in (ROOT / "rigid_lcp").rglob("*.py"):
+        module = ast.parse(path.read_text())
+        module.body = [
+            part for part in module.body if isinstance(part, ast.Import | ast.ImportFrom)
+        ]
+        assert not imported(ast.unparse(module)) & for_one_job, path
+
+
 def test_no_vague_names() -> None:
     """No file or folder is named after nothing."""
     for path in sources():

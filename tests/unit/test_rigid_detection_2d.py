@@ -8,15 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.contacts import Contacts, contact_rows
-from rigid_lcp.detection_2d import (
-    bounding_boxes,
-    detect_2d,
-    near_pairs,
-    place_shapes,
-    shapes_2d,
-    widest_face,
-)
+from rigid_lcp.detection_2d import detect_2d, shapes_2d, widest_face
 from rigid_lcp.errors import Overlapping, SceneError
+from rigid_lcp.near_pairs import bounding_boxes, near_pairs, place_shapes
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
@@ -138,7 +132,7 @@ def test_broad_phase_finds_every_near_pair(seed: int) -> None:
 @settings(max_examples=30, deadline=None)
 def test_widest_face_is_the_separation(seed: int) -> None:
     """Against all vertices over all faces in plain NumPy."""
-    shapes, places, angles = heap(seed, 2)
+    _, places, angles = heap(seed, 2)
     polygons = [Polygon.regular(5, 1.0), Polygon.regular(3, 0.7)]
     arrays = shapes_2d(polygons, np.ones(2, bool))
     vertices, normals = place_shapes(

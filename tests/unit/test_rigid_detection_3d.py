@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from rigid_lcp.contacts import Contacts
 from rigid_lcp.detection_3d import bounding_boxes, detect_3d, near_pairs, place_solids, shapes_3d
-from rigid_lcp.equations import relative_velocity
+from rigid_lcp.equations import inertial_acceleration, relative_velocity
 from rigid_lcp.errors import SceneError
 from rigid_lcp.motion import Motion, motion_displaced
-from rigid_lcp.placed_solids import MOST_EDGES
+from rigid_lcp.placed_solids import FEATURE_BITS, MOST_EDGES
 from rigid_lcp.polyhedra import ballast_stone
 from rigid_lcp.rotations import (
     Floats,
@@ -222,6 +222,54 @@ def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
             # round-off 1e-16 / h = 1e-9; truncation h^2 |w|^3 is far below
             assert (ahead[key] - behind[key]) / (2 * h) == pytest.approx(rate, abs=2e-8)
             checked += 1
+    assert checked > 0
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10_000))
+def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
+    """Eqs 14 and 24 in space: ``d2g/dt2`` of bodies with constant velocity and spin.
+
+    Corners on faces, spheres on faces, corners, spheres and planes.  Not for crossing edges and
+    spheres on edges, whose normals turn with both bodies: `inertial_acceleration` says so.
+    """
+    shapes, position, quaternion = near_pair(seed)
+    generator = np.random.default_rng(seed)
+    shapes = [*shapes, Sphere(0.3), Sphere(0.5), HalfSpace([0.1, 0.2, 1.0], -0.8)]
+    top = rotate(quaternion[0], shapes[0].vertices)  # type: ignore[attr-defined]
+    corner = top[generator.integers(len(top))]
+    above = corner * (1 + 0.3 / np.linalg.norm(corner))
+    place = np.vstack([position, above, above + np.array([0.0, 0.8, 0.0]), np.zeros(3)])
+    turns = np.vstack([quaternion, np.tile(UPRIGHT, (3, 1))])
+    rates = np.vstack([generator.normal(size=(4, 6)), np.zeros(6)])
+    motion = Motion(place, turns, rates[:, :3], rates[:, 3:])
+    arrays = shapes_3d(shapes, np.array([True, True, True, True, False]))
+    h = 1e-4
+
+    def gaps(t: float) -> dict[int, float]:
+        there = motion_displaced(motion, t * rates)
+        found = detect_3d(arrays, there.position, there.angle, 0.05)
+        return dict(zip(found.key.tolist(), found.gap.tolist(), strict=True))
+
+    found = detect_3d(arrays, place, turns, 0.05)
+    exact = inertial_acceleration(found, motion)[:, 0]
+    ahead, behind = gaps(h), gaps(-h)
+    checked = 0
+    for k, key in enumerate(found.key.tolist()):
+        feature = key & (2 * MOST_EDGES - 1)
+        crossing = (key >> FEATURE_BITS) & (2 * MOST_EDGES - 1) >= MOST_EDGES
+        on_edge = False
+        if found.radius_b[k] == 0.0:
+            solid = shapes[found.body_b[k]]
+            assert isinstance(solid, Polyhedron)
+            on_edge = feature < len(solid.faces) + len(solid.edges)
+        if crossing or on_edge or key not in ahead or key not in behind:
+            continue
+        second = (ahead[key] - 2 * found.gap[k] + behind[key]) / h**2
+        # round-off 4e-16 / h^2 = 4e-8; truncation h^2 / 12 times the fourth derivative, up to
+        # |w|^4 = 1e3 and v^4 / R^3 = 1e3 here
+        assert second == pytest.approx(exact[k], abs=1e-5, rel=1e-5)
+        checked += 1
     assert checked > 0
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_lcp.contacts import Contacts, contact_frames
+from rigid_lcp.contacts import contact_frames
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
@@ -119,12 +119,9 @@ def test_normal_work_is_never_positive(e: float, start: float, before: float, fr
 
     ``start >= 0``: gap at the start of the step, ``start + h/2 u_N-`` at its midpoint.
     """
-    h, one, number = 1e-3, np.ones(1), np.zeros(1, np.int64)
-    contacts = Contacts(
-        number, number, np.zeros((1, 2)), np.array([[0.0, 1.0]]), one * (start + h / 2 * before),
-        number, 0 * one, np.inf * one, 0 * one, e * one,
-    )  # fmt: skip
-    shift = contact_shift(contacts, before * one, free * one, 0.0, h)[0]
+    h, one = 1e-3, np.ones(1)
+    gap = one * (start + h / 2 * before)
+    shift = contact_shift(e * one, gap, before * one, free * one, 0.0, h)[0]
     assert before - shift <= 1e-12
 
 
@@ -207,11 +204,10 @@ def test_driven_body_carries_another_along() -> None:
     assert run.positions[box, 0] == pytest.approx(0.3 - 1 / G, abs=1e-4)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_poured_grains_come_to_rest(seed: int) -> None:
+def test_poured_grains_come_to_rest() -> None:
     """A small heap loses its energy, and its overlaps stay below 1e-4 of a grain."""
-    run = poured(25, seed=seed, step=2e-3)
-    run.advance(0.8)
+    run = poured(12, step=2e-3)
+    run.advance(0.5)
     assert np.abs(run.velocities).max() < 0.05 * sqrt(G * 0.02)
     assert run.overlap < 1e-4 * run.world.length
     assert run.worst_residual < 1e-9

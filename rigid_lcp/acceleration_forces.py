@@ -1,0 +1,77 @@
+"""Contact forces at acceleration level: Coulomb's law for contacts that slide already, and others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from rigid_lcp.dantzig import dantzig
+from rigid_lcp.errors import NoSolution, NotConverged
+from rigid_lcp.friction_problem import BodySpace, FrictionSolution, friction_problem
+from rigid_lcp.pivoting import pivoting
+from rigid_lcp.solver import solve_friction
+from rigid_lcp.time_stepping import forces_error
+
+Floats = NDArray[np.float64]
+
+ACCEPTED = 1e-8
+"""Residual of forces or impulses above which a step is not made."""
+
+
+def forces_found(
+    bodies: BodySpace, offset: Floats, friction: Floats, slip: Floats, tolerance: float,
+    gravity: float,
+) -> tuple[FrictionSolution, float]:  # fmt: skip
+    """Contact forces (eqs 26, 27), and their error over the forces that ``gravity`` [m/s^2] asks.
+
+    Where ``slip`` (nc, dim - 1) is not zero, friction opposes it: ``f_T = -mu f_N slip/|slip|``;
+    elsewhere it opposes the tangential acceleration.  Raises `NoSolution` or `NotConverged`.
+    """
+    dim = 1 + slip.shape[1]
+    if not (slip.any(axis=1) & (friction > 0)).any():
+        solution = solve_friction(bodies, offset, friction, dim=dim, tolerance=tolerance)
+    elif dim == 2:
+        problem = friction_problem(bodies, offset, friction, dim)
+        solution = pivoting(problem, None, tolerance, tangential_velocity=slip[:, 0])
+        if not solution.solved:
+            solution = dantzig(problem, None, tolerance, tangential_velocity=slip[:, 0])
+    else:
+        solution = _sliding_forces(bodies, offset, friction, slip, tolerance)
+    if solution.status == "no solution":
+        raise NoSolution(
+            "no finite contact forces obey Coulomb's law (Painleve)", where="contact forces",
+            remedy='use method="time-stepping", whose impulses always exist',
+        )  # fmt: skip
+    error = forces_error(bodies, solution, gravity)
+    if not error <= ACCEPTED:
+        raise NotConverged(
+            f"the contact forces have a residual of {error:.2g}",
+            where=f"{len(friction)} contacts",
+            remedy='use method="time-stepping"; ' + solution.message,
+        )
+    return solution, error
+
+
+def _sliding_forces(
+    bodies: BodySpace, offset: Floats, friction: Floats, slip: Floats, tolerance: float
+) -> FrictionSolution:
+    """3D: the columns of a sliding contact's normal force take its friction along.
+
+    With ``r = S s``, ``S`` the identity but for ``(1, -mu slip/|slip|)`` in the normal column of
+    a sliding contact, s is a friction problem of the matrix ``W S`` without friction there.
+    """
+    speed = np.linalg.norm(slip, axis=1)
+    sliding = np.flatnonzero(speed > 0)
+    dim = 1 + slip.shape[1]
+    along = -friction[sliding, None] * slip[sliding] / speed[sliding, None]
+    rows = (sliding[:, None] * dim + np.arange(1, dim)).ravel()
+    size = len(offset)
+    mixing = sp.eye_array(size, format="csr") + sp.csr_array(
+        (along.ravel(), (rows, np.repeat(sliding * dim, dim - 1))), shape=(size, size)
+    )
+    limits = np.where(speed > 0, 0.0, friction)
+    solution = solve_friction(bodies.matrix @ mixing, offset, limits, dim=dim, tolerance=tolerance)
+    return replace(solution, r=np.asarray(mixing @ solution.r))

@@ -1,0 +1,208 @@
+"""Collisions (section 7): impulses of hard grains that approach at their contacts, all at once.
+
+Where a contact approaches, no finite force stops it in time, only an impulse (eq. 32).  The seed's
+assumptions: all pairs collide at once; impulses push; a contact leaves at least at ``-eps v``; one
+that leaves faster had no impulse.  With the excess velocity ``dv = v' + eps v`` (eq. 34) that is
+
+    dv = (1 + eps) v + A dp,   dv >= 0,   dp >= 0,   dv dp = 0.       (35, 36)
+
+What it means: the stiffness went to infinity with every pair loaded at the same time.  The answer
+does not depend on an order of pairs, and differs from a chain of pair collisions: in Newton's
+cradle of three the last ball leaves with 2/3, not with all.
+
+Energy: ``E' - E = sum (1 - eps_c) dp_c v_c / 2``.  Contacts that part already (v > 0) are erased
+first (section 4, point 3), so every ``v_c <= 0``: energy never grows, also with different eps, and
+is conserved exactly at eps = 1.  Erased contacts may approach afterwards; then the next round
+follows, until nothing approaches.
+
+With friction, Coulomb's law acts on the impulses.  ``newton``: eps on normal velocities only; with
+several contacts, or oblique ones, energy can grow then (Kane's paradox).  ``moreau``: eps on normal
+and tangential velocities (Moreau, Unilateral contact and dry friction in finite freedom dynamics,
+1988): ``E' - E <= 0`` for one eps; for contacts of different eps neither is proved.  So energy is
+watched, and eps scaled down where it would grow: at eps = 0 it can not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.errors import ProblemError
+from rigid_lcp.friction_problem import BodySpace, FrictionProblem, FrictionSolution, Status
+from rigid_lcp.frictionless import frictionless
+
+Floats = NDArray[np.float64]
+Law = Literal["newton", "moreau"]
+
+ROUND_OFF = 1e-12
+"""Velocities this small against the largest of the collision are no approach; energies likewise."""
+
+
+@dataclass(frozen=True)
+class Collision:
+    """What a collision did."""
+
+    velocity: Floats
+    """Velocities of the bodies after it, (ndof,)."""
+    impulse: Floats
+    """Impulses of the contacts over all rounds [N s], (nc * dim,)."""
+    energy_change: float
+    """Kinetic energy after less before [J]."""
+    residual: float
+    """Largest scale-free residual of the rounds [-]."""
+    status: Status
+    rounds: int
+    """Rounds until no contact approached."""
+    restitution_scale: float
+    """Smallest factor eps had to be multiplied by for energy not to grow; 1 without friction."""
+    message: str = ""
+
+    @property
+    def solved(self) -> bool:
+        """Nothing approaches any more, and every round reached its tolerance."""
+        return self.status == "solved"
+
+
+def collide(
+    bodies: BodySpace,
+    velocity: ArrayLike,
+    restitution: ArrayLike,
+    friction: ArrayLike = 0.0,
+    *,
+    law: Law = "moreau",
+    energy: Literal["safe", "watched"] = "safe",
+    tolerance: float = 1e-12,
+    max_rounds: int = 50,
+) -> Collision:
+    """Velocities after a collision by eqs 33 to 36, and the impulses that change them.
+
+    ``velocity`` (ndof,) of the bodies [m/s, 1/s]; ``restitution`` eps and ``friction`` mu, (nc,) or
+    one number, eps in [0, 1].  ``law``: what eps acts on with friction.  ``energy``: ``safe``
+    scales eps down until energy does not grow, ``watched`` says so in the message only.
+    After ``max_rounds`` the rest is taken without restitution, which ends.
+
+    Raises `ProblemError` for malformed input.  Contacts are those of J: also touching ones with
+    v = 0 take part, as they pass impulses on.
+    """
+    before = np.asarray(velocity, dtype=float).ravel()
+    dim = 2 if bodies.body_size == 3 else 3
+    nc = bodies.jacobian.shape[0] // dim
+    eps, mu = _checked(bodies, before, restitution, friction, nc)
+    scale = float(np.abs(bodies.jacobian @ before).max(initial=0.0))
+    after, impulse = before.copy(), np.zeros(nc * dim)
+    worst, rounds, factor, notes = 0.0, 0, 1.0, ""
+    status: Status = "solved"
+    while True:
+        normal = (bodies.jacobian @ after)[::dim]
+        if not (normal < -ROUND_OFF * scale).any():
+            break
+        if rounds > max_rounds:
+            status, notes = "not converged", f"contacts still approach after {rounds} rounds"
+            break
+        last = rounds == max_rounds
+        taking = np.arange(nc) if last else np.flatnonzero(normal <= ROUND_OFF * scale)
+        part, solution, used = collision_round(
+            bodies, after, taking, eps * (not last), mu, dim, law, energy, tolerance
+        )
+        impulse += part
+        after = after + bodies.inverse_mass @ (bodies.jacobian.T @ part)
+        worst, rounds, factor = max(worst, solution.residual), rounds + 1, min(factor, used)
+        if not solution.solved:
+            status, notes = solution.status, solution.message
+            break
+    # the work of the impulses at the mean velocity: no difference of large energies
+    change = 0.5 * float(impulse @ (bodies.jacobian @ (before + after)))
+    size = float(np.abs(impulse) @ np.abs(bodies.jacobian @ before))
+    if factor < 1.0:
+        notes = f"restitution was scaled by {factor:.3g}, as energy would have grown" + notes
+    if change > ROUND_OFF * size:
+        notes = f"energy grew by {change:.3g} J\n  -> use energy='safe', or law='moreau'" + notes
+    return Collision(after, impulse, change, worst, status, rounds, factor, notes)
+
+
+def collision_round(
+    bodies: BodySpace, velocity: Floats, taking: NDArray[np.int64], eps: Floats, mu: Floats,
+    dim: int, law: Law, energy: str, tolerance: float,
+) -> tuple[Floats, FrictionSolution, float]:  # fmt: skip
+    """Impulses of one round on the contacts that take part; the solution; the factor of eps."""
+    rows = (dim * taking[:, None] + np.arange(dim)).ravel()
+    part = BodySpace(sp.csr_array(bodies.jacobian[rows]), bodies.inverse_mass, bodies.body_size)
+    v = part.jacobian @ velocity
+    factor = 1.0
+    while True:
+        used = factor * eps[taking]
+        excess = v.reshape(-1, dim).copy()
+        excess[:, 0] += used * v[::dim]  # (1 + eps) v: eq. 35
+        if law == "moreau":
+            excess[:, 1:] += used[:, None] * v.reshape(-1, dim)[:, 1:]
+        problem = FrictionProblem(None, excess.ravel(), mu[taking], dim, part)
+        solution = impulses_of(problem, tolerance)
+        p = solution.r
+        change = 0.5 * float(p @ (2.0 * v + part.product(p)))
+        size = float(np.abs(p) @ np.abs(v))
+        if energy != "safe" or change <= ROUND_OFF * size or factor == 0.0 or not used.any():
+            break
+        factor = 0.5 * factor if factor > 0.01 else 0.0
+    impulse = np.zeros(bodies.jacobian.shape[0])
+    impulse[rows] = p
+    return impulse, solution, factor
+
+
+def impulses_of(problem: FrictionProblem, tolerance: float) -> FrictionSolution:
+    """Solve eq. 36 without friction, or Coulomb's law on impulses with it."""
+    if not problem.friction.any():
+        return frictionless(problem, None, tolerance)
+    if problem.dim == 2 and problem.contacts <= 300:
+        from rigid_lcp.pivoting import pivoting
+
+        found = pivoting(problem, None, tolerance)
+        if found.solved:
+            return found
+    from rigid_lcp.solver import solve_friction
+
+    solution: FrictionSolution = solve_friction(
+        problem.bodies, problem.offset, problem.friction, problem.dim, tolerance=tolerance
+    )
+    return solution
+
+
+def kinetic_energy(bodies: BodySpace, velocity: Floats) -> float:
+    """``v M v / 2`` [J] of all bodies; freedoms of infinite mass (M^-1 = 0) have none."""
+    inverse = bodies.inverse_mass.toarray()
+    moves = np.flatnonzero(inverse.any(axis=1))
+    v = velocity[moves]
+    return 0.5 * float(v @ np.linalg.solve(inverse[np.ix_(moves, moves)], v))
+
+
+def _checked(
+    bodies: BodySpace, velocity: Floats, restitution: ArrayLike, friction: ArrayLike, nc: int
+) -> tuple[Floats, Floats]:
+    if velocity.shape != (bodies.jacobian.shape[1],) or not np.isfinite(velocity).all():
+        raise ProblemError(
+            f"the velocity is not {bodies.jacobian.shape[1]} finite numbers", where="velocity",
+            remedy="give one number a freedom of the bodies, as J has columns",
+        )  # fmt: skip
+    found = []
+    for name, values, upper in (
+        ("restitution", restitution, 1.0),
+        ("friction", friction, np.inf),
+    ):
+        array = np.asarray(values, dtype=float)
+        if array.shape not in ((), (nc,)):
+            raise ProblemError(
+                f"{name} has shape {array.shape} for {nc} contacts", where=name,
+                remedy="give one number, or one a contact",
+            )  # fmt: skip
+        array = np.broadcast_to(array, (nc,)).copy()
+        bad = np.flatnonzero(~(np.isfinite(array) & (array >= 0.0) & (array <= upper)))
+        if len(bad):
+            raise ProblemError(
+                f"{name} is {array[bad[0]]:g}", where=f"{name}, contact {bad[0]}",
+                remedy="give a number of 0 or more" + (", at most 1" if upper == 1.0 else ""),
+            )  # fmt: skip
+        found.append(array)
+    return found[0], found[1]

@@ -1,0 +1,200 @@
+"""What happens to contacts between two Runge-Kutta steps: they last, collide, stop sliding, drift.
+
+Lengths are told by the size of the smallest movable body, velocities by ``sqrt(g size)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.acceleration_forces import ACCEPTED
+from rigid_lcp.contacts import Contacts, contact_rows
+from rigid_lcp.equations import body_space, relative_velocity
+from rigid_lcp.errors import NotConverged
+from rigid_lcp.friction_problem import BodySpace
+from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
+from rigid_lcp.scene import World
+from rigid_lcp.solver import solve_friction
+from rigid_lcp.time_stepping import forces_error
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+TOUCH = 1e-9
+"""Gap below which two bodies touch, as a share of the smallest body's size."""
+OVERLAP = 1e-11
+"""Overlap that makes a step too long, likewise."""
+DRIFT = 1e-3
+"""Overlap that contacts which press all the time may have before it is removed, likewise."""
+REST_SPEED = 1e-4
+"""Approach that ends without a bounce, as a share of ``sqrt(g size)``."""
+STILL = 1e-9
+"""Relative velocity that counts as none, normal or tangential, likewise."""
+
+
+@dataclass(frozen=True)
+class Lasting:
+    """The contacts that touch and do not part, as a step takes them to be."""
+
+    contacts: Contacts
+    slip: Floats
+    """Tangential velocities (nc, dim - 1) [m/s], zero for contacts that may stick."""
+
+    @property
+    def sliding(self) -> Bools:
+        """Contacts whose friction has its direction from the velocity, (nc,)."""
+        return (self.slip != 0).any(axis=1)
+
+
+def speed_scale(world: World, motion: Motion) -> float:
+    """``sqrt(g size)`` [m/s]; without gravity the greatest speed there is."""
+    gravity = float(np.linalg.norm(world.scene.gravity))
+    if gravity > 0:
+        return float(np.sqrt(gravity * world.length))
+    return float(np.abs(motion.velocity).max(initial=0.0))
+
+
+def lasting_contacts(world: World, motion: Motion) -> Lasting:
+    """Contacts that touch and neither approach nor part; sliding above ``STILL`` is a slip."""
+    contacts = world.contacts(motion, 0.5 * TOUCH * world.length)
+    velocity = relative_velocity(contacts, motion)
+    still = STILL * speed_scale(world, motion)
+    stay = velocity[:, 0] <= still
+    slip = velocity[stay, 1:]
+    slip[np.linalg.norm(slip, axis=1) <= still] = 0.0
+    return Lasting(contacts[stay], slip)
+
+
+def contacts_again(
+    world: World, motion: Motion, h: float, lasting: Lasting
+) -> tuple[Contacts, Floats]:
+    """The lasting contacts at a stage of the step, and the slip that directs their friction."""
+    if len(lasting.contacts) == 0:
+        return lasting.contacts, lasting.slip
+    travel = h * (
+        np.linalg.norm(motion.velocity, axis=1)
+        + np.linalg.norm(motion.rates[:, motion.dim :], axis=1) * world.reach
+    )
+    found = world.contacts(motion, travel + 10 * TOUCH * world.length)
+    rows, there = contact_rows(found.key, lasting.contacts.key)
+    contacts, slip = found[rows[there]], lasting.slip[there]
+    if motion.dim == 3:
+        now = relative_velocity(contacts, motion)[:, 1:]
+        slip = np.where((slip != 0).any(axis=1)[:, None], now, 0.0)
+    return contacts, slip
+
+
+def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, bool]:
+    """Velocities after the collisions of touching bodies (eqs 32-36), and whether there were any.
+
+    All at once: excess velocities ``u+ + e u-`` (eq. 34) under Coulomb's law for the impulses.
+    """
+    contacts = world.contacts(motion, 0.5 * TOUCH * world.length)
+    if len(contacts) == 0:
+        return motion, False
+    before = relative_velocity(contacts, motion)
+    scale = speed_scale(world, motion)
+    if before[:, 0].min() >= -STILL * scale:
+        return motion, False
+    bounce = before[:, 0] < -REST_SPEED * scale
+    excess = before.copy()
+    excess[:, 0] += np.where(bounce, contacts.restitution * before[:, 0], 0.0)
+    bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+    solution = solve_friction(
+        bodies, excess.ravel(), contacts.friction, dim=motion.dim, tolerance=tolerance
+    )
+    error = forces_error(bodies, solution, STILL * scale)
+    if not error <= ACCEPTED:
+        raise NotConverged(
+            f"the impulses of a collision have a residual of {error:.2g}",
+            where=f"{len(contacts)} contacts", remedy=solution.message,
+        )  # fmt: skip
+    return _pushed(world, motion, bodies, solution.r), True
+
+
+def share_until_rest(world: World, after: Motion, lasting: Lasting) -> float:
+    """Share of the step after which the first sliding contact came to rest; 1 if none did.
+
+    2D only, where friction has two directions; in 3D the direction turns with the velocity.
+    """
+    if after.dim == 3 or not lasting.sliding.any():
+        return 1.0
+    found = world.contacts(after, 5 * TOUCH * world.length)
+    rows, there = contact_rows(found.key, lasting.contacts.key)
+    there &= lasting.sliding & (lasting.contacts.friction > 0)
+    if not there.any():
+        return 1.0
+    now = relative_velocity(found[rows[there]], after)[:, 1]
+    then = lasting.slip[there, 0]
+    still = STILL * speed_scale(world, after)
+    turned = (now * then < 0) & (np.abs(now) > still)
+    return float((then[turned] / (then[turned] - now[turned])).min(initial=1.0))
+
+
+def overlap_beyond(world: World, motion: Motion, pressed: Ints) -> float:
+    """Overlap that makes the step too long [m]: of contacts not ``pressed`` all the time (keys).
+
+    That of lasting contacts is an error of the integration, which `drift_removed` takes out; it
+    counts above ``DRIFT`` only.
+    """
+    found = world.contacts(motion, 0.0)
+    lasting = np.isin(found.key, pressed)
+    overlap = -found.gap
+    overlap[lasting & (overlap < DRIFT * world.length)] = 0.0
+    return float(overlap.max(initial=0.0))
+
+
+def drift_removed(world: World, motion: Motion, pressed: Ints, stuck: Ints) -> Motion:
+    """The smallest change after which lasting contacts are closed and at rest.
+
+    Keys ``pressed``: contacts that pressed all through the step; ``stuck``: those whose friction
+    was below its limit as well, so that their tangential velocities vanish too.
+    """
+    if len(pressed) == 0:
+        return motion
+    found = world.contacts(motion, DRIFT * world.length)
+    contacts = found[np.isin(found.key, pressed)]
+    if len(contacts) == 0:
+        return motion
+    wanted = np.repeat(np.isin(contacts.key, stuck)[:, None], motion.dim, axis=1)
+    closing = np.zeros(wanted.shape, dtype=bool)
+    closing[:, 0] = wanted[:, 0] = True
+    gaps = np.zeros(wanted.shape)
+    gaps[:, 0] = contacts.gap
+    motion = _constrained(world, motion, contacts, gaps, closing, velocities=False)
+    velocity = relative_velocity(contacts, motion)
+    return _constrained(world, motion, contacts, velocity, wanted, velocities=True)
+
+
+def _constrained(
+    world: World, motion: Motion, contacts: Contacts, value: Floats, rows: Bools, *,
+    velocities: bool,
+) -> Motion:  # fmt: skip
+    """``M^-1 J^T lambda`` added to velocities or places, so that ``value`` vanishes in ``rows``."""
+    if not value[rows].any():
+        return motion
+    bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+    kept = np.flatnonzero(rows.ravel())
+    matrix = bodies.matrix[kept][:, kept].toarray()
+    push = np.zeros(value.size)
+    push[kept] = np.linalg.lstsq(matrix, -value.ravel()[kept], rcond=1e-12)[0]
+    if velocities:
+        return _pushed(world, motion, bodies, push)
+    move = np.zeros_like(motion.rates)
+    move[world.movable] = _response(bodies, push, world.size)
+    return motion_displaced(motion, move)
+
+
+def _pushed(world: World, motion: Motion, bodies: BodySpace, impulse: Floats) -> Motion:
+    rates = motion.rates
+    rates[world.movable] += _response(bodies, impulse, world.size)
+    return motion_with_rates(motion, rates)
+
+
+def _response(bodies: BodySpace, impulse: Floats, size: int) -> Floats:
+    change = bodies.inverse_mass @ (bodies.jacobian.T @ impulse)
+    return np.asarray(change).reshape(-1, size)

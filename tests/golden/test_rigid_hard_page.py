@@ -1,0 +1,71 @@
+"""docs/rigid-hard-cases.md is made from the committed record, and the record holds its bars."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from validation.rigid_hard_page import PAGE, RECORD, page, record_lines, record_read
+from validation.rigid_hard_trials import Row
+
+ORIGIN = {"commit": "c", "command": "x", "machine": "m", "started": "now"}
+
+
+def row(**changes: object) -> Row:
+    given = {
+        "case": "box", "answer": "rests", "method": "time-stepping", "measure": "move",
+        "value": 1e-12, "bar": "<= 1e-09", "ok": True, "unit": "m", "cpu_s": 0.5, "steps": 10,
+    }  # fmt: skip
+    return Row(**(given | changes))  # type: ignore[arg-type]
+
+
+def test_page_is_that_of_the_record() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(record_read())
+
+
+def test_every_case_has_a_row_of_ours_and_misses_are_told() -> None:
+    lines = record_read()
+    text = PAGE.read_text(encoding="utf-8")
+    assert {line["case"] for line in lines if not line["peer"]} == {line["case"] for line in lines}
+    misses = [line for line in lines if not line["peer"] and not line["ok"]]
+    assert ("Where ours misses its bar" in text) == bool(misses)
+    for line in misses:
+        assert f"* {line['case']}, {line['method']}: " in text
+
+
+@pytest.mark.parametrize(
+    "family",
+    [
+        "1e4 times heavier", "mu = tan 20°", "1 - 1e-9", "1 + 1e-9", "block at rest", "card house",
+        "wedge", "arch of", "Painleve rod", "bouncing", "needles", "coincident edges",
+        "tower of 200", "jammed hopper", "light on heavy",
+    ],
+)  # fmt: skip
+def test_no_hard_case_is_missing(family: str) -> None:
+    assert any(family in line["case"] for line in record_read())
+
+
+def test_a_miss_is_bold_and_told() -> None:
+    """Of two rows the second misses: it is bold, and has a line below the table."""
+    text = page(record_lines([row(), row(method="acceleration", value=1.0, ok=False)], ORIGIN))
+    assert "1 of 2 rows of ours" in text
+    assert "**1**" in text
+    assert "* box, acceleration: move 1 against <= 1e-09 m." in text
+
+
+def test_a_peer_without_a_number_has_its_reason() -> None:
+    """Blown up, or never run: said in the table and below it, and valid JSON in the record."""
+    nan, inf = float("nan"), float("inf")
+    gone = row(method="ODE", value=nan, ok=False, cpu_s=nan, steps=0, why="no discs", peer=True)
+    blown = row(method="MuJoCo 4", value=inf, ok=False, peer=True)
+    lines = record_lines([row(), gone, blown], ORIGIN)
+    assert "NaN" not in json.dumps(lines)
+    text = page(lines)
+    assert "* ODE: no discs (1 case)" in text
+    assert "blew up" in text
+    assert "Peers that ran: MuJoCo 4." in text
+
+
+def test_record_is_plain_json_a_line_each() -> None:
+    assert all(json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines())

@@ -1,0 +1,62 @@
+"""The page on the solvers of rigid contact against its record."""
+
+from __future__ import annotations
+
+import pytest
+
+from validation import rigid_report as report
+from validation.rigid_page import PAGE_PATH, page
+from validation.rigid_picture import PICTURE
+from validation.rigid_runs import RECORD, rows_read
+
+ROWS = rows_read(RECORD)
+
+
+def test_the_page_is_what_the_record_says() -> None:
+    """Written by `python -m validation.rigid_page`, and not by hand."""
+    assert PAGE_PATH.read_text(encoding="utf-8") == page(ROWS)
+    assert PICTURE.exists()
+
+
+def test_rows_are_whole() -> None:
+    """Each says what it is, who made it and, where there is no answer, why."""
+    assert ROWS
+    for row in ROWS:
+        assert {"case", "method", "setting", "seed", "work", "work_unit", "ok", "why"} <= set(row)
+        assert row["commit"]
+        assert row["started"]
+        if row["error"] is None:
+            assert not row["ok"]
+            assert row["why"]
+        elif row["case"] == "rigid-solvers":
+            assert row["ok"] == (row["error"] <= max(row["setting"]["tolerance"], row["bar"]))
+            assert row["cost_s"] >= 0
+
+
+def test_no_failure_of_ours_is_silent() -> None:
+    """A run of ours that misses what was asked for says so."""
+    assert report.silent_failures(ROWS) == []
+
+
+def test_every_method_of_a_problem_is_raced() -> None:
+    """No problem lacks our default or the plain hybrid that it is measured against."""
+    for name, each in report.problems(ROWS).items():
+        made = {row["method"] for row in each}
+        assert {report.OURS, report.HYBRID} <= made, name
+
+
+def test_the_case_judges_the_record() -> None:
+    """Every family and each packing within the bar on Siconos is judged."""
+    from validation.cases.rigid import record_checks
+
+    names = [check.name for check in record_checks(ROWS)]
+    assert len(set(names)) == len(names)
+    for family in report.families(ROWS):
+        assert any(name.startswith(f"{family}: problems of") for name in names)
+
+
+@pytest.mark.parametrize("method", ["dantzig", "dantzig, reversal"])
+def test_without_friction_dantzig_always_solves(method: str) -> None:
+    """The seed's algorithm at friction zero, all orders of contacts."""
+    solved, orders = report.dantzig_success(ROWS, method)[0.0]
+    assert solved == orders == 10

@@ -1,0 +1,104 @@
+"""Small friction problems for tests: contact networks of grains, towers, and stored real ones."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+
+Floats = NDArray[np.float64]
+GRAVITY, STEP = 9.81, 1e-3
+
+
+def network_bodies(
+    grains: int, seed: int, *, ratio: float = 4.0, kept: float = 0.62
+) -> tuple[BodySpace, Floats]:
+    """Grains at random places that touch their neighbours at points between them, on fixed ones.
+
+    Returns J and M^-1, and velocities after a time step of free fall and some shaking.  The more
+    neighbours are kept as contacts, the more the network is hyperstatic.
+    """
+    g = np.random.default_rng(seed)
+    side = int(np.ceil(np.sqrt(grains)))
+    grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2)[:grains]
+    place = grid + g.uniform(-0.3, 0.3, (grains, 2))
+    place[:, 0] += 0.5 * (np.arange(grains) // side % 2)
+    triangles = Delaunay(place).simplices
+    pairs = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [0, 2]]])
+    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
+    pairs = pairs[np.linalg.norm(place[pairs[:, 0]] - place[pairs[:, 1]], axis=1) < 1.8]
+    pairs = pairs[g.random(len(pairs)) < kept]
+    fixed = np.arange(grains) < side
+    pairs = pairs[~(fixed[pairs].all(axis=1))]
+    jacobian = np.zeros((2 * len(pairs), 3 * grains))
+    for c, (a, b) in enumerate(pairs):
+        normal = (place[a] - place[b]) / np.linalg.norm(place[a] - place[b])
+        point = 0.5 * (place[a] + place[b])
+        for body, sign in ((a, 1.0), (b, -1.0)):
+            if not fixed[body]:
+                rows = contact_rows(normal, point - place[body])
+                jacobian[2 * c : 2 * c + 2, 3 * body : 3 * body + 3] = sign * rows
+    mass = g.uniform(1.0, ratio, grains)
+    inverse = np.repeat(1.0 / mass, 3)
+    inverse[2::3] *= 8.0  # discs of radius 1/2
+    velocity = 5e-4 * g.normal(size=3 * grains)
+    velocity[1::3] -= GRAVITY * STEP
+    bodies = BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.diags_array(inverse)), 3)
+    return bodies, velocity
+
+
+def contact_rows(normal: Floats, arm: Floats) -> Floats:
+    """Rows n, t of J for one body: ``n . (v + w x arm)``, t a quarter turn from n."""
+    tangent = np.array([-normal[1], normal[0]])
+    return np.array([[d[0], d[1], arm[0] * d[1] - arm[1] * d[0]] for d in (normal, tangent)])
+
+
+def network(grains: int, mu: float, seed: int = 0) -> FrictionProblem:
+    """The friction problem of `network_bodies`, with W as a matrix."""
+    bodies, velocity = network_bodies(grains, seed)
+    return friction_problem(bodies.matrix, bodies.jacobian @ velocity, mu, 2)
+
+
+def tower_bodies(boxes: int, top: float = 1.0) -> BodySpace:
+    """Unit boxes on each other, two contacts a face: redundant by one friction force each."""
+    jacobian = np.zeros((4 * boxes, 3 * boxes))
+    for box in range(boxes):
+        for k, x in enumerate((-0.5, 0.5)):
+            row = 4 * box + 2 * k
+            up = np.array([0.0, 1.0])
+            jacobian[row : row + 2, 3 * box : 3 * box + 3] = contact_rows(up, np.array([x, -0.5]))
+            if box:
+                below = contact_rows(up, np.array([x, 0.5]))
+                jacobian[row : row + 2, 3 * box - 3 : 3 * box] = -below
+    mass = np.ones(boxes)
+    mass[-1] = top
+    inverse = np.repeat(1.0 / mass, 3)
+    inverse[2::3] *= 6.0
+    return BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.diags_array(inverse)), 3)
+
+
+def tower(boxes: int, mu: float, top: float = 1.0) -> FrictionProblem:
+    """A tower under gravity for a step, at rest before."""
+    bodies = tower_bodies(boxes, top)
+    fall = np.zeros(3 * boxes)
+    fall[1::3] = -GRAVITY * STEP
+    return friction_problem(bodies.matrix, bodies.jacobian @ fall, mu, 2)
+
+
+def stored(name: str, mu: float | None = None) -> FrictionProblem:
+    """A real problem from the folder ``TRACKBED_DATA`` names; skips where it is not set."""
+    home = os.environ.get("TRACKBED_DATA", "")
+    path = Path(home) / "friction_problems" / f"{name}.npz"
+    if not home or not path.exists():
+        pytest.skip("TRACKBED_DATA does not name a folder with friction_problems/" + name)
+    numbers = np.load(path)
+    matrix = sp.load_npz(path.with_name(f"{name}_W.npz"))
+    friction = numbers["mu"] if mu is None else mu
+    return friction_problem(matrix, numbers["q"], friction, int(numbers["dim"]))

@@ -1,0 +1,212 @@
+"""Scenes in space with known answers: rest, the threshold of sliding, rolling, towers, piles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigid_lcp.gyroscopic import Floats, angular_momentum
+from rigid_lcp.polyhedra import ballast_stone
+from rigid_lcp.rotations import quaternion_of_rotation, unit_quaternion
+from rigid_lcp.scene import Scene
+from rigid_lcp.shapes_2d import HalfSpace
+from rigid_lcp.shapes_3d import Sphere, box
+from rigid_lcp.simulation import Simulation
+
+G = 9.81
+FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)
+
+
+def on_floor(shape: object, **state: object) -> Simulation:
+    scene = Scene(dim=3)
+    scene.add(shape, density=2000.0, **state)  # type: ignore[arg-type]
+    scene.add(FLOOR)
+    return Simulation(scene)
+
+
+def test_box_at_rest_stays_and_weighs_what_it_should() -> None:
+    run = on_floor(box(1.0, 0.6, 0.4), position=[0.0, 0.0, 0.2], friction=0.5)
+    run.advance(0.3)
+    assert np.abs(run.positions[0] - [0.0, 0.0, 0.2]).max() < 1e-14
+    assert np.abs(run.velocities).max() < 1e-14
+    weight = 2000.0 * 0.24 * G
+    assert run.contacts.normal_force.sum() == pytest.approx(weight, rel=1e-12)
+
+
+# --- the threshold of sliding, in every direction ---
+
+
+@pytest.mark.parametrize("excess", [-1e-6, 0.0, 1e-6])
+@pytest.mark.parametrize("azimuth", [0.0, 0.3, np.pi / 4, 2.0])
+def test_box_on_incline_slides_below_the_angle_of_friction(excess: float, azimuth: float) -> None:
+    """mu = tan(alpha) (1 + excess): at rest for excess >= 0, else a = g sin(alpha) |excess|.
+
+    The incline is turned about the vertical by ``azimuth``: the cone has no corners to feel.
+    """
+    alpha, seconds = np.deg2rad(20.0), 0.1
+    downhill = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    normal = np.sin(alpha) * downhill + [0.0, 0.0, np.cos(alpha)]
+    turn = quaternion_of_rotation(alpha * np.array([-np.sin(azimuth), np.cos(azimuth), 0.0]))
+    scene = Scene(dim=3)
+    friction = np.tan(alpha) * (1 + excess)
+    scene.add(box(1.0, 1.0, 0.5), density=1e3, position=0.25 * normal, angle=turn,
+              friction=friction)  # fmt: skip
+    scene.add(HalfSpace(normal, 0.0))
+    run = Simulation(scene)
+    run.advance(seconds)
+    slope = np.cos(alpha) * downhill - [0.0, 0.0, np.sin(alpha)]
+    wanted = max(-excess, 0.0) * G * np.sin(alpha) * seconds**2 / 2 * slope
+    # residual of the forces 1e-12 (of g) over the time of the run
+    assert np.allclose(run.positions[0] - 0.25 * normal, wanted, rtol=0, atol=G * 1e-12)
+
+
+def test_a_kicked_box_slides_straight_in_every_direction() -> None:
+    """A box pushed along the floor stops after v^2 / (2 mu g), straight ahead."""
+    for azimuth in (0.0, 0.7, np.pi / 4):
+        ahead = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        turn = quaternion_of_rotation([0.0, 0.0, azimuth])
+        run = on_floor(box(1.0, 1.0, 0.1), position=[0.0, 0.0, 0.05], friction=0.4,
+                       angle=turn, velocity=0.5 * ahead)  # fmt: skip
+        run.advance(0.2)
+        reached = run.positions[0] - [0.0, 0.0, 0.05]
+        # the last step of h = 1e-3 in which it stops: mu g h^2 / 8
+        assert reached @ ahead == pytest.approx(0.25 / (2 * 0.4 * G), abs=0.4 * G * 1e-6)
+        assert np.linalg.norm(reached - (reached @ ahead) * ahead) < 1e-10
+
+
+# --- spheres ---
+
+
+def test_a_sphere_with_backspin_rolls_as_the_textbook_says() -> None:
+    """Friction mu g against the first slip s0 until it is gone, at t = 2 |s0| / (7 mu g).
+
+    Then the sphere rolls with ``v = (5 v0 - 2 w0 x x) / 7``, x from the centre to the floor: the
+    angular momentum about the contact is kept.  With oblique backspin the path is a parabola.
+    """
+    radius, v0 = 0.1, np.array([1.0, 0.2, 0.0])
+    spin0 = np.array([3.0, -10.0, 7.0])
+    run = on_floor(Sphere(radius), position=[0.0, 0.0, radius], velocity=v0, spin=spin0,
+                   friction=0.5)  # fmt: skip
+    slip = v0 + np.cross(spin0, [0.0, 0.0, -radius])
+    duration = 2 * np.linalg.norm(slip) / (7 * 0.5 * G)
+    run.advance(0.5 * duration)
+    wanted = v0 - 0.5 * G * 0.5 * duration * slip / np.linalg.norm(slip)
+    assert np.allclose(run.velocities[0], wanted, atol=1e-9)  # slides: constant deceleration
+    run.advance(duration)
+    rolling = (5 * v0 - 2 * np.cross(spin0, [0.0, 0.0, -radius])) / 7
+    assert np.allclose(run.velocities[0], rolling, atol=1e-9)
+    found = run.velocities[0] + np.cross(run.spins[0], [0.0, 0.0, -radius])
+    assert np.linalg.norm(found) < 1e-9
+
+
+def test_a_sphere_spins_on_like_a_top() -> None:
+    """A point contact has no moment about its normal: a sphere that stands keeps its spin."""
+    run = on_floor(Sphere(0.1), position=[0.0, 0.0, 0.1], spin=[0.0, 0.0, 50.0], friction=0.8)
+    run.advance(0.3)
+    assert np.allclose(run.spins[0], [0.0, 0.0, 50.0], rtol=1e-13)
+    assert np.abs(run.positions[0] - [0.0, 0.0, 0.1]).max() < 1e-13
+
+
+def test_a_spinning_stone_flies_on_a_parabola_with_its_momentum() -> None:
+    stone = ballast_stone(np.random.default_rng(0), 0.05)
+    scene = Scene(dim=3)
+    spin = np.array([20.0, -35.0, 10.0])
+    scene.add(stone, density=2700.0, position=[0.0, 0.0, 1.0], velocity=[1.0, 2.0, 3.0], spin=spin)
+    run = Simulation(scene, step=1e-3)
+    inertia = stone.mass_properties(2700.0)[1]
+    momentum = angular_momentum(inertia, run.angles[0], spin)
+    energy = run.energy
+    run.advance(0.2)
+    fallen = np.array([0.2, 0.4, 1.0 + 0.6 - G * 0.02])
+    assert np.allclose(run.positions[0], fallen, atol=1e-12)
+    found = angular_momentum(inertia, run.angles[0], run.spins[0])
+    assert np.allclose(found, momentum, rtol=0, atol=1e-12 * np.linalg.norm(momentum))
+    # second order: (w h)^2 = 1.6e-3 of the energy of rotation, which is bounded
+    assert run.energy == pytest.approx(energy, rel=1e-4)
+
+
+# --- towers and piles ---
+
+
+@pytest.mark.parametrize("top", [1.0, 1e4])
+def test_a_tower_of_ten_boxes_stands(top: float) -> None:
+    scene = Scene(dim=3)
+    start = np.array([[0.0, 0.0, 0.5 + k] for k in range(10)])
+    for k, place in enumerate(start):
+        density = 1e3 * (top if k == 9 else 1.0)
+        scene.add(box(1.0, 1.0, 1.0), density=density, position=place, friction=0.5)
+    scene.add(FLOOR)
+    run = Simulation(scene, step=5e-3)
+    run.advance(0.5)
+    assert len(run.contacts) == 40
+    assert np.abs(run.positions[:10] - start).max() < 1e-9
+    weight = 1e3 * G * (9 + top)
+    below = run.contacts.body_b == 10
+    assert run.contacts.normal_force[below].sum() == pytest.approx(weight, rel=1e-9)
+
+
+def test_a_twisted_tower_stands_on_crossing_edges() -> None:
+    """Every cube is turned by 30 degrees on the one below; the shared faces are dodecagons."""
+    scene = Scene(dim=3)
+    start = np.array([[0.0, 0.0, 0.5 + k] for k in range(5)])
+    for k, place in enumerate(start):
+        turn = quaternion_of_rotation([0.0, 0.0, k * np.pi / 6])
+        scene.add(box(1.0, 1.0, 1.0), density=1e3, position=place, angle=turn, friction=0.5)
+    scene.add(FLOOR)
+    run = Simulation(scene, step=5e-3)
+    run.advance(0.25)
+    assert np.abs(run.positions[:5] - start).max() < 1e-9
+
+
+def poured(count: int, size: float, seed: int) -> Scene:
+    """Stones at random angles in layers of nine, just apart, above the floor."""
+    generator = np.random.default_rng(seed)
+    scene = Scene(dim=3)
+    for number in range(count):
+        layer, cell = divmod(number, 9)
+        across = 1.35 * size * np.array([cell % 3 - 1.0, cell // 3 - 1.0])
+        scene.add(
+            ballast_stone(generator, size), density=2700.0, friction=0.6,
+            position=[*across, size * (0.8 + 1.4 * layer)],
+            angle=unit_quaternion(generator.normal(size=4)),
+        )  # fmt: skip
+    scene.add(FLOOR)
+    return scene
+
+
+def settle(run: Simulation, seconds: float, step: float) -> tuple[float, Floats]:
+    """Run; returns the greatest overlap on the way [m] and the energies [J]."""
+    overlap, energies = 0.0, [run.energy]
+    for _ in range(round(seconds / step)):
+        run.advance(step)
+        overlap = max(overlap, run.overlap)
+        energies.append(run.energy)
+    return overlap, np.array(energies)
+
+
+def check_pile(count: int, seconds: float) -> None:
+    size, step = 0.05, 4e-3
+    run = Simulation(poured(count, size, 7), step=step, tolerance=1e-9)
+    overlap, energies = settle(run, seconds, step)
+    # An overlap is what curvature leaves of a step: half of (w h)^2 times the reach, with spins
+    # of v / size at the impact, v^2 = 2 g times the height of the pour.
+    speed = np.sqrt(2 * G * size * (0.8 + 1.4 * (count // 9)))
+    assert overlap < 0.5 * (speed / size * step) ** 2 * size
+    assert run.overlap < 1e-3 * size
+    assert np.abs(run.velocities[:count]).max() < 0.02  # was 1 to 3 m/s
+    assert run.positions[:count, 2].min() > 0.2 * size
+    # A body that comes to rest within a step may gain m (g h)^2 / 8.
+    mass = sum(body.mass for body in run.world.scene.bodies[:count])
+    assert np.diff(energies).max() < mass * (G * step) ** 2 / 8 + 1e-9 * energies[0]
+    weight = mass * G
+    floor = run.contacts.body_b == count
+    assert run.contacts.force[floor, 2].sum() == pytest.approx(weight, rel=0.05)
+
+
+def test_a_handful_of_stones_comes_to_rest() -> None:
+    check_pile(9, 0.8)
+
+
+@pytest.mark.validate
+def test_a_pile_of_fifty_stones_comes_to_rest() -> None:
+    check_pile(50, 1.2)

@@ -1,0 +1,238 @@
+"""Collisions (section 7): closed forms, energy, momentum, corners, friction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_lcp.collisions import Collision, Floats, Law, collide, kinetic_energy
+from rigid_lcp.errors import ProblemError
+from rigid_lcp.friction_problem import BodySpace
+from tests.rigid_networks import contact_rows, network_bodies
+
+
+def cradle(balls: int) -> BodySpace:
+    """Equal balls of mass 1 in a row that touch; n along the row."""
+    jacobian = np.zeros((2 * (balls - 1), 3 * balls))
+    for c in range(balls - 1):
+        for ball, sign, arm in ((c + 1, 1.0, -0.5), (c, -1.0, 0.5)):
+            rows = contact_rows(np.array([1.0, 0.0]), np.array([arm, 0.0]))
+            jacobian[2 * c : 2 * c + 2, 3 * ball : 3 * ball + 3] = sign * rows
+    inverse = np.ones(3 * balls)
+    inverse[2::3] = 10.0
+    return BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.diags_array(inverse)), 3)
+
+
+def one_body(contacts: list[tuple[list[float], list[float]]], inertia: float) -> BodySpace:
+    """A body of mass 1 on fixed walls: normals and arms of its contacts."""
+    rows = [contact_rows(np.array(n), np.array(arm)) for n, arm in contacts]
+    inverse = sp.diags_array([1.0, 1.0, 1.0 / inertia])
+    return BodySpace(sp.csr_array(np.vstack(rows)), sp.csr_array(inverse), 3)
+
+
+def energy_of(bodies: BodySpace, velocity: Floats, found: Collision) -> tuple[float, float]:
+    """Kinetic energy before and after."""
+    return kinetic_energy(bodies, velocity), kinetic_energy(bodies, found.velocity)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize(
+    ("balls", "moving", "expected"),
+    [
+        (2, 1, [0.0, 1.0]),
+        (3, 1, [-1 / 3, 2 / 3, 2 / 3]),
+        (5, 1, [-0.6, 0.4, 0.4, 0.4, 0.4]),
+        (5, 2, [-0.2, -0.2, 0.8, 0.8, 0.8]),
+    ],
+)
+def test_cradle(balls: int, moving: int, expected: list[float], mu: float) -> None:
+    """The seed's law: all collide at once.  k balls into n: v' = v - 2 (n-k)/n, or + 2 k/n.
+
+    From eqs 35, 36 at eps = 1 all balls of a group leave alike; momentum and energy give the rest.
+    """
+    bodies = cradle(balls)
+    velocity = np.zeros(3 * balls)
+    velocity[: 3 * moving : 3] = 1.0
+    found = collide(bodies, velocity, 1.0, mu)
+    assert found.solved
+    assert found.velocity[::3] == pytest.approx(expected, abs=1e-12)
+    assert abs(found.energy_change) <= 1e-13
+
+
+@given(st.floats(0.0, 1.0), st.integers(0, 10**6))
+@settings(deadline=None, max_examples=25)
+def test_energy_is_as_derived(eps: float, seed: int) -> None:
+    """One eps, one round: ``E' - E = -(1 - eps)/2 dp . |v|``; and no contact approaches."""
+    bodies, velocity = network_bodies(30, seed)
+    normal = (bodies.jacobian @ velocity)[::2]
+    found = collide(bodies, velocity, eps, max_rounds=200)
+    before, after = energy_of(bodies, velocity, found)
+    assert found.solved, found.message
+    assert after - before == pytest.approx(found.energy_change, abs=1e-12 * before)
+    assert found.energy_change <= 1e-13 * before
+    if found.rounds == 1:
+        lost = -0.5 * (1 - eps) * found.impulse[::2] @ np.abs(normal)
+        assert found.energy_change == pytest.approx(lost, abs=1e-12 * before)
+    left = (bodies.jacobian @ found.velocity)[::2]
+    assert left.min() >= -1e-11 * np.abs(normal).max()
+
+
+def test_elastic_collisions_conserve_energy() -> None:
+    """eps = 1: exactly, round for round, until the last."""
+    bodies, velocity = network_bodies(80, 3)
+    found = collide(bodies, velocity, 1.0, max_rounds=500)
+    before, after = energy_of(bodies, velocity, found)
+    assert found.solved, found.message
+    assert after == pytest.approx(before, rel=1e-11)
+
+
+@given(st.integers(0, 10**6))
+@settings(deadline=None, max_examples=25)
+def test_different_restitution_makes_no_energy(seed: int) -> None:
+    """``E' - E = -sum (1 - eps_c) dp_c |v_c| / 2`` whatever each eps is."""
+    bodies, velocity = network_bodies(30, seed)
+    contacts = bodies.jacobian.shape[0] // 2
+    eps = np.random.default_rng(seed).uniform(0.0, 1.0, contacts)
+    found = collide(bodies, velocity, eps, max_rounds=200)
+    before, after = energy_of(bodies, velocity, found)
+    assert found.solved
+    assert after <= before * (1 + 1e-12)
+
+
+def test_momentum_is_conserved() -> None:
+    """Free bodies: impulses come in pairs, so linear and angular momentum stay."""
+    bodies = cradle(4)
+    velocity = np.random.default_rng(0).normal(size=12)
+    velocity[::3] = [2.0, 1.0, 0.0, -1.0]
+    found = collide(bodies, velocity, 0.5, 0.4)
+    moment = lambda v: (  # noqa: E731  (spin about the line, radius 1/2, inertia 1/10)
+        v[::3].sum(), v[1::3].sum(), 0.1 * v[2::3].sum() + np.arange(4) @ v[1::3],
+    )  # fmt: skip
+    assert found.solved
+    assert moment(found.velocity) == pytest.approx(moment(velocity), abs=1e-12)
+
+
+@pytest.mark.parametrize("eps", [0.0, 0.5, 1.0])
+def test_a_ball_into_a_corner(eps: float) -> None:
+    """Two walls at right angles: each component turns, ``v' = -eps v``."""
+    body = one_body([([1.0, 0.0], [-0.5, 0.0]), ([0.0, 1.0], [0.0, -0.5])], 0.1)
+    found = collide(body, [-2.0, -3.0, 0.0], eps)
+    assert found.velocity == pytest.approx([2.0 * eps, 3.0 * eps, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("eps", [0.0, 0.5, 1.0])
+def test_a_corner_hits_the_floor(eps: float) -> None:
+    """A square that lands on a corner at arm x: ``p = (1 + eps) v / (1/m + x^2/I)``."""
+    x, inertia, v = 0.3, 1.0 / 6.0, 2.0
+    body = one_body([([0.0, 1.0], [x, -0.5])], inertia)
+    found = collide(body, [0.0, -v, 0.0], eps)
+    impulse = (1 + eps) * v / (1 + x * x / inertia)
+    assert found.impulse == pytest.approx([impulse, 0.0])
+    assert found.velocity == pytest.approx([0.0, impulse - v, x * impulse / inertia])
+    assert found.energy_change == pytest.approx(-0.5 * (1 - eps) * impulse * v, abs=1e-13)
+
+
+def test_a_box_lands_flat() -> None:
+    """Two corners at once: it bounces without turning, each corner with half the impulse."""
+    body = one_body([([0.0, 1.0], [-0.5, -0.5]), ([0.0, 1.0], [0.5, -0.5])], 1.0 / 6.0)
+    found = collide(body, [0.0, -1.0, 0.0], 0.5)
+    assert found.velocity == pytest.approx([0.0, 0.5, 0.0], abs=1e-12)
+    assert found.impulse[::2] == pytest.approx([0.75, 0.75])
+
+
+@pytest.mark.parametrize("law", ["newton", "moreau"])
+def test_a_sliding_ball(law: Law) -> None:
+    """Fast and oblique: it slides through the collision, so ``p_T = mu p_N`` whatever the law."""
+    ball = one_body([([0.0, 1.0], [0.0, -0.5])], 0.1)
+    found = collide(ball, [-10.0, -1.0, 0.0], 0.5, 0.2, law=law)
+    assert found.impulse[0] == pytest.approx(1.5)
+    assert abs(found.impulse[1]) == pytest.approx(0.2 * 1.5)
+    assert found.velocity[:2] == pytest.approx([-10.0 + 0.3, 0.5])
+    assert found.energy_change < 0
+
+
+def paradox() -> tuple[BodySpace, list[float]]:
+    """A rod whose tip hits the floor obliquely so that, with Newton's law, friction feeds it.
+
+    Kane and Levinson's case: at rest tangentially after impact, restitution on n alone.
+    """
+    sine, cosine = np.sin(0.6), np.cos(0.6)
+    rod = one_body([([0.0, 1.0], [-0.5 * cosine, -0.5 * sine])], 1.0 / 12.0)
+    return rod, [0.0, 0.0, 0.0]
+
+
+def test_energy_that_would_grow_is_said_and_prevented() -> None:
+    """Newton's law with friction on some of many tips: watched it grows and says so; safe not."""
+    rod, _ = paradox()
+    g = np.random.default_rng(0)
+    grew = 0
+    for _ in range(60):
+        velocity = g.normal(size=3)
+        watched = collide(rod, velocity, 0.9, 1.0, law="newton", energy="watched")
+        safe = collide(rod, velocity, 0.9, 1.0, law="newton")
+        moreau = collide(rod, velocity, 0.9, 1.0, law="moreau", energy="watched")
+        size = kinetic_energy(rod, velocity)
+        assert safe.energy_change <= 1e-11 * size
+        assert moreau.energy_change <= 1e-11 * size
+        if watched.energy_change > 1e-9 * size:
+            grew += 1
+            assert "grew" in watched.message
+            assert safe.restitution_scale < 1.0
+            assert "scaled" in safe.message
+    assert grew > 0
+
+
+@pytest.mark.parametrize("law", ["newton", "moreau"])
+def test_networks_with_friction(law: Law) -> None:
+    """Many contacts, each with its eps: no approach is left, energy does not grow."""
+    bodies, velocity = network_bodies(30, 2)
+    contacts = bodies.jacobian.shape[0] // 2
+    eps = np.random.default_rng(0).uniform(0.0, 0.8, contacts)
+    found = collide(bodies, velocity, eps, 0.4, law=law)
+    before, after = energy_of(bodies, velocity, found)
+    assert found.solved, found.message
+    assert after <= before * (1 + 1e-12)
+    assert found.impulse.reshape(-1, 2)[:, 0].min() >= 0
+
+
+def test_nothing_collides() -> None:
+    """Contacts that part, or rest, need no impulse; no contacts at all."""
+    bodies = cradle(3)
+    for first in (-1.0, 0.0):
+        found = collide(bodies, [first, 0, 0, 0, 0, 0, 0, 0, 0], 0.5)
+        assert found.rounds == 0
+        assert (found.impulse == 0).all()
+    empty = BodySpace(sp.csr_array((0, 3)), sp.csr_array(sp.eye_array(3)), 3)
+    assert collide(empty, [1.0, 0.0, 0.0], 0.5).solved
+
+
+def test_rounds_that_do_not_end_are_cut() -> None:
+    """After the rounds allowed the rest has no restitution: nothing approaches, and that is all."""
+    bodies, velocity = network_bodies(80, 3)
+    found = collide(bodies, velocity, 1.0, max_rounds=1)
+    normal = (bodies.jacobian @ found.velocity)[::2]
+    assert found.solved
+    assert normal.min() >= -1e-11 * np.abs(bodies.jacobian @ velocity).max()
+
+
+@pytest.mark.parametrize(
+    ("eps", "mu", "velocity", "where"),
+    [
+        (1.1, 0.0, [0.0] * 9, "restitution"),
+        (-0.1, 0.0, [0.0] * 9, "restitution"),
+        (np.nan, 0.0, [0.0] * 9, "restitution"),
+        (0.5, -1.0, [0.0] * 9, "friction"),
+        ([0.5] * 3, 0.0, [0.0] * 9, "restitution"),
+        (0.5, 0.0, [0.0] * 8, "velocity"),
+        (0.5, 0.0, [np.inf] * 9, "velocity"),
+    ],
+)
+def test_malformed_input(
+    eps: float | list[float], mu: float, velocity: list[float], where: str
+) -> None:
+    """What is wrong is named."""
+    with pytest.raises(ProblemError, match=where):
+        collide(cradle(3), velocity, eps, mu)

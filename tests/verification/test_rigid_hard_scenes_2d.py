@@ -1,0 +1,160 @@
+"""Hard cases in the plane with answers in closed form, by time stepping."""
+
+from __future__ import annotations
+
+from math import radians, tan
+
+import numpy as np
+import pytest
+
+from rigid_lcp.scene import Scene
+from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
+from rigid_lcp.simulation import Simulation
+from validation.rigid_scenes import (
+    DENSITY,
+    G,
+    arch,
+    block_on_incline,
+    block_on_incline_way,
+    card_house,
+    card_house_friction,
+    light_on_heavy,
+    stack,
+    stack_drop,
+    wedge,
+    wedge_acceleration,
+)
+
+SLOPE = radians(20)
+
+
+@pytest.mark.parametrize("share", [1.0, 1 + 1e-9, 1 - 1e-9, 0.98, 1.02])
+def test_block_at_its_threshold(share: float) -> None:
+    """It slides iff ``mu < tan(slope)``: ``g (sin - mu cos) t^2 / 2``, 1.7e-9 t^2 m at 1 - 1e-9."""
+    mu, seconds = tan(SLOPE) * share, 0.2
+    run = block_on_incline(SLOPE, mu, step=2e-3)
+    run.advance(seconds)
+    way = block_on_incline_way(SLOPE, mu, seconds)
+    # A residual of 1e-12 is an acceleration of 1e-11 m/s^2.
+    assert run.positions[0, 0] == pytest.approx(way, rel=1e-9, abs=1e-12)
+    assert abs(run.angles[0]) < 1e-12
+
+
+def test_block_does_not_creep() -> None:
+    """At rest on 20 degrees with mu = 1: 1e-12 m in 1e5 steps is 1e-17 m a step."""
+    run = block_on_incline(SLOPE, 1.0)
+    assert stack_drop(run, 0.2) < 1e-14
+
+
+@pytest.mark.parametrize("top", [1.0, 1e4])
+def test_stack(top: float) -> None:
+    """Ten boxes, the top one up to 1e4 times heavier, stay within 1e-9 m in 2 s: 1e-10 in 0.1 s."""
+    run = stack(10, top, step=2e-3)
+    assert stack_drop(run, 0.1) < 1e-10
+    load = run.world.mass[:10].sum() * G
+    below = run.contacts.body_b == 10
+    # The residual is of impulses and for all contacts: that of the lightest box over h.
+    assert run.contacts.normal_force[below].sum() == pytest.approx(load, rel=1e-6)
+
+
+def test_light_on_heavy_on_light() -> None:
+    assert stack_drop(light_on_heavy(1e6), 0.05) < 1e-10
+
+
+@pytest.mark.parametrize("phi", [0.2, 0.5])
+def test_card_house(phi: float) -> None:
+    """It stands iff ``mu >= tan(phi)/2``."""
+    limit = card_house_friction(phi)
+    assert stack_drop(card_house(phi, limit * (1 + 1e-6)), 0.05) < 1e-10
+    fallen = stack_drop(card_house(phi, limit * 0.98), 0.05)
+    assert fallen > 1e-5
+    slow = stack_drop(card_house(phi, limit * (1 - 1e-6)), 0.05)
+    assert 1e-10 < slow < 1e-8
+
+
+@pytest.mark.parametrize("share", [1 + 1e-6, 1 - 1e-6, 0.5])
+def test_wedge(share: float) -> None:
+    """It jams iff ``mu >= tan(half angle)``; else it is squeezed out as fast as on paper."""
+    angle = radians(15)
+    mu = tan(angle) * share
+    run = wedge(angle, mu, 1e4)
+    expected = wedge_acceleration(run, angle, mu, 1e4)
+    assert (expected > 0) == (share < 1)
+    run.advance(0.02)
+    scale = 1e4 / run.world.mass[0]
+    assert run.velocities[0, 1] == pytest.approx(expected * 0.02, rel=1e-9, abs=1e-9 * scale * 0.02)
+
+
+def test_arch() -> None:
+    """A semicircular arch stands iff it is thicker than 0.1075 of its radius (Heyman)."""
+    assert stack_drop(arch(16, 0.115), 0.02) < 1e-9
+    assert stack_drop(arch(16, 0.10), 0.02) > 1e-6
+
+
+def test_no_friction_no_grip() -> None:
+    """mu = 0 on a slope: free sliding; a huge mu: none, and the box tips over its corner."""
+    run = block_on_incline(SLOPE, 0.0)
+    run.advance(0.05)
+    assert run.positions[0, 0] == pytest.approx(block_on_incline_way(SLOPE, 0.0, 0.05), rel=1e-9)
+    steep = block_on_incline(radians(50), 1e6)
+    steep.advance(0.05)
+    # J_A phi'' = m g (a/2) (sin - cos), J_A = 2/3 m a^2, to the first order in the angle
+    tip = 0.75 * G * (np.sin(radians(50)) - np.cos(radians(50)))
+    assert steep.angles[0] == pytest.approx(-tip * 0.05**2 / 2, rel=1e-2)
+    assert steep.contacts.status[steep.contacts.normal_force > 0].tolist() == ["stick"]
+
+
+def test_coincident_edges() -> None:
+    """Boxes side by side and on each other share whole edges and corners: nothing moves."""
+    scene = Scene(2)
+    for k in range(6):
+        scene.add(
+            Polygon.rectangle(1, 1), density=DENSITY, position=(k % 3, 0.5 + k // 3), friction=0.3
+        )
+    scene.add(HalfSpace((0, 1)))
+    assert stack_drop(Simulation(scene), 0.03) < 1e-11
+
+
+def test_needles() -> None:
+    """Grains a hundred times longer than thick come to rest upon each other without overlap."""
+    scene = Scene(2)
+    for k in range(4):
+        scene.add(
+            Polygon.rectangle(1.0, 0.01), density=DENSITY, position=(0.2 * k, 0.1 + 0.2 * k),
+            angle=0.15 * k, friction=0.5,
+        )  # fmt: skip
+    scene.add(HalfSpace((0, 1)))
+    run = Simulation(scene, step=1e-3)
+    run.advance(0.4)
+    assert run.overlap < 1e-4
+    assert run.energy < DENSITY * 0.01 * 4 * G * 0.4
+
+
+def test_jammed_hopper() -> None:
+    """Three discs over an opening narrower than they are wide, between rough walls, hold."""
+    scene = Scene(2)
+    radius, opening = 0.5, 1.6
+    scene.add(Disc(radius), density=DENSITY, position=(-0.5, 0.0), friction=0.9)
+    scene.add(Disc(radius), density=DENSITY, position=(0.5, 0.0), friction=0.9)
+    scene.add(Disc(radius), density=DENSITY, position=(0.0, np.sqrt(0.75)), friction=0.9)
+    ledge = opening / 2
+    depth = -np.sqrt(radius**2 - (ledge - 0.5) ** 2)
+    for side in (-1.0, 1.0):
+        scene.add(
+            Polygon.rectangle(2.0, 1.0), fixed=True, position=(side * (ledge + 1.0), depth - 0.5)
+        )
+    run = Simulation(scene)
+    assert stack_drop(run, 0.05) < 1e-10
+
+
+def test_one_contact_lost_and_found() -> None:
+    """A disc thrown upwards from the floor: no contact, then the same one again."""
+    scene = Scene(2)
+    scene.add(Disc(0.1), density=1.0, position=(0, 0.1), velocity=(0, 0.5))
+    scene.add(HalfSpace((0, 1)))
+    run = Simulation(scene)
+    run.advance(0.05)
+    assert len(run.contacts) == 0
+    run.advance(0.06)
+    assert run.contacts.status.tolist() == ["stick"]
+    assert run.positions[0, 1] == pytest.approx(0.1, abs=1e-12)

@@ -1,0 +1,150 @@
+"""Pivoting along a path: it does not cycle at any friction, and a near start saves pivots."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_lcp.errors import ProblemError
+from rigid_lcp.friction_problem import friction_problem
+from rigid_lcp.pivoting import pivoting
+from tests.rigid_networks import network, stored, tower
+
+TOLERANCE = 1e-12
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1, 0.3, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_networks_at_every_friction(mu: float, seed: int) -> None:
+    """Where the seed's driving cycles (mu >= 0.3) the path ends in a solution, to 1e-12."""
+    found = pivoting(network(120, mu, seed))
+    assert found.solved, found.message
+    assert found.residual <= TOLERANCE
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.3, 0.5, 0.8])
+def test_lemkes_path_from_no_forces(mu: float) -> None:
+    """d = n from far: it needs no start at all."""
+    found = pivoting(network(60, mu, 5), sweeps=0)
+    assert found.solved, found.message
+    assert found.work["sweeps"] == 0
+    assert found.work["pivots"] > 0
+
+
+def test_a_near_start_saves_pivots() -> None:
+    """From the solution of a problem that is 1e-3 away: a tenth of the pivots of Lemke's path."""
+    problem = network(120, 0.5)
+    first = pivoting(problem, sweeps=0)
+    moved = friction_problem(
+        problem.delassus,
+        problem.offset * (1 + 1e-3 * np.random.default_rng(0).normal(size=len(problem.offset))),
+        0.5, 2,
+    )  # fmt: skip
+    warm = pivoting(moved, first.r)
+    assert first.solved
+    assert warm.solved, warm.message
+    assert warm.work["pivots"] < 0.1 * first.work["pivots"]
+
+
+def test_a_solution_is_returned_as_it_is() -> None:
+    """A start at or below the tolerance needs no pivot."""
+    problem = network(60, 0.5)
+    first = pivoting(problem)
+    again = pivoting(problem, first.r)
+    assert (again.r == first.r).all()
+    assert again.work["pivots"] == 0
+
+
+@pytest.mark.parametrize("start", ["zero", "random", "far"])
+def test_any_start_will_do(start: str) -> None:
+    """Forces outside the cones, or 1e6 times too large, are only a place to begin."""
+    problem = network(60, 0.5, 2)
+    g = np.random.default_rng(1)
+    size = {"zero": 0.0, "random": 1e-2, "far": 1e4}[start]
+    found = pivoting(problem, size * g.normal(size=len(problem.offset)))
+    assert found.solved, found.message
+
+
+@pytest.mark.parametrize("top", [1.0, 1e4])
+@pytest.mark.parametrize("mu", [0.0, 0.3, 0.8])
+def test_redundant_towers(mu: float, top: float) -> None:
+    """10 boxes, the top one up to 1e4 heavier: each face carries what is above it."""
+    found = pivoting(tower(10, mu, top))
+    assert found.solved, found.message
+    weight = 9.81e-3 * (top + np.arange(9, -1, -1.0))
+    assert found.r[::2].reshape(10, 2).sum(axis=1) == pytest.approx(weight, rel=1e-9)
+
+
+@given(
+    st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.0, 3.0), st.floats(-0.9, 0.9)
+)  # fmt: skip
+@settings(deadline=None, max_examples=60)
+def test_one_contact_by_cases(normal: float, tangential: float, mu: float, skew: float) -> None:
+    """One contact with W = [[1, k], [k, 1]]: whatever is found obeys eq. 27."""
+    problem = friction_problem([[1.0, skew], [skew, 1.0]], [normal, tangential], mu, 2)
+    found = pivoting(problem, sweeps=0)
+    force, velocity = found.r, found.u
+    small = 1e-9 * (1.0 + abs(force).max())
+    assert found.solved
+    assert force[0] >= 0
+    assert velocity[0] >= -small
+    assert abs(force[0] * velocity[0]) <= small
+    assert abs(force[1]) <= mu * force[0] + small
+    assert abs(velocity[1]) * (mu * force[0] - abs(force[1])) <= small
+    assert force[1] * velocity[1] <= small
+
+
+def test_no_solution_is_proved() -> None:
+    """The sliding rod beyond Painleve's limit: a linear programme finds no forces at all."""
+    w = [[1.6, 1.2], [1.2, 3.4]]
+    assert pivoting(
+        friction_problem(w, [-1.0, 0.0], 2.0, 2), tangential_velocity=np.array([1.0])
+    ).status == "no solution"  # fmt: skip
+    at_rest = pivoting(friction_problem(w, [-1.0, 0.0], 2.0, 2))
+    assert at_rest.solved
+
+
+def test_a_matrix_not_quite_symmetric() -> None:
+    """Stored problems are asymmetric by 1e-3."""
+    problem = network(60, 0.5)
+    w = problem.delassus.copy()
+    w.data *= 1 + 1e-3 * np.random.default_rng(0).uniform(-1, 1, w.nnz)
+    assert pivoting(friction_problem(w, problem.offset, 0.5, 2)).solved
+
+
+def test_units_do_not_matter() -> None:
+    """Millimetres and grams: the same pivots, velocities 1e3 times."""
+    problem = network(40, 0.5)
+    other = friction_problem(problem.delassus * 1e6, problem.offset * 1e3, 0.5, 2)
+    one, two = pivoting(problem, sweeps=0), pivoting(other, sweeps=0)
+    assert one.solved
+    assert two.solved
+    assert two.work["pivots"] == pytest.approx(one.work["pivots"], rel=0.1)
+
+
+def test_a_few_pivots_only() -> None:
+    """What is given up says so, with its best point."""
+    problem = network(60, 0.5)
+    found = pivoting(problem, sweeps=0, max_pivots=5)
+    assert found.status == "not converged"
+    assert found.residual == problem.residual(found.r) > TOLERANCE
+    assert found.message
+
+
+def test_nothing_to_do() -> None:
+    """No contacts; only parting ones; 3D with friction is refused."""
+    assert pivoting(friction_problem(np.zeros((0, 0)), [], 0.3, 2)).solved
+    assert (pivoting(friction_problem(np.eye(2), [1.0, 0.0], 0.3, 2)).r == 0).all()
+    with pytest.raises(ProblemError, match="circle"):
+        pivoting(friction_problem(np.eye(3), -np.ones(3), 0.3, 3))
+
+
+@pytest.mark.parametrize(
+    "name", ["tower2d_10", "tower2d_10_m1e4", "discs_125", "FrictionContactProblem00237.dat"]
+)
+def test_real_problems(name: str) -> None:
+    """Stored problems, at the friction they came with and at 0.3 and 0.8."""
+    for mu in (None, 0.3, 0.8):
+        assert pivoting(stored(name, mu)).solved

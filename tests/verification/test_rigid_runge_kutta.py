@@ -1,0 +1,207 @@
+"""Acceleration level: exact motions, fourth order, collisions, step control, no solution."""
+
+from __future__ import annotations
+
+from math import radians
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from rigid_lcp.errors import NoSolution, NotConverged
+from rigid_lcp.scene import Scene
+from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
+from rigid_lcp.simulation import Simulation
+from validation.rigid_scenes import (
+    G,
+    block_on_incline,
+    bouncing_disc,
+    bouncing_time,
+    disc_on_incline,
+    disc_on_incline_acceleration,
+    sliding_rod,
+    sliding_rod_limit,
+)
+
+Floats = NDArray[np.float64]
+NEEDLE = Polygon([(-1, 0), (0, -0.01), (1, 0), (0, 0.01)])
+
+
+def needle(
+    mu: float, step: float, method: str, *, angle: float = 1.0, speed: float = 0.0
+) -> Simulation:
+    """A needle with its tip on the floor, about to fall to the left (body 0), centre at the top."""
+    scene = Scene(2)
+    scene.add(
+        NEEDLE, density=1.0, position=(np.cos(angle), np.sin(angle)), angle=angle,
+        velocity=(speed, 0),
+    )  # fmt: skip
+    scene.add(HalfSpace((0, 1)), friction=mu)
+    return Simulation(scene, method, step=step)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("mu", [0.02, 0.5])
+def test_disc_rolls_or_slides(mu: float) -> None:
+    slope = radians(20)
+    run = disc_on_incline(slope, mu, method="acceleration", step=0.02)
+    run.advance(0.1)
+    expected = disc_on_incline_acceleration(slope, mu)
+    assert run.positions[0, 0] == pytest.approx(expected * 0.005, rel=1e-11)
+    assert run.velocities[0, 0] == pytest.approx(expected * 0.1, rel=1e-11)
+
+
+def falling(mu: float, seconds: float) -> float:
+    """Angle of the needle, by SciPy: about a fixed tip, or with its centre on a vertical line."""
+    mass, inertia = NEEDLE.mass_properties(1.0)
+
+    def sticking(time: float, y: Floats) -> list[float]:
+        return [y[1], -mass * G * np.cos(y[0]) / (mass + inertia)]
+
+    def frictionless(time: float, y: Floats) -> list[float]:
+        c, s = np.cos(y[0]), np.sin(y[0])
+        return [y[1], -c * (G - s * y[1] ** 2) * mass / (inertia + mass * c * c)]
+
+    law = sticking if mu else frictionless
+    answer = solve_ivp(law, (0, seconds), [1.0, 0.0], rtol=1e-12, atol=1e-13, method="DOP853")
+    return float(answer.y[0, -1])
+
+
+@pytest.mark.parametrize("mu", [0.0, 5.0])
+def test_fourth_order(mu: float) -> None:
+    """A needle falls about its tip (sticking) or with its tip free to slide, against SciPy."""
+    seconds = 0.24
+    expected = falling(mu, seconds)
+    errors = []
+    for step in (0.08, 0.04, 0.02):
+        run = needle(mu, step, "acceleration")
+        run.advance(seconds)
+        errors.append(abs(run.angles[0] - expected))
+        assert run.overlap < 1e-12
+    order = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert (order > 3.6).all()
+    assert errors[-1] < 1e-7
+
+
+@pytest.mark.parametrize("mu", [0.0, 5.0])
+def test_both_methods_have_one_limit(mu: float) -> None:
+    """Time stepping goes to the same answer as Runge-Kutta: second order while nothing changes."""
+    expected = falling(mu, 0.32)
+    errors = []
+    for step in (8e-3, 4e-3, 2e-3):
+        run = needle(mu, step, "time-stepping")
+        run.advance(0.32)
+        errors.append(abs(run.angles[0] - expected))
+    assert (np.log2(np.array(errors[:-1]) / errors[1:]) > 1.7).all()
+
+
+def test_both_methods_have_one_limit_with_impacts() -> None:
+    """A box hits the floor with a corner, slides and turns: first order of time stepping."""
+
+    def end(method: str, step: float) -> Floats:
+        scene = Scene(2)
+        scene.add(
+            Polygon.rectangle(1, 0.5), density=1.0, position=(0, 0.6), angle=0.4, velocity=(1, 0)
+        )
+        scene.add(HalfSpace((0, 1)), friction=0.2, restitution=0.3)
+        run = Simulation(scene, method, step=step)  # type: ignore[arg-type]
+        run.advance(0.3)
+        return np.array([*run.positions[0], run.angles[0]])
+
+    exact = end("acceleration", 0.01)
+    assert np.abs(end("acceleration", 0.005) - exact).max() < 1e-6
+    errors = [np.abs(end("time-stepping", step) - exact).max() for step in (8e-3, 2e-3, 5e-4)]
+    assert errors[2] < 2e-3
+    assert errors[2] < 0.15 * errors[0]  # 1/16 at first order; where a step begins is chance
+
+
+def test_sliding_stops_where_it_should() -> None:
+    """``v^2 / (2 mu g)``, met to the speed that counts as rest: the step is cut at the event."""
+    run = block_on_incline(0.0, 0.5, method="acceleration", step=0.01)
+    run.motion.velocity[0, 0] = 1.0
+    run.advance(0.3)
+    assert run.positions[0, 0] == pytest.approx(1 / G, abs=1e-9)
+    assert run.pace.shortened >= 1
+    assert (run.contacts.status == "stick").all()
+
+
+def test_bounces_keep_the_energy() -> None:
+    """Restitution 1: 1e-13 a bounce; time between bounces as on paper."""
+    run = bouncing_disc(0.01, 1.0, method="acceleration", step=0.01)
+    energy = run.energy
+    run.advance(0.5)
+    assert run.pace.collisions == 6  # the first after sqrt(2h/g) = 45 ms, then every 90 ms
+    assert abs(run.energy / energy - 1) < 1e-13 * run.pace.collisions
+
+
+def test_zeno_is_cut_off() -> None:
+    """Bounces are met one by one until they are too slow to be worth it; then rest."""
+    run = bouncing_disc(0.1, 0.5, method="acceleration", step=0.01)
+    seconds = bouncing_time(0.1, 0.5)
+    run.advance(0.99 * seconds)
+    assert run.positions[0, 1] > 0.1
+    run.advance(0.02 * seconds)
+    assert run.positions[0, 1] == pytest.approx(0.1, abs=1e-9)
+    assert np.abs(run.velocities).max() < 1e-9
+    # v = e^k sqrt(2 g h) falls to 1e-4 sqrt(g R) after 14 bounces
+    assert run.pace.collisions == pytest.approx(14, abs=1)
+
+
+def test_step_is_halved_and_doubled() -> None:
+    """Section 9: overlaps halve the step; three clean steps double it, up to the longest one."""
+    run = bouncing_disc(0.1, 0.5, method="acceleration", step=0.01)
+    run.advance(0.15)
+    assert run.pace.halved > 5
+    assert run.pace.step < 0.01
+    run.advance(0.45)
+    assert run.pace.step == 0.01
+
+
+def test_nothing_jumps_over_another() -> None:
+    """A fast disc hits a thin plate although one longest step would carry it through."""
+    scene = Scene(2, (0, 0))
+    scene.add(Disc(0.05), density=1.0, position=(0, 1), velocity=(0, -100), restitution=1.0)
+    scene.add(Polygon.rectangle(1, 0.01), fixed=True)
+    run = Simulation(scene, "acceleration", step=0.1)
+    run.advance(0.1)
+    assert run.velocities[0, 1] == pytest.approx(100)
+
+
+def test_painleve() -> None:
+    """Below its limit the sliding rod has forces; above it none, and impulses go on."""
+    limit = sliding_rod_limit(sliding_rod(1.0, method="acceleration"))
+    assert limit == pytest.approx(4 / 3, rel=1e-6)  # a uniform thin rod at tan t = 2
+    below = sliding_rod(0.99 * limit, method="acceleration")
+    below.advance(1e-7)
+    mass, inertia = below.world.mass[0], below.world.inertia[0]
+    x, y = (below.contacts.point - below.positions)[0]
+    compliance = 1 / mass + x * x / inertia - 0.99 * limit * x * y / inertia
+    assert below.contacts.normal_force[0] == pytest.approx(G / compliance, rel=1e-3)
+    above = sliding_rod(1.01 * limit, method="acceleration")
+    with pytest.raises(NoSolution, match="Painleve") as error:
+        above.advance(1e-3)
+    assert "time-stepping" in error.value.remedy
+    impulses = sliding_rod(1.01 * limit, method="time-stepping")
+    energy = impulses.energy
+    impulses.advance(0.05)
+    assert impulses.worst_residual < 1e-9
+    assert impulses.energy < energy
+    assert impulses.overlap < 1e-9
+
+
+def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forces that were not found stop the run, with their residual."""
+    import rigid_lcp.acceleration_forces as integrator
+
+    right = integrator.solve_friction
+
+    def wrong(*args: object, **keys: object) -> object:
+        from dataclasses import replace
+
+        found = right(*args, **keys)  # type: ignore[arg-type]
+        return replace(found, residual=1e-3, status="not converged", message="stopped")
+
+    monkeypatch.setattr(integrator, "solve_friction", wrong)
+    run = block_on_incline(0.1, 0.5, method="acceleration")
+    with pytest.raises(NotConverged, match="residual"):
+        run.advance(0.01)

@@ -1,0 +1,256 @@
+"""The page on the solvers of rigid contact, written from the record of `rigid_runs`.
+
+    python -m validation.rigid_page             writes docs/rigid-solvers.md and its picture
+    python -m validation.rigid_page --words     the page alone
+
+The words are in ``rigid_page.md`` beside this file; every figure in them is looked up in the
+record, and a test holds the page to it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from validation import rigid_report as report
+from validation.qdem_record import write_atomically
+from validation.rigid_picture import PICTURE, picture
+from validation.rigid_report import HYBRID, OSQP, OURS, Row
+from validation.rigid_runs import LEMKE_MOST, RECORD, TOLERANCES, rows_read
+
+WORDS = Path(__file__).with_suffix(".md")
+PAGE_PATH = Path(__file__).parents[1] / "docs" / "rigid-solvers.md"
+FEW = ("stored", "packings 2D", "packings 3D", "towers 2D", "towers 3D")
+"""Families of the table problem by problem."""
+
+
+def page(rows: Sequence[Row]) -> str:
+    """The whole page in Markdown."""
+    races = report.races(rows)
+    contacts = [each[0]["contacts"] for each in report.problems(races).values()]
+    parts = {
+        "count": str(len(contacts)),
+        "least": f"{min(contacts):,}",
+        "most": f"{max(contacts):,}",
+        "asked": ", ".join(f"{t:.0e}".replace("e-0", "e-") for t in TOLERANCES),
+        "summary": _summary(races),
+        "commits": ", ".join(sorted({f"`{row['commit'][:10]}`" for row in rows})),
+        "tables": _problem_tables(races),
+        "failures": _failures(races),
+        "frictionless": _frictionless(races),
+        "scale": _scale(rows),
+        "dantzig": _dantzig(rows),
+        "lemke": str(LEMKE_MOST),
+        "budgets": " or ".join(sorted({_budget(row) for row in races})),
+    }
+    text = WORDS.read_text(encoding="utf-8")
+    for name, words in parts.items():
+        text = text.replace(f"{{{name}}}", words)
+    return re.sub(r"\n{3,}", "\n\n", text)
+
+
+def _summary(rows: Sequence[Row]) -> str:
+    mine = report.problems(report.of(rows, OURS))
+    costs = [report.cost_to(each, each[0]["bar"]) for each in mine.values()]
+    reached = [cost for cost in costs if np.isfinite(cost)]
+    if not reached:
+        return ""
+    return (
+        f"`solve_friction` with its default settings brought {len(reached)} of {len(mine)} to it, "
+        f"in {_seconds(float(np.median(reached)))} (median), {_seconds(max(reached))} at most."
+    )
+
+
+def _problem_tables(rows: Sequence[Row]) -> str:
+    parts: list[str] = []
+    for family in FEW:
+        found = report.problems(rows, family)
+        if found:
+            parts += ["", f"### {family[0].upper()}{family[1:]}", "", *_table(found)]
+    unseen = report.problems(rows, "unseen")
+    if unseen:
+        parts += ["", *_unseen(unseen)]
+    return "\n".join(parts)
+
+
+def _table(found: dict[str, list[Row]]) -> list[str]:
+    lines = [
+        f"| problem | contacts | `solve_friction` | {HYBRID} | Clarabel | best of Siconos |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, each in found.items():
+        groups = [report.of(each, OURS), report.of(each, HYBRID), report.of(each, "Clarabel")]
+        cells = [_cell(group) for group in groups]
+        siconos = report.starting(each, "Siconos")
+        cells.append(_cell(siconos, named=True))
+        lines.append(f"| {name} | {each[0]['contacts']:,} | {' | '.join(cells)} |")
+    return lines
+
+
+def _cell(rows: Sequence[Row], named: bool = False) -> str:
+    error = report.least_error(rows)
+    if not rows:
+        return ""
+    if not np.isfinite(error):
+        return report.outcome(rows)
+    bar = rows[0]["bar"]
+    cost = report.cost_to(rows, max(error, bar))
+    text = f"{error:.1e} @ {_seconds(cost)}"
+    if named:
+        best = next(r for r in rows if r["cost_s"] == cost)
+        text += f" ({best['method'].removeprefix('Siconos ')[3:]})"
+    return f"**{text}**" if error <= bar else text
+
+
+def _unseen(found: dict[str, list[Row]]) -> list[str]:
+    lines = [
+        "### Unseen: the stored problems changed at random",
+        "",
+        "q by 5 % noise, friction by factors from 0.7 to 1.3, contacts in another order.",
+        "",
+        "| method | reached the bar | median cost | greatest cost |",
+        "|---|---|---|---|",
+    ]
+    rows = [row for each in found.values() for row in each]
+    for method in report.method_names(rows):
+        mine = report.problems(report.of(rows, method))
+        costs = [report.cost_to(each, each[0]["bar"]) for each in mine.values()]
+        reached = [cost for cost in costs if np.isfinite(cost)]
+        if reached:
+            lines.append(
+                f"| {method} | {len(reached)} of {len(mine)} | "
+                f"{_seconds(float(np.median(reached)))} | {_seconds(max(reached))} |"
+            )
+        else:
+            lines.append(f"| {method} | 0 of {len(mine)} | | |")
+    return lines
+
+
+def _failures(rows: Sequence[Row]) -> str:
+    lines = [
+        f"| method | problems | {' | '.join(report.OUTCOMES)} |",
+        f"|---|---|{'---|' * len(report.OUTCOMES)}",
+    ]
+    for method in report.method_names(rows):
+        counted = report.outcomes(rows, method)
+        cells = " | ".join(str(counted[name] or "") for name in report.OUTCOMES)
+        lines.append(f"| {method} | {sum(counted.values())} | {cells} |")
+    deaths = report.deaths(rows)
+    if deaths:
+        kinds = sorted({(r["method"], r["problem"], _quoted(r["why"])) for r in deaths})
+        lines += ["", f"Runs that killed their process ({len(deaths)}):", ""]
+        lines += [f"- {method} on {problem}: {why}" for method, problem, why in kinds]
+    wrong = report.wrong_answers(rows)
+    if wrong:
+        worst = {(r["method"], r["problem"]): r["error"] for r in wrong}
+        lines += [
+            "",
+            "Solved by their own account (asked for 1e-8 or less), residual above 1e-3:",
+            "",
+        ]
+        lines += [f"- {m} on {p}: {error:.1e}" for (m, p), error in sorted(worst.items())]
+    return "\n".join(lines)
+
+
+def _quoted(why: str) -> str:
+    return why.replace("|", "/").replace("<", "(").replace(">", ")")[:120]
+
+
+def _frictionless(rows: Sequence[Row]) -> str:
+    found = report.problems(rows, "frictionless")
+    if not found:
+        return ""
+    lines = [
+        "## Without friction",
+        "",
+        f"| problem | contacts | `solve_friction` | {OSQP} | {HYBRID} |",
+        "|---|---|---|---|---|",
+    ]
+    for name, each in found.items():
+        cells = [_cell(report.of(each, method)) for method in (OURS, OSQP, HYBRID)]
+        lines.append(f"| {name} | {each[0]['contacts']:,} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _scale(rows: Sequence[Row]) -> str:
+    """Large packings, where they are recorded."""
+    made = [row for row in rows if row["case"] == "rigid-scale"]
+    if not made:
+        return ""
+    lines = [
+        "## Large packings",
+        "",
+        "Warm: from the impulses of the time step before, whose residual is given.",
+        "",
+        "| packing | contacts | residual at the start | residual | cost | bar | by |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in made:
+        begun = f"{row['start_error']:.1e}" if row["setting"]["warm"] else "(zero forces)"
+        lines.append(
+            f"| {row['problem']} | {row['contacts']:,} | {begun} | {row['error']:.1e} | "
+            f"{_seconds(row['cost_s'])} | {row['bar_s']:g} s | {row['by']} |"
+        )
+    return "\n".join(lines)
+
+
+def _dantzig(rows: Sequence[Row]) -> str:
+    monotone, reversal = (
+        report.dantzig_success(rows, method) for method in ("dantzig", "dantzig, reversal")
+    )
+    if not monotone:
+        return ""
+    lines = [
+        "| friction | as in the seed | with reversal of the driven force |",
+        "|---|---|---|",
+    ]
+    for friction, (solved, orders) in monotone.items():
+        other = reversal.get(friction, (0, 0))
+        lines.append(f"| {friction:g} | {solved} of {orders} | {other[0]} of {other[1]} |")
+    ends = report.dantzig_ends(rows)
+    if ends:
+        told = ", ".join(f"{method}: {end} ({n})" for (method, end), n in sorted(ends.items()))
+        lines += ["", f"How the others ended: {told}."]
+    shown = report.trace(rows)
+    if shown is not None:
+        steps = [event[5] for event in shown["events"]]
+        still = next((k for k, step in enumerate(reversed(steps)) if step > 0), len(steps))
+        _, _, contact, origin, target, *_ = shown["events"][-1]
+        lines += [
+            "",
+            f"The run in the picture (friction {shown['setting']['friction']:g}, order "
+            f"{shown['seed']}) ends after {shown['work']} changes of lists with {still} of length "
+            f"zero: contact {contact} goes from {target} to {origin} and back.",
+        ]
+    return "\n".join(lines)
+
+
+def _budget(row: Row) -> str:
+    words = row["command"].split()
+    return words[words.index("--budget") + 1] if "--budget" in words else "10"
+
+
+def _seconds(cost: float) -> str:
+    return f"{cost:.1g} s" if cost < 0.01 else f"{cost:.2g} s"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the page and, unless told otherwise, draw its picture."""
+    parser = argparse.ArgumentParser(description="Writes the page on solvers from their record.")
+    parser.add_argument("--record", type=Path, default=RECORD, help="the record's .jsonl")
+    parser.add_argument("--out", type=Path, default=PAGE_PATH, help="the page")
+    parser.add_argument("--words", action="store_true", help="do not draw the picture")
+    asked = parser.parse_args(arguments)
+    rows = rows_read(asked.record)
+    write_atomically(asked.out, page(rows))
+    if not asked.words:
+        picture(rows, PICTURE if asked.out == PAGE_PATH else asked.out.with_suffix(".png"))
+    print(asked.out)
+
+
+if __name__ == "__main__":
+    main()
