@@ -1,4 +1,4 @@
-"""Contact forces at acceleration level: Coulomb's law for contacts that slide already, and others."""
+"""Contact forces at acceleration level, of contacts that slide already and of others (eq. 27)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigid_lcp.errors import NoSolution, NotConverged
 from rigid_lcp.friction_problem import BodySpace, FrictionSolution, friction_problem
 from rigid_lcp.pivoting import pivoting
 from rigid_lcp.solver import solve_friction
-from rigid_lcp.time_stepping import forces_error
+from rigid_lcp.time_stepping import forces_error, impulses_found
 
 Floats = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ def forces_found(
     """
     dim = 1 + slip.shape[1]
     if not (slip.any(axis=1) & (friction > 0)).any():
-        solution = solve_friction(bodies, offset, friction, dim=dim, tolerance=tolerance)
+        solution = impulses_found(bodies, offset.reshape(-1, dim), friction, None, tolerance)
     elif dim == 2:
         problem = friction_problem(bodies, offset, friction, dim)
         solution = pivoting(problem, None, tolerance, tangential_velocity=slip[:, 0])

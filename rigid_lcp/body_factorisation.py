@@ -185,7 +185,7 @@ class BodyFactorisation:
     def factor(self, a: Floats, b: Floats) -> Solve:
         """See `Factorisation`."""
         try:
-            inverse = np.linalg.inv(a)
+            inverse: Floats = np.linalg.inv(a).astype(np.float64, copy=False)
         except np.linalg.LinAlgError as error:
             raise SingularSystem from error
         stiffness = np.matmul(inverse, b)

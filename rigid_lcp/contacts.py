@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,15 @@ class Contacts:
     """Coulomb's coefficients [-], (nc,)."""
     restitution: Floats
     """Coefficients of restitution [-], (nc,)."""
+    edge_a: Floats = field(default_factory=lambda: np.zeros(0))
+    """Unit directions of a's edge at the contact (nc, dim), zero where it is none; 3D only."""
+    edge_b: Floats = field(default_factory=lambda: np.zeros(0))
+    """Unit directions of b's edge, likewise; 3D only."""
+
+    def __post_init__(self) -> None:
+        for name in ("edge_a", "edge_b"):
+            if len(getattr(self, name)) != len(self.normal):
+                object.__setattr__(self, name, np.zeros_like(self.normal))
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -53,7 +62,7 @@ class Contacts:
         return Contacts(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ContactForces(Contacts):
     """Contacts with the forces they carried in the last step."""
 

@@ -13,16 +13,27 @@ A new contact that breaks (step 1) needs nothing.  Else its normal force is driv
 ``a_N = 0`` (step 2, 3), then its tangential force until it sticks or slides, while the forces of
 the permanent contacts follow by eqs 30, 31 and contacts change lists (events 3a to 3d).
 
-What it can and can not do, on settled packings of discs (solved of 10 random contact orders, driven
-as in the seed / with reversal): see `validation`; without friction it always ends, up to mu = 0.1
-nearly always, at mu >= 0.3 as driven in the seed practically never: one contact goes from static to
-sliding and back in steps of length zero, as with sliding columns the matrix of eq. 28 need not have
-positive principal minors.  That is no round-off.  `rigid_lcp.pivoting` follows a path instead that
-can turn, and does not fail.
+What it can and can not do: a settled packing of discs, 227 contacts, solved of 10 random orders of
+contacts (pivots, CPU time of one thread, provisional):
 
-Redundant contacts make eq. 28 singular.  So ``A + shift mean(diag A)`` is solved, and the shift
-removed at the end by proximal steps, each of which drives the change of b that it makes.  Ties
-(b = 0, symmetric piles) make lists cycle; a perturbation of b breaks them and is driven out too.
+=====  =====================  ======================  ==========================================
+mu     driven as in the seed  with reversal           what stops it
+=====  =====================  ======================  ==========================================
+0      10  (290, 0.01 s)      10  (290, 0.01 s)
+0.1    9   (1210, 0.05 s)     10  (1230, 0.05 s)      cycle
+0.2    1   (1030, 0.05 s)     9   (1480, 0.07 s)      cycle; driven force back at zero
+0.3    0                      4                       cycle; driven force back at zero
+0.5    0                      0                       cycle; driven force back at zero
+0.8    0                      0                       cycle; driven force back at zero
+=====  =====================  ======================  ==========================================
+
+The cycle is one contact that goes from static to sliding and back in steps of length zero: with
+sliding columns the matrix of eq. 28 need not have positive principal minors.  That is no round-off.
+`rigid_lcp.pivoting` follows a path that can turn, and solves these.
+
+Redundant contacts make eq. 28 singular, ties (b = 0, symmetric piles) make lists cycle: a shift of
+A and a perturbation of b, in the range of A, prevent that, and are driven out at the end
+(`rigid_lcp.pivot_state`).  A pivot costs O(k^2) for k unknown forces, the seed's way O(k^3).
 """
 
 from __future__ import annotations

@@ -64,7 +64,35 @@ def detect_3d(
     return Contacts(
         bodies[:, 0], bodies[:, 1], numbers[:, 0:3], numbers[:, 3:6], numbers[:, 6], key,
         numbers[:, 7], numbers[:, 8], zero, zero.copy(),
+        *edge_directions(shapes.kind, solids, bodies, key),
     )  # fmt: skip
+
+
+def edge_directions(kind: Ints, solids: Solids, bodies: Ints, key: Ints) -> tuple[Floats, Floats]:
+    """Unit directions (nc, 3) of the edges of a and of b that the contacts' names tell of.
+
+    Zero at corners, faces and spheres.
+    """
+    a, b = bodies[:, 0], bodies[:, 1]
+    directions = np.zeros((2, len(key), 3))
+    feature_a = (key >> FEATURE_BITS) & (2 * MOST_EDGES - 1)
+    feature_b = key & (2 * MOST_EDGES - 1)
+    crossing = (kind[a] == POLYHEDRON) & (feature_a >= MOST_EDGES)
+    on_sphere = key & ((1 << 2 * FEATURE_BITS) - 1)  # a sphere has no features of its own
+    past_faces = on_sphere - np.diff(solids.first_face)[b]
+    edges = np.diff(solids.first_edge)[b]
+    rolling = (kind[a] == SPHERE) & (kind[b] == POLYHEDRON)
+    rolling &= (past_faces >= 0) & (past_faces < edges)
+    for side, rows, body, edge in (
+        (0, crossing, a, feature_a - MOST_EDGES),
+        (1, crossing, b, feature_b - MOST_EDGES),
+        (1, rolling, b, past_faces),
+    ):
+        ends = solids.edge[solids.first_edge[body[rows]] + edge[rows]]
+        first, second = (solids.first_vertex[body[rows], None] + ends).T
+        along = solids.vertex[second] - solids.vertex[first]
+        directions[side, rows] = along / np.linalg.norm(along, axis=1)[:, None]
+    return directions[0], directions[1]
 
 
 @njit(cache=True)

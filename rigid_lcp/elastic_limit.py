@@ -18,6 +18,11 @@ What the limit is:
   is not proved, and a history of sliding (`coulomb_slider`, MD) ends in other forces.
 - Where bodies accelerate: displacements drift along the motion for ever, which opens what opens
   and slides what slides, and the forces of the contacts that hold are as above.
+
+Measured, one thread, warm: towers of 10, 50 and 200 boxes (20 to 400 contacts) 0.01 to 0.1 s, a
+frictionless pyramid of 465 discs (1,335 contacts) 0.6 s.  Pyramids that collapse with most of
+their contacts sliding, 51 to 210 contacts, friction 0.05 to 0.9: 14 of 16 in 2,000 Newton steps
+(about 1 s); with 1,335 contacts it did not find the limit, and says so.
 """
 
 from __future__ import annotations

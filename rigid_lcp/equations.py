@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from rigid_lcp.contacts import Contacts, contact_frames
+from rigid_lcp.edge_normals import edge_acceleration
 from rigid_lcp.friction_problem import BodySpace
 from rigid_lcp.motion import Motion
 
@@ -96,7 +97,7 @@ def inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
 
     where in the second c_b is the point of body b at c_a.  Tangential, while the contact lasts
     (gap and gap rate zero): ``t . (c_a'' - c_b'')`` with c_b at the contact point of a flat b.
-    In 3D two crossing edges have no such carrier: use velocity-level time stepping for them.
+    In 3D, at edges, see `rigid_lcp.edge_normals`.
     """
     frames = contact_frames(contacts.normal)
     n = contacts.normal
@@ -119,7 +120,21 @@ def inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
     pull = pull_a - _centripetal(contacts.body_b, motion, under)
     result = np.einsum("cij,cj->ci", frames, pull)
     result[:, 0] = normal
+    if motion.dim == 3:
+        edges = np.flatnonzero(np.any(contacts.edge_b != 0, axis=1))
+        result[edges, 0] = _across_edges(contacts[edges], motion)
     return result
+
+
+def _across_edges(contacts: Contacts, motion: Motion) -> Floats:
+    """Normal part for contacts at an edge of b, (nc,)."""
+    a, b = contacts.body_a, contacts.body_b
+    carrier = contacts.point + contacts.radius_a[:, None] * contacts.normal
+    foot = contacts.point - contacts.gap[:, None] * contacts.normal
+    velocity = _point_velocities(contacts, motion, a, carrier)
+    velocity -= _point_velocities(contacts, motion, b, foot)
+    pull = _centripetal(a, motion, carrier) - _centripetal(b, motion, foot)
+    return edge_acceleration(contacts, _spin_of(a, motion), _spin_of(b, motion), velocity, pull)
 
 
 def _spin_of(bodies: Ints, motion: Motion) -> Floats:

@@ -14,12 +14,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.cones import natural_residual
+from rigid_lcp.cones import natural_map, natural_residual
 from rigid_lcp.errors import ProblemError
 
 Floats = NDArray[np.float64]
 Status = Literal["solved", "not converged", "no solution", "cycled", "singular"]
 """What became of a problem: ``no solution`` is a proof (a ray), the others are not."""
+
+
+SHARE_LEFT = 0.1
+ROUND_OFF = 1e-15
 
 
 @dataclass(frozen=True)
@@ -111,6 +115,13 @@ class FrictionProblem:
         mean = float(self.diagonal.mean()) if len(self.diagonal) else 1.0
         return 1.0 / mean if mean > 0 else 1.0
 
+    @cached_property
+    def error_without_forces(self) -> float:
+        """Norm of the natural map at r = 0, in units of r: what forces have to mend."""
+        shape = (self.contacts, self.dim)
+        velocity = np.ascontiguousarray(self.offset).reshape(shape)
+        return float(np.linalg.norm(natural_map(0.0 * velocity, velocity, self.friction, self.rho)))
+
     def velocity(self, force: Floats) -> Floats:
         """``u = W r + q``, (nc * dim,)."""
         if self.matrix is None and self.bodies is not None:
@@ -160,9 +171,15 @@ def friction_solution(
     status: Status = "not converged",
     message: str = "",
 ) -> FrictionSolution:
-    """Judge forces by their residual: ``solved`` at or below ``tolerance``, else ``status``."""
+    """Judge forces by their residual: ``solved`` at or below ``tolerance``, else ``status``.
+
+    Forces that grow without bound in a problem that has no solution make the residual, which is
+    relative to them, as small as one likes: they are not ``solved`` unless they also leave less
+    than `SHARE_LEFT` of the error that no forces have.
+    """
     residual = problem.residual(force)
-    solved = residual <= tolerance
+    left = max(residual, ROUND_OFF) * float(np.linalg.norm(force))
+    solved = residual <= tolerance and left <= SHARE_LEFT * problem.error_without_forces
     if not solved and not message:
         message = (
             f"{method} stopped at a residual of {residual:.2g} (asked: {tolerance:.2g})"

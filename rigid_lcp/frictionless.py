@@ -33,11 +33,13 @@ from rigid_lcp.friction_problem import (
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-SHIFTS = (1e-8, 1e-6)
-"""Relative shifts of the diagonal, one after the other if need be: a small one is soon taken out
-again, a large one lets less round-off into self-stress."""
-SWEEPS, SWEEPS_BETWEEN, SMOOTHED = 100, 20, 5
-"""Sweeps before the first exchange; between two, as long as more contacts than that are wrong."""
+SHIFT = 1e-8
+"""Relative shift of the diagonal: a small one is soon taken out again."""
+SWEEPS, SWEEPS_BETWEEN = 100, 20
+"""Sweeps before the first exchange, and instead of one"""
+SMOOTHED, SMOOTHINGS, HASTE = 5, 3, 15
+"""as long as more contacts than that are wrong, so many times; with self-stress they mislead, so
+that the exchanges begin again without them where so many do not end."""
 PROXIMAL_STEPS = 20
 ROUND_OFF = 1e-13
 """Relative size of an acceleration or force that counts as zero."""
@@ -98,15 +100,19 @@ def frictionless(
     w = problem.delassus
     a = sp.csr_array(w[::dim][:, ::dim]) if dim > 1 else w
     b = problem.offset[::dim]
-    f = np.zeros(nc) if start is None else np.maximum(start[::dim], 0.0)
-    normal_sweeps(a.indptr, a.indices, a.data, b, f, SWEEPS)
-    carries = f > 0.0
+    first = np.zeros(nc) if start is None else np.maximum(start[::dim], 0.0)
+    normal_sweeps(a.indptr, a.indices, a.data, b, first, SWEEPS)
     work = {"exchanges": 0.0, "proximal": 0.0}
+    mean = float(a.diagonal().mean()) or 1.0
+    shifted = sp.csc_array(a + SHIFT * mean * sp.eye_array(nc))
     best, least = np.zeros(nc * dim), np.inf
-    for shift in SHIFTS:
-        shifted = sp.csc_array(a + shift * float(a.diagonal().mean()) * sp.eye_array(nc))
+    for smoothings, limit in ((SMOOTHINGS, HASTE), (0, max_exchanges)):
+        f, carries = first.copy(), first > 0.0
         for step in range(PROXIMAL_STEPS):
-            f, sharper = principal_pivots(shifted, a, b, f, carries, work, max_exchanges)
+            before = work["exchanges"]
+            f, sharper = principal_pivots(
+                shifted, a, b, f, carries, work, limit, smoothings if step == 0 else 0
+            )
             better = False
             for candidate in (sharper, f):
                 force = np.zeros(nc * dim)
@@ -116,7 +122,7 @@ def frictionless(
                     best, least, better = force, residual, True
                 if least <= tolerance:
                     return friction_solution(problem, best, tolerance, "frictionless", work)
-            if step > 4 and not better:
+            if (step > 4 and not better) or work["exchanges"] - before >= limit:
                 break
             work["proximal"] += 1
     return friction_solution(problem, best, tolerance, "frictionless", work)
@@ -124,24 +130,25 @@ def frictionless(
 
 def principal_pivots(
     shifted: sp.csc_array, a_matrix: sp.csr_array, b: Floats, before: Floats, carries: Bools,
-    work: dict[str, float], limit: int,
+    work: dict[str, float], limit: int, smoothings: int,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """One proximal step: forces of ``a = b + A f + shift (f - before)`` that obey eq. 19.
 
     ``carries`` holds who carries at first, and in the end (changed in place).  The second
-    answer is two steps further on, with the same factor and no change of sides.
+    answer is a few steps further on, with the same factor and no change of sides.
     """
     offset = b + a_matrix @ before - shifted @ before
     fewest, patience = len(b) + 1, PATIENCE
+    smoothed = False
     scale = float(np.abs(b).max()) or 1.0
-    unit = float(shifted.diagonal().mean())
+    unit = float(shifted.diagonal().mean()) or 1.0
     f = np.zeros(len(b))
     while True:
         work["exchanges"] += 1
         limit -= 1
         f[:] = 0.0
         inside = np.flatnonzero(carries)
-        factor = factor_of(shifted[inside][:, inside]) if len(inside) else None
+        factor: Any = factor_of(shifted[inside][:, inside]) if len(inside) else None
         if factor is not None:
             f[inside] = factor.solve(-offset[inside])
         a = offset + shifted @ f
@@ -150,11 +157,15 @@ def principal_pivots(
         count = int(wrong.sum())
         if count == 0 or limit <= 0:
             break
+        if smoothed and count > 0.7 * fewest:
+            smoothings = 0
         if count < fewest:
             fewest, patience = count, PATIENCE
         else:
             patience -= 1
-        if count > SMOOTHED and patience == PATIENCE:
+        smoothed = count > SMOOTHED and patience == PATIENCE and smoothings > 0
+        if smoothed:
+            smoothings -= 1
             f = np.maximum(f, 0.0)
             normal_sweeps(shifted.indptr, shifted.indices, shifted.data, offset, f, SWEEPS_BETWEEN)
             carries[:] = f > 0.0
@@ -163,17 +174,20 @@ def principal_pivots(
                 wrong[: int(np.flatnonzero(wrong)[-1])] = False
             carries ^= wrong
     sharper = f.copy()
-    for _ in range(2):
-        if factor is not None:
-            sharper[inside] -= factor.solve((b + a_matrix @ sharper)[inside])
+    for _ in range(5 if factor is not None else 0):
+        change = factor.solve((b + a_matrix @ sharper)[inside])
+        sharper[inside] -= change
+        if np.abs(change).max() <= 1e-14 * np.abs(sharper).max():
+            break
     return f, sharper
 
 
 def factor_of(matrix: sp.csc_array) -> Any:
     """Sparse factor of a symmetric positive definite matrix: no pivoting, symmetric order."""
     return splu(
-        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, relax=4,
+        options={"SymmetricMode": True},
+    )  # fmt: skip
 
 
 @njit(cache=True)

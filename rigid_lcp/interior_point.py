@@ -9,7 +9,8 @@ and followed along ``x o s = sigma e`` (Jordan product).  On that path
     r_T = -mu r_N u_T / (u_N / mu + |u_T|),    u_N > 0:
 
 friction that is viscous far from the answer and Coulomb's at its end.  One Newton step, scaled
-after Nesterov and Todd (``H x = s``), is a system ``(C + W) dr = b`` (`rigid_lcp.body_factorisation`)
+after Nesterov and Todd (``H x = s``), is a system ``(C + W) dr = b``
+(`rigid_lcp.body_factorisation`):
 
     C = U H X,    X = dx/dr = diag(mu, 1, 1),    U = du/ds = [[mu, -mu s_T / |s_T|], [0, 1]]
 
@@ -17,7 +18,8 @@ Without the term |u_T| (``convex``) U is X, C is symmetric, and the problem is t
 Anitescu and Tasora (Comput. Optim. Appl. 47 (2010) 207): it can hardly fail, and its answer is
 right where nothing slides.  The term makes it Coulomb's law (De Saxce), non-convex, and the path
 may fold back; |s_T| is rounded to ``s_T^2 / sqrt(s_T^2 + eps^2)``, which is right to eps^2 where
-a contact slides; eps falls with sigma, and another ``rounding`` is another path.  Predictor and corrector after Mehrotra.
+a contact slides; eps falls with sigma, and another ``rounding`` is another path.  Predictor and
+corrector after Mehrotra.
 
 A contact without friction is a half line: r_T stays zero.  For a problem that has no solution
 the steps become ever smaller, and the best point is given back.
@@ -77,7 +79,7 @@ def interior_point(
     problem: FrictionProblem,
     start: Floats | None = None,
     tolerance: float = 1e-8,
-    path: Path = Path(),  # noqa: B008  (frozen)
+    path: Path = Path(),
     *,
     linear: Factorisation | None = None,
     iterations: int = ITERATIONS,
@@ -169,9 +171,7 @@ class PathStep:
         length = min(1.0, cone_step(x, dx), cone_step(s, ds))
         ahead = float(np.sum((x + length * dx) * (s + length * ds))) / contacts
         centring = max(LEAST_CENTRING, min(1.0, max(0.0, ahead / gap) ** 2))
-        second = cone_product(
-            cone_scale(eta, point, dx, False), cone_scale(eta, point, ds, True)
-        )
+        second = cone_product(cone_scale(eta, point, dx, False), cone_scale(eta, point, ds, True))
         dx, ds = direction(centring * gap * self.unit - square - second)
         length = BOUNDARY_SHARE * min(cone_step(x, dx), cone_step(s, ds))
         if length < BACK_OFF_STEP:  # off the path: back to its middle, higher up

@@ -17,8 +17,7 @@ from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction_problem import BodySpace
 from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
 from rigid_lcp.scene import World
-from rigid_lcp.solver import solve_friction
-from rigid_lcp.time_stepping import forces_error
+from rigid_lcp.time_stepping import forces_error, impulses_found
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -104,9 +103,7 @@ def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, bo
     excess = before.copy()
     excess[:, 0] += np.where(bounce, contacts.restitution * before[:, 0], 0.0)
     bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
-    solution = solve_friction(
-        bodies, excess.ravel(), contacts.friction, dim=motion.dim, tolerance=tolerance
-    )
+    solution = impulses_found(bodies, excess, contacts.friction, None, tolerance)
     error = forces_error(bodies, solution, STILL * scale)
     if not error <= ACCEPTED:
         raise NotConverged(

@@ -123,6 +123,11 @@ def contact_stiffness(problem: FrictionProblem, stiffness: ArrayLike) -> Floats:
             "a contact's stiffness is not a number above zero", where="stiffness",
             remedy="leave out contacts that carry nothing; use 1 for all if none is known",
         )  # fmt: skip
+    if k.ndim == 2 and shape[1] == 3 and (k[:, 1] != k[:, 2]).any():
+        raise ProblemError(
+            "the two tangential stiffnesses of a contact differ", where="stiffness",
+            remedy="give both the same: friction has no preferred direction",
+        )  # fmt: skip
     return np.array(np.broadcast_to(k[:, None] if k.ndim == 1 else k, shape))
 
 

@@ -80,7 +80,6 @@ def alart_curnier(
     return f, a, b, status
 
 
-
 def newton(
     problem: FrictionProblem,
     start: Floats | None = None,
@@ -109,9 +108,10 @@ def newton(
             f, a, b, _ = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
             done, waited = done + 1, waited + 1
             try:
-                force = force - linear.factor(a + (shift * scale) * b, b)(f.ravel())
+                solve = linear.factor(a + (shift * scale) * b, b)
             except SingularSystem:
                 break
+            force = force - solve(f.ravel())
             residual = problem.residual(force)
             if not np.isfinite(residual):
                 break
@@ -119,8 +119,18 @@ def newton(
                 best, best_residual = force, residual
             if best_residual < 0.5 * mark:
                 waited, mark = 0, best_residual
+            if best_residual <= tolerance:  # once more by the same factors: nearly for nothing
+                velocity = problem.velocity(best).reshape(shape)
+                f = alart_curnier(best.reshape(shape), velocity, problem.friction, rho)[0]
+                last = best - solve(f.ravel())
+                if problem.residual(last) < best_residual:
+                    best = last
     return friction_solution(
-        problem, best, tolerance, "newton", {"iterations": float(done), "factorisations": float(done)}
+        problem,
+        best,
+        tolerance,
+        "newton",
+        {"iterations": float(done), "factorisations": float(done)},
     )
 
 

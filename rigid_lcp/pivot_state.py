@@ -110,7 +110,7 @@ def pivots_state(
     number[rows] = np.arange(len(rows))
     w = problem.delassus[rows][:, rows]
     diagonal = w.diagonal()
-    unit = float(diagonal.mean()) if len(rows) else 0.0
+    unit = (float(diagonal.mean()) if len(rows) else 0.0) or 1.0
     w = sp.csr_array(w + shift * unit * sp.eye_array(len(rows)))
     wc = sp.csc_array(w)
     inside = (diagonal_places(w), diagonal_places(wc))
@@ -261,56 +261,58 @@ def pivots_residual(problem: FrictionProblem, state: Pivots, force: Floats) -> f
 
 
 _ENDS: dict[int, tuple[Status, str]] = {
-    DONE: ("not converged", "the shift of the diagonal came out to a residual of {res:.2g} only"
-           "\n  -> ask for less, allow more pivots, or polish with a Newton method"),
-    RAY: ("not converged", "the driven quantity at contact {where} grows without bound (a ray)"
-          "\n  -> use `pivoting`, or another order of contacts"),
-    CYCLED: ("cycled", "the lists repeat without progress at contact {where}"
-             "\n  -> use `pivoting`; this happens from a friction of about 0.2 on"),
-    RETURNED: ("not converged", "the force driven at contact {where} came back to zero"
-               "\n  -> use `pivoting`, or another order of contacts"),
-    SINGULAR: ("singular", "the reduced equations (28) became singular at contact {where}"
-               "\n  -> raise `shift`, or use `pivoting`"),
-    TOO_MANY: ("not converged", "the pivots were used up at contact {where}"
-               "\n  -> raise `max_pivots`, or use `pivoting`"),
-}  # fmt: skip
+    DONE: ("not converged", "the shift of the diagonal came out to a residual of {res:.2g} only"),
+    RAY: ("not converged", "what is driven grows without bound (a ray){where}"),
+    CYCLED: ("cycled", "the lists repeat without progress{where}"),
+    RETURNED: ("not converged", "the force that is driven came back to zero{where}"),
+    SINGULAR: ("singular", "the reduced equations (28) became singular{where}"),
+    TOO_MANY: ("not converged", "the pivots allowed were used up{where}"),
+}
+_REMEDIES = {
+    "dantzig": "use `pivoting` or a Newton method, or another order of contacts",
+    "pivoting": "give a nearer start or more pivots, or use a Newton or interior-point method",
+}
 
 
 def pivots_solution(
     problem: FrictionProblem, state: Pivots, force: Floats, tolerance: float, method: str,
     ended: int, where: int,
 ) -> FrictionSolution:  # fmt: skip
-    """Judge the forces; a ray becomes ``no solution`` if a linear programme proves that."""
+    """Judge the forces; a ray, or a shift that stays, become ``no solution`` if that is proved."""
     residual = pivots_residual(problem, state, force)
     work = {"pivots": float(state.events[0])}
     velocity = problem.velocity(force)
     if residual <= tolerance:
         return FrictionSolution(force, velocity, residual, "solved", method, work)
     status, text = _ENDS[ended]
-    if ended == RAY and forces_impossible(problem, state.geometry.slip):
-        status = "no solution"
-        text = (
-            "no finite forces keep the contacts from approaching (Painleve); the ray was met at"
-            " contact {where}\n  -> use impulses: a velocity-level time step or a collision"
+    remedy = _REMEDIES[method]
+    if ended in (RAY, DONE) and forces_impossible(problem, state.geometry.slip):
+        status, text = (
+            "no solution",
+            "no finite forces keep the contacts from approaching (Painleve)",
         )
-    message = f"{method}: " + text.format(where=where, res=residual)
+        remedy = "use impulses: a velocity-level time step or a collision"
+    place = f" at contact {where}" if where >= 0 else ""
+    message = f"{method}: {text.format(where=place, res=residual)}\n  -> {remedy}"
     return FrictionSolution(force, velocity, residual, status, method, work, message)
 
 
 def forces_impossible(problem: FrictionProblem, slip: Ints) -> bool:
     """Whether no forces of the allowed signs and sizes at all give ``a_N >= 0``: a proof by LP."""
-    nc, mu = problem.contacts, problem.friction
+    nc, mu, dim = problem.contacts, problem.friction, problem.dim
     unit = sp.eye_array(nc)
-    # f = columns f_N, and two edges of the cone where the contact does not slide yet
+    normal, tangent = np.eye(dim)[:, :1], np.eye(dim)[:, 1:2]
+    # any force is a sum of the two edges of its cone, or lies on the one that a slip leaves
     edges = [
-        sp.kron(unit, [[1.0], [0.0]])
-        + sp.kron(sp.diags_array(np.where(slip == 0, sign, slip) * mu), [[0.0], [1.0]])
+        sp.kron(unit, normal)
+        + sp.kron(sp.diags_array(np.where(slip == 0, sign, slip) * mu), tangent)
         for sign in (1, -1)
     ]
-    normal = sp.csr_array(problem.delassus)[::2] @ sp.hstack(edges)
+    w = sp.csr_array(problem.delassus)
+    rates = w[::dim] @ sp.hstack(edges)
     scale = float(np.abs(problem.offset).max()) or 1.0
     found = linprog(
-        np.zeros(2 * nc), A_ub=-normal / problem.delassus.diagonal().mean(),
-        b_ub=problem.offset[::2] / scale, bounds=(0, None), method="highs",
+        np.zeros(2 * nc), A_ub=-rates / (float(w.diagonal().mean()) or 1.0),
+        b_ub=problem.offset[::dim] / scale, bounds=(0, None), method="highs",
     )  # fmt: skip
     return bool(found.status == 2)

@@ -20,6 +20,10 @@ From forces near a solution (of the last step, of Gauss-Seidel, of Newton): the 
 them, and d is what is missing to make them a solution of the problem at lambda = 1.  A few corners
 are left.  There d need not be inside K*, so a ray or a detour can end the path.
 
+Networks of 500 contacts, friction 0.1 to 0.8, CPU time of one thread (provisional): from a start of
+residual 1e-4 0.02 to 0.1 s (0 to 50 pivots; two of a dozen needed 600 and 0.4 s), from no forces
+0.1 to 2 s (600 to 7,000 pivots).  Above a friction of 1.5 some networks are not solved.
+
 2D friction, or 3D without friction.  In 3D friction sliding has a circle of directions, which a
 pivoting method can only replace by a polygon (an error of ``1 - cos(pi / k)`` for k edges).
 """

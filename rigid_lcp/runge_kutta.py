@@ -44,6 +44,13 @@ from rigid_lcp.time_stepping import contact_forces
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+CLEAN_STEPS = 3
+"""Steps without an overlap before the step is doubled (section 9)."""
+SHORTEST = 1e-12
+"""Shortest step as a share of the longest one."""
+TRAVEL = 0.25
+"""Way a body may go in one step, in sizes of the smallest body: nothing jumps over another."""
+
 
 @dataclass
 class Pace:

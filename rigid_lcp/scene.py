@@ -171,6 +171,16 @@ class World:
         angle, spin = free_rotation(self.principal, motion.angle, motion.spin, seconds)
         return Motion(motion.position + seconds * motion.velocity, angle, motion.velocity, spin)
 
+    def coasting(self, motion: Motion) -> Floats:
+        """Generalised accelerations (n, size) while no force acts: in 3D spins change all the
+        same [rad/s^2]."""
+        result = np.zeros((len(self.mass), self.size))
+        if self.scene.dim == 3:
+            from rigid_lcp.gyroscopic import gyroscopic_acceleration
+
+            result[:, 3:] = gyroscopic_acceleration(self.inertia, motion.angle, motion.spin)
+        return result
+
     def accelerations(
         self, motion: Motion, loads: ArrayLike | None, gyroscopic: bool = True
     ) -> Floats:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigid_lcp.errors import ShapeError
 
 Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+Ints = NDArray[np.int64]
 
 FLATNESS = 1e-9
 """Corners within this share of the size of a plane lie in it: round-off of coordinates is far
@@ -68,7 +68,7 @@ class SolidIntegrals:
     """About the centroid [m^5], (3, 3)."""
 
 
-def solid_integrals(points: Floats, triangles: Integers) -> SolidIntegrals:
+def solid_integrals(points: Floats, triangles: Ints) -> SolidIntegrals:
     """Exact integrals over the solid inside a closed surface of triangles wound outwards.
 
     The divergence theorem splits the solid into signed tetrahedra with one corner in the mean of
@@ -115,7 +115,7 @@ class Polyhedron:
         distances d of the faces from the centre of mass [m], (f,), as in eq. 9."""
 
     @cached_property
-    def edges(self) -> Integers:
+    def edges(self) -> Ints:
         """(e, 4): first and second corner, and the two faces that meet there.
 
         Raises `ShapeError` where faces do not meet edge to edge.
@@ -161,7 +161,7 @@ def box(length: float, width: float, height: float) -> Polyhedron:
     return Polyhedron(corners * [length, width, height])
 
 
-def _hull(points: ArrayLike) -> tuple[Integers, Floats]:
+def _hull(points: ArrayLike) -> tuple[Ints, Floats]:
     """Triangles of the convex hull, wound outwards, and the points that are its corners."""
     from scipy.spatial import ConvexHull, QhullError
 
@@ -191,7 +191,7 @@ def _hull(points: ArrayLike) -> tuple[Integers, Floats]:
     return triangles, given[corners]
 
 
-def _faces(points: Floats, triangles: Integers) -> tuple[list[Integers], Floats, Floats]:
+def _faces(points: Floats, triangles: Ints) -> tuple[list[Ints], Floats, Floats]:
     """Planes of the hull, from the largest triangle down: loops of corners, normals, distances.
 
     A plane takes every point within `FLATNESS`; so slivers, which have no normal of their own to
@@ -201,7 +201,7 @@ def _faces(points: Floats, triangles: Integers) -> tuple[list[Integers], Floats,
     area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     squares = np.einsum("ti,ti->t", area, area)
     tolerance = FLATNESS * float(np.abs(points).max())
-    loops: list[Integers] = []
+    loops: list[Ints] = []
     normals: list[Floats] = []
     free = np.ones(len(triangles), dtype=bool)
     for first in np.argsort(-squares, kind="stable"):
@@ -221,7 +221,7 @@ def _faces(points: Floats, triangles: Integers) -> tuple[list[Integers], Floats,
     return loops, np.array(normals), np.array(distances)
 
 
-def _loop(points: Floats, corners: Integers, normal: Floats, tolerance: float) -> Integers:
+def _loop(points: Floats, corners: Ints, normal: Floats, tolerance: float) -> Ints:
     """Corners of a convex face anticlockwise about its normal, without those along an edge."""
     arm = points[corners] - points[corners].mean(axis=0)
     along = arm[np.argmax(np.einsum("ci,ci->c", arm, arm))]

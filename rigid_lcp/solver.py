@@ -17,7 +17,7 @@ problem that has a solution, but there is no proof: read ``status`` and ``residu
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
@@ -46,8 +46,9 @@ HAND_OVER = 1e-7
 PATHS = (
     (Path(rounding=0.3, compliance=0.01), 100),
     (Path(rounding=0.03, compliance=1.0), 100),
+    (Path(rounding=1.0, compliance=0.1), 100),
     (Path(rounding=1e-3, compliance=1e-3), 300),
-    (Path(rounding=0.1, compliance=0.1), 300),
+    (Path(rounding=0.3, compliance=0.1), 300),
     (Path(convex=True, compliance=1e-4), 300),
 )
 """Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
@@ -58,7 +59,7 @@ PROOF_CONTACTS = 3000
 
 
 def solve_friction(
-    W: ArrayLike | sp.sparray | sp.spmatrix | BodySpace,  # noqa: N803  (its name in the field)
+    W: ArrayLike | sp.sparray | sp.spmatrix | BodySpace,
     q: ArrayLike,
     mu: ArrayLike,
     dim: int,
@@ -108,9 +109,7 @@ def solve_auto(
     parts = islands(problem)
     if len(parts) > 1:
         trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
-    if not trial.best.solved and (
-        trial.best.status == "no solution" or no_forces_suffice(problem)
-    ):
+    if not trial.best.solved and (trial.best.status == "no solution" or no_forces_suffice(problem)):
         return trial.solution(
             "no solution",
             "no forces within the cones of friction keep all contacts from approaching (proved by"
@@ -182,9 +181,7 @@ def _attempts(problem: FrictionProblem, start: Floats | None, tolerance: float) 
     trial = _Trial(problem, start, tolerance)
     if trial.best.solved:
         return trial
-    if start is not None and (
-        trial.polish(trial.best) or trial.sweep(start, WARM_SWEEPS, "start")
-    ):
+    if start is not None and (trial.polish(trial.best) or trial.sweep(start, WARM_SWEEPS, "start")):
         return trial
     for path, sweeps in PATHS:
         trial.linear = trial.linear or factorisation(problem)
@@ -241,30 +238,32 @@ def no_forces_suffice(problem: FrictionProblem) -> bool:
     if contacts > PROOF_CONTACTS:
         return False
     normal = np.arange(contacts) * dim
-    # |r_T| <= mu r_N in every tangential direction, as rows: +-r_T - mu r_N <= 0
-    rows, columns, values = [], [], []
-    for k in range(1, dim):
-        for sign in (1.0, -1.0):
-            row = contacts * len(rows) + np.arange(contacts)
-            rows.append(np.concatenate([row, row]))
-            columns.append(np.concatenate([normal + k, normal]))
-            values.append(np.concatenate([np.full(contacts, sign), -mu]))
-    cones = sp.csr_array(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
-        shape=(2 * (dim - 1) * contacts, contacts * dim),
-    )
+    # |r_T| <= mu r_N in every tangential direction: +-r_T - mu r_N <= 0
+    limit = sp.diags_array(mu)
+    edges = [
+        sp.kron(sp.eye_array(contacts), _unit_row(k, dim, sign))
+        - sp.kron(limit, _unit_row(0, dim, 1.0))
+        for k in range(1, dim)
+        for sign in (1.0, -1.0)
+    ]
     scale = float(np.abs(problem.offset).max()) or 1.0
     approach = sp.csr_array(problem.delassus[normal] * (-problem.rho))
     lower = np.full(contacts * dim, -np.inf)
     lower[normal] = 0.0
     found = linprog(
         np.zeros(contacts * dim),
-        A_ub=sp.vstack([approach, cones]),
-        b_ub=np.concatenate([problem.offset[normal] / scale, np.zeros(cones.shape[0])]),
+        A_ub=sp.vstack([approach, *edges]),
+        b_ub=np.concatenate([problem.offset[normal] / scale, np.zeros(len(edges) * contacts)]),
         bounds=np.column_stack([lower, np.full(contacts * dim, np.inf)]),
         method="highs",
     )
     return bool(found.status == 2)
+
+
+def _unit_row(k: int, dim: int, sign: float) -> Floats:
+    row = np.zeros((1, dim))
+    row[0, k] = sign
+    return row
 
 
 def _start(start: ArrayLike, problem: FrictionProblem) -> Floats:

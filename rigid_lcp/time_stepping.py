@@ -30,7 +30,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.contacts import ContactForces, Contacts, contact_frames, contact_rows
 from rigid_lcp.equations import body_space, inertial_acceleration, relative_velocity
-from rigid_lcp.friction_problem import BodySpace, FrictionSolution
+from rigid_lcp.friction_problem import BodySpace, FrictionSolution, friction_problem
+from rigid_lcp.frictionless import frictionless
 from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
@@ -74,25 +75,43 @@ def moreau_step(
     inverse_mass = world.inverse_mass(middle)
     bodies = body_space(contacts, middle.position, world.columns, inverse_mass)
     turning = 0.5 * h * inertial_acceleration(contacts, middle)
+    if motion.dim == 3:  # spins change also while no force acts
+        coasting = motion_with_rates(middle, world.coasting(middle))
+        turning += 0.5 * h * relative_velocity(contacts, coasting)
     before = relative_velocity(contacts, middle)[:, 0] - turning[:, 0]
     offset = relative_velocity(contacts, free) + turning
     gap = contacts.gap - 0.25 * h * turning[:, 0]
     slow = float(np.linalg.norm(world.scene.gravity)) * h
     shift = np.zeros_like(offset)
     shift[:, 0] = contact_shift(contacts.restitution, gap, before, offset[:, 0], slow, h)
-    solution = solve_friction(
-        bodies, (offset + shift).ravel(), contacts.friction, dim=motion.dim,
-        start=known_impulses(contacts, known, h), tolerance=tolerance,
-    )  # fmt: skip
+    start = known_impulses(contacts, known, h)
+    solution = impulses_found(bodies, offset + shift, contacts.friction, start, tolerance)
     impulse = solution.r.reshape(-1, motion.dim)
     after = solution.u.reshape(-1, motion.dim) - shift
     rates = free.rates
     rates[world.movable] += _velocities(bodies, impulse, world.size)
-    end = motion_with_rates(middle, rates)
-    end = motion_displaced(end, 0.5 * h * rates)
+    end = world.drifted(motion_with_rates(middle, rates), 0.5 * h)
     end = overlap_removed(world, end, bodies, gap + 0.5 * h * after[:, 0])
     error = forces_error(bodies, solution, slow)
     return Step(end, contact_forces(contacts, impulse, after, h), error, solution.message)
+
+
+def impulses_found(
+    bodies: BodySpace, offset: Floats, friction: Floats, start: Floats | None, tolerance: float
+) -> FrictionSolution:
+    """Impulses (or forces, displacements) of contacts with ``offset`` q (nc, dim).
+
+    Where no contact has friction, there are no tangential unknowns.
+    """
+    dim = offset.shape[1]
+    if not friction.any():
+        problem = friction_problem(bodies, offset, friction, dim)
+        solution = frictionless(problem, start, tolerance)
+        if solution.solved:
+            return solution
+    return solve_friction(
+        bodies, offset.ravel(), friction, dim=dim, start=start, tolerance=tolerance
+    )
 
 
 def forces_error(bodies: BodySpace, solution: FrictionSolution, free: float) -> float:
@@ -174,9 +193,7 @@ def overlap_removed(world: World, motion: Motion, bodies: BodySpace, gap: Floats
         return motion
     offset = np.zeros((len(gap), motion.dim))
     offset[:, 0] = gap
-    apart = solve_friction(
-        bodies, offset.ravel(), np.zeros(len(gap)), dim=motion.dim, tolerance=PROJECTION_TOLERANCE
-    )
+    apart = impulses_found(bodies, offset, np.zeros(len(gap)), None, PROJECTION_TOLERANCE)
     move = np.zeros_like(motion.rates)
     move[world.movable] = _velocities(bodies, apart.r.reshape(-1, motion.dim), world.size)
     return motion_displaced(motion, move)

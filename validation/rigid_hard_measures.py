@@ -180,4 +180,3 @@ def hopper_rows(quick: bool, peers: Sequence[str]) -> list[Row]:
         peer_seconds=min(steps, 1000) * held.step,
     )  # fmt: skip
     return [trial_ours(trial, "time-stepping"), *(trial_peer(trial, peer) for peer in peers)]
-

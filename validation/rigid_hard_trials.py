@@ -138,9 +138,7 @@ def box_grid(columns: int, rows: int) -> Simulation:
     scene = Scene(2)
     for k in range(columns * rows):
         place = (k % columns, k // columns + 0.5)
-        scene.add(
-            Polygon.rectangle(1, 1), density=scenes.DENSITY, position=place, friction=0.5
-        )
+        scene.add(Polygon.rectangle(1, 1), density=scenes.DENSITY, position=place, friction=0.5)
     scene.add(scenes.FLOOR)
     return Simulation(scene)
 
@@ -153,9 +151,7 @@ def needle_pile(needles: int) -> Simulation:
             Polygon.rectangle(1, 1e-4), density=scenes.DENSITY, position=(0, (k + 0.5) * 1e-4),
             friction=0.5,
         )  # fmt: skip
-    scene.add(
-        Polygon.rectangle(1e-4, 1), density=scenes.DENSITY, position=(1, 0.5), friction=0.5
-    )
+    scene.add(Polygon.rectangle(1e-4, 1), density=scenes.DENSITY, position=(1, 0.5), friction=0.5)
     scene.add(scenes.FLOOR)
     return Simulation(scene)
 

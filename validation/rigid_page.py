@@ -20,7 +20,7 @@ from validation import rigid_report as report
 from validation.qdem_record import write_atomically
 from validation.rigid_picture import PICTURE, picture
 from validation.rigid_report import HYBRID, OSQP, OURS, Row
-from validation.rigid_runs import LEMKE_MOST, RECORD, TOLERANCES, rows_read
+from validation.rigid_runs import RECORD, SICONOS_MOST, TOLERANCES, rows_read
 
 WORDS = Path(__file__).with_suffix(".md")
 PAGE_PATH = Path(__file__).parents[1] / "docs" / "rigid-solvers.md"
@@ -44,7 +44,8 @@ def page(rows: Sequence[Row]) -> str:
         "frictionless": _frictionless(races),
         "scale": _scale(rows),
         "dantzig": _dantzig(rows),
-        "lemke": str(LEMKE_MOST),
+        "lemke": f"{SICONOS_MOST['2D_LEMKE']:,}",
+        "dense": f"{SICONOS_MOST['2D_NSGS']:,}",
         "budgets": " or ".join(sorted({_budget(row) for row in races})),
     }
     text = WORDS.read_text(encoding="utf-8")

@@ -41,8 +41,9 @@ TOLERANCES = (1e-4, 1e-8, 1e-12)
 """What every method is asked for."""
 BUDGET_S = 10.0
 """Processor seconds of a run, unless told otherwise."""
-LEMKE_MOST, DANTZIG_MOST, PIVOTING_MOST = 300, 500, 1000
-"""Contacts above which dense pivoting is not tried: its cost grows with the fourth power."""
+DANTZIG_MOST, PIVOTING_MOST = 500, 1000
+SICONOS_MOST = {"2D_LEMKE": 300, "2D_NSGS": 2500, "2D_CPG": 2500}
+"""Contacts above which methods on dense matrices are not tried."""
 OURS = ("auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig")
 ON_UNSEEN = ("rigid_lcp", "Clarabel + Newton")
 """What is run on changed problems, which are many: our default, and its nearest rival."""
@@ -77,7 +78,7 @@ def methods(problem: FrictionProblem, quick: bool) -> dict[str, Callable[[float]
         runs["OSQP polished"] = _each(problem, lambda t, s: peers.osqp(problem, t))
     if not quick and not peers.siconos_missing():
         for solver in peers.SICONOS[problem.dim]:
-            if solver != "2D_LEMKE" or problem.contacts <= LEMKE_MOST:
+            if problem.contacts <= SICONOS_MOST.get(solver, 10**9):
                 runs[f"Siconos {solver}"] = _siconos(problem, solver)
     return runs
 

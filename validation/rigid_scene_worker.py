@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
 import sys
 import time
 from importlib import import_module, metadata
@@ -77,17 +78,14 @@ def mujoco_model(scene: Data, step: float) -> str:
             nx, ny = body["normal"]
             at = [body["offset"] * nx, body["offset"] * ny]
             geometry = (
-                f'type="plane" size="0 0 1" pos="{text(at[0], 0, at[1])}" '
-                f'zaxis="{text(nx, 0, ny)}"'
+                f'type="plane" size="0 0 1" pos="{text(at[0], 0, at[1])}" zaxis="{text(nx, 0, ny)}"'
             )
         elif body["kind"] == "disc":
             geometry = f'type="sphere" size="{text(body["radius"])}"'
         elif (sides := rectangle(body["vertices"])) is not None:
             geometry = f'type="box" size="{text(sides[0] / 2, depth / 2, sides[1] / 2)}"'
         else:
-            points = [
-                text(x, y, z) for x, z in body["vertices"] for y in (-depth / 2, depth / 2)
-            ]
+            points = [text(x, y, z) for x, z in body["vertices"] for y in (-depth / 2, depth / 2)]
             assets.append(f'<mesh name="m{k}" inertia="exact" vertex="{" ".join(points)}"/>')
             geometry = f'type="mesh" mesh="m{k}"'
         geometry = f'<geom name="g{k}" {geometry} {shape_common}/>'
@@ -145,6 +143,16 @@ def run_mujoco(scene: Data, step: float, steps: int) -> tuple[list[list[float]],
         x, y, turned = (float(v) for v in state.qpos[3 * column : 3 * column + 3])
         ends[k] = [x, y, turned - scene["bodies"][k]["angle"]]
     return ends, mujoco.__version__, cost
+
+
+def ode_version() -> str:
+    """Version of the system's library, which its Python binding does not tell."""
+    words = ["dpkg-query", "--show", "--showformat=${source:Upstream-Version}", "libode8"]
+    try:
+        found = subprocess.run(words, capture_output=True, text=True)
+    except OSError:
+        return "of unknown version"
+    return found.stdout.strip() or "of unknown version"
 
 
 def run_ode(scene: Data, step: float, steps: int) -> tuple[list[list[float]], str, float]:
@@ -223,7 +231,7 @@ def run_ode(scene: Data, step: float, steps: int) -> tuple[list[list[float]], st
         turn = one.getRotation()
         angle = math.atan2(turn[3], turn[0]) - body["angle"]
         ends.append([x - body["position"][0], y - body["position"][1], angle])
-    return ends, "0.16", cost
+    return ends, ode_version(), cost
 
 
 def slab(outline: list[list[float]], depth: float) -> Data:

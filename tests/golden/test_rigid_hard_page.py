@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 
 import pytest
 
@@ -64,8 +65,30 @@ def test_a_peer_without_a_number_has_its_reason() -> None:
     text = page(lines)
     assert "* ODE: no discs (1 case)" in text
     assert "blew up" in text
-    assert "Peers that ran: MuJoCo 4." in text
+    assert "| MuJoCo 4 | 1 | 0 |" in text
+    assert "| ODE |" not in text
 
 
 def test_record_is_plain_json_a_line_each() -> None:
     assert all(json.loads(line) for line in RECORD.read_text(encoding="utf-8").splitlines())
+
+
+def test_case_gives_checks_of_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+    """``trackbed validate rigid-hard-cases`` is found by its name and runs no peer."""
+    from validation.case import case_load
+    from validation.cases import rigid_hard_cases
+
+    asked: list[tuple[bool, int]] = []
+
+    def family(quick: bool, peers: Sequence[str]) -> list[Row]:
+        asked.append((quick, len(peers)))
+        return [row(), row(method="acceleration", value=float("nan"), ok=False, why="no solution")]
+
+    monkeypatch.setattr(rigid_hard_cases, "_compile", lambda: None)
+    monkeypatch.setattr(rigid_hard_cases, "FAMILIES", {"one": family})
+    good, bad = case_load("rigid-hard-cases")(True)
+    assert asked == [(True, 0)]
+    assert good.name == "box, time-stepping: move"
+    assert good.holds
+    assert not bad.holds
+    assert "no solution" in bad.bar

@@ -84,9 +84,7 @@ def test_peer_that_is_not_there_is_a_row(monkeypatch: pytest.MonkeyPatch) -> Non
         peer_missing.cache_clear()
 
 
-def test_peer_that_dies_or_hangs_is_a_row(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_peer_that_dies_or_hangs_is_a_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(peers, "peer_missing", lambda engine: "")
     monkeypatch.setattr(peers, "SYSTEM_PYTHON", sys.executable)
     script = tmp_path / "worker.py"

@@ -63,7 +63,7 @@ def test_cradle(balls: int, moving: int, expected: list[float], mu: float) -> No
 
 
 @given(st.floats(0.0, 1.0), st.integers(0, 10**6))
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=8)
 def test_energy_is_as_derived(eps: float, seed: int) -> None:
     """One eps, one round: ``E' - E = -(1 - eps)/2 dp . |v|``; and no contact approaches."""
     bodies, velocity = network_bodies(30, seed)
@@ -90,7 +90,7 @@ def test_elastic_collisions_conserve_energy() -> None:
 
 
 @given(st.integers(0, 10**6))
-@settings(deadline=None, max_examples=25)
+@settings(deadline=None, max_examples=8)
 def test_different_restitution_makes_no_energy(seed: int) -> None:
     """``E' - E = -sum (1 - eps_c) dp_c |v_c| / 2`` whatever each eps is."""
     bodies, velocity = network_bodies(30, seed)
@@ -154,19 +154,13 @@ def test_a_sliding_ball(law: Law) -> None:
     assert found.energy_change < 0
 
 
-def paradox() -> tuple[BodySpace, list[float]]:
-    """A rod whose tip hits the floor obliquely so that, with Newton's law, friction feeds it.
+def test_energy_that_would_grow_is_said_and_prevented() -> None:
+    """A rod that hits with its tip: Newton's law with friction can make energy (Kane's paradox).
 
-    Kane and Levinson's case: at rest tangentially after impact, restitution on n alone.
+    ``watched`` lets it and says so, ``safe`` does not; Moreau's law never does for one eps.
     """
     sine, cosine = np.sin(0.6), np.cos(0.6)
     rod = one_body([([0.0, 1.0], [-0.5 * cosine, -0.5 * sine])], 1.0 / 12.0)
-    return rod, [0.0, 0.0, 0.0]
-
-
-def test_energy_that_would_grow_is_said_and_prevented() -> None:
-    """Newton's law with friction on some of many tips: watched it grows and says so; safe not."""
-    rod, _ = paradox()
     g = np.random.default_rng(0)
     grew = 0
     for _ in range(60):

@@ -1,4 +1,4 @@
-"""The seed's modified Dantzig algorithm: its inverse, its lists, where it works and how it fails."""
+"""The seed's modified Dantzig algorithm: its inverse, its lists, where it works and fails."""
 
 from __future__ import annotations
 

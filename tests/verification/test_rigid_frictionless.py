@@ -56,7 +56,7 @@ def test_networks(grains: int) -> None:
 
 @pytest.mark.parametrize("grains", [60, 200])
 def test_as_good_as_osqp(grains: int) -> None:
-    """OSQP with polishing on the same quadratic programme: same accelerations, no worse residual."""
+    """OSQP, polished, on the same quadratic programme: same accelerations, no worse residual."""
     osqp = pytest.importorskip("osqp")
     problem = network(grains, 0.0, 1)
     a, b = problem.delassus[::2][:, ::2], problem.offset[::2]
@@ -67,7 +67,7 @@ def test_as_good_as_osqp(grains: int) -> None:
         np.full(n, np.inf), verbose=False, polishing=True, eps_abs=1e-7, eps_rel=1e-7,
     )  # fmt: skip
     force = np.zeros(2 * n)
-    force[::2] = np.maximum(peer.solve().x, 0.0) * size / unit
+    force[::2] = np.maximum(peer.solve(raise_error=False).x, 0.0) * size / unit
     found = frictionless(problem)
     assert found.residual <= max(problem.residual(force), 1e-14)
     assert found.u[::2] == pytest.approx(problem.velocity(force)[::2], abs=1e-6 * size)

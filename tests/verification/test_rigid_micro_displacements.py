@@ -10,6 +10,7 @@ import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import fsolve
 
 from rigid_lcp.elastic_limit import elastic_limit, minimum_norm_forces
 from rigid_lcp.elastic_network import slider_energy, slider_forces, slider_slope
@@ -118,6 +119,27 @@ def test_beam_on_three_supports(method, stiffness):
     assert answer.solved
     assert answer.r[0::2] == pytest.approx(k * (u + w * x), rel=1e-9)
     assert np.all(answer.r[1::2] == 0.0)
+
+
+def test_a_force_law_of_ones_own():
+    """Hertz' law at the three supports, f = k xi^1.5: the two equations solved by SciPy."""
+
+    def hertz(xi, slip, k, friction):
+        return np.column_stack([k[:, 0] * np.maximum(xi[:, 0], 0) ** 1.5, 0 * xi[:, 1]]), slip
+
+    x = np.array([-1.0, 0.2, 1.0]) - 0.3
+
+    def balance(uw):
+        f = np.maximum(uw[0] + uw[1] * x, 0) ** 1.5
+        return f.sum() - 10 * GRAVITY, f @ x
+
+    u, w = fsolve(balance, (10.0, 0.0), xtol=1e-13)
+    # its steepest slope is 1.5 xi^0.5 < 9: the step of a spring of 1 N/m, by nine
+    jacobian, _ = mass_free_jacobian(beam().bodies)
+    h = stable_step(jacobian, np.full((3, 2), 9.0))
+    answer = micro_displacements(beam(), law=hertz, step=h)
+    assert answer.solved
+    assert answer.r[0::2] == pytest.approx((u + w * x) ** 1.5, rel=1e-9)
 
 
 def test_beam_that_tips_off_a_support():
@@ -330,8 +352,8 @@ def test_step_bound():
     true = np.linalg.norm(j2.toarray(), 2) ** 2
     # beyond 2 / l_max the printed relaxation does not settle
     begun = np.random.default_rng(0).normal(size=6)
-    for share, settles in ((1.9, True), (2.1, False)):
-        relaxed = micro_displacements(sticks, start=begun, step=share / true, iterations_max=9000)
+    for share, settles in ((1.5, True), (2.1, False)):
+        relaxed = micro_displacements(sticks, start=begun, step=share / true, iterations_max=3000)
         assert relaxed.solved is settles
 
 
@@ -375,6 +397,8 @@ def test_malformed_input_is_refused():
             method(problem, [1.0, 2.0])
         with pytest.raises(ProblemError, match="start"):
             method(problem, start=[1.0])
+        with pytest.raises(ProblemError, match="differ"):
+            method(table(), np.tile([1.0, 1.0, 2.0], (4, 1)))
 
 
 # ---- kernels ------------------------------------------------------------------------------------
@@ -410,7 +434,7 @@ def test_slider_slope_and_energy_by_differences(seed, dim):
 
 
 class Springs:
-    """Discs on linear springs (normal, and tangential without limit), large displacements, damped.
+    """Discs on linear springs, normal and tangential, with large displacements, damped.
 
     The geometry is the real one: overlaps, turning normals, rolling; so it differs from the
     rigid answer by the displacements, which are of order 1 / k.
@@ -451,7 +475,10 @@ class Springs:
             relative = v[a] - np.where(inside[:, None], v[b], 0.0)
             spin = self.radius[a] * phi_rate[a] + np.where(inside, other_radius * phi_rate[b], 0.0)
             shear -= dt * ((relative * t).sum(1) - spin)
-            f = np.column_stack([np.maximum(-k * gap, 0.0), self.softness * k * shear])
+            normal = np.maximum(-k * gap, 0.0)
+            most = 1e3 * normal / (self.softness * k)  # so much friction that only open ones slide
+            shear = np.clip(shear, -most, most)
+            f = np.column_stack([normal, self.softness * k * shear])
             push = f[:, :1] * n + f[:, 1:] * t
             total = np.zeros_like(x)
             total[:, 1] -= GRAVITY * self.mass
@@ -500,19 +527,24 @@ def pyramid_scene():
     return Springs(centre, np.ones(6), mass, pairs, planes, 0.7)
 
 
-@pytest.mark.parametrize("scene", [wedge_scene, pyramid_scene])
-def test_stiff_springs_end_in_the_same_forces(scene):
-    """Springs ten times stiffer have a tenth of the error: geometry changes by displacement."""
-    springs = scene()
+def springs_against_limit(springs, stiffness, steps):
+    """Greatest difference of forces over the weight of all, and the rigid limit's forces."""
     problem = springs.rigid()
-    k = np.tile([1.0, springs.softness], (problem.contacts, 1))
-    answer = elastic_limit(problem, k)
+    answer = elastic_limit(problem, np.tile([1.0, springs.softness], (problem.contacts, 1)))
     assert answer.solved
-    scale = GRAVITY * springs.mass.sum()
-    errors = [
-        np.abs(springs.rest(stiffness, 6000) - answer.r.reshape(-1, 2)).max() / scale
-        for stiffness in (1e5, 1e6, 1e7)
-    ]
+    rigid = answer.r.reshape(-1, 2)
+    return np.abs(springs.rest(stiffness, steps) - rigid).max() / (GRAVITY * springs.mass.sum())
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e7])
+def test_springs_on_plane_walls_agree_at_any_stiffness(stiffness):
+    """A disc keeps its normals as it sinks into plane walls: only round-off is left."""
+    assert springs_against_limit(wedge_scene(), stiffness, 3000) < 1e-9
+
+
+def test_stiff_springs_end_in_the_same_forces():
+    """Springs ten times stiffer have a tenth of the error: normals turn by the displacements."""
+    errors = [springs_against_limit(pyramid_scene(), k, 5000) for k in (1e5, 1e6, 1e7)]
     order = np.log10(errors[0] / errors[1]), np.log10(errors[1] / errors[2])
     assert errors[2] < 1e-5
-    assert order == pytest.approx((1.0, 1.0), abs=0.15)
+    assert order == pytest.approx((1.0, 1.0), abs=0.1)

@@ -102,6 +102,8 @@ def test_no_solution_is_proved() -> None:
     assert pivoting(
         friction_problem(w, [-1.0, 0.0], 2.0, 2), tangential_velocity=np.array([1.0])
     ).status == "no solution"  # fmt: skip
+    immovable = friction_problem(np.zeros((3, 3)), [-1.0, 0.0, 0.0], 0.0, 3)
+    assert pivoting(immovable).status == "no solution"
     at_rest = pivoting(friction_problem(w, [-1.0, 0.0], 2.0, 2))
     assert at_rest.solved
 

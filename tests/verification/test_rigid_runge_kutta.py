@@ -193,7 +193,7 @@ def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forces that were not found stop the run, with their residual."""
     import rigid_lcp.acceleration_forces as integrator
 
-    right = integrator.solve_friction
+    right = integrator.impulses_found
 
     def wrong(*args: object, **keys: object) -> object:
         from dataclasses import replace
@@ -201,7 +201,7 @@ def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
         found = right(*args, **keys)  # type: ignore[arg-type]
         return replace(found, residual=1e-3, status="not converged", message="stopped")
 
-    monkeypatch.setattr(integrator, "solve_friction", wrong)
+    monkeypatch.setattr(integrator, "impulses_found", wrong)
     run = block_on_incline(0.1, 0.5, method="acceleration")
     with pytest.raises(NotConverged, match="residual"):
         run.advance(0.01)

@@ -37,9 +37,7 @@ FAMILIES: dict[str, Family] = {
     "cards": lambda quick, peers: trial_rows(card_trials(), peers) + card_threshold_rows(),
     "wedge": lambda quick, peers: trial_rows(wedge_trials(), peers),
     "piles": lambda quick, peers: trial_rows(pile_trials(quick), peers) + light_on_heavy_rows(),
-    "arch": lambda quick, peers: trial_rows(
-        arch_trials(11, quick) + arch_trials(31, quick), peers
-    ),
+    "arch": lambda quick, peers: trial_rows(arch_trials(11, quick) + arch_trials(31, quick), peers),
     "rod": lambda quick, peers: rod_rows(),
     "bounce": lambda quick, peers: bounce_rows(1_000 if quick else 10_000),
     "hopper": hopper_rows,
@@ -48,11 +46,11 @@ FAMILIES: dict[str, Family] = {
 
 
 def hard_rows(
-    quick: bool, peers: Sequence[str] = (), families: Sequence[str] = tuple(FAMILIES)
+    quick: bool, peers: Sequence[str] = (), families: Sequence[str] | None = None
 ) -> dict[str, list[Row]]:
     """Rows by family; ``peers`` of `validation.rigid_scene_peers.PEERS`."""
     _compile()
-    return {name: FAMILIES[name](quick, peers) for name in families}
+    return {name: FAMILIES[name](quick, peers) for name in families or FAMILIES}
 
 
 def run(quick: bool) -> list[Check]:

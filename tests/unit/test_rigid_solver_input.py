@@ -1,0 +1,81 @@
+"""`solve_friction` answers malformed input by a sentence, and hopeless problems by a status."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from rigid_lcp import solve_friction
+from rigid_lcp.errors import ProblemError, UsageError
+
+W = np.diag([1.0, 2.0, 1.0, 2.0])
+Q = np.array([-1.0, 0.5, 1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("w", "q", "mu", "dim", "words"),
+    [
+        (W, [-1.0, np.nan, 1.0, 0.0], 0.5, 2, "q.*not finite"),
+        (np.where(W == 2.0, np.inf, W), Q, 0.5, 2, "W.*not finite"),
+        (W, Q, [0.5, -0.1], 2, "contact 1.*negative"),
+        (W, Q, [0.5, 0.1, 0.2], 2, "mu has shape"),
+        (W[:, :3], Q, 0.5, 2, "W is"),
+        (W[:3, :3], Q, 0.5, 2, "W is"),
+        (W, Q[:3], 0.5, 2, "not 2 a contact"),
+        (W, Q, 0.5, 4, "dim is 4"),
+        (W, "no numbers", 0.5, 2, "q is not made of numbers"),
+    ],
+)
+def test_malformed_input_is_named(w, q, mu, dim, words):
+    with pytest.raises(ProblemError, match=words):
+        solve_friction(w, q, mu, dim)
+
+
+def test_a_bad_start_method_or_tolerance_is_named():
+    with pytest.raises(ProblemError, match=r"start.*3 numbers"):
+        solve_friction(W, Q, 0.5, 2, start=np.zeros(3))
+    with pytest.raises(ProblemError, match=r"start.*finite"):
+        solve_friction(W, Q, 0.5, 2, start=np.full(4, np.nan))
+    with pytest.raises(UsageError, match="no method 'magic'"):
+        solve_friction(W, Q, 0.5, 2, method="magic")
+    with pytest.raises(UsageError, match="tolerance"):
+        solve_friction(W, Q, 0.5, 2, tolerance=0.0)
+
+
+@pytest.mark.parametrize("method", ["auto", "newton", "interior-point", "gauss-seidel"])
+def test_no_contacts_are_solved(method):
+    found = solve_friction(np.zeros((0, 0)), [], [], 3, method=method)
+    assert found.solved
+    assert found.r.shape == found.u.shape == (0,)
+
+
+@pytest.mark.parametrize("kind", [np.asarray, sp.csr_array, sp.csc_matrix, sp.coo_array])
+def test_dense_and_sparse_matrices_of_any_kind(kind):
+    # contact 0 sticks: u_T = 0 takes r_T = -0.25, which mu r_N = 0.5 allows; contact 1 is open
+    found = solve_friction(kind(W), Q, 0.5, 2)
+    assert found.solved
+    np.testing.assert_allclose(found.r, [1.0, -0.25, 0.0, 0.0], atol=1e-12)
+
+
+def test_a_contact_that_bears_on_no_mass_has_no_solution():
+    """W = 0 and q_N < 0: no force changes the approach; a linear programme proves it."""
+    found = solve_friction(np.zeros((2, 2)), [-1.0, 0.0], 0.5, 2)
+    assert found.status == "no solution"
+    assert "mass" in found.message
+
+
+def test_a_negative_normal_mass_has_no_solution():
+    """W_NN < 0 (no W of real bodies): any force only adds to the approach."""
+    found = solve_friction(-np.eye(3), [-1.0, 0.0, 0.0], 0.0, 3)
+    assert found.status == "no solution"
+    assert np.isfinite(found.r).all()
+
+
+def test_the_work_of_one_failed_contact_does_not_spoil_the_others():
+    """Two islands, one without a solution: the other's forces are those it has alone."""
+    w = np.zeros((4, 4))
+    w[2:, 2:] = np.eye(2)
+    found = solve_friction(w, [-1.0, 0.0, -3.0, 0.0], 0.5, 2)
+    assert found.status == "no solution"
+    np.testing.assert_allclose(found.r[2:], [3.0, 0.0], atol=1e-9)

@@ -1,0 +1,115 @@
+"""Strength of a grain: closed forms of the stresses, where it splits, what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigid_lcp.errors import ShapeError
+from rigid_lcp.strength import (
+    brazilian_tension,
+    mean_stress,
+    opposite_pair,
+    splitting_line,
+    weibull_strength,
+)
+
+RADIUS, THICKNESS = 0.02, 0.03
+VOLUME = np.pi * RADIUS**2 * THICKNESS
+
+
+def radial(angles, pushes):
+    """Forces towards the centre of a disc, their points and vectors."""
+    outward = np.column_stack([np.cos(angles), np.sin(angles)])
+    return RADIUS * outward, -np.asarray(pushes)[:, None] * outward
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, 2.0])
+def test_brazilian_disc(turn):
+    """2 P / (pi D t) across the diameter, whatever its direction, at any place."""
+    points, forces = radial(turn + np.array([0, np.pi]), [500.0, 500.0])
+    centre = np.array([3.0, -2.0])
+    tension = brazilian_tension(mean_stress(points + centre, forces, centre, VOLUME))
+    assert tension == pytest.approx(2 * 500 / (np.pi * 2 * RADIUS * THICKNESS), rel=1e-12)
+
+
+def test_mean_stress_of_even_pressure():
+    """Pressure p all around: -p I, and no tension; n forces p 2 pi R t / n."""
+    pressure, n = 2e5, 12
+    push = pressure * 2 * np.pi * RADIUS * THICKNESS / n
+    stress = mean_stress(*radial(2 * np.pi * np.arange(n) / n, n * [push]), (0, 0), VOLUME)
+    assert stress == pytest.approx(-pressure * np.eye(2), rel=1e-12, abs=1e-9 * pressure)
+    assert brazilian_tension(stress) == pytest.approx(-pressure, rel=1e-12)
+
+
+def test_stress_at_the_centre_of_a_disc_by_flamant():
+    """S = sum P [I / (2 pi R t) - 2 n n / (pi R t)], written out, for three unequal forces."""
+    angles = np.array([0.1, 2.3, 4.0])
+    outward = np.column_stack([np.cos(angles), np.sin(angles)])
+    # pushes of three directions in balance: the null vector of their directions
+    pushes = np.linalg.svd(outward.T)[2][-1]
+    pushes *= 300 / np.abs(pushes).max() * np.sign(pushes[0])
+    assert (pushes > 0).all()
+    points, forces = radial(angles, pushes)
+    at_centre = sum(
+        p * (np.eye(2) / 2 - 2 * np.outer(n, n)) / (np.pi * RADIUS * THICKNESS)
+        for p, n in zip(pushes, outward, strict=True)
+    )
+    greatest = np.linalg.eigvalsh(at_centre)[-1]
+    tension = brazilian_tension(mean_stress(points, forces, (0, 0), VOLUME))
+    assert tension == pytest.approx(greatest, rel=1e-12)
+
+
+def test_mean_stress_of_a_bar():
+    """F / A in a bar under tension in 3D, and nothing across."""
+    points = np.array([[0.5, 0, 0], [-0.5, 0, 0]])
+    stress = mean_stress(points, [[10.0, 0, 0], [-10.0, 0, 0]], (0, 0, 0), 1.0 * 0.02)
+    assert stress[0, 0] == pytest.approx(10 / 0.02)
+    assert np.abs(stress).sum() == pytest.approx(10 / 0.02)
+
+
+def test_greatest_pair_and_line():
+    """Two weak and two strong opposite pushes: the crack runs through the strong ones."""
+    points, forces = radial(np.array([0, np.pi, 1.2, 1.2 + np.pi]), [50, 50, 700, 690.0])
+    i, j, squeeze = opposite_pair(points, forces)
+    assert (i, j) == (2, 3)
+    assert squeeze == pytest.approx(690)
+    split = splitting_line(points, forces, (0, 0), VOLUME, strength=1e4)
+    assert split.point == pytest.approx([0, 0], abs=1e-15)
+    assert abs(split.direction @ [np.cos(1.2), np.sin(1.2)]) == pytest.approx(1)
+    # just below and just above its tension: it breaks or holds
+    for share, breaks in ((1 - 1e-12, True), (1 + 1e-12, False)):
+        found = splitting_line(points, forces, (0, 0), VOLUME, split.tension * share)
+        assert (found is not None) is breaks
+
+
+def test_point_load_in_3d():
+    """F / d^2, Jaeger."""
+    points = np.array([[0, 0, 0.025], [0, 0, -0.025]])
+    forces = np.array([[0, 0, -900.0], [0, 0, 900.0]])
+    split = splitting_line(points, forces, (0, 0, 0), 6e-5, 1e5, kind="point-load")
+    assert split.tension == pytest.approx(900 / 0.05**2)
+    with pytest.raises(ShapeError, match="2D"):
+        splitting_line(points, forces, (0, 0, 0), 6e-5, 1e5)
+
+
+def test_no_pair_no_break():
+    """A grain pulled apart, a grain with one contact, and one with none."""
+    points, forces = radial(np.array([0, np.pi]), [-5.0, -5.0])
+    assert opposite_pair(points, forces) is None
+    assert splitting_line(points[:1], -forces[:1], (0, 0), VOLUME, 1.0) is None
+    assert splitting_line(np.zeros((0, 2)), np.zeros((0, 2)), (0, 0), VOLUME, 1.0) is None
+    assert opposite_pair([[0, 0], [0, 0]], [[1, 0], [-1, 0]]) is None
+
+
+def test_size_effect():
+    """Eight times the volume at m = 3: half the strength; 37 % survive at the strength itself."""
+    assert weibull_strength(4e6, 1e-5, 1e-5, 3.0) == pytest.approx(4e6)
+    assert weibull_strength(4e6, 8e-5, 1e-5, 3.0) == pytest.approx(2e6)
+    likely, rare = (weibull_strength(4e6, 1e-5, 1e-5, 3.0, survival=s) for s in (0.9, 0.1))
+    assert likely < 4e6 < rare
+    for bad in ((0.0, 1e-5, 3.0, 0.5), (1e-5, 1e-5, 0.0, 0.5), (1e-5, 1e-5, 3.0, 1.0)):
+        with pytest.raises(ShapeError, match="survival"):
+            weibull_strength(4e6, *bad[:3], survival=bad[3])
+    with pytest.raises(ShapeError, match="volume"):
+        mean_stress([[0, 0]], [[0, 0]], (0, 0), 0.0)

@@ -1,0 +1,171 @@
+"""The parts of the interior point and of Newton's method, against definitions and differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from rigid_lcp.body_factorisation import (
+    BodyFactorisation,
+    ContactFactorisation,
+    DenseFactorisation,
+    SingularSystem,
+)
+from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.interior_point import Path, coulomb_velocity, interior_point
+from rigid_lcp.lorentz_cones import (
+    cone_divide,
+    cone_product,
+    cone_scale,
+    cone_scaling,
+    cone_scaling_square,
+    cone_step,
+)
+from rigid_lcp.newton import alart_curnier, newton
+
+
+def inside(generator: np.random.Generator, contacts: int, dim: int) -> np.ndarray:
+    x = generator.standard_normal((contacts, dim))
+    x[:, 0] = np.linalg.norm(x[:, 1:], axis=1) + generator.uniform(0.01, 2.0, contacts)
+    return x
+
+
+def chain(bodies: int, dim: int, seed: int = 0) -> FrictionProblem:
+    """Bodies, each bound to the one before and to the ground by contacts at random."""
+    g = np.random.default_rng(seed)
+    size = 3 if dim == 2 else 6
+    jacobian = np.zeros((2 * bodies * dim, bodies * size))
+    for k in range(bodies):
+        own = slice(size * k, size * (k + 1))
+        jacobian[2 * k * dim : (2 * k + 1) * dim, own] = g.standard_normal((dim, size))
+        rows = slice((2 * k + 1) * dim, (2 * k + 2) * dim)
+        jacobian[rows, own] = g.standard_normal((dim, size))
+        if k:
+            jacobian[rows, size * (k - 1) : size * k] = g.standard_normal((dim, size))
+    inverse_mass = sp.block_diag([np.eye(size) * g.uniform(0.1, 2.0) for _ in range(bodies)])
+    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(inverse_mass), size)
+    velocity = jacobian @ g.standard_normal(bodies * size)
+    return friction_problem(space, velocity, g.uniform(0.1, 0.9, 2 * bodies), dim)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_scaling_maps_both_points_onto_one(dim):
+    g = np.random.default_rng(1)
+    x, s = inside(g, 50, dim), inside(g, 50, dim)
+    eta, point = cone_scaling(x, s)
+    scaled = cone_scale(eta, point, x, False)
+    np.testing.assert_allclose(scaled, cone_scale(eta, point, s, True), rtol=1e-9, atol=1e-11)
+    square = cone_scaling_square(eta, point)
+    np.testing.assert_allclose(np.einsum("cij,cj->ci", square, x), s, rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(cone_product(x, cone_divide(x, s)), s, rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_step_ends_on_the_boundary(dim):
+    """The determinant x_N^2 - |x_T|^2 is zero there for one contact, and negative for none."""
+    g = np.random.default_rng(2)
+    for _ in range(200):
+        x, d = inside(g, 3, dim), g.standard_normal((3, dim))
+        step = cone_step(x, d)
+        if step > 1e20:
+            continue
+        y = x + step * d
+        determinant = y[:, 0] ** 2 - np.sum(y[:, 1:] ** 2, axis=1)
+        assert abs(determinant.min()) < 1e-9 * (y**2).sum()
+        assert (y[:, 0] > -1e-12).all()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("convex", [False, True])
+def test_the_derivative_of_the_rounded_velocity(dim, convex):
+    g = np.random.default_rng(3)
+    s, mu, h = inside(g, 20, dim), g.uniform(0.1, 1.0, 20), 1e-6
+    _, slope = coulomb_velocity(s, mu, 0.3, convex)
+    for k in range(dim):
+        d = np.zeros(dim)
+        d[k] = h
+        ahead, behind = (coulomb_velocity(s + w, mu, 0.3, convex)[0] for w in (d, -d))
+        np.testing.assert_allclose((ahead - behind) / (2 * h), slope[:, :, k], atol=1e-8)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_derivatives_of_the_contact_law(dim):
+    """A = dF/dr and B = dF/du by central differences, away from changes of status."""
+    g = np.random.default_rng(4)
+    r, u = g.standard_normal((2, 60, dim))
+    mu, rho, h = g.uniform(0.1, 3.0, 60), g.uniform(0.5, 2.0, 60), 1e-6
+    _, a, b, status = alart_curnier(r, u, mu, rho)
+    assert set(status) == {0, 1, 2}
+    for k in range(dim):
+        d = np.zeros(dim)
+        d[k] = h
+        by_r = (alart_curnier(r + d, u, mu, rho)[0] - alart_curnier(r - d, u, mu, rho)[0]) / (2 * h)
+        by_u = (alart_curnier(r, u + d, mu, rho)[0] - alart_curnier(r, u - d, mu, rho)[0]) / (2 * h)
+        np.testing.assert_allclose(by_r, a[:, :, k], atol=1e-7)
+        np.testing.assert_allclose(by_u, b[:, :, k], atol=1e-7)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_all_factorisations_solve_the_same_system(dim):
+    """``(A + B W) x = b`` with A, B at random: residual at round-off, non-symmetric as they are."""
+    g = np.random.default_rng(5)
+    problem = chain(20, dim)
+    a = g.standard_normal((40, dim, dim)) + 4 * np.eye(dim)
+    b = 0.2 * g.standard_normal((40, dim, dim)) + np.eye(dim)
+    right = g.standard_normal(40 * dim)
+    full = sp.block_diag(list(a)) + sp.block_diag(list(b)) @ problem.delassus
+    for made in (DenseFactorisation, ContactFactorisation, BodyFactorisation):
+        x = made(problem).factor(a, b)(right)
+        assert np.linalg.norm(full @ x - right) < 1e-10 * np.linalg.norm(right), made.__name__
+
+
+def test_a_singular_system_is_named():
+    problem = chain(2, 2)
+    with pytest.raises(SingularSystem):
+        BodyFactorisation(problem).factor(np.zeros((4, 2, 2)), np.ones((4, 2, 2)))
+    with pytest.raises(SingularSystem):
+        DenseFactorisation(problem).factor(np.zeros((4, 2, 2)), np.zeros((4, 2, 2)))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_newton_converges_quadratically_from_near(dim):
+    """From 1e-4 beside a solution, three steps reach round-off; a shift of 1e-9 adds no error."""
+    for seed in range(5):
+        problem = chain(15, dim, seed)
+        rough = interior_point(problem, None, 1e-8, Path())
+        exact = newton(problem, rough.r, 1e-13)
+        assert exact.residual < 1e-13
+        g = np.random.default_rng(seed)
+        near = exact.r * (1 + 1e-4 * g.standard_normal(len(exact.r)))
+        again = newton(problem, near, 1e-12)
+        assert again.solved
+        assert again.work["iterations"] <= 4
+
+
+def test_the_shift_leaves_no_error_on_redundant_contacts():
+    """Four legs of one block: W has rank 3 of 8; 1e-9 shift, residual at 1e-14."""
+    at = np.array([-1.5, -0.5, 0.5, 1.5])
+    jacobian = np.zeros((8, 3))
+    jacobian[::2, 1], jacobian[::2, 2] = 1.0, at
+    jacobian[1::2, 0], jacobian[1::2, 2] = 1.0, 0.5
+    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(np.eye(3)), 3)
+    problem = friction_problem(space, np.tile([-9.81, 0.3], 4), 0.5, 2)
+    start = np.tile([3.0, 0.0], 4)
+    assert newton(problem, start, 1e-14).residual <= 1e-14
+
+
+def test_the_convex_path_is_coulombs_where_all_stick_and_not_where_they_slide():
+    """Block of unit mass on a slope: mu = 1 holds it, mu = 0.2 does not; convex then lifts off.
+
+    The convex law has u_N = mu |u_T| where it slides (Anitescu and Tasora): residual not small.
+    """
+    slope = np.radians(20)
+    q = 9.81 * np.array([-np.cos(slope), np.sin(slope)])
+    held = friction_problem(np.eye(2), q, 1.0, 2)
+    assert interior_point(held, None, 1e-9, Path(convex=True)).solved
+    loose = friction_problem(np.eye(2), q, 0.2, 2)
+    convex = interior_point(loose, None, 1e-9, Path(convex=True))
+    assert convex.residual > 1e-3
+    assert convex.u[0] == pytest.approx(0.2 * abs(convex.u[1]), rel=0.05)
+    assert interior_point(loose, None, 1e-9).solved

@@ -1,0 +1,216 @@
+"""`solve_friction` on closed forms, on hard small cases, and on real problems where they are given.
+
+A solution is judged by its residual (`rigid_lcp.cones`); forces are compared only where they are
+unique.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_lcp import BodySpace, solve_friction
+from rigid_lcp.friction_problem import friction_problem
+from rigid_lcp.problem_files import read_problem
+from rigid_lcp.solver import solve_auto
+
+FOLDER = Path(os.environ.get("TRACKBED_DATA", "")) / "friction_problems"
+STORED = (
+    sorted(p for p in FOLDER.glob("*.npz") if p.stem[-2:] not in ("_W", "_H"))
+    if "TRACKBED_DATA" in os.environ
+    else []
+)
+
+
+def block_on_slope(tangent_of_slope: float, mu: float, dim: int) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations of a unit mass on a slope, and its law's answer (a_T, r_T) by hand."""
+    cosine = 1.0 / np.hypot(1.0, tangent_of_slope)
+    weight, pull = 9.81 * cosine, 9.81 * cosine * tangent_of_slope
+    q = np.zeros(dim)
+    q[0], q[-1] = -weight, pull
+    friction = min(pull, mu * weight)
+    return q, np.array([pull - friction, -friction])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 1 - 1e-9, 1.0, 1 + 1e-9, 2.0, 1e3])
+def test_block_on_a_slope(dim, ratio):
+    """a_T = g (sin - mu cos) where mu < tan, else 0; r_N = m g cos.  Also exactly at tan = mu."""
+    q, (sliding, friction) = block_on_slope(0.4, 0.4 * ratio, dim)
+    found = solve_friction(np.eye(dim), q, 0.4 * ratio, dim)
+    assert found.solved, found.message
+    assert found.r[0] == pytest.approx(-q[0], rel=1e-11)
+    assert found.r[-1] == pytest.approx(friction, abs=1e-10)
+    assert found.u[-1] == pytest.approx(sliding, abs=1e-10)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_nothing_approaches_so_there_are_no_forces(dim):
+    q = np.array([0.0, 3.0, -2.0][:dim])
+    found = solve_friction(np.eye(dim), q, 0.7, dim)
+    assert found.method == "no forces"
+    assert found.residual == 0.0
+    np.testing.assert_array_equal(found.r, 0.0)
+
+
+def tower(boxes: int, top: float, dim: int) -> tuple[BodySpace, np.ndarray]:
+    """Unit boxes on each other, contacts at the corners of each face, under gravity 1."""
+    size = 3 if dim == 2 else 6
+    corners = [(-0.5,), (0.5,)] if dim == 2 else [(x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
+    blocks = np.zeros((2, len(corners), dim, size))
+    for side, height in enumerate((-0.5, 0.5)):
+        for c, corner in enumerate(corners):
+            if dim == 2:  # normal up; u = v + phi x (x, h)
+                blocks[side, c] = [[0, 1, corner[0]], [1, 0, -height]]
+                continue
+            x, y, h = *corner, height
+            blocks[side, c] = [
+                [0, 0, 1, y, -x, 0], [1, 0, 0, 0, h, -y], [0, 1, 0, -h, 0, x]
+            ]  # fmt: skip
+    jacobian = np.zeros((boxes * len(corners) * dim, boxes * size))
+    per = len(corners) * dim
+    for k in range(boxes):
+        jacobian[k * per : (k + 1) * per, k * size : (k + 1) * size] = blocks[0].reshape(per, size)
+        if k:
+            jacobian[k * per : (k + 1) * per, (k - 1) * size : k * size] -= blocks[1].reshape(
+                per, size
+            )
+    mass = np.ones(boxes)
+    mass[-1] = top
+    inertia = [1.0, 1.0, 1 / 6] if dim == 2 else [1.0] * 3 + [1 / 6] * 3
+    inverse = sp.diags_array(1.0 / np.concatenate([m * np.array(inertia) for m in mass]))
+    gravity = np.zeros(boxes * size)
+    gravity[1 if dim == 2 else 2 :: size] = -1.0
+    return BodySpace(sp.csr_array(jacobian), sp.csr_array(inverse), size), jacobian @ gravity
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize(("boxes", "top"), [(1, 1.0), (10, 1.0), (10, 1e4), (10, 1e-4), (100, 1.0)])
+def test_towers_stand_and_each_face_bears_the_weight_above(dim, boxes, top):
+    """Redundant corners: single forces are not unique, their sum over a face is."""
+    bodies, q = tower(boxes, top, dim)
+    found = solve_friction(bodies, q, 0.5, dim)
+    assert found.solved, found.message
+    faces = found.r.reshape(boxes, -1, dim)[:, :, 0].sum(axis=1)
+    above = np.arange(boxes - 1, -1, -1) + top
+    np.testing.assert_allclose(faces, above, rtol=1e-9)
+    # a tower of n boxes adds up n such errors of the residual's size
+    assert np.abs(found.u).max() < 1e-10 * above[0]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_bodies_and_matrix_give_a_solution_of_the_same_problem(dim):
+    bodies, q = tower(20, 3.0, dim)
+    by_bodies = solve_friction(bodies, q, 0.3, dim)
+    by_matrix = solve_friction(bodies.matrix, q, 0.3, dim)
+    assert by_bodies.solved
+    assert by_matrix.solved
+    again = solve_friction(bodies.matrix, q, 0.3, dim, start=by_bodies.r)
+    assert again.method == "start"
+
+
+@pytest.mark.parametrize("mu", [0.0, 1e-9, 1e3, 1e6])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_no_friction_hardly_any_and_huge_friction(mu, dim):
+    """Round-off of u_T comes into the residual times mu: 1e6 * 1e-16 is what can be asked."""
+    g = np.random.default_rng(7)
+    j = g.standard_normal((6 * dim, 6 * dim - 3))
+    q = j @ g.standard_normal(j.shape[1])
+    found = solve_friction(j @ j.T, q, mu, dim, tolerance=max(1e-12, 1e-15 * mu))
+    assert found.solved, found.message
+    if mu == 0.0:
+        np.testing.assert_array_equal(found.r.reshape(-1, dim)[:, 1:], 0.0)
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(
+    seed=st.integers(0, 10**6),
+    dim=st.sampled_from([2, 3]),
+    contacts=st.integers(1, 25),
+    rank=st.floats(0.2, 1.0),
+    skew=st.sampled_from([0.0, 1e-3]),
+    mixed=st.booleans(),
+)
+def test_random_problems_with_a_solution_are_solved(seed, dim, contacts, rank, skew, mixed):
+    """W = J J^T of any rank and q = J v: v may be stopped, so there is a solution.
+
+    Then a relative skew part of 1e-3, W stays monotone and, as q stays in its image, solvable.
+    """
+    g = np.random.default_rng(seed)
+    size = contacts * dim
+    j = g.standard_normal((size, max(1, round(rank * size))))
+    turn = g.standard_normal((j.shape[1],) * 2) * skew / np.sqrt(j.shape[1])
+    w = j @ (np.eye(len(turn)) + turn - turn.T) @ j.T
+    mu = g.uniform(0.0, 1.2, contacts)
+    if mixed:
+        mu[g.uniform(size=contacts) < 0.3] = 0.0
+    found = solve_friction(w, j @ g.standard_normal(j.shape[1]), mu, dim)
+    assert found.solved, found.message
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_units_do_not_matter(dim):
+    """Metres to millimetres, kilograms to grams: solved alike, and a solution stays one."""
+    bodies, q = tower(12, 5.0, dim)
+    push = bodies.jacobian @ np.random.default_rng(3).standard_normal(bodies.jacobian.shape[1])
+    w, q = bodies.matrix, q + push
+    here = solve_friction(w, q, 0.4, dim)
+    assert here.solved
+    # u in mm/s^2, r in g mm/s^2: W falls by 1e3, r grows by 1e6
+    there = solve_friction(w * 1e-3, q * 1e3, 0.4, dim)
+    assert there.solved
+    assert problem_residual(w, q, 0.4, dim, there.r * 1e-6) < 1e-11
+
+
+def problem_residual(w, q, mu, dim, r) -> float:
+    return friction_problem(w, q, mu, dim).residual(r)
+
+
+def test_a_warm_start_costs_less_and_a_wrong_one_does_no_harm():
+    bodies, q = tower(60, 1.0, 3)
+    cold = solve_friction(bodies, q, 0.5, 3)
+    push = bodies.jacobian @ np.random.default_rng(5).standard_normal(360)
+    changed = q + 1e-3 * push
+    warm = solve_friction(bodies, changed, 0.5, 3, start=cold.r)
+    assert warm.solved
+    assert warm.work["factorisations"] < 0.5 * cold.work["factorisations"]
+    wrong = solve_friction(bodies, changed, 0.5, 3, start=-1e3 * cold.r)
+    assert wrong.solved
+
+
+@pytest.mark.parametrize("method", ["newton", "interior-point", "gauss-seidel", "pivoting"])
+def test_every_method_says_what_it_reached(method):
+    """On a small tower: solved, or a residual above the tolerance and a message with a remedy."""
+    bodies, q = tower(3, 1.0, 2)
+    found = solve_friction(bodies, q, 0.5, 2, tolerance=1e-10, method=method)
+    assert found.solved == (found.residual <= 1e-10)
+    assert found.solved or "->" in found.message
+
+
+def test_contacts_in_any_order():
+    bodies, q = tower(8, 2.0, 3)
+    order = np.random.default_rng(1).permutation(32)
+    rows = (order[:, None] * 3 + np.arange(3)).ravel()
+    found = solve_friction(bodies.matrix[rows][:, rows], q[rows], 0.5, 3)
+    assert found.solved
+    faces = np.zeros(8)
+    np.add.at(faces, order // 4, found.r[::3])
+    np.testing.assert_allclose(faces, np.arange(7, -1, -1) + 2.0, rtol=1e-9)
+
+
+@pytest.mark.skipif(not STORED, reason="TRACKBED_DATA does not name a folder with problems")
+@pytest.mark.parametrize("path", STORED, ids=[p.stem for p in STORED])
+def test_real_problems(path):
+    """Capsules, spheres, towers, masonry and flows, many with redundant contacts: to 1e-12."""
+    if path.stem.startswith("nonunique"):
+        data = np.load(path)
+        found = solve_friction(data["W"], data["q"], data["mu"], 2)
+    else:
+        found = solve_auto(read_problem(path))
+    assert found.residual <= 1e-12, found.message
