@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +58,9 @@ class Contacts:
         """2 or 3."""
         return self.normal.shape[1]
 
-    def __getitem__(self, rows: Bools | Ints) -> Contacts:
+    def __getitem__(self, rows: Bools | Ints) -> Self:
         """The contacts ``rows``, a mask or an array of numbers."""
-        return Contacts(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
+        return type(self)(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
 
 
 @dataclass(frozen=True, kw_only=True)

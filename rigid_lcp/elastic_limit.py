@@ -14,15 +14,17 @@ What the limit is:
   convex, so f is unique, whatever the order of contacts and bodies and whatever the start.
   `minimum_norm_forces` computes it apart, by linear algebra, for contacts that stick.
 - Where contacts slide while others hold (friction mobilised inside a jammed pile): equilibrium of
-  springs and sliders loaded in one go from nothing.  Coulomb's law has no potential; uniqueness
-  is not proved, and a history of sliding (`coulomb_slider`, MD) ends in other forces.
+  springs and sliders loaded in one go from nothing.  Coulomb's law has no potential, and there is
+  more than one such state: forces were the same to 1e-10 for any order and for starts up to a
+  tenth of the final displacements, but 25 % different for a start as large as those, and 8 times
+  as large in a wedge with a history of sliding (`coulomb_slider`, MD).  All obey eqs 26 and 27.
 - Where bodies accelerate: displacements drift along the motion for ever, which opens what opens
   and slides what slides, and the forces of the contacts that hold are as above.
 
 Measured, one thread, warm: towers of 10, 50 and 200 boxes (20 to 400 contacts) 0.01 to 0.1 s, a
 frictionless pyramid of 465 discs (1,335 contacts) 0.6 s.  Pyramids that collapse with most of
-their contacts sliding, 51 to 210 contacts, friction 0.05 to 0.9: 14 of 16 in 2,000 Newton steps
-(about 1 s); with 1,335 contacts it did not find the limit, and says so.
+their contacts sliding, 51 to 210 contacts, friction 0.05 to 0.9: 16 of 16, in 25 to 1,100 Newton
+steps (0.03 to 2.5 s); with 1,335 contacts it did not find the limit, and says so.
 """
 
 from __future__ import annotations

@@ -120,7 +120,7 @@ def share_until_rest(world: World, after: Motion, lasting: Lasting) -> float:
     """
     if after.dim == 3 or not lasting.sliding.any():
         return 1.0
-    found = world.contacts(after, 5 * TOUCH * world.length)
+    found = world.contacts(after, DRIFT * world.length)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     there &= lasting.sliding & (lasting.contacts.friction > 0)
     if not there.any():

@@ -10,10 +10,11 @@ from math import ceil
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.contacts import ContactForces
 from rigid_lcp.errors import NotConverged, Overlapping, UsageError
+from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.runge_kutta import Pace, runge_kutta_advance
 from rigid_lcp.scene import Loads, Scene, world_of
 from rigid_lcp.time_stepping import contact_forces, moreau_step
@@ -74,6 +75,20 @@ class Simulation:
         count = max(ceil(seconds / self.step - 1e-9), 0)
         for _ in range(count):
             self._time_step(seconds / count)
+
+    def fragment(self, body: int, line: tuple[ArrayLike, ArrayLike]) -> int:
+        """Break a polygon (polyhedron) that moves in two; returns the number of the second part.
+
+        ``line``: a point and a direction (2D), a point and the plane's normal (3D), in the world.
+        The first part keeps the number of the whole, the second comes after all bodies; both go
+        on as parts of the rigid body did (section 10), so that loads are now wanted for one body
+        more.  Raises `ShapeError` for a disc, a fixed body, or a sliver.
+        """
+        scene = broken_scene(self.world.scene, self.motion, body, *line)
+        self.world, self.motion = world_of(scene)
+        whole = (self.contacts.body_a == body) | (self.contacts.body_b == body)
+        self.contacts = self.contacts[~whole]
+        return len(scene.bodies) - 1
 
     @property
     def positions(self) -> Floats:

@@ -10,8 +10,13 @@
     islands          what is still not solved, each island apart, by all of this
 
 Every method alone can fail on real problems: Newton far from a solution, the interior point where
-its path folds back, Gauss-Seidel on tall piles.  Together they have not been seen to fail on a
-problem that has a solution, but there is no proof: read ``status`` and ``residual``.
+its path folds back, Gauss-Seidel on tall piles.  Together they solved 597 of 600 problems made from
+15 real or packed ones by random changes of q and mu to 1e-12, and the others to 1e-6; that is no
+proof: read ``status`` and ``residual``.
+
+Cost: some 20 factorisations from nothing, 1 to 6 from the forces of the step before.  In 3D their
+fill grows fast: above some 3,000 contacts of a 3D packing each takes tenths of a second, and
+Gauss-Seidel is the cheaper way to rough answers.
 """
 
 from __future__ import annotations

@@ -25,6 +25,8 @@ WALL = 4
 """The last bodies of the scene: two slopes and two walls above them, all fixed."""
 STILL = 1e-9
 """Speed below which the discs above the outlet are at rest [m/s]."""
+SETTLING = 0.5
+"""Time the arch has to come to rest once those that fell through are gone [s]."""
 
 
 def hopper(grains: int, seed: int, *, mu: float = 0.6, step: float = 1e-3) -> Simulation:
@@ -63,7 +65,9 @@ def jam(grains: int, seed: int, *, longest: float = 4.0) -> tuple[Simulation, fl
         if held.sum() < grains / 3:
             return None
         if np.abs(run.velocities[:-WALL][held]).max() < STILL:
-            return _held(run, held), run.time
+            jammed = _held(run, held)
+            jammed.advance(SETTLING)
+            return _held(jammed, jammed.positions[:-WALL, 1] > 0), run.time
     return None
 
 

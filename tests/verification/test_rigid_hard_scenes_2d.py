@@ -158,3 +158,35 @@ def test_one_contact_lost_and_found() -> None:
     run.advance(0.06)
     assert run.contacts.status.tolist() == ["stick"]
     assert run.positions[0, 1] == pytest.approx(0.1, abs=1e-12)
+
+
+def test_broken_grain_leaves_the_pile_stable() -> None:
+    """A box in a stack is split upright: nothing is set in motion, its weight is still carried."""
+    run = stack(3, step=1e-3)
+    run.advance(5e-3)
+    energy, mass = run.energy, run.world.mass[:3].sum()
+    added = run.fragment(1, ((0.1, 1.5), (0.0, 1.0)))
+    assert added == 4
+    assert run.energy == pytest.approx(energy, rel=1e-12)
+    assert run.world.mass[np.isfinite(run.world.mass)].sum() == pytest.approx(mass)
+    assert stack_drop(run, 0.02) < 1e-10
+    floor = run.contacts.body_b == 3
+    assert run.contacts.normal_force[floor].sum() == pytest.approx(mass * G, rel=1e-9)
+
+
+def test_broken_grain_moves_on_as_it_was() -> None:
+    """In flight: the parts keep the momentum, the energy and the angular momentum of the whole."""
+    scene = Scene(2, (0, 0))
+    scene.add(Polygon.regular(6, 1.0), density=2.0, velocity=(1, 2), spin=3.0)
+    run = Simulation(scene)
+    energy = run.energy
+    run.fragment(0, ((0.2, 0.1), (1.0, 0.4)))
+    assert run.energy == pytest.approx(energy, rel=1e-13)
+    mass = run.world.mass
+    np.testing.assert_allclose(mass @ run.velocities, mass.sum() * np.array([1, 2]), rtol=1e-13)
+    run.advance(0.01)
+    x, v = run.positions, run.velocities
+    turning = (mass * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])).sum()
+    turning += (run.world.inertia * run.spins).sum()
+    whole = 2.0 * np.array(Polygon.regular(6, 1.0).mass_properties(1.0))
+    assert turning == pytest.approx(3.0 * whole[1], rel=1e-9)
