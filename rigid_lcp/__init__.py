@@ -9,18 +9,50 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rigid_lcp.collisions import collide
     from rigid_lcp.errors import RigidError
     from rigid_lcp.friction_problem import BodySpace, FrictionProblem, FrictionSolution
+    from rigid_lcp.frictionless import lcp
+    from rigid_lcp.scene import Scene
+    from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
+    from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
+    from rigid_lcp.simulation import Simulation
     from rigid_lcp.solver import solve_friction
 
 _HOMES = {
     "BodySpace": "friction_problem",
+    "Disc": "shapes_2d",
     "FrictionProblem": "friction_problem",
     "FrictionSolution": "friction_problem",
+    "HalfSpace": "shapes_2d",
+    "Polygon": "shapes_2d",
+    "Polyhedron": "shapes_3d",
     "RigidError": "errors",
+    "Scene": "scene",
+    "Simulation": "simulation",
+    "Sphere": "shapes_3d",
+    "box": "shapes_3d",
+    "collide": "collisions",
+    "lcp": "frictionless",
     "solve_friction": "solver",
 }
-__all__ = ["BodySpace", "FrictionProblem", "FrictionSolution", "RigidError", "solve_friction"]
+__all__ = [
+    "BodySpace",
+    "Disc",
+    "FrictionProblem",
+    "FrictionSolution",
+    "HalfSpace",
+    "Polygon",
+    "Polyhedron",
+    "RigidError",
+    "Scene",
+    "Simulation",
+    "Sphere",
+    "box",
+    "collide",
+    "lcp",
+    "solve_friction",
+]
 
 
 def __getattr__(name: str) -> Any:
