@@ -144,6 +144,8 @@ class PathStep:
         """One predictor-corrector step; returns its length.  Raises `SingularSystem`."""
         x, s, path, contacts = self.x, self.s, self.path, self.problem.contacts
         gap = float(np.sum(x * s)) / contacts
+        if not gap > 0.0:  # round-off has put a point on the boundary of its cone, or beyond
+            raise SingularSystem
         eps = path.rounding * np.sqrt(gap / self.problem.rho)
         at = self.problem.velocity(self.force()).reshape(x.shape)
         velocity, slope = coulomb_velocity(s, self.mu, eps, path.convex)
