@@ -32,3 +32,5 @@ validate:
 	$(bin)/trackbed validate qdem --quick
 	$(bin)/trackbed validate qdem-cost --quick
 	$(bin)/trackbed validate qdem-hard-cases --quick
+	$(bin)/trackbed validate rigid --quick
+	$(bin)/trackbed validate rigid-hard-cases --quick

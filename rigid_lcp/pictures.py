@@ -42,8 +42,9 @@ def window_of(scene: Scene, positions: list[Floats]) -> tuple[Floats, Floats]:
 
 
 def draw_chains(
-    axes: Any, motion: Motion, contacts: ContactForces, scale: float, plane: tuple[int, int]
-) -> None:
+    axes: Any, scene: Scene, motion: Motion, contacts: ContactForces, scale: float,
+    plane: tuple[int, int],
+) -> None:  # fmt: skip
     """Lines from the bodies' centres to their contacts, as wide as the normal force.
 
     ``scale`` [N]: force of the widest line; ``plane``: the two axes that are drawn.  Blue sticks,
@@ -57,7 +58,7 @@ def draw_chains(
     for c in np.flatnonzero(shown):
         point = contacts.point[c, plane]
         for body in (contacts.body_a[c], contacts.body_b[c]):
-            if body >= 0:
+            if body >= 0 and not isinstance(scene.bodies[body].shape, HalfSpace):
                 lines.append([place[body], point])
                 widths.append(WIDEST * contacts.normal_force[c] / scale)
                 colours.append(SLIDE if contacts.status[c] == "slide" else STICK)
@@ -121,7 +122,7 @@ def picture_state(
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     (draw_bodies_2d if scene.dim == 2 else draw_bodies_3d)(axes, scene, motion)
-    draw_chains(axes, motion, contacts, scale, plane)
+    draw_chains(axes, scene, motion, contacts, scale, plane)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axes.set_title(title, fontsize=10, loc="left")
     axes.set(xlabel="x [m]", ylabel="y [m]" if scene.dim == 2 else "z [m]")
