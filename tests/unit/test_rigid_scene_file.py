@@ -159,7 +159,8 @@ def test_a_load_acts_on_the_named_body_alone() -> None:
     from rigid_lcp.scene import world_of
 
     _, motion = world_of(scene)
-    forces = np.asarray(loads(1.1, motion))
+    peak = file.tables.load[0].begin + 0.5 / (file.tables.load[0].frequency or 1.0)
+    forces = np.asarray(loads(peak, motion))
     loaded = np.flatnonzero(np.abs(forces).sum(axis=1))
     assert [scene.bodies[n].name for n in loaded] == ["sleeper"]
     np.testing.assert_allclose(forces[loaded[0]], [0, -8000, 0])
