@@ -107,8 +107,12 @@ def test_the_inverse_follows_the_lists(seed: int) -> None:
     assert np.diag(matrix - halved) == pytest.approx(0.5e-2 * state.unit, rel=1e-9)
 
 
+OFFSETS = st.floats(-2.0, 2.0).map(lambda x: x if abs(x) > 1e-9 else 0.0)
+"""Where b_N is 1e-79 of b_T, round-off in the one is all there is of the other's forces."""
+
+
 @given(
-    st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.0, 3.0), st.floats(0.1, 10.0)
+    OFFSETS, OFFSETS, st.floats(0.0, 3.0), st.floats(0.1, 10.0)
 )  # fmt: skip
 @settings(deadline=None, max_examples=60)
 def test_one_contact(normal: float, tangential: float, mu: float, mass: float) -> None:

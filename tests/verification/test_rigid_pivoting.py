@@ -77,8 +77,12 @@ def test_redundant_towers(mu: float, top: float) -> None:
     assert found.r[::2].reshape(10, 2).sum(axis=1) == pytest.approx(weight, rel=1e-9)
 
 
+OFFSETS = st.floats(-2.0, 2.0).map(lambda x: x if abs(x) > 1e-9 else 0.0)
+"""Where b_N is 1e-79 of b_T, round-off in the one is all there is of the other's forces."""
+
+
 @given(
-    st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.0, 3.0), st.floats(-0.9, 0.9)
+    OFFSETS, OFFSETS, st.floats(0.0, 3.0), st.floats(-0.9, 0.9)
 )  # fmt: skip
 @settings(deadline=None, max_examples=60)
 def test_one_contact_by_cases(normal: float, tangential: float, mu: float, skew: float) -> None:
