@@ -191,7 +191,9 @@ def friction_solution(
     )  # fmt: skip
 
 
-def friction_problem(matrix: Any, offset: ArrayLike, friction: ArrayLike, dim: int) -> Any:
+def friction_problem(
+    matrix: Any, offset: ArrayLike, friction: ArrayLike, dim: int
+) -> FrictionProblem:
     """Check W, q and mu and make a `FrictionProblem` of them.
 
     ``matrix``: W as a scipy sparse or dense array (nc * dim, nc * dim), or a `BodySpace`;

@@ -11,12 +11,11 @@
     islands          what is still not solved, each island apart, by all of this
 
 Every method alone can fail on real problems: Newton far from a solution, the interior point where
-its path folds back, Gauss-Seidel on tall piles.  Together they solved 597 of 600 problems made from
-15 real or packed ones by random changes of q and mu to 1e-12, and the others to 1e-6; that is no
-proof: read ``status`` and ``residual``.
+its path folds back, Gauss-Seidel on tall piles.  Together they fail seldom (`docs/rigid-solvers.md`
+counts it); there is no proof: read ``status`` and ``residual``.
 
-Cost: some 20 factorisations from nothing, 1 to 6 from the forces of the step before.  In 3D their
-fill grows fast: above some 3,000 contacts of a 3D packing each takes tenths of a second, and
+Cost: hundreds of sweeps and a few factorisations; the interior point takes some 20 a path.  In 3D
+their fill grows fast: above some 3,000 contacts of a 3D packing each takes tenths of a second, and
 Gauss-Seidel is the cheaper way to rough answers.
 """
 
