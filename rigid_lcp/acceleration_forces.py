@@ -17,6 +17,8 @@ from rigid_lcp.time_stepping import forces_error, impulses_found
 
 Floats = NDArray[np.float64]
 
+LASTING_MOST = 200
+"""Contacts above which a dense solve is no short cut."""
 ACCEPTED = 1e-8
 """Residual of forces or impulses above which a step is not made."""
 
@@ -31,6 +33,9 @@ def forces_found(
     elsewhere it opposes the tangential acceleration.  Raises `NoSolution` or `NotConverged`.
     """
     dim = 1 + slip.shape[1]
+    lasting = forces_if_lasting(bodies, offset, friction, slip)
+    if lasting is not None and lasting.residual <= tolerance:
+        return lasting, forces_error(bodies, lasting, gravity)
     if not (slip.any(axis=1) & (friction > 0)).any():
         solution = impulses_found(bodies, offset.reshape(-1, dim), friction, None, tolerance)
     elif dim == 2:
@@ -53,6 +58,43 @@ def forces_found(
             remedy='use method="time-stepping"; ' + solution.message,
         )
     return solution, error
+
+
+def forces_if_lasting(
+    bodies: BodySpace, offset: Floats, friction: Floats, slip: Floats
+) -> FrictionSolution | None:
+    """Forces if every contact presses, sticks where ``slip`` is zero and slides on elsewhere.
+
+    With ``r = S s``, s the forces that are not known from others, eq. 28 is ``S0^T (W S s + b) =
+    0``; one dense solve, redundant contacts by least squares.  Most steps between two events need
+    no more.  None where a contact would pull, or grip by more than its friction.
+    """
+    dim, count = 1 + slip.shape[1], len(friction)
+    if count > LASTING_MOST:
+        return None
+    known = np.zeros((count, dim), dtype=bool)
+    known[:, 1:] = (slip.any(axis=1) | (friction == 0))[:, None]
+    free = np.flatnonzero(~known.ravel())
+    speed = np.linalg.norm(slip, axis=1)
+    along = -friction[:, None] * slip / np.where(speed > 0.0, speed, 1.0)[:, None]
+    mixing = np.eye(count * dim)
+    for c in np.flatnonzero(speed > 0.0):
+        mixing[c * dim + 1 : (c + 1) * dim, c * dim] = along[c]
+    jacobian = bodies.jacobian.toarray()
+    w = jacobian @ (bodies.inverse_mass @ jacobian.T)
+    mixed = (w @ mixing)[free][:, free]
+    force = mixing[:, free] @ np.linalg.lstsq(mixed, -offset[free], rcond=1e-13)[0]
+    error = offset + w @ force
+    force -= mixing[:, free] @ np.linalg.lstsq(mixed, error[free], rcond=1e-13)[0]
+    found = force.reshape(count, dim)
+    grip = np.linalg.norm(found[:, 1:], axis=1) * (speed == 0.0)
+    size = float(np.linalg.norm(force))
+    if size == 0.0 or (found[:, 0] < 0.0).any() or (grip > friction * found[:, 0]).any():
+        return None
+    u = offset + w @ force
+    # no longer than this, as forces are within their cones (`rigid_lcp.cones.natural_map`)
+    residual = float(np.linalg.norm(u[free])) / float(w.diagonal().mean()) / size
+    return FrictionSolution(force, u, residual, "solved", "lasting contacts", {})
 
 
 def _sliding_forces(

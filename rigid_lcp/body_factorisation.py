@@ -10,7 +10,8 @@ whose matrix has one block for each pair of touching bodies, while W has one for
 contacts on a body: in packings it fills in far less.  A has to be regular here; the methods keep
 it so (a barrier, or a proximal shift).
 
-The pattern, its fill-reducing order (minimum degree) and where each number goes are found once.
+The pattern, its order of elimination and where each number goes are found once
+(`rigid_lcp.elimination_tree`); the factors are made by dense products (`rigid_lcp.multifrontal`).
 """
 
 from __future__ import annotations
@@ -23,9 +24,10 @@ import scipy.linalg
 import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse.linalg import SuperLU, splu
 
+from rigid_lcp.elimination_tree import elimination_tree
 from rigid_lcp.friction_problem import FrictionProblem
+from rigid_lcp.multifrontal import factor_fronts, solve_fronts
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -35,10 +37,6 @@ DENSE_SIZE = 150
 """Up to so many rows a dense LU costs less than the bookkeeping of a sparse one."""
 DENSE_SHARE = 0.3
 """Fuller matrices are factored dense: their sparse LU would be full anyway."""
-
-LEAST_PIVOT = 1e-8
-"""A diagonal entry so many times smaller than another of its column is still taken as pivot: the
-shifts and barriers keep it good enough, and other pivots double or triple the fill."""
 
 
 class SingularSystem(ArithmeticError):
@@ -81,48 +79,19 @@ class DenseFactorisation:
         return lambda right: scipy.linalg.lapack.dgetrs(lu, pivots, right)[0]
 
 
-class SparseSystem:
-    """A sparse matrix of fixed pattern, filled entry by entry and factored by SuperLU."""
+class BlockSystem:
+    """A sparse matrix of dense blocks at fixed places, filled anew and factored each time."""
 
-    def __init__(self, pattern: sp.csc_array) -> None:
-        """``pattern``: symmetric, diagonal included, in the caller's order of unknowns."""
-        size = pattern.shape[0]
-        laplacian = sp.csc_array(
-            (np.full(pattern.nnz, -1.0), pattern.indices, pattern.indptr), pattern.shape
-        ) + sp.diags_array(np.full(size, 2.0 * size))
-        found = splu(
-            sp.csc_array(laplacian), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )  # fmt: skip
-        self.order = np.argsort(found.perm_c)
-        self.rank = np.asarray(found.perm_c, dtype=np.int64)
-        ordered = sp.csc_array(pattern[self.order][:, self.order])
-        ordered.sort_indices()
-        self.shape, self.indices, self.indptr = ordered.shape, ordered.indices, ordered.indptr
+    def __init__(self, count: int, size: int, rows: Integers, columns: Integers) -> None:
+        """``count`` block rows of ``size`` rows each; blocks at (rows, columns)."""
+        self.tree = elimination_tree(count, size, rows, columns)
 
-    def places(self, rows: Integers, columns: Integers) -> Integers:
-        """Where the entries (rows, columns), in the caller's order, are among the data."""
-        return _places(self.rank[rows], self.rank[columns], self.indices, self.indptr)
-
-    def factor(self, data: Floats) -> Solve:
-        """Factor the matrix with these entries.  Raises `SingularSystem`."""
-        if not np.isfinite(data).all():
+    def factor(self, blocks: Floats) -> Solve:
+        """Factor the matrix with these blocks (entries, size, size).  Raises `SingularSystem`."""
+        factors, regular = factor_fronts(self.tree, blocks)
+        if not regular:
             raise SingularSystem
-        matrix = sp.csc_array((data, self.indices, self.indptr), self.shape)
-        try:
-            factors: SuperLU = splu(
-                matrix, permc_spec="NATURAL", diag_pivot_thresh=LEAST_PIVOT,
-                options={"SymmetricMode": True},
-            )  # fmt: skip
-        except RuntimeError as error:  # exactly singular
-            raise SingularSystem from error
-
-        def solve(right: Floats) -> Floats:
-            x = np.empty_like(right)
-            x[self.order] = factors.solve(right[self.order])
-            return x
-
-        return solve
+        return lambda right: solve_fronts(self.tree, factors, right)
 
 
 class ContactFactorisation:
@@ -133,24 +102,17 @@ class ContactFactorisation:
         w = problem.delassus.tobsr((dim, dim))
         w = sp.bsr_array(w + sp.bsr_array(_zero_blocks(contacts, dim), shape=w.shape))
         w.sort_indices()
-        self.blocks, self.block_columns, self.first = w.data, w.indices, w.indptr
-        row = np.repeat(np.arange(contacts), np.diff(w.indptr))
-        self.diagonal = np.flatnonzero(row == w.indices)
-        self.row = row
-        inside = np.arange(dim)
-        rows = np.broadcast_to((row * dim)[:, None, None] + inside[:, None], w.data.shape).ravel()
-        columns = np.broadcast_to((w.indices * dim)[:, None, None] + inside, w.data.shape).ravel()
-        ones = sp.csc_array((np.ones(len(rows)), (rows, columns)), w.shape)
-        self.system = SparseSystem(sp.csc_array(ones + ones.T))
-        self.places = self.system.places(rows.astype(np.int64), columns.astype(np.int64))
+        self.blocks = w.data
+        self.row = np.repeat(np.arange(contacts), np.diff(w.indptr))
+        column = w.indices.astype(np.int64)
+        self.diagonal = np.flatnonzero(self.row == column)
+        self.system = BlockSystem(contacts, dim, self.row, column)
 
     def factor(self, a: Floats, b: Floats) -> Solve:
         """See `Factorisation`."""
         blocks = np.matmul(b[self.row], self.blocks)
         blocks[self.diagonal] += a
-        data = np.zeros(len(self.system.indices))
-        data[self.places] = blocks.ravel()
-        return self.system.factor(data)
+        return self.system.factor(blocks)
 
 
 class BodyFactorisation:
@@ -158,29 +120,27 @@ class BodyFactorisation:
 
     def __init__(self, problem: FrictionProblem) -> None:
         assert problem.bodies is not None
-        dim, mass = problem.dim, problem.bodies.mass.tocoo()
+        dim, size = problem.dim, problem.bodies.body_size
         self.jacobian = sp.csr_array(problem.bodies.jacobian)
         self.transposed = sp.csr_array(self.jacobian.T)
-        freedoms = self.jacobian.shape[1]
+        bodies = self.jacobian.shape[1] // size
         entries = self.jacobian.tocoo()
-        # the rows of a contact as one full block: its columns are first[c]:first[c + 1]
-        key = (entries.row // dim).astype(np.int64) * freedoms + entries.col
+        # J of contact c by body ``body[k]``, first[c] <= k < first[c + 1], as full blocks
+        key = (entries.row // dim).astype(np.int64) * bodies + entries.col // size
         found, where = np.unique(key, return_inverse=True)
-        contact, self.columns = found // freedoms, found % freedoms
+        contact, body = found // bodies, found % bodies
         self.first = np.searchsorted(contact, np.arange(problem.contacts + 1))
-        self.rows = np.zeros((len(found), dim))
-        self.rows[where, entries.row % dim] = entries.data
-        touched = sp.csr_array(
-            (np.ones(len(found)), (contact, self.columns)), (problem.contacts, freedoms)
-        )
-        self.system = SparseSystem(
-            sp.csc_array(touched.T @ touched + abs(mass) + sp.eye_array(freedoms))
-        )
-        self.mass = np.zeros(len(self.system.indices))
-        self.mass[self.system.places(mass.row.astype(np.int64), mass.col.astype(np.int64))] = (
-            mass.data
-        )
-        self.places = self.system.places(*_pairs(self.first, self.columns))
+        self.blocks = np.zeros((len(found), dim, size))
+        self.blocks[where, entries.row % dim, entries.col % size] = entries.data
+        rows, columns = _pairs(self.first, body)
+        own = np.arange(bodies)
+        key = np.concatenate([own * bodies + own, rows * bodies + columns])
+        found, places = np.unique(key, return_inverse=True)
+        self.system = BlockSystem(bodies, size, found // bodies, found % bodies)
+        mass = problem.bodies.mass.tocoo()
+        self.mass = np.zeros((len(found), size, size))
+        self.mass[places[mass.row // size], mass.row % size, mass.col % size] = mass.data
+        self.places = places[bodies:]
 
     def factor(self, a: Floats, b: Floats) -> Solve:
         """See `Factorisation`."""
@@ -189,9 +149,9 @@ class BodyFactorisation:
         except np.linalg.LinAlgError as error:
             raise SingularSystem from error
         stiffness = np.matmul(inverse, b)
-        data = self.mass.copy()
-        _add_contacts(data, self.first, self.rows, self.places, stiffness)
-        solve_bodies = self.system.factor(data)
+        matrix = self.mass.copy()
+        _add_contacts(matrix, self.first, self.blocks, self.places, stiffness)
+        solve_bodies = self.system.factor(matrix)
 
         def solve(right: Floats) -> Floats:
             force = multiply_blocks(inverse, right)
@@ -211,49 +171,40 @@ def _zero_blocks(contacts: int, dim: int) -> tuple[Floats, Integers, Integers]:
 
 
 @njit(cache=True)
-def _places(
-    rows: Integers, columns: Integers, indices: NDArray[np.int32], indptr: NDArray[np.int32]
-) -> Integers:
-    places = np.empty(len(rows), dtype=np.int64)
-    for k in range(len(rows)):
-        low, high = indptr[columns[k]], indptr[columns[k] + 1]
-        places[k] = low + np.searchsorted(indices[low:high], rows[k])
-    return places
-
-
-@njit(cache=True)
-def _pairs(first: Integers, columns: Integers) -> tuple[Integers, Integers]:
-    """Row and column of every entry that a contact adds to, in the order of `_add_contacts`."""
+def _pairs(first: Integers, body: Integers) -> tuple[Integers, Integers]:
+    """Row and column of every block that a contact adds to, in the order of `_add_contacts`."""
     total = 0
     for c in range(len(first) - 1):
         total += (first[c + 1] - first[c]) ** 2
-    rows, cols = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
+    rows, columns = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
     k = 0
     for c in range(len(first) - 1):
         for i in range(first[c], first[c + 1]):
             for j in range(first[c], first[c + 1]):
-                rows[k], cols[k] = columns[i], columns[j]
+                rows[k], columns[k] = body[i], body[j]
                 k += 1
-    return rows, cols
+    return rows, columns
 
 
 @njit(cache=True)
 def _add_contacts(
-    data: Floats, first: Integers, rows: Floats, places: Integers, stiffness: Floats
+    matrix: Floats, first: Integers, blocks: Floats, places: Integers, stiffness: Floats
 ) -> None:
-    """Add ``J_c^T K_c J_c`` of every contact, ``K = A^-1 B``, to the entries of the body matrix."""
-    dim = rows.shape[1]
-    half = np.empty(dim)
+    """Add ``J_c^T K_c J_c`` of every contact, ``K = A^-1 B``, to the blocks of the body matrix."""
+    dim, size = blocks.shape[1:]
+    half = np.empty((size, dim))
     k = 0
     for c in range(len(first) - 1):
         for i in range(first[c], first[c + 1]):
-            for b in range(dim):
-                half[b] = 0.0
-                for a in range(dim):
-                    half[b] += rows[i, a] * stiffness[c, a, b]
-            for j in range(first[c], first[c + 1]):
-                total = 0.0
+            for m in range(size):
                 for b in range(dim):
-                    total += half[b] * rows[j, b]
-                data[places[k]] += total
+                    half[m, b] = 0.0
+                    for a in range(dim):
+                        half[m, b] += blocks[i, a, m] * stiffness[c, a, b]
+            for j in range(first[c], first[c + 1]):
+                block = matrix[places[k]]
+                for m in range(size):
+                    for n in range(size):
+                        for b in range(dim):
+                            block[m, n] += half[m, b] * blocks[j, b, n]
                 k += 1

@@ -77,13 +77,17 @@ def collide(
     energy: Literal["safe", "watched"] = "safe",
     tolerance: float = 1e-12,
     max_rounds: int = 50,
+    still: float = 0.0,
+    rest_speed: float = 0.0,
 ) -> Collision:
     """Velocities after a collision by eqs 33 to 36, and the impulses that change them.
 
     ``velocity`` (ndof,) of the bodies [m/s, 1/s]; ``restitution`` eps and ``friction`` mu, (nc,) or
     one number, eps in [0, 1].  ``law``: what eps acts on with friction.  ``energy``: ``safe``
     scales eps down until energy does not grow, ``watched`` says so in the message only.
-    After ``max_rounds`` the rest is taken without restitution, which ends.
+    After ``max_rounds`` the rest is taken without restitution, which ends.  ``still`` [m/s]: an
+    approach not faster is none; ``rest_speed`` [m/s]: one not faster ends without a bounce, which
+    cuts off bounces without end (Zeno).
 
     Raises `ProblemError` for malformed input.  Contacts are those of J: also touching ones with
     v = 0 take part, as they pass impulses on.
@@ -92,21 +96,22 @@ def collide(
     dim = 2 if bodies.body_size == 3 else 3
     nc = bodies.jacobian.shape[0] // dim
     eps, mu = _checked(bodies, before, restitution, friction, nc)
-    scale = float(np.abs(bodies.jacobian @ before).max(initial=0.0))
+    none = max(still, ROUND_OFF * float(np.abs(bodies.jacobian @ before).max(initial=0.0)))
     after, impulse = before.copy(), np.zeros(nc * dim)
     worst, rounds, factor, notes = 0.0, 0, 1.0, ""
     status: Status = "solved"
     while True:
         normal = (bodies.jacobian @ after)[::dim]
-        if not (normal < -ROUND_OFF * scale).any():
+        if not (normal < -none).any():
             break
         if rounds > max_rounds:
             status, notes = "not converged", f"contacts still approach after {rounds} rounds"
             break
         last = rounds == max_rounds
-        taking = np.arange(nc) if last else np.flatnonzero(normal <= ROUND_OFF * scale)
+        taking = np.arange(nc) if last else np.flatnonzero(normal <= none)
+        bounce = np.where((normal < -rest_speed) & (not last), eps, 0.0)
         part, solution, used = collision_round(
-            bodies, after, taking, eps * (not last), mu, dim, law, energy, tolerance
+            bodies, after, taking, bounce, mu, dim, law, energy, tolerance
         )
         impulse += part
         after = after + bodies.inverse_mass @ (bodies.jacobian.T @ part)

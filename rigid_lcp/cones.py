@@ -60,8 +60,38 @@ def dual_velocity(velocity: Floats, mu: Floats) -> Floats:
 
 @njit(cache=True)
 def natural_map(force: Floats, velocity: Floats, mu: Floats, rho: float) -> Floats:
-    """``r - P_K(r - rho (u + mu |u_T| n))``, (nc, dim): zero at a solution, in units of r."""
-    return force - project_cones(force - rho * dual_velocity(velocity, mu), mu)
+    """``r - P_K(r - rho (u + mu |u_T| n))``, (nc, dim): zero at a solution, in units of r.
+
+    With ``a = r - rho u`` the point to project is ``(a_N - mu |rho u_T|, a_T)``.  Where it lies is
+    told from ``a_N + mu (|a_T| - |rho u_T|)``, the lengths subtracted by their squares: added one
+    by one the terms of a great mu would swallow a_N, and with it the approach of the bodies.
+    """
+    error = np.empty_like(force)
+    for c in range(force.shape[0]):
+        here = slip = change = 0.0
+        for k in range(1, force.shape[1]):
+            speed = rho * velocity[c, k]
+            here += (force[c, k] - speed) ** 2
+            slip += speed**2
+            change += force[c, k] * (force[c, k] - 2.0 * speed)
+        here, slip = np.sqrt(here), np.sqrt(slip)
+        longer = change / (here + slip) if here + slip > 0.0 else 0.0
+        push = rho * velocity[c, 0]
+        height = force[c, 0] - push + mu[c] * longer
+        if height <= 0.0:  # in the polar cone: nearest is the apex
+            for k in range(force.shape[1]):
+                error[c, k] = force[c, k]
+        elif here <= mu[c] * (force[c, 0] - push - mu[c] * slip):  # in the cone: it stays
+            error[c, 0] = push + mu[c] * slip
+            for k in range(1, force.shape[1]):
+                error[c, k] = rho * velocity[c, k]
+        else:
+            nearest = height / (1.0 + mu[c] ** 2)
+            error[c, 0] = force[c, 0] - nearest
+            share = mu[c] * nearest / here if here > 0.0 else 0.0
+            for k in range(1, force.shape[1]):
+                error[c, k] = force[c, k] - share * (force[c, k] - rho * velocity[c, k])
+    return error
 
 
 def natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) -> float:
@@ -69,10 +99,15 @@ def natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) ->
 
     ``rho``: force over velocity that makes the two comparable, ``1 / mean(diag W)``.  Where all
     forces are zero, the velocities that should not be are measured instead: the norm of the map
-    over ``rho`` times that of u.  Zero for no contacts.  NaN stays NaN.
+    over ``rho`` times that of u.  Zero for no contacts; not finite where a number is not.
+
+    A contact that carries and approaches all the same shows ``rho |u_N| / (1 + mu^2)^(1/2)`` of
+    it: at mu = 1000 a residual of 1e-12 means approach to 1e-9.
     """
-    error = float(np.linalg.norm(natural_map(force, velocity, mu, rho)))
-    if error == 0.0:
-        return 0.0
-    scale = float(np.linalg.norm(force)) or rho * float(np.linalg.norm(velocity))
-    return error / scale
+    push = rho * velocity
+    scale = float(np.maximum(np.abs(force).max(initial=0.0), np.abs(push).max(initial=0.0)))
+    if scale == 0.0 or not np.isfinite(scale):
+        return scale
+    force, push = force / scale, push / scale  # squares neither vanish nor overflow
+    error = float(np.linalg.norm(natural_map(force, push, mu, 1.0)))
+    return error / (float(np.linalg.norm(force)) or float(np.linalg.norm(push)))

@@ -33,7 +33,7 @@ sliding columns the matrix of eq. 28 need not have positive principal minors.  T
 
 Redundant contacts make eq. 28 singular, ties (b = 0, symmetric piles) make lists cycle: a shift of
 A and a perturbation of b, in the range of A, prevent that, and are driven out at the end
-(`rigid_lcp.pivot_state`).  A pivot costs O(k^2) for k unknown forces, the seed's way O(k^3).
+(`rigid_lcp.pivot_shift`).  A pivot costs O(k^2) for k unknown forces, the seed's way O(k^3).
 """
 
 from __future__ import annotations
@@ -66,14 +66,13 @@ from rigid_lcp.factor_updates import (
     column_scatter,
 )
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution
+from rigid_lcp.pivot_shift import SHIFT_LEAST, shift_remove
 from rigid_lcp.pivot_state import (
-    SHIFT_LEAST,
     Pivots,
     offset_drive,
     pivots_force,
     pivots_solution,
     pivots_state,
-    shift_remove,
 )
 
 Floats = NDArray[np.float64]

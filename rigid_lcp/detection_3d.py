@@ -21,10 +21,10 @@ from rigid_lcp.manifold_3d import (
     four_of,
     solids_contacts,
 )
+from rigid_lcp.near_pairs import HALF_SPACE, near_pairs
 from rigid_lcp.placed_solids import (
     BODY_BITS,
     FEATURE_BITS,
-    HALF_SPACE,
     MOST_EDGES,
     POLYHEDRON,
     SPHERE,
@@ -39,7 +39,6 @@ __all__ = ["detect_3d", "shapes_3d"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 
 def detect_3d(
@@ -99,7 +98,7 @@ def edge_directions(kind: Ints, solids: Solids, bodies: Ints, key: Ints) -> tupl
 def bounding_boxes(
     kind: Ints, solids: Solids, reach: Floats, position: Floats, margin: Floats
 ) -> Floats:
-    """Boxes (x0, y0, z0, x1, y1, z1) around polyhedra and spheres with their margins, (n, 6)."""
+    """Boxes around polyhedra and spheres, swollen by their margins, (n, 6)."""
     boxes = np.empty((len(kind), 6))
     for body in range(len(kind)):
         for axis in range(3):
@@ -112,47 +111,6 @@ def bounding_boxes(
             boxes[body, axis] = low - margin[body]
             boxes[body, 3 + axis] = high + margin[body]
     return boxes
-
-
-def near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
-    """Pairs (i < j) whose boxes overlap and every half-space with every movable body, (m, 2).
-
-    Boxes sorted by their lower ends along the axis in which the bodies spread most, and swept.
-    """
-    solid = np.flatnonzero(kind != HALF_SPACE)
-    axis = int(np.argmax(boxes[solid, :3].std(axis=0))) if len(solid) else 0
-    order = solid[np.argsort(boxes[solid, axis], kind="stable")]
-    swept = swept_pairs(order, axis, boxes, movable)
-    walls, moving = np.flatnonzero(kind == HALF_SPACE), solid[movable[solid]]
-    on_walls = np.column_stack([np.tile(moving, len(walls)), np.repeat(walls, len(moving))])
-    pairs = np.vstack([swept, on_walls])
-    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
-
-
-@njit(cache=True)
-def swept_pairs(order: Ints, sweep: int, boxes: Floats, movable: Bools) -> Ints:
-    """Pairs (i < j) of overlapping boxes, which are given in the order of their lower ends."""
-    pairs = np.empty((0, 2), dtype=np.int64)
-    for store in range(2):  # first count, then store
-        count = 0
-        for place in range(len(order)):
-            i = order[place]
-            for later in range(place + 1, len(order)):
-                j = order[later]
-                if boxes[j, sweep] > boxes[i, 3 + sweep]:
-                    break
-                apart = not (movable[i] or movable[j])
-                for axis in range(3):
-                    if boxes[i, axis] > boxes[j, 3 + axis] or boxes[j, axis] > boxes[i, 3 + axis]:
-                        apart = True
-                if apart:
-                    continue
-                if store:
-                    pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
-                count += 1
-        if not store:
-            pairs = np.empty((count, 2), dtype=np.int64)
-    return pairs
 
 
 @njit(cache=True)

@@ -154,16 +154,8 @@ def cut_contacts(left: Floats, right: Floats) -> CutContacts:
     return CutContacts(ends, np.array([normal, normal]), np.zeros(2))
 
 
-def broken_scene(
-    scene: Scene, motion: Motion, body: int, point: ArrayLike, direction: ArrayLike
-) -> Scene:
-    """The scene at the state ``motion`` with one body broken in two.
-
-    In 2D along the line through ``point`` (2,) [m] with ``direction`` (2,); in 3D by the plane
-    through ``point`` (3,) with the normal ``direction`` (3,); world frame.  The first part has the
-    number of the whole, the second is added at the end; surface values are those of the whole.
-    Raises `ShapeError` for what can not be split: a disc, a fixed body, a sliver.
-    """
+def scene_at(scene: Scene, motion: Motion) -> Scene:
+    """The same bodies, starting from the state ``motion``."""
     from rigid_lcp.scene import Scene
 
     made = Scene(scene.dim, scene.gravity)
@@ -174,6 +166,20 @@ def broken_scene(
         )
         for k, each in enumerate(scene.bodies)
     ]  # fmt: skip
+    return made
+
+
+def broken_scene(
+    scene: Scene, motion: Motion, body: int, point: ArrayLike, direction: ArrayLike
+) -> Scene:
+    """The scene at the state ``motion`` with one body broken in two.
+
+    In 2D along the line through ``point`` (2,) [m] with ``direction`` (2,); in 3D by the plane
+    through ``point`` (3,) with the normal ``direction`` (3,); world frame.  The first part has the
+    number of the whole, the second is added at the end; surface values are those of the whole.
+    Raises `ShapeError` for what can not be split: a disc, a fixed body, a sliver.
+    """
+    made = scene_at(scene, motion)
     where = scene.bodies[body].name or f"body {body}"
     if not scene.bodies[body].movable or not hasattr(scene.bodies[body].shape, "vertices"):
         raise ShapeError(

@@ -12,18 +12,25 @@ from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.cones import natural_map, natural_residual
 from rigid_lcp.errors import ProblemError
+from rigid_lcp.problem_input import check_factors, finite_numbers, in_range, matrix_given
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int32]
 Status = Literal["solved", "not converged", "no solution", "cycled", "singular"]
 """What became of a problem: ``no solution`` is a proof (a ray), the others are not."""
 
 
+MOST_FRICTION = 1e6
+"""Largest coefficient of friction [-]: the residual shows ``rho |u_N| / mu`` of an approach."""
 SHARE_LEFT = 0.1
+"""Part of the error without forces that a solution may leave, where its forces are huge [-]."""
 ROUND_OFF = 1e-15
+"""Relative round-off of a force: what it leaves even where the residual is zero [-]."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,12 @@ class BodySpace:
     @cached_property
     def diagonal(self) -> Floats:
         """The diagonal of W, without W."""
-        return np.asarray(self.spread.T.multiply(self.jacobian).sum(axis=1)).ravel()
+        rows, mass = self.jacobian, self.inverse_mass
+        found: Floats = _row_forms(
+            rows.indptr, rows.indices, rows.data, mass.indptr, mass.indices, mass.data,
+            rows.shape[1],
+        )  # fmt: skip
+        return found
 
     def product(self, force: Floats) -> Floats:
         """``W r``."""
@@ -128,13 +140,17 @@ class FrictionProblem:
             return self.bodies.product(force) + self.offset
         return np.asarray(self.delassus @ force) + self.offset
 
-    def residual(self, force: Floats) -> float:
-        """Scale-free natural residual of forces r (nc * dim,), see `rigid_lcp.cones`."""
+    def residual(self, force: Floats, velocity: Floats | None = None) -> float:
+        """Scale-free natural residual of forces r (nc * dim,), see `rigid_lcp.cones`.
+
+        ``velocity``: ``W r + q``, where it is known already.
+        """
         shape = (self.contacts, self.dim)
-        velocity = self.velocity(force).reshape(shape)
+        u = self.velocity(force) if velocity is None else velocity
         return natural_residual(
-            np.ascontiguousarray(force).reshape(shape), velocity, self.friction, self.rho
-        )
+            np.ascontiguousarray(force).reshape(shape), np.ascontiguousarray(u).reshape(shape),
+            self.friction, self.rho,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -177,16 +193,23 @@ def friction_solution(
     relative to them, as small as one likes: they are not ``solved`` unless they also leave less
     than `SHARE_LEFT` of the error that no forces have.
     """
-    residual = problem.residual(force)
+    velocity = problem.velocity(force)
+    residual = problem.residual(force, velocity)
     left = max(residual, ROUND_OFF) * float(np.linalg.norm(force))
     solved = residual <= tolerance and left <= SHARE_LEFT * problem.error_without_forces
-    if not solved and not message:
+    if not solved and not message and residual <= tolerance:
+        message = (
+            f"{method}: forces grow without bound ({float(np.abs(force).max()):.1g}) and mend"
+            " nothing; relative to them any error is small"
+            "\n  -> look for contacts that bear on no mass, or use impulses"
+        )
+    elif not solved and not message:
         message = (
             f"{method} stopped at a residual of {residual:.2g} (asked: {tolerance:.2g})"
             "\n  -> ask for less, start from another point, or try another method"
         )
     return FrictionSolution(
-        force, problem.velocity(force), residual, "solved" if solved else status, method,
+        force, velocity, residual, "solved" if solved else status, method,
         work or {}, "" if solved else message,
     )  # fmt: skip
 
@@ -194,24 +217,26 @@ def friction_solution(
 def friction_problem(
     matrix: Any, offset: ArrayLike, friction: ArrayLike, dim: int
 ) -> FrictionProblem:
-    """Check W, q and mu and make a `FrictionProblem` of them.
+    """Check W, q and mu and make a `FrictionProblem` of them; what was given is left as it is.
 
-    ``matrix``: W as a scipy sparse or dense array (nc * dim, nc * dim), or a `BodySpace`;
-    ``offset`` q (nc * dim,); ``friction`` mu (nc,), or one number for all; ``dim`` 2 or 3.
+    ``matrix``: W (nc * dim, nc * dim) as a dense or sparse matrix, as a scipy `LinearOperator`,
+    which is written out by nc * dim products, or as a `BodySpace`; ``offset`` q (nc * dim,) or
+    (nc, dim); ``friction`` mu (nc,), or one number for all; ``dim`` 2 or 3.
     Raises `ProblemError`, which names what is wrong and where.
     """
-    if dim not in (2, 3):
+    if not isinstance(dim, int | np.integer) or dim not in (2, 3):
         raise ProblemError(f"dim is {dim!r}", where="dim", remedy="give 2 or 3")
-    q = _finite(offset, "q").ravel()
+    q = finite_numbers(offset, "q").ravel()
+    in_range(q, "q", least=0.0)  # bodies may come to rest as slowly as they like
     if len(q) % dim:
         raise ProblemError(
             f"q has {len(q)} numbers, which are not {dim} a contact", where="q",
             remedy="order it contact after contact: n, t" + ", t2" * (dim - 2),
         )  # fmt: skip
     contacts = len(q) // dim
-    mu = np.broadcast_to(_finite(friction, "mu"), (contacts,)) if np.ndim(friction) == 0 else (
-        _finite(friction, "mu")
-    )  # fmt: skip
+    mu = finite_numbers(friction, "mu")
+    if mu.ndim == 0:
+        mu = np.full(contacts, float(mu))
     if mu.shape != (contacts,):
         raise ProblemError(
             f"mu has shape {mu.shape} for {contacts} contacts", where="mu",
@@ -223,38 +248,40 @@ def friction_problem(
             f"friction is negative ({mu[worst]:g})", where=f"mu, contact {worst}",
             remedy="give a coefficient of friction of zero or more",
         )  # fmt: skip
+    if (mu > MOST_FRICTION).any():
+        worst = int(np.argmax(mu))
+        raise ProblemError(
+            f"friction is {mu[worst]:g}", where=f"mu, contact {worst}",
+            remedy=f"give {MOST_FRICTION:g} at most: above it round-off decides what sticks",
+        )  # fmt: skip
     bodies = matrix if isinstance(matrix, BodySpace) else None
-    w = None if bodies is not None else _matrix(matrix)
+    if bodies is not None:
+        check_factors(bodies)
+    w = None if bodies is not None else matrix_given(matrix)
+    if w is not None:
+        in_range(w.data, "W")
     shape = (bodies.jacobian.shape[0],) * 2 if bodies is not None else w.shape  # type: ignore[union-attr]
     if shape != (len(q), len(q)):
         raise ProblemError(
             f"W is {shape[0]} x {shape[1]} and q has {len(q)} numbers", where="W",
             remedy="give a square W with a row for every number of q",
         )  # fmt: skip
-    return FrictionProblem(w, q, np.ascontiguousarray(mu, dtype=float), dim, bodies)
+    return FrictionProblem(w, q, mu, int(dim), bodies)
 
 
-def _finite(values: ArrayLike, name: str) -> Floats:
-    try:
-        array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(f"{name} is not made of numbers ({error})", where=name) from error
-    bad = np.flatnonzero(~np.isfinite(array))
-    if len(bad):
-        raise ProblemError(
-            f"{len(bad)} of its numbers are not finite, first number {bad[0]}", where=name,
-            remedy="look for a mass of zero or a division by zero where it was made",
-        )  # fmt: skip
-    return array
-
-
-def _matrix(matrix: Any) -> sp.csr_array:
-    if not sp.issparse(matrix):
-        dense = _finite(matrix, "W")
-        if dense.ndim != 2:
-            raise ProblemError(f"it has {dense.ndim} dimensions, not 2", where="W")
-        return sp.csr_array(dense)
-    w = sp.csr_array(matrix, dtype=float)
-    w.sum_duplicates()
-    _finite(w.data, "W")
-    return w
+@njit(cache=True)
+def _row_forms(
+    start: Integers, index: Integers, value: Floats,
+    mass_start: Integers, mass_index: Integers, inverse_mass: Floats, freedoms: int,
+) -> Floats:  # fmt: skip
+    """``J_i M^-1 J_i^T`` of every row i of J; both matrices by rows, M^-1 symmetric."""
+    found, row = np.zeros(len(start) - 1), np.zeros(freedoms)
+    for i in range(len(found)):
+        for k in range(start[i], start[i + 1]):
+            row[index[k]] += value[k]
+        for k in range(start[i], start[i + 1]):
+            for m in range(mass_start[index[k]], mass_start[index[k] + 1]):
+                found[i] += value[k] * inverse_mass[m] * row[mass_index[m]]
+        for k in range(start[i], start[i + 1]):
+            row[index[k]] = 0.0
+    return found

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.acceleration_forces import ACCEPTED
-from rigid_lcp.contacts import Contacts, contact_rows
+from rigid_lcp.collisions import collide
+from rigid_lcp.contacts import Contacts, contact_rows, contact_tangents
 from rigid_lcp.equations import body_space, relative_velocity
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction_problem import BodySpace
 from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
 from rigid_lcp.scene import World
-from rigid_lcp.time_stepping import forces_error, impulses_found
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -81,55 +81,66 @@ def contacts_again(
     found = world.contacts(motion, travel + 10 * TOUCH * world.length)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     contacts, slip = found[rows[there]], lasting.slip[there]
-    if motion.dim == 3:
+    if motion.dim == 3:  # the direction turns with the velocity, until that has reversed
+        slip = slip_carried(lasting, there, contacts)
         now = relative_velocity(contacts, motion)[:, 1:]
-        slip = np.where((slip != 0).any(axis=1)[:, None], now, 0.0)
+        slip = np.where(((now * slip).sum(axis=1) > 0)[:, None], now, slip)
     return contacts, slip
+
+
+def slip_carried(lasting: Lasting, rows: Bools, contacts: Contacts) -> Floats:
+    """Slips of the lasting contacts ``rows`` in the tangents of the same ``contacts`` now.
+
+    The tangents of a contact jump where its normal passes the axis they are made from.
+    """
+    then = contact_tangents(lasting.contacts.normal[rows])
+    vector = np.einsum("cij,ci->cj", then, lasting.slip[rows])
+    return np.einsum("cij,cj->ci", contact_tangents(contacts.normal), vector)
 
 
 def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, bool]:
     """Velocities after the collisions of touching bodies (eqs 32-36), and whether there were any.
 
-    All at once: excess velocities ``u+ + e u-`` (eq. 34) under Coulomb's law for the impulses.
+    `rigid_lcp.collisions.collide`, restitution on normal velocities, as time stepping has it, but
+    scaled down where energy would grow.  Raises `NotConverged`.
     """
     contacts = world.contacts(motion, 0.5 * TOUCH * world.length)
     if len(contacts) == 0:
         return motion, False
-    before = relative_velocity(contacts, motion)
     scale = speed_scale(world, motion)
-    if before[:, 0].min() >= -STILL * scale:
+    if relative_velocity(contacts, motion)[:, 0].min() >= -STILL * scale:
         return motion, False
-    bounce = before[:, 0] < -REST_SPEED * scale
-    excess = before.copy()
-    excess[:, 0] += np.where(bounce, contacts.restitution * before[:, 0], 0.0)
     bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
-    solution = impulses_found(bodies, excess, contacts.friction, None, tolerance)
-    error = forces_error(bodies, solution, STILL * scale)
-    if not error <= ACCEPTED:
+    moving = motion.rates[world.movable].ravel()
+    found = collide(
+        bodies, moving, contacts.restitution, contacts.friction, law="newton",
+        tolerance=tolerance, still=STILL * scale, rest_speed=REST_SPEED * scale,
+    )  # fmt: skip
+    if not (found.solved or found.residual <= ACCEPTED):
         raise NotConverged(
-            f"the impulses of a collision have a residual of {error:.2g}",
-            where=f"{len(contacts)} contacts", remedy=solution.message,
+            f"the impulses of a collision have a residual of {found.residual:.2g}",
+            where=f"{len(contacts)} contacts", remedy=found.message,
         )  # fmt: skip
-    return _pushed(world, motion, bodies, solution.r), True
+    rates = motion.rates
+    rates[world.movable] = found.velocity.reshape(-1, world.size)
+    return motion_with_rates(motion, rates), True
 
 
 def share_until_rest(world: World, after: Motion, lasting: Lasting) -> float:
-    """Share of the step after which the first sliding contact came to rest; 1 if none did.
-
-    2D only, where friction has two directions; in 3D the direction turns with the velocity.
-    """
-    if after.dim == 3 or not lasting.sliding.any():
+    """Share of the step after which the first sliding contact came to rest; 1 if none did."""
+    if not lasting.sliding.any():
         return 1.0
     found = world.contacts(after, DRIFT * world.length)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     there &= lasting.sliding & (lasting.contacts.friction > 0)
     if not there.any():
         return 1.0
-    now = relative_velocity(found[rows[there]], after)[:, 1]
-    then = lasting.slip[there, 0]
+    contacts = found[rows[there]]
+    now, then = relative_velocity(contacts, after)[:, 1:], slip_carried(lasting, there, contacts)
+    along, before = (now * then).sum(axis=1), (then * then).sum(axis=1)
     still = STILL * speed_scale(world, after)
-    turned = (now * then < 0) & (np.abs(now) > still)
-    return float((then[turned] / (then[turned] - now[turned])).min(initial=1.0))
+    turned = (along < 0) & (np.linalg.norm(now, axis=1) > still)
+    return float((before[turned] / (before[turned] - along[turned])).min(initial=1.0))
 
 
 def overlap_beyond(world: World, motion: Motion, pressed: Ints) -> float:

@@ -262,9 +262,11 @@ def solids_contacts(
     face, own, other = (face_b, b, a) if own_is_b else (face_a, a, b)
     crossing = np.empty(9)
     towards = solids.normal[face] * (1.0 if own_is_b else -1.0)
+    # The normal is on the outer side of b's edge; grains with sharp edges may have it at more than
+    # a right angle to that of the face.
     crosses = (
         edge_a >= 0
-        and edge_crossing(solids, a, edge_a, b, edge_b, towards, crossing)
+        and edge_crossing(solids, a, edge_a, b, edge_b, solids.bisector[edge_b], crossing)
         and 0.0 <= crossing[0] <= 1.0
         and 0.0 <= crossing[1] <= 1.0
     )

@@ -1,4 +1,7 @@
-"""Broad phase in the plane: shapes placed, boxes around them, pairs whose boxes overlap."""
+"""Broad phase: pairs of bodies whose boxes overlap; for the plane, shapes placed and their boxes.
+
+Boxes are rows of their lower, then their upper corner: (x0, y0, x1, y1), (x0, y0, z0, x1, y1, z1).
+"""
 
 from __future__ import annotations
 
@@ -36,21 +39,16 @@ def place_shapes(
 def bounding_boxes(
     kind: Ints, first: Ints, vertices: Floats, radius: Floats, position: Floats, margin: Floats
 ) -> Floats:
-    """Boxes (x0, x1, y0, y1) around polygons and discs, swollen by their margins, (n, 4)."""
+    """Boxes around polygons and discs, swollen by their margins, (n, 4)."""
     boxes = np.empty((len(kind), 4))
     for body in range(len(kind)):
-        if kind[body] == POLYGON:
-            boxes[body, 0::2], boxes[body, 1::2] = np.inf, -np.inf
-            for v in range(first[body], first[body + 1]):
-                for axis in range(2):
-                    boxes[body, 2 * axis] = min(boxes[body, 2 * axis], vertices[v, axis])
-                    boxes[body, 2 * axis + 1] = max(boxes[body, 2 * axis + 1], vertices[v, axis])
-        else:
-            for axis in range(2):
-                boxes[body, 2 * axis] = position[body, axis] - radius[body]
-                boxes[body, 2 * axis + 1] = position[body, axis] + radius[body]
-        boxes[body, 0::2] -= margin[body]
-        boxes[body, 1::2] += margin[body]
+        for axis in range(2):
+            low, high = position[body, axis] - radius[body], position[body, axis] + radius[body]
+            if kind[body] == POLYGON:
+                low, high = np.inf, -np.inf
+                for v in range(first[body], first[body + 1]):
+                    low, high = min(low, vertices[v, axis]), max(high, vertices[v, axis])
+            boxes[body, axis], boxes[body, 2 + axis] = low - margin[body], high + margin[body]
     return boxes
 
 
@@ -58,10 +56,18 @@ def bounding_boxes(
 def near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
     """Pairs (i < j) whose boxes overlap and every half-space with every movable body, (m, 2).
 
-    Boxes sorted by their left ends, swept from left to right.
+    ``boxes`` (n, 2 dim); those of half-spaces are not read.  Boxes are sorted by their lower ends
+    along the axis in which the bodies spread most, and swept.
     """
     solid = np.flatnonzero(kind != HALF_SPACE)
-    order = solid[np.argsort(boxes[solid, 0], kind="mergesort")]
+    dim = boxes.shape[1] // 2
+    sweep, widest = 0, -1.0
+    for axis in range(dim):
+        spread = np.var(boxes[solid, axis]) if len(solid) > 0 else 0.0
+        if spread > widest:
+            sweep, widest = axis, spread
+    order = solid[np.argsort(boxes[solid, sweep], kind="mergesort")]
+    walls = np.flatnonzero(kind == HALF_SPACE)
     pairs = np.empty((0, 2), dtype=np.int64)
     for store in range(2):  # first count, then store
         count = 0
@@ -69,16 +75,21 @@ def near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
             i = order[place]
             for later in range(place + 1, len(order)):
                 j = order[later]
-                if boxes[j, 0] > boxes[i, 1]:
+                if boxes[j, sweep] > boxes[i, dim + sweep]:
                     break
-                if boxes[i, 2] > boxes[j, 3] or boxes[j, 2] > boxes[i, 3]:
-                    continue
-                if not (movable[i] or movable[j]):
+                apart = not (movable[i] or movable[j])
+                for axis in range(dim):
+                    if (
+                        boxes[i, axis] > boxes[j, dim + axis]
+                        or boxes[j, axis] > boxes[i, dim + axis]
+                    ):
+                        apart = True
+                if apart:
                     continue
                 if store:
                     pairs[count, 0], pairs[count, 1] = min(i, j), max(i, j)
                 count += 1
-        for wall in np.flatnonzero(kind == HALF_SPACE):
+        for wall in walls:
             for i in solid:
                 if movable[i]:
                     if store:
@@ -86,5 +97,4 @@ def near_pairs(kind: Ints, boxes: Floats, movable: Bools) -> Ints:
                     count += 1
         if not store:
             pairs = np.empty((count, 2), dtype=np.int64)
-    size = len(kind)
-    return pairs[np.argsort(pairs[:, 0] * size + pairs[:, 1], kind="mergesort")]
+    return pairs[np.argsort(pairs[:, 0] * len(kind) + pairs[:, 1], kind="mergesort")]

@@ -7,7 +7,7 @@ With ``z = r_N - rho u_N`` and ``y = r_T - rho u_T`` (Alart and Curnier, CMAME 9
 is zero exactly at a solution.  One step solves ``(A + B W) dr = -F``, A and B the derivatives of F
 by r and u: contacts open, stick or slide in it, and once these are guessed right the step is
 exact but for the direction of sliding.  Where forces are not unique (stick, redundant contacts)
-W is singular there; A is shifted by ``shift * B``, which is one proximal-point step on r: the
+W is singular there; W is shifted by ``shift / rho``, which is one proximal-point step on r: the
 limit has no error from it, unlike Tikhonov's.
 """
 
@@ -24,9 +24,13 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
 ITERATIONS = 50
-SHIFTS = (1e-9, 1e-6, 1e-4)
-"""Proximal shifts over mean(diag W), tried in turn: the smaller, the faster near the end."""
-PATIENCE = 5
+FIRST_SHIFTS = (1e-5, 1e-3)
+"""Proximal shifts over mean(diag W) to begin with, tried in turn."""
+LEAST_SHIFT, QUIET = 1e-10, 0.01
+"""The shift falls by `QUIET` at a step on which no contact changes its status: then it is all that
+holds the steps up.  While some do a great one is better: round-off is divided by it, and contacts
+that hardly bear would change at every step."""
+PATIENCE = 8
 """Steps that may fail to halve the best residual: contacts change status before it falls."""
 
 
@@ -98,17 +102,19 @@ def newton(
     shape = (problem.contacts, problem.dim)
     linear = linear or factorisation(problem)
     rho = contact_rho(problem)
-    scale = (problem.rho / rho)[:, None, None]
     best = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
     best_residual, done = problem.residual(best), 0
-    for shift in SHIFTS:
+    for shift in FIRST_SHIFTS:
         force, waited, mark = best, 0, best_residual
+        status = np.zeros(0, dtype=np.int8)
         while best_residual > tolerance and done < iterations and waited < PATIENCE:
-            velocity = problem.velocity(force).reshape(shape)
-            f, a, b, _ = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
+            velocity, last = problem.velocity(force).reshape(shape), status
+            f, a, b, status = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
+            if np.array_equal(status, last):
+                shift = max(LEAST_SHIFT, QUIET * shift)
             done, waited = done + 1, waited + 1
             try:
-                solve = linear.factor(a + (shift * scale) * b, b)
+                solve = linear.factor(a + (shift / problem.rho) * b, b)
             except SingularSystem:
                 break
             force = force - solve(f.ravel())
@@ -122,16 +128,13 @@ def newton(
             if best_residual <= tolerance:  # once more by the same factors: nearly for nothing
                 velocity = problem.velocity(best).reshape(shape)
                 f = alart_curnier(best.reshape(shape), velocity, problem.friction, rho)[0]
-                last = best - solve(f.ravel())
-                if problem.residual(last) < best_residual:
-                    best = last
+                again = best - solve(f.ravel())
+                if problem.residual(again) < best_residual:
+                    best = again
     return friction_solution(
-        problem,
-        best,
-        tolerance,
-        "newton",
+        problem, best, tolerance, "newton",
         {"iterations": float(done), "factorisations": float(done)},
-    )
+    )  # fmt: skip
 
 
 def contact_rho(problem: FrictionProblem) -> Floats:

@@ -1,13 +1,7 @@
-"""A problem as the pivoting methods hold it, the shift that makes it regular, and its answer.
+"""A problem as the pivoting methods hold it, and the answer that comes out of it, judged.
 
-Redundant contacts make the reduced equations (28) singular, and nearly redundant ones make the
-way to a solution long.  So ``A + shift`` is solved, and the shift taken out by proximal steps
-
-    a = (A + shift) f - shift f_before + b,
-
-each of which drives the change of b that it makes, all contacts kept consistent.  A fixed point
-knows no shift (Rockafellar, SIAM J. Control Optim. 14 (1976) 877, for monotone problems; with
-friction it is judged by its residual).  The shift falls as long as that takes few pivots.
+What has no solution is told by a proof, a linear programme, not by forces that grow: those can have
+a small residual, as that is relative to them.
 """
 
 from __future__ import annotations
@@ -33,28 +27,19 @@ from rigid_lcp.dantzig_drive import (
 )
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.factor_updates import (
-    BREAKING,
     LIST_NAMES,
-    STATIC,
     Geometry,
     Reduced,
-    geometry_product,
     reduced_empty,
-    reduced_refresh,
 )
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, Status
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SHIFT_LEAST = 1e-6
-"""Relative shift below which round-off in the inverse would make events up."""
-PROXIMAL_STEPS = 60
-"""Most proximal steps that take the shift out,"""
-HARDLY = 10
-"""Pivots of a proximal step after which the shift can fall faster."""
-PROXIMAL_PATIENCE = 12
-"""and most without a better residual: self-stress moves on for a while before it settles."""
+DIVERGED = 1e-3
+"""Approach that forces leave, over the greatest of q, which no residual turns into a solution:
+relative to |r| it falls to nothing as forces grow without bound."""
 
 
 class Pivots(NamedTuple):
@@ -156,81 +141,6 @@ def diagonal_places(matrix: sp.csr_array | sp.csc_array) -> Ints:
     return np.flatnonzero(matrix.indices == line)
 
 
-def shift_change(state: Pivots, shift: float) -> bool:
-    """Another shift [that of A]; b takes the difference up, f and a and the lists stay."""
-    geometry, by = state.geometry, shift - state.shift[0]
-    geometry.row_value[state.diagonal[0]] += by
-    geometry.column_value[state.diagonal[1]] += by
-    state.shift[0] = shift
-    product = np.zeros_like(state.b)
-    geometry_product(geometry, state.f, product)
-    state.b[:] = state.a - product
-    return bool(reduced_refresh(geometry, state.reduced))
-
-
-def shift_remove(problem: FrictionProblem, state: Pivots, tolerance: float, few: int) -> Floats:
-    """Proximal steps; the shift falls tenfold each, a hundredfold after a step of hardly a pivot.
-
-    A step of more than ``few`` pivots is done again with the shift of before, which then falls
-    more slowly.
-    """
-    exact, best = problem.offset[state.rows], pivots_force(problem, state)
-    least, idle, pace = pivots_residual(problem, state, best), 0, 1.0
-    taken, floor = 0, SHIFT_LEAST * state.unit
-    for _ in range(PROXIMAL_STEPS if state.shift[0] > 0.0 else 0):
-        if idle == PROXIMAL_PATIENCE:
-            break
-        before, shift, spent = state_copy(state), float(state.shift[0]), int(state.events[0])
-        smaller = min(shift, max((0.1 if taken > HARDLY else 0.01) ** pace * shift, floor))
-        if least <= tolerance:
-            smaller = shift  # what comes now is cheap, and free where no list changes
-        if smaller < shift:
-            shift_change(state, smaller)
-        change = exact - smaller * state.f - state.b
-        ended = offset_drive(state, change, 1.0, True, spent + few)
-        taken = int(state.events[0]) - spent
-        if ended != DONE:
-            if smaller == shift or pace < 0.1:
-                break
-            state_restore(state, before, shift)
-            pace *= 0.5
-            continue
-        force = pivots_force(problem, state)
-        residual = pivots_residual(problem, state, force)
-        idle = 0 if residual < least else idle + 1
-        if least <= tolerance and (taken or not residual < 0.5 * least):
-            break
-        if residual < least:
-            best, least = force, residual
-    return best
-
-
-def state_copy(state: Pivots) -> tuple[Ints, Floats, Floats]:
-    """The lists, f and a, to come back to."""
-    return state.reduced.kind.copy(), state.f.copy(), state.a.copy()
-
-
-def state_restore(state: Pivots, kept: tuple[Ints, Floats, Floats], shift: float) -> None:
-    """Come back to lists, f and a, with the shift they belong to."""
-    lists_set(state, kept[0])
-    state.f[:], state.a[:] = kept[1], kept[2]
-    shift_change(state, shift)
-
-
-def lists_set(state: Pivots, kinds: Ints) -> None:
-    """Put every contact on a list; the inverse has then to be made anew."""
-    geometry, reduced = state.geometry, state.reduced
-    reduced.kind[:] = kinds
-    reduced.place[:] = -1
-    inside = np.zeros(len(state.rows), dtype=bool)
-    inside[geometry.normal[kinds != BREAKING]] = True
-    inside[geometry.tangent[kinds == STATIC]] = True
-    members = np.flatnonzero(inside)
-    reduced.members[: len(members)] = members
-    reduced.place[members] = np.arange(len(members))
-    reduced.size[0] = len(members)
-
-
 def pivots_force(problem: FrictionProblem, state: Pivots) -> Floats:
     """Forces of all rows (nc * dim,): no round-off outside the cones."""
     force = np.zeros(len(problem.offset))
@@ -282,9 +192,10 @@ def pivots_solution(
     residual = pivots_residual(problem, state, force)
     work = {"pivots": float(state.events[0])}
     velocity = problem.velocity(force)
-    if residual <= tolerance:
+    diverged = forces_diverged(problem, velocity)
+    if residual <= tolerance and not diverged:
         return FrictionSolution(force, velocity, residual, "solved", method, work)
-    status, text = _ENDS[ended]
+    status, text = _ENDS[RAY if diverged and ended == DONE else ended]
     remedy = _REMEDIES[method]
     if ended in (RAY, DONE) and forces_impossible(problem, state.geometry.slip):
         status, text = (
@@ -295,6 +206,12 @@ def pivots_solution(
     place = f" at contact {where}" if where >= 0 else ""
     message = f"{method}: {text.format(where=place, res=residual)}\n  -> {remedy}"
     return FrictionSolution(force, velocity, residual, status, method, work, message)
+
+
+def forces_diverged(problem: FrictionProblem, velocity: Floats) -> bool:
+    """Whether a contact still approaches, fast next to q: large forces hide it in the residual."""
+    size = float(np.abs(problem.offset).max(initial=0.0))
+    return bool(velocity[:: problem.dim].min(initial=0.0) < -DIVERGED * size)
 
 
 def forces_impossible(problem: FrictionProblem, slip: Ints) -> bool:
@@ -310,9 +227,18 @@ def forces_impossible(problem: FrictionProblem, slip: Ints) -> bool:
     ]
     w = sp.csr_array(problem.delassus)
     rates = w[::dim] @ sp.hstack(edges)
-    scale = float(np.abs(problem.offset).max()) or 1.0
+    matrix = sp.csr_array(-rates)
+    # HiGHS takes what is below 1e-9 for zero and above 1e15 for malformed: rows and columns alike
+    lengths = np.ones(nc)
+    for _ in range(3):
+        for axis in (0, 1):
+            size = abs(matrix).max(axis=axis).toarray().ravel()
+            factor = sp.diags_array(1.0 / np.where(size > 0.0, size, 1.0))
+            matrix = matrix @ factor if axis == 0 else factor @ matrix
+            lengths = lengths if axis == 0 else lengths * factor.diagonal()
+    bound = problem.offset[::dim] * lengths
     found = linprog(
-        np.zeros(2 * nc), A_ub=-rates / (float(w.diagonal().mean()) or 1.0),
-        b_ub=problem.offset[::dim] / scale, bounds=(0, None), method="highs",
+        np.zeros(2 * nc), A_ub=matrix, b_ub=bound / (float(np.abs(bound).max()) or 1.0),
+        bounds=(0, None), method="highs",
     )  # fmt: skip
     return bool(found.status == 2)

@@ -49,15 +49,13 @@ from rigid_lcp.factor_updates import (
 )
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
 from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.pivot_shift import SHIFT_LEAST, lists_set, shift_remove
 from rigid_lcp.pivot_state import (
-    SHIFT_LEAST,
     Pivots,
-    lists_set,
     offset_drive,
     pivots_force,
     pivots_solution,
     pivots_state,
-    shift_remove,
 )
 
 Floats = NDArray[np.float64]

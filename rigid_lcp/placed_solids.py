@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.errors import SceneError
+from rigid_lcp.near_pairs import HALF_SPACE
 from rigid_lcp.rotations import rotation_matrix
 from rigid_lcp.separation_3d import NEARLY, TILT, Solids
 from rigid_lcp.shapes_2d import HalfSpace
@@ -18,7 +19,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-POLYHEDRON, SPHERE, HALF_SPACE = 0, 1, 2
+POLYHEDRON, SPHERE = 0, 1
+"""Kinds of shapes as the kernels know them, with `HALF_SPACE`."""
 FEATURE_BITS, BODY_BITS = 10, 21
 """Digits of the names of contacts that tell features and bodies."""
 MOST_EDGES = 1 << (FEATURE_BITS - 1)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rigid_lcp import pictures
+from rigid_lcp.frame_bodies import frame_scene
 from rigid_lcp.run_folder import RunFolder, frame_read, write_whole
 from rigid_lcp.scene import Scene
 from rigid_lcp.scene_run import history_of, history_write
@@ -90,13 +91,14 @@ def report_write(
 def frames_draw(folder: RunFolder, scene: Scene, title: str) -> list[Path]:
     """Draw every frame as ``picture-NUMBER.png`` with one scale, and all as ``movie.gif``."""
     frames = [frame_read(path) for path in folder.frames()]
-    window = pictures.window_of(scene, [frame["motion"].position for frame in frames])
+    positions = [frame["motion"].position[: len(scene.bodies)] for frame in frames]
+    window = pictures.window_of(scene, positions)
     scale = pictures.force_scale([frame["contacts"].normal_force for frame in frames])
     drawn = []
     for number, frame in enumerate(frames):
         head = f"{title}   t = {float(frame['time']):.3f} s, widest line {scale:.3g} N"
         figure = pictures.picture_state(
-            scene, frame["motion"], frame["contacts"], window, scale, head
+            frame_scene(frame, scene), frame["motion"], frame["contacts"], window, scale, head
         )
         drawn.append(folder.path / f"picture-{number:06d}.png")
         figure.savefig(drawn[-1])

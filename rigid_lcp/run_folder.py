@@ -22,6 +22,7 @@ import numpy as np
 
 from rigid_lcp.contacts import ContactForces
 from rigid_lcp.errors import SceneError, UsageError
+from rigid_lcp.frame_bodies import bodies_arrays, bodies_restore
 from rigid_lcp.motion import Motion
 from rigid_lcp.simulation import Simulation
 
@@ -154,6 +155,7 @@ class RunFolder:
         }
         arrays |= {name: np.asarray(getattr(run, name)) for name in COUNTERS}
         arrays |= {"energy": np.asarray(run.energy), "overlap": np.asarray(run.overlap)}
+        arrays |= bodies_arrays(run)
         buffer = io.BytesIO()
         np.savez_compressed(buffer, cpu=np.asarray(cpu), **arrays)
         write_whole(self.path / FRAME.format(number), buffer.getvalue())
@@ -188,10 +190,12 @@ def frame_restore(path: Path, run: Simulation) -> float:
     Raises `SceneError` if the frame is of other bodies.
     """
     frame = frame_read(path)
-    if frame["motion"].position.shape != run.motion.position.shape:
+    bodies_restore(run, frame)
+    bodies = len(run.world.scene.bodies)
+    if len(frame["motion"].position) != bodies or frame["motion"].dim != run.motion.dim:
         raise SceneError(
-            f"the frame has {len(frame['motion'].position)} bodies, the scene "
-            f"{len(run.motion.position)}", where=str(path), remedy="--force to compute it anew",
+            f"the frame has {len(frame['motion'].position)} bodies, the scene {bodies}",
+            where=str(path), remedy="--force to compute it anew",
         )  # fmt: skip
     run.motion, run.contacts = frame["motion"], frame["contacts"]
     run.time, run.steps = float(frame["time"]), int(frame["steps"])

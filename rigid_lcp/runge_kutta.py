@@ -7,13 +7,16 @@ one.  Three things are added to the paper:
 
 * Bounces that get shorter without end (Zeno) are cut off: an approach slower than 1e-4 of
   the free-fall speed over a body's size (``REST_SPEED``) is a collision without restitution.
+  Collisions are those of `rigid_lcp.collisions.collide`.
 * A sliding contact keeps the direction of its friction during a step.  A step in which it comes
   to rest is taken back and shortened to end there; from then on it may stick.
 * Gaps and velocities of lasting contacts are put back to zero after each step, as the second
   derivative of a gap alone would let them drift (by the fifth power of the step).
 
 Use it for few bodies and where order counts; where forces do not exist (Painleve) it raises
-`NoSolution`, and velocity-level time stepping goes on.
+`NoSolution`, and velocity-level time stepping goes on.  Every collision halves the step some twenty
+times, down to a gap of 5e-10 of a body, and it doubles again: 75 steps each in a box of a dozen
+grains that bounce (83 collisions), nine times the cost of time stepping at 1 ms (provisional).
 """
 
 from __future__ import annotations

@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid_lcp.breakage import Breakage
 from rigid_lcp.run_folder import FRAME, RunFolder, frame_read, frame_restore, write_whole
 from rigid_lcp.scene import Scene
 from rigid_lcp.scene_file import SceneFile, loads_of, scene_build
 from rigid_lcp.simulation import Simulation
+from rigid_lcp.wear import Wear
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float, Simulation], None]
@@ -32,8 +34,28 @@ def simulation_of(file: SceneFile) -> tuple[Scene, Simulation]:
     run = file.tables.run
     scene = scene_build(file)
     return scene, Simulation(
-        scene, run.method, step=run.step, tolerance=run.tolerance, loads=loads_of(file)
-    )
+        scene, run.method, step=run.step, tolerance=run.tolerance, loads=loads_of(file),
+        wear=wear_of(file), breakage=breakage_of(file),
+    )  # fmt: skip
+
+
+def wear_of(file: SceneFile) -> Wear | None:
+    """How grains wear, or None where the scene does not say."""
+    table = file.tables.wear
+    if table is None:
+        return None
+    return Wear(table.coefficient, table.every, table.volume_scale)
+
+
+def breakage_of(file: SceneFile) -> Breakage | None:
+    """When grains break, or None where the scene does not say."""
+    table = file.tables.strength
+    if table is None:
+        return None
+    return Breakage(
+        table.tension, table.every, table.smallest, table.modulus, table.reference_volume,
+        table.unique,
+    )  # fmt: skip
 
 
 def frame_times(duration: float, frames: int) -> Floats:
@@ -98,7 +120,10 @@ def left_out(file: SceneFile) -> list[str]:
         absent.append("loads: none but gravity")
     absent.append("elastic deformation: grains are rigid; forces where they are not unique are one "
                   "of many")  # fmt: skip
-    absent.append("abrasion and fragmentation")
+    if tables.wear is None:
+        absent.append("abrasion: no corner wears")
+    if tables.strength is None:
+        absent.append("fragmentation: no grain breaks")
     return absent
 
 

@@ -124,6 +124,34 @@ class Load(Table):
     end: Positive | None = None
 
 
+class WearTable(Table):
+    """Corners of polygons worn by the work of friction."""
+
+    coefficient: Positive
+    """Volume per work of friction [m^3/J]."""
+    every: Annotated[int, Field(ge=1)] = 20
+    """Steps between cuts."""
+    volume_scale: Positive | None = None
+    """Wear that changes the stiffness of a corner [m^2]; without it none does."""
+
+
+class StrengthTable(Table):
+    """Grains that break under their contact forces."""
+
+    tension: Positive
+    """[Pa]"""
+    every: Annotated[int, Field(ge=1)] = 20
+    """Steps between judgements."""
+    smallest: NotNegative = 0.0
+    """Volume below which grains do not break [m^3], in 2D area [m^2]."""
+    modulus: Positive | None = None
+    """Weibull's modulus; with ``reference_volume``."""
+    reference_volume: Positive | None = None
+    """Volume (2D: area) of a grain that bears ``tension``."""
+    unique: bool = False
+    """Judge by the forces of elastic contacts; for piles at rest."""
+
+
 class SceneTables(Table):
     """A whole scene file."""
 
@@ -136,6 +164,8 @@ class SceneTables(Table):
     body: list[BodyTable] = []
     grains: list[Grains] = []
     load: list[Load] = []
+    wear: WearTable | None = None
+    strength: StrengthTable | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -167,6 +197,14 @@ class SceneTables(Table):
         for i, load in enumerate(self.load):
             if load.body not in names:
                 raise ValueError(f"load.{i}.body: there is no body {load.body}")
+        if self.wear is not None and self.dimensions == 3:
+            raise ValueError("wear: only polygons wear in a run, leave [wear] out in 3 dimensions")
+        if self.run.method == "acceleration" and (self.wear or self.strength):
+            raise ValueError("run.method: nothing wears or breaks at acceleration level")
+        if self.strength and (self.strength.modulus is None) != (
+            self.strength.reference_volume is None
+        ):
+            raise ValueError("strength: give both modulus and reference_volume, or neither")
         if not self.grains and all(body.fixed for body in self.body):
             raise ValueError("no body can move: add a [[body]] with a density, or [[grains]]")
         return self

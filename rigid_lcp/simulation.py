@@ -6,18 +6,22 @@ level, section 9) for few bodies and high order.
 
 from __future__ import annotations
 
-from math import ceil
+from math import ceil, nan
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigid_lcp.breakage import Breakage, Broken, breaks, scene_broken
 from rigid_lcp.contacts import ContactForces
 from rigid_lcp.errors import NotConverged, Overlapping, UsageError
 from rigid_lcp.fragmentation import broken_scene
+from rigid_lcp.motion import Motion
 from rigid_lcp.runge_kutta import Pace, runge_kutta_advance
 from rigid_lcp.scene import Loads, Scene, world_of
 from rigid_lcp.time_stepping import contact_forces, moreau_step
+from rigid_lcp.unique_forces import unique_forces
+from rigid_lcp.wear import Wear, scene_worn, wear_after_break, wear_start, wear_step
 
 Floats = NDArray[np.float64]
 Method = Literal["time-stepping", "acceleration"]
@@ -35,12 +39,14 @@ class Simulation:
     `NoSolution` where no finite forces exist).  ``step`` [s]: length of the steps, for
     ``acceleration`` the longest one; default 1e-3 s.  ``tolerance``: scale-free residual of the
     contact forces.  ``loads(time, motion)``: further forces and torques (n, 3) or (n, 6) [N, N m].
+    ``wear``, ``breakage``: grains lose their corners, break (time stepping only); none by default.
     Raises `SceneError`, or `Overlapping` where bodies overlap at the start.
     """
 
     def __init__(
         self, scene: Scene, method: Method = "time-stepping", *, step: float = 1e-3,
-        tolerance: float = 1e-12, loads: Loads | None = None,
+        tolerance: float = 1e-12, loads: Loads | None = None, wear: Wear | None = None,
+        breakage: Breakage | None = None,
     ) -> None:  # fmt: skip
         if method not in ("time-stepping", "acceleration"):
             raise UsageError(
@@ -48,6 +54,16 @@ class Simulation:
             )
         if not 0 < step < np.inf:
             raise UsageError(f"step is {step}", remedy="give a positive number of seconds")
+        if method == "acceleration" and (wear is not None or breakage is not None):
+            raise UsageError(
+                "bodies do not wear or break at acceleration level", where="method",
+                remedy="give method='time-stepping', or leave wear and breakage out",
+            )  # fmt: skip
+        self.wear, self.breakage = wear, breakage
+        self.worn = None if wear is None else wear_start(scene)
+        """What corners have lost; None without wear."""
+        self.broken: list[Broken] = []
+        """Grains that broke; by `fragment` at a tension of NaN."""
         self.world, self.motion = world_of(scene)
         self.method, self.step, self.tolerance, self.loads = method, step, tolerance, loads
         self.pace = Pace(step, step)
@@ -85,10 +101,25 @@ class Simulation:
         more.  Raises `ShapeError` for a disc, a fixed body, or a sliver.
         """
         scene = broken_scene(self.world.scene, self.motion, body, *line)
+        part = self._go_on_broken(scene, body)
+        self.broken.append(Broken(self.time, body, part, nan, nan))
+        return part
+
+    def _go_on_broken(self, scene: Scene, body: int) -> int:
         self.world, self.motion = world_of(scene)
+        if self.worn is not None:
+            self.worn = wear_after_break(self.worn, scene, body)
         whole = (self.contacts.body_a == body) | (self.contacts.body_b == body)
         self.contacts = self.contacts[~whole]
         return len(scene.bodies) - 1
+
+    def unique_forces(self, stiffness: float = 1.0) -> ContactForces:
+        """Forces that elastic contacts would choose now (section 8), worn corners softer.
+
+        For grains at rest or in slow motion.  Raises `NotConverged` where they are not found.
+        """
+        loads = None if self.loads is None else self.loads(self.time, self.motion)
+        return unique_forces(self.world, self.motion, loads, stiffness, self.wear, self.worn)
 
     @property
     def positions(self) -> Floats:
@@ -125,9 +156,29 @@ class Simulation:
         loads = None if self.loads is None else self.loads(self.time + h / 2, self.motion)
         made = moreau_step(self.world, self.motion, loads, h, self.contacts, self.tolerance)
         self._judge(made.residual, made.message)
-        self.motion, self.contacts = made.motion, made.contacts
+        before, self.motion, self.contacts = self.motion, made.motion, made.contacts
         self.time += h
         self.steps += 1
+        self._wear_and_break(before, h)
+
+    def _wear_and_break(self, before: Motion, h: float) -> None:
+        """What the forces of the last step do to the bodies (section 8, end, and section 10)."""
+        if self.worn is not None and self.wear is not None:
+            wear_step(self.worn, self.wear, self.contacts, before, self.motion, h)
+            cut = None
+            if self.steps % self.wear.every == 0:
+                cut = scene_worn(self.world.scene, self.motion, self.worn)
+            if cut is not None:
+                scene, self.worn = cut
+                self.world, self.motion = world_of(scene)
+        if self.breakage is not None and self.steps % self.breakage.every == 0:
+            forces = self.unique_forces() if self.breakage.unique else self.contacts
+            found = breaks(self.world.scene, self.motion, forces, self.breakage)
+            for body, line in found:
+                scene_now = scene_broken(self.world.scene, self.motion, body, line)
+                if scene_now is not None:
+                    part = self._go_on_broken(scene_now, body)
+                    self.broken.append(Broken(self.time, body, part, line.tension, line.strength))
 
     def _integrate(self, seconds: float) -> None:
         self.motion, self.contacts = runge_kutta_advance(

@@ -4,8 +4,9 @@
 
     no forces        where nothing approaches
     frictionless     where no contact has friction: principal pivoting, exact
-    Gauss-Seidel     with momentum, from the start given or from nothing, and Newton at its end: a
-                     sweep costs a thousandth of a factorisation, and most problems need no more
+    Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
+                     Newton at its end: first few sweeps and factorisations, then many, as what is
+                     hard for the one is often easy for the other
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
                      goes to Newton, and if that is not enough to Gauss-Seidel and Newton again
     islands          what is still not solved, each island apart, by all of this
@@ -14,7 +15,7 @@ Every method alone can fail on real problems: Newton far from a solution, the in
 its path folds back, Gauss-Seidel on tall piles.  Together they fail seldom (`docs/rigid-solvers.md`
 counts it); there is no proof: read ``status`` and ``residual``.
 
-Cost: hundreds of sweeps and a few factorisations; the interior point takes some 20 a path.  In 3D
+Cost: hundreds of sweeps and some factorisations; the interior point takes some 20 a path.  In 3D
 their fill grows fast: above some 3,000 contacts of a 3D packing each takes tenths of a second, and
 Gauss-Seidel is the cheaper way to rough answers.
 """
@@ -39,10 +40,11 @@ from rigid_lcp.friction_problem import (
     friction_solution,
 )
 from rigid_lcp.frictionless import frictionless
-from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.gauss_seidel import Sweeper, gauss_seidel, sweeper_of
 from rigid_lcp.interior_point import Path, interior_point
 from rigid_lcp.islands import islands, solve_islands
 from rigid_lcp.newton import newton
+from rigid_lcp.proximal_newton import proximal_newton
 
 Floats = NDArray[np.float64]
 Method = Literal["auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig"]
@@ -58,10 +60,16 @@ PATHS = (
     (Path(convex=True, compliance=1e-4), 300),
 )
 """Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
-FIRST_SWEEPS = 1000
-LAST_WORD = 1e-11
-"""At such a tolerance and below Newton ends what Gauss-Seidel began: the residual is measured on
-the scale of all forces, and only what is exact to round-off is so for a pebble under a boulder."""
+FEW_SWEEPS, FEW = 100, 20
+"""Sweeps and factorisations that are tried first: enough for most steps of a pile in motion."""
+CONTACTS_A_SWEEP = 10
+"""One sweep more for every so many contacts: the larger a problem, the dearer a factorisation."""
+FIRST_SWEEPS, MANY = 1000, 60
+"""What is spent where the first try was too short."""
+LAST_WORD, ROUND_OFF = 1e-11, 1e-15
+"""At such a tolerance and below a step of Newton ends what the others found: the residual is
+measured on the scale of all forces, and only what is exact to round-off is so for a pebble under a
+boulder."""
 LAST_SWEEPS = 2000
 PROOF_CONTACTS = 3000
 """Up to so many contacts a linear programme looks for the proof that there is no solution."""
@@ -118,7 +126,7 @@ def solve_auto(
     parts = islands(problem)
     if len(parts) > 1:
         trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
-    if not trial.best.solved and (trial.best.status == "no solution" or no_forces_suffice(problem)):
+    if not trial.best.solved and (trial.best.status == "no solution" or _proved_insoluble(problem)):
         return trial.solution(
             "no solution",
             "no forces within the cones of friction keep all contacts from approaching (proved by"
@@ -136,6 +144,7 @@ class _Trial:
         self.problem, self.tolerance, self.work = problem, tolerance, dict[str, float]()
         self.best = friction_solution(problem, zero, tolerance, "no forces")
         self.linear: Factorisation | None = None
+        self.sweeper: Sweeper | None = None
         if start is not None:
             self.keep(friction_solution(problem, start, tolerance, "start"))
 
@@ -154,23 +163,37 @@ class _Trial:
             )
         return found
 
-    def polish(self, found: FrictionSolution, after: str = "") -> bool:
-        """Newton from a point of another method; whether the tolerance is reached."""
+    def polish(self, found: FrictionSolution, after: str = "", factorisations: int = MANY) -> bool:
+        """Proximal points from a point of another method; whether the tolerance is reached."""
         if self.best.solved or not np.isfinite(found.residual):
             return self.best.solved
         self.linear = self.linear or factorisation(self.problem)
         self.keep(
-            newton(self.problem, found.r, self.tolerance, linear=self.linear),
+            proximal_newton(
+                self.problem, found.r, self.tolerance, linear=self.linear,
+                factorisations=factorisations,
+            ),
             after or found.method,
-        )
+        )  # fmt: skip
+        if self.best.solved and self.tolerance <= LAST_WORD:
+            self.keep(
+                newton(self.problem, self.best.r, ROUND_OFF, linear=self.linear, iterations=1),
+                self.best.method,
+            )
         return self.best.solved
 
-    def sweep(self, start: Floats | None, sweeps: int, after: str = "", until: float = 0.0) -> bool:
+    def sweep(
+        self, start: Floats | None, sweeps: int, after: str = "", until: float = 0.0,
+        factorisations: int = MANY,
+    ) -> bool:  # fmt: skip
         """Gauss-Seidel to a residual of ``until``, and Newton; whether the tolerance is reached."""
         until = max(until, self.tolerance)
-        found = self.keep(gauss_seidel(self.problem, start, until, sweeps), after)
+        self.sweeper = self.sweeper or sweeper_of(self.problem)
+        found = self.keep(
+            gauss_seidel(self.problem, start, until, sweeps, sweeper=self.sweeper), after
+        )
         name = f"{after} + gauss-seidel" if after else "gauss-seidel"
-        return self.best.solved or self.polish(found, name)
+        return self.best.solved or self.polish(found, name, factorisations)
 
     def solution(self, status: Status | None = None, message: str = "") -> FrictionSolution:
         """The best point, with the work of all attempts."""
@@ -194,7 +217,10 @@ def _attempts(problem: FrictionProblem, start: Floats | None, tolerance: float) 
     if not problem.friction.any():
         trial.keep(frictionless(problem, start, tolerance))
     rough = tolerance if tolerance > LAST_WORD else HAND_OVER
-    if trial.best.solved or trial.sweep(start, FIRST_SWEEPS, until=rough):
+    few = min(max(FEW_SWEEPS, problem.contacts // CONTACTS_A_SWEEP), FIRST_SWEEPS)
+    if trial.best.solved or trial.sweep(start, few, until=rough, factorisations=FEW):
+        return trial
+    if trial.sweep(trial.best.r, FIRST_SWEEPS, until=rough):
         return trial
     if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
         return trial
@@ -242,43 +268,10 @@ def _methods() -> dict[str, Callable[..., FrictionSolution]]:
     }
 
 
-def no_forces_suffice(problem: FrictionProblem) -> bool:
-    """Whether a linear programme proves that no r in K gives ``u_N >= 0`` at every contact.
+def _proved_insoluble(problem: FrictionProblem) -> bool:
+    from rigid_lcp.force_proof import forces_insufficient
 
-    In 3D the disc of friction is replaced by the square around it, so that a proof stays one.
-    """
-    from scipy.optimize import linprog
-
-    contacts, dim, mu = problem.contacts, problem.dim, problem.friction
-    if contacts > PROOF_CONTACTS:
-        return False
-    normal = np.arange(contacts) * dim
-    # |r_T| <= mu r_N in every tangential direction: +-r_T - mu r_N <= 0
-    limit = sp.diags_array(mu)
-    edges = [
-        sp.kron(sp.eye_array(contacts), _unit_row(k, dim, sign))
-        - sp.kron(limit, _unit_row(0, dim, 1.0))
-        for k in range(1, dim)
-        for sign in (1.0, -1.0)
-    ]
-    scale = float(np.abs(problem.offset).max()) or 1.0
-    approach = sp.csr_array(problem.delassus[normal] * (-problem.rho))
-    lower = np.full(contacts * dim, -np.inf)
-    lower[normal] = 0.0
-    found = linprog(
-        np.zeros(contacts * dim),
-        A_ub=sp.vstack([approach, *edges]),
-        b_ub=np.concatenate([problem.offset[normal] / scale, np.zeros(len(edges) * contacts)]),
-        bounds=np.column_stack([lower, np.full(contacts * dim, np.inf)]),
-        method="highs",
-    )
-    return bool(found.status == 2)
-
-
-def _unit_row(k: int, dim: int, sign: float) -> Floats:
-    row = np.zeros((1, dim))
-    row[0, k] = sign
-    return row
+    return problem.contacts <= PROOF_CONTACTS and forces_insufficient(problem)
 
 
 def _start(start: ArrayLike, problem: FrictionProblem) -> Floats:

@@ -1,9 +1,11 @@
 """docs/rigid-hard-cases.md from validation/results/rigid-hard-cases.jsonl, and that record.
 
     python -m validation.rigid_hard_page --run [--quick] [--only FAMILY ...]    measure, write both
+    python -m validation.rigid_hard_page --run --resume        go on with a run that was cut off
     python -m validation.rigid_hard_page                       write the page from the record
 
-A family is one of `validation.cases.rigid_hard_cases.FAMILIES`; lines of others are kept.
+A family is one of `validation.cases.rigid_hard_cases.FAMILIES`; lines of others are kept, and each
+is in the record as soon as it is done.
 """
 
 from __future__ import annotations
@@ -158,8 +160,11 @@ def _reasons(lines: Sequence[Data]) -> list[str]:
     ]
 
 
-def measure(quick: bool, only: Sequence[str] | None) -> None:
-    """Run ours and the peers, family after family; each is in the record when it is done."""
+def measure(quick: bool, only: Sequence[str] | None, resume: bool = False) -> None:
+    """Run ours and the peers, family after family; each is in the record when it is done.
+
+    ``resume``: families that the record has from the same code and command are left as they are.
+    """
     from validation.cases.rigid_hard_cases import FAMILIES, hard_rows
     from validation.rigid_scene_peers import PEERS
 
@@ -173,8 +178,16 @@ def measure(quick: bool, only: Sequence[str] | None) -> None:
         origin = provenance([*words, "--only", name])
         known = record_read() if RECORD.is_file() else []
         lines = {each: [line for line in known if line["family"] == each] for each in FAMILIES}
+        if resume and is_measured(lines[name], origin):
+            continue
         lines[name] = record_lines(hard_rows(quick, PEERS, [name])[name], origin, name)
         record_write([line for part in lines.values() for line in part])
+
+
+def is_measured(lines: Sequence[Data], origin: Data) -> bool:
+    """Whether lines of a family come from the same code, command and machine."""
+    keys = ("commit", "command", "machine")
+    return bool(lines) and all(line[key] == origin[key] for line in lines for key in keys)
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -182,10 +195,11 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--run", action="store_true", help="measure first, and write the record")
     parser.add_argument("--quick", action="store_true", help="short runs")
+    parser.add_argument("--resume", action="store_true", help="leave out what is measured already")
     parser.add_argument("--only", nargs="+", metavar="FAMILY", help="measure these again only")
     arguments = parser.parse_args(words)
     if arguments.run:
-        measure(arguments.quick, arguments.only)
+        measure(arguments.quick, arguments.only, arguments.resume)
     lines = record_read()
     write_atomically(PAGE, page(lines))
     picture_draw(lines, PAGE.with_suffix(".png"))

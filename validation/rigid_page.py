@@ -18,14 +18,28 @@ import numpy as np
 
 from validation import rigid_report as report
 from validation.qdem_record import write_atomically
+from validation.rigid_peers import SICONOS_MOST, SICONOS_SPARSE
 from validation.rigid_picture import PICTURE, picture
 from validation.rigid_report import HYBRID, OSQP, OURS, Row
-from validation.rigid_runs import RECORD, SICONOS_MOST, TOLERANCES, rows_read
+from validation.rigid_runs import LADDER, LARGE, RECORD, rows_read
 
 WORDS = Path(__file__).with_suffix(".md")
 PAGE_PATH = Path(__file__).parents[1] / "docs" / "rigid-solvers.md"
 FEW = ("stored", "packings 2D", "packings 3D", "towers 2D", "towers 3D")
 """Families of the table problem by problem."""
+UNSEEN = (
+    (
+        "Unseen: the stored problems changed at random",
+        "q by 5 % noise, friction by factors from 0.7 to 1.3, contacts in another order.",
+        "unseen",
+    ),
+    (
+        "Unseen: packings of other seeds",
+        "Discs and spheres, friction from 0.1 to 1.2; no setting was chosen by them.",
+        "other packings",
+    ),
+)
+"""Families that are summed up: title, words, how the name of the family begins."""
 
 
 def page(rows: Sequence[Row]) -> str:
@@ -36,22 +50,43 @@ def page(rows: Sequence[Row]) -> str:
         "count": str(len(contacts)),
         "least": f"{min(contacts):,}",
         "most": f"{max(contacts):,}",
-        "asked": ", ".join(f"{t:.0e}".replace("e-0", "e-") for t in TOLERANCES),
+        "asked": _asked(races),
         "summary": _summary(races),
         "commits": ", ".join(sorted({f"`{row['commit'][:10]}`" for row in rows})),
         "tables": _problem_tables(races),
         "failures": _failures(races),
         "frictionless": _frictionless(races),
+        "ladder": _ladder(races),
         "scale": _scale(rows),
         "dantzig": _dantzig(rows),
         "lemke": f"{SICONOS_MOST['2D_LEMKE']:,}",
         "dense": f"{SICONOS_MOST['2D_NSGS']:,}",
-        "budgets": " or ".join(sorted({_budget(row) for row in races})),
+        "wide": f"{SICONOS_SPARSE:,}",
+        "budgets": _budgets(races),
     }
     text = WORDS.read_text(encoding="utf-8")
     for name, words in parts.items():
         text = text.replace(f"{{{name}}}", words)
     return re.sub(r"\n{3,}", "\n\n", text)
+
+
+def _asked(rows: Sequence[Row]) -> str:
+    """Tolerances of small problems, and those of large ones where they are more."""
+    small, large = (
+        sorted(
+            {row["setting"]["tolerance"] for row in rows if (row["contacts"] >= LARGE) == is_large},
+            reverse=True,
+        )
+        for is_large in (False, True)
+    )
+    words = _powers(small or large)
+    if small and large and small != large:
+        words += f" (those of {LARGE} contacts and more with friction: {_powers(large)})"
+    return words
+
+
+def _powers(levels: Sequence[float]) -> str:
+    return ", ".join(f"{level:.0e}".replace("e-0", "e-") for level in levels)
 
 
 def _summary(rows: Sequence[Row]) -> str:
@@ -62,7 +97,22 @@ def _summary(rows: Sequence[Row]) -> str:
         return ""
     return (
         f"`solve_friction` with its default settings brought {len(reached)} of {len(mine)} to it, "
-        f"in {_seconds(float(np.median(reached)))} (median), {_seconds(max(reached))} at most."
+        f"in {_seconds(float(np.median(reached)))} (median), {_seconds(max(reached))} at most. "
+        + _beside_hybrid(rows)
+    )
+
+
+def _beside_hybrid(rows: Sequence[Row]) -> str:
+    """On how many problems our default is the slower one."""
+    ratios = report.cost_ratios(rows, HYBRID)
+    if not ratios:
+        return ""
+    values = np.array(list(ratios.values()))
+    worst = max(ratios, key=lambda name: ratios[name])
+    return (
+        f"Of the {len(values)} problems that {HYBRID} brings to it too, `solve_friction` is slower "
+        f"on {int((values > 1).sum())}, by a factor of {values.max():.2g} at most ({worst}); the "
+        f"median of the ratios of costs is {np.median(values):.2g}."
     )
 
 
@@ -72,9 +122,11 @@ def _problem_tables(rows: Sequence[Row]) -> str:
         found = report.problems(rows, family)
         if found:
             parts += ["", f"### {family[0].upper()}{family[1:]}", "", *_table(found)]
-    unseen = report.problems(rows, "unseen")
-    if unseen:
-        parts += ["", *_unseen(unseen)]
+    for title, words, begins in UNSEEN:
+        found = {name: each for family in report.families(rows) if family.startswith(begins)
+                 for name, each in report.problems(rows, family).items()}  # fmt: skip
+        if found:
+            parts += ["", f"### {title}", "", words, "", *_unseen(found)]
     return "\n".join(parts)
 
 
@@ -108,14 +160,7 @@ def _cell(rows: Sequence[Row], named: bool = False) -> str:
 
 
 def _unseen(found: dict[str, list[Row]]) -> list[str]:
-    lines = [
-        "### Unseen: the stored problems changed at random",
-        "",
-        "q by 5 % noise, friction by factors from 0.7 to 1.3, contacts in another order.",
-        "",
-        "| method | reached the bar | median cost | greatest cost |",
-        "|---|---|---|---|",
-    ]
+    lines = ["| method | reached the bar | median cost | greatest cost |", "|---|---|---|---|"]
     rows = [row for each in found.values() for row in each]
     for method in report.method_names(rows):
         mine = report.problems(report.of(rows, method))
@@ -177,6 +222,34 @@ def _frictionless(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
+def _ladder(rows: Sequence[Row]) -> str:
+    """Costs at equal residual on packings of `LARGE` to 5,000 contacts, beside Siconos."""
+    found = {
+        name: each for name, each in report.packings_between(rows, LARGE, 5000).items()
+        if report.starting(each, "Siconos")
+    }  # fmt: skip
+    if not found:
+        return ""
+    lines = [
+        "## Packings beside Siconos, at equal residual",
+        "",
+        "Cell: cost of `solve_friction`, of the best solver of Siconos, and the latter over the "
+        "former; -: not reached in the time it had.",
+        "",
+        f"| packing | contacts | {' | '.join(_powers([level]) for level in LADDER)} |",
+        f"|---|---|{'---|' * len(LADDER)}",
+    ]
+    for name, each in found.items():
+        cells = []
+        for _, ours, theirs in report.ladder(each, LADDER):
+            words = [_seconds(cost) if np.isfinite(cost) else "-" for cost in (ours, theirs)]
+            if np.isfinite(ours) and np.isfinite(theirs):
+                words.append(f"{theirs / ours:.2g} x")
+            cells.append(", ".join(words))
+        lines.append(f"| {name} | {each[0]['contacts']:,} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def _scale(rows: Sequence[Row]) -> str:
     """Large packings, where they are recorded."""
     made = [row for row in rows if row["case"] == "rigid-scale"]
@@ -230,9 +303,17 @@ def _dantzig(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def _budget(row: Row) -> str:
-    words = row["command"].split()
-    return words[words.index("--budget") + 1] if "--budget" in words else "10"
+def _budgets(rows: Sequence[Row]) -> str:
+    """Processor seconds that runs were given, by method."""
+    given: dict[str, set[float]] = {}
+    for row in rows:
+        if "budget_s" in row:
+            name = "Siconos" if row["method"].startswith("Siconos") else row["method"]
+            given.setdefault(name, set()).add(row["budget_s"])
+    names: dict[str, list[str]] = {}
+    for method, seconds in given.items():
+        names.setdefault(" or ".join(f"{each:g}" for each in sorted(seconds)), []).append(method)
+    return "; ".join(f"{', '.join(methods)}: {time}" for time, methods in names.items())
 
 
 def _seconds(cost: float) -> str:

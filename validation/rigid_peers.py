@@ -22,7 +22,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from rigid_lcp.errors import LibraryMissing
-from rigid_lcp.friction_problem import FrictionProblem
+from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from validation.rigid_newton_polish import newton_polish
 
 Floats = NDArray[np.float64]
@@ -42,6 +42,13 @@ SICONOS = {
     3: ("3D_NSGS", "3D_ADMM", "3D_NSN_AC", "3D_NSN_FB", "3D_PROX"),
 }
 """Solvers by dimension; the others are slower or worse on all stored problems."""
+SICONOS_MOST = {
+    "2D_LEMKE": 300, "2D_NSGS": 1000, "2D_CPG": 1000, "3D_NSN_AC": 1500, "3D_NSN_FB": 500,
+    "3D_PROX": 500,
+}  # fmt: skip
+"""Contacts above which a solver is not tried: dense matrices, or far behind the others there."""
+SICONOS_SPARSE = 400
+"""Contacts above which plane problems are also given to sparse solvers, as problems in space."""
 ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
@@ -80,6 +87,29 @@ def batch_size(wall_s: float) -> int:
     return int(np.clip(np.ceil(BATCH_S / max(wall_s, 1e-6)), 1, BATCH_MOST))
 
 
+def siconos_solvers(problem: FrictionProblem) -> list[str]:
+    """The solvers that are worth a try on a problem."""
+    names = [*SICONOS[problem.dim]]
+    if problem.dim == 2 and problem.contacts > SICONOS_SPARSE:
+        names += ["3D_NSGS", "3D_ADMM"]
+    return [name for name in names if problem.contacts <= SICONOS_MOST.get(name, 10**9)]
+
+
+def in_space(problem: FrictionProblem) -> FrictionProblem:
+    """A plane problem as one in space: nothing pushes along t2, so its forces there are zero."""
+    contacts = problem.contacts
+    wide = np.arange(2 * contacts) // 2 * 3 + np.arange(2 * contacts) % 2
+    w = problem.delassus.tocoo()
+    across = np.arange(2, 3 * contacts, 3)
+    entries = np.concatenate([w.data, np.full(contacts, 1.0 / problem.rho)])
+    rows, columns = (np.concatenate([wide[each], across]) for each in (w.row, w.col))
+    offset = np.zeros(3 * contacts)
+    offset[wide] = problem.offset
+    matrix = sp.csr_array((entries, (rows, columns)), (3 * contacts,) * 2)
+    made: FrictionProblem = friction_problem(matrix, offset, problem.friction, 3)
+    return made
+
+
 @cache
 def siconos_missing() -> str:
     """Why Siconos can not be run; empty if it can."""
@@ -98,10 +128,18 @@ def siconos(
 
     ``tolerances``: loose ones first; those beyond one that is not reached in time are not tried.
     ``budget_s``: processor seconds of a run.  A run that kills the process is reported, and the
-    next tolerance tried.  Raises `LibraryMissing` without Siconos.
+    next tolerance tried.  A plane problem for a solver in space: see `in_space`.
+    Raises `LibraryMissing` without Siconos.
     """
     if siconos_missing():
         raise LibraryMissing("Siconos is not installed", remedy=siconos_missing())
+    if problem.dim == 2 and solver.startswith("3D"):
+        return [
+            replace(
+                run, force=None if run.force is None else run.force.reshape(-1, 3)[:, :2].ravel()
+            )
+            for run in siconos(in_space(problem), solver, tolerances, budget_s)
+        ]
     jobs = [
         {"solver": solver, "tolerance": t, "iterations": None, "budget_s": budget_s}
         | {"repeats": REPEATS, "batch_s": BATCH_S, "batch_most": BATCH_MOST}

@@ -4,7 +4,8 @@ Stored: those of the folder ``friction_problems`` under the environment variable
 (real ones of the test suite of Siconos, Apache-2.0, and packings).  Unseen: the same, changed: q by
 5 % noise, friction by a factor from 0.7 to 1.3, contacts in another order, all by a seed.
 Generated: towers, and settled packings of discs and spheres (`rigid_packings`), also as problems
-without friction; large ones settle for minutes and are kept in the folder TRACKBED_BEDS, if set.
+without friction, and others of other seeds and frictions, which no setting was chosen by; large
+ones settle for seconds to minutes and are kept in the folder TRACKBED_BEDS, if set.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ NONUNIQUE = "nonunique_discs_125"
 SIX_DIGITS = ("granularflow",)
 """Problems whose W was printed to six digits: their residual can be asked for 1e-10."""
 NOISE, FRICTION_FACTORS = 0.05, (0.7, 1.3)
+GRAINS = {2: "discs", 3: "spheres"}
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,11 @@ class NamedProblem:
     def bar(self) -> float:
         """The residual to be reached."""
         return 1e-10 if any(word in self.name for word in SIX_DIGITS) else 1e-12
+
+    @property
+    def hyperstatic(self) -> bool:
+        """A packing of grains, whose forces are far from unique."""
+        return self.name.startswith(tuple(GRAINS.values()))
 
 
 def data_folder() -> Path | None:
@@ -108,6 +115,13 @@ def changed(problem: FrictionProblem, generator: np.random.Generator) -> Frictio
     return made
 
 
+def bodies_anew(problem: FrictionProblem) -> BodySpace:
+    """The bodies of a problem without what they keep of earlier solves."""
+    bodies = problem.bodies
+    assert bodies is not None
+    return BodySpace(bodies.jacobian, bodies.inverse_mass, bodies.body_size)
+
+
 def generated_problems(quick: bool) -> list[NamedProblem]:
     """Towers and packings, up to some 100 contacts if ``quick``, else up to 5,000."""
     boxes = ((10, 2), (10, 3)) if quick else ((50, 2), (200, 2), (50, 3), (200, 3))
@@ -124,7 +138,7 @@ def generated_problems(quick: bool) -> list[NamedProblem]:
     ]
     problems += [
         NamedProblem(
-            f"{'discs' if dim == 2 else 'spheres'}{count}_mu{mu:g}", f"packings {dim}D",
+            f"{GRAINS[dim]}{count}_mu{mu:g}", f"packings {dim}D",
             partial(_packing, count, dim, mu), 1,
         )
         for count, dim in grains
@@ -133,28 +147,59 @@ def generated_problems(quick: bool) -> list[NamedProblem]:
     return problems
 
 
-def frictionless_problems(quick: bool) -> list[NamedProblem]:
-    """The normal parts of packings in 2D, some 100 contacts if ``quick``, else 100 to 1,300."""
+OTHERS = (
+    (100, 2, 0.1), (200, 2, 1.2), (300, 2, 0.6), (600, 2, 0.2), (600, 2, 1.0),
+    (60, 3, 0.1), (80, 3, 1.2), (150, 3, 0.2), (300, 3, 0.6), (300, 3, 1.0),
+)  # fmt: skip
+"""Grains, dimension and friction of packings that are raced only against the nearest rival."""
+OTHER_SEEDS = (11, 12)
+FRICTIONLESS = (
+    (60, 2, 1), (125, 2, 1), (250, 2, 1), (700, 2, 1), (1500, 2, 1), (2500, 2, 1), (90, 2, 11),
+    (400, 2, 12), (40, 3, 1), (120, 3, 1), (200, 3, 1), (400, 3, 1), (1500, 3, 1), (80, 3, 11),
+    (250, 3, 12),
+)  # fmt: skip
+"""Grains, dimension and seed; the first one serves the quick runs."""
+
+
+def other_packings() -> list[NamedProblem]:
+    """Packings of other seeds and frictions from 0.1 to 1.2."""
     return [
-        NamedProblem(f"discs{count}_lcp", "frictionless", partial(_frictionless, count), 1)
-        for count in ((60,) if quick else (60, 125, 250, 700))
-    ]
+        NamedProblem(
+            f"{GRAINS[dim]}{count}_mu{mu:g}_seed{seed}", f"other packings {dim}D",
+            partial(_packing, count, dim, mu, seed), seed,
+        )
+        for count, dim, mu in OTHERS
+        for seed in OTHER_SEEDS
+    ]  # fmt: skip
+
+
+def frictionless_problems(quick: bool) -> list[NamedProblem]:
+    """The normal parts of packings, some 100 contacts if ``quick``, else 100 to 5,000."""
+    return [
+        NamedProblem(
+            f"{GRAINS[dim]}{count}_lcp" + f"_seed{seed}" * (seed > 1), "frictionless",
+            partial(_frictionless, count, dim, seed), seed,
+        )
+        for count, dim, seed in (FRICTIONLESS[:1] if quick else FRICTIONLESS)
+    ]  # fmt: skip
 
 
 @cache
-def _packing(grains: int, dim: int, friction: float) -> FrictionProblem:
+def _packing(grains: int, dim: int, friction: float, seed: int = 1) -> FrictionProblem:
     kept = os.environ.get("TRACKBED_BEDS")
-    return packing(grains, dim, seed=1, friction=friction, folder=Path(kept) if kept else None)
+    return packing(grains, dim, seed=seed, friction=friction, folder=Path(kept) if kept else None)
 
 
-def _frictionless(grains: int) -> FrictionProblem:
-    packed = _packing(grains, 2, 0.5)
+def _frictionless(grains: int, dim: int, seed: int) -> FrictionProblem:
+    packed = _packing(grains, dim, 0.5, seed)
     assert packed.bodies is not None
-    made: FrictionProblem = friction_problem(packed.bodies, packed.offset, 0.0, 2)
+    made: FrictionProblem = friction_problem(packed.bodies, packed.offset, 0.0, dim)
     return made
 
 
 def all_problems(quick: bool) -> list[NamedProblem]:
     """Everything that is raced."""
     problems = generated_problems(quick) + frictionless_problems(quick)
-    return problems if quick else [*stored_problems(), *problems, *unseen_problems()]
+    if quick:
+        return problems
+    return [*stored_problems(), *problems, *other_packings(), *unseen_problems()]

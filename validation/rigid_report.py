@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from validation.rigid_problems import GRAINS
+
 Row = dict[str, Any]
 OURS, HYBRID, OSQP = "rigid_lcp", "Clarabel + Newton", "OSQP polished"
 WRONG = 1e-3
@@ -16,7 +18,7 @@ method says it has solved the problem."""
 TIE_S = 1e-3
 """Costs below this are not compared: they are the overhead of calls [s]."""
 OUTCOMES = ("reached", "stopped short", "wrong, though it says solved", "out of time", "died")
-HYPERSTATIC = ("discs", "spheres")
+HYPERSTATIC = tuple(GRAINS.values())
 """How the names of packings begin."""
 
 
@@ -73,6 +75,16 @@ def ratio(ours: float, theirs: float) -> float:
     return max(ours, TIE_S) / max(theirs, TIE_S)
 
 
+def cost_ratios(rows: Iterable[Row], rival: str) -> dict[str, float]:
+    """Our cost of the bar over a rival's, on the problems that the rival brings to it."""
+    found = {}
+    for name, each in problems(rows).items():
+        mine, theirs = (cost_to(of(each, method), each[0]["bar"]) for method in (OURS, rival))
+        if np.isfinite(theirs):
+            found[name] = ratio(mine, theirs)
+    return found
+
+
 def outcome(rows: Sequence[Row]) -> str:
     """What a method made of a problem, over all its runs: one of `OUTCOMES`."""
     if least_error(rows) <= rows[0]["bar"]:
@@ -124,6 +136,12 @@ def siconos_lead(rows: Sequence[Row]) -> tuple[float, float]:
     theirs = starting(rows, "Siconos")
     error = least_error(theirs)
     return error, cost_to(theirs, error) / cost_to(of(rows, OURS), error)
+
+
+def ladder(rows: Sequence[Row], levels: Sequence[float]) -> list[tuple[float, float, float]]:
+    """On one problem, a residual each: our cost, and that of the best solver of Siconos [s]."""
+    mine, theirs = of(rows, OURS), starting(rows, "Siconos")
+    return [(level, cost_to(mine, level), cost_to(theirs, level)) for level in levels]
 
 
 def packings_between(rows: Iterable[Row], least: int, most: int) -> dict[str, list[Row]]:

@@ -1,15 +1,20 @@
 """The race of friction solvers: which runs are made, and their record.
 
-    python -m validation.rigid_runs                       all runs that the record has not yet
+    python -m validation.rigid_runs                all runs that the record has not yet
+    python -m validation.rigid_runs --fresh        those too that another commit made; goes on
+                                                   where it was stopped
     python -m validation.rigid_runs --methods rigid_lcp --problems stored --fresh     some again
     python -m validation.rigid_runs --quick --out quick.jsonl     small generated problems only
+
+With those of Dantzig's algorithm and of large packings (`rigid_dantzig_runs`, `rigid_scale_runs`).
+The page is made of it by `python -m validation.rigid_page`.
 
 One JSON line a run in ``validation/results/rigid-solvers.jsonl``: problem, method, what it was
 asked for, its error and its cost.  Every answer is judged by the same residual (`rigid_lcp.cones`),
 with the tolerance asked for, other settings as they come, cold start, one thread.  A run that
-fails is a line that says how.  Costs are processor seconds, where a run takes less than a tenth of
-the time that it may the median of five means over `rigid_peers.batch_size` runs.  With the variable
-TRACKBED_DATA set, the stored problems are raced too (`rigid_problems`).
+fails is a line that says how.  Costs are processor seconds, where a run takes less than `SHORT_S`
+the median of five means over `rigid_peers.batch_size` runs.  With the variable TRACKBED_DATA set,
+the stored problems are raced too (`rigid_problems`).
 """
 
 from __future__ import annotations
@@ -21,7 +26,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,25 +34,33 @@ import numpy as np
 
 from adapters.provenance import provenance
 from rigid_lcp.errors import RigidError
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem
+from rigid_lcp.friction_problem import FrictionProblem
 from validation import rigid_peers as peers
 from validation.rigid_dantzig_runs import dantzig_rows, warm
 from validation.rigid_peers import PeerRun
-from validation.rigid_problems import NamedProblem, all_problems
+from validation.rigid_problems import NamedProblem, all_problems, bodies_anew
+from validation.rigid_scale_runs import SCALES, Scale, scale_row
 
 Row = dict[str, Any]
 RECORD = Path(__file__).parent / "results" / "rigid-solvers.jsonl"
 TOLERANCES = (1e-4, 1e-8, 1e-12)
-"""What every method is asked for."""
-BUDGET_S = 10.0
-"""Processor seconds of a run, unless told otherwise."""
+"""What every method is asked for,"""
+LADDER = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+"""and on packings of `LARGE` contacts and more, where costs at equal residual are compared."""
+LARGE, HUGE = 500, 2000
+MOST_S = 60.0
+"""Processor seconds of a run of ours, and of all runs unless told otherwise."""
+RIVAL_S, OTHER_S = 5.0, 1.0
+"""Of the nearest rivals, and of the other methods."""
+SICONOS_S = {0: 1.0, LARGE: 5.0, HUGE: 15.0}
+"""Of Siconos, by the least number of contacts; large ones are packings only."""
 DANTZIG_MOST, PIVOTING_MOST = 500, 1000
-SICONOS_MOST = {"2D_LEMKE": 300, "2D_NSGS": 2500, "2D_CPG": 2500}
-"""Contacts above which methods on dense matrices are not tried."""
 OURS = ("auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig")
 ON_UNSEEN = ("rigid_lcp", "Clarabel + Newton")
-"""What is run on changed problems, which are many: our default, and its nearest rival."""
-REPEATS, SHORT = 5, 0.1
+FEW_METHODS = ("unseen", "other packings")
+"""What is run on families that have many problems: our default, and its nearest rival."""
+REPEATS, SHORT_S = 5, 0.5
+RIVALS = ("Clarabel + Newton", "OSQP polished")
 ORIGIN = ("commit", "command", "machine", "started")
 
 
@@ -59,7 +72,7 @@ class OutOfTime(Exception):
 
 
 def methods(problem: FrictionProblem, quick: bool) -> dict[str, Callable[[float], list[PeerRun]]]:
-    """What is run on a problem, by name; each makes all its runs with a budget [s].
+    """What is run on a problem, by name; each makes all its runs with a budget [s] at most.
 
     ``quick``: without Siconos, which takes most of the time.
     """
@@ -76,11 +89,25 @@ def methods(problem: FrictionProblem, quick: bool) -> dict[str, Callable[[float]
         )
     if frictionless and not peers.library_missing("osqp"):
         runs["OSQP polished"] = _each(problem, lambda t, s: peers.osqp(problem, t))
-    if not quick and not peers.siconos_missing():
-        for solver in peers.SICONOS[problem.dim]:
-            if problem.contacts <= SICONOS_MOST.get(solver, 10**9):
-                runs[f"Siconos {solver}"] = _siconos(problem, solver)
+    if not quick and not frictionless and not peers.siconos_missing():
+        for solver in peers.siconos_solvers(problem):
+            runs[f"Siconos {solver}"] = _siconos(problem, solver)
     return runs
+
+
+def budget(named: NamedProblem, problem: FrictionProblem, method: str) -> float:
+    """Processor seconds that a run of a method on a problem may take."""
+    if method == "rigid_lcp":
+        return MOST_S
+    if method.startswith("Siconos"):
+        contacts = problem.contacts if named.hyperstatic else 0
+        return max(seconds for least, seconds in SICONOS_S.items() if least <= contacts)
+    return RIVAL_S if method in RIVALS else OTHER_S
+
+
+def tolerances(problem: FrictionProblem) -> tuple[float, ...]:
+    """What is asked for on a problem."""
+    return LADDER if problem.contacts >= LARGE and problem.friction.any() else TOLERANCES
 
 
 def _fits(name: str, problem: FrictionProblem) -> bool:
@@ -94,9 +121,7 @@ def _ours(problem: FrictionProblem, name: str) -> Callable[[float], list[PeerRun
     method: Any = name
 
     def solve(tolerance: float, _: float) -> PeerRun:
-        w: Any = problem.matrix
-        if problem.bodies is not None:  # anew, as it keeps what is derived from it
-            w = BodySpace(*(getattr(problem.bodies, each.name) for each in fields(BodySpace)))
+        w: Any = problem.matrix if problem.bodies is None else bodies_anew(problem)
         start = time.process_time()
         found = solve_friction(
             w, problem.offset, problem.friction, problem.dim, tolerance=tolerance, method=method
@@ -115,7 +140,7 @@ def _each(
     """All tolerances, within the budget each, repeated where short."""
 
     def runs(budget_s: float) -> list[PeerRun]:
-        return [_repeated(solve, tolerance, budget_s) for tolerance in TOLERANCES]
+        return [_repeated(solve, tolerance, budget_s) for tolerance in tolerances(problem)]
 
     return runs
 
@@ -129,7 +154,7 @@ def _repeated(
         first = _limited(lambda: solve(tolerance, budget_s), 2 * budget_s)
         wall = time.perf_counter() - start
         costs = [first.cost_s or 0.0]
-        if wall < SHORT * budget_s:
+        if wall < SHORT_S:
             batch = peers.batch_size(wall)
             costs = [
                 float(np.mean([solve(tolerance, budget_s).cost_s or 0.0 for _ in range(batch)]))
@@ -163,13 +188,15 @@ def _limited(job: Callable[[], PeerRun], seconds: float) -> PeerRun:
 
 
 def _siconos(problem: FrictionProblem, solver: str) -> Callable[[float], list[PeerRun]]:
-    return lambda budget_s: peers.siconos(problem, solver, TOLERANCES, budget_s)
+    return lambda budget_s: peers.siconos(problem, solver, tolerances(problem), budget_s)
 
 
 # --- rows -------------------------------------------------------------------------------------
 
 
-def row_of(named: NamedProblem, problem: FrictionProblem, method: str, run: PeerRun) -> Row:
+def row_of(
+    named: NamedProblem, problem: FrictionProblem, method: str, run: PeerRun, budget_s: float
+) -> Row:
     """A line of the record.  ``ok``: the residual is the one that was asked for, or less."""
     error = None
     if run.force is not None and np.isfinite(run.force).all():
@@ -181,7 +208,7 @@ def row_of(named: NamedProblem, problem: FrictionProblem, method: str, run: Peer
     return {
         "case": "rigid-solvers", "problem": named.name, "family": named.family,
         "contacts": problem.contacts, "dim": problem.dim, "bar": named.bar, "method": method,
-        "setting": run.setting, "seed": named.seed, "error": error,
+        "setting": run.setting, "seed": named.seed, "budget_s": budget_s, "error": error,
         "error_kind": "natural residual", "cost_s": run.cost_s, "repeats_s": list(run.repeats_s),
         "work": run.work, "work_unit": run.work_unit, "ok": ok, "claims": run.claims, "why": why,
     }  # fmt: skip
@@ -206,15 +233,21 @@ def rows_write(path: Path, rows: Sequence[Row]) -> None:
 
 def race(
     path: Path, quick: bool, *, only_problems: str = "", only_methods: str = "",
-    fresh: bool = False, budget_s: float = BUDGET_S, command: Sequence[str] = (),
+    fresh: bool = False, budget_s: float = MOST_S, command: Sequence[str] = (),
 ) -> list[Row]:  # fmt: skip
     """Make the runs that ``path`` has not, all methods of a problem after another; all rows.
 
     ``only_problems``: words, with commas, of which the name of the problem or of its family holds
-    one; ``only_methods``: how names of methods begin.  Both empty for all.
+    one; ``only_methods``: how names of methods begin.  Both empty for all.  ``fresh``: what
+    another commit recorded is made again.
     """
     origin = {key: value for key, value in provenance(command).items() if key in ORIGIN}
     rows = rows_read(path)
+
+    def done(have: list[Row]) -> bool:
+        """What is recorded need not be made again."""
+        return bool(have) and not (fresh and any(r["commit"] != origin["commit"] for r in have))
+
     some_problems, some_methods = (
         [word for word in words.split(",") if word] for words in (only_problems, only_methods)
     )
@@ -227,23 +260,46 @@ def race(
         for method, runs in methods(problem, quick).items():
             if some_methods and not any(method.startswith(word) for word in some_methods):
                 continue
-            if named.family == "unseen" and method not in ON_UNSEEN:
+            if named.family.startswith(FEW_METHODS) and method not in ON_UNSEEN:
                 continue
             have = [r for r in rows if (r.get("problem"), r["method"]) == (named.name, method)]
-            if have and not fresh:
+            if done(have):
                 continue
-            made = [row_of(named, problem, method, run) | origin for run in runs(budget_s)]
+            most = min(budget_s, budget(named, problem, method))
+            made = [row_of(named, problem, method, run, most) | origin for run in runs(most)]
             rows = [row for row in rows if row not in have] + made
             rows_write(path, rows)
             best = min((r["error"] for r in made if r["error"] is not None), default=None)
             print(f"{time.strftime('%H:%M:%S')} {named.name} {method}: {best}", flush=True)
-    have = [row for row in rows if row["case"].startswith("rigid-dantzig")]
-    asked = not some_methods and (not some_problems or "dantzig" in some_problems)
-    if asked and (fresh or not have):
-        rows = [row for row in rows if row not in have]
-        rows += [row | origin for row in dantzig_rows(quick)]
+    for title, belongs, make in () if some_methods else further(quick):
+        have = [row for row in rows if belongs(row)]
+        if done(have) or (some_problems and not any(word in title for word in some_problems)):
+            continue
+        rows = [row for row in rows if not belongs(row)] + [row | origin for row in make()]
         rows_write(path, rows)
+        print(f"{time.strftime('%H:%M:%S')} {title}", flush=True)
     return rows
+
+
+def further(quick: bool) -> list[tuple[str, Callable[[Row], bool], Callable[[], list[Row]]]]:
+    """What else is recorded: name, which rows belong to it, and how they are made."""
+    scales = () if quick else SCALES
+    return [
+        ("dantzig", lambda row: row["case"].startswith("rigid-dantzig"),
+         lambda: dantzig_rows(quick)),
+        *(
+            (f"scale {scale.name}", partial(_of_scale, scale.name), partial(_scale_rows, scale))
+            for scale in scales
+        ),
+    ]  # fmt: skip
+
+
+def _of_scale(name: str, row: Row) -> bool:
+    return row["case"] == "rigid-scale" and bool(row["problem"] == name)
+
+
+def _scale_rows(scale: Scale) -> list[Row]:
+    return [scale_row(scale)]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -254,8 +310,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--quick", action="store_true", help="small generated problems, no Siconos")
     parser.add_argument("--problems", default="", help="words in names of problems or families")
     parser.add_argument("--methods", default="", help="how the names of methods begin")
-    parser.add_argument("--fresh", action="store_true", help="make recorded runs again")
-    parser.add_argument("--budget", type=float, default=BUDGET_S, help="seconds of a run")
+    parser.add_argument(
+        "--fresh", action="store_true", help="make again what another commit recorded"
+    )
+    parser.add_argument("--budget", type=float, default=MOST_S, help="most seconds of a run")
     parser.add_argument("--out", type=Path, default=RECORD, help="the record (JSON lines)")
     asked = parser.parse_args(arguments)
     if asked.quick and asked.out == RECORD:

@@ -24,7 +24,9 @@ import numpy as np
 GROWTH, WORTH = 10.0, 2.0
 """A run that stopped at its number of iterations is made again with up to ten times as many, if
 there is time for twice as many and the forces were not the same as before."""
-SAME = 1e-14
+SAME, SHORT_S = 1e-14, 0.2
+TOGETHER = 3.0
+"""All runs of a solver on a problem end when they have taken so many times what one may."""
 
 
 def run(numerics: Any, problem: Any, job: dict[str, Any]) -> tuple[dict[str, Any], Any]:
@@ -61,15 +63,20 @@ def main(folder: Path) -> None:
     arrays = np.load(folder / "problem.npz")
     dim = int(arrays["dim"])
     problem = dim, matrix_of(arrays, dim), arrays["q"], arrays["mu"]
+    allowed, begun = None, time.process_time()
     for number, job in json.loads((folder / "jobs.json").read_text()):
         budget, last = job["budget_s"], np.full(len(problem[2]), np.nan)
+        if time.process_time() - begun > TOGETHER * budget:
+            break
+        if allowed is not None:  # with fewer it would stop at a point that is recorded already
+            job = job | {"iterations": allowed}
         while True:
             limit = time.process_time() + 2 * budget + job["repeats"] * job["batch_s"]
             resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, resource.RLIM_INFINITY))
             start = time.perf_counter()
             result, force = run(numerics, problem, job)
             wall = time.perf_counter() - start
-            if wall < budget / 10:
+            if wall < min(budget / 10, SHORT_S):
                 batch = int(np.clip(np.ceil(job["batch_s"] / wall), 1, job["batch_most"]))
                 result["repeats_s"] = [
                     float(np.mean([run(numerics, problem, job)[0]["cost_s"] for _ in range(batch)]))
@@ -86,8 +93,8 @@ def main(folder: Path) -> None:
                 or np.allclose(force, last, rtol=0, atol=SAME * max(abs(force)))
             ):
                 break
-            last = force
-            job = job | {"iterations": int(more * result["allowed"])}
+            last, allowed = force, int(more * result["allowed"])
+            job = job | {"iterations": allowed}
         if result["info"] != 0:
             break  # what it could not reach, it can not better
 

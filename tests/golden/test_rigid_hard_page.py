@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 
+from adapters.run_folder import write_atomically
+from validation import rigid_hard_page
 from validation.rigid_hard_page import PAGE, RECORD, page, record_lines, record_read
 from validation.rigid_hard_trials import Row
 
@@ -40,7 +43,9 @@ def test_every_case_has_a_row_of_ours_and_misses_are_told() -> None:
     [
         "1e4 times heavier", "mu = tan 20°", "1 - 1e-9", "1 + 1e-9", "block at rest", "card house",
         "wedge", "arch of", "Painleve rod", "bouncing", "needles", "coincident edges",
-        "tower of 200", "jammed hopper", "light on heavy",
+        "tower of 200", "jammed hopper", "light on heavy", "storeys", "tan a exactly",
+        "lowest kicked", "needles of 1000", "by up to 1e-12", "in mm and g", "turned by 45",
+        "1e+08 times heavier", "rocking block", "disc rolling",
     ],
 )  # fmt: skip
 def test_no_hard_case_is_missing(family: str) -> None:
@@ -67,6 +72,38 @@ def test_a_peer_without_a_number_has_its_reason() -> None:
     assert "blew up" in text
     assert "| MuJoCo 4 | 1 | 0 |" in text
     assert "| ODE |" not in text
+
+
+def test_a_run_that_was_cut_off_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """``--resume`` measures what the same code and command have not measured yet, and no more."""
+    record, asked = tmp_path / "record.jsonl", list[str]()
+
+    def rows(quick: bool, peers: Sequence[str], names: Sequence[str]) -> dict[str, list[Row]]:
+        asked.extend(names)
+        if len(asked) == 2:
+            raise KeyboardInterrupt
+        return {name: [row(case=name)] for name in names}
+
+    monkeypatch.setattr(rigid_hard_page, "RECORD", record)
+    monkeypatch.setattr(rigid_hard_page, "record_read", lambda: record_read(record))
+    monkeypatch.setattr(
+        rigid_hard_page, "record_write", lambda lines: write_atomically(
+            record, "".join(json.dumps(line) + "\n" for line in lines)
+        ),
+    )  # fmt: skip
+    monkeypatch.setattr(rigid_hard_page, "provenance", lambda words: ORIGIN | {"command": words})
+    monkeypatch.setattr("validation.cases.rigid_hard_cases.hard_rows", rows)
+    with pytest.raises(KeyboardInterrupt):
+        rigid_hard_page.measure(True, None)
+    assert [line["case"] for line in record_read(record)] == asked[:1]
+    rigid_hard_page.measure(True, None, resume=True)
+    assert asked[2] == asked[1]
+    assert sorted(set(asked)) == sorted(line["case"] for line in record_read(record))
+    count = len(asked)
+    rigid_hard_page.measure(True, asked[:2], resume=True)
+    assert len(asked) == count
+    rigid_hard_page.measure(False, asked[:1], resume=True)  # longer runs: another command
+    assert len(asked) == count + 1
 
 
 def test_record_is_plain_json_a_line_each() -> None:

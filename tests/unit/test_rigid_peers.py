@@ -227,6 +227,44 @@ def test_siconos(dim: int, solver: str) -> None:
 
 
 @needs_siconos
+def test_siconos_in_space() -> None:
+    """A plane problem given to a solver in space: forces of the plane come back."""
+    problem = tower(5, 2)
+    found = peers.siconos(problem, "3D_ADMM", (1e-8,), 1.0)
+    assert any(run.force is not None and problem.residual(run.force) <= 1e-6 for run in found)
+
+
+def test_plane_problem_in_space() -> None:
+    """A solution stays one, with zeros along t2; no other coupling comes in."""
+    problem = tower(3, 2)
+    found = solve_friction(problem.delassus, problem.offset, problem.friction, 2)
+    wide = peers.in_space(problem)
+    force = np.column_stack([found.r.reshape(-1, 2), np.zeros(problem.contacts)]).ravel()
+    assert wide.residual(force) <= 1e-12
+    velocity = wide.velocity(force).reshape(-1, 3)
+    assert velocity[:, :2].ravel() == pytest.approx(found.u, abs=1e-15)
+    assert (velocity[:, 2] == 0).all()
+
+
+def test_solvers_of_siconos_by_size() -> None:
+    """Large plane problems go to sparse solvers too, and to no dense ones."""
+    small, large = tower(10, 2), tower(600, 2)
+    assert peers.siconos_solvers(small) == ["2D_NSGS", "2D_CPG", "2D_LEMKE"]
+    assert peers.siconos_solvers(large) == ["3D_NSGS", "3D_ADMM"]
+
+
+def test_budgets() -> None:
+    """More time for Siconos on large packings alone."""
+    large = tower(300, 2)
+    tall, packed = (NamedProblem(name, "x", lambda: large) for name in ("tower", "discs"))
+    assert runs.budget(tall, large, "Siconos 3D_NSGS") == runs.SICONOS_S[0]
+    assert runs.budget(packed, large, "Siconos 3D_NSGS") == runs.SICONOS_S[runs.LARGE]
+    assert runs.budget(packed, large, "rigid_lcp") == runs.MOST_S
+    assert runs.tolerances(large) == runs.LADDER
+    assert runs.tolerances(tower(2, 2)) == runs.TOLERANCES
+
+
+@needs_siconos
 def test_siconos_wrong_answer_is_seen() -> None:
     """Its 2D Lemke solver reports success on a stored tower with an answer that is none."""
     stored = {each.name: each for each in stored_problems()}
@@ -236,7 +274,7 @@ def test_siconos_wrong_answer_is_seen() -> None:
     problem = named.make()
     (found,) = peers.siconos(problem, "2D_LEMKE", (1e-8,), 1.0)
     assert found.claims
-    line = runs.row_of(named, problem, "Siconos 2D_LEMKE", found)
+    line = runs.row_of(named, problem, "Siconos 2D_LEMKE", found, 1.0)
     assert not line["ok"]
     assert report.wrong_answers([line]) == [line]
     assert report.outcome([line]) == "wrong, though it says solved"
@@ -302,7 +340,7 @@ def test_forces_that_are_not_finite() -> None:
     problem = tower(1, 2)
     named = NamedProblem("tower", "towers 2D", lambda: problem)
     run = peers.PeerRun({"tolerance": 1e-8}, np.full(4, np.nan), 0.1, claims=True)
-    row = runs.row_of(named, problem, "broken", run)
+    row = runs.row_of(named, problem, "broken", run, 1.0)
     assert (row["error"], row["ok"], row["why"]) == (None, False, "its forces are not finite")
 
 
@@ -312,6 +350,7 @@ def test_race_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runs, "all_problems", lambda quick: [named])
     monkeypatch.setattr(runs, "warm", lambda: None)
     path = tmp_path / "record.jsonl"
+    solve_friction(tower(2, 2).bodies, np.ones(8), 0.5, 2, method="newton")  # compiled
     arguments: dict[str, Any] = {"only_methods": "rigid_lcp newton", "budget_s": 1.0}
     rows = runs.race(path, True, **arguments)
     assert [row["setting"]["tolerance"] for row in rows] == list(runs.TOLERANCES)
@@ -320,7 +359,32 @@ def test_race_resumes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     again = {"rigid_lcp newton": lambda _: pytest.fail("it was run again")}
     monkeypatch.setattr(runs, "methods", lambda *_: again)
     assert runs.race(path, True, **arguments) == rows
+    assert runs.race(path, True, fresh=True, **arguments) == rows  # the same commit made them
     assert runs.race(path, True, only_problems="packings") == rows
+
+
+def test_fresh_is_by_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``fresh`` makes again what another commit made, Dantzig's and large packings' rows too."""
+    monkeypatch.setattr(runs, "all_problems", lambda quick: [])
+    monkeypatch.setattr(runs, "warm", lambda: None)
+    commits = iter("aabb")
+    monkeypatch.setattr(runs, "provenance", lambda _: {"commit": next(commits)})
+    made: list[str] = []
+
+    def further(_: bool) -> list[Any]:
+        def rows() -> list[dict[str, Any]]:
+            made.append("x")
+            return [{"case": "rigid-scale", "problem": "x", "method": "m"}]
+
+        return [("scale x", lambda row: row["problem"] == "x", rows)]
+
+    monkeypatch.setattr(runs, "further", further)
+    path = tmp_path / "record.jsonl"
+    for fresh, count in ((False, 1), (True, 1), (True, 2), (False, 2)):
+        found = runs.race(path, True, fresh=fresh)
+        assert len(made) == count
+        assert len(found) == 1
+    assert found[0]["commit"] == "b"
 
 
 def test_changed_problems_are_of_the_family() -> None:
@@ -357,6 +421,20 @@ def test_cost_at_equal_residual() -> None:
     assert report.cost_to(rows, 1e-6) == 1.0
     assert report.cost_to(rows, 1e-9) == np.inf
     assert report.least_error(rows) == 1e-8
+
+
+def test_costs_beside_rivals() -> None:
+    """At each residual our cost and the least of Siconos; ratios where the rival gets there."""
+    rows = [
+        row("rigid_lcp", "p", 1e-13, 0.1), row("rigid_lcp", "p", 1e-5, 0.05),
+        row("Siconos A", "p", 1e-5, 0.4), row("Siconos B", "p", 1e-7, 0.8),
+        row(report.HYBRID, "p", 1e-14, 0.2), row(report.HYBRID, "q", 1e-3, 0.2),
+        row("rigid_lcp", "q", 1e-13, 0.1),
+    ]  # fmt: skip
+    each = report.problems(rows)["p"]
+    assert report.ladder(each, (1e-4, 1e-6)) == [(1e-4, 0.05, 0.4), (1e-6, 0.1, 0.8)]
+    assert report.ladder(each, (1e-9,)) == [(1e-9, 0.1, np.inf)]
+    assert report.cost_ratios(rows, report.HYBRID) == pytest.approx({"p": 0.5})
 
 
 def test_lead_on_siconos() -> None:

@@ -203,6 +203,22 @@ def test_nothing_collides() -> None:
     assert collide(empty, [1.0, 0.0, 0.0], 0.5).solved
 
 
+@pytest.mark.parametrize(("speed", "left"), [(0.9, 0.0), (1.1, 0.55)])
+def test_slow_approaches_do_not_bounce(speed: float, left: float) -> None:
+    """Zeno's cut-off: at ``rest_speed`` or slower a ball stops, above it leaves with ``eps v``."""
+    ball = one_body([([0.0, 1.0], [0.0, -0.5])], 0.1)
+    found = collide(ball, [0.0, -speed, 0.0], 0.5, rest_speed=1.0)
+    assert found.velocity == pytest.approx([0.0, left, 0.0], abs=1e-15)
+
+
+def test_what_stands_still_does_not_collide() -> None:
+    """An approach not faster than ``still`` is none: nothing changes."""
+    ball = one_body([([0.0, 1.0], [0.0, -0.5])], 0.1)
+    found = collide(ball, [1e-9, -1e-9, 0.0], 0.5, 0.3, still=1e-9)
+    assert found.rounds == 0
+    assert (found.velocity == [1e-9, -1e-9, 0.0]).all()
+
+
 def test_rounds_that_do_not_end_are_cut() -> None:
     """After the rounds allowed the rest has no restitution: nothing approaches, and that is all."""
     bodies, velocity = network_bodies(80, 3)

@@ -21,7 +21,12 @@ from rigid_lcp.factor_updates import (
     slide_sign,
 )
 from rigid_lcp.friction_problem import friction_problem
-from rigid_lcp.pivot_state import Floats, Pivots, pivots_state, shift_change
+from rigid_lcp.pivot_shift import shift_change
+from rigid_lcp.pivot_state import (
+    Floats,
+    Pivots,
+    pivots_state,
+)
 from tests.rigid_networks import network, stored, tower
 
 TOLERANCE = 1e-12

@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction_problem import friction_problem
-from rigid_lcp.frictionless import Floats, frictionless, lcp, normal_sweeps
-from tests.rigid_networks import network, stored, tower
+from rigid_lcp.friction_problem import BodySpace, friction_problem
+from rigid_lcp.frictionless import Floats, face_solver, frictionless, lcp, normal_matrix
+from rigid_lcp.normal_sweeps import normal_sweeps
+from tests.rigid_networks import network, network_bodies, stored, tower
 
 TOLERANCE = 1e-12
 
@@ -132,16 +133,61 @@ def test_three_dimensions() -> None:
     assert found.r[::3].sum() == pytest.approx(1.0, rel=1e-12)
 
 
-def test_sweeps_against_numpy() -> None:
-    """The kernel's projected Gauss-Seidel against a plain loop."""
+@pytest.mark.parametrize("sweeps", [3, 40])
+def test_sweeps_against_numpy(sweeps: int) -> None:
+    """The kernel against plain loops: projected Gauss-Seidel, Nesterov's momentum, restarts."""
     problem = network(30, 0.0)
     a, b = problem.delassus[::2][:, ::2].tocsr(), problem.offset[::2]
-    f, plain, dense = np.zeros(len(b)), np.zeros(len(b)), a.toarray()
-    normal_sweeps(a.indptr, a.indices, a.data, b, f, 3)
-    for sweep in range(3):
-        for c in range(len(b))[:: 1 if sweep % 2 == 0 else -1]:
-            plain[c] = max(plain[c] - (b[c] + dense[c] @ plain) / dense[c, c], 0.0)
-    assert f == pytest.approx(plain, rel=1e-12, abs=1e-15)
+    f, dense = np.zeros(len(b)), a.toarray()
+    assert normal_sweeps(a.indptr, a.indices, a.data, b, f, sweeps, sweeps, -1) == sweeps
+    weight = dense.diagonal()
+    x, last, time, least = np.zeros(len(b)), np.zeros(len(b)), 1.0, np.inf
+    for _ in range(sweeps):
+        later = (1 + np.sqrt(1 + 4 * time**2)) / 2
+        y = x + (time - 1) / later * (x - last)
+        last, x, time = x, y.copy(), later
+        for c in range(len(b)):
+            x[c] = max(x[c] - (b[c] + dense[c] @ x) / dense[c, c], 0.0)
+        least = min(least, weight @ (x - y) ** 2)
+        if weight @ ((y - x) * (x - last)) > 0 or weight @ (x - y) ** 2 > 1.5**2 * least:
+            time, least = 1.0, np.inf
+    assert f == pytest.approx(x, rel=1e-9, abs=1e-15)
+
+
+def test_sweeps_end_when_sides_settle() -> None:
+    """Contacts apart from each other are solved by one sweep: two rounds show it."""
+    a = sp.eye_array(4, format="csr")
+    f = np.zeros(4)
+    done = normal_sweeps(a.indptr, a.indices, a.data, np.array([1.0, -1, -2, 3]), f, 100, 5, 0)
+    assert done == 10
+    assert f == pytest.approx([0, 1, 2, 0])
+
+
+def test_normal_part_of_w() -> None:
+    """By bodies and by W itself: rows and columns of the normals, whatever the mass matrix."""
+    bodies, velocity = network_bodies(40, 3)
+    skew = sp.csr_array(np.kron(np.eye(40), np.array([[2.0, 0.3, 0.1], [0.3, 1, 0], [0.1, 0, 3]])))
+    for space in (bodies, BodySpace(bodies.jacobian, skew, 3)):
+        offset = space.jacobian @ velocity
+        expected = space.matrix.toarray()[::2, ::2]
+        for w in (space, space.matrix):
+            found = normal_matrix(friction_problem(w, offset, 0.0, 2))
+            assert found.toarray() == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("most", [0.0, 1e9])
+@pytest.mark.parametrize("skew", [0.0, 1e-3])
+def test_faces(most: float, skew: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``A + shift`` of some contacts in any order, by a band and by sparse LU, against numpy."""
+    monkeypatch.setattr("rigid_lcp.frictionless.BAND_MOST", most)
+    g = np.random.default_rng(5)
+    a = network(40, 0.0).delassus[::2][:, ::2].tocsr()
+    a.data *= 1 + skew * g.normal(size=a.nnz)
+    inside = g.permutation(a.shape[0])[:25].astype(np.int32)
+    right = g.normal(size=25)
+    expected = np.linalg.solve(a.toarray()[np.ix_(inside, inside)] + 0.1 * np.eye(25), right)
+    assert face_solver(a, inside, 0.1)(right) == pytest.approx(expected, rel=1e-10)
+    assert face_solver(a, inside[:0], 0.1)(right[:0]).shape == (0,)
 
 
 def test_what_can_not_be_posed_is_refused() -> None:

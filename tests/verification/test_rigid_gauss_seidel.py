@@ -103,7 +103,7 @@ def test_momentum_keeps_the_velocities_of_the_bodies() -> None:
         sweeper.sweep(force)
     assert sweeper.bodies is not None
     exact = sweeper.bodies.body_velocity(force)
-    np.testing.assert_allclose(sweeper.velocity, exact, atol=1e-11 * np.abs(force).max())
+    np.testing.assert_allclose(sweeper.state.velocity, exact, atol=1e-11 * np.abs(force).max())
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -10,6 +10,15 @@ import pytest
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
+from validation.rigid_hard_equilibrium import BALANCED, least_that_rests, unbalance
+from validation.rigid_hard_scenes import (
+    card_storeys,
+    card_storeys_friction,
+    in_units,
+    jittered_grid,
+    kicked_tower,
+    turned,
+)
 from validation.rigid_scenes import (
     DENSITY,
     G,
@@ -89,6 +98,55 @@ def test_arch() -> None:
     """A semicircular arch stands iff it is thicker than 0.1075 of its radius (Heyman)."""
     assert stack_drop(arch(16, 0.115), 0.02) < 1e-9
     assert stack_drop(arch(16, 0.10), 0.02) > 1e-6
+
+
+def test_forces_at_rest_exist_iff_the_block_holds() -> None:
+    """The linear programme on a block on a slope: balance turns at ``mu = tan(slope)``."""
+    run = block_on_incline(SLOPE, 1.0)
+    limit = least_that_rests(lambda mu: unbalance(run, mu) <= BALANCED, 0.0, 2.0, 1e-9)
+    assert limit == pytest.approx(tan(SLOPE), abs=2e-9)
+
+
+@pytest.mark.parametrize("off", [-1e-2, 1e-2])
+def test_card_house_of_storeys(off: float) -> None:
+    """Two storeys fall where no forces at rest exist, and stand just above."""
+    limit = card_storeys_friction(2, radians(20))
+    move = stack_drop(card_storeys(2, radians(20), (1 + off) * limit), 0.05)
+    assert move > 1e-5 if off < 0 else move < 1e-10
+
+
+@pytest.mark.parametrize("angle", [radians(45), 2.0])
+def test_a_turned_scene_rests_as_well(angle: float) -> None:
+    """Gravity, floor and boxes turned together: the frame is no part of the answer."""
+    assert stack_drop(turned(stack(5, 1e4), angle), 0.02) < 1e-10
+
+
+def test_units_are_no_part_of_the_answer() -> None:
+    """A card house that slides apart, in metres and kilograms and in millimetres and grams."""
+    plain = card_house(0.4, 0.9 * card_house_friction(0.4))
+    small = in_units(plain, 1e3, 1e3)
+    for run in (plain, small):
+        run.advance(0.05)
+    np.testing.assert_allclose(small.positions / 1e3, plain.positions, atol=1e-12)
+    np.testing.assert_allclose(small.angles, plain.angles, atol=1e-12)
+    np.testing.assert_allclose(
+        small.contacts.normal_force / 1e6, plain.contacts.normal_force, rtol=1e-9
+    )
+
+
+def test_offsets_of_round_off_do_not_matter() -> None:
+    """Edges that coincide but for 1e-12 m: the boxes settle within their gaps."""
+    assert stack_drop(jittered_grid(3, 3, 1e-12), 0.03) < 1e-11
+
+
+def test_a_kicked_tower_gains_nothing() -> None:
+    """The lowest of 30 boxes is kicked: friction takes the energy, the others hardly move."""
+    run = kicked_tower(30, 1.0)
+    energy, mass = run.energy, run.world.mass[0]
+    run.advance(0.02)
+    assert run.energy < energy
+    assert run.energy == pytest.approx(energy - 0.5 * mass, rel=1e-3)
+    assert run.overlap < 1e-9
 
 
 def test_no_friction_no_grip() -> None:

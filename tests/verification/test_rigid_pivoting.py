@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigid_lcp.dantzig import dantzig
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction_problem import friction_problem
+from rigid_lcp.friction_problem import FrictionSolution, friction_problem
+from rigid_lcp.pivot_state import forces_impossible
 from rigid_lcp.pivoting import pivoting
 from tests.rigid_networks import network, stored, tower
 
 TOLERANCE = 1e-12
+Method = Callable[..., FrictionSolution]
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.1, 0.3, 0.5, 0.8, 1.0])
@@ -154,3 +159,42 @@ def test_real_problems(name: str) -> None:
     """Stored problems, at the friction they came with and at 0.3 and 0.8."""
     for mu in (None, 0.3, 0.8):
         assert pivoting(stored(name, mu)).solved
+
+
+@pytest.mark.parametrize("method", [pivoting, dantzig])
+@pytest.mark.parametrize("below", [1e-3, 1e-6, 1e-8, 1e-10, -1e-10, -1e-8, -1e-6, -1e-3, 0.0])
+def test_either_side_of_painleves_limit(below: float, method: Method) -> None:
+    """W = [[1, 3/4], [3/4, 2]], slip against it: ``f_N = 1 / (1 - 3/4 mu)`` below mu = 4/3.
+
+    The shift that the methods begin with is larger than that pivot; it must hide neither its size
+    nor its sign.  The pivot is known to round-off only.
+    """
+    mu = 4 / 3 * (1 - below)
+    problem = friction_problem([[1.0, 0.75], [0.75, 2.0]], [-1.0, 0.0], mu, 2)
+    found = method(problem, None, TOLERANCE, tangential_velocity=np.array([1.0]))
+    if below > 0:
+        assert found.solved, found.message
+        assert found.r[0] == pytest.approx(1 / (1 - 0.75 * mu), rel=1e-9 + 4e-16 / below)
+    else:
+        assert found.status == "no solution"
+
+
+@pytest.mark.parametrize("method", [pivoting, dantzig])
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_a_contact_that_bears_on_no_mass(mu: float, method: Method) -> None:
+    """It approaches whatever its force is; as that grows the residual falls, and solves nothing."""
+    w, q = np.diag([1.0, 1.0, 0.0, 0.0]), np.array([-1.0, 0.3, -1.0, 0.0])
+    found = method(friction_problem(w, q, mu, 2), None, 1e-6)
+    assert found.residual <= 1e-6
+    assert found.status == "no solution"
+
+
+@pytest.mark.parametrize("light", [1e-6, 1e-9, 1e-12])
+def test_a_contact_that_bears_on_much_mass(light: float) -> None:
+    """W = 1e-12 of another contact's is small, not zero: the force is ``1 / light``."""
+    w, q = np.diag([1.0, 1.0, light, light]), np.array([-1.0, 0.3, -1.0, 0.0])
+    problem = friction_problem(w, q, 0.5, 2)
+    found = pivoting(problem)
+    assert found.solved
+    assert found.r[2] == pytest.approx(1 / light)
+    assert not forces_impossible(problem, np.zeros(2, dtype=np.int64))

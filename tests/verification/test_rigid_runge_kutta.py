@@ -202,6 +202,7 @@ def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(found, residual=1e-3, status="not converged", message="stopped")
 
     monkeypatch.setattr(integrator, "impulses_found", wrong)
+    monkeypatch.setattr(integrator, "forces_if_lasting", lambda *_: None)
     run = block_on_incline(0.1, 0.5, method="acceleration")
     with pytest.raises(NotConverged, match="residual"):
         run.advance(0.01)

@@ -13,6 +13,13 @@ from collections.abc import Callable, Sequence
 
 from validation import rigid_scenes as scenes
 from validation.case import Check
+from validation.rigid_hard_further import (
+    frame_trials,
+    motion_rows,
+    ratio_trials,
+    rocking_rows,
+    storey_rows,
+)
 from validation.rigid_hard_measures import (
     bounce_rows,
     card_threshold_rows,
@@ -24,6 +31,7 @@ from validation.rigid_hard_trials import (
     Row,
     arch_trials,
     card_trials,
+    creep_trials,
     incline_trials,
     pile_trials,
     trial_rows,
@@ -33,13 +41,19 @@ from validation.rigid_hard_trials import (
 Family = Callable[[bool, Sequence[str]], list[Row]]
 
 FAMILIES: dict[str, Family] = {
-    "incline": lambda quick, peers: trial_rows(incline_trials(2_000 if quick else 100_000), peers),
+    "incline": lambda quick, peers: trial_rows(incline_trials(), peers),
+    "creep": lambda quick, peers: trial_rows(creep_trials(2_000 if quick else 100_000), peers),
     "cards": lambda quick, peers: trial_rows(card_trials(), peers) + card_threshold_rows(),
+    "storeys": lambda quick, peers: storey_rows(peers),
     "wedge": lambda quick, peers: trial_rows(wedge_trials(), peers),
     "piles": lambda quick, peers: trial_rows(pile_trials(quick), peers) + light_on_heavy_rows(),
+    "ratios": lambda quick, peers: trial_rows(ratio_trials(quick), peers),
+    "frames": lambda quick, peers: trial_rows(frame_trials(quick), peers),
     "arch": lambda quick, peers: trial_rows(arch_trials(11, quick) + arch_trials(31, quick), peers),
     "rod": lambda quick, peers: rod_rows(),
     "bounce": lambda quick, peers: bounce_rows(1_000 if quick else 10_000),
+    "rocking": lambda quick, peers: rocking_rows(),
+    "motion": lambda quick, peers: motion_rows(quick),
     "hopper": hopper_rows,
 }
 """Hard cases by family: rows of ours and of the peers asked for."""

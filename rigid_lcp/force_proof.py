@@ -1,0 +1,50 @@
+"""A proof that contacts can not be kept from approaching, by a linear programme."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import scipy.sparse as sp
+
+from rigid_lcp.friction_problem import FrictionProblem
+
+EQUILIBRATIONS = 3
+"""Rounds of scaling rows and columns to entries of one: HiGHS takes what is below 1e-9 for zero."""
+
+
+def forces_insufficient(problem: FrictionProblem) -> bool:
+    """Whether it is proved that no r in K gives ``u_N >= 0`` at every contact.
+
+    Every force of a cone is a sum of forces along its edges; in 3D the cone is replaced by the
+    pyramid around it, so that a proof stays one.
+    """
+    from scipy.optimize import linprog
+
+    contacts, dim = problem.contacts, problem.dim
+    edges = []
+    for signs in product((1.0, -1.0), repeat=dim - 1):
+        direction = np.ones((contacts, dim))
+        direction[:, 1:] = problem.friction[:, None] * signs
+        columns = np.repeat(np.arange(contacts), dim)
+        edges.append(sp.csr_array((direction.ravel(), (np.arange(contacts * dim), columns))))
+    approach = sp.csr_array(-(problem.delassus[::dim] @ sp.hstack(edges)))
+    lengths = np.ones(contacts)
+    for _ in range(EQUILIBRATIONS):
+        for axis in (0, 1):
+            size = abs(approach).max(axis=axis).toarray().ravel()
+            factor = 1.0 / np.where(size > 0.0, size, 1.0)
+            if axis == 0:
+                approach = sp.csr_array(approach @ sp.diags_array(factor))
+            else:
+                approach = sp.csr_array(sp.diags_array(factor) @ approach)
+                lengths *= factor
+    bound = problem.offset[::dim] * lengths
+    found = linprog(
+        np.zeros(approach.shape[1]),
+        A_ub=approach,
+        b_ub=bound / (float(np.abs(bound).max()) or 1.0),
+        bounds=(0, None),
+        method="highs",
+    )
+    return bool(found.status == 2)

@@ -1,0 +1,122 @@
+"""What a friction problem may be made of: numbers, matrices and operators as a caller has them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.errors import ProblemError
+
+if TYPE_CHECKING:
+    from rigid_lcp.friction_problem import BodySpace
+
+Floats = NDArray[np.float64]
+
+LEAST, MOST = 1e-100, 1e100
+"""Range of the largest number of W, and of q: squares beyond it are no numbers any more."""
+COLUMNS = 256
+"""Columns of an operator that are written out at a time."""
+
+
+def finite_numbers(values: ArrayLike, name: str) -> Floats:
+    """A copy of ``values`` as an array of floats; `ProblemError`, with ``name``, for all else.
+
+    Refused are text, complex numbers, masked ones, numbers that are not finite or out of range.
+    """
+    if np.ma.is_masked(values):
+        raise ProblemError(
+            "some of its numbers are masked", where=name,
+            remedy="fill them, or leave out their contacts",
+        )  # fmt: skip
+    try:
+        given = np.asarray(values)
+        array = given.astype(float) if given.dtype.kind in "biufO" else None
+    except (TypeError, ValueError) as error:
+        raise ProblemError(f"{name} is not made of numbers ({error})", where=name) from error
+    if array is None:
+        raise ProblemError(
+            f"{name} is not made of numbers (but of {given.dtype})", where=name,
+            remedy="give real numbers",
+        )  # fmt: skip
+    bad = np.flatnonzero(~np.isfinite(array))
+    if len(bad):
+        raise ProblemError(
+            f"{len(bad)} of its numbers are not finite, first number {bad[0]}", where=name,
+            remedy="look for a mass of zero or a division by zero where it was made",
+        )  # fmt: skip
+    return array
+
+
+def in_range(values: Floats, name: str, least: float = LEAST) -> None:
+    """Raise `ProblemError` where the largest of the numbers can not be squared in floats."""
+    largest = float(np.abs(values).max(initial=0.0))
+    if largest and not least <= largest <= MOST:
+        raise ProblemError(
+            f"its largest number is {largest:.1g}", where=name,
+            remedy=f"choose other units: {LEAST:g} to {MOST:g} can be computed with",
+        )  # fmt: skip
+
+
+def matrix_given(matrix: Any) -> sp.csr_array:
+    """W from a dense or sparse matrix, or a scipy `LinearOperator` (n products with columns)."""
+    if hasattr(matrix, "matmat") and not sp.issparse(matrix):
+        matrix = operator_written(matrix)
+    if not sp.issparse(matrix):
+        dense = finite_numbers(matrix, "W")
+        if dense.ndim != 2:
+            raise ProblemError(
+                f"it has {dense.ndim} dimensions, not 2", where="W",
+                remedy="give a square matrix; for no contacts numpy.zeros((0, 0))",
+            )  # fmt: skip
+        return sp.csr_array(dense)
+    rows = sp.csr_array(matrix)
+    w = sp.csr_array((finite_numbers(rows.data, "W"), rows.indices, rows.indptr), rows.shape)
+    if not w.has_canonical_format:
+        w = w.copy()  # the caller's indices are not ours to sort
+        w.sum_duplicates()
+    return w
+
+
+def operator_written(operator: Any) -> sp.csr_array:
+    """The matrix of an operator, from its products with the columns of the identity."""
+    rows, columns = operator.shape
+    parts = []
+    for first in range(0, columns, COLUMNS):
+        width = min(COLUMNS, columns - first)
+        unit = np.zeros((columns, width))
+        unit[first + np.arange(width), np.arange(width)] = 1.0
+        parts.append(sp.csc_array(finite_numbers(operator.matmat(unit), "W")))
+    return sp.csr_array(sp.hstack(parts)) if parts else sp.csr_array((rows, columns))
+
+
+def check_factors(bodies: BodySpace) -> None:
+    """Raise `ProblemError` where the factors of W do not fit together."""
+    where = "BodySpace"
+    jacobian, inverse, size = bodies.jacobian, bodies.inverse_mass, bodies.body_size
+    for name, part in (("jacobian", jacobian), ("inverse_mass", inverse)):
+        if not sp.issparse(part) or part.format != "csr":
+            raise ProblemError(
+                f"{name} is no sparse matrix by rows", where=where,
+                remedy="give scipy.sparse.csr_array",
+            )  # fmt: skip
+        if not np.isfinite(part.data).all():
+            raise ProblemError(
+                f"{name} holds numbers that are not finite", where=where,
+                remedy="look for a mass of zero or a division by zero where it was made",
+            )  # fmt: skip
+        in_range(part.data, f"{where}, {name}")
+    freedoms = jacobian.shape[1]
+    if inverse.shape != (freedoms, freedoms) or size not in (3, 6) or freedoms % size:
+        raise ProblemError(
+            f"jacobian has {freedoms} columns, inverse_mass the shape {inverse.shape}, and a body "
+            f"{size} freedoms", where=where,
+            remedy="give 3 freedoms a body in 2D and 6 in 3D, all bodies' in both",
+        )  # fmt: skip
+    if not (inverse.diagonal() > 0).all():
+        raise ProblemError(
+            "a mass is negative or infinite", where=f"{where}, inverse_mass",
+            remedy="leave out the columns of bodies that can not move",
+        )  # fmt: skip

@@ -1,0 +1,104 @@
+"""Proximal points, each found by Newton's method, for contacts that are redundant and slide.
+
+Where W is singular and contacts slide, Newton's method (`rigid_lcp.newton`) changes the statuses
+of the same few contacts to and fro.  A proximal point is the answer of a regular problem near the
+last one (Rockafellar, SIAM J. Control Optim. 14 (1976) 877)
+
+    u = W r + q + alpha (r - r_k),        r_(k+1) = r        so that no error of alpha is left
+
+which Newton finds in a few steps from r_k if alpha is great enough.  So alpha falls while it does,
+and grows where it does not: great shifts creep and can not fail, small ones end fast.  Not proved
+to converge, as W + alpha is monotone but Coulomb's law is not; the best point is kept.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factorisation
+from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
+from rigid_lcp.newton import alart_curnier, contact_rho
+
+Floats = NDArray[np.float64]
+
+FIRST_SHIFT, LEAST_SHIFT, GREATEST_SHIFT = 1e-4, 1e-11, 10.0
+"""alpha over mean(diag W); the first is not greater than the residual."""
+SHRINK, GROW = 0.3, 10.0
+"""How alpha goes on after a point that was found, and after one that was not."""
+STEPS = 5
+"""Newton steps in which a point has to be found: from the one before it most take one or two."""
+FINER = 0.1
+"""A point is found where its own error is so small a part of the residual of the one before."""
+FINEST = 1e-15
+FACTORISATIONS = 60
+
+
+def proximal_newton(
+    problem: FrictionProblem,
+    start: Floats | None = None,
+    tolerance: float = 1e-12,
+    *,
+    linear: Factorisation | None = None,
+    factorisations: int = FACTORISATIONS,
+) -> FrictionSolution:
+    """Proximal points from ``start`` (zero forces if None) until the residual is small enough.
+
+    ``linear``: factorisations of this problem's W, made if not given; at most ``factorisations``
+    are spent.  Good from a rough point on (a few dozen sweeps, or the forces of the step before);
+    where `rigid_lcp.newton` converges it needs fewer.
+    """
+    linear = linear or factorisation(problem)
+    centre = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
+    best, best_residual = centre, problem.residual(centre)
+    residual, spent, points = best_residual, 0, 0
+    shift = max(LEAST_SHIFT, min(FIRST_SHIFT, residual))
+    while best_residual > tolerance and spent < factorisations and shift <= GREATEST_SHIFT:
+        enough = max(FINER * residual, FINEST)
+        force, found, steps = proximal_point(
+            problem, centre, shift / problem.rho, linear, enough,
+            min(STEPS, factorisations - spent),
+        )  # fmt: skip
+        spent, points = spent + steps, points + 1
+        reached = problem.residual(force)
+        at_end = found and shift == LEAST_SHIFT and not reached < best_residual
+        if reached < best_residual:
+            best, best_residual = force, reached
+        if at_end:  # nothing but rounding is left
+            break
+        if found:
+            centre, residual = force, reached
+        shift = max(LEAST_SHIFT, shift * SHRINK) if found else shift * GROW
+    return friction_solution(
+        problem, best, tolerance, "proximal newton",
+        {"points": float(points), "factorisations": float(spent)},
+    )  # fmt: skip
+
+
+def proximal_point(
+    problem: FrictionProblem, centre: Floats, alpha: float, linear: Factorisation, enough: float,
+    steps: int,
+) -> tuple[Floats, bool, int]:  # fmt: skip
+    """Forces of ``u = W r + q + alpha (r - centre)``, if they were found, and the steps it took.
+
+    ``alpha`` [velocity per force]; ``enough``: size of Alart and Curnier's F over that of r.
+    """
+    shape = (problem.contacts, problem.dim)
+    rho = contact_rho(problem)
+    force, least = centre, np.inf
+    best = centre
+    for step in range(steps + 1):
+        velocity = problem.velocity(force) + alpha * (force - centre)
+        f, a, b, _ = alart_curnier(
+            force.reshape(shape), velocity.reshape(shape), problem.friction, rho
+        )
+        error = float(np.linalg.norm(f)) / (float(np.linalg.norm(force)) or 1.0)
+        if error < least:
+            best, least = force, error
+        if (error <= enough and step > 0) or step == steps or not np.isfinite(error):
+            break
+        try:
+            force = force - linear.factor(a + alpha * b, b)(f.ravel())
+        except SingularSystem:
+            return best, False, step + 1
+    return best, least <= enough, step

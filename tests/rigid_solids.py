@@ -1,0 +1,53 @@
+"""Solids for tests: their contacts, and two stones at random angles that nearly touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigid_lcp.contacts import Contacts
+from rigid_lcp.detection_3d import detect_3d, shapes_3d
+from rigid_lcp.polyhedra import ballast_stone
+from rigid_lcp.rotations import Floats, unit_quaternion
+from rigid_lcp.shapes_2d import HalfSpace
+from rigid_lcp.shapes_3d import box
+
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)
+CUBE = box(1.0, 1.0, 1.0)
+Placed = tuple[Sequence[object], Floats, Floats]
+
+
+def contacts(
+    shapes: Sequence[object], position: object, quaternion: object = None, margin: float = 1e-3
+) -> Contacts:
+    """Contacts with a gap up to ``2 margin``."""
+    movable = np.array([not isinstance(shape, HalfSpace) for shape in shapes])
+    turns = np.array([UPRIGHT] * len(shapes)) if quaternion is None else np.array(quaternion)
+    return detect_3d(shapes_3d(shapes, movable), np.array(position, dtype=float), turns, margin)
+
+
+def sorted_points(found: Contacts) -> Floats:
+    across = np.round(found.point[:, :2], 9) + 0.0
+    return found.point[np.lexsort(across.T)]
+
+
+def near_pair(seed: int, gap: float = 1e-4) -> Placed:
+    """Two stones at random angles, moved together until the least gap is about ``gap`` [m]."""
+    generator = np.random.default_rng(seed)
+    shapes = [ballast_stone(generator, 1.0), ballast_stone(generator, 0.7, 12)]
+    quaternion = unit_quaternion(generator.normal(size=(2, 4)))
+    direction = generator.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    arrays = shapes_3d(shapes, np.array([True, True]))
+
+    def least(distance: float, margin: float) -> float:
+        position = np.array([np.zeros(3), distance * direction])
+        return float(detect_3d(arrays, position, quaternion, margin).gap.min(initial=np.inf))
+
+    close, far = 0.0, 2.0  # bisection: nearer than the gap, or not
+    for _ in range(45):
+        middle = 0.5 * (close + far)
+        close, far = (close, middle) if least(middle, 2e-3) > gap else (middle, far)
+    return shapes, np.array([np.zeros(3), close * direction]), quaternion

@@ -1,0 +1,111 @@
+"""The direct limit of section 8: least energy, unique where it must be, and where it is not.
+
+Reference: Schwager and Poeschel 2002, section 8, eqs 37-40 with 26 and 27.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_lcp.elastic_limit import elastic_limit, minimum_norm_forces
+from rigid_lcp.friction_problem import BodySpace, friction_problem
+from tests.rigid_static_problems import (
+    GRAVITY,
+    difference,
+    pyramid,
+    tower,
+)
+
+
+@pytest.mark.parametrize("top", [1.0, 1e4])
+def test_sticking_tower_has_the_minimum_norm(top):
+    problem = tower(10, top)
+    answer = elastic_limit(problem)
+    assert answer.solved
+    assert difference(answer.r, minimum_norm_forces(problem)) < 1e-11
+    # a heavier top: every box carries all above it, half at each corner
+    above = top + 9 - np.arange(10)
+    assert answer.r[0::2] == pytest.approx(np.repeat(above, 2) * GRAVITY / 2, rel=1e-11)
+
+
+@pytest.mark.parametrize("across", [0.0, 2.0])
+def test_frictionless_limit_obeys_the_conditions_of_least_energy(across):
+    """f = k (-J dq)_+ and equilibrium are the conditions of min sum f^2/k, f >= 0, J^T f + Q = M a
+    with contacts that part left out; across the pile accelerates, and they hold all the same."""
+    problem = pyramid(6, 0.0, across=across)
+    k = np.random.default_rng(3).uniform(0.5, 2.0, problem.contacts)
+    answer = elastic_limit(problem, k)
+    assert answer.solved
+    normal = answer.r[0::2]
+    deformation = -(problem.bodies.jacobian @ answer.displacement)[0::2]
+    # displacements are in units in which k are as given; motion enters by round-off of a long step
+    assert difference(normal, np.maximum(k * deformation, 0.0)) < 1e-8
+    assert problem.residual(answer.r) < 1e-12
+    # no other solution has less: go from it to any other and energy grows
+    active = np.flatnonzero(normal > 1e-9 * normal.max())
+    rows = problem.bodies.jacobian[2 * active].toarray()
+    free = np.linalg.svd(rows.T)[2][np.linalg.matrix_rank(rows) :]
+    assert np.abs(free @ (normal / k)[active]).max(initial=0.0) < 1e-9 * normal.max()
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.05, 0.2, 0.5, 0.9])
+@pytest.mark.parametrize("across", [0.0, 2.0])
+def test_forces_do_not_depend_on_order_numbering_or_start(friction, across):
+    problem = pyramid(4, friction, across=across)
+    answer = elastic_limit(problem)
+    rng = np.random.default_rng(7)
+    order = rng.permutation(problem.contacts)
+    other = pyramid(4, friction, order, rng.permutation(10), across=across)
+    begun = rng.normal(size=30) * 0.1 * np.abs(answer.r).max()
+    again = elastic_limit(other, start=begun)
+    assert answer.solved
+    assert again.solved
+    sorted_back = np.empty((problem.contacts, 2))
+    sorted_back[order] = again.r.reshape(-1, 2)
+    assert difference(sorted_back.ravel(), answer.r) < 1e-10
+
+
+@settings(max_examples=15, deadline=None)
+@given(masses=st.integers(0, 10**6), spread=st.floats(0, 1))
+def test_any_stiffness_frictionless_or_sticking(masses, spread):
+    """Unique by order and equal to the least norm wherever nothing opens or slides."""
+    problem = pyramid(3, 5.0, masses=masses)
+    rng = np.random.default_rng(masses)
+    k = np.repeat(10 ** rng.uniform(-spread / 2, spread / 2, (problem.contacts, 1)), 2, axis=1)
+    answer = elastic_limit(problem, k)
+    assert answer.solved
+    least = minimum_norm_forces(problem, k)
+    if (np.abs(least[1::2]) < 5.0 * least[0::2]).all():
+        assert difference(answer.r, least) < 1e-9
+
+
+def test_units_do_not_matter():
+    """Millimetres and grams: forces in g mm / s^2 are 1e6 times those in N."""
+    problem = pyramid(3, 0.4, across=1.0)
+    space = problem.bodies
+    freedom = np.tile([1e3, 1e3, 1.0], 6)
+    jacobian = sp.csr_array(1e3 * space.jacobian @ sp.diags_array(1 / freedom))
+    # energy, so mass by both freedoms, is 1e9 times as many g mm^2 / s^2
+    inverse = sp.csr_array(sp.diags_array(1e-9 * freedom**2) @ space.inverse_mass)
+    small = friction_problem(BodySpace(jacobian, inverse, 3), 1e3 * problem.offset, 0.4, 2)
+    a, b = elastic_limit(problem), elastic_limit(small)
+    assert difference(b.r, a.r * 1e6) < 1e-10
+
+
+def test_friction_can_be_mobilised_in_more_ways_than_one():
+    """The price of friction: from far away springs and sliders settle in other forces.
+
+    Both are solutions, to the last digit; uniqueness is for frictionless and sticking contacts.
+    """
+    problem = pyramid(4, 0.9)
+    near = elastic_limit(problem)
+    start = np.random.default_rng(0).normal(size=30) * np.abs(near.r).max()
+    far = elastic_limit(problem, start=start)
+    assert near.solved
+    assert far.solved
+    assert max(near.residual, far.residual) < 1e-12
+    assert difference(far.r, near.r) > 0.1

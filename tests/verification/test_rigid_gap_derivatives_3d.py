@@ -1,0 +1,125 @@
+"""The geometry equations in space against finite differences of the gap function."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rigid_lcp.detection_3d import detect_3d, shapes_3d
+from rigid_lcp.equations import inertial_acceleration, relative_velocity
+from rigid_lcp.motion import Motion, motion_displaced
+from rigid_lcp.rotations import quaternion_of_rotation, quaternion_product, rotate
+from rigid_lcp.shapes_2d import HalfSpace
+from rigid_lcp.shapes_3d import Sphere
+from tests.rigid_solids import CUBE, UPRIGHT, contacts, near_pair
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10_000))
+def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
+    """Eq. 13: ``dg/dt = n . (v_a - v_b)`` at the contact point, for every kind of contact."""
+    shapes, position, quaternion = near_pair(seed)
+    shapes = [*shapes, Sphere(0.5), HalfSpace([0.1, 0.2, 1.0], -0.8)]
+    generator = np.random.default_rng(seed)
+    place = np.vstack([position, [0.0, 0.0, 1.0], np.zeros(3)])
+    turns = np.vstack([quaternion, UPRIGHT, UPRIGHT])
+    rates = np.vstack([generator.normal(size=(3, 6)), np.zeros(6)])
+    motion = Motion(place, turns, rates[:, :3], rates[:, 3:])
+    arrays = shapes_3d(shapes, np.array([True, True, True, False]))
+    h = 1e-7
+
+    def gaps(t: float) -> dict[int, float]:
+        there = motion_displaced(motion, t * rates)
+        found = detect_3d(arrays, there.position, there.angle, 0.05)
+        return dict(zip(found.key.tolist(), found.gap.tolist(), strict=True))
+
+    found = detect_3d(arrays, place, turns, 0.05)
+    assert len(found) > 0
+    speed = relative_velocity(found, motion)[:, 0]
+    ahead, behind = gaps(h), gaps(-h)
+    checked = 0
+    for key, rate in zip(found.key.tolist(), speed, strict=True):
+        if key in ahead and key in behind:
+            # round-off 1e-16 / h = 1e-9; truncation h^2 |w|^3 is far below
+            assert (ahead[key] - behind[key]) / (2 * h) == pytest.approx(rate, abs=2e-8)
+            checked += 1
+    assert checked > 0
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10_000))
+def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
+    """Eqs 14 and 24 in space: ``d2g/dt2`` of bodies with constant velocity and spin.
+
+    Corners on faces, crossing edges, spheres on faces, edges, corners, spheres and planes.
+    """
+    shapes, position, quaternion = near_pair(seed)
+    generator = np.random.default_rng(seed)
+    shapes = [*shapes, Sphere(0.3), Sphere(0.5), HalfSpace([0.1, 0.2, 1.0], -0.8)]
+    top = rotate(quaternion[0], shapes[0].vertices)  # type: ignore[attr-defined]
+    corner = top[generator.integers(len(top))]
+    above = corner * (1 + 0.3 / np.linalg.norm(corner))
+    place = np.vstack([position, above, above + np.array([0.0, 0.8, 0.0]), np.zeros(3)])
+    turns = np.vstack([quaternion, np.tile(UPRIGHT, (3, 1))])
+    rates = np.vstack([generator.normal(size=(4, 6)), np.zeros(6)])
+    motion = Motion(place, turns, rates[:, :3], rates[:, 3:])
+    arrays = shapes_3d(shapes, np.array([True, True, True, True, False]))
+    h = 1e-4
+
+    def gaps(t: float) -> dict[int, float]:
+        there = motion_displaced(motion, t * rates)
+        found = detect_3d(arrays, there.position, there.angle, 0.05)
+        return dict(zip(found.key.tolist(), found.gap.tolist(), strict=True))
+
+    found = detect_3d(arrays, place, turns, 0.05)
+    exact = inertial_acceleration(found, motion)[:, 0]
+    ahead, behind = gaps(h), gaps(-h)
+    checked = 0
+    for k, key in enumerate(found.key.tolist()):
+        if key not in ahead or key not in behind:
+            continue
+        second = (ahead[key] - 2 * found.gap[k] + behind[key]) / h**2
+        # round-off 4e-16 / h^2 = 4e-8; truncation h^2 / 12 times the fourth derivative, up to
+        # |w|^4 = 1e3 and v^4 / R^3 = 1e3 here
+        assert second == pytest.approx(exact[k], abs=1e-5, rel=1e-5)
+        checked += 1
+    assert checked > 0
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from(["crossing", "sphere"]))
+def test_inertial_terms_at_edges(seed: int, form: str) -> None:
+    """Normals across edges turn with both bodies: a cube's edge over another's, or under a sphere.
+
+    Without `rigid_lcp.edge_normals` a sphere that rolls along an edge would seem to lift off it
+    with v^2 / R.
+    """
+    generator = np.random.default_rng(seed)
+    lower = quaternion_of_rotation([np.pi / 4, 0.0, 0.0])
+    if form == "crossing":
+        shapes: list[object] = [CUBE, CUBE]
+        upper = quaternion_product(
+            quaternion_of_rotation([0.0, 0.0, generator.uniform(0.5, 2.5)])[None], lower[None]
+        )[0]
+        place = np.array([[0.0, 0, 0], [*generator.uniform(-0.2, 0.2, 2), 2**0.5 + 1e-3]])
+    else:
+        shapes, upper = [CUBE, Sphere(0.4)], UPRIGHT
+        place = np.array([[0.0, 0, 0], [*generator.uniform(-0.1, 0.1, 2), 0.5**0.5 + 0.401]])
+    turns = np.array([lower, upper])
+    rates = generator.normal(size=(2, 6))
+    motion = Motion(place, turns, rates[:, :3], rates[:, 3:])
+    h = 1e-4
+    found = contacts(shapes, place, turns, margin=0.1)
+    assert len(found) == 1
+    assert found.edge_b.any()
+    gaps = []
+    for t in (-h, 0.0, h):
+        there = motion_displaced(motion, t * rates)
+        gaps.append(contacts(shapes, there.position, there.angle, margin=0.1).gap[0])
+    second = (gaps[0] - 2 * gaps[1] + gaps[2]) / h**2
+    exact = inertial_acceleration(found, motion)[0, 0]
+    assert second == pytest.approx(exact, abs=1e-5, rel=1e-5)
+    rate = relative_velocity(found, motion)[0, 0]
+    assert (gaps[2] - gaps[0]) / (2 * h) == pytest.approx(rate, abs=1e-5)

@@ -1,0 +1,98 @@
+"""A ballast bed in the plane, poured, tamped and loaded cyclically: rigid against soft grains.
+
+    trackbed validate rigid-ballast            judges the record, after the runs that it lacks
+    trackbed validate rigid-ballast --quick    two small beds, three cycles: under a minute
+
+What comes out in words and pictures: ``docs/rigid-ballast.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from validation.case import Check
+from validation.rigid_ballast_bed import Bed
+from validation.rigid_ballast_judge import duels, limits_of, summaries
+from validation.rigid_ballast_runs import (
+    CYCLES,
+    LEVELS,
+    QUICK_LEVELS,
+    RECORD,
+    SEEDS,
+    rows_read,
+    study,
+)
+
+Row = dict[str, Any]
+OVERLAP = 1e-2
+"""Greatest overlap of rigid grains, as a share of the smallest stone [-]."""
+SMALLEST = 0.025
+"""Diameter of the smallest stone [m]."""
+
+
+def run(quick: bool) -> list[Check]:
+    """All checks; the quick form makes runs of its own."""
+    if quick:
+        rows: list[Row] = []
+        beds = [Bed(seed, stones=20, width=0.22, sleeper=0.09, peak=18e3) for seed in (1, 2)]
+        study(beds, QUICK_LEVELS, 3, rows, rows.append)
+        return record_checks(rows)
+    rows = rows_read(RECORD)
+    study([Bed(seed) for seed in range(1, SEEDS + 1)], LEVELS, CYCLES, rows, rows.append)
+    return record_checks(rows)
+
+
+def record_checks(rows: Sequence[Row]) -> list[Check]:
+    """What must hold of every rigid run, and what came out."""
+    ours = [row for row in rows if row["kind"] == "rigid"]
+    soft = [row for row in rows if row["kind"] == "soft"]
+    lost = sum(not row["ok"] for row in ours) + sum(row["kind"] == "no bed" for row in rows)
+    blown = sum(not row["ok"] for row in soft)
+    ours = [row for row in ours if row["ok"]]
+    overlap = max(row["overlap"] for row in ours) / SMALLEST
+    gained = max(-min(row["dissipated"]) / max(row["dissipated"]) for row in ours)
+    checks = [
+        Check("rigid runs and beds that did not go to their end", lost, "= 0", lost == 0),
+        Check("soft runs that did not", blown, "reported", True),
+        Check("rigid: greatest overlap under a peak load, of the smallest stone", overlap,
+              f"<= {OVERLAP:g}", overlap <= OVERLAP),
+        Check("rigid: energy gained in a cycle, of the greatest loss in one", gained, "<= 0.01",
+              gained <= 0.01),
+    ]  # fmt: skip
+    residual = max(row["residual"] / row["level"]["extra"] for row in ours)
+    checks.append(Check("rigid: worst residual of any step, of that asked for", residual,
+                        "reported", True))  # fmt: skip
+    return [*checks, *limit_checks(rows)]
+
+
+def limit_checks(rows: Sequence[Row]) -> list[Check]:
+    """The joint reference, every level's error, and the cost at equal error."""
+    limits = limits_of(rows)
+    found = summaries(rows, limits)
+    apart = abs(limits.difference) / limits.mean
+    noise = limits.interval / limits.mean
+    checks = [
+        Check("mean settlement of the joint reference", limits.mean, "> 0", limits.mean > 0, "m"),
+        Check("the two limits: their difference, of the mean", apart, "reported", True),
+        Check("95 % interval of that", noise if np.isfinite(noise) else np.nan, "reported", True),
+    ]
+    for s in found:
+        checks.append(Check(f"{s.method}, {s.name}: error of the mean settlement", s.bias,
+                            "reported", True))  # fmt: skip
+        checks.append(Check(f"{s.method}, {s.name}: cost of a run", s.cost, "reported", True, "s"))
+    for duel in duels(found):
+        if duel.soft is not None:
+            title = f"{duel.rigid.name}: cost of soft over rigid grains at equal error"
+            checks.append(Check(title, duel.cost_ratio, "reported", True))
+    return [*checks, *rest_checks(rows)]
+
+
+def rest_checks(rows: Sequence[Row]) -> list[Check]:
+    """Rigid beds at rest under the least load keep still before the first cycle."""
+    drift = [abs(row["rest_drift"]) for row in rows if row["kind"] == "rigid" and row["ok"]]
+    found = float(np.median(drift))
+    return [Check("rigid: median drift in 50 ms under the least load", found, "<= 1e-05",
+                  found <= 1e-5, "m")]  # fmt: skip

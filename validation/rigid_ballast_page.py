@@ -1,0 +1,201 @@
+"""docs/rigid-ballast.md and .png from validation/results/rigid-ballast.jsonl.
+
+python -m validation.rigid_ballast_page
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adapters.run_folder import write_atomically
+from validation.rigid_ballast_bed import Bed, bed_scene
+from validation.rigid_ballast_judge import (
+    Duel,
+    Limits,
+    Summary,
+    duels,
+    limits_of,
+    summaries,
+)
+from validation.rigid_ballast_measures import settlement_law
+from validation.rigid_ballast_picture import picture_draw
+from validation.rigid_ballast_runs import RECORD, rows_read
+
+PAGE = Path(__file__).parents[1] / "docs" / "rigid-ballast.md"
+TEXT = Path(__file__).with_name("rigid_ballast_page.md")
+Row = dict[str, Any]
+
+
+def page(rows: Sequence[Row]) -> str:
+    """The page as Markdown: `rigid_ballast_page.md` with its gaps filled."""
+    limits = limits_of(rows)
+    found = summaries(rows, limits)
+    beds = [row for row in rows if row["kind"] == "bed"]
+    cycles = max(len(s.curve) for s in found)
+    return TEXT.read_text(encoding="utf-8").format(
+        beds=len(beds), cycles=cycles, verdict=verdict(limits, found),
+        levels=levels_table(found), duels=duels_table(duels(found)), laws=laws_table(found),
+        fabric=fabric_table(found), energies=energies_table(found), elastic=elastic_table(found),
+        failures=failures(rows), prepared=f"{np.mean([row['cpu_s'] for row in beds]):.2g}",
+        machine=beds[0]["machine"], commits=", ".join(sorted({row["commit"] for row in rows})),
+        damping=beds[0]["damping"],
+    )  # fmt: skip
+
+
+def verdict(limits: Limits, found: Sequence[Summary]) -> str:
+    """The findings in sentences, each number from the record."""
+    rigid = next((s for s in found if s.name == "h = 0.001 s, residual 1e-06"), None)
+    one = "can not be told apart" if limits.agree else "differ"
+    lines = [
+        f"* The two limits {one}: rigid ({limits.rigid}) less soft ({limits.soft}) is "
+        f"{1e3 * limits.difference:+.3f} ± {1e3 * limits.interval:.3f} mm in the mean over "
+        f"{len(limits.reference)} beds (95 %), of a mean settlement of {1e3 * limits.mean:.3f} mm."
+    ]
+    if rigid is None or rigid.is_limit:
+        return lines[0]
+    lines.append(
+        f"* Steps of 1e-3 s do, as the paper says: the mean settlement is off by "
+        f"{100 * rigid.bias:+.0f} ± {100 * rigid.bias_interval:.0f} % of the joint reference."
+        if abs(rigid.bias) <= max(rigid.bias_interval, 0.1)
+        else f"* Steps of 1e-3 s leave an error of {100 * rigid.bias:+.0f} ± "
+        f"{100 * rigid.bias_interval:.0f} % of the joint reference's mean."
+    )
+    duel = next(d for d in duels(found) if d.rigid is rigid)
+    if duel.soft is None:
+        lines.append("* No soft level that was run errs as little as that.")
+    else:
+        ratio = duel.cost_ratio
+        said = f"{ratio:.2g} times that of" if ratio >= 1 else f"{1 / ratio:.2g} times less than"
+        lines.append(
+            f"* The cheapest soft level that errs no more ({duel.soft.name}) takes steps of "
+            f"{duel.soft.step:.1e} s, {rigid.step / duel.soft.step:,.0f} times shorter; its cost, "
+            f"{duel.soft.cost:.2g} s, is {said} the rigid run's {rigid.cost:.2g} s."
+        )
+    return "\n".join(lines)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return "\n".join([_row(head), "|" + "---|" * len(head), *map(_row, rows)])
+
+
+def levels_table(found: Sequence[Summary]) -> str:
+    """Every level: settlement, error, cost."""
+    head = ("level", "beds", "settlement after 1 [mm]", "after the last [mm]",
+            "error of the mean [%]", "CPU s a run", "step [s]", "CPU a step [us]")  # fmt: skip
+    return _table(head, [
+        (f"{s.method}: {s.name}" + (" (limit)" if s.is_limit else ""), f"{s.beds}",
+         f"{1e3 * s.curve[0]:.3f}", f"{1e3 * s.settlement:.3f} ± {1e3 * s.interval:.3f}",
+         f"{100 * s.bias:+.0f} ± {100 * s.bias_interval:.0f}", f"{s.cost:.2g}", f"{s.step:.1e}",
+         f"{1e6 * s.cost * s.step / _seconds(s):.0f}")
+        for s in found
+    ])  # fmt: skip
+
+
+def _seconds(summary: Summary) -> float:
+    from validation.rigid_ballast_bed import PERIOD, REST
+
+    return REST + PERIOD * len(summary.curve)
+
+
+def duels_table(found: Sequence[Duel]) -> str:
+    """Cost at equal error."""
+    head = ("rigid level", "error [%]", "CPU s", "cheapest soft level that errs no more",
+            "error [%]", "CPU s", "cost soft / rigid", "step rigid / soft")  # fmt: skip
+    rows = []
+    for duel in found:
+        mine, other = duel.rigid, duel.soft
+        theirs = ("none", "", "", "", "") if other is None else (
+            other.name, f"{100 * abs(other.bias):.0f}", f"{other.cost:.2g}",
+            f"{duel.cost_ratio:.2g}", f"{mine.step / other.step:,.0f}",
+        )  # fmt: skip
+        rows.append((mine.name, f"{100 * abs(mine.bias):.0f}", f"{mine.cost:.2g}", *theirs))
+    return _table(head, rows)
+
+
+def laws_table(found: Sequence[Summary]) -> str:
+    """Both laws fitted to the mean curves."""
+    head = ("level", "log: a [mm]", "b [mm]", "rms [um]", "linear: a [mm]", "b [mm a cycle]",
+            "rms [um]")  # fmt: skip
+    rows = []
+    for s in found:
+        cells = [f"{s.method}: {s.name}"]
+        for kind in ("log", "linear"):
+            a, b, off = settlement_law(s.curve, kind)
+            cells += [f"{1e3 * a:.4f}", f"{1e3 * b:.4f}", f"{1e6 * off:.1f}"]
+        rows.append(cells)
+    return _table(head, rows)
+
+
+def fabric_table(found: Sequence[Summary]) -> str:
+    """Fabric under the last peak load."""
+    head = ("level", "coordination", "contact points", "anisotropy", "of forces", "sliding",
+            "largest / mean force", "below the mean")  # fmt: skip
+    return _table(head, [
+        (f"{s.method}: {s.name}", f"{s.fabric['coordination']:.2f}", f"{s.fabric['contacts']:.0f}",
+         f"{s.fabric['anisotropy']:.2f}", f"{s.fabric['force_anisotropy']:.2f}",
+         f"{100 * s.fabric['sliding']:.0f} %", f"{s.fabric['force_largest']:.1f}",
+         f"{100 * s.fabric['force_below_mean']:.0f} %")
+        for s in found
+    ])  # fmt: skip
+
+
+def energies_table(found: Sequence[Summary]) -> str:
+    """Energy dissipated a cycle."""
+    last = len(found[0].lost)
+    shown = [n for n in (1, 2, 5, last) if n <= last]
+    head = ("level", *(f"cycle {n} [J/m]" for n in shown))
+    return _table(head, [
+        (f"{s.method}: {s.name}", *(f"{s.lost[n - 1]:.3g}" for n in shown)) for s in found
+    ])  # fmt: skip
+
+
+def elastic_table(found: Sequence[Summary]) -> str:
+    """What rigid grains leave out, by stiffness."""
+    scene = bed_scene(Bed(1))
+    stones = [body for body in scene.bodies if body.movable and body.name != "sleeper"]
+    mass = float(np.mean([body.mass for body in stones]))
+    size = float(np.mean([2 * body.shape.reach for body in stones]))
+    rows = []
+    for s in found:
+        if s.method == "soft" and s.level["extra"] == 0.05:
+            k = s.level["value"]
+            rows.append((f"{k:.0e}", f"{1e3 * s.deflection:.4f}", f"{s.step:.1e}",
+                         f"{size * (k / mass) ** 0.5:.0f}"))  # fmt: skip
+    head = (
+        "k [N/m]",
+        "elastic recoil of the sleeper [mm]",
+        "step [s]",
+        "wave speed d √(k/m) [m/s]",
+    )
+    return _table(head, rows)
+
+
+def failures(rows: Sequence[Row]) -> str:
+    """Runs that did not go to their end, and why; beds whose settlement matters most."""
+    lost = [row for row in rows if row["kind"] in ("rigid", "soft") and not row["ok"]]
+    lost += [row for row in rows if row["kind"] == "no bed"]
+    if not lost:
+        return "Every run went to its end."
+    return "\n".join(f"* {row.get('name', 'pouring')}, seed {row['bed']['seed']}: {row['why']}"
+                     for row in lost)  # fmt: skip
+
+
+def main() -> None:
+    """Write page and picture."""
+    rows = rows_read(RECORD)
+    write_atomically(PAGE, page(rows))
+    limits = limits_of(rows)
+    picture_draw(rows, summaries(rows, limits), limits, PAGE.with_suffix(".png"))
+    print(PAGE)
+
+
+if __name__ == "__main__":
+    main()
