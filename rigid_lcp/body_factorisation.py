@@ -204,7 +204,7 @@ def _add_contacts(
             for j in range(first[c], first[c + 1]):
                 block = matrix[places[k]]
                 for m in range(size):
-                    for n in range(size):
-                        for b in range(dim):
+                    for b in range(dim):
+                        for n in range(size):
                             block[m, n] += half[m, b] * blocks[j, b, n]
                 k += 1

@@ -97,9 +97,9 @@ def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
     }
     with folder.locked():
         goes_on = folder.settle(manifest, file.text, resume=arguments.resume, force=arguments.force)
-        if goes_on and folder.finished:
-            summary = json.loads((path / RESULT).read_text(encoding="utf-8"))
-            return dict(summary) | {"folder": str(path)}
+        there = folder.summary
+        if goes_on and there is not None:
+            return there | {"folder": str(path)}
         scene_run(file, run, folder, resume=goes_on, progress=_progress())
         summary = summary_of(file, scene, run, folder)
         report_write(folder, scene, manifest, summary, draw=not arguments.no_pictures)

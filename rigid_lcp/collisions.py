@@ -51,7 +51,7 @@ class Collision:
     impulse: Floats
     """Impulses of the contacts over all rounds [N s], (nc * dim,)."""
     energy_change: float
-    """Kinetic energy after less before [J]."""
+    """Kinetic energy after less before [J]; with ``drive``, without the work of those walls."""
     residual: float
     """Largest scale-free residual of the rounds [-]."""
     status: Status
@@ -79,6 +79,7 @@ def collide(
     max_rounds: int = 50,
     still: float = 0.0,
     rest_speed: float = 0.0,
+    drive: ArrayLike | None = None,
 ) -> Collision:
     """Velocities after a collision by eqs 33 to 36, and the impulses that change them.
 
@@ -87,7 +88,8 @@ def collide(
     scales eps down until energy does not grow, ``watched`` says so in the message only.
     After ``max_rounds`` the rest is taken without restitution, which ends.  ``still`` [m/s]: an
     approach not faster is none; ``rest_speed`` [m/s]: one not faster ends without a bounce, which
-    cuts off bounces without end (Zeno).
+    cuts off bounces without end (Zeno).  ``drive`` (nc * dim,) [m/s]: relative velocities of the
+    contacts while the bodies of J rest, those of walls that are moved from outside.
 
     Raises `ProblemError` for malformed input.  Contacts are those of J: also touching ones with
     v = 0 take part, as they pass impulses on.
@@ -96,12 +98,15 @@ def collide(
     dim = 2 if bodies.body_size == 3 else 3
     nc = bodies.jacobian.shape[0] // dim
     eps, mu = _checked(bodies, before, restitution, friction, nc)
-    none = max(still, ROUND_OFF * float(np.abs(bodies.jacobian @ before).max(initial=0.0)))
+    moved = np.zeros(nc * dim) if drive is None else np.asarray(drive, dtype=float).ravel()
+    first = bodies.jacobian @ before + moved
+    none = max(still, ROUND_OFF * float(np.abs(first).max(initial=0.0)))
     after, impulse = before.copy(), np.zeros(nc * dim)
     worst, rounds, factor, notes = 0.0, 0, 1.0, ""
     status: Status = "solved"
     while True:
-        normal = (bodies.jacobian @ after)[::dim]
+        now = bodies.jacobian @ after + moved
+        normal = now[::dim]
         if not (normal < -none).any():
             break
         if rounds > max_rounds:
@@ -111,7 +116,7 @@ def collide(
         taking = np.arange(nc) if last else np.flatnonzero(normal <= none)
         bounce = np.where((normal < -rest_speed) & (not last), eps, 0.0)
         part, solution, used = collision_round(
-            bodies, after, taking, bounce, mu, dim, law, energy, tolerance
+            bodies, now, taking, bounce, mu, dim, law, energy, tolerance
         )
         impulse += part
         after = after + bodies.inverse_mass @ (bodies.jacobian.T @ part)
@@ -120,8 +125,8 @@ def collide(
             status, notes = solution.status, solution.message
             break
     # the work of the impulses at the mean velocity: no difference of large energies
-    change = 0.5 * float(impulse @ (bodies.jacobian @ (before + after)))
-    size = float(np.abs(impulse) @ np.abs(bodies.jacobian @ before))
+    change = 0.5 * float(impulse @ (first + bodies.jacobian @ after + moved))
+    size = float(np.abs(impulse) @ np.abs(first))
     if factor < 1.0:
         notes = f"restitution was scaled by {factor:.3g}, as energy would have grown" + notes
     if change > ROUND_OFF * size:
@@ -133,10 +138,13 @@ def collision_round(
     bodies: BodySpace, velocity: Floats, taking: NDArray[np.int64], eps: Floats, mu: Floats,
     dim: int, law: Law, energy: str, tolerance: float,
 ) -> tuple[Floats, FrictionSolution, float]:  # fmt: skip
-    """Impulses of one round on the contacts that take part; the solution; the factor of eps."""
+    """Impulses of one round on the contacts that take part; the solution; the factor of eps.
+
+    ``velocity`` (nc * dim,): of all contacts before it [m/s].
+    """
     rows = (dim * taking[:, None] + np.arange(dim)).ravel()
     part = BodySpace(sp.csr_array(bodies.jacobian[rows]), bodies.inverse_mass, bodies.body_size)
-    v = part.jacobian @ velocity
+    v = velocity[rows]
     factor = 1.0
     while True:
         used = factor * eps[taking]
@@ -186,6 +194,11 @@ def kinetic_energy(bodies: BodySpace, velocity: Floats) -> float:
 def _checked(
     bodies: BodySpace, velocity: Floats, restitution: ArrayLike, friction: ArrayLike, nc: int
 ) -> tuple[Floats, Floats]:
+    if bodies.body_size not in (3, 6):
+        raise ProblemError(
+            f"a body has {bodies.body_size} freedoms", where="body_size",
+            remedy="give 3 in 2D and 6 in 3D",
+        )  # fmt: skip
     if velocity.shape != (bodies.jacobian.shape[1],) or not np.isfinite(velocity).all():
         raise ProblemError(
             f"the velocity is not {bodies.jacobian.shape[1]} finite numbers", where="velocity",

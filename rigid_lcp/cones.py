@@ -111,3 +111,11 @@ def natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) ->
     force, push = force / scale, push / scale  # squares neither vanish nor overflow
     error = float(np.linalg.norm(natural_map(force, push, mu, 1.0)))
     return error / (float(np.linalg.norm(force)) or float(np.linalg.norm(push)))
+
+
+def length(values: Floats) -> float:
+    """Euclidean norm of all numbers of an array; their squares may vanish or overflow."""
+    largest = float(np.abs(values).max(initial=0.0))
+    if largest == 0.0 or not np.isfinite(largest):
+        return largest
+    return largest * float(np.linalg.norm(values / largest))

@@ -157,7 +157,9 @@ def residual_of(blocks: SweepBlocks, force: Floats) -> float:
     if error == 0.0:
         return 0.0
     scale = size(force)
-    return error / (scale if scale > 0.0 else blocks.rho * size(velocity))
+    if scale == 0.0:
+        scale = blocks.rho * size(velocity)
+    return error / scale if scale > 0.0 else np.inf
 
 
 @njit(cache=True)
@@ -182,7 +184,7 @@ def extrapolate(values: Floats, last: Floats, part: float) -> None:
 
 @njit(cache=True)
 def step_made(origin: Floats, values: Floats, last: Floats, local: Floats) -> tuple[float, float]:
-    """``(y - x) . (x - last)`` and ``|y - x|^2`` of a sweep from y to x, weighted with diag W.
+    """``(y - x) . (x - last)`` and ``|y - x|^2`` of a sweep from y to x, weighted with |diag W|.
 
     The first is positive if the sweep went against the way made since ``last``.
     """
@@ -190,8 +192,9 @@ def step_made(origin: Floats, values: Floats, last: Floats, local: Floats) -> tu
     for i in range(values.shape[0]):
         for k in range(values.shape[1]):
             back = origin[i, k] - values[i, k]
-            product += local[i, k, k] * back * (values[i, k] - last[i, k])
-            square += local[i, k, k] * back * back
+            weight = abs(local[i, k, k])
+            product += weight * back * (values[i, k] - last[i, k])
+            square += weight * back * back
     return product, square
 
 

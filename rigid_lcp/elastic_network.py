@@ -4,21 +4,29 @@ Unknown is the move d of the mass-free coordinates, which balances inertia, load
 
     d / h = Q + J^T f(xi - J d),    f: `coulomb_spring`
 
-Two iterations share the work.  Newton's method on this equation is quick near a solution, but its
-slope is not symmetric where contacts slide, and from afar it stalls.  With the greatest friction
-forces held fixed (Tresca's law) the equation is the minimum of a convex energy, which Newton's
-method with a line search always finds; the friction limits are then taken from its normal forces,
-and so on, until Newton's method takes over (a fixed point exists by Brouwer's theorem).
+Newton's method on this equation is quick near a solution, but where contacts slide its slope is
+not symmetric, and from afar it stalls.  Without friction the equation is the minimum of a convex
+energy, which Newton's method with a line search always finds.  With friction it is a friction
+problem with a softer W (`ElasticNetwork.friction_step`), for which there are solvers that go on
+where Newton's method stops; its end is left to Newton's method, for the last digits.
 """
 
 from __future__ import annotations
+
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from rigid_lcp.friction_problem import friction_problem
+from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.newton import newton
+
 Floats = NDArray[np.float64]
+SWEEPS = 300
+"""Of Gauss-Seidel in a step."""
 
 
 def slider_forces(trial: Floats, allowed: Floats) -> Floats:
@@ -84,6 +92,13 @@ class ElasticNetwork:
         self.identity = sp.eye_array(jacobian.shape[1], format="csc")
         self.load = float(np.linalg.norm(free)) or 1.0
         self.newton_steps = 0
+        self.force = np.zeros(jacobian.shape[0])
+        """Forces of the last `friction_step`, where the next begins."""
+
+    @cached_property
+    def delassus(self) -> sp.csr_array:
+        """W of bodies of unit mass."""
+        return sp.csr_array(self.jacobian @ self.jacobian.T)
 
     def trial(self, deformation: Floats, move: Floats) -> Floats:
         """Spring forces (nc, dim) after the move, before contacts open or slide."""
@@ -135,6 +150,28 @@ class ElasticNetwork:
         # no more descent: round-off, if the balance is as good as it can be
         return move, error <= 1e-11 * self.load
 
+    def friction_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
+        """The implicit step as a friction problem; move, whether found.
+
+        With forces f for unknowns, ``u = (W + 1 / (k h)) f + J Q - xi / h``: a closed contact has
+        no ``u_N``, a sticking one no ``u_T``, and a sliding one slides against f_T.  Springs make W
+        regular, and Gauss-Seidel with Newton at its end finds what Newton alone does not.
+        """
+        soft = self.delassus + sp.diags_array(1.0 / (h * self.stiffness.ravel()))
+        offset = self.jacobian @ self.free - deformation.ravel() / h
+        problem = friction_problem(sp.csr_array(soft), offset, self.friction, deformation.shape[1])
+        found = gauss_seidel(problem, self.force, 1e-7, SWEEPS)
+        self.newton_steps += SWEEPS // 100  # the cost of as many sweeps
+        if found.residual > 1e-13:
+            polished = newton(problem, found.r, 1e-14)
+            self.newton_steps += int(polished.work.get("factorisations", 0.0))
+            found = min(polished, found, key=lambda each: each.residual)
+        if found.residual > 1e-9:
+            return np.zeros(self.jacobian.shape[1]), False
+        self.force = found.r
+        move = h * (self.free + self.jacobian.T @ found.r)
+        return self.coulomb_step(deformation, move, h, 10)
+
     def tresca_step(
         self, deformation: Floats, move: Floats, h: float, allowed: Floats
     ) -> tuple[Floats, Floats]:
@@ -164,38 +201,11 @@ class ElasticNetwork:
             move, value, trial = tried, value_tried, trial_tried
         return move, trial
 
-    def implicit_step(
-        self, deformation: Floats, h: float, allowed: Floats | None = None
-    ) -> tuple[Floats, bool]:
-        """Move d (ndof,) of one implicit step from deformations xi (nc, dim), whether found.
-
-        ``allowed`` (nc,): friction limits to begin with; by default all sticks.
-        """
+    def implicit_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
+        """Move d (ndof,) of one implicit step from deformations xi (nc, dim), whether found."""
         move = np.zeros(self.jacobian.shape[1])
         if not self.friction.any():
             move, _ = self.tresca_step(deformation, move, h, self.friction)
             return self.coulomb_step(deformation, move, h, 5)
         found, converged = self.coulomb_step(deformation, move, h, 15)
-        if converged:
-            return found, True
-        first = allowed is None
-        if allowed is None:
-            allowed = np.where(self.friction > 0, np.inf, 0.0)
-        change, blend, attempt = np.inf, 1.0, 1e-2
-        for turn in range(60):
-            move, trial = self.tresca_step(deformation, move, h, allowed)
-            target, last = self.allowed(trial), change
-            if first and turn == 0:
-                allowed = target
-                continue
-            change = float(np.linalg.norm(target - allowed))
-            # limits that swing to and fro are averaged
-            blend = max(0.3, 0.7 * blend) if change > 0.7 * last else blend
-            allowed = allowed + blend * (target - allowed)
-            relative = change / (float(np.linalg.norm(allowed)) or 1.0)
-            if relative <= attempt:
-                attempt = relative / 4.0
-                found, converged = self.coulomb_step(deformation, move, h, 15)
-                if converged:
-                    return found, True
-        return move, False
+        return (found, True) if converged else self.friction_step(deformation, h)

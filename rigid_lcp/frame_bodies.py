@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from rigid_lcp.breakage import Broken
 from rigid_lcp.scene import Scene, world_of
 from rigid_lcp.shapes_2d import Polygon
-from rigid_lcp.wear import WearState, WornPolygon
+from rigid_lcp.wear import WearState
+from rigid_lcp.worn_polygon import WornPolygon
 
 if TYPE_CHECKING:
     from rigid_lcp.scene import Body

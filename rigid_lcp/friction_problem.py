@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.cones import natural_map, natural_residual
+from rigid_lcp.cones import length, natural_map, natural_residual
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.problem_input import check_factors, finite_numbers, in_range, matrix_given
 
@@ -83,9 +83,14 @@ class BodySpace:
         )  # fmt: skip
         return found
 
+    @cached_property
+    def transposed(self) -> sp.csc_array:
+        """J^T, a view."""
+        return self.jacobian.T
+
     def product(self, force: Floats) -> Floats:
         """``W r``."""
-        return np.asarray(self.jacobian @ (self.spread @ force))
+        return np.asarray(self.jacobian @ (self.inverse_mass @ (self.transposed @ force)))
 
 
 @dataclass(frozen=True)
@@ -132,7 +137,9 @@ class FrictionProblem:
         """Norm of the natural map at r = 0, in units of r: what forces have to mend."""
         shape = (self.contacts, self.dim)
         velocity = np.ascontiguousarray(self.offset).reshape(shape)
-        return float(np.linalg.norm(natural_map(0.0 * velocity, velocity, self.friction, self.rho)))
+        none = np.zeros_like(velocity)
+        scale = length(velocity) or 1.0
+        return scale * length(natural_map(none, velocity / scale, self.friction, self.rho))
 
     def velocity(self, force: Floats) -> Floats:
         """``u = W r + q``, (nc * dim,)."""
@@ -195,7 +202,7 @@ def friction_solution(
     """
     velocity = problem.velocity(force)
     residual = problem.residual(force, velocity)
-    left = max(residual, ROUND_OFF) * float(np.linalg.norm(force))
+    left = max(residual, ROUND_OFF) * length(force)
     solved = residual <= tolerance and left <= SHARE_LEFT * problem.error_without_forces
     if not solved and not message and residual <= tolerance:
         message = (

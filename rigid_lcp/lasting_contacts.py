@@ -107,14 +107,15 @@ def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, bo
     contacts = world.contacts(motion, 0.5 * TOUCH * world.length)
     if len(contacts) == 0:
         return motion, False
-    scale = speed_scale(world, motion)
-    if relative_velocity(contacts, motion)[:, 0].min() >= -STILL * scale:
+    scale, velocity = speed_scale(world, motion), relative_velocity(contacts, motion)
+    if velocity[:, 0].min() >= -STILL * scale:
         return motion, False
     bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     moving = motion.rates[world.movable].ravel()
     found = collide(
         bodies, moving, contacts.restitution, contacts.friction, law="newton",
         tolerance=tolerance, still=STILL * scale, rest_speed=REST_SPEED * scale,
+        drive=velocity.ravel() - bodies.jacobian @ moving,
     )  # fmt: skip
     if not (found.solved or found.residual <= ACCEPTED):
         raise NotConverged(

@@ -2,14 +2,15 @@
 
 A front holds the columns that are eliminated together, and the rows that they reach; what they
 leave on these rows goes to the front's parent (`rigid_lcp.elimination_tree`).  Inside a front the
-columns go panel by panel, F = [D, E; G, H] with D a square of at most `panel` rows:
+columns go panel by panel, F = [D, E; G, H] with D a square of at most ``panel`` rows:
 
-    D = P^T L U,    next F = H - (G U^-1) (L^-1 P E)
+    D = L U,    next F = H - (G U^-1) (L^-1 E)
 
-Rows are exchanged inside D alone, so that the order of elimination stays.  That is safe where the
-symmetric part of the matrix is positive definite, and good enough where a shift or a barrier keeps
-it regular.  L and U are inverted, D is not: a matrix of stiff and soft directions would lose the
-stiff ones.  Nearly all the work is in products of dense matrices.
+Nothing is exchanged.  That is safe where the symmetric part of the matrix is positive definite, and
+good enough where a shift or a barrier keeps it regular: a zero pivot ends the factorisation, and
+accuracy is the caller's to watch.  Exchanging rows inside D alone, or multiplying by inverses of D,
+L or U, loses digits as stiff and soft directions meet in one body (1e-9 shift: 4 to 8 digits), so
+the sides are found by substitution.  Nearly all the work is in products of dense matrices.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ Integers = NDArray[np.int64]
 def factor_fronts(tree: EliminationTree, blocks: Floats) -> tuple[Floats, bool]:
     """Factors of the matrix with these entries (entries, size, size), and whether it has them.
 
-    It has none if a square D is singular or not finite.
+    It has none if a pivot is zero or not finite.
     """
     size, fronts = tree.size, len(tree.parent)
     factors = np.empty(tree.factor_start[fronts])

@@ -49,7 +49,9 @@ def grains_place(grains: Grains, dim: int) -> Iterator[tuple[Any, Floats, Any]]:
         diameter = random.uniform(grains.size[0], grains.size[1])
         corners = int(random.integers(grains.corners[0], grains.corners[1], endpoint=True))
         if dim == 2:
-            yield stone_2d(random, diameter, corners), position, random.uniform(0, 2 * np.pi)
+            stone, angle = stone_2d(random, diameter, corners), random.uniform(0, 2 * np.pi)
+            c, s = np.cos(angle), np.sin(angle)  # the ellipse lies in its cell, not the centroid
+            yield stone, position + np.array([[c, -s], [s, c]]) @ stone.centroid, angle
         else:
             yield stone_3d(random, diameter, corners), position, random.normal(size=4)
 

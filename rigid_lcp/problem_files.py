@@ -16,6 +16,7 @@ equality constraints (V, R) and problems by M and H (``fclib_global``) are refus
 
 from __future__ import annotations
 
+import lzma
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
@@ -33,6 +34,11 @@ from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_prob
 Floats = NDArray[np.float64]
 BODY_SIZE = {2: 3, 3: 6}
 """Freedoms of a body by dimension."""
+DAMAGED = (
+    OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, RuntimeError, MemoryError,
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError,
+)  # fmt: skip
+"""What Python and numpy raise as they read a damaged npz: any byte of it may be wrong."""
 SAME = 1e-8
 """W and its factors, both stored, differ by less than this share of the largest entry of W."""
 
@@ -121,7 +127,7 @@ def _npz_arrays(path: Path) -> dict[str, NDArray[Any]]:
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
-    except (OSError, EOFError, ValueError, AttributeError, zipfile.BadZipFile, zlib.error) as error:
+    except DAMAGED as error:
         raise ProblemError(
             f"it can not be read as npz: {error}", where=str(path),
             remedy="write it again with numpy.savez, numbers only; the file may be cut short",
@@ -145,9 +151,7 @@ def _npz_sparse(path: Path) -> sp.csr_array:
         with path.open("rb") as stream:  # numpy leaves a broken file open that it opened itself
             matrix = sp.csr_array(sp.load_npz(stream))
         matrix.check_format(full_check=True)
-    except (
-        OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error
-    ) as error:  # fmt: skip
+    except DAMAGED as error:
         raise ProblemError(
             f"it can not be read as a sparse matrix: {error}", where=path.name,
             remedy="write it again with scipy.sparse.save_npz",

@@ -11,7 +11,6 @@ import io
 import json
 import os
 import socket
-import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import fields
@@ -24,6 +23,7 @@ from rigid_lcp.contacts import ContactForces
 from rigid_lcp.errors import SceneError, UsageError
 from rigid_lcp.frame_bodies import bodies_arrays, bodies_restore
 from rigid_lcp.motion import Motion
+from rigid_lcp.problem_files import DAMAGED
 from rigid_lcp.simulation import Simulation
 
 FRAME = "frame_{:06d}.npz"
@@ -65,9 +65,9 @@ class RunFolder:
         self.path = path
 
     @property
-    def finished(self) -> bool:
-        """Whether the run came to its end, report and all."""
-        return (self.path / RESULT).exists()
+    def summary(self) -> dict[str, Any] | None:
+        """What the run came to; None where it has not come to its end, report and all."""
+        return _json_object(self.path / RESULT) or None
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -114,8 +114,13 @@ class RunFolder:
                 f"this folder has files that are no run's ({', '.join(sorted(strangers)[:3])})",
                 where=str(self.path), remedy="give an empty --run-folder",
             )  # fmt: skip
-        there = self._manifest()
+        there = _json_object(self.path / MANIFEST)
         if there is not None and not force:
+            if not there:
+                raise UsageError(
+                    f"the {MANIFEST} of this run can not be read", where=str(self.path),
+                    remedy="give another --run-folder, or --force to lose that run",
+                )  # fmt: skip
             if there.get("scene") != manifest["scene"]:
                 raise UsageError(
                     "this folder holds the run of another scene", where=str(self.path),
@@ -123,7 +128,7 @@ class RunFolder:
                 )  # fmt: skip
             if resume:
                 return True
-            state = "is finished" if self.finished else "is not finished"
+            state = "is not finished" if self.summary is None else "is finished"
             raise UsageError(
                 f"this run is there already and {state}", where=str(self.path),
                 remedy="--resume to go on with it, or --force to compute it anew",
@@ -134,16 +139,6 @@ class RunFolder:
         write_whole(self.path / "scene.toml", scene)
         write_whole(self.path / MANIFEST, json.dumps(manifest, indent=1) + "\n")
         return False
-
-    def _manifest(self) -> dict[str, Any] | None:
-        """The manifest that is there; None without one, empty when it can not be read."""
-        try:
-            content = json.loads((self.path / MANIFEST).read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            return None
-        except (OSError, ValueError):
-            return {}
-        return content if isinstance(content, dict) else {}
 
     # --- frames ---------------------------------------------------------------------------------
 
@@ -165,12 +160,22 @@ class RunFolder:
         sound: list[Path] = []
         while (path := self.path / FRAME.format(len(sound))).exists():
             try:
-                with np.load(path) as file:
-                    file["cpu"]
-            except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+                frame_read(path)
+            except DAMAGED:
                 break
             sound.append(path)
         return sound
+
+
+def _json_object(path: Path) -> dict[str, Any] | None:
+    """An object of a JSON file; None where there is no file, empty when it can not be read."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
 
 
 def frame_read(path: Path) -> dict[str, Any]:

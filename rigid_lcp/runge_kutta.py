@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigid_lcp.acceleration_forces import forces_found
 from rigid_lcp.contacts import ContactForces, Contacts
 from rigid_lcp.equations import body_space, contact_offset
-from rigid_lcp.errors import Overlapping
+from rigid_lcp.errors import NotConverged, Overlapping
 from rigid_lcp.lasting_contacts import (
     OVERLAP,
     Lasting,
@@ -41,7 +41,8 @@ from rigid_lcp.lasting_contacts import (
     share_until_rest,
 )
 from rigid_lcp.motion import Motion, motion_with_rates
-from rigid_lcp.scene import Loads, World
+from rigid_lcp.scene import World
+from rigid_lcp.scene_input import Loads
 from rigid_lcp.time_stepping import contact_forces
 
 Floats = NDArray[np.float64]
@@ -51,6 +52,8 @@ CLEAN_STEPS = 3
 """Steps without an overlap before the step is doubled (section 9)."""
 SHORTEST = 1e-12
 """Shortest step as a share of the longest one."""
+MOST_STEPS = 10_000_000
+"""Steps that one call may take: what moves too fast for its size would never end."""
 TRAVEL = 0.25
 """Way a body may go in one step, in sizes of the smallest body: nothing jumps over another."""
 
@@ -97,6 +100,12 @@ def runge_kutta_advance(
     Raises `NoSolution` (Painleve), `NotConverged`, or `Overlapping` where no step is short enough.
     """
     end, forces = time + seconds, None
+    fastest = _travel_limit(world, motion)
+    if seconds > MOST_STEPS * fastest:
+        raise NotConverged(
+            f"{seconds:g} s take more than {MOST_STEPS:.0e} steps, so fast do bodies go or turn",
+            where=f"time {time:.9g} s", remedy="use method='time-stepping'",
+        )  # fmt: skip
     while end - time > SHORTEST * pace.longest or forces is None:
         motion, impulses = collided(world, motion, tolerance)
         pace.collisions += impulses

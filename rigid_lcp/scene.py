@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from rigid_lcp.contacts import Contacts
 from rigid_lcp.detection_2d import detect_2d, shapes_2d
 from rigid_lcp.errors import SceneError
+from rigid_lcp.friction_problem import MOST_FRICTION
 from rigid_lcp.motion import Motion, motion_displaced
+from rigid_lcp.scene_input import check_half_space, number_in, vector_given
 from rigid_lcp.shapes_2d import HalfSpace
 
 if TYPE_CHECKING:
@@ -23,8 +25,10 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Loads = Callable[[float, Motion], ArrayLike]
-"""Forces and torques (n, 3) in 2D, (n, 6) in 3D [N, N m] at a time [s] and state."""
+
+
+MOST_DENSITY = 1e50
+"""Densities above it [kg/m^3] have masses that can not be computed with."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +58,14 @@ class Scene:
     """Bodies and gravity.  ``gravity`` (dim,) [m/s^2]; the default pulls along the last axis."""
 
     def __init__(self, dim: int = 2, gravity: ArrayLike | None = None) -> None:
-        if dim not in (2, 3):
+        if not isinstance(dim, int | np.integer) or dim not in (2, 3):
             raise SceneError(f"dim is {dim!r}", where="scene", remedy="give 2 or 3")
-        self.dim = dim
+        self.dim = int(dim)
         default = np.zeros(dim)
         default[-1] = -9.81
-        self.gravity = default if gravity is None else _vector(gravity, dim, "gravity", "scene")
+        self.gravity = (
+            default if gravity is None else vector_given(gravity, dim, "gravity", "scene")
+        )
         self.bodies: list[Body] = []
 
     def add(
@@ -78,26 +84,28 @@ class Scene:
         leaves it to the other; without any both are zero.  Raises `SceneError`.
         """
         where = name or f"body {len(self.bodies)}"
-        if getattr(shape, "dim", None) != self.dim:
+        if isinstance(shape, type) or getattr(shape, "dim", None) != self.dim:
             raise SceneError(
                 f"{type(shape).__name__} is no shape of {self.dim} dimensions", where=where,
                 remedy=f"use a shape with dim {self.dim}",
             )  # fmt: skip
-        fixed = fixed or isinstance(shape, HalfSpace)
-        if not fixed and not (density is not None and isfinite(density) and density > 0):
-            raise SceneError(
-                f"the density is {density}", where=where,
-                remedy="give a positive density, or fixed=True for a body that does not move",
-            )  # fmt: skip
-        mass, inertia = (np.inf, np.inf) if fixed else shape.mass_properties(density)
-        if friction is not None and not (isfinite(friction) and friction >= 0):
-            raise SceneError(f"friction is {friction}", where=where, remedy="give zero or more")
-        if restitution is not None and not 0 <= restitution <= 1:
-            raise SceneError(f"restitution is {restitution}", where=where, remedy="give 0 to 1")
+        if isinstance(shape, HalfSpace):
+            check_half_space(shape, position, angle, velocity, spin, where)
+            fixed = True
+        mass, inertia = np.inf, np.inf
+        if not fixed:
+            remedy = "give a positive density, or fixed=True for a body that does not move"
+            density = number_in(density, 0.0, MOST_DENSITY, "the density", where, remedy, True)
+            mass, inertia = shape.mass_properties(density)
+        if friction is not None:
+            remedy = f"give 0 to {MOST_FRICTION:g}"
+            friction = number_in(friction, 0.0, MOST_FRICTION, "friction", where, remedy)
+        if restitution is not None:
+            restitution = number_in(restitution, 0.0, 1.0, "restitution", where, "give 0 to 1")
         origin = getattr(shape, "centroid", np.zeros(self.dim))
         turn = 3 if self.dim == 3 else 1
         upright = [1.0, 0.0, 0.0, 0.0] if self.dim == 3 else 0.0
-        angle = _vector(
+        angle = vector_given(
             upright if angle is None else angle, 1 if self.dim == 2 else 4, "angle", where
         )
         length = float(np.linalg.norm(angle))
@@ -106,10 +114,10 @@ class Scene:
         rest = np.zeros(self.dim)
         self.bodies.append(Body(
             shape, mass, inertia,
-            _vector(origin if position is None else position, self.dim, "position", where),
+            vector_given(origin if position is None else position, self.dim, "position", where),
             angle / length if self.dim == 3 else angle,
-            _vector(rest if velocity is None else velocity, self.dim, "velocity", where),
-            _vector(np.zeros(turn) if spin is None else spin, turn, "spin", where),
+            vector_given(rest if velocity is None else velocity, self.dim, "velocity", where),
+            vector_given(np.zeros(turn) if spin is None else spin, turn, "spin", where),
             friction, restitution, name,
         ))  # fmt: skip
         return len(self.bodies) - 1
@@ -209,14 +217,22 @@ class World:
     def contacts(self, motion: Motion, margin: Any) -> Contacts:
         """Contacts of a state with friction and restitution of their surfaces."""
         found = self.detect(motion, margin)
-        pick = np.fmin  # the smaller; a body without a value leaves it to the other
-        bodies = self.scene.bodies
-        surface = {}
-        for name in ("friction", "restitution"):
-            values = [getattr(body, name) for body in bodies]
-            value = np.array([np.nan if v is None else v for v in [*values, None]], dtype=float)
-            surface[name] = np.nan_to_num(pick(value[found.body_a], value[found.body_b]))
+        surface = {  # the smaller; a body without a value leaves it to the other
+            name: np.nan_to_num(np.fmin(value[found.body_a], value[found.body_b]))
+            for name, value in self.surfaces.items()
+        }
         return replace(found, **surface)
+
+    @cached_property
+    def surfaces(self) -> dict[str, Floats]:
+        """Friction and restitution of every body and of nothing, NaN where unknown, (n + 1,)."""
+        return {
+            name: np.array(
+                [np.nan if (v := getattr(body, name, None)) is None else v
+                 for body in [*self.scene.bodies, None]], dtype=float,
+            )
+            for name in ("friction", "restitution")
+        }  # fmt: skip
 
     def energy(self, motion: Motion) -> float:
         """Kinetic and potential energy of the movable bodies [J]."""
@@ -238,9 +254,19 @@ class World:
         return np.einsum("nij,njk,nlk->nil", frame, self.inertia, frame)
 
 
+def _detected(
+    detect: Callable[..., Contacts], shapes: Any, motion: Motion, margin: Any
+) -> Contacts:
+    return detect(shapes, motion.position, motion.angle, margin)
+
+
 def world_of(scene: Scene) -> tuple[World, Motion]:
-    """Arrays of a scene and its state at the start.  Raises `SceneError` for an empty scene."""
-    bodies = scene.bodies
+    """Arrays of a scene and its state at the start.  Raises `SceneError` for an empty scene.
+
+    What is done to ``scene`` later changes neither.
+    """
+    given, scene = scene, Scene(scene.dim, scene.gravity)
+    scene.bodies = bodies = list(given.bodies)
     movable = np.array([body.movable for body in bodies], dtype=bool)
     if not movable.any():
         raise SceneError("no body can move", where="scene", remedy="add a body with a density")
@@ -252,16 +278,13 @@ def world_of(scene: Scene) -> tuple[World, Motion]:
         arrays = shapes_2d(shapes, movable)
         inertia = np.array([body.inertia for body in bodies])
 
-        def detect(motion: Motion, margin: Any) -> Contacts:
-            return detect_2d(arrays, motion.position, motion.angle, margin)
+        detect = partial(_detected, detect_2d, arrays)
     else:
         from rigid_lcp.detection_3d import detect_3d, shapes_3d
 
         solids = shapes_3d(shapes, movable)
         inertia = np.array([body.inertia if body.movable else np.eye(3) for body in bodies])
-
-        def detect(motion: Motion, margin: Any) -> Contacts:
-            return detect_3d(solids, motion.position, motion.angle, margin)
+        detect = partial(_detected, detect_3d, solids)
 
     angle = np.array([body.angle for body in bodies])
     spin = np.array([body.spin for body in bodies])
@@ -271,12 +294,3 @@ def world_of(scene: Scene) -> tuple[World, Motion]:
     )  # fmt: skip
     length = float(reach[movable].min())
     return World(scene, columns, mass, inertia, reach, length, detect), start
-
-
-def _vector(values: ArrayLike, size: int, what: str, where: str) -> Floats:
-    vector = np.atleast_1d(np.asarray(values, dtype=float))
-    if vector.shape != (size,) or not np.isfinite(vector).all():
-        raise SceneError(
-            f"{what} is {values!r}", where=where, remedy=f"give {size} finite number(s)"
-        )
-    return vector

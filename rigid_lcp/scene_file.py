@@ -15,7 +15,8 @@ from pydantic import ValidationError
 
 from rigid_lcp.errors import SceneError, UsageError
 from rigid_lcp.motion import Motion
-from rigid_lcp.scene import Loads, Scene
+from rigid_lcp.scene import Scene
+from rigid_lcp.scene_input import Loads
 from rigid_lcp.scene_types import BodyTable, Load, SceneTables
 
 REMEDY = "correct these keys; scenes/pile.toml explains every key"

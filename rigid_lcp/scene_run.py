@@ -154,6 +154,8 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
         },
         "cpu_s": float(history["cpu"][-1]),
         "cpu_a_step": float(history["cpu"][-1]) / max(run.steps, 1),
+        **({} if run.worn is None else {"worn": run.worn.volume, "friction_work": run.worn.work}),
+        **({} if run.breakage is None else {"broken": len(run.broken)}),
         "frames": frames,
         "last_frame": FRAME.format(frames),
         "left_out": left_out(file),

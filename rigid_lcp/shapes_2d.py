@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot, inf, isfinite, pi
+from math import hypot, inf, pi
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 
 FLAT = 1e-12
 """Sine of the turn at a vertex below which three vertices count as one line [-]."""
+LEAST, MOST = 1e-50, 1e50
+"""Lengths that a shape may have [m]: their fourth powers are numbers still."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,13 +48,16 @@ class Polygon:
 
     @classmethod
     def rectangle(cls, width: float, height: float) -> Polygon:
-        """Rectangle of ``width`` along x and ``height`` along y [m]."""
+        """Rectangle of ``width`` along x and ``height`` along y [m].  Raises `ShapeError`."""
+        width = _length(width, "width", "rectangle")
+        height = _length(height, "height", "rectangle")
         x, y = width / 2, height / 2
         return cls([(-x, -y), (x, -y), (x, y), (-x, y)])
 
     @classmethod
     def regular(cls, corners: int, radius: float) -> Polygon:
         """Regular polygon with ``corners`` vertices on a circle of ``radius`` [m]."""
+        radius = _length(radius, "radius", "polygon")
         angle = 2 * pi * np.arange(corners) / corners
         return cls(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
 
@@ -88,10 +93,7 @@ class Disc:
     dim = 2
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.radius) and self.radius > 0):
-            raise ShapeError(
-                f"the radius is {self.radius}", where="disc", remedy="give a positive length"
-            )
+        object.__setattr__(self, "radius", _length(self.radius, "radius", "disc"))
 
     @property
     def area(self) -> float:
@@ -123,17 +125,16 @@ class HalfSpace:
     reach = inf
 
     def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
-        direction = np.asarray(normal, dtype=float)
-        length = float(np.linalg.norm(direction))
-        if direction.shape not in ((2,), (3,)) or not isfinite(length) or length == 0:
+        direction = _given(normal, "normal", "half-space")
+        largest = float(np.abs(direction).max(initial=0.0))
+        if direction.shape not in ((2,), (3,)) or largest == 0:
             raise ShapeError(
                 f"the normal is {normal!r}", where="half-space",
                 remedy="give two or three numbers that are not all zero",
             )  # fmt: skip
-        if not isfinite(offset):
-            raise ShapeError(f"the offset is {offset}", where="half-space", remedy="give metres")
-        object.__setattr__(self, "normal", direction / length)
-        object.__setattr__(self, "offset", float(offset))
+        direction = direction / largest  # squares of what is left neither vanish nor overflow
+        object.__setattr__(self, "normal", direction / np.linalg.norm(direction))
+        object.__setattr__(self, "offset", float(_given(offset, "offset", "half-space")))
 
     @property
     def dim(self) -> int:
@@ -144,17 +145,18 @@ class HalfSpace:
 def _outline(vertices: ArrayLike) -> Floats:
     """The vertices (n, 2) if they are a convex polygon, anticlockwise; else a `ShapeError`."""
     where = "polygon"
-    try:
-        outline = np.array(vertices, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ShapeError(f"vertices are not numbers ({error})", where=where) from error
+    outline = _given(vertices, "outline", where)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
         raise ShapeError(
             f"vertices have shape {outline.shape}", where=where,
             remedy="give at least three vertices of two coordinates",
         )  # fmt: skip
-    if not np.isfinite(outline).all():
-        raise ShapeError("a vertex is not finite", where=where, remedy="give metres")
+    size = float(np.ptp(outline, axis=0).max())
+    if size != 0 and not LEAST <= size <= MOST:
+        raise ShapeError(
+            f"it is {size:.1g} m in size", where=where,
+            remedy=f"choose other units: {LEAST:g} to {MOST:g} can be computed with",
+        )  # fmt: skip
     side = np.roll(outline, -1, axis=0) - outline
     length = np.hypot(side[:, 0], side[:, 1])
     if (length <= FLAT * length.max()).any():
@@ -183,6 +185,28 @@ def _outline(vertices: ArrayLike) -> Floats:
             remedy="divide it into convex polygons, or take its convex hull",
         )  # fmt: skip
     return outline
+
+
+def _given(values: ArrayLike, what: str, where: str) -> Floats:
+    """A copy of finite numbers; a `ShapeError` for anything else."""
+    try:
+        array = np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"the {what} holds what are not numbers ({error})", where=where) from error
+    if not np.isfinite(array).all():
+        raise ShapeError(f"the {what} is not finite", where=where, remedy="give metres")
+    return array
+
+
+def _length(value: float, what: str, where: str) -> float:
+    """A length that a shape can have [m]; a `ShapeError` for any other."""
+    array = _given(value, what, where)
+    if array.ndim or not LEAST <= array <= MOST:
+        raise ShapeError(
+            f"the {what} is {value}", where=where,
+            remedy=f"give a positive length, {LEAST:g} to {MOST:g} m",
+        )  # fmt: skip
+    return float(array)
 
 
 def _moments(outline: Floats) -> tuple[float, Floats, float]:

@@ -6,6 +6,7 @@ level, section 9) for few bodies and high order.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, nan
 from typing import Literal
 
@@ -14,11 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.breakage import Breakage, Broken, breaks, scene_broken
 from rigid_lcp.contacts import ContactForces
-from rigid_lcp.errors import NotConverged, Overlapping, UsageError
+from rigid_lcp.errors import NotConverged, Overlapping, SceneError, UsageError
 from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.motion import Motion
 from rigid_lcp.runge_kutta import Pace, runge_kutta_advance
-from rigid_lcp.scene import Loads, Scene, world_of
+from rigid_lcp.scene import Scene, world_of
+from rigid_lcp.scene_input import CheckedLoads, Loads, body_given, seconds_given
 from rigid_lcp.time_stepping import contact_forces, moreau_step
 from rigid_lcp.unique_forces import unique_forces
 from rigid_lcp.wear import Wear, scene_worn, wear_after_break, wear_start, wear_step
@@ -28,8 +30,13 @@ Method = Literal["time-stepping", "acceleration"]
 
 OVERLAP_AT_START = 1e-6
 """Overlap that a start may have, as a share of the smallest body's size."""
-GIVE_UP = 1e-3
-"""Residual [-] above which a step is no step: the run stops."""
+NO_STEP = 1e-9
+"""Part of a step that is round-off of a sum of times [-]."""
+SHORTEST_STEP = 1e-100
+"""Shorter steps [s] have squares that are no numbers."""
+ACCEPT, GIVE_UP = 1e-6, 1e-3
+"""Residuals [-]: a step of many contacts is left at the first where its tolerance would take the
+dearest methods; above the second it is no step, and the run stops."""
 
 
 class Simulation:
@@ -38,22 +45,26 @@ class Simulation:
     ``method``: ``time-stepping`` (any scene) or ``acceleration`` (Runge-Kutta, section 9; raises
     `NoSolution` where no finite forces exist).  ``step`` [s]: length of the steps, for
     ``acceleration`` the longest one; default 1e-3 s.  ``tolerance``: scale-free residual of the
-    contact forces.  ``loads(time, motion)``: further forces and torques (n, 3) or (n, 6) [N, N m].
+    contact forces; ``accept``: a step of many contacts that ends at or below it is left there
+    rather than to the dearest methods; above ``give_up`` the run stops.  ``loads(time, motion)``:
+    further forces and torques (n, 3) or (n, 6) [N, N m].
     ``wear``, ``breakage``: grains lose their corners, break (time stepping only); none by default.
     Raises `SceneError`, or `Overlapping` where bodies overlap at the start.
     """
 
     def __init__(
         self, scene: Scene, method: Method = "time-stepping", *, step: float = 1e-3,
-        tolerance: float = 1e-12, loads: Loads | None = None, wear: Wear | None = None,
+        tolerance: float = 1e-12, accept: float = ACCEPT, give_up: float = GIVE_UP,
+        loads: Loads | None = None, wear: Wear | None = None,
         breakage: Breakage | None = None,
     ) -> None:  # fmt: skip
         if method not in ("time-stepping", "acceleration"):
             raise UsageError(
                 f"method is {method!r}", remedy="give 'time-stepping' or 'acceleration'"
             )
-        if not 0 < step < np.inf:
-            raise UsageError(f"step is {step}", remedy="give a positive number of seconds")
+        step = seconds_given(step, "step", least=SHORTEST_STEP)
+        if loads is not None and not callable(loads):
+            raise UsageError("loads are no function", remedy="give loads(time, motion)")
         if method == "acceleration" and (wear is not None or breakage is not None):
             raise UsageError(
                 "bodies do not wear or break at acceleration level", where="method",
@@ -65,7 +76,9 @@ class Simulation:
         self.broken: list[Broken] = []
         """Grains that broke; by `fragment` at a tension of NaN."""
         self.world, self.motion = world_of(scene)
-        self.method, self.step, self.tolerance, self.loads = method, step, tolerance, loads
+        self.method, self.step, self.tolerance = method, step, tolerance
+        self.accept, self.give_up = accept, give_up
+        self.loads = None if loads is None else CheckedLoads(loads)
         self.pace = Pace(step, step)
         """Step control of ``acceleration``, and its counts."""
         self.time = 0.0
@@ -73,6 +86,8 @@ class Simulation:
         self.steps = 0
         self.worst_residual = 0.0
         """Greatest residual of any step so far [-]."""
+        self.steps_above = 0
+        """Steps whose residual was above ``tolerance`` (time stepping)."""
         self.contacts: ContactForces = contact_forces(
             self.world.contacts(self.motion, 0.0)[np.zeros(0, np.int64)],
             np.zeros((0, scene.dim)), None, 1.0,
@@ -83,12 +98,18 @@ class Simulation:
     def advance(self, seconds: float) -> None:
         """Go on for ``seconds`` [s], in equal steps not longer than ``step``.
 
+        Less than a billionth of a step is none: sums of times differ by so much.
+
         Raises `NotConverged` where a step's forces are not found; the state before it is kept.
+        `UsageError` for a negative time, `SceneError` for loads that are none.
         """
+        seconds = seconds_given(seconds, "the time to go on")
+        if seconds <= NO_STEP * self.step:
+            return
         if self.method == "acceleration":
             self._integrate(seconds)
             return
-        count = max(ceil(seconds / self.step - 1e-9), 0)
+        count = max(ceil(seconds / self.step - NO_STEP), 1)
         for _ in range(count):
             self._time_step(seconds / count)
 
@@ -98,8 +119,15 @@ class Simulation:
         ``line``: a point and a direction (2D), a point and the plane's normal (3D), in the world.
         The first part keeps the number of the whole, the second comes after all bodies; both go
         on as parts of the rigid body did (section 10), so that loads are now wanted for one body
-        more.  Raises `ShapeError` for a disc, a fixed body, or a sliver.
+        more.  Raises `ShapeError` for a disc, a fixed body, or a sliver, `SceneError` for a body
+        or a line that is none.
         """
+        body = body_given(body, len(self.motion.position))
+        if not isinstance(line, Sequence | np.ndarray) or len(line) != 2:
+            raise SceneError(
+                f"the line is {line!r}", where="fragment",
+                remedy="give (point, direction), in 3D (point, normal)",
+            )  # fmt: skip
         scene = broken_scene(self.world.scene, self.motion, body, *line)
         part = self._go_on_broken(scene, body)
         self.broken.append(Broken(self.time, body, part, nan, nan))
@@ -154,7 +182,9 @@ class Simulation:
 
     def _time_step(self, h: float) -> None:
         loads = None if self.loads is None else self.loads(self.time + h / 2, self.motion)
-        made = moreau_step(self.world, self.motion, loads, h, self.contacts, self.tolerance)
+        made = moreau_step(
+            self.world, self.motion, loads, h, self.contacts, self.tolerance, self.accept
+        )
         self._judge(made.residual, made.message)
         before, self.motion, self.contacts = self.motion, made.motion, made.contacts
         self.time += h
@@ -190,7 +220,8 @@ class Simulation:
 
     def _judge(self, residual: float, message: str) -> None:
         self.worst_residual = max(self.worst_residual, residual)
-        if not residual <= GIVE_UP:
+        self.steps_above += not residual <= self.tolerance
+        if not residual <= self.give_up:
             raise NotConverged(
                 f"the contact forces have a residual of {residual:.2g}",
                 where=f"step {self.steps}, {self.time:.6g} s",

@@ -4,6 +4,7 @@
 
     no forces        where nothing approaches
     frictionless     where no contact has friction: principal pivoting, exact
+    convex path      without a start: a part of it, and Newton; solves most static piles
     Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
                      Newton at its end: first few sweeps and factorisations, then many, as what is
                      hard for the one is often easy for the other
@@ -23,6 +24,7 @@ Gauss-Seidel is the cheaper way to rough answers.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -49,6 +51,8 @@ from rigid_lcp.proximal_newton import proximal_newton
 Floats = NDArray[np.float64]
 Method = Literal["auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig"]
 
+TINY = 1e-60
+"""Problems with a smaller q are solved in other units."""
 HAND_OVER = 1e-7
 """Residual at which Newton takes over."""
 PATHS = (
@@ -60,12 +64,19 @@ PATHS = (
     (Path(convex=True, compliance=1e-4), 300),
 )
 """Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
-FEW_SWEEPS, FEW = 100, 20
-"""Sweeps and factorisations that are tried first: enough for most steps of a pile in motion."""
-CONTACTS_A_SWEEP = 10
-"""One sweep more for every so many contacts: the larger a problem, the dearer a factorisation."""
+FEW_SWEEPS, FEW, FEW_CONTACTS = 100, 20, 300
+"""Sweeps and factorisations that are tried first, up to so many contacts: enough for most steps of
+a pile in motion; where there are more, news need more sweeps to get through it."""
+FEW_STEPS = 20
+"""Steps of Newton from `HAND_OVER`, where it mostly needs fewer factorisations than proximal
+points."""
 FIRST_SWEEPS, MANY = 1000, 60
 """What is spent where the first try was too short."""
+CONVEX_PATH = Path(convex=True, compliance=1e-4)
+CONVEX_SWEEPS, CONVEX_STEPS, CONVEX_CONTACTS = 30, 7, 10_000
+CONVEX_END, CONVEX_USEFUL = 1e-4, 1e-3
+"""Without a start, and up to so many contacts: sweeps, steps along the convex path to a residual
+of `CONVEX_END`, and Newton from there if it came below `CONVEX_USEFUL` (where little slides)."""
 LAST_WORD, ROUND_OFF = 1e-11, 1e-15
 """At such a tolerance and below a step of Newton ends what the others found: the residual is
 measured on the scale of all forces, and only what is exact to round-off is so for a pebble under a
@@ -83,6 +94,7 @@ def solve_friction(
     start: ArrayLike | None = None,
     tolerance: float = 1e-12,
     method: Method = "auto",
+    accept: float = 0.0,
 ) -> FrictionSolution:
     """Forces r and velocities u with ``u = W r + q`` under unilateral contact and Coulomb friction.
 
@@ -91,6 +103,9 @@ def solve_friction(
     r in N and u in m/s^2, or in N s and m/s, with W to match.  ``mu`` (nc,) or one number [-].
     ``start`` r (nc * dim,): forces of the step before.  ``tolerance``: on the scale-free residual
     (`rigid_lcp.cones`); round-off ends near 1e-15 times the condition of W.
+
+    ``accept``: where sweeps and Newton leave more than ``tolerance``, but not more than this,
+    ``auto`` tries no more on problems of more than `FEW_CONTACTS` contacts.
 
     ``method``: ``auto`` (module docstring); ``interior-point`` and ``newton`` are polished by
     Newton; ``pivoting`` and ``dantzig`` (2D) are in the modules of their names.
@@ -113,15 +128,29 @@ def solve_friction(
     begin = None if start is None else _start(start, problem)
     if problem.contacts == 0:
         return friction_solution(problem, problem.offset.copy(), tolerance, method)
+    largest = float(np.abs(problem.offset).max())
+    if 0.0 < largest < TINY:  # squares of such numbers are zero
+        unit = 2.0 ** np.frexp(largest)[1]
+        large = replace(problem, offset=problem.offset / unit)
+        found = solve_friction(
+            large.bodies or large.delassus, large.offset, large.friction, dim,
+            None if begin is None else begin / unit, tolerance, method, accept,
+        )  # fmt: skip
+        return replace(found, r=found.r * unit, u=found.u * unit)
+    if method == "auto":
+        return solve_auto(problem, begin, tolerance, accept)
     return _methods()[method](problem, begin, tolerance)
 
 
 def solve_auto(
-    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12
-) -> FrictionSolution:
+    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12,
+    accept: float = 0.0,
+) -> FrictionSolution:  # fmt: skip
     """The default of `solve_friction` on a problem that is made already."""
-    trial = _attempts(problem, start, tolerance)
-    if trial.best.solved:
+    trial = _attempts(problem, start, tolerance, accept)
+    if trial.best.solved or (
+        trial.best.residual <= accept and problem.contacts > FEW_CONTACTS
+    ):  # fmt: skip
         return trial.solution()
     parts = islands(problem)
     if len(parts) > 1:
@@ -168,6 +197,10 @@ class _Trial:
         if self.best.solved or not np.isfinite(found.residual):
             return self.best.solved
         self.linear = self.linear or factorisation(self.problem)
+        if found.residual <= HAND_OVER:
+            found = self.newton(found.r, FEW_STEPS, after or found.method)
+            if self.best.solved:
+                return True
         self.keep(
             proximal_newton(
                 self.problem, found.r, self.tolerance, linear=self.linear,
@@ -175,11 +208,7 @@ class _Trial:
             ),
             after or found.method,
         )  # fmt: skip
-        if self.best.solved and self.tolerance <= LAST_WORD:
-            self.keep(
-                newton(self.problem, self.best.r, ROUND_OFF, linear=self.linear, iterations=1),
-                self.best.method,
-            )
+        self.sharpen()
         return self.best.solved
 
     def sweep(
@@ -194,6 +223,46 @@ class _Trial:
         )
         name = f"{after} + gauss-seidel" if after else "gauss-seidel"
         return self.best.solved or self.polish(found, name, factorisations)
+
+    def convex_start(self) -> bool:
+        """A few sweeps, a part of the convex path, and Newton: solves most static piles."""
+        self.sweeper = self.sweeper or sweeper_of(self.problem)
+        self.keep(
+            gauss_seidel(self.problem, None, self.tolerance, CONVEX_SWEEPS, sweeper=self.sweeper)
+        )
+        if self.best.solved:
+            return True
+        self.linear = self.linear or factorisation(self.problem)
+        found, steps, name = self.best, FEW_STEPS, self.best.method
+        if found.residual > HAND_OVER:
+            found = self.keep(
+                interior_point(
+                    self.problem, None, CONVEX_END, CONVEX_PATH, linear=self.linear,
+                    iterations=CONVEX_STEPS,
+                )
+            )  # fmt: skip
+            steps, name = CONVEX_STEPS + 1, found.method
+        if found.residual < CONVEX_USEFUL:
+            self.newton(found.r, steps, name)
+        return self.best.solved
+
+    def newton(self, start: Floats, steps: int, after: str) -> FrictionSolution:
+        """So many steps of Newton, and one more where the answer is to be exact."""
+        self.linear = self.linear or factorisation(self.problem)
+        found = self.keep(
+            newton(self.problem, start, self.tolerance, linear=self.linear, iterations=steps),
+            after,
+        )
+        self.sharpen()
+        return found
+
+    def sharpen(self) -> None:
+        """One step of Newton from a solution where the tolerance asks for an exact one."""
+        if self.best.solved and self.best.residual > ROUND_OFF and self.tolerance <= LAST_WORD:
+            self.keep(
+                newton(self.problem, self.best.r, ROUND_OFF, linear=self.linear, iterations=1),
+                self.best.method,
+            )
 
     def solution(self, status: Status | None = None, message: str = "") -> FrictionSolution:
         """The best point, with the work of all attempts."""
@@ -210,17 +279,26 @@ class _Trial:
         )  # fmt: skip
 
 
-def _attempts(problem: FrictionProblem, start: Floats | None, tolerance: float) -> _Trial:
+def _attempts(
+    problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
+) -> _Trial:
     trial = _Trial(problem, start, tolerance)
     if trial.best.solved:
         return trial
     if not problem.friction.any():
         trial.keep(frictionless(problem, start, tolerance))
     rough = tolerance if tolerance > LAST_WORD else HAND_OVER
-    few = min(max(FEW_SWEEPS, problem.contacts // CONTACTS_A_SWEEP), FIRST_SWEEPS)
-    if trial.best.solved or trial.sweep(start, few, until=rough, factorisations=FEW):
+    if trial.best.solved:
         return trial
-    if trial.sweep(trial.best.r, FIRST_SWEEPS, until=rough):
+    small = problem.contacts <= FEW_CONTACTS
+    cold = start is None and tolerance < HAND_OVER and problem.contacts <= CONVEX_CONTACTS
+    if cold and trial.convex_start():
+        return trial
+    if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
+        return trial
+    if trial.sweep(trial.best.r, FIRST_SWEEPS, until=max(rough, HAND_OVER)):
+        return trial
+    if trial.best.residual <= accept and not small:
         return trial
     if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
         return trial
@@ -259,7 +337,6 @@ def _methods() -> dict[str, Callable[..., FrictionSolution]]:
     from rigid_lcp.pivoting import pivoting
 
     return {
-        "auto": solve_auto,
         "newton": newton,
         "interior-point": _interior_point,
         "gauss-seidel": gauss_seidel,
@@ -275,7 +352,7 @@ def _proved_insoluble(problem: FrictionProblem) -> bool:
 
 
 def _start(start: ArrayLike, problem: FrictionProblem) -> Floats:
-    force = np.asarray(start, dtype=float).ravel()
+    force = np.array(start, dtype=float).ravel()
     if force.shape != problem.offset.shape:
         raise ProblemError(
             f"it has {len(force)} numbers and q has {len(problem.offset)}", where="start",

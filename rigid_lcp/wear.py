@@ -24,18 +24,16 @@ from rigid_lcp.contacts import ContactForces, Contacts, contact_frames
 from rigid_lcp.detection_2d import FACE_BITS
 from rigid_lcp.equations import relative_velocity
 from rigid_lcp.errors import SceneError, ShapeError
-from rigid_lcp.fragmentation import polygon_moments, scene_at
+from rigid_lcp.fragmentation import scene_at
 from rigid_lcp.motion import Motion
 from rigid_lcp.shapes_2d import Polygon
+from rigid_lcp.worn_polygon import WornPolygon, polygon_worn
 
 if TYPE_CHECKING:
     from rigid_lcp.scene import Body, Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-LEAST_CUT = 1e-6
-"""Chamfers shorter than this share of a grain's reach wait: detection has ties of 1e-9 of it."""
 
 
 @dataclass(frozen=True)
@@ -59,22 +57,6 @@ class Wear:
                 f"every is {self.every}", where="wear", remedy="give 1 or more steps between cuts"
             )
         worn_stiffness(1.0, 0.0, self.volume_scale or 1.0, self.stiffness_left)
-
-
-@dataclass(frozen=True)
-class WornPolygon:
-    """A polygon and the sharp one that it is worn from; all in the frame of the latter's shape."""
-
-    sharp: Floats
-    """Corners before chamfers (k, 2) [m]."""
-    lost: Floats
-    """Area cut off each sharp corner (k,) [m^2]."""
-    vertices: Floats
-    """Corners now (n, 2) [m]."""
-    owner: Ints
-    """The sharp corner that each corner now belongs to (n,)."""
-    total: Floats
-    """All area that has been worn at each corner now, on whatever sharp polygon, (n,) [m^2]."""
 
 
 @dataclass
@@ -201,105 +183,6 @@ def contact_stiffness_worn(
     return worn_stiffness(k, lost, wear.volume_scale, wear.stiffness_left)
 
 
-def chamfered(sharp: Floats, lost: Floats) -> tuple[Floats, Ints] | None:
-    """A polygon (n, 2) with ``lost`` (n,) [m^2] cut off its corners, and each corner's owner.
-
-    Each chamfer cuts the same length off both edges.  None where chamfers would meet on an edge,
-    or take more than half of one.
-    """
-    back = np.roll(sharp, 1, axis=0) - sharp
-    ahead = np.roll(sharp, -1, axis=0) - sharp
-    length_back, length = np.linalg.norm(back, axis=1), np.linalg.norm(ahead, axis=1)
-    back, ahead = back / length_back[:, None], ahead / length[:, None]
-    cut = np.sqrt(2 * lost / np.abs(back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0]))
-    if (cut > 0.49 * np.minimum(length, length_back)).any():
-        return None
-    ends = np.stack([sharp + cut[:, None] * back, sharp + cut[:, None] * ahead], axis=1)
-    kept = np.column_stack([np.ones(len(sharp), bool), lost > 0]).ravel()
-    owner = np.repeat(np.arange(len(sharp)), 2)
-    return ends.reshape(-1, 2)[kept], owner[kept]
-
-
-def polygon_worn(grain: WornPolygon, pending: Floats) -> WornPolygon | None:
-    """The polygon with the ``pending`` wear (n,) [m^2] of its corners cut off too.
-
-    None where all of it is too little to be cut yet.  Raises `ShapeError` where it is more than
-    half of the grain.
-    """
-    size = float(np.linalg.norm(np.ptp(grain.sharp, axis=0)))
-    least = (LEAST_CUT * size) ** 2
-    if pending.max() < least:
-        return None
-    sharp, owner = grain.sharp, grain.owner
-    lost = grain.lost + np.bincount(owner, pending, len(sharp))
-    made = chamfered(sharp, lost)
-    if made is None:  # wear on from the shape as it is now
-        sharp, owner, lost = grain.vertices, np.arange(len(pending)), pending
-        made = chamfered(sharp, lost)
-    total = np.zeros(len(sharp))
-    np.maximum.at(total, owner, grain.total)
-    total += np.bincount(owner, pending, len(sharp))
-    if made is None:  # corners with short edges go as a whole
-        sharp, owner = corners_taken(sharp, pending)
-        lost, total = np.zeros(len(sharp)), total[owner]
-        made = sharp, np.arange(len(sharp))
-    return WornPolygon(sharp, lost, made[0], made[1], total[made[1]])
-
-
-def corners_taken(vertices: Floats, areas: Floats) -> tuple[Floats, Ints]:
-    """A polygon (n, 2) that loses ``areas`` (n,) [m^2] at its corners by straight cuts of any size.
-
-    Each cut is across the bisector of its corner, and takes neighbouring corners too where it must.
-    The corners that remain, and for each the nearest of the old ones.  Raises `ShapeError` where
-    that leaves no more than half of the polygon.
-    """
-    from scipy.optimize import brentq
-
-    if areas.sum() > 0.5 * polygon_moments(vertices)[0]:
-        raise ShapeError(
-            f"{areas.sum():.3g} m^2 wore off a grain of {polygon_moments(vertices)[0]:.3g} m^2 "
-            "between two cuts", where="wear",
-            remedy="cut more often (every), or take a smaller coefficient",
-        )  # fmt: skip
-    left = vertices
-    for k in np.argsort(-areas, kind="stable"):
-        if areas[k] == 0:
-            break
-        corner = int(np.argmin(np.linalg.norm(left - vertices[k], axis=1)))
-        sides = left[[corner - 1, (corner + 1) % len(left)]] - left[corner]
-        across = -(sides / np.linalg.norm(sides, axis=1)[:, None]).sum(axis=0)
-        across /= np.linalg.norm(across)
-        depth = (left[corner] - left) @ across
-        whole = polygon_moments(left)[0]
-
-        def excess(
-            t: float, left: Floats = left, across: Floats = across, corner: int = corner,
-            wanted: float = whole - float(areas[k]),
-        ) -> float:  # fmt: skip
-            return polygon_moments(_clipped(left, (left - left[corner]) @ across + t))[0] - wanted
-
-        t = float(brentq(excess, 0.0, 0.999 * float(depth.max()), xtol=1e-300, rtol=1e-15))
-        left = _clipped(left, t - depth)
-    edge = np.linalg.norm(np.roll(left, -1, axis=0) - left, axis=1)
-    left = left[edge > LEAST_CUT * edge.max()]
-    apart = np.linalg.norm(left[:, None] - vertices[None], axis=2)
-    return left, np.argmin(apart, axis=1)
-
-
-def _clipped(vertices: Floats, height: Floats) -> Floats:
-    """The part of a convex polygon where ``height`` (n,), linear in place, is not positive."""
-    kept = []
-    for k in range(len(vertices)):
-        following = (k + 1) % len(vertices)
-        here, there = height[k], height[following]
-        if here <= 0:
-            kept.append(vertices[k])
-        if here * there < 0:
-            share = here / (here - there)
-            kept.append((1 - share) * vertices[k] + share * vertices[following])
-    return np.array(kept)
-
-
 def scene_worn(scene: Scene, motion: Motion, state: WearState) -> tuple[Scene, WearState] | None:
     """The scene at ``motion`` with all pending wear cut off; None where there is none to cut.
 
@@ -316,8 +199,8 @@ def scene_worn(scene: Scene, motion: Motion, state: WearState) -> tuple[Scene, W
         made = None if grain is None else polygon_worn(grain, pending[k])
         if grain is None or made is None:
             continue
-        bodies[k] = _body_worn(bodies[k], grain, made)
-        grains[k], pending[k], changed = made, np.zeros(len(made.vertices)), True
+        grains[k], pending[k] = made
+        bodies[k], changed = _body_worn(bodies[k], grain, made[0]), True
     if not changed:
         return None
     worn = Scene(scene.dim, scene.gravity)

@@ -2,6 +2,8 @@
 
     python -m validation.rigid_ballast_3d --run [--quick]    measure what is missing, write it all
     python -m validation.rigid_ballast_3d                    write the page from the record
+    python -m validation.rigid_ballast_3d --chains RUN       and the picture of force chains, from
+                                                   the folder of a run of the scene
 
 Bed and surfaces are those of ``scenes/sleeper-3d.toml``, each sample with a seed of its own.  The
 stones are poured; the block is laid on the highest of them and pressed down; then the load goes
@@ -220,11 +222,12 @@ def study_run(study: Study, samples: int, steps: Sequence[float], path: Path) ->
 
 def main(words: Sequence[str] | None = None) -> None:
     """Command line."""
-    from validation.rigid_ballast_3d_page import page_write
+    from validation.rigid_ballast_3d_page import chains_write, page_write
 
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--run", action="store_true", help="measure what is missing first")
     parser.add_argument("--quick", action="store_true", help="a small bed, which is not recorded")
+    parser.add_argument("--chains", type=Path, metavar="RUN", help="folder of a run of the scene")
     given = parser.parse_args(words)
     if given.quick:
         for line in rows(QUICK, 1, STEPS[:2], set()):
@@ -232,6 +235,8 @@ def main(words: Sequence[str] | None = None) -> None:
         return
     if given.run:
         study_run(Study(), SAMPLES, STEPS, RECORD)
+    if given.chains:
+        chains_write(given.chains)
     page_write(record_read())
 
 

@@ -35,7 +35,7 @@ PERIOD = 0.04
 LEAST = 1e3
 """Load of the sleeper between two wheels [N per metre of track]."""
 FRICTION = 0.6
-UPRIGHT = 0.2
+UPRIGHT = 0.25
 """Greatest angle of the sleeper after tamping [rad]; a bed where it is larger is not used."""
 PREPARED_STEP, PREPARED_TOLERANCE = 2e-3, 1e-6
 """Step [s] and residual [-] of pouring and tamping."""
@@ -46,24 +46,26 @@ class Bed:
     """What a bed is made of; the default is the scene's."""
 
     seed: int
-    stones: int = 60
-    width: float = 0.40
+    stones: int = 40
+    width: float = 0.30
     """Distance of the walls [m]."""
-    sleeper: float = 0.18
+    sleeper: float = 0.14
     """Width of the sleeper [m]."""
-    peak: float = 32e3
-    """Greatest load of a cycle [N per metre of track]."""
+    peak: float = 25e3
+    """Greatest vertical load of a cycle [N per metre of track]."""
+    lateral: float = 0.25
+    """Lateral over vertical part of what a wheel adds to the load, as in a curve [-]."""
 
     def scene_words(self) -> list[str]:
         """Overrides of the scene file."""
         half = 0.5 * self.width
-        high = 0.10 + 0.48 * (self.stones / 60) * (0.40 / self.width)
+        high = 0.05 + 0.48 * (self.stones / 40) * (0.30 / self.width)
         return [
             f"grains.0.seed={self.seed}", f"grains.0.count={self.stones}",
             f"grains.0.region_low=[{-half}, 0.0]", f"grains.0.region_high=[{half}, 0.6]",
             f"ground.1.offset={-half}", f"ground.2.offset={-half}",
             f"body.0.box=[{self.sleeper}, 0.05]", f"body.0.position=[0.0, {high}]",
-            f"load.3.force=[0, {-self.peak}]",
+            f"load.3.force=[{self.lateral * (self.peak - LEAST)}, {-self.peak}]",
         ]  # fmt: skip
 
 
@@ -91,9 +93,11 @@ def bed_scene(bed: Bed) -> Scene:
 
 
 def load_at(bed: Bed, time: Floats | float) -> Floats:
-    """Vertical load of the sleeper [N] at times [s] from the begin of the first cycle."""
-    phase = 0.5 - 0.5 * np.cos(2 * np.pi * np.asarray(time) / PERIOD)
-    return -np.where(np.asarray(time) < 0, LEAST, LEAST + (bed.peak - LEAST) * phase)
+    """Load of the sleeper (m, 2) [N] at m times [s] from the begin of the first cycle."""
+    times = np.atleast_1d(np.asarray(time, dtype=float))
+    phase = np.where(times < 0, 0.0, 0.5 - 0.5 * np.cos(2 * np.pi * times / PERIOD))
+    wheel = (bed.peak - LEAST) * phase
+    return np.column_stack([bed.lateral * wheel, -LEAST - wheel])
 
 
 @dataclass(frozen=True)
@@ -127,16 +131,15 @@ def rigid_moments(
     bed: Bed, scene: Scene, start: Motion, cycles: int, step: float, tolerance: float
 ) -> Iterator[Moment]:
     """Load cycles by `rigid_lcp` with steps of ``step`` [s] at most; twice a cycle a moment."""
-    run = Simulation(scene, step=step, tolerance=tolerance)
-    run.motion = start
     body, spent, work = sleeper_of(scene), 0.0, 0.0
     forces = np.zeros((len(scene.bodies), 3))
 
     def loads(time: float, motion: Motion) -> Floats:
-        forces[body, 1] = load_at(bed, time - REST)
+        forces[body, :2] = load_at(bed, time - REST)[0]
         return forces
 
-    run.loads = loads
+    run = Simulation(scene, step=step, tolerance=tolerance, loads=loads)
+    run.motion = start
     for half in range(2 * cycles + 1):
         seconds = REST if half == 0 else 0.5 * PERIOD
         count = int(np.ceil(seconds / step - 1e-9))
@@ -144,7 +147,7 @@ def rigid_moments(
             before, begin = run.positions[body].copy(), process_time()
             run.advance(seconds / count)
             spent += process_time() - begin
-            work += float(forces[body, 1] * (run.positions[body] - before)[1])
+            work += float(forces[body, :2] @ (run.positions[body] - before))
         found = run.contacts
         contacts = {
             "bodies": np.column_stack([found.body_a, found.body_b]), "point": found.point,
@@ -167,7 +170,7 @@ def soft_moments(
         seconds = REST if half == 0 else 0.5 * PERIOD
         since = -REST if half == 0 else 0.5 * PERIOD * (half - 1)
         times = since + np.linspace(0, seconds, 41)
-        forces = np.column_stack([np.zeros(41), load_at(bed, times)])
+        forces = load_at(bed, times)
         begin = process_time()
         soft_advance(run, body, forces, seconds)
         spent += process_time() - begin

@@ -32,8 +32,8 @@ TANGENTIAL = 0.8
 DAMPING = 0.5
 """Share of critical damping of a contact [-], of the mass that moves at it in its direction."""
 STEP_SHARE = 0.05
-"""Step over ``2 sqrt(m / k)`` of the lightest stone [-]; at twice that the dashpots of corners and
-stones with many contacts grow unstable: stacks on a slope creep."""
+"""Step over ``2 sqrt(m / k)`` of the lightest stone [-].  Four blocks upon each other on a slope
+rest at this and at twice this step; at four times it they slide, as the dashpots grow unstable."""
 SKIN = 0.02
 """Width of the neighbour list's skin, as a share of the smallest body's size [-]."""
 

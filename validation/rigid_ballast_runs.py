@@ -1,6 +1,6 @@
 """The runs of the ballast study, one line each in validation/results/rigid-ballast.jsonl.
 
-    python -m validation.rigid_ballast_runs [--seeds 12] [--out FILE]    go on where the record ends
+    python -m validation.rigid_ballast_runs [--beds 7] [--out FILE]    go on where the record ends
 
 Lines: ``bed`` (the tamped state that a seed's runs start from), ``rigid`` and ``soft`` (a run),
 ``state`` (the contacts of the first seed under the last peak load, for the picture).
@@ -38,7 +38,7 @@ from validation.rigid_ballast_measures import dissipated, fabric_of
 
 RECORD = Path(__file__).parent / "results" / "rigid-ballast.jsonl"
 Row = dict[str, Any]
-CYCLES, SEEDS = 10, 12
+CYCLES, BEDS, SEEDS = 10, 7, 13
 
 
 @dataclass(frozen=True)
@@ -64,11 +64,9 @@ TOLERANCE = 1e-6
 LEVELS = (
     *(Level("rigid", step, TOLERANCE) for step in (4e-3, 2e-3, 1e-3)),
     *(Level("soft", stiffness, STEP_SHARE) for stiffness in (1e7, 1e8, 1e9)),
-    Level("rigid", 5e-4, TOLERANCE), Level("soft", 1e10, STEP_SHARE),
-    Level("rigid", 1e-3, 1e-4), Level("soft", 1e8, 0.5 * STEP_SHARE),
-    Level("rigid", 2.5e-4, TOLERANCE), Level("rigid", 2e-3, 1e-8),
+    Level("rigid", 5e-4, TOLERANCE), Level("soft", 4e9, STEP_SHARE), Level("rigid", 4e-3, 1e-8),
 )  # fmt: skip
-"""In the order of their runs: what is cut off at the end are the controls."""
+"""In the order of their runs."""
 QUICK_LEVELS = (
     *(Level("rigid", step, TOLERANCE) for step in (4e-3, 2e-3)),
     *(Level("soft", stiffness, STEP_SHARE) for stiffness in (1e8, 1e9)),
@@ -162,22 +160,29 @@ def _seven(text: str) -> float:
 
 
 def study(
-    beds: Sequence[Bed], levels: Sequence[Level], cycles: int, known: Sequence[Row],
-    write: Callable[[Row], None],
+    beds: Sequence[Bed], wanted: int, levels: Sequence[Level], cycles: int,
+    known: Sequence[Row], write: Callable[[Row], None],
 ) -> None:  # fmt: skip
-    """All runs that ``known`` lacks: the beds, then level after level; each line is written when it
-    is there."""
+    """All runs that ``known`` lacks: the first ``wanted`` of the beds that can be used, then level
+    after level; each line is written when it is there."""
     _compile()
     poured = {row["bed"]["seed"]: row for row in known if row["kind"] == "bed"}
     failed = {row["bed"]["seed"] for row in known if row["kind"] == "no bed"}
     for bed in beds:
-        if bed.seed in poured or bed.seed in failed:
+        if bed.seed in poured or bed.seed in failed or len(poured) >= wanted:
             continue
         try:
             poured[bed.seed] = bed_row(bed)
             write(poured[bed.seed])
         except RigidError as error:
-            write({"kind": "no bed", "bed": asdict(bed), "why": str(error)})
+            write(
+                {
+                    "kind": "no bed",
+                    "bed": asdict(bed),
+                    "why": str(error),
+                    "error": type(error).__name__,
+                }
+            )
     done = {(row["bed"]["seed"], row["name"]) for row in known if row["kind"] in ("rigid", "soft")}
     for level in levels:
         for bed in beds:
@@ -187,9 +192,10 @@ def study(
 
 
 def _compile() -> None:
-    """A bed of few stones by both methods, so that no cost holds the time of a compiler."""
+    """Few stones that fall, by both methods, so that no cost holds the time of a compiler."""
     bed = Bed(1, stones=4, width=0.15, sleeper=0.08, peak=2e3)
-    _, scene, start = bed_again(bed_row(bed))
+    scene = bed_scene(bed)
+    start = world_of(scene)[1]
     for level in QUICK_LEVELS[::2]:
         list(level_moments(level, bed, scene, start, 1))
 
@@ -204,10 +210,10 @@ def rows_read(path: Path = RECORD) -> list[Row]:
 def main(words: Sequence[str] | None = None) -> None:
     """Read the command line and go on with the study."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="beds")
+    parser.add_argument("--beds", type=int, default=BEDS, help="how many")
     parser.add_argument("--out", type=Path, default=RECORD, help="the record")
     arguments = parser.parse_args(words)
-    command = ["python", "-m", "validation.rigid_ballast_runs", "--seeds", str(arguments.seeds)]
+    command = ["python", "-m", "validation.rigid_ballast_runs", "--beds", str(arguments.beds)]
     origin = provenance(command)
     kept = {name: origin[name] for name in ("commit", "command", "machine", "started")}
     kept["damping"] = DAMPING
@@ -216,8 +222,8 @@ def main(words: Sequence[str] | None = None) -> None:
         with arguments.out.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row | kept) + "\n")
 
-    beds = [Bed(seed) for seed in range(1, arguments.seeds + 1)]
-    study(beds, LEVELS, CYCLES, rows_read(arguments.out), write)
+    beds = [Bed(seed) for seed in range(1, SEEDS + 1)]
+    study(beds, arguments.beds, LEVELS, CYCLES, rows_read(arguments.out), write)
 
 
 if __name__ == "__main__":

@@ -54,7 +54,9 @@ PICTURE = """
 
 Every mark is an engine on one scene that must rest or move by a known way; errors below 1e-17 m
 are drawn there, the line is the bar of most scenes.  Soft contacts are cheap: at equal steps ours
-costs more and is exact to round-off; the peers' errors are those of their models and tolerances.
+costs more, and is exact to round-off or its tolerance; that is relative to the largest forces, so
+mass ratios of 1e8 and more end it (the marks of ours above the line).  The peers' errors are those
+of their models and tolerances.
 """
 
 

@@ -23,11 +23,13 @@ from validation.rigid_indeterminacy import (
     RELAXATION,
     SCENES,
     SPRINGS,
+    Row,
     order_rows,
     scene_rows,
     warm_up,
 )
 from validation.rigid_indeterminacy_picture import picture_draw
+from validation.rigid_indeterminacy_wear import wear_rows
 
 ROOT = Path(__file__).parents[1]
 RECORD = ROOT / "validation" / "results" / "rigid-indeterminacy.jsonl"
@@ -90,19 +92,34 @@ are from it.
 
 ORDER_TEXT = """## Order, numbers, start
 
-Contacts and bodies in random order, and a random start of a tenth of the final displacements;
-relative difference of all forces (2-norm).  Pyramids not used in development of the method; between
-walls for friction 0 and 0.3.
+Contacts and bodies in random order, and then a random start of a tenth of the final displacements
+as well; relative difference of all forces (2-norm).  Pyramids not used in development of the
+method; between walls for friction 0 and 0.3.
 """
 
-UNSTABLE_TEXT = """"Not found": with many sliding contacts the direct limit may not exist as a place
-that the relaxation tends to.  Coulomb's law has no potential: the tangent of springs and sliders
-along the way has eigenvalues with negative real parts (-1e-5 to -7e-4 of the stiffest mode on
-collapsing pyramids of 210 discs at friction 0.2 and 0.5; at 0.05, where the limit is found, none
-below -1e-7), so small differences grow, long implicit steps jump between branches, and short
-ones wander: followed with short steps, forces of 590 contacts went on changing by 1 to 10 % a step
-at residuals of 1e-5 to 1e-2 for 200 steps.  The answer says "not converged" then, with its best
-point.  `solve_friction` has forces for such piles, to round-off, but not unique ones.
+UNSTABLE_TEXT = """
+Order and numbers never matter where the limit is found.  The start may, where contacts slide: of
+these, pyramids of 210 and 465 discs at friction 5 have more than one state.
+
+"Not found": with many sliding contacts the limit may not be a place that the relaxation tends to.
+Coulomb's law has no potential: on pyramids of 210 discs that collapse at friction 0.2 and 0.5 the
+tangent of springs and sliders along the way has eigenvalues down to -7e-5 and -7e-4 (its largest
+are 0.3 and 0.4; at friction 0.05, where the limit is found, none is below -1e-7), so small
+differences grow.  Long implicit steps jump between branches and short ones wander: followed with
+short steps at friction 0.2, residuals stayed between 1e-5 and 2e-2 for 220 steps.  The answer says
+"not converged" then, with its best point.  `solve_friction` has forces for such piles too, but not
+unique ones.
+"""
+
+WEAR_TEXT = """## Wear and breakage in a run
+
+`Simulation(scene, wear=Wear(k), breakage=Breakage(strength))`, or `[wear]` and `[strength]` in a
+scene file: the work of friction takes the corners off polygons by ``V = k W`` (Archard, Reye),
+grains whose contact forces pull them apart harder than their strength are split, in 2D by the
+Brazilian criterion.  Where neither is named nothing of it is computed.  Where a criterion hangs on
+forces that are not unique, `Breakage(unique=True)` judges by those of elastic contacts: in the
+tower below, the time stepping's own forces hold friction that squeezes the boxes sideways, and its
+boxes do not break.
 """
 
 
@@ -114,17 +131,20 @@ def measure(quick: bool) -> None:
     lines: list[Data] = []
     for scene in SCENES:
         for row in scene_rows(scene, quick):
-            data = {"case": "rigid-indeterminacy"} | asdict(row)
-            data["error"] = data["error"] if isfinite(data["error"]) else None
-            lines.append(data | kept)
+            lines.append(_line(row, kept))
             print(row.scene, row.method, row.stiffness, row.ramp, f"{row.error:.1e}", flush=True)
-    lines += _order_lines(quick, kept)
+    lines += _order_lines(quick, kept) + _wear_lines(quick, kept)
     write_atomically(RECORD, "\n".join(json.dumps(line) for line in lines) + "\n")
+
+
+def _line(row: Row, kept: Data) -> Data:
+    data = {"case": "rigid-indeterminacy"} | asdict(row)
+    return data | {"error": row.error if isfinite(row.error) else None} | kept
 
 
 def _order_lines(quick: bool, kept: Data) -> list[Data]:
     lines = []
-    for row in order_rows((6, 12) if quick else (6, 12, 20, 30)):
+    for row in order_rows((6, 12) if quick else (6, 12, 16, 20, 30)):
         data = {"case": "rigid-indeterminacy", "method": "order"} | asdict(row)
         for name in ("order", "start"):
             data[name] = data[name] if isfinite(data[name]) else None
@@ -133,12 +153,23 @@ def _order_lines(quick: bool, kept: Data) -> list[Data]:
     return lines
 
 
-def measure_order() -> None:
-    """Measure the rows on order, numbers and start only; the other lines of the record stay."""
-    origin = provenance(["python", "-m", "validation.rigid_indeterminacy_page", "--order"])
+def _wear_lines(quick: bool, kept: Data) -> list[Data]:
+    return [
+        {"case": "rigid-indeterminacy", "method": "wear", "scene": row.name} | asdict(row) | kept
+        for row in wear_rows(quick)
+    ]
+
+
+def measure_part(method: str) -> None:
+    """Measure ``order``, ``wear`` or the direct limit only; other lines of the record stay."""
+    origin = provenance(["python", "-m", "validation.rigid_indeterminacy_page", "--only", method])
     kept = {name: origin[name] for name in ("commit", "command", "machine", "started")}
-    lines = [line for line in record_read() if line["method"] != "order"]
-    lines += _order_lines(False, kept)
+    if method == LIMIT:
+        warm_up()
+        made = [_line(next(scene_rows(scene, False)), kept) for scene in SCENES]
+    else:
+        made = (_order_lines if method == "order" else _wear_lines)(False, kept)
+    lines = [line for line in record_read() if line["method"] != method] + made
     write_atomically(RECORD, "\n".join(json.dumps(line) for line in lines) + "\n")
 
 
@@ -153,7 +184,7 @@ def page(lines: Sequence[Data]) -> str:
     return "\n".join([
         HEAD, machine, STIFF_TEXT, *_stiff_table(lines), "", COST_TEXT, *_cost_table(lines), "",
         SLIDING_TEXT, *_sliding_table(lines), "", ORDER_TEXT, *_order_table(lines), "",
-        UNSTABLE_TEXT,
+        UNSTABLE_TEXT, WEAR_TEXT, *_wear_table(lines), "",
     ])  # fmt: skip
 
 
@@ -240,17 +271,26 @@ def _order_table(lines: Sequence[Data]) -> list[str]:
     return table
 
 
+def _wear_table(lines: Sequence[Data]) -> list[str]:
+    table = ["| what | measured | bar |", "|---|---|---|"]
+    for line in lines:
+        if line["method"] == "wear":
+            unit = f" {line['unit']}" if line["unit"] else ""
+            table.append(f"| {line['name']} | {line['value']:.2g}{unit} | {line['bar']:g}{unit} |")
+    return table
+
+
 def main(words: Sequence[str] | None = None) -> None:
     """Read the command line; measure if asked to; write the page."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--run", action="store_true", help="measure first, and write the record")
     parser.add_argument("--quick", action="store_true", help="fewer settings")
-    parser.add_argument("--order", action="store_true", help="measure the last table only")
+    parser.add_argument("--only", choices=("order", "wear", LIMIT), help="measure this table only")
     arguments = parser.parse_args(words)
     if arguments.run:
         measure(arguments.quick)
-    elif arguments.order:
-        measure_order()
+    elif arguments.only:
+        measure_part(arguments.only)
     lines = record_read()
     write_atomically(PAGE, page(lines))
     picture_draw(lines, PAGE.with_suffix(".png"))

@@ -43,7 +43,7 @@ SICONOS = {
 }
 """Solvers by dimension; the others are slower or worse on all stored problems."""
 SICONOS_MOST = {
-    "2D_LEMKE": 300, "2D_NSGS": 1000, "2D_CPG": 1000, "3D_NSN_AC": 1500, "3D_NSN_FB": 500,
+    "2D_LEMKE": 300, "2D_NSGS": 500, "2D_CPG": 1000, "3D_NSN_AC": 500, "3D_NSN_FB": 500,
     "3D_PROX": 500,
 }  # fmt: skip
 """Contacts above which a solver is not tried: dense matrices, or far behind the others there."""

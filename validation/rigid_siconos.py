@@ -25,6 +25,8 @@ GROWTH, WORTH = 10.0, 2.0
 """A run that stopped at its number of iterations is made again with up to ten times as many, if
 there is time for twice as many and the forces were not the same as before."""
 SAME, SHORT_S = 1e-14, 0.2
+PILOT = 20
+"""Iterations that show what one costs, so that the first run ends in time."""
 TOGETHER = 3.0
 """All runs of a solver on a problem end when they have taken so many times what one may."""
 
@@ -49,6 +51,16 @@ def run(numerics: Any, problem: Any, job: dict[str, Any]) -> tuple[dict[str, Any
     return {"info": int(info), "cost_s": cost, "iterations": done, "allowed": allowed}, force
 
 
+def affordable(numerics: Any, problem: Any, job: dict[str, Any]) -> int | None:
+    """Iterations that the time is enough for, or None where it is enough for the default."""
+    if not job["solver"].endswith(("NSGS", "ADMM", "CPG", "PROX")):
+        return None
+    pilot, _ = run(numerics, problem, job | {"iterations": PILOT})
+    default, _ = run(numerics, problem, job | {"iterations": None, "tolerance": 1e30})
+    each = pilot["cost_s"] / max(pilot["iterations"], 1)
+    return None if each * default["allowed"] <= job["budget_s"] else int(job["budget_s"] / each)
+
+
 def matrix_of(arrays: Any, dim: int) -> Any:
     """W as the drivers take it: dense in 2D, where they refuse sparse ones, columns in 3D."""
     import scipy.sparse as sp
@@ -63,8 +75,10 @@ def main(folder: Path) -> None:
     arrays = np.load(folder / "problem.npz")
     dim = int(arrays["dim"])
     problem = dim, matrix_of(arrays, dim), arrays["q"], arrays["mu"]
-    allowed, begun = None, time.process_time()
-    for number, job in json.loads((folder / "jobs.json").read_text()):
+    jobs = json.loads((folder / "jobs.json").read_text())
+    begun = time.process_time()
+    allowed = affordable(numerics, problem, jobs[0][1]) if jobs else None
+    for number, job in jobs:
         budget, last = job["budget_s"], np.full(len(problem[2]), np.nan)
         if time.process_time() - begun > TOGETHER * budget:
             break

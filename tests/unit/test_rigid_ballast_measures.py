@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from validation.rigid_ballast_measures import (
+    Floats,
     dissipated,
     fabric_of,
     mean_with_interval,
@@ -15,8 +16,9 @@ from validation.rigid_ballast_measures import (
 
 @pytest.mark.parametrize("kind", ["log", "linear"])
 def test_law_finds_its_own_coefficients(kind: str) -> None:
-    cycles = np.arange(1, 21)
-    settlement = 1e-3 + 2e-4 * (np.log(cycles) if kind == "log" else cycles)
+    cycles = np.arange(1, 21, dtype=float)
+    column: Floats = np.log(cycles) if kind == "log" else cycles
+    settlement = 1e-3 + 2e-4 * column
     a, b, error = settlement_law(settlement, kind)
     assert (a, b) == pytest.approx((1e-3, 2e-4), rel=1e-10)
     assert error < 1e-15

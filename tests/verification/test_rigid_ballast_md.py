@@ -75,7 +75,10 @@ def test_work_of_the_load_is_kinetic_energy_in_free_flight() -> None:
 
 
 def test_friction_of_a_wall_is_remembered_in_a_scene_of_many_bodies() -> None:
-    """Walls have small numbers: their springs must survive beside those of other pairs."""
+    """Walls have small numbers: their springs must survive beside those of other pairs.
+
+    Lost springs let the stack slide on; with them it rests but for some ringing of the edges.
+    """
     scene = Scene(2, gravity=9.81 * np.array([np.sin(0.3), -np.cos(0.3)]))
     scene.add(HalfSpace([0, 1], 0.0))
     for k in range(4):
@@ -85,7 +88,7 @@ def test_friction_of_a_wall_is_remembered_in_a_scene_of_many_bodies() -> None:
     md.soft_advance(run, 1, np.zeros((2, 2)), 1.0)
     start = run.motion.position[1:, 0].copy()
     md.soft_advance(run, 1, np.zeros((2, 2)), 0.4)
-    assert np.abs(run.motion.position[1:, 0] - start).max() < 1e-9
+    assert np.abs(run.motion.position[1:, 0] - start).max() < 1e-4 * np.abs(start).max()
 
 
 def law_twin(

@@ -129,3 +129,22 @@ def test_breakage_that_is_refused():
     ):
         with pytest.raises(ShapeError):
             Breakage(**bad)
+
+
+def test_a_pressed_cube_breaks_in_space():
+    """Point load F / d^2 of the greatest pair: a cube between floor and plate in 3D splits in two
+    halves along the force, with its mass, and the pile stays."""
+    from rigid_lcp.shapes_3d import box
+
+    scene = Scene(3)
+    scene.add(HalfSpace([0, 0, 1]), friction=0.5)
+    scene.add(box(0.1, 0.1, 0.1), density=2700.0, position=[0, 0, 0.05], friction=0.5)
+    scene.add(box(0.1, 0.1, 0.02), density=5e5, position=[0, 0, 0.11], friction=0.5)
+    run = Simulation(scene, step=1e-3, breakage=Breakage(1e4, every=1))
+    run.advance(1e-3)
+    assert [event.body for event in run.broken] == [1]
+    # four corners carry a quarter of the plate each, over the edge of 0.1 m
+    assert run.broken[0].tension == pytest.approx(100 * GRAVITY / 4 / 0.1**2, rel=0.05)
+    masses = run.world.scene.bodies[1].mass + run.world.scene.bodies[3].mass
+    assert masses == pytest.approx(2.7, rel=1e-12)
+    assert run.overlap < 1e-9

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -217,6 +219,27 @@ def test_what_stands_still_does_not_collide() -> None:
     found = collide(ball, [1e-9, -1e-9, 0.0], 0.5, 0.3, still=1e-9)
     assert found.rounds == 0
     assert (found.velocity == [1e-9, -1e-9, 0.0]).all()
+
+
+@pytest.mark.parametrize("eps", [0.0, 0.5, 1.0])
+def test_a_wall_that_is_driven(eps: float) -> None:
+    """A wall comes with speed w towards a ball at rest: it leaves with ``(1 + eps) w``.
+
+    In the wall's frame energy does not grow, whatever the wall does to it in ours.
+    """
+    ball = one_body([([0.0, 1.0], [0.0, -0.5])], 0.1)
+    found = collide(ball, [0.0, 0.0, 0.0], eps, 0.3, drive=[-2.0, 0.0])
+    assert found.velocity == pytest.approx([0.0, 2.0 * (1 + eps), 0.0])
+    assert found.energy_change <= 0
+    away = collide(ball, [0.0, -1.0, 0.0], eps, 0.3, drive=[3.0, 0.0])
+    assert away.rounds == 0
+
+
+def test_a_body_of_four_freedoms() -> None:
+    """Neither 2D nor 3D."""
+    ball = one_body([([0.0, 1.0], [0.0, -0.5])], 0.1)
+    with pytest.raises(ProblemError, match="4 freedoms"):
+        collide(replace(ball, body_size=4), [0.0, -1.0, 0.0], 0.5)
 
 
 def test_rounds_that_do_not_end_are_cut() -> None:

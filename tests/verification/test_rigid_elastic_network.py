@@ -1,4 +1,4 @@
-"""Springs and sliders: slopes and energies of the force law by differences."""
+"""Springs and sliders: slopes and energies by differences, and the implicit step."""
 
 from __future__ import annotations
 
@@ -7,8 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.elastic_network import slider_energy, slider_forces, slider_slope
-from rigid_lcp.micro_displacements import coulomb_spring
+from rigid_lcp.elastic_network import (
+    ElasticNetwork,
+    slider_energy,
+    slider_forces,
+    slider_slope,
+)
+from rigid_lcp.micro_displacements import coulomb_spring, free_motion, mass_free_jacobian
+from tests.rigid_static_problems import pyramid
 
 
 @settings(max_examples=40, deadline=None)
@@ -35,3 +41,25 @@ def test_slider_slope_and_energy_by_differences(seed, dim):
             one[c, j] += e
             gain = slider_energy(k * one, k, limits) - slider_energy(k * xi, k, limits)
             assert gain / e == pytest.approx(force[c, j], abs=1e-5)
+
+
+def test_implicit_step_is_a_friction_problem():
+    """`friction_step` balances ``d / h = Q + J^T f(xi - J d)``, the equation of `coulomb_step`,
+    from deformations as well as from nothing; where Newton finds the move too, it is the same."""
+    problem = pyramid(4, 0.3, across=2.0)
+    jacobian, _ = mass_free_jacobian(problem.bodies)
+    shape = (problem.contacts, 2)
+    free = free_motion(jacobian, problem.offset)
+    network = ElasticNetwork(jacobian, free, np.full(shape, 0.05), problem.friction)
+    rng = np.random.default_rng(2)
+    for deformation in (np.zeros(shape), rng.normal(size=shape) * 30):
+        for h in (3.0, 100.0):
+            move, found = network.friction_step(deformation, h)
+            assert found
+            trial = network.trial(deformation, move)
+            force = slider_forces(trial, network.allowed(trial))
+            left = network.imbalance(force, move, h)
+            assert np.linalg.norm(left) < 1e-11 * network.load
+            newton, converged = network.coulomb_step(deformation, np.zeros_like(move), h, 50)
+            if converged and h == 3.0:
+                assert move == pytest.approx(newton, rel=1e-8, abs=1e-9)

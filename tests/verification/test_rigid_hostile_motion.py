@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import cos, pi, sin
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from rigid_lcp.acceleration_forces import forces_found, forces_if_lasting
+from rigid_lcp.errors import NotConverged
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
@@ -95,6 +97,36 @@ def test_two_corners_at_once(restitution: float) -> None:
     run.advance(0.5)
     after = np.array([*run.velocities[0], run.spins[0]])
     np.testing.assert_allclose(after, [0, restitution, 0], atol=1e-9)
+
+
+def test_a_common_velocity_changes_nothing() -> None:
+    """Galilei: grains, and the fixed slab they fall on, all with the same velocity."""
+    ends = []
+    for velocity in ((0.0, 0.0), (0.7, 0.3)):
+        scene = Scene(2)
+        for k in range(2):
+            scene.add(
+                Polygon.regular(5, 0.1), density=1.0, position=(0.25 * k, 0.13 + 0.02 * k),
+                angle=0.3 * k, velocity=velocity, restitution=0.3,
+            )  # fmt: skip
+        scene.add(
+            Polygon.rectangle(2, 0.1), fixed=True, position=(0, -0.05), velocity=velocity,
+            friction=0.4, restitution=0.3,
+        )  # fmt: skip
+        run = Simulation(scene, "acceleration", step=0.01)
+        run.advance(0.12)
+        assert run.pace.collisions > 1
+        ends.append(run.positions - 0.12 * np.array(velocity))
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("quick", [{"spin": 1e9}, {"velocity": (1e9, 0)}])
+def test_too_fast_to_be_followed(quick: dict[str, Any]) -> None:
+    """A step a thousandth of a turn: it says so instead of going on for ever."""
+    scene = Scene(2, (0, 0))
+    scene.add(Polygon.regular(5, 0.1), density=1.0, **quick)
+    with pytest.raises(NotConverged, match="more than 1e"):
+        Simulation(scene, "acceleration").advance(1.0)
 
 
 def test_a_rod_that_hits_with_its_tip_gains_no_energy() -> None:

@@ -34,12 +34,12 @@ def apart(grains: Grains, friction: float, force) -> float:
 
 @pytest.mark.parametrize("make", [beam, wedge, lambda: pyramid(4, walls=True, seed=11)])
 def test_springs_end_in_the_limit_as_they_get_stiffer(make):
-    """Without friction, on scenes of each kind: a tenth of the error for ten times the stiffness."""
+    """Without friction, on scenes of each kind: a tenth of the error at ten times the stiffness."""
     grains = make()
     errors = []
     for stiffness in (1e3, 1e4, 1e5):
-        rest = springs_rest(grains, stiffness * grains.weight, 0.0)
-        assert rest.imbalance <= 1e-11
+        rest = springs_rest(grains, stiffness * grains.weight, 0.0, tolerance=1e-9)
+        assert rest.imbalance <= 1e-9
         errors.append(apart(grains, 0.0, rest.force))
     assert np.log10(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
     assert np.log10(errors[1] / errors[2]) == pytest.approx(1.0, abs=0.1)
@@ -50,7 +50,7 @@ def test_springs_end_in_the_limit_as_they_get_stiffer(make):
 def test_springs_on_plane_walls_agree_at_any_stiffness(stiffness):
     """A disc keeps its normals as it sinks into plane walls: only round-off is left."""
     grains = groove()
-    rest = springs_rest(grains, stiffness * grains.weight, 0.0)
+    rest = springs_rest(grains, stiffness * grains.weight, 0.0, tolerance=1e-10)
     assert apart(grains, 0.0, rest.force) < 1e-9
 
 
@@ -61,7 +61,7 @@ def test_with_friction_the_load_must_grow_slowly(make, friction):
     grains = make()
     error = {
         ramp: apart(grains, friction, springs_rest(
-            grains, 1e6 * grains.weight, friction, ramp=ramp, tolerance=1e-10).force)
+            grains, 1e6 * grains.weight, friction, ramp=ramp, tolerance=1e-8).force)
         for ramp in (0, 1_000, 10_000)
     }  # fmt: skip
     assert error[0] > 1e-2
@@ -73,10 +73,10 @@ def test_springs_are_in_balance_and_obey_coulomb():
     """The peer itself: forces at rest solve the rigid problem to the order of 1 / k."""
     grains = pyramid(4, walls=True)
     problem = grains.problem(0.3)
-    rest = springs_rest(grains, 1e6 * grains.weight, 0.3, ramp=2_000, tolerance=1e-10)
+    rest = springs_rest(grains, 1e6 * grains.weight, 0.3, ramp=2_000, tolerance=1e-8)
     assert problem.residual(rest.force.ravel()) < 1e-5
     assert (np.abs(rest.force[:, 1]) <= 0.3 * rest.force[:, 0] * (1 + 1e-12)).all()
-    coarse = springs_rest(grains, 1e4 * grains.weight, 0.3, ramp=2_000, tolerance=1e-10)
+    coarse = springs_rest(grains, 1e4 * grains.weight, 0.3, ramp=2_000, tolerance=1e-8)
     assert problem.residual(coarse.force.ravel()) > 10 * problem.residual(rest.force.ravel())
 
 
@@ -85,7 +85,7 @@ def test_friction_can_have_two_states_at_one_load():
     at the springs' displacements it finds that one.  Both solve the rigid problem to round-off."""
     grains = pyramid(10, walls=True)
     problem, stiffness = grains.problem(0.3), 1e7 * grains.weight
-    rest = springs_rest(grains, stiffness, 0.3, ramp=20_000, tolerance=1e-8)
+    rest = springs_rest(grains, stiffness, 0.3, ramp=10_000, tolerance=1e-6)
     first = elastic_limit(problem)
     other = elastic_limit(problem, start=stiffness * rest.displacement)
     assert max(first.residual, other.residual) < 1e-12
@@ -100,7 +100,7 @@ def test_liggghts_agrees():
     grains = pyramid(3, walls=True, seed=5)
     for stiffness in (1e3, 1e5):
         force, imbalance, cpu = liggghts_rest(grains, stiffness * grains.weight, 0.0, steps=20_000)
-        ours = springs_rest(grains, stiffness * grains.weight, 0.0).force
+        ours = springs_rest(grains, stiffness * grains.weight, 0.0, tolerance=1e-9).force
         assert imbalance < 1e-8
         assert cpu > 0
         error = apart(grains, 0.0, force)
@@ -109,7 +109,7 @@ def test_liggghts_agrees():
 
 
 def test_redundancy_and_sliding_are_counted():
-    """Beam: 3 forces for 2 equations (the sideways one is idle); wedge without friction: 4 for 3."""
+    """Beam: 3 forces for 2 equations (none acts sideways); wedge without friction: 4 for 3."""
     for grains, friction, spare in ((beam(), 0.0, 1), (wedge(), 0.0, 1), (groove(), 5.0, 1)):
         problem = grains.problem(friction)
         force = elastic_limit(problem).r.reshape(-1, 2)
@@ -160,6 +160,7 @@ def test_case_judges_its_rows(monkeypatch):
 
     monkeypatch.setattr(case, "scene_rows", rows)
     monkeypatch.setattr(case, "order_rows", lambda sizes: [])
+    monkeypatch.setattr(case, "wear_rows", lambda quick: [])
     monkeypatch.setattr(case, "warm_up", lambda: None)
     checks = case_load("rigid-indeterminacy")(True)
     failed = [check.name for check in checks if not check.holds]

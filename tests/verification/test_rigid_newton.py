@@ -120,6 +120,24 @@ def test_all_factorisations_solve_the_same_system(dim):
         assert np.linalg.norm(full @ x - right) < 1e-10 * np.linalg.norm(right), made.__name__
 
 
+def test_a_body_that_nothing_touches_and_one_with_a_full_mass():
+    """It keeps its own rows of the body matrix; the answer is that of the contacts' matrix."""
+    g = np.random.default_rng(6)
+    jacobian = np.zeros((9, 18))
+    jacobian[:6, :6] = g.standard_normal((6, 6))
+    jacobian[3:, 12:] = g.standard_normal((6, 6))
+    turned = g.standard_normal((6, 6))
+    inverse_mass = sp.block_diag([np.eye(6), np.eye(6), turned @ turned.T + np.eye(6)])
+    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(inverse_mass), 6)
+    problem = friction_problem(space, g.standard_normal(9), 0.4, 3)
+    a = np.broadcast_to(0.3 * np.eye(3), (3, 3, 3)).copy()
+    b = g.standard_normal((3, 3, 3)) * 0.1 + np.eye(3)
+    full = sp.block_diag(list(a)) + sp.block_diag(list(b)) @ problem.delassus
+    right = g.standard_normal(9)
+    x = BodyFactorisation(problem).factor(a, b)(right)
+    np.testing.assert_allclose(full @ x, right, rtol=0, atol=1e-12)
+
+
 def test_a_singular_system_is_named():
     problem = chain(2, 2)
     with pytest.raises(SingularSystem):
@@ -141,6 +159,46 @@ def test_newton_converges_quadratically_from_near(dim):
         again = newton(problem, near, 1e-12)
         assert again.solved
         assert again.work["iterations"] <= 4
+
+
+@pytest.mark.parametrize(("force", "velocity"), [(1e6, 1.0), (1e-3, 1e3), (1e9, 1e-9)])
+def test_newton_does_not_depend_on_units(force, velocity):
+    """W in velocity per force: three steps in other units end at the same forces; so the shift is
+    one over mean(diag W), not a number."""
+    problem = chain(12, 3, 1)
+    assert problem.bodies is not None
+    near = 1.01 * interior_point(problem, None, 1e-6, Path()).r
+    share = velocity / force
+    space = BodySpace(
+        problem.bodies.jacobian, sp.csr_array(problem.bodies.inverse_mass * share), 6
+    )  # fmt: skip
+    other = friction_problem(space, problem.offset * velocity, problem.friction, 3)
+    steps = newton(problem, near, 1e-300, iterations=3)
+    turned = newton(other, near * force, 1e-300, iterations=3)
+    np.testing.assert_allclose(turned.r / force, steps.r, rtol=1e-7, atol=1e-9)
+
+
+def test_the_shift_falls_where_only_it_holds_the_steps_up():
+    """A tower whose contacts all stick: W's least eigenvalue falls as height^-2 and less, and
+    proximal steps with a shift kept at 1e-5 would take off but a part of the error each."""
+    boxes = 60
+    jacobian = np.zeros((4 * boxes, 3 * boxes))
+    for k in range(boxes):
+        for side, arm in enumerate((-0.5, 0.5)):
+            row = 4 * k + 2 * side
+            jacobian[row, 3 * k + 1], jacobian[row, 3 * k + 2] = 1.0, arm
+            jacobian[row + 1, 3 * k], jacobian[row + 1, 3 * k + 2] = 1.0, 0.5
+            if k:
+                jacobian[row, 3 * k - 2], jacobian[row, 3 * k - 1] = -1.0, -arm
+                jacobian[row + 1, 3 * k - 3], jacobian[row + 1, 3 * k - 1] = -1.0, 0.5
+    inverse_mass = sp.diags_array(np.tile([1.0, 1.0, 6.0], boxes))
+    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(inverse_mass), 3)
+    offset = jacobian @ np.tile([0.2, -1.0, 0.0], boxes)
+    problem = friction_problem(space, offset, 0.9, 2)
+    rough = interior_point(problem, None, 1e-4, Path(convex=True))
+    exact = newton(problem, rough.r, 1e-13)
+    assert exact.solved
+    assert exact.work["iterations"] <= 12
 
 
 def test_the_shift_leaves_no_error_on_redundant_contacts():

@@ -18,13 +18,11 @@ from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
 from rigid_lcp.wear import (
     Wear,
-    chamfered,
     contact_stiffness_worn,
-    corners_taken,
-    polygon_worn,
     scene_worn,
     wear_start,
 )
+from rigid_lcp.worn_polygon import chamfered, corners_taken, cut_depth, polygon_worn
 
 GRAVITY = 9.81
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -164,12 +162,12 @@ def test_worn_polygons_lose_exactly_what_they_shall(seed, corners, share):
     for _ in range(4):
         pending = rng.uniform(0, 1, len(grain.vertices)) * (rng.random(len(grain.vertices)) < 0.7)
         pending *= share * area / 4 / max(pending.sum(), 1e-9)
-        made = polygon_worn(grain, pending)
+        made, left = polygon_worn(grain, pending) or (None, None)
         if made is None:
             continue
         now = polygon_moments(made.vertices)[0]
         before = polygon_moments(grain.vertices)[0]
-        assert now == pytest.approx(before - pending.sum(), abs=1e-11)
+        assert now == pytest.approx(before - pending.sum() + left.sum(), abs=1e-11)
         worn = Polygon(made.vertices)  # convex, or it is refused
         outward, faces = shape.face_normals, shape.vertices
         height = (made.vertices[:, None] - faces[None]) @ outward.T
@@ -186,7 +184,7 @@ def test_chamfer_by_chamfer_is_one_chamfer_of_the_sum():
     for k in range(10):
         pending = np.zeros(len(grain.vertices))
         pending[np.flatnonzero(grain.owner == 2)[k % 2 if k else 0]] = 1e-3
-        grain = polygon_worn(grain, pending)
+        grain, _ = polygon_worn(grain, pending)
     once, _ = chamfered(grain.sharp, np.array([0, 0, 1e-2, 0]))
     assert grain.vertices == pytest.approx(once, abs=1e-14)
     assert grain.total[grain.owner == 2] == pytest.approx(1e-2)
@@ -199,6 +197,27 @@ def test_corner_larger_than_its_edges():
     assert len(nearest) == len(left)
     with pytest.raises(ShapeError, match="cut more often"):
         corners_taken(SQUARE, np.array([0.6, 0.0, 0.0, 0.0]))
+
+
+def test_wear_too_small_to_cut_waits_at_its_corner():
+    """One corner worn by 0.01, another by 1e-20 of the area: a chamfer of 1e-10 m is no edge."""
+    scene = Scene(2)
+    scene.add(Polygon(SQUARE), density=1.0)
+    grain = wear_start(scene).grains[0]
+    assert polygon_worn(grain, np.full(4, 1e-20)) is None
+    made, left = polygon_worn(grain, np.array([0.01, 0.0, 1e-20, 0.0]))
+    assert len(made.vertices) == 5
+    assert left.sum() == 1e-20
+    assert made.owner[np.argmax(left)] == 2
+    assert polygon_moments(made.vertices)[0] == pytest.approx(0.99, rel=1e-14)
+
+
+@settings(max_examples=50, deadline=None)
+@given(share=st.floats(1e-12, 0.999), height=st.floats(0.1, 3.0))
+def test_depth_of_a_cut_in_closed_form(share, height):
+    """A triangle's tip: the area goes with the square of the depth, t = H sqrt(share)."""
+    t = cut_depth(np.array([0.0, -height, -height]), np.array([0.3, -1.0, 1.0]), share * height)
+    assert t == pytest.approx(height * np.sqrt(share), rel=1e-13)
 
 
 def test_stiffness_follows_wear_gradually():
@@ -236,3 +255,19 @@ def test_wear_that_is_refused():
         Wear(1e-9, every=0)
     with pytest.raises(SceneError, match="only polygons"):
         wear_start(Scene(3))
+
+
+def test_order_of_the_bodies_is_no_matter():
+    """Two blocks on a slope, added in either order: each loses the same, to round-off."""
+    lost = []
+    for order in ((0, 1), (1, 0)):
+        scene = Scene(2, [4.0, -8.0])
+        for k in order:
+            block = Polygon.rectangle(0.2 + 0.1 * k, 0.1)
+            scene.add(block, density=2700.0 * (1 + k), position=[k, 0.05], friction=0.1 + 0.2 * k)
+        scene.add(HalfSpace([0, 1]))
+        run = Simulation(scene, step=1e-2, wear=Wear(1e-6, every=3))
+        run.advance(0.2)
+        lost.append([0.02 + 0.01 * k - run.world.scene.bodies[order[k]].shape.area for k in (0, 1)])
+    assert lost[0] == pytest.approx(lost[1], rel=1e-10)
+    assert min(lost[0]) > 0

@@ -1,4 +1,4 @@
-"""Statically indeterminate grains: unique forces against stiff springs in time and LIGGGHTS.
+"""Statically indeterminate grains: unique forces against springs in time; wear and breakage.
 
     trackbed validate rigid-indeterminacy            some minutes
     trackbed validate rigid-indeterminacy --quick    fewer settings
@@ -25,6 +25,7 @@ from validation.rigid_indeterminacy import (
     scene_rows,
     warm_up,
 )
+from validation.rigid_indeterminacy_wear import wear_rows
 
 DENSE_BAR = 1e-12
 """Least energy by dense least squares: round-off of the solution of some hundred equations."""
@@ -40,13 +41,17 @@ def run(quick: bool) -> list[Check]:
     checks = []
     for scene in SCENES:
         checks += scene_checks(scene, list(scene_rows(scene, quick)))
-    for row in order_rows((6, 12) if quick else (6, 12, 20, 30)):
+    for row in order_rows((6, 12) if quick else (6, 12, 16, 20, 30)):
         name = f"{row.scene}: other order and numbers"
         if row.found and row.sliding == 0:
             checks.append(below(name, row.order, ORDER_BAR))
             checks.append(below(f"{row.scene}: other start", row.start, ORDER_BAR))
         else:
             checks.append(reported(f"{row.scene}: limit found", float(row.found)))
+    for measured in wear_rows(quick):
+        bar = f"<= {measured.bar:g}"
+        holds = measured.value <= measured.bar
+        checks.append(Check(measured.name, measured.value, bar, holds, measured.unit))
     return checks
 
 

@@ -1,0 +1,110 @@
+"""What a scene and its run may be given: numbers, spans of time, loads, numbers of bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, nan
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.errors import SceneError, UsageError
+from rigid_lcp.motion import Motion
+
+if TYPE_CHECKING:
+    from rigid_lcp.shapes_2d import HalfSpace
+
+Floats = NDArray[np.float64]
+Loads = Callable[[float, Motion], ArrayLike | None]
+"""Forces and torques (n, 3) in 2D, (n, 6) in 3D [N, N m] at a time [s] and state."""
+
+
+def vector_given(values: ArrayLike, size: int, what: str, where: str) -> Floats:
+    """A copy of ``size`` finite numbers; `SceneError` for anything else."""
+    try:
+        vector = np.atleast_1d(np.array(values, dtype=float))
+    except (TypeError, ValueError):
+        vector = np.zeros(0)
+    if vector.shape != (size,) or not np.isfinite(vector).all():
+        raise SceneError(
+            f"{what} is {values!r}", where=where, remedy=f"give {size} finite number(s)"
+        )
+    return vector
+
+
+def number_in(
+    value: Any, least: float, most: float, what: str, where: str, remedy: str, above: bool = False
+) -> float:
+    """A finite number from ``least`` to ``most``, or ``above`` the least; else `SceneError`."""
+    number = float(value) if isinstance(value, Real) else nan
+    if not least <= number <= most or (above and number == least):
+        raise SceneError(f"{what} is {value!r}", where=where, remedy=remedy)
+    return number
+
+
+def seconds_given(value: Any, what: str, least: float = 0.0) -> float:
+    """A span of time [s], zero allowed unless ``least`` is above it; `UsageError` for any other."""
+    number = float(value) if isinstance(value, Real) else nan
+    if not least <= number < inf:
+        raise UsageError(f"{what} is {value!r}", remedy="give a positive number of seconds")
+    return number
+
+
+def body_given(number: Any, bodies: int) -> int:
+    """The number of a body of a scene; `SceneError` where it has none of that number."""
+    sound = isinstance(number, Integral) and not isinstance(number, bool)
+    if not sound or not 0 <= number < bodies:
+        raise SceneError(
+            f"there is no body {number!r}", where="fragment",
+            remedy=f"give a whole number, 0 to {bodies - 1}, as Scene.add returned it",
+        )  # fmt: skip
+    return int(number)
+
+
+def check_half_space(
+    shape: HalfSpace, position: Any, angle: Any, velocity: Any, spin: Any, where: str
+) -> None:
+    """Raise `SceneError` for what a half-space can not do: be put elsewhere, turn, advance."""
+    speed = np.zeros(shape.dim) if velocity is None else (
+        vector_given(velocity, shape.dim, "velocity", where)
+    )  # fmt: skip
+    advance = abs(float(speed @ shape.normal))
+    if advance > 1e-12 * float(np.linalg.norm(speed)):
+        raise SceneError(
+            f"a half-space can not advance ({advance:.3g} m/s along its normal)", where=where,
+            remedy="give a velocity along its face (a belt), or use a fixed body that moves",
+        )  # fmt: skip
+    if not (position is None and angle is None and spin is None):
+        raise SceneError(
+            "a half-space is where its normal and offset put it", where=where,
+            remedy="leave position, angle and spin out",
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class CheckedLoads:
+    """Loads whose answer is looked at: a row for every body, fragments included, all finite."""
+
+    loads: Loads
+
+    def __call__(self, time: float, motion: Motion) -> Floats | None:
+        """The forces and torques at a time [s]; `SceneError` where they are none."""
+        given = self.loads(time, motion)
+        if given is None:
+            return None
+        shape = motion.rates.shape
+        try:
+            forces = np.asarray(given, dtype=float)
+        except (TypeError, ValueError):
+            forces = np.zeros(0)
+        if forces.shape != shape or not np.isfinite(forces).all():
+            what = f"have shape {forces.shape}" if forces.shape != shape else "are not finite"
+            raise SceneError(
+                f"they {what}", where=f"loads at {time:.6g} s",
+                remedy=f"return finite numbers {shape}: a row for every body, the fixed ones and"
+                " fragments too",
+            )  # fmt: skip
+        return forces

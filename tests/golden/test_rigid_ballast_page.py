@@ -1,0 +1,33 @@
+"""docs/rigid-ballast.md is made from the committed record, and says what it holds."""
+
+from __future__ import annotations
+
+from validation.cases.rigid_ballast import record_checks
+from validation.rigid_ballast_judge import limits_of, summaries
+from validation.rigid_ballast_page import PAGE, page
+from validation.rigid_ballast_runs import PICTURED, RECORD, rows_read
+
+ROWS = rows_read(RECORD)
+
+
+def test_page_is_that_of_the_record() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(ROWS)
+    assert PAGE.with_suffix(".png").is_file()
+
+
+def test_record_holds_its_bars() -> None:
+    assert [check.name for check in record_checks(ROWS) if not check.holds] == []
+
+
+def test_both_methods_have_an_ensemble() -> None:
+    """At least five beds a level, steps of both sides of 1e-3 s, stiffnesses over three decades."""
+    found = [s for s in summaries(ROWS, limits_of(ROWS)) if s.beds >= 5]
+    steps = [s.level["value"] for s in found if s.method == "rigid"]
+    stiffness = [s.level["value"] for s in found if s.method == "soft"]
+    assert min(steps) < 1e-3 < max(steps)
+    assert max(stiffness) / min(stiffness) >= 1e3
+
+
+def test_force_chains_of_both_methods_are_there() -> None:
+    drawn = {row["name"] for row in ROWS if row["kind"] == "state"}
+    assert drawn == {level.name for level in PICTURED}

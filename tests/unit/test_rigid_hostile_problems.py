@@ -1,0 +1,311 @@
+"""Hostile friction problems: named in a sentence, or solved, never silently wrong."""
+
+from __future__ import annotations
+
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rigid_lcp import BodySpace, solve_friction
+from rigid_lcp.cones import dual_velocity, natural_map, natural_residual, project_cones
+from rigid_lcp.errors import ProblemError
+from rigid_lcp.friction_problem import friction_problem, friction_solution
+from rigid_lcp.problem_files import read_problem
+
+Floats = NDArray[np.float64]
+
+W = np.diag([1.0, 2.0, 1.0, 2.0])
+Q = np.array([-1.0, 0.5, 1.0, 0.0])
+R = np.array([1.0, -0.25, 0.0, 0.0])
+"""Contact 0 sticks: ``r_T = -q_T / W_TT``, less than mu r_N = 0.5; contact 1 parts."""
+
+
+# --- what is no problem -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("w", "q", "mu", "dim", "words"),
+    [
+        (np.ma.masked_array(W, mask=W == 2.0), Q, 0.5, 2, "W.*masked"),
+        (W, np.ma.masked_array(Q, mask=[1, 0, 0, 0]), 0.5, 2, "q.*masked"),
+        (W * (1 + 1j), Q, 0.5, 2, "W is not made of numbers.*complex"),
+        (sp.csr_array(W * (1 + 1j)), Q, 0.5, 2, "W is not made of numbers.*complex"),
+        (W, Q * 1j, 0.5, 2, "q is not made of numbers"),
+        (W, Q, "0.5", 2, "mu is not made of numbers"),
+        (W, Q, 0.5, 2.0, "dim is 2.0"),
+        (W, Q, 0.5, np.array([2, 3]), "dim is array"),
+        (W, Q, np.inf, 2, "mu.*not finite"),
+        (W, Q, 1e20, 2, "contact 0: friction is 1e"),
+        (W * 1e-200, Q, 0.5, 2, "W: its largest"),
+        (W * 1e200, Q, 0.5, 2, "W: its largest"),
+        (W, Q * 1e200, 0.5, 2, "q: its largest"),
+        ([], [], 0.5, 2, "1 dimensions"),
+    ],
+)
+def test_what_can_not_be_computed_with_is_named(w, q, mu, dim, words):
+    with pytest.raises(ProblemError, match=words):
+        solve_friction(w, q, mu, dim)
+
+
+def bodies_of(**changed: object) -> BodySpace:
+    parts = {
+        "jacobian": sp.csr_array(np.eye(2, 3)), "inverse_mass": sp.csr_array(np.eye(3)),
+        "body_size": 3,
+    }  # fmt: skip
+    return BodySpace(**(parts | changed))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"jacobian": np.eye(2, 3)}, "jacobian is no sparse matrix by rows"),
+        ({"inverse_mass": sp.csc_array(np.eye(3))}, "inverse_mass is no sparse matrix by rows"),
+        ({"jacobian": sp.csr_array(np.full((2, 3), np.nan))}, "jacobian holds .* not finite"),
+        ({"inverse_mass": sp.csr_array(np.diag([1.0, -1.0, 1.0]))}, "negative"),
+        ({"inverse_mass": sp.csr_array(np.eye(6))}, "3 columns"),
+        ({"body_size": 2}, "a body 2 freedoms"),
+    ],
+)
+def test_factors_that_do_not_fit_are_named(changed, words):
+    with pytest.raises(ProblemError, match=words):
+        solve_friction(bodies_of(**changed), [-1.0, 0.0], 0.5, 2)
+    assert solve_friction(bodies_of(), [-1.0, 0.0], 0.5, 2).solved
+
+
+# --- what is one --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        sp.linalg.aslinearoperator(W), sp.linalg.aslinearoperator(sp.csr_array(W)),
+        np.asfortranarray(W), W.astype(int), W.astype(np.float32), W.astype(object), W.tolist(),
+        sp.dok_array(W), sp.lil_matrix(W), sp.csr_array(W.astype(int)),
+    ],
+)  # fmt: skip
+def test_operators_and_matrices_of_any_kind_are_the_same_problem(matrix):
+    np.testing.assert_allclose(solve_friction(matrix, Q, 0.5, 2).r, R, atol=1e-14)
+
+
+def test_an_operator_wider_than_a_block_of_columns_is_written_out_whole():
+    rng = np.random.default_rng(1)
+    part = rng.normal(size=(600, 3))
+    problem = friction_problem(sp.linalg.aslinearoperator(part @ part.T), np.zeros(600), 0.5, 3)
+    np.testing.assert_allclose(problem.delassus.toarray(), part @ part.T, atol=1e-13)
+
+
+def test_what_the_caller_owns_stays_as_it_was():
+    """W with entries twice and out of order is added up in a copy; q and mu are no views."""
+    rows = sp.csr_array((np.array([1.0, 1.0, 2.0]), np.array([0, 0, 1]), np.array([0, 2, 3])))
+    q, mu = np.array([-1.0, 0.5]), np.array([0.5])
+    kept = rows.data.copy(), rows.indices.copy(), rows.indptr.copy()
+    problem = friction_problem(rows, q, mu, 2)
+    for before, after in zip(kept, (rows.data, rows.indices, rows.indptr), strict=True):
+        np.testing.assert_array_equal(before, after)
+    np.testing.assert_array_equal(problem.delassus.toarray(), [[2.0, 0.0], [0.0, 2.0]])
+    q[0], mu[0] = 7.0, 7.0
+    assert problem.offset[0] == -1.0
+    assert problem.friction[0] == 0.5
+
+
+def test_arrays_that_can_not_be_written_are_read():
+    w, q = W.copy(), Q.copy()
+    w.flags.writeable = q.flags.writeable = False
+    np.testing.assert_allclose(solve_friction(w, q, 0.5, 2).r, R, atol=1e-14)
+
+
+# --- the measure of an answer -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.3, 10.0])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_natural_map_is_its_definition(mu, dim):
+    """``r - P_K(r - rho (u + mu |u_T| n))``; terms of ``mu`` cancel to round-off of the largest."""
+    rng = np.random.default_rng(4)
+    force, velocity = rng.normal(size=(2, 300, dim))
+    force[:50], velocity[40:90] = 0.0, 0.0
+    friction = mu * rng.uniform(0.5, 1.0, 300)
+    shifted = force - 0.7 * dual_velocity(velocity, friction)
+    twin = force - project_cones(shifted, friction)
+    found = natural_map(force, velocity, friction, 0.7)
+    np.testing.assert_allclose(found, twin, atol=1e-14 * (1 + mu))
+
+
+def test_great_friction_does_not_hide_an_approach():
+    """r = 0, u = (-1, -s): what is projected is (1 - mu s, s), at 1 / (1 + mu^2) (1, mu) for any s.
+
+    At mu s = 1e17 the one is lost in a sum of floats, and r = 0 was a solution.
+    """
+    mu = 1e6
+    for slip in (1.0, 1e5, 1e11):
+        error = natural_map(np.zeros((1, 2)), np.array([[-1.0, -slip]]), np.array([mu]), 1.0)
+        expected = -np.array([1.0, mu]) / (1 + mu**2)
+        np.testing.assert_allclose(error[0], expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-200, 1e-120, 1e120, 1e150])
+def test_the_residual_of_tiny_and_huge_numbers(scale):
+    """It has no units: squares that vanish or overflow made everything a solution."""
+    force, velocity = np.array([[1.0, 0.2], [0.0, 0.0]]), np.array([[0.1, 0.3], [-1.0, 2.0]])
+    mu = np.array([0.5, 0.3])
+    once = natural_residual(force, velocity, mu, 1.0)
+    assert natural_residual(scale * force, scale * velocity, mu, 1.0) == pytest.approx(once)
+    assert natural_residual(scale * force, velocity, mu, scale) == pytest.approx(once)
+    assert natural_residual(0 * force, scale * velocity, mu, 1.0) > 0.1
+    assert not np.isfinite(natural_residual(force, np.nan * velocity, mu, 1.0))
+
+
+@pytest.mark.parametrize("method", ["auto", "gauss-seidel", "pivoting"])
+def test_sweeps_that_diverge_give_a_status_and_no_warning(method):
+    """A W of no bodies (not symmetric, a negative mass): forces of 1e160 had no norm."""
+    rng = np.random.default_rng(6)
+    for _ in range(25):
+        w = rng.normal(size=(6, 6)) + np.eye(6)
+        found = solve_friction(w, rng.normal(size=6), 2.0, 2, method=method)
+        assert found.solved or found.message
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-120, 1e-30, 1e90])
+def test_bodies_may_come_to_rest_as_slowly_as_they_like(scale):
+    """Round-off of round-off (1e-17, 1e-33, ...) of velocities is a problem like any other."""
+    found = solve_friction(W, scale * Q, 0.5, 2)
+    assert found.solved
+    np.testing.assert_allclose(found.r, scale * R, rtol=1e-12)
+
+
+def test_forces_without_bound_are_no_solution_and_the_message_says_so():
+    """W = 0 at a contact that approaches: r = 1e18 has a residual of zero."""
+    problem = friction_problem(np.zeros((2, 2)), [-1.0, 0.0], 0.5, 2)
+    found = friction_solution(problem, np.array([1e18, 0.0]), 1e-12, "any")
+    assert found.status == "not converged"
+    assert "without bound" in found.message
+
+
+# --- any 'solved' that is wrong? ------------------------------------------------------------------
+
+
+def complementarity_error(w: Floats, q: Floats, mu: float, dim: int, r: Floats) -> float:
+    """How far forces are from eq. 27, contact by contact, from its own words [-].
+
+    No approach, no tension, ``|r_T| <= mu r_N``, ``u_N r_N = 0``, and where it slips r_T against
+    the slip; forces over ``|r|`` (a billionth of what q would need at least), velocities over
+    ``mean(diag W)`` times that.
+    """
+    u = (w.astype(np.longdouble) @ r + q).reshape(-1, dim)
+    push = r.reshape(-1, dim)
+    stiff = float(np.abs(np.diag(w)).mean()) or 1.0
+    size = max(float(np.linalg.norm(r)), 1e-9 * float(np.linalg.norm(q)) / stiff) or 1.0
+    worst = 0.0
+    for force, velocity in zip(push / size, np.asarray(u / (size * stiff), float), strict=True):
+        pull, slip = np.linalg.norm(force[1:]), np.linalg.norm(velocity[1:])
+        against = np.linalg.norm(force[1:] * slip + mu * force[0] * velocity[1:]) if slip else 0.0
+        worst = max(
+            worst, -velocity[0], -force[0], pull - mu * force[0],
+            min(abs(velocity[0]), abs(force[0])), min(against, against / slip if slip else 0.0),
+        )  # fmt: skip
+    return worst
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.integers(0, 2**31), st.sampled_from([2, 3]), st.integers(1, 12),
+    st.sampled_from(["regular", "deficient", "twice", "whole numbers", "skew", "a zero row"]),
+    st.sampled_from([0.0, 0.3, 0.8, 2.0]),
+)  # fmt: skip
+def test_what_is_called_solved_obeys_signorini_and_coulomb(seed, dim, contacts, family, mu):
+    """A residual of 1e-12 bounds every breach by some 1e-12 (1 + mu^2) and the size of u / r."""
+    rng = np.random.default_rng(seed)
+    n = contacts * dim
+    part = rng.normal(size=(n, max(1, n // 3) if family == "deficient" else n))
+    if family == "whole numbers":
+        part = rng.integers(-1, 2, size=(n, n)).astype(float)
+    if family == "twice":
+        half = contacts // 2 * dim
+        part[half : 2 * half] = part[:half]
+    if family == "a zero row":
+        part[rng.integers(0, n)] = 0.0
+    w = part @ part.T
+    if family == "skew":
+        w *= 1 + 1e-3 * rng.normal(size=w.shape)
+    q = rng.normal(size=n) if rng.random() < 0.7 else rng.integers(-2, 3, size=n).astype(float)
+    found = solve_friction(w, q, mu, dim)
+    assert found.status in ("solved", "not converged", "no solution")
+    assert found.solved or found.message
+    round_off = 1e-13 * (np.abs(w) @ np.abs(found.r) + np.abs(q))
+    assert (np.abs(found.u - w @ found.r - q) <= round_off + 1e-300).all()
+    if found.solved:
+        assert complementarity_error(w, q, mu, dim, found.r) <= 1e-9
+
+
+def some_solution(w: Floats, q: Floats, mu: float) -> bool:
+    """Whether any of the 4^nc statuses (open, stick, two slips) of a 2D problem has a solution."""
+    contacts = len(q) // 2
+    for status in product(range(4), repeat=contacts):
+        rows, right = np.eye(2 * contacts), np.zeros(2 * contacts)
+        for c, what in enumerate(status):
+            n, t = 2 * c, 2 * c + 1
+            if what:
+                rows[n], right[n] = w[n], -q[n]
+            if what == 1:
+                rows[t], right[t] = w[t], -q[t]
+            elif what:
+                rows[t, n] = mu if what == 2 else -mu
+        r = np.linalg.lstsq(rows, right, rcond=1e-11)[0]
+        small = np.abs(rows @ r - right).max() < 1e-9 and np.linalg.norm(r) < 1e9
+        if small and complementarity_error(w, q, mu, 2, r) < 1e-9:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("method", ["auto", "pivoting", "dantzig"])
+def test_no_solution_is_a_proof(method):
+    """Every problem that is said to have none: all statuses are tried, none is a solution."""
+    rng = np.random.default_rng(11)
+    said = 0
+    for _ in range(150):
+        contacts = int(rng.integers(1, 4))
+        n = 2 * contacts
+        w = rng.normal(size=(n, n)) + 0.3 * np.sqrt(n) * np.eye(n)
+        q, mu = rng.normal(size=n), float(rng.choice([0.3, 0.8, 2.0, 10.0]))
+        q[::2] = -np.abs(q[::2])
+        found = solve_friction(w, q, mu, 2, method=method)
+        if found.status == "no solution":
+            said += 1
+            assert not some_solution(w, q, mu)
+        elif found.solved:
+            assert complementarity_error(w, q, mu, 2, found.r) <= 1e-9
+    assert said > 0
+
+
+# --- files ------------------------------------------------------------------------------------
+
+
+def test_a_file_cut_or_spoilt_anywhere_is_named(tmp_path: Path):
+    """Every cut and flipped byte gives the problem or a `ProblemError`, and no other error."""
+    whole = tmp_path / "whole.npz"
+    np.savez_compressed(whole, W=W, q=Q, mu=np.full(2, 0.5))
+    content, rng = whole.read_bytes(), np.random.default_rng(3)
+    path = tmp_path / "spoilt.npz"
+    named = 0  # or whole: a flipped date of a file harms nobody
+    for trial in range(120):
+        spoilt = bytearray(content)
+        if trial % 2:
+            spoilt = spoilt[: int(rng.integers(0, len(content)))]
+        else:
+            for place in rng.integers(0, len(content), 3):
+                spoilt[place] ^= 1 << int(rng.integers(0, 8))
+        path.write_bytes(bytes(spoilt))
+        try:
+            problem = read_problem(path)
+        except ProblemError as error:
+            named += str(path) in str(error)
+        else:
+            np.testing.assert_array_equal(problem.delassus.toarray(), W)
+            named += 1
+    assert named == 120

@@ -1,0 +1,281 @@
+"""Hostile scenes, runs and run folders: a typed sentence or the right motion, never silence."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trackbed
+from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
+from rigid_lcp.errors import RigidError, SceneError, ShapeError, UsageError
+from rigid_lcp.run_folder import RunFolder
+
+BLOCK = Polygon.rectangle(0.2, 0.1)
+
+
+def at_rest(method: str = "time-stepping", **given: object) -> Simulation:
+    """A block on the ground."""
+    scene = Scene()
+    scene.add(HalfSpace([0, 1]))
+    scene.add(BLOCK, density=2700, position=(0, 0.05), friction=0.5)
+    return Simulation(scene, method, **given)  # type: ignore[arg-type]
+
+
+# --- shapes ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Polygon.rectangle(-1, -1), lambda: Polygon.rectangle(1, 0),
+        lambda: Polygon.rectangle("a", 1), lambda: Polygon.regular(5, -1.0),
+        lambda: Polygon.regular(2, 1.0), lambda: Disc("a"), lambda: Disc(1e-200),
+        lambda: Polygon(1e-160 * BLOCK.vertices), lambda: Polygon(1e160 * BLOCK.vertices),
+        lambda: Polygon([*BLOCK.vertices, *BLOCK.vertices]), lambda: Polygon(np.zeros((0, 2))),
+        lambda: Polygon([(0, 0), (1j, 0), (0, 1)]), lambda: HalfSpace("ab"),
+        lambda: HalfSpace([0, 1], "a"), lambda: HalfSpace([0, 1, 0, 0]), lambda: HalfSpace(None),
+    ],
+)  # fmt: skip
+def test_shapes_that_are_none_are_named(make):
+    with pytest.raises(ShapeError):
+        make()
+
+
+@pytest.mark.parametrize("length", [1e-200, 1.0, 1e200])
+def test_a_normal_of_any_length_is_a_direction(length):
+    np.testing.assert_allclose(HalfSpace([3 * length, 4 * length]).normal, [0.6, 0.8], rtol=1e-15)
+
+
+# --- scenes ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"density": "a"}, {"density": [1, 2]}, {"density": 1e300}, {"density": np.nan},
+        {"friction": "a"}, {"friction": 1e9}, {"friction": np.inf}, {"friction": [0.1, 0.2]},
+        {"restitution": "a"}, {"restitution": np.nan}, {"restitution": 1.1},
+        {"position": "a"}, {"position": [[1], 2]}, {"position": (0, 0, 0)}, {"angle": "x"},
+        {"spin": (1, 2, 3)}, {"velocity": (np.nan, 0)}, {"shape": Disc}, {"shape": None},
+    ],
+)  # fmt: skip
+def test_bodies_that_are_none_are_named(given):
+    scene = Scene()
+    with pytest.raises(SceneError):
+        scene.add(**({"shape": BLOCK, "density": 1.0} | given))
+    assert scene.bodies == []
+
+
+@pytest.mark.parametrize("given", [{"dim": 2.0}, {"dim": "2"}, {"gravity": "abc"}, {"gravity": 9}])
+def test_scenes_that_are_none_are_named(given):
+    with pytest.raises(SceneError):
+        Scene(**given)
+
+
+@pytest.mark.parametrize(
+    "given", [{"velocity": (0, 1)}, {"position": (0, 1)}, {"angle": 0.5}, {"spin": 1.0}]
+)
+def test_a_half_space_that_would_not_go_where_it_is_sent_is_refused(given):
+    """Its plane is where normal and offset put it: bodies were thrown by a floor that stayed."""
+    with pytest.raises(SceneError, match="half-space"):
+        Scene().add(HalfSpace([0, 1]), **given)
+
+
+def test_a_belt_carries_a_block_along():
+    """A half-space that moves along its face: ``v = mu g t`` until the block has its speed."""
+    scene = Scene()
+    scene.add(HalfSpace([0, 1]), velocity=(1.0, 0.0))
+    scene.add(BLOCK, density=2700, position=(0, 0.05), friction=0.5)
+    run = Simulation(scene)
+    run.advance(0.1)
+    assert run.velocities[1, 0] == pytest.approx(0.5 * 9.81 * 0.1, rel=1e-12)
+    run.advance(0.2)
+    assert run.velocities[1, 0] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_what_a_caller_gave_is_his_to_change():
+    """One array for all positions, changed in between, put all bodies in one place."""
+    place, gravity = np.zeros(2), np.array([0.0, -1.0])
+    scene = Scene(gravity=gravity)
+    for k in range(3):
+        place[0] = k
+        scene.add(BLOCK, density=1.0, position=place, velocity=place, spin=place[:1])
+    gravity[1] = place[0] = 77.0
+    run = Simulation(scene)
+    np.testing.assert_array_equal(run.positions[:, 0], [0, 1, 2])
+    np.testing.assert_array_equal(run.velocities[:, 0], [0, 1, 2])
+    np.testing.assert_array_equal(run.world.scene.gravity, [0, -1])
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+METHODS = pytest.mark.parametrize("method", ["time-stepping", "acceleration"])
+
+
+@METHODS
+@pytest.mark.parametrize("seconds", [-1.0, np.nan, np.inf, "1", None])
+def test_a_time_that_is_none_changes_nothing(method, seconds):
+    run = at_rest(method)
+    with pytest.raises(UsageError, match="seconds"):
+        run.advance(seconds)
+    assert (run.time, run.steps) == (0.0, 0)
+
+
+@METHODS
+def test_no_time_is_no_step(method):
+    run = at_rest(method)
+    run.advance(0)
+    assert (run.time, run.steps) == (0.0, 0)
+    run.advance(1e-5)  # shorter than a step
+    assert (run.time, run.steps) == (1e-5, 1)
+
+
+@pytest.mark.parametrize("step", [0, -1e-3, np.nan, np.inf, "1", 1e-300])
+def test_a_step_that_is_none_is_named(step):
+    with pytest.raises(UsageError, match="step is"):
+        at_rest(step=step)
+
+
+@METHODS
+@pytest.mark.parametrize(
+    "answer",
+    [np.zeros(3), np.zeros((1, 3)), np.zeros((2, 2)), np.full((2, 3), np.nan), 0.0, "a"],
+)
+def test_loads_that_are_none_are_named(method, answer):
+    """NaN made positions of NaN without a word, other shapes an IndexError."""
+    run = at_rest(method, loads=lambda time, motion: answer)
+    with pytest.raises(SceneError, match="loads at"):
+        run.advance(0.01)
+    assert np.isfinite(run.positions).all()
+    with pytest.raises(UsageError, match="no function"):
+        at_rest(method, loads=answer)
+
+
+def test_loads_for_too_few_bodies_after_a_break_are_named():
+    run = at_rest(loads=lambda time, motion: np.zeros((2, 3)))
+    run.fragment(1, ((0, 0.05), (0, 1)))
+    with pytest.raises(SceneError, match=r"shape \(2, 3\)"):
+        run.advance(0.01)
+
+
+@pytest.mark.parametrize("body", [-1, 7, True, "block", 1.0, None])
+def test_a_body_that_is_none_is_not_broken(body):
+    """-1 broke the last body."""
+    run = at_rest()
+    with pytest.raises(SceneError, match="no body"):
+        run.fragment(body, ((0, 0.05), (0, 1)))
+    assert len(run.positions) == 2
+
+
+@pytest.mark.parametrize(
+    "line",
+    [None, 3, ((0, 0.05),), ((10, 0), (0, 1)), ((0, 0.05), (0, 0)), ((np.nan, 0), (0, 1)),
+     ((0, 0, 0), (0, 1, 0))],
+)  # fmt: skip
+def test_a_line_that_breaks_nothing_changes_nothing(line):
+    run = at_rest()
+    before = run.energy
+    with pytest.raises(RigidError):
+        run.fragment(1, line)
+    assert (len(run.positions), run.energy) == (2, before)
+
+
+def test_a_scene_that_changes_later_does_not_change_its_runs():
+    scene = Scene()
+    scene.add(HalfSpace([0, 1]))
+    scene.add(BLOCK, density=2700, position=(0, 0.05))
+    first, second = Simulation(scene), Simulation(scene)
+    scene.add(BLOCK, density=2700, position=(0, 5.0))
+    scene.gravity[1] = 100.0
+    first.fragment(1, ((0, 0.05), (0, 1)))
+    first.advance(0.02)
+    second.advance(0.02)
+    assert (len(first.positions), len(second.positions)) == (3, 2)
+    assert np.abs(second.velocities).max() < 1e-12
+
+
+@METHODS
+@pytest.mark.parametrize("clone", [copy.deepcopy, lambda run: pickle.loads(pickle.dumps(run))])
+def test_a_run_copied_or_pickled_goes_on_the_same(method, clone):
+    run = at_rest(method)
+    run.advance(0.01)
+    other = clone(run)
+    run.fragment(1, ((0.01, 0.05), (0.1, 1)))
+    other.fragment(1, ((0.01, 0.05), (0.1, 1)))
+    run.advance(0.01)
+    other.advance(0.01)
+    np.testing.assert_array_equal(other.positions, run.positions)
+    np.testing.assert_array_equal(other.motion.rates, run.motion.rates)
+
+
+# --- run folders ----------------------------------------------------------------------------------
+
+SCENE = """\
+title = "A block slides"
+dimensions = 2
+[run]
+duration = 0.006
+step = 2e-3
+frames = 3
+[[ground]]
+normal = [0, 1]
+[[body]]
+name = "block"
+box = [0.2, 0.1]
+density = 2000.0
+position = [0.0, 0.05]
+velocity = [0.1, 0.0]
+"""
+
+
+@pytest.fixture
+def words(tmp_path: Path) -> list[str]:
+    path = tmp_path / "slide.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    return ["rigid", str(path), "--no-pictures", "--run-folder", str(tmp_path / "run")]
+
+
+def test_a_run_whose_result_is_spoilt_is_finished_again(words, tmp_path):
+    assert trackbed.main(words) == 0
+    result = tmp_path / "run" / "result.json"
+    for spoilt in ("{", "", "[1]", "\0"):
+        result.write_text(spoilt, encoding="utf-8")
+        assert trackbed.main([*words, "--resume"]) == 0
+        assert json.loads(result.read_text(encoding="utf-8"))["time"] == pytest.approx(0.006)
+
+
+def test_a_manifest_that_can_not_be_read_is_not_called_another_scene(words, tmp_path, capsys):
+    assert trackbed.main(words) == 0
+    (tmp_path / "run" / "manifest.json").write_text("{", encoding="utf-8")
+    assert trackbed.main([*words, "--resume"]) == 2
+    assert "can not be read" in capsys.readouterr().err
+    assert trackbed.main([*words, "--force"]) == 0
+
+
+def test_frames_spoilt_anywhere_are_computed_again(words, tmp_path):
+    """A flipped byte within a frame, as a disk makes it, and not its end only."""
+    assert trackbed.main(words) == 0
+    folder = RunFolder(tmp_path / "run")
+    frame, rng = folder.frames()[2], np.random.default_rng(1)
+    content = frame.read_bytes()
+    for place in rng.integers(60, len(content) - 60, 12):
+        spoilt = bytearray(content)
+        spoilt[place] ^= 0xFF
+        frame.write_bytes(bytes(spoilt))
+        (folder.path / "result.json").unlink()
+        assert trackbed.main([*words, "--resume"]) == 0
+        assert len(folder.frames()) == 4
+        frame.write_bytes(content)
+
+
+def test_a_folder_has_one_writer(words, tmp_path, capsys):
+    folder = RunFolder(tmp_path / "run")
+    with folder.locked():
+        assert trackbed.main(words) == 2
+    assert "another process writes" in capsys.readouterr().err
+    assert trackbed.main(words) == 0
