@@ -99,12 +99,15 @@ class ContactFactorisation:
 
     def __init__(self, problem: FrictionProblem) -> None:
         contacts, dim = problem.contacts, problem.dim
-        w = problem.delassus.tobsr((dim, dim))
-        w = sp.bsr_array(w + sp.bsr_array(_zero_blocks(contacts, dim), shape=w.shape))
-        w.sort_indices()
-        self.blocks = w.data
-        self.row = np.repeat(np.arange(contacts), np.diff(w.indptr))
-        column = w.indices.astype(np.int64)
+        w = sp.bsr_array(problem.delassus.tobsr((dim, dim)))
+        row, column = np.repeat(np.arange(contacts), np.diff(w.indptr)), w.indices.astype(np.int64)
+        bare = np.setdiff1d(
+            np.arange(contacts), row[row == column]
+        )  # W has no diagonal block there
+        row, column = np.concatenate([row, bare]), np.concatenate([column, bare])
+        order = np.lexsort((column, row))
+        self.row, column = row[order], column[order]
+        self.blocks = np.concatenate([w.data, np.zeros((len(bare), dim, dim))])[order]
         self.diagonal = np.flatnonzero(self.row == column)
         self.system = BlockSystem(contacts, dim, self.row, column)
 
@@ -164,10 +167,6 @@ class BodyFactorisation:
 def multiply_blocks(blocks: Floats, vector: Floats) -> Floats:
     """Block diagonal matrix (nc, dim, dim) times a vector (nc * dim,)."""
     return np.matmul(blocks, vector.reshape(*blocks.shape[:2], 1)).ravel()
-
-
-def _zero_blocks(contacts: int, dim: int) -> tuple[Floats, Integers, Integers]:
-    return np.zeros((contacts, dim, dim)), np.arange(contacts), np.arange(contacts + 1)
 
 
 @njit(cache=True)

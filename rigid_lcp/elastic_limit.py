@@ -15,7 +15,7 @@ What the limit is:
   `minimum_norm_forces` computes it apart, by linear algebra, for contacts that stick.
 - Where contacts slide while others hold (friction mobilised inside a jammed pile): equilibrium of
   springs and sliders loaded in one go from nothing.  Coulomb's law has no potential, and there is
-  more than one such state: forces were the same to 1e-10 for any order, and up to 378 contacts
+  more than one such state: forces were the same to 1e-10 for any order, and up to 590 contacts
   for starts up to a tenth of the final displacements, but 25 % different for a start as large as
   those, and 8 times as large in a wedge with a history of sliding (`coulomb_slider`, MD).  All obey
   eqs 26 and 27.

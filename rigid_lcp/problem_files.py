@@ -38,7 +38,7 @@ DAMAGED = (
     OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, RuntimeError, MemoryError,
     zipfile.BadZipFile, zlib.error, lzma.LZMAError,
 )  # fmt: skip
-"""What Python and numpy raise as they read a damaged npz: any byte of it may be wrong."""
+"""What numpy and h5py raise as they read a damaged file: any byte of it may be wrong."""
 SAME = 1e-8
 """W and its factors, both stored, differ by less than this share of the largest entry of W."""
 
@@ -265,8 +265,13 @@ def _fclib_file(path: Path) -> Iterator[Any]:
             f"it can not be read as HDF5: {error}", where=str(path),
             remedy="fetch it again; a few lines of text stand for a file that Git LFS keeps",
         ) from error  # fmt: skip
-    with file:
-        yield file
+    try:
+        with file:
+            yield file
+    except DAMAGED as error:  # h5py opens a file whose inside is damaged
+        raise ProblemError(
+            f"a part of it can not be read: {error}", where=str(path), remedy="fetch it again"
+        ) from error
 
 
 def _numbers(group: Any, name: str, path: Path) -> NDArray[Any]:

@@ -31,30 +31,28 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.body_factorisation import Factorisation, factorisation
+from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import (
     BodySpace,
     FrictionProblem,
     FrictionSolution,
-    Status,
     friction_problem,
     friction_solution,
 )
 from rigid_lcp.frictionless import frictionless
-from rigid_lcp.gauss_seidel import Sweeper, gauss_seidel, sweeper_of
+from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.interior_point import Path, interior_point
 from rigid_lcp.islands import islands, solve_islands
 from rigid_lcp.newton import newton
-from rigid_lcp.proximal_newton import proximal_newton
+from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
+from rigid_lcp.solver_trial import CONVEX_CONTACTS, HAND_OVER, LAST_WORD, Trial
 
 Floats = NDArray[np.float64]
 Method = Literal["auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig"]
 
 TINY = 1e-60
 """Problems with a smaller q are solved in other units."""
-HAND_OVER = 1e-7
-"""Residual at which Newton takes over."""
 PATHS = (
     (Path(rounding=0.3, compliance=0.01), 100),
     (Path(rounding=0.03, compliance=1.0), 100),
@@ -67,20 +65,8 @@ PATHS = (
 FEW_SWEEPS, FEW, FEW_CONTACTS = 100, 20, 300
 """Sweeps and factorisations that are tried first, up to so many contacts: enough for most steps of
 a pile in motion; where there are more, news need more sweeps to get through it."""
-FEW_STEPS = 20
-"""Steps of Newton from `HAND_OVER`, where it mostly needs fewer factorisations than proximal
-points."""
-FIRST_SWEEPS, MANY = 1000, 60
+FIRST_SWEEPS = 1000
 """What is spent where the first try was too short."""
-CONVEX_PATH = Path(convex=True, compliance=1e-4)
-CONVEX_SWEEPS, CONVEX_STEPS, CONVEX_CONTACTS = 30, 7, 10_000
-CONVEX_END, CONVEX_USEFUL = 1e-4, 1e-3
-"""Without a start, and up to so many contacts: sweeps, steps along the convex path to a residual
-of `CONVEX_END`, and Newton from there if it came below `CONVEX_USEFUL` (where little slides)."""
-LAST_WORD, ROUND_OFF = 1e-11, 1e-15
-"""At such a tolerance and below a step of Newton ends what the others found: the residual is
-measured on the scale of all forces, and only what is exact to round-off is so for a pebble under a
-boulder."""
 LAST_SWEEPS = 2000
 PROOF_CONTACTS = 3000
 """Up to so many contacts a linear programme looks for the proof that there is no solution."""
@@ -154,7 +140,9 @@ def solve_auto(
         return trial.solution()
     parts = islands(problem)
     if len(parts) > 1:
-        trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
+        apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
+        if _error(apart) < _error(trial.best):  # endless forces on one hide the errors of others
+            trial.best = apart
     if not trial.best.solved and (trial.best.status == "no solution" or _proved_insoluble(problem)):
         return trial.solution(
             "no solution",
@@ -165,124 +153,10 @@ def solve_auto(
     return trial.solution()
 
 
-class _Trial:
-    """The best point so far, who found it, and the work of all."""
-
-    def __init__(self, problem: FrictionProblem, start: Floats | None, tolerance: float) -> None:
-        zero = np.zeros(len(problem.offset))
-        self.problem, self.tolerance, self.work = problem, tolerance, dict[str, float]()
-        self.best = friction_solution(problem, zero, tolerance, "no forces")
-        self.linear: Factorisation | None = None
-        self.sweeper: Sweeper | None = None
-        if start is not None:
-            self.keep(friction_solution(problem, start, tolerance, "start"))
-
-    def keep(self, found: FrictionSolution, after: str = "") -> FrictionSolution:
-        """Count the work of a solution and keep it if it is the best; gives it back."""
-        for name, count in found.work.items():
-            key = name if found.method == "gauss-seidel" or name == "factorisations" else (
-                f"{found.method} {name}"
-            )  # fmt: skip
-            self.work[key] = self.work.get(key, 0.0) + count
-        if found.residual < self.best.residual or not np.isfinite(self.best.residual):
-            name = f"{after} + {found.method}" if after else found.method
-            status = "not converged" if found.status == "solved" else found.status
-            self.best = friction_solution(
-                self.problem, found.r, self.tolerance, name, status=status, message=found.message
-            )
-        return found
-
-    def polish(self, found: FrictionSolution, after: str = "", factorisations: int = MANY) -> bool:
-        """Proximal points from a point of another method; whether the tolerance is reached."""
-        if self.best.solved or not np.isfinite(found.residual):
-            return self.best.solved
-        self.linear = self.linear or factorisation(self.problem)
-        if found.residual <= HAND_OVER:
-            found = self.newton(found.r, FEW_STEPS, after or found.method)
-            if self.best.solved:
-                return True
-        self.keep(
-            proximal_newton(
-                self.problem, found.r, self.tolerance, linear=self.linear,
-                factorisations=factorisations,
-            ),
-            after or found.method,
-        )  # fmt: skip
-        self.sharpen()
-        return self.best.solved
-
-    def sweep(
-        self, start: Floats | None, sweeps: int, after: str = "", until: float = 0.0,
-        factorisations: int = MANY,
-    ) -> bool:  # fmt: skip
-        """Gauss-Seidel to a residual of ``until``, and Newton; whether the tolerance is reached."""
-        until = max(until, self.tolerance)
-        self.sweeper = self.sweeper or sweeper_of(self.problem)
-        found = self.keep(
-            gauss_seidel(self.problem, start, until, sweeps, sweeper=self.sweeper), after
-        )
-        name = f"{after} + gauss-seidel" if after else "gauss-seidel"
-        return self.best.solved or self.polish(found, name, factorisations)
-
-    def convex_start(self) -> bool:
-        """A few sweeps, a part of the convex path, and Newton: solves most static piles."""
-        self.sweeper = self.sweeper or sweeper_of(self.problem)
-        self.keep(
-            gauss_seidel(self.problem, None, self.tolerance, CONVEX_SWEEPS, sweeper=self.sweeper)
-        )
-        if self.best.solved:
-            return True
-        self.linear = self.linear or factorisation(self.problem)
-        found, steps, name = self.best, FEW_STEPS, self.best.method
-        if found.residual > HAND_OVER:
-            found = self.keep(
-                interior_point(
-                    self.problem, None, CONVEX_END, CONVEX_PATH, linear=self.linear,
-                    iterations=CONVEX_STEPS,
-                )
-            )  # fmt: skip
-            steps, name = CONVEX_STEPS + 1, found.method
-        if found.residual < CONVEX_USEFUL:
-            self.newton(found.r, steps, name)
-        return self.best.solved
-
-    def newton(self, start: Floats, steps: int, after: str) -> FrictionSolution:
-        """So many steps of Newton, and one more where the answer is to be exact."""
-        self.linear = self.linear or factorisation(self.problem)
-        found = self.keep(
-            newton(self.problem, start, self.tolerance, linear=self.linear, iterations=steps),
-            after,
-        )
-        self.sharpen()
-        return found
-
-    def sharpen(self) -> None:
-        """One step of Newton from a solution where the tolerance asks for an exact one."""
-        if self.best.solved and self.best.residual > ROUND_OFF and self.tolerance <= LAST_WORD:
-            self.keep(
-                newton(self.problem, self.best.r, ROUND_OFF, linear=self.linear, iterations=1),
-                self.best.method,
-            )
-
-    def solution(self, status: Status | None = None, message: str = "") -> FrictionSolution:
-        """The best point, with the work of all attempts."""
-        best = self.best
-        if not best.solved and not message:
-            message = (
-                f"no method reached {self.tolerance:.2g}; the best residual is {best.residual:.2g}"
-                f" by {best.method}\n  -> look at W (a mass of zero? an entry of the wrong sign?),"
-                " ask for less, or give forces near the solution as start"
-            )
-        return FrictionSolution(
-            best.r, best.u, best.residual, status or best.status, best.method, self.work,
-            "" if best.solved else message,
-        )  # fmt: skip
-
-
 def _attempts(
     problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
-) -> _Trial:
-    trial = _Trial(problem, start, tolerance)
+) -> Trial:
+    trial = Trial(problem, start, tolerance)
     if trial.best.solved:
         return trial
     if not problem.friction.any():
@@ -296,8 +170,14 @@ def _attempts(
         return trial
     if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
         return trial
-    if trial.sweep(trial.best.r, FIRST_SWEEPS, until=max(rough, HAND_OVER)):
-        return trial
+    # a large bed in motion: where one place of it resists, proximal points fail for all
+    moving = not small and start is not None
+    plan = ((FIRST_SWEEPS, 0), (LAST_SWEEPS, FEW)) if moving else ((FIRST_SWEEPS, MANY),)
+    for count, factorisations in plan:
+        if trial.sweep(
+            trial.best.r, count, until=max(rough, HAND_OVER), factorisations=factorisations
+        ):
+            return trial
     if trial.best.residual <= accept and not small:
         return trial
     if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
@@ -309,8 +189,15 @@ def _attempts(
         )
         if trial.polish(found) or trial.sweep(found.r, sweeps, "interior-point"):
             return trial
+        if trial.best.residual <= accept and not small:
+            return trial
     trial.sweep(None, LAST_SWEEPS)
     return trial
+
+
+def _error(found: FrictionSolution) -> float:
+    """Size of the natural map in units of force, not over that of the forces."""
+    return found.residual * float(np.linalg.norm(found.r))
 
 
 def _solve_island(
@@ -322,7 +209,7 @@ def _solve_island(
 def _interior_point(
     problem: FrictionProblem, start: Floats | None, tolerance: float
 ) -> FrictionSolution:
-    trial = _Trial(problem, None, tolerance)
+    trial = Trial(problem, None, tolerance)
     trial.linear = factorisation(problem)
     found = interior_point(
         problem, None, max(HAND_OVER, tolerance), PATHS[0][0], linear=trial.linear

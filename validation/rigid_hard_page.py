@@ -175,14 +175,15 @@ def measure(quick: bool, only: Sequence[str] | None, resume: bool = False) -> No
         raise UsageError(
             f"no family {', '.join(sorted(strangers))}", remedy=f"one of {', '.join(FAMILIES)}"
         )
+    record = lambda: record_read() if RECORD.is_file() else []  # noqa: E731
     words = ["python", "-m", "validation.rigid_hard_page", "--run", *["--quick"] * quick]
     for name in only or FAMILIES:
         origin = provenance([*words, "--only", name])
-        known = record_read() if RECORD.is_file() else []
-        lines = {each: [line for line in known if line["family"] == each] for each in FAMILIES}
-        if resume and is_measured(lines[name], origin):
+        if resume and is_measured([line for line in record() if line["family"] == name], origin):
             continue
-        lines[name] = record_lines(hard_rows(quick, PEERS, [name])[name], origin, name)
+        made = record_lines(hard_rows(quick, PEERS, [name])[name], origin, name)
+        lines = {each: [line for line in record() if line["family"] == each] for each in FAMILIES}
+        lines[name] = made
         record_write([line for part in lines.values() for line in part])
 
 

@@ -98,8 +98,8 @@ method; between walls for friction 0 and 0.3.
 """
 
 UNSTABLE_TEXT = """
-Order and numbers never matter where the limit is found.  The start may, where contacts slide: of
-these, pyramids of 210 and 465 discs at friction 5 have more than one state.
+Order and numbers do not matter where the limit is found.  The start may, where contacts slide: of
+these piles, the one of 465 discs at friction 5 has more than one state.
 
 "Not found": with many sliding contacts the limit may not be a place that the relaxation tends to.
 Coulomb's law has no potential: on pyramids of 210 discs that collapse at friction 0.2 and 0.5 the

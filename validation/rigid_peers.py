@@ -82,9 +82,9 @@ class PeerRun:
 # --- Siconos ----------------------------------------------------------------------------------
 
 
-def batch_size(wall_s: float) -> int:
-    """Number of runs whose mean cost is one measurement, from the time of a run [s]."""
-    return int(np.clip(np.ceil(BATCH_S / max(wall_s, 1e-6)), 1, BATCH_MOST))
+def batch_size(cost_s: float) -> int:
+    """Number of runs whose mean cost is one measurement, from the cost of a run [s]."""
+    return int(np.clip(np.ceil(BATCH_S / max(cost_s, 1e-6)), 1, BATCH_MOST))
 
 
 def siconos_solvers(problem: FrictionProblem) -> list[str]:

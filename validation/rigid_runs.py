@@ -56,9 +56,13 @@ SICONOS_S = {0: 1.0, LARGE: 5.0, HUGE: 15.0}
 """Of Siconos, by the least number of contacts; large ones are packings only."""
 DANTZIG_MOST, PIVOTING_MOST = 500, 1000
 OURS = ("auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig")
-ON_UNSEEN = ("rigid_lcp", "Clarabel + Newton")
-FEW_METHODS = ("unseen", "other packings")
-"""What is run on families that have many problems: our default, and its nearest rival."""
+FEW_METHODS = {
+    "unseen": ("rigid_lcp", "Clarabel + Newton"),
+    "other": ("rigid_lcp", "Clarabel + Newton"),
+    "frictionless": ("rigid_lcp", "Clarabel + Newton", "OSQP polished"),
+}
+"""What is run on families of many problems, by the first word of their names: our default and its
+nearest rivals; all methods on the others."""
 REPEATS, SHORT_S = 5, 0.5
 RIVALS = ("Clarabel + Newton", "OSQP polished")
 ORIGIN = ("commit", "command", "machine", "started")
@@ -155,7 +159,7 @@ def _repeated(
         wall = time.perf_counter() - start
         costs = [first.cost_s or 0.0]
         if wall < SHORT_S:
-            batch = peers.batch_size(wall)
+            batch = peers.batch_size(first.cost_s or 0.0)
             costs = [
                 float(np.mean([solve(tolerance, budget_s).cost_s or 0.0 for _ in range(batch)]))
                 for _ in range(REPEATS)
@@ -260,7 +264,7 @@ def race(
         for method, runs in methods(problem, quick).items():
             if some_methods and not any(method.startswith(word) for word in some_methods):
                 continue
-            if named.family.startswith(FEW_METHODS) and method not in ON_UNSEEN:
+            if method not in FEW_METHODS.get(named.family.split()[0], (method,)):
                 continue
             have = [r for r in rows if (r.get("problem"), r["method"]) == (named.name, method)]
             if done(have):

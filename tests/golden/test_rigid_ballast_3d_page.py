@@ -15,6 +15,7 @@ def line(sample: int, step: float, end: float, why: str = "") -> Data:
         "contacts": 40.0, "carrying": 30.0, "sliding": 0.1, "steps": 20, "ok": not why, "why": why,
         "cpu_s": 0.4, "residual_median": 1e-9, "residual_99": 1e-8, "residual_worst": 1e-7,
         "overlap": 1e-6, "size": 0.04, "work": [2.0, 1.0], "gain": 1e-6, "machine": "m",
+        "commit": "c",
     }  # fmt: skip
 
 
@@ -41,7 +42,12 @@ def test_differences_are_taken_sample_by_sample() -> None:
 
 
 def test_a_run_that_was_stopped_is_told_and_not_counted() -> None:
-    lines = [line(1, 1e-3, 3e-4), line(1, 5e-4, 1e-4), line(2, 1e-3, 9.0, why="60 m/s in cycle 1")]
+    lines = [
+        line(1, 1e-3, 3e-4),
+        line(1, 5e-4, 1e-4),
+        line(3, 5e-4, 2e-4),
+        line(2, 1e-3, 9.0, why="60 m/s in cycle 1"),
+    ]
     text = page(lines)
     assert "* sample 2, step 1 ms: 60 m/s in cycle 1." in text
     assert "9000" not in text

@@ -76,17 +76,18 @@ def made_rows(settled: dict[Level, float]) -> list[dict[str, Any]]:
     return rows
 
 
-def test_reference_is_joint_and_errors_are_of_the_mean() -> None:
-    """Limits 1.0 and 1.2 mm: the reference is 1.1; a level of 1.21 mm errs by a tenth."""
-    settled = dict(zip([*RIGID, *SOFT], [1.21e-3, 1.1e-3, 1e-3, 4e-3, 2e-3, 1.2e-3], strict=True))
+def test_errors_are_of_the_mean_and_the_soft_limit_is_extrapolated() -> None:
+    """1.2 against 1.0 mm errs by a fifth; 4, 2, 1.5: geometric, their limit 4/3."""
+    settled = dict(zip([*RIGID, *SOFT], [1.6e-3, 1.2e-3, 1e-3, 4e-3, 2e-3, 1.5e-3], strict=True))
     rows = made_rows(settled)
     limits = limits_of(rows)
     assert (limits.rigid, limits.soft) == (RIGID[2].name, SOFT[2].name)
-    assert limits.mean == pytest.approx(2.2e-3)
-    assert limits.difference == pytest.approx(-0.4e-3)
+    assert limits.mean == pytest.approx(2e-3)
+    assert limits.difference == pytest.approx(-1e-3)
+    assert limits.soft_limit == pytest.approx(2 * 4e-3 / 3)
     found = {s.name: s for s in summaries(rows, limits)}
-    assert found[RIGID[0].name].bias == pytest.approx(0.1)
-    assert found[RIGID[1].name].bias == pytest.approx(0.0, abs=1e-12)
+    assert found[RIGID[1].name].bias == pytest.approx(0.2)
+    assert found[SOFT[2].name].bias == pytest.approx(0.5)
     assert found[SOFT[2].name].is_limit
     first, second = duels(list(found.values()))
     assert first.soft is not None

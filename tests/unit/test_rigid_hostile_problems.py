@@ -286,19 +286,40 @@ def test_no_solution_is_a_proof(method):
 # --- files ------------------------------------------------------------------------------------
 
 
-def test_a_file_cut_or_spoilt_anywhere_is_named(tmp_path: Path):
-    """Every cut and flipped byte gives the problem or a `ProblemError`, and no other error."""
-    whole = tmp_path / "whole.npz"
-    np.savez_compressed(whole, W=W, q=Q, mu=np.full(2, 0.5))
+def npz_written(path: Path) -> None:
+    np.savez_compressed(path, W=W, q=Q, mu=np.full(2, 0.5))
+
+
+def hdf5_written(path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    rows = sp.csr_array(W)
+    with h5py.File(path, "w") as file:
+        file["fclib_local/spacedim"] = np.array([2])
+        file["fclib_local/vectors/q"], file["fclib_local/vectors/mu"] = Q, np.full(2, 0.5)
+        parts = {"m": [4], "n": [4], "nz": [-2], "p": rows.indptr, "i": rows.indices}
+        for name, values in (parts | {"x": rows.data}).items():
+            file[f"fclib_local/W/{name}"] = values
+
+
+@pytest.mark.parametrize(
+    ("written", "checked"), [(npz_written, True), (hdf5_written, False)], ids=["npz", "hdf5"]
+)
+def test_a_file_cut_or_spoilt_anywhere_is_named(tmp_path: Path, written, checked):
+    """Every cut and flipped byte gives a problem or a `ProblemError`, and no other error.
+
+    Where the format has check sums (``checked``) it gives the problem that was written.
+    """
+    whole = tmp_path / f"whole.{'npz' if checked else 'hdf5'}"
+    written(whole)
     content, rng = whole.read_bytes(), np.random.default_rng(3)
-    path = tmp_path / "spoilt.npz"
-    named = 0  # or whole: a flipped date of a file harms nobody
-    for trial in range(120):
+    path = whole.with_stem("spoilt")
+    named = 0
+    for trial in range(300):
         spoilt = bytearray(content)
         if trial % 2:
             spoilt = spoilt[: int(rng.integers(0, len(content)))]
         else:
-            for place in rng.integers(0, len(content), 3):
+            for place in rng.integers(0, len(content), 4):
                 spoilt[place] ^= 1 << int(rng.integers(0, 8))
         path.write_bytes(bytes(spoilt))
         try:
@@ -306,6 +327,22 @@ def test_a_file_cut_or_spoilt_anywhere_is_named(tmp_path: Path):
         except ProblemError as error:
             named += str(path) in str(error)
         else:
-            np.testing.assert_array_equal(problem.delassus.toarray(), W)
             named += 1
-    assert named == 120
+            if checked:
+                np.testing.assert_array_equal(problem.delassus.toarray(), W)
+    assert named == 300
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_contact_that_bears_on_nothing_among_many(dim):
+    """Of 301 contacts one has no row in W, as between fixed bodies: it parts, the others solve."""
+    rng = np.random.default_rng(9)
+    part = sp.random_array((300 * dim, 300 * dim), density=0.01, rng=rng)
+    w = sp.block_array([[part @ part.T + sp.eye_array(300 * dim), None],
+                        [None, sp.csr_array((dim, dim))]], format="csr")  # fmt: skip
+    q = rng.normal(size=301 * dim)
+    q[-dim:] = 0.5
+    for method in ("auto", "interior-point"):
+        found = solve_friction(w, q, 0.3, dim, method=method)
+        assert found.solved
+        assert not found.r[-dim:].any()

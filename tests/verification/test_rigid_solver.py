@@ -179,7 +179,8 @@ def test_a_warm_start_costs_less_and_a_wrong_one_does_no_harm():
     changed = q + 1e-3 * push
     warm = solve_friction(bodies, changed, 0.5, 3, start=cold.r)
     assert warm.solved
-    assert warm.work["factorisations"] < 0.5 * cold.work["factorisations"]
+    assert warm.work["factorisations"] < cold.work["factorisations"]
+    assert "interior-point iterations" not in warm.work
     wrong = solve_friction(bodies, changed, 0.5, 3, start=-1e3 * cold.r)
     assert wrong.solved
 

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_lcp.contacts import contact_frames
+from rigid_lcp.errors import NotConverged
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
@@ -211,3 +212,40 @@ def test_poured_grains_come_to_rest() -> None:
     assert np.abs(run.velocities).max() < 0.05 * sqrt(G * 0.02)
     assert run.overlap < 1e-4 * run.world.length
     assert run.worst_residual < 1e-9
+
+
+@given(st.floats(-1, 1), st.floats(-1e-3, 1e-3), st.floats(-2, 2), st.floats(-2, 2))
+def test_bodies_may_come_to_rest(turning: float, gap: float, before: float, free: float) -> None:
+    """``u_N+ = turning`` at rest: allowed where nothing bounces, as jammed grains need it."""
+    h, one = 1e-3, np.ones(1)
+    shift = contact_shift(
+        0.0 * one, gap * one, before * one, free * one, 0.0, h, turning * one
+    )[0]  # fmt: skip
+    assert turning + shift >= 0.0
+
+
+def test_no_overlap_is_left_after_a_step() -> None:
+    """Grains that are poured turn, and are hit, faster than a step foresees: with steps of 4 ms the
+    geometry at its end is what counts.  A projection is exact to 1e-9 of the forces it takes."""
+    run = poured(12, seed=5)
+    for _ in range(40):
+        run.advance(4e-3)
+        assert run.overlap < 1e-8 * run.world.length
+
+
+def test_a_body_that_turns_too_far_within_a_step_is_refused() -> None:
+    scene = Scene(2)
+    scene.add(Polygon.rectangle(1, 2), density=3.0, spin=4000.0)
+    with pytest.raises(NotConverged, match="shorter than"):
+        Simulation(scene, step=1e-3).advance(1e-3)
+
+
+def test_steps_above_the_tolerance_are_counted_and_bad_ones_stop_the_run() -> None:
+    """No method reaches 1e-30; a residual above zero is counted, and above ``give_up`` it ends."""
+    run = stack(5, 10.0)
+    counted = Simulation(run.world.scene, tolerance=1e-30)
+    counted.advance(3e-3)
+    assert 0 < counted.steps_above <= 3
+    assert 0.0 < counted.worst_residual < 1e-12
+    with pytest.raises(NotConverged):
+        Simulation(run.world.scene, tolerance=1e-30, give_up=1e-29).advance(3e-3)

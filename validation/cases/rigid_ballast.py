@@ -74,13 +74,13 @@ def record_checks(rows: Sequence[Row]) -> list[Check]:
 
 
 def limit_checks(rows: Sequence[Row]) -> list[Check]:
-    """The joint reference, every level's error, and the cost at equal error."""
+    """The reference, every level's error, and the cost at equal error."""
     limits = limits_of(rows)
     found = summaries(rows, limits)
     apart = abs(limits.difference) / limits.mean
     noise = limits.interval / limits.mean
     checks = [
-        Check("mean settlement of the joint reference", limits.mean, "> 0", limits.mean > 0, "m"),
+        Check("mean settlement of the reference", limits.mean, "> 0", limits.mean > 0, "m"),
         Check("the two limits: their difference, of the mean", apart, "reported", True),
         Check("95 % interval of that", noise if np.isfinite(noise) else np.nan, "reported", True),
     ]
