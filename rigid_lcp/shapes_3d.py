@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ShapeError
+from rigid_lcp.shapes_2d import LEAST, MOST, _given, _length
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,11 +31,7 @@ class Sphere:
     dim = 3
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.radius) and self.radius > 0):
-            raise ShapeError(
-                f"its radius is {self.radius!r}", where="Sphere",
-                remedy="give a positive radius in metres",
-            )  # fmt: skip
+        object.__setattr__(self, "radius", _length(self.radius, "radius", "sphere"))
 
     @property
     def volume(self) -> float:
@@ -156,16 +153,20 @@ class Polyhedron:
 
 
 def box(length: float, width: float, height: float) -> Polyhedron:
-    """A cuboid with edges along x, y and z [m]."""
+    """A cuboid with edges along x, y and z [m].  Raises `ShapeError` unless all are positive."""
+    edges = [
+        _length(value, name, "box")
+        for value, name in ((length, "length"), (width, "width"), (height, "height"))
+    ]
     corners = np.indices((2, 2, 2)).reshape(3, -1).T - 0.5
-    return Polyhedron(corners * [length, width, height])
+    return Polyhedron(corners * edges)
 
 
 def _hull(points: ArrayLike) -> tuple[Ints, Floats]:
     """Triangles of the convex hull, wound outwards, and the points that are its corners."""
     from scipy.spatial import ConvexHull, QhullError
 
-    given = np.asarray(points, dtype=float)
+    given = _given(points, "points", "Polyhedron")
     if given.ndim != 2 or given.shape[1] != 3 or len(given) < 4 or not np.isfinite(given).all():
         raise ShapeError(
             f"points of shape {given.shape} are not four or more finite places in space",
@@ -173,6 +174,11 @@ def _hull(points: ArrayLike) -> tuple[Ints, Floats]:
         )  # fmt: skip
     middle = given.mean(axis=0)
     size = float(np.abs(given - middle).max())
+    if size != 0 and not LEAST <= size <= MOST:
+        raise ShapeError(
+            f"it is {size:.1g} m in size", where="Polyhedron",
+            remedy=f"choose other units: {LEAST:g} to {MOST:g} can be computed with",
+        )  # fmt: skip
     try:
         hull = ConvexHull((given - middle) / (size or 1.0))
     except QhullError as error:

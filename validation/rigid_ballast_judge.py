@@ -159,14 +159,14 @@ def summaries(rows: Sequence[Row], limits: Limits) -> list[Summary]:
             mine = [runs[seed] for seed in seeds]
             settled = last_settlement(runs)
             mean, interval = mean_with_interval([settled[s] for s in seeds])
-            scale = float(np.mean([limits.reference[s] for s in seeds]))
+            scale = abs(float(np.mean([limits.reference[s] for s in seeds])))
             middle = float(np.median([settled[s] for s in seeds]))
             own = float(np.median([limits.reference[s] for s in seeds]))
             bias, wide = mean_with_interval([settled[s] - limits.reference[s] for s in seeds])
             found.append(Summary(
                 name, method, mine[0]["level"], len(seeds), mean, interval,
-                np.mean([row["settlement"] for row in mine], axis=0), middle, middle / own - 1,
-                bias / scale, wide / scale,
+                np.mean([row["settlement"] for row in mine], axis=0), middle,
+                (middle - own) / abs(own), bias / scale, wide / scale,
                 float(np.mean([row["cpu_s"] for row in mine])),
                 float(np.mean([row["step_s"] for row in mine])),
                 float(np.median([row["deflection"] for row in mine])),

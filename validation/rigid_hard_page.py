@@ -175,16 +175,19 @@ def measure(quick: bool, only: Sequence[str] | None, resume: bool = False) -> No
         raise UsageError(
             f"no family {', '.join(sorted(strangers))}", remedy=f"one of {', '.join(FAMILIES)}"
         )
-    record = lambda: record_read() if RECORD.is_file() else []  # noqa: E731
     words = ["python", "-m", "validation.rigid_hard_page", "--run", *["--quick"] * quick]
     for name in only or FAMILIES:
         origin = provenance([*words, "--only", name])
-        if resume and is_measured([line for line in record() if line["family"] == name], origin):
+        if resume and is_measured(_known(name), origin):
             continue
         made = record_lines(hard_rows(quick, PEERS, [name])[name], origin, name)
-        lines = {each: [line for line in record() if line["family"] == each] for each in FAMILIES}
-        lines[name] = made
+        lines = {each: _known(each) for each in FAMILIES} | {name: made}
         record_write([line for part in lines.values() for line in part])
+
+
+def _known(family: str) -> list[Data]:
+    lines = record_read() if RECORD.is_file() else []
+    return [line for line in lines if line["family"] == family]
 
 
 def is_measured(lines: Sequence[Data], origin: Data) -> bool:

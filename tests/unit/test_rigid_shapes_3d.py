@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -76,3 +78,17 @@ def test_points_that_span_no_volume_are_refused(points: np.ndarray) -> None:
 def test_a_sphere_needs_a_radius(radius: float) -> None:
     with pytest.raises(ShapeError, match="radius"):
         Sphere(radius)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Sphere("a"), lambda: Sphere(-1.0), lambda: Polyhedron("abc"),
+        lambda: Polyhedron([[0, 0, 0], [1, 0], [0, 1, 0], [0, 0, 1]]),
+        lambda: box(-1.0, -1.0, 1.0), lambda: box(1e-120, 1e-120, 1e-120),
+        lambda: Polyhedron(1e-120 * np.eye(4, 3)),
+    ],
+)  # fmt: skip
+def test_what_is_no_size_is_refused(make: Callable[[], object]) -> None:
+    with pytest.raises(ShapeError):
+        make()

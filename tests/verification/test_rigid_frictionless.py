@@ -133,10 +133,10 @@ def test_three_dimensions() -> None:
     assert found.r[::3].sum() == pytest.approx(1.0, rel=1e-12)
 
 
-@pytest.mark.parametrize("sweeps", [3, 40])
-def test_sweeps_against_numpy(sweeps: int) -> None:
+@pytest.mark.parametrize(("grains", "sweeps"), [(30, 3), (30, 40), (200, 120)])
+def test_sweeps_against_numpy(grains: int, sweeps: int) -> None:
     """The kernel against plain loops: projected Gauss-Seidel, Nesterov's momentum, restarts."""
-    problem = network(30, 0.0)
+    problem = network(grains, 0.0)
     a, b = problem.delassus[::2][:, ::2].tocsr(), problem.offset[::2]
     f, dense = np.zeros(len(b)), a.toarray()
     assert normal_sweeps(a.indptr, a.indices, a.data, b, f, sweeps, sweeps, -1) == sweeps
@@ -151,7 +151,7 @@ def test_sweeps_against_numpy(sweeps: int) -> None:
         least = min(least, weight @ (x - y) ** 2)
         if weight @ ((y - x) * (x - last)) > 0 or weight @ (x - y) ** 2 > 1.5**2 * least:
             time, least = 1.0, np.inf
-    assert f == pytest.approx(x, rel=1e-9, abs=1e-15)
+    assert f == pytest.approx(x, rel=1e-6, abs=1e-9 * x.max())
 
 
 def test_sweeps_end_when_sides_settle() -> None:
