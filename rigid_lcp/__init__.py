@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rigid_lcp.breakage import Breakage
     from rigid_lcp.collisions import collide
     from rigid_lcp.errors import RigidError
     from rigid_lcp.friction_problem import BodySpace, FrictionProblem, FrictionSolution
@@ -18,9 +19,11 @@ if TYPE_CHECKING:
     from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
     from rigid_lcp.simulation import Simulation
     from rigid_lcp.solver import solve_friction
+    from rigid_lcp.wear import Wear
 
 _HOMES = {
     "BodySpace": "friction_problem",
+    "Breakage": "breakage",
     "Disc": "shapes_2d",
     "FrictionProblem": "friction_problem",
     "FrictionSolution": "friction_problem",
@@ -31,6 +34,7 @@ _HOMES = {
     "Scene": "scene",
     "Simulation": "simulation",
     "Sphere": "shapes_3d",
+    "Wear": "wear",
     "box": "shapes_3d",
     "collide": "collisions",
     "lcp": "frictionless",
@@ -38,6 +42,7 @@ _HOMES = {
 }
 __all__ = [
     "BodySpace",
+    "Breakage",
     "Disc",
     "FrictionProblem",
     "FrictionSolution",
@@ -48,6 +53,7 @@ __all__ = [
     "Scene",
     "Simulation",
     "Sphere",
+    "Wear",
     "box",
     "collide",
     "lcp",
