@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Solve = Callable[[Floats], Floats]
 
-DENSE_SIZE = 150
+DENSE_SIZE = 220
 """Up to so many rows a dense LU costs less than the bookkeeping of a sparse one."""
 DENSE_SHARE = 0.3
 """Fuller matrices are factored dense: their sparse LU would be full anyway."""
@@ -45,6 +45,9 @@ class SingularSystem(ArithmeticError):
 
 class Factorisation(Protocol):
     """Factors ``A + B W`` for one W and many A, B (nc, dim, dim)."""
+
+    flops: float
+    """About what one factorisation costs."""
 
     def factor(self, a: Floats, b: Floats) -> Solve:
         """What solves ``(A + B W) x = right`` for x.  Raises `SingularSystem`."""
@@ -66,6 +69,7 @@ class DenseFactorisation:
     def __init__(self, problem: FrictionProblem) -> None:
         self.contacts, self.dim = problem.contacts, problem.dim
         self.matrix = problem.delassus.toarray()
+        self.flops = 2.0 / 3.0 * float(len(self.matrix)) ** 3
 
     def factor(self, a: Floats, b: Floats) -> Solve:
         """See `Factorisation`."""
@@ -85,6 +89,13 @@ class BlockSystem:
     def __init__(self, count: int, size: int, rows: Integers, columns: Integers) -> None:
         """``count`` block rows of ``size`` rows each; blocks at (rows, columns)."""
         self.tree = elimination_tree(count, size, rows, columns)
+
+    @property
+    def flops(self) -> float:
+        """About what one factorisation costs."""
+        width = np.diff(self.tree.first).astype(float) * self.tree.size
+        below = np.diff(self.tree.row_start).astype(float) * self.tree.size
+        return float((((width + below) ** 3 - below**3) * 2.0 / 3.0).sum())
 
     def factor(self, blocks: Floats) -> Solve:
         """Factor the matrix with these blocks (entries, size, size).  Raises `SingularSystem`."""
@@ -110,6 +121,7 @@ class ContactFactorisation:
         self.blocks = np.concatenate([w.data, np.zeros((len(bare), dim, dim))])[order]
         self.diagonal = np.flatnonzero(self.row == column)
         self.system = BlockSystem(contacts, dim, self.row, column)
+        self.flops = self.system.flops
 
     def factor(self, a: Floats, b: Floats) -> Solve:
         """See `Factorisation`."""
@@ -140,6 +152,7 @@ class BodyFactorisation:
         key = np.concatenate([own * bodies + own, rows * bodies + columns])
         found, places = np.unique(key, return_inverse=True)
         self.system = BlockSystem(bodies, size, found // bodies, found % bodies)
+        self.flops = self.system.flops
         mass = problem.bodies.mass.tocoo()
         self.mass = np.zeros((len(found), size, size))
         self.mass[places[mass.row // size], mass.row % size, mass.col % size] = mass.data

@@ -4,6 +4,8 @@
 
     no forces        where nothing approaches
     frictionless     where no contact has friction: principal pivoting, exact
+    all stick        without a start, where a few sweeps find nothing open and little that slides:
+                     one factorisation; exact for towers and much of what stands
     convex path      without a start: a part of it, and Newton; solves most static piles
     Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
                      Newton at its end: first few sweeps and factorisations, then many, as what is
@@ -16,9 +18,9 @@ Every method alone can fail on real problems: Newton far from a solution, the in
 its path folds back, Gauss-Seidel on tall piles.  Together they fail seldom (`docs/rigid-solvers.md`
 counts it); there is no proof: read ``status`` and ``residual``.
 
-Cost: hundreds of sweeps and some factorisations; the interior point takes some 20 a path.  In 3D
-their fill grows fast: above some 3,000 contacts of a 3D packing each takes tenths of a second, and
-Gauss-Seidel is the cheaper way to rough answers.
+Cost: hundreds of sweeps or some factorisations; the interior point takes some 20 a path.  In 3D
+their fill grows fast: where one costs as much as a hundred sweeps (3D packings above some 3,000
+contacts), thousands of sweeps go first.
 """
 
 from __future__ import annotations
@@ -68,6 +70,8 @@ a pile in motion; where there are more, news need more sweeps to get through it.
 FIRST_SWEEPS = 1000
 """What is spent where the first try was too short."""
 LAST_SWEEPS = 2000
+DEAR_SWEEPS = 3000
+"""What is spent before a factorisation that is dear."""
 PROOF_CONTACTS = 3000
 """Up to so many contacts a linear programme looks for the proof that there is no solution."""
 
@@ -169,6 +173,9 @@ def _attempts(
     if cold and trial.convex_start():
         return trial
     if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
+        return trial
+    if not small and trial.dear and trial.sweep(trial.best.r, DEAR_SWEEPS, factorisations=0):
+        trial.sharpen()
         return trial
     # a large bed in motion: where one place of it resists, proximal points fail for all
     moving = not small and start is not None

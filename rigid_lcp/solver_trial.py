@@ -16,6 +16,7 @@ from rigid_lcp.gauss_seidel import Sweeper, gauss_seidel, sweeper_of
 from rigid_lcp.interior_point import Path, interior_point
 from rigid_lcp.newton import newton
 from rigid_lcp.proximal_newton import FACTORISATIONS, proximal_newton
+from rigid_lcp.sticking import seem_to_stick, sticking
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +30,10 @@ CONVEX_SWEEPS, CONVEX_STEPS, CONVEX_CONTACTS = 30, 7, 10_000
 CONVEX_END, CONVEX_USEFUL = 1e-4, 1e-3
 """Without a start, and up to so many contacts: sweeps, steps along the convex path to a residual
 of `CONVEX_END`, and Newton from there if it came below `CONVEX_USEFUL` (where little slides)."""
+UPDATE_FLOPS = 160.0
+"""Flops of a factorisation that cost as much as a contact's update in a sweep, over dim^2."""
+DEAR = 100.0
+"""A factorisation that costs as much as so many sweeps is dear: sweeps go first, and on."""
 LAST_WORD, ROUND_OFF = 1e-11, 1e-15
 """At such a tolerance and below a step of Newton ends what the others found: the residual is
 measured on the scale of all forces, and only what is exact to round-off is so for a pebble under a
@@ -97,15 +102,24 @@ class Trial:
         return self.best.solved or self.polish(found, name, factorisations)
 
     def convex_start(self) -> bool:
-        """A few sweeps, a part of the convex path, and Newton: solves most static piles."""
+        """A few sweeps; then what sticks, or a part of the convex path (where a factorisation is
+        not dear) and Newton: solves most static piles."""
         self.sweeper = self.sweeper or sweeper_of(self.problem)
         self.keep(
             gauss_seidel(self.problem, None, self.tolerance, CONVEX_SWEEPS, sweeper=self.sweeper)
         )
         if self.best.solved:
+            self.sharpen()
             return True
         self.linear = self.linear or factorisation(self.problem)
+        if seem_to_stick(self.problem, self.best.r):
+            exact = ROUND_OFF if self.tolerance <= LAST_WORD else self.tolerance
+            self.keep(sticking(self.problem, exact, linear=self.linear))
+            if self.best.solved:
+                return True
         found, steps, name = self.best, FEW_STEPS, self.best.method
+        if self.dear and found.residual > HAND_OVER:
+            return False
         if found.residual > HAND_OVER:
             found = self.keep(
                 interior_point(
@@ -117,6 +131,13 @@ class Trial:
         if found.residual < CONVEX_USEFUL:
             self.newton(found.r, steps, name)
         return self.best.solved
+
+    @property
+    def dear(self) -> bool:
+        """Whether a factorisation costs as much as many sweeps."""
+        self.linear = self.linear or factorisation(self.problem)
+        update = UPDATE_FLOPS * self.problem.dim**2
+        return self.linear.flops > DEAR * update * self.problem.contacts
 
     def newton(self, start: Floats, steps: int, after: str) -> FrictionSolution:
         """So many steps of Newton, and one more where the answer is to be exact."""

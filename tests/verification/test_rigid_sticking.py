@@ -1,0 +1,68 @@
+"""The guess that all contacts stick: W r + q = 0, right for what stands and for nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigid_lcp import solve_friction
+from rigid_lcp.body_factorisation import factorisation
+from rigid_lcp.friction_problem import friction_problem
+from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.sticking import seem_to_stick, sticking
+from tests.rigid_networks import GRAVITY, STEP, tower
+
+
+@pytest.mark.parametrize("top", [1.0, 1e4])
+@pytest.mark.parametrize("boxes", [1, 10, 60])
+def test_a_tower_bears_its_weight_by_one_factorisation(boxes, top):
+    """Face k carries all above it: N1 + N2 = m_above g h.  Three freedoms and four forces a face,
+    so W is singular; the step's shift is gone after a few rounds.  Velocities are right to
+    round-off of the greatest force; forces to that times W's condition, boxes^2 for a chain of so
+    many times the ratio of masses."""
+    problem = tower(boxes, 0.5, top)
+    found = sticking(problem, 1e-15)
+    assert found.work == {"factorisations": 1.0}
+    weights = (top + np.arange(boxes)) * GRAVITY * STEP  # from the top down
+    normal = found.r.reshape(-1, 2)[:, 0].reshape(boxes, 2).sum(axis=1)
+    assert normal == pytest.approx(weights[::-1], rel=1e-14 * max(10, boxes) ** 2 * top)
+    assert found.residual < 1e-15
+
+
+def test_a_tower_is_solved_by_the_default_in_one_factorisation():
+    solution = solve_friction(tower(40, 0.5).matrix, tower(40, 0.5).offset, 0.5, dim=2)
+    assert solution.solved
+    assert solution.method == "sticking"
+    assert solution.work["factorisations"] == 1
+
+
+def test_what_slides_opens_or_bears_nothing_is_not_taken_for_sticking():
+    slides = friction_problem(np.eye(2), np.array([-1.0, 0.8]), 0.3, 2)
+    force = gauss_seidel(slides, None, 1e-12, 50).r
+    assert not seem_to_stick(slides, force)
+    opens = friction_problem(np.eye(4), np.array([-1.0, 0.1, 1.0, 0.0]), 0.3, 2)
+    assert not seem_to_stick(opens, gauss_seidel(opens, None, 1e-12, 50).r)
+    assert not seem_to_stick(opens, np.zeros(4))
+
+
+def test_where_one_contact_slides_the_guess_says_so_and_the_default_goes_on():
+    """Two blocks that do not touch, on floors of friction .5: one pushed at .3 of its weight, one
+    at .8.  Sticking forces of the second leave its cone; its true speed is .8 - .5 = .3."""
+    problem = friction_problem(np.eye(6), np.array([-1, 0.3, -1, 0.3, -1, 0.8]), 0.5, 2)
+    linear = factorisation(problem)
+    guess = sticking(problem, 1e-12, linear=linear)
+    assert not guess.solved
+    assert guess.residual > 1e-2
+    solution = solve_friction(np.eye(6), problem.offset, 0.5, dim=2)
+    assert solution.solved
+    assert solution.u[5] == pytest.approx(0.3, abs=1e-12)
+
+
+def test_the_guess_has_no_units():
+    """Forces in mN, velocities in km/s: the same residual and the same forces to round-off."""
+    problem = tower(10, 0.5)
+    scaled = friction_problem(problem.matrix * 1e-9, problem.offset * 1e-3, 0.5, 2)
+    plain, other = sticking(problem, 1e-15), sticking(scaled, 1e-15)
+    normal, again = (each.r.reshape(-1, 2, 2)[:, :, 0].sum(axis=1) for each in (plain, other))
+    assert again / 1e6 == pytest.approx(normal, rel=1e-12)
+    assert other.residual < 1e-15
