@@ -104,7 +104,8 @@ def islands_join(
             work[name] = work.get(name, 0.0) + count
     failed = [k for k, solution in enumerate(solutions) if not solution.solved]
     worst = next((k for k in failed if solutions[k].status == "no solution"), (failed or [-1])[0])
-    method = max((solution.method for solution in solutions), default="islands")
+    largest = max(solutions, key=lambda solution: len(solution.r), default=None)
+    method = largest.method if largest is not None else "islands"
     if not failed:
         return friction_solution(problem, force, tolerance, method, work)
     message = (
@@ -141,9 +142,12 @@ def solve_islands(
     work: dict[str, float] = {}
     for round_ in range(ROUNDS):
         finer = tolerance * 0.1**round_
+        begin: list[Floats | None] = [None] * len(larger)
+        if start is not None or round_ > 0:
+            begin = [force[contact_rows(part, problem.dim)] for part in larger]
         solutions = [
-            method(island, force[contact_rows(part, problem.dim)], finer, **options)
-            for island, part in zip(problems, larger, strict=True)
+            method(island, near, finer, **options)
+            for island, near in zip(problems, begin, strict=True)
         ]
         joined = islands_join(problem, [single, *larger], [alone, *solutions], tolerance)
         joined.work["islands"] = float(len(parts))

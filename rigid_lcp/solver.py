@@ -4,15 +4,16 @@
 
     no forces        where nothing approaches
     frictionless     where no contact has friction: principal pivoting, exact
-    all stick        without a start, where a few sweeps find nothing open and little that slides:
-                     one factorisation; exact for towers and much of what stands
+    all stick        where the start, or a few sweeps, find nothing open and little that slides: one
+                     factorisation; exact for towers and much of what stands
     convex path      without a start: a part of it, and Newton; solves most static piles
     Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
                      Newton at its end: first few sweeps and factorisations, then many, as what is
                      hard for the one is often easy for the other
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
                      goes to Newton, and if that is not enough to Gauss-Seidel and Newton again
-    islands          what is still not solved, each island apart, by all of this
+    islands          what is still not solved, each island apart, by all of this (large problems
+                     of few islands at once)
 
 Every method alone can fail on real problems: Newton far from a solution, the interior point where
 its path folds back, Gauss-Seidel on tall piles.  Together they fail seldom (`docs/rigid-solvers.md`
@@ -67,10 +68,13 @@ PATHS = (
 FEW_SWEEPS, FEW, FEW_CONTACTS = 100, 20, 300
 """Sweeps and factorisations that are tried first, up to so many contacts: enough for most steps of
 a pile in motion; where there are more, news need more sweeps to get through it."""
+FEW_ISLANDS = 20
+"""Up to so many islands, single contacts not counted, of a large problem are solved apart at once:
+a few grains that lie loose can keep a whole bed from converging.  More cost more than they gain."""
 FIRST_SWEEPS = 1000
 """What is spent where the first try was too short."""
 LAST_SWEEPS = 2000
-DEAR_SWEEPS = 3000
+DEAR_SWEEPS = 6000
 """What is spent before a factorisation that is dear."""
 PROOF_CONTACTS = 3000
 """Up to so many contacts a linear programme looks for the proof that there is no solution."""
@@ -137,13 +141,20 @@ def solve_auto(
     accept: float = 0.0,
 ) -> FrictionSolution:  # fmt: skip
     """The default of `solve_friction` on a problem that is made already."""
-    trial = _attempts(problem, start, tolerance, accept)
+    parts = islands(problem) if problem.contacts > FEW_CONTACTS else []
+    larger = sum(len(part) > 1 for part in parts)
+    split = len(parts) > 1 and larger <= FEW_ISLANDS
+    if split:
+        trial = Trial(problem, start, tolerance)
+        trial.keep(solve_islands(problem, _solve_island, start, tolerance, accept=accept))
+    else:
+        trial = _attempts(problem, start, tolerance, accept)
     if trial.best.solved or (
         trial.best.residual <= accept and problem.contacts > FEW_CONTACTS
     ):  # fmt: skip
         return trial.solution()
-    parts = islands(problem)
-    if len(parts) > 1:
+    parts = parts or islands(problem)
+    if len(parts) > 1 and not split:
         apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
         if _error(apart) < _error(trial.best):  # endless forces on one hide the errors of others
             trial.best = apart
@@ -170,11 +181,11 @@ def _attempts(
         return trial
     small = problem.contacts <= FEW_CONTACTS
     cold = start is None and tolerance < HAND_OVER and problem.contacts <= CONVEX_CONTACTS
-    if cold and trial.convex_start():
+    if trial.convex_start() if cold else trial.stick():
         return trial
     if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
         return trial
-    if not small and trial.dear and trial.sweep(trial.best.r, DEAR_SWEEPS, factorisations=0):
+    if not small and trial.dear and trial.sweep(start, DEAR_SWEEPS, factorisations=0):
         trial.sharpen()
         return trial
     # a large bed in motion: where one place of it resists, proximal points fail for all
@@ -208,9 +219,9 @@ def _error(found: FrictionSolution) -> float:
 
 
 def _solve_island(
-    problem: FrictionProblem, start: Floats | None, tolerance: float
+    problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
 ) -> FrictionSolution:
-    return _attempts(problem, start, tolerance).solution()
+    return _attempts(problem, start, tolerance, accept).solution()
 
 
 def _interior_point(

@@ -54,10 +54,9 @@ class Trial:
 
     def keep(self, found: FrictionSolution, after: str = "") -> FrictionSolution:
         """Count the work of a solution and keep it if it is the best; gives it back."""
+        named = found.method == "gauss-seidel" or "islands" in found.work  # islands name their own
         for name, count in found.work.items():
-            key = name if found.method == "gauss-seidel" or name == "factorisations" else (
-                f"{found.method} {name}"
-            )  # fmt: skip
+            key = name if named or name == "factorisations" else f"{found.method} {name}"
             self.work[key] = self.work.get(key, 0.0) + count
         if found.residual < self.best.residual or not np.isfinite(self.best.residual):
             name = f"{after} + {found.method}" if after else found.method
@@ -111,12 +110,8 @@ class Trial:
         if self.best.solved:
             self.sharpen()
             return True
-        self.linear = self.linear or factorisation(self.problem)
-        if seem_to_stick(self.problem, self.best.r):
-            exact = ROUND_OFF if self.tolerance <= LAST_WORD else self.tolerance
-            self.keep(sticking(self.problem, exact, linear=self.linear))
-            if self.best.solved:
-                return True
+        if self.stick():
+            return True
         found, steps, name = self.best, FEW_STEPS, self.best.method
         if self.dear and found.residual > HAND_OVER:
             return False
@@ -130,6 +125,14 @@ class Trial:
             steps, name = CONVEX_STEPS + 1, found.method
         if found.residual < CONVEX_USEFUL:
             self.newton(found.r, steps, name)
+        return self.best.solved
+
+    def stick(self) -> bool:
+        """Where the best point looks like it: all contacts stick; whether that is the answer."""
+        if seem_to_stick(self.problem, self.best.r):
+            exact = ROUND_OFF if self.tolerance <= LAST_WORD else self.tolerance
+            self.linear = self.linear or factorisation(self.problem)
+            self.keep(sticking(self.problem, exact, linear=self.linear))
         return self.best.solved
 
     @property
