@@ -23,7 +23,7 @@ def short_name(summary: Summary) -> str:
     """What is written beside a mark: the step in ms or the stiffness, controls with their own."""
     value, extra = summary.level["value"], summary.level["extra"]
     if summary.method == "rigid":
-        control = "" if extra == 1e-6 else f", res. {extra:.0e}"
+        control = "" if extra == 1e-9 else f", res. {extra:.0e}"
         return f"h = {1e3 * value:g} ms{control}"
     control = "" if extra == 0.05 else ", half step"
     return f"k = {value:.0e}{control}".replace("e+0", "e").replace("e+", "e")
