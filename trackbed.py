@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from textwrap import wrap
 
 __version__ = "0.1.0"
 
@@ -37,13 +38,20 @@ exit codes:
 """
 
 
+class HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Help whose lines do not break at hyphens: names of scenes and flags stay whole."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return wrap(" ".join(text.split()), width, break_on_hyphens=False)
+
+
 def parser_build(verb: str | None) -> argparse.ArgumentParser:
     """The command's parser; only ``verb`` gets its arguments, so only its package is loaded."""
     parser = argparse.ArgumentParser(
         prog="trackbed",
         description="Railway ballast: settlement under load cycles, vibration, hard grains.",
         epilog=EXIT_CODES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=HelpFormatter,
         allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"trackbed {__version__}")
@@ -52,7 +60,7 @@ def parser_build(verb: str | None) -> argparse.ArgumentParser:
     for name, (module, summary) in VERBS.items():
         verb_parser = verbs.add_parser(
             name, help=summary, description=summary, allow_abbrev=False, epilog=EXIT_CODES,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=HelpFormatter,
         )  # fmt: skip
         verb_parser.add_argument(
             "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
 from importlib.resources import files
 from pathlib import Path
+
+VERB_OF_TABLE = {"sample": "run", "simulation": "qdem", "run": "rigid"}
+"""A table of a scene file, and the verb that reads it."""
 
 
 def scene_names() -> tuple[str, ...]:
@@ -30,5 +34,6 @@ def scene_path(name: str) -> Path:
 
 
 def scene_verb(name: str) -> str:
-    """The verb of ``trackbed`` that runs the scene ``name``: ``qdem`` for one of bodies."""
-    return "qdem" if "\n[[body]]" in scene_template(name) else "run"
+    """The verb of ``trackbed`` that runs the scene ``name``, told by a table only it has."""
+    tables = tomllib.loads(scene_template(name))
+    return next((verb for table, verb in VERB_OF_TABLE.items() if table in tables), "run")

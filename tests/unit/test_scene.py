@@ -16,7 +16,7 @@ from adapters.errors import SceneError, TrackbedError, UsageError
 from adapters.load_series import load_series_read
 from adapters.scene import ENGINES, Engine, Loading, Scene
 from adapters.scene_file import key_lines, scene_load
-from scenes import scene_names, scene_template, scene_verb
+from scenes import scene_names, scene_path, scene_template, scene_verb
 
 KARRECH = scene_template("karrech")
 
@@ -70,6 +70,16 @@ def test_shipped_scenes_load_without_doubts() -> None:
         assert scene.engine.name == "liggghts"
     with pytest.raises(KeyError, match="karrech-coarse"):
         scene_template("carrech")
+
+
+def test_new_names_the_verb_that_reads_the_scene() -> None:
+    """`trackbed new` says which verb goes on: that whose reader takes the scene."""
+    from qdem_fem.scene_file import scene_read as qdem_scene
+    from rigid_lcp.scene_file import scene_read as rigid_scene
+
+    readers = {"run": scene_load, "qdem": qdem_scene, "rigid": rigid_scene}
+    for name in scene_names():
+        readers[scene_verb(name)](scene_path(name))
 
 
 def test_karrech_scene_is_table_1(tmp_path: Path) -> None:
