@@ -6,18 +6,22 @@ from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from rigid_lcp.friction_problem import FrictionProblem
+
+Ints = NDArray[np.int64]
 
 EQUILIBRATIONS = 3
 """Rounds of scaling rows and columns to entries of one: HiGHS takes what is below 1e-9 for zero."""
 
 
-def forces_insufficient(problem: FrictionProblem) -> bool:
+def forces_insufficient(problem: FrictionProblem, slip: Ints | None = None) -> bool:
     """Whether it is proved that no r in K gives ``u_N >= 0`` at every contact.
 
-    Every force of a cone is a sum of forces along its edges; in 3D the cone is replaced by the
-    pyramid around it, so that a proof stays one.
+    ``slip`` (nc,), in 2D: +-1 where a slip leaves the edge of the cone with that sign only, 0
+    where the whole cone is free.  Every force of a cone is a sum of forces along its edges; in 3D
+    the cone is replaced by the pyramid around it, so that a proof stays one.
     """
     from scipy.optimize import linprog
 
@@ -25,7 +29,9 @@ def forces_insufficient(problem: FrictionProblem) -> bool:
     edges = []
     for signs in product((1.0, -1.0), repeat=dim - 1):
         direction = np.ones((contacts, dim))
-        direction[:, 1:] = problem.friction[:, None] * signs
+        free = np.broadcast_to(signs, (contacts, dim - 1))
+        side = free if slip is None else np.where(slip[:, None] == 0, free, slip[:, None])
+        direction[:, 1:] = problem.friction[:, None] * side
         columns = np.repeat(np.arange(contacts), dim)
         edges.append(sp.csr_array((direction.ravel(), (np.arange(contacts * dim), columns))))
     approach = sp.csr_array(-(problem.delassus[::dim] @ sp.hstack(edges)))

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linprog
 
 from rigid_lcp.cones import natural_map
 from rigid_lcp.dantzig_drive import (
@@ -32,6 +31,7 @@ from rigid_lcp.factor_updates import (
     Reduced,
     reduced_empty,
 )
+from rigid_lcp.force_proof import forces_insufficient
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, Status
 
 Floats = NDArray[np.float64]
@@ -197,7 +197,7 @@ def pivots_solution(
         return FrictionSolution(force, velocity, residual, "solved", method, work)
     status, text = _ENDS[RAY if diverged and ended == DONE else ended]
     remedy = _REMEDIES[method]
-    if ended in (RAY, DONE) and forces_impossible(problem, state.geometry.slip):
+    if ended in (RAY, DONE) and forces_insufficient(problem, state.geometry.slip):
         status, text = (
             "no solution",
             "no finite forces keep the contacts from approaching (Painleve)",
@@ -212,33 +212,3 @@ def forces_diverged(problem: FrictionProblem, velocity: Floats) -> bool:
     """Whether a contact still approaches, fast next to q: large forces hide it in the residual."""
     size = float(np.abs(problem.offset).max(initial=0.0))
     return bool(velocity[:: problem.dim].min(initial=0.0) < -DIVERGED * size)
-
-
-def forces_impossible(problem: FrictionProblem, slip: Ints) -> bool:
-    """Whether no forces of the allowed signs and sizes at all give ``a_N >= 0``: a proof by LP."""
-    nc, mu, dim = problem.contacts, problem.friction, problem.dim
-    unit = sp.eye_array(nc)
-    normal, tangent = np.eye(dim)[:, :1], np.eye(dim)[:, 1:2]
-    # any force is a sum of the two edges of its cone, or lies on the one that a slip leaves
-    edges = [
-        sp.kron(unit, normal)
-        + sp.kron(sp.diags_array(np.where(slip == 0, sign, slip) * mu), tangent)
-        for sign in (1, -1)
-    ]
-    w = sp.csr_array(problem.delassus)
-    rates = w[::dim] @ sp.hstack(edges)
-    matrix = sp.csr_array(-rates)
-    # HiGHS takes what is below 1e-9 for zero and above 1e15 for malformed: rows and columns alike
-    lengths = np.ones(nc)
-    for _ in range(3):
-        for axis in (0, 1):
-            size = abs(matrix).max(axis=axis).toarray().ravel()
-            factor = sp.diags_array(1.0 / np.where(size > 0.0, size, 1.0))
-            matrix = matrix @ factor if axis == 0 else factor @ matrix
-            lengths = lengths if axis == 0 else lengths * factor.diagonal()
-    bound = problem.offset[::dim] * lengths
-    found = linprog(
-        np.zeros(2 * nc), A_ub=matrix, b_ub=bound / (float(np.abs(bound).max()) or 1.0),
-        bounds=(0, None), method="highs",
-    )  # fmt: skip
-    return bool(found.status == 2)

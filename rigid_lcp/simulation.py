@@ -34,7 +34,7 @@ NO_STEP = 1e-9
 """Part of a step that is round-off of a sum of times [-]."""
 SHORTEST_STEP = 1e-100
 """Shorter steps [s] have squares that are no numbers."""
-ACCEPT, GIVE_UP = 1e-6, 1e-3
+ACCEPT, GIVE_UP = 1e-5, 1e-3
 """Residuals [-]: a step of many contacts is left at the first where its tolerance would take the
 dearest methods; above the second it is no step, and the run stops."""
 

@@ -58,6 +58,7 @@ def page(rows: Sequence[Row]) -> str:
         "frictionless": _frictionless(races),
         "ladder": _ladder(races),
         "scale": _scale(rows),
+        "motion": _motion(rows),
         "dantzig": _dantzig(rows),
         "lemke": f"{SICONOS_MOST['2D_LEMKE']:,}",
         "dense": f"{SICONOS_MOST['2D_NSGS']:,}",
@@ -268,6 +269,31 @@ def _scale(rows: Sequence[Row]) -> str:
         lines.append(
             f"| {row['problem']} | {row['contacts']:,} | {begun} | {row['error']:.1e} | "
             f"{_seconds(row['cost_s'])} | {row['bar_s']:g} s | {row['by']} |"
+        )
+    return "\n".join(lines)
+
+
+def _motion(rows: Sequence[Row]) -> str:
+    """Steps of a large bed in motion, where they are recorded."""
+    made = [row for row in rows if row["case"] == "rigid-motion"]
+    if not made:
+        return ""
+    lines = [
+        "## A large bed in motion",
+        "",
+        "Whole time steps (contacts found, forces solved, overlaps removed), each from the forces"
+        " of the one before; `validation/rigid_motion_runs.py` says what moves.",
+        "",
+        "| bed | contacts | residual asked for | median | worst | steps above it | median step |"
+        " 99 % | worst | bar |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in made:
+        lines.append(
+            f"| {row['problem']} | {row['contacts']:,} | {row['setting']['tolerance']:.0e} | "
+            f"{row['error_median']:.1e} | {row['error']:.1e} | {row['steps_above']} of "
+            f"{row['setting']['steps']} | {_seconds(row['cost_s'])} | "
+            f"{_seconds(row['cost_99_s'])} | {_seconds(row['cost_worst_s'])} | {row['bar_s']:g} s |"
         )
     return "\n".join(lines)
 
