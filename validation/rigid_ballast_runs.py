@@ -101,8 +101,10 @@ def level_moments(
     return soft_moments(bed, scene, start, cycles, level.value, level.extra)
 
 
-def run_row(level: Level, bed: Bed, scene: Scene, start: Motion, cycles: int) -> list[Row]:
-    """The line of a run, and with it that of its state if it is drawn."""
+def run_row(
+    level: Level, bed: Bed, scene: Scene, start: Motion, cycles: int, drawn: bool = False
+) -> list[Row]:
+    """The line of a run, and with it that of its state if it is ``drawn``."""
     row: Row = {
         "kind": level.method,
         "level": asdict(level),
@@ -136,7 +138,7 @@ def run_row(level: Level, bed: Bed, scene: Scene, start: Motion, cycles: int) ->
         "step_s": (REST + PERIOD * (len(whole) - 1)) / last.steps,
     }  # fmt: skip
     rows = [row]
-    if level in PICTURED and bed.seed == 1:
+    if drawn:
         rows.append(state_row(level, bed, peaks[-1]))
     return rows
 
@@ -188,7 +190,8 @@ def study(
     for level in levels:
         for bed in usable:
             if (bed.seed, level.name) not in done:
-                for row in run_row(level, *bed_again(poured[bed.seed]), cycles):
+                drawn = level in PICTURED and bed is usable[0]
+                for row in run_row(level, *bed_again(poured[bed.seed]), cycles, drawn):
                     write(row)
 
 

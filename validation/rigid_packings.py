@@ -162,15 +162,19 @@ def bed_pairs(made: Bed, margin: float) -> Bed:
     return replace(made, pairs=pairs, impulse=impulse)
 
 
+def bed_touching(made: Bed) -> Bed:
+    """The same grains with those pairs only that touch."""
+    kept = bed_gaps(made) < TOUCH * made.radius.mean()
+    return replace(made, pairs=made.pairs[kept], impulse=made.impulse[kept])
+
+
 def bed_problem(made: Bed, step: float, *, gaps: bool = False) -> FrictionProblem:
     """The problem of a step [s]: of the pairs that touch, or of all with what gaps they have.
 
     A gap g leaves ``u_N >= -g / h``, and an overlap asks for a part of it back.
     """
+    made = made if gaps else bed_touching(made)
     apart = bed_gaps(made)
-    if not gaps:
-        kept = apart < TOUCH * made.radius.mean()
-        made = replace(made, pairs=made.pairs[kept], impulse=made.impulse[kept])
     radius, first, second = made.radius, made.pairs[:, 0], made.pairs[:, 1]
     frames = bed_frames(made)
     other = np.where(second < 0, 0.0, radius[second])

@@ -22,7 +22,7 @@ import numpy as np
 
 from adapters.provenance import provenance
 from rigid_lcp.solver import solve_friction
-from validation.rigid_packings import bed, bed_problem, bed_start
+from validation.rigid_packings import bed, bed_problem, bed_start, bed_touching
 from validation.rigid_peers import ONE_THREAD
 from validation.rigid_problems import bodies_anew
 
@@ -58,7 +58,7 @@ def scale_row(scale: Scale) -> Row:
     """Make the packing and solve it, each time anew."""
     kept = os.environ.get("TRACKBED_BEDS")
     folder = Path(kept) if kept else None
-    made = bed(scale.grains, scale.dim, seed=1, settle=scale.settle, folder=folder)
+    made = bed_touching(bed(scale.grains, scale.dim, seed=1, settle=scale.settle, folder=folder))
     problem = bed_problem(made, STEP)
     start = bed_start(made, STEP) if scale.started_warm else None
     before = 1.0 if start is None else problem.residual(start)
