@@ -205,3 +205,8 @@ def duels(found: Sequence[Summary]) -> list[Duel]:
             good = [s for s in found if s.method == "soft" and near(s) <= near(mine)]
             result.append(Duel(mine, min(good, key=lambda s: s.cost, default=None)))
     return result
+
+
+def gain_most(rows: Sequence[Row]) -> float:
+    """Greatest energy gained in a cycle, of the greatest loss in a cycle of the same run [-]."""
+    return max(-min(row["dissipated"]) / max(row["dissipated"]) for row in rows)

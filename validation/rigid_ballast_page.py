@@ -19,6 +19,7 @@ from validation.rigid_ballast_judge import (
     Limits,
     Summary,
     duels,
+    gain_most,
     limits_of,
     near,
     summaries,
@@ -44,7 +45,7 @@ def page(rows: Sequence[Row]) -> str:
         beds=most, cycles=cycles, verdict=verdict(limits, found),
         levels=levels_table(found), duels=duels_table(duels(found)), laws=laws_table(found),
         fabric=fabric_table(found), energies=energies_table(found), elastic=elastic_table(found),
-        failures=failures(rows), poured=len(beds) + tilted, unused=tilted,
+        gain=gains(rows), failures=failures(rows), poured=len(beds) + tilted, unused=tilted,
         prepared=f"{np.mean([row['cpu_s'] for row in beds]):.2g}",
         machine=beds[0]["machine"], commits=", ".join(sorted({row["commit"] for row in rows})),
         damping=beds[0]["damping"],
@@ -187,6 +188,19 @@ def energies_table(found: Sequence[Summary]) -> str:
     return _table(head, [
         (f"{s.method}: {s.name}", *(f"{s.lost[n - 1]:.3g}" for n in shown)) for s in found
     ])  # fmt: skip
+
+
+def gains(rows: Sequence[Row]) -> str:
+    """The most energy gained in a cycle, step by step."""
+    ours = [row for row in rows if row["kind"] == "rigid" and row["ok"]]
+    steps = sorted({row["level"]["value"] for row in ours}, reverse=True)
+    found = []
+    for step in steps:
+        mine = [row for row in ours if row["level"]["value"] == step]
+        joules = max(0.0, -min(min(row["dissipated"]) for row in mine))
+        share = max(0.0, gain_most(mine))
+        found.append(f"{joules:.1e} J/m at {1e3 * step:g} ms ({share:.1e} of its run's worst loss)")
+    return ", ".join(found)
 
 
 def elastic_table(found: Sequence[Summary]) -> str:

@@ -133,6 +133,7 @@ def run_row(
         "tilt": float(last.place[2] - whole[0].place[2]),
         "dissipated": dissipated([m.work for m in whole], [m.energy for m in whole]).tolist(),
         "overlap": max(max(0.0, -float(m.contacts["gap"].min(initial=0.0))) for m in peaks),
+        "overlap_after": max(overlap_of(scene, m.motion) for m in moments),
         "fabric": fabric_of(peaks[-1].contacts, stones, FRICTION),
         "cpu_s": last.cpu, "steps": last.steps, "residual": last.residual,
         "step_s": (REST + PERIOD * (len(whole) - 1)) / last.steps,
@@ -141,6 +142,11 @@ def run_row(
     if drawn:
         rows.append(state_row(level, bed, peaks[-1]))
     return rows
+
+
+def overlap_of(scene: Scene, motion: Motion) -> float:
+    """Greatest overlap of any two bodies in a state [m]."""
+    return max(0.0, -float(world_of(scene)[0].contacts(motion, 0.0).gap.min(initial=0.0)))
 
 
 def state_row(level: Level, bed: Bed, moment: Moment) -> Row:

@@ -118,7 +118,10 @@ def main(words: Sequence[str] | None = None) -> None:
     origin = provenance(["python", "-m", "validation.rigid_motion_runs"])
     made = motion_row(asked.grains, asked.steps, asked.tolerance)
     made |= {key: origin[key] for key in ORIGIN}
-    rows = [row for row in rows_read(asked.out) if row.get("problem") != made["problem"]]
+    rows = [
+        row for row in rows_read(asked.out)
+        if (row.get("problem"), row["setting"]) != (made["problem"], made["setting"])
+    ]  # fmt: skip
     rows_write(asked.out, [*rows, made])
     print({name: made[name] for name in ("contacts", "error", "cost_s", "cost_99_s")})
 
