@@ -141,6 +141,10 @@ def solve_auto(
     accept: float = 0.0,
 ) -> FrictionSolution:  # fmt: skip
     """The default of `solve_friction` on a problem that is made already."""
+    if not problem.friction.any():
+        exact = frictionless(problem, start, tolerance)
+        if exact.solved:
+            return exact
     parts = islands(problem) if problem.contacts > FEW_CONTACTS else []
     larger = sum(len(part) > 1 for part in parts)
     split = len(parts) > 1 and larger <= FEW_ISLANDS
@@ -173,12 +177,13 @@ def _attempts(
 ) -> Trial:
     trial = Trial(problem, start, tolerance)
     if trial.best.solved:
+        trial.sharpen()
         return trial
     if not problem.friction.any():
         trial.keep(frictionless(problem, start, tolerance))
+        if trial.best.solved:
+            return trial
     rough = tolerance if tolerance > LAST_WORD else HAND_OVER
-    if trial.best.solved:
-        return trial
     small = problem.contacts <= FEW_CONTACTS
     cold = start is None and tolerance < HAND_OVER and problem.contacts <= CONVEX_CONTACTS
     if trial.convex_start() if cold else trial.stick():

@@ -133,6 +133,7 @@ class Trial:
             exact = ROUND_OFF if self.tolerance <= LAST_WORD else self.tolerance
             self.linear = self.linear or factorisation(self.problem)
             self.keep(sticking(self.problem, exact, linear=self.linear))
+            self.sharpen()
         return self.best.solved
 
     @property
