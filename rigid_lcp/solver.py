@@ -3,7 +3,8 @@
 ``auto`` takes the first point that is exact enough, and otherwise the best of all:
 
     no forces        where nothing approaches
-    frictionless     where no contact has friction: principal pivoting, exact
+    frictionless     where no contact has friction: sweeps and principal pivoting, exact; there are
+                     no tangential unknowns
     all stick        where the start, or a few sweeps, find nothing open and little that slides: one
                      factorisation; exact for towers and much of what stands
     convex path      without a start: a part of it, and Newton; solves most static piles

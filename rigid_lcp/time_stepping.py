@@ -32,8 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigid_lcp.contacts import ContactForces, Contacts, contact_frames, contact_rows
 from rigid_lcp.equations import body_space, inertial_acceleration, relative_velocity
 from rigid_lcp.errors import NotConverged
-from rigid_lcp.friction_problem import BodySpace, FrictionSolution, friction_problem
-from rigid_lcp.frictionless import frictionless
+from rigid_lcp.friction_problem import BodySpace, FrictionSolution
 from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
@@ -122,19 +121,11 @@ def impulses_found(
     bodies: BodySpace, offset: Floats, friction: Floats, start: Floats | None, tolerance: float,
     accept: float = 0.0,
 ) -> FrictionSolution:  # fmt: skip
-    """Impulses (or forces, displacements) of contacts with ``offset`` q (nc, dim).
-
-    Where no contact has friction, there are no tangential unknowns.
-    """
-    dim = offset.shape[1]
-    if not friction.any():
-        problem = friction_problem(bodies, offset, friction, dim)
-        solution = frictionless(problem, start, tolerance)
-        if solution.solved:
-            return solution
+    """Impulses (or forces, displacements) of contacts with ``offset`` q (nc, dim)."""
     return solve_friction(
-        bodies, offset.ravel(), friction, dim=dim, start=start, tolerance=tolerance, accept=accept
-    )
+        bodies, offset.ravel(), friction, dim=offset.shape[1], start=start, tolerance=tolerance,
+        accept=accept,
+    )  # fmt: skip
 
 
 def forces_error(

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from adapters.provenance import provenance
 from rigid_lcp import Disc, HalfSpace, Scene, Simulation
 from rigid_lcp.motion import Motion
-from validation.rigid_packings import GRAVITY, Bed, bed
+from validation.rigid_packings import GRAVITY, Bed, bed, bed_gaps
+from validation.rigid_runs import ORIGIN, RECORD, rows_read, rows_write
 
 Row = dict[str, Any]
 Floats = NDArray[np.float64]
@@ -38,7 +39,7 @@ BAR_S = 1.0
 
 def scene_of(made: Bed) -> Scene:
     """The bed's grains between its walls, discs a little smaller than they were."""
-    gap = max(CLEARANCE * float(made.radius.max()), -float(gaps_least(made)))
+    gap = max(CLEARANCE * float(made.radius.max()), -float(bed_gaps(made).min()))
     scene = Scene(dim=2, gravity=(0.0, -GRAVITY))
     for normal, place in (((0, 1), (0, 0)), ((1, 0), (0, 0)), ((-1, 0), (made.width, 0))):
         scene.add(HalfSpace(normal, float(np.dot(normal, place))), friction=made.friction)
@@ -48,13 +49,6 @@ def scene_of(made: Bed) -> Scene:
             friction=made.friction,
         )  # fmt: skip
     return scene
-
-
-def gaps_least(made: Bed) -> float:
-    """The least gap of any two touching grains, or grain and wall [m]."""
-    from validation.rigid_packings import bed_gaps
-
-    return float(bed_gaps(made).min(initial=0.0))
 
 
 def load_of(made: Bed, walls: int, weight: float) -> Any:
@@ -107,8 +101,6 @@ def motion_row(grains: int, steps: int, tolerance: float) -> Row:
 
 def main(words: Sequence[str] | None = None) -> None:
     """Measure and put the row in the record."""
-    from validation.rigid_runs import ORIGIN, RECORD, rows_read, rows_write
-
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--grains", type=int, default=5300)
     parser.add_argument("--steps", type=int, default=40, help="40: a cycle of the load")
