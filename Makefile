@@ -1,5 +1,5 @@
 # Every target does its own set-up (setup.sh says what it installs) and is quick when all is there.
-.PHONY: demo test lint bench validate setup
+.PHONY: demo demo-rigid test lint bench validate setup
 
 bin := .venv/bin
 
@@ -10,6 +10,11 @@ demo: setup
 	$(bin)/trackbed run scenes/karrech-coarse.toml --control --run-folder demo-bed/run
 	$(bin)/trackbed report demo-bed/run --open
 	$(bin)/trackbed status demo-bed/run
+
+demo-rigid: setup
+	$(bin)/trackbed rigid scenes/pile.toml --run-folder demo-pile --resume \
+		--set run.duration=0.95 --set run.frames=19
+	@echo "now look at demo-pile/report.html and demo-pile/movie.gif"
 
 test:
 	@./setup.sh test

@@ -25,7 +25,17 @@ import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
 
-from rigid_lcp.elimination_tree import elimination_tree
+from rigid_lcp.body_matrix import (
+    add_contacts,
+    bodies_pushed,
+    body_pairs,
+    contact_stiffness,
+    dense_delassus,
+    force_left,
+    jacobian_blocks,
+    multiply_blocks,
+)
+from rigid_lcp.elimination_tree import EliminationTree, elimination_tree
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.multifrontal import factor_fronts, solve_fronts
 
@@ -33,7 +43,7 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Solve = Callable[[Floats], Floats]
 
-DENSE_SIZE = 220
+DENSE_SIZE = 100
 """Up to so many rows a dense LU costs less than the bookkeeping of a sparse one."""
 DENSE_SHARE = 0.3
 """Fuller matrices are factored dense: their sparse LU would be full anyway."""
@@ -68,7 +78,13 @@ class DenseFactorisation:
 
     def __init__(self, problem: FrictionProblem) -> None:
         self.contacts, self.dim = problem.contacts, problem.dim
-        self.matrix = problem.delassus.toarray()
+        if problem.matrix is None and problem.bodies is not None:
+            rows, mass = problem.bodies.jacobian, problem.bodies.inverse_mass
+            self.matrix: Floats = dense_delassus(
+                rows.indptr, rows.indices, rows.data, mass.indptr, mass.indices, mass.data
+            )
+        else:
+            self.matrix = problem.delassus.toarray()
         self.flops = 2.0 / 3.0 * float(len(self.matrix)) ** 3
 
     def factor(self, a: Floats, b: Floats) -> Solve:
@@ -135,88 +151,62 @@ class BodyFactorisation:
 
     def __init__(self, problem: FrictionProblem) -> None:
         assert problem.bodies is not None
-        dim, size = problem.dim, problem.bodies.body_size
-        self.jacobian = sp.csr_array(problem.bodies.jacobian)
-        self.transposed = sp.csr_array(self.jacobian.T)
-        bodies = self.jacobian.shape[1] // size
-        entries = self.jacobian.tocoo()
-        # J of contact c by body ``body[k]``, first[c] <= k < first[c + 1], as full blocks
-        key = (entries.row // dim).astype(np.int64) * bodies + entries.col // size
-        found, where = np.unique(key, return_inverse=True)
-        contact, body = found // bodies, found % bodies
-        self.first = np.searchsorted(contact, np.arange(problem.contacts + 1))
-        self.blocks = np.zeros((len(found), dim, size))
-        self.blocks[where, entries.row % dim, entries.col % size] = entries.data
-        rows, columns = _pairs(self.first, body)
-        own = np.arange(bodies)
-        key = np.concatenate([own * bodies + own, rows * bodies + columns])
+        space, size = problem.bodies, problem.bodies.body_size
+        rows = space.jacobian
+        bodies = self.bodies = rows.shape[1] // size
+        self.dim = problem.dim
+        self.first, self.body, self.block = jacobian_blocks(
+            rows.indptr, rows.indices, rows.data, problem.dim, size
+        )
+        own = np.arange(bodies) * (bodies + 1)
+        key = np.concatenate([own, body_pairs(self.first, self.body, bodies)])
         found, places = np.unique(key, return_inverse=True)
         self.system = BlockSystem(bodies, size, found // bodies, found % bodies)
         self.flops = self.system.flops
-        mass = problem.bodies.mass.tocoo()
         self.mass = np.zeros((len(found), size, size))
-        self.mass[places[mass.row // size], mass.row % size, mass.col % size] = mass.data
+        self.mass[places[:bodies]] = space.mass_blocks
         self.places = places[bodies:]
 
     def factor(self, a: Floats, b: Floats) -> Solve:
         """See `Factorisation`."""
-        try:
-            inverse: Floats = np.linalg.inv(a).astype(np.float64, copy=False)
-        except np.linalg.LinAlgError as error:
-            raise SingularSystem from error
-        stiffness = np.matmul(inverse, b)
-        matrix = self.mass.copy()
-        _add_contacts(matrix, self.first, self.blocks, self.places, stiffness)
-        solve_bodies = self.system.factor(matrix)
+        tree = self.system.tree
+        inverse, stiffness, factors, regular = factor_contacts(
+            tree, self.mass, self.first, self.block, self.places, a, b
+        )
+        if not regular:
+            raise SingularSystem
 
         def solve(right: Floats) -> Floats:
-            force = multiply_blocks(inverse, right)
-            velocity = solve_bodies(self.transposed @ force)
-            return force - multiply_blocks(stiffness, self.jacobian @ velocity)
+            left: Floats = solve_contacts(
+                tree, factors, self.first, self.body, self.block, self.bodies, inverse, stiffness,
+                right.reshape(-1, self.dim),
+            )  # fmt: skip
+            return left
 
         return solve
 
 
-def multiply_blocks(blocks: Floats, vector: Floats) -> Floats:
-    """Block diagonal matrix (nc, dim, dim) times a vector (nc * dim,)."""
-    return np.matmul(blocks, vector.reshape(*blocks.shape[:2], 1)).ravel()
+@njit(cache=True)
+def factor_contacts(
+    tree: EliminationTree, mass: Floats, first: Integers, block: Floats, places: Integers,
+    a: Floats, b: Floats,
+) -> tuple[Floats, Floats, Floats, bool]:  # fmt: skip
+    """``A^-1``, ``A^-1 B`` and the factors of ``M + J^T A^-1 B J``, and whether there are any."""
+    inverse, stiffness, regular = contact_stiffness(a, b)
+    if not regular:
+        return inverse, stiffness, np.empty(0), False
+    matrix = mass.copy()
+    add_contacts(matrix, first, block, places, stiffness)
+    factors, regular = factor_fronts(tree, matrix)
+    return inverse, stiffness, factors, regular
 
 
 @njit(cache=True)
-def _pairs(first: Integers, body: Integers) -> tuple[Integers, Integers]:
-    """Row and column of every block that a contact adds to, in the order of `_add_contacts`."""
-    total = 0
-    for c in range(len(first) - 1):
-        total += (first[c + 1] - first[c]) ** 2
-    rows, columns = np.empty(total, dtype=np.int64), np.empty(total, dtype=np.int64)
-    k = 0
-    for c in range(len(first) - 1):
-        for i in range(first[c], first[c + 1]):
-            for j in range(first[c], first[c + 1]):
-                rows[k], columns[k] = body[i], body[j]
-                k += 1
-    return rows, columns
-
-
-@njit(cache=True)
-def _add_contacts(
-    matrix: Floats, first: Integers, blocks: Floats, places: Integers, stiffness: Floats
-) -> None:
-    """Add ``J_c^T K_c J_c`` of every contact, ``K = A^-1 B``, to the blocks of the body matrix."""
-    dim, size = blocks.shape[1:]
-    half = np.empty((size, dim))
-    k = 0
-    for c in range(len(first) - 1):
-        for i in range(first[c], first[c + 1]):
-            for m in range(size):
-                for b in range(dim):
-                    half[m, b] = 0.0
-                    for a in range(dim):
-                        half[m, b] += blocks[i, a, m] * stiffness[c, a, b]
-            for j in range(first[c], first[c + 1]):
-                block = matrix[places[k]]
-                for m in range(size):
-                    for b in range(dim):
-                        for n in range(size):
-                            block[m, n] += half[m, b] * blocks[j, b, n]
-                k += 1
+def solve_contacts(
+    tree: EliminationTree, factors: Floats, first: Integers, body: Integers, block: Floats,
+    bodies: int, inverse: Floats, stiffness: Floats, right: Floats,
+) -> Floats:  # fmt: skip
+    """``dr = A^-1 (b - B J v)`` of the right-hand side b (nc, dim)."""
+    force = multiply_blocks(inverse, right)
+    push = bodies_pushed(first, body, block, bodies, force)
+    return force_left(first, body, block, stiffness, force, solve_fronts(tree, factors, push))

@@ -13,6 +13,7 @@ contacts (section 8) instead, for piles at rest or in slow motion.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from sys import float_info
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,7 @@ from rigid_lcp.contacts import ContactForces
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.motion import Motion
+from rigid_lcp.scene_input import number_in, whole_in
 from rigid_lcp.strength import Break, splitting_line, weibull_strength
 
 if TYPE_CHECKING:
@@ -50,11 +52,10 @@ class Breakage:
     """Judge by the forces of elastic contacts (`rigid_lcp.unique_forces`), impacts left out."""
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.strength) and self.strength > 0 and self.every >= 1):
-            raise ShapeError(
-                f"strength is {self.strength}, every is {self.every}", where="breakage",
-                remedy="give a tension above zero and 1 or more steps between judgements",
-            )  # fmt: skip
+        positive, steps = "give a tension above zero", "give 1 or more steps between judgements"
+        number_in(self.strength, 0.0, float_info.max, "strength", "breakage", positive, above=True)
+        whole_in(self.every, 1, "every", "breakage", steps)
+        number_in(self.smallest, 0.0, np.inf, "smallest", "breakage", "give a volume, or zero")
         if (self.modulus is None) != (self.reference_volume is None):
             raise ShapeError(
                 "a size effect needs both modulus and reference_volume", where="breakage",

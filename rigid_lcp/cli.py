@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,16 +67,18 @@ def _shown(value: Any) -> str:
 
 def _outlook(file: SceneFile) -> dict[str, Any]:
     """What a run would be: bodies, steps, what is left out."""
-    from rigid_lcp.scene_run import left_out, simulation_of
+    from rigid_lcp.scene_run import left_out, simulation_of, steps_planned, unknowns_a_contact
 
     _, run = simulation_of(file)
     tables = file.tables.run
+    steps, step = steps_planned(file)
     return {
         "title": file.tables.title,
         "method": tables.method,
         "bodies": int(run.world.movable.sum()),
-        "steps": round(tables.duration / tables.step),
-        "step": tables.step,
+        "steps": steps,
+        "step": step,
+        "unknowns_a_contact": unknowns_a_contact(file),
         "frames": tables.frames,
         "left_out": left_out(file),
     }
@@ -83,6 +86,7 @@ def _outlook(file: SceneFile) -> dict[str, Any]:
 
 def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
+    from rigid_lcp.interruption import interruptible
     from rigid_lcp.provenance import provenance
     from rigid_lcp.report import report_write
     from rigid_lcp.run_folder import RESULT, RunFolder, write_whole
@@ -95,7 +99,7 @@ def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
         "scene": file.tables.model_dump(mode="json"),
         "provenance": provenance(["trackbed", *sys.argv[1:]]),
     }
-    with folder.locked():
+    with folder.locked(), interruptible(path):
         goes_on = folder.settle(manifest, file.text, resume=arguments.resume, force=arguments.force)
         there = folder.summary
         if goes_on and there is not None:
@@ -117,9 +121,11 @@ def _progress() -> Any:
             first.append(now)
         spent = time.monotonic() - began
         left = spent / max(now - first[0] / 2, 1e-12) * (duration - now)
-        print(
-            f"{now:.4g} of {duration:.4g} s, {len(run.contacts)} contacts, about {left:.0f} s left",
-            file=sys.stderr, flush=True,
-        )  # fmt: skip
+        with suppress(OSError):  # who reads this line may be gone; the run goes on
+            print(
+                f"{now:.4g} of {duration:.4g} s, {len(run.contacts)} contacts, "
+                f"about {max(left, 0.0):.0f} s left",
+                file=sys.stderr, flush=True,
+            )  # fmt: skip
 
     return show

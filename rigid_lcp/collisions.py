@@ -25,18 +25,20 @@ watched, and eps scaled down where it would grow: at eps = 0 it can not.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.errors import ProblemError
+from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, FrictionSolution, Status
 from rigid_lcp.frictionless import frictionless
+from rigid_lcp.problem_input import finite_numbers
 
 Floats = NDArray[np.float64]
 Law = Literal["newton", "moreau"]
+Energy = Literal["safe", "watched"]
 
 ROUND_OFF = 1e-12
 """Velocities this small against the largest of the collision are no approach; energies likewise."""
@@ -74,7 +76,7 @@ def collide(
     friction: ArrayLike = 0.0,
     *,
     law: Law = "moreau",
-    energy: Literal["safe", "watched"] = "safe",
+    energy: Energy = "safe",
     tolerance: float = 1e-12,
     max_rounds: int = 50,
     still: float = 0.0,
@@ -91,14 +93,17 @@ def collide(
     cuts off bounces without end (Zeno).  ``drive`` (nc * dim,) [m/s]: relative velocities of the
     contacts while the bodies of J rest, those of walls that are moved from outside.
 
-    Raises `ProblemError` for malformed input.  Contacts are those of J: also touching ones with
-    v = 0 take part, as they pass impulses on.
+    Contacts are those of J: also touching ones with v = 0 take part, as they pass impulses on.
+    Raises `ProblemError` for malformed input, `UsageError` for a choice that there is not.
     """
-    before = np.asarray(velocity, dtype=float).ravel()
-    dim = 2 if bodies.body_size == 3 else 3
+    _check_choices(law, energy, tolerance, max_rounds, still, rest_speed)
+    dim, before = _moving(bodies, velocity)
     nc = bodies.jacobian.shape[0] // dim
-    eps, mu = _checked(bodies, before, restitution, friction, nc)
-    moved = np.zeros(nc * dim) if drive is None else np.asarray(drive, dtype=float).ravel()
+    eps = _one_a_contact("restitution", restitution, 1.0, nc)
+    mu = _one_a_contact("friction", friction, np.inf, nc)
+    moved = np.zeros(nc * dim)
+    if drive is not None:
+        moved = _numbers_of("drive", drive, nc * dim, "one number a row of J")
     first = bodies.jacobian @ before + moved
     none = max(still, ROUND_OFF * float(np.abs(first).max(initial=0.0)))
     after, impulse = before.copy(), np.zeros(nc * dim)
@@ -136,7 +141,7 @@ def collide(
 
 def collision_round(
     bodies: BodySpace, velocity: Floats, taking: NDArray[np.int64], eps: Floats, mu: Floats,
-    dim: int, law: Law, energy: str, tolerance: float,
+    dim: int, law: Law, energy: Energy, tolerance: float,
 ) -> tuple[Floats, FrictionSolution, float]:  # fmt: skip
     """Impulses of one round on the contacts that take part; the solution; the factor of eps.
 
@@ -191,36 +196,62 @@ def kinetic_energy(bodies: BodySpace, velocity: Floats) -> float:
     return 0.5 * float(v @ np.linalg.solve(inverse[np.ix_(moves, moves)], v))
 
 
-def _checked(
-    bodies: BodySpace, velocity: Floats, restitution: ArrayLike, friction: ArrayLike, nc: int
-) -> tuple[Floats, Floats]:
+def _moving(bodies: BodySpace, velocity: ArrayLike) -> tuple[int, Floats]:
+    """2 or 3 dimensions, and the velocities of the bodies; refuses what is neither."""
+    if not isinstance(bodies, BodySpace):
+        raise ProblemError(
+            f"they are a {type(bodies).__name__}", where="bodies",
+            remedy="give a BodySpace: a collision needs J and M^-1 apart",
+        )  # fmt: skip
     if bodies.body_size not in (3, 6):
         raise ProblemError(
             f"a body has {bodies.body_size} freedoms", where="body_size",
             remedy="give 3 in 2D and 6 in 3D",
         )  # fmt: skip
-    if velocity.shape != (bodies.jacobian.shape[1],) or not np.isfinite(velocity).all():
+    freedoms = bodies.jacobian.shape[1]
+    before = _numbers_of("velocity", velocity, freedoms, "one number a freedom, as J has columns")
+    return (2 if bodies.body_size == 3 else 3), before
+
+
+def _numbers_of(name: str, values: ArrayLike, count: int, remedy: str) -> Floats:
+    array = finite_numbers(values, name).ravel()
+    if len(array) != count:
         raise ProblemError(
-            f"the velocity is not {bodies.jacobian.shape[1]} finite numbers", where="velocity",
-            remedy="give one number a freedom of the bodies, as J has columns",
+            f"{name} has {len(array)} numbers, not {count}", where=name, remedy=f"give {remedy}"
+        )
+    return array
+
+
+def _one_a_contact(name: str, values: ArrayLike, upper: float, nc: int) -> Floats:
+    array = finite_numbers(values, name)
+    if array.shape not in ((), (nc,)):
+        raise ProblemError(
+            f"{name} has shape {array.shape} for {nc} contacts", where=name,
+            remedy="give one number, or one a contact",
         )  # fmt: skip
-    found = []
-    for name, values, upper in (
-        ("restitution", restitution, 1.0),
-        ("friction", friction, np.inf),
-    ):
-        array = np.asarray(values, dtype=float)
-        if array.shape not in ((), (nc,)):
-            raise ProblemError(
-                f"{name} has shape {array.shape} for {nc} contacts", where=name,
-                remedy="give one number, or one a contact",
-            )  # fmt: skip
-        array = np.broadcast_to(array, (nc,)).copy()
-        bad = np.flatnonzero(~(np.isfinite(array) & (array >= 0.0) & (array <= upper)))
-        if len(bad):
-            raise ProblemError(
-                f"{name} is {array[bad[0]]:g}", where=f"{name}, contact {bad[0]}",
-                remedy="give a number of 0 or more" + (", at most 1" if upper == 1.0 else ""),
-            )  # fmt: skip
-        found.append(array)
-    return found[0], found[1]
+    array = np.broadcast_to(array, (nc,)).copy()
+    bad = np.flatnonzero(~((array >= 0.0) & (array <= upper)))
+    if len(bad):
+        raise ProblemError(
+            f"{name} is {array[bad[0]]:g}", where=f"{name}, contact {bad[0]}",
+            remedy="give a number of 0 or more" + (", at most 1" if upper == 1.0 else ""),
+        )  # fmt: skip
+    return array
+
+
+def _check_choices(
+    law: str, energy: str, tolerance: float, max_rounds: int, still: float, rest_speed: float
+) -> None:
+    for name, given, known in (("law", law, get_args(Law)), ("energy", energy, get_args(Energy))):
+        if given not in known:
+            raise UsageError(
+                f"{name} is {given!r}", where=name, remedy="give one of " + ", ".join(known)
+            )
+    least = {"tolerance": tolerance, "still": still, "rest_speed": rest_speed}
+    for name, value in least.items():
+        if not (0.0 <= value < np.inf) or (name == "tolerance" and value == 0.0):
+            raise UsageError(f"{name} is {value!r}", where=name, remedy="give a positive number")
+    if isinstance(max_rounds, bool) or max_rounds != int(max_rounds) or max_rounds < 0:
+        raise UsageError(
+            f"max_rounds is {max_rounds!r}", where="max_rounds", remedy="give a count of 0 or more"
+        )

@@ -104,13 +104,27 @@ def natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) ->
     A contact that carries and approaches all the same shows ``rho |u_N| / (1 + mu^2)^(1/2)`` of
     it: at mu = 1000 a residual of 1e-12 means approach to 1e-9.
     """
+    found: float = _natural_residual(
+        np.ascontiguousarray(force), np.ascontiguousarray(velocity), mu, rho
+    )
+    return found
+
+
+@njit(cache=True)
+def _natural_residual(force: Floats, velocity: Floats, mu: Floats, rho: float) -> float:
     push = rho * velocity
-    scale = float(np.maximum(np.abs(force).max(initial=0.0), np.abs(push).max(initial=0.0)))
-    if scale == 0.0 or not np.isfinite(scale):
-        return scale
-    force, push = force / scale, push / scale  # squares neither vanish nor overflow
-    error = float(np.linalg.norm(natural_map(force, push, mu, 1.0)))
-    return error / (float(np.linalg.norm(force)) or float(np.linalg.norm(push)))
+    largest = 0.0
+    for c in range(force.shape[0]):
+        for k in range(force.shape[1]):
+            if not (np.isfinite(force[c, k]) and np.isfinite(push[c, k])):
+                return np.nan
+            largest = max(largest, abs(force[c, k]), abs(push[c, k]))
+    if largest == 0.0:
+        return 0.0
+    scaled, push = force / largest, push / largest  # squares neither vanish nor overflow
+    error = np.sqrt(np.sum(natural_map(scaled, push, mu, 1.0) ** 2))
+    size = np.sqrt(np.sum(scaled**2))
+    return error / (size if size > 0.0 else np.sqrt(np.sum(push**2)))
 
 
 def length(values: Floats) -> float:

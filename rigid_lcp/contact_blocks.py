@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
 
+from rigid_lcp.body_matrix import diagonal_blocks, jacobian_blocks
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem
 
 Floats = NDArray[np.float64]
@@ -92,19 +93,44 @@ def body_blocks(problem: FrictionProblem) -> BodyBlocks | None:
     root = inverse_mass_root(space)
     if root is None:
         return None
-    pattern = sp.bsr_array(space.jacobian, blocksize=(dim, size))
-    pattern.eliminate_zeros()
-    count = np.diff(pattern.indptr)
-    if count.max() > 2:
+    rows = space.jacobian
+    first, moved, part = jacobian_blocks(rows.indptr, rows.indices, rows.data, dim, size)
+    laid_out = pairs_of_blocks(first, moved, part, root)
+    if laid_out is None:
         return None
-    body = np.full((contacts, 2), len(root), dtype=np.int64)
-    block = np.zeros((contacts, 2, dim, size))
-    contact = np.repeat(np.arange(contacts), count)
-    side = np.arange(len(contact)) - pattern.indptr[contact]
-    body[contact, side] = pattern.indices
-    block[contact, side] = pattern.data @ root[pattern.indices]
-    local = np.einsum("csik,csjk->cij", block, block)
-    return BodyBlocks(body, block, local, len(root))
+    return BodyBlocks(*laid_out, len(root))
+
+
+@njit(cache=True)
+def pairs_of_blocks(
+    first: Integers, moved: Integers, part: Floats, root: Floats
+) -> tuple[Integers, Floats, Floats] | None:
+    """``body``, ``block`` and ``local`` of `BodyBlocks`; None if a contact moves three bodies.
+
+    A block of zeros moves none.
+    """
+    contacts, (dim, size) = len(first) - 1, part.shape[1:]
+    body = np.full((contacts, 2), len(root))
+    block, local = np.zeros((contacts, 2, dim, size)), np.zeros((contacts, dim, dim))
+    for c in range(contacts):
+        side = 0
+        for k in range(first[c], first[c + 1]):
+            if not part[k].any():
+                continue
+            if side == 2:
+                return None
+            body[c, side] = moved[k]
+            own = block[c, side]
+            for i in range(dim):
+                for m in range(size):
+                    if part[k, i, m] != 0.0:
+                        own[i] += part[k, i, m] * root[moved[k], m]
+            for i in range(dim):
+                for j in range(dim):
+                    for m in range(size):
+                        local[c, i, j] += own[i, m] * own[j, m]
+            side += 1
+    return body, block, local
 
 
 def inverse_mass_root(space: BodySpace) -> Floats | None:
@@ -112,14 +138,10 @@ def inverse_mass_root(space: BodySpace) -> Floats | None:
 
     By eigenvectors, as a body that is held has zeros there.
     """
-    size = space.body_size
-    blocks = sp.bsr_array(space.inverse_mass, blocksize=(size, size))
-    blocks.eliminate_zeros()
-    row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
-    if (row != blocks.indices).any():
+    rows = space.inverse_mass
+    mass = diagonal_blocks(rows.indptr, rows.indices, rows.data, space.body_size)
+    if np.count_nonzero(mass) != np.count_nonzero(rows.data):
         return None
-    mass = np.zeros((len(blocks.indptr) - 1, size, size))
-    mass[row] = blocks.data
     diagonal = np.einsum("bii->bi", mass)
     if np.count_nonzero(mass) == np.count_nonzero(diagonal):
         if (diagonal < 0).any():

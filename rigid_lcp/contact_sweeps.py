@@ -1,9 +1,9 @@
-"""One sweep over the contacts, each solved exactly while the others are held: three kernels.
+"""Sweeps over the contacts, each solved exactly while the others are held, with momentum.
 
-In body space, plane and solid, where a visit reads and changes the velocities of two bodies, and
-by the rows of W.  A contact that has no solution keeps its force.  `sweeps_until` repeats them
-with momentum (`rigid_lcp.gauss_seidel` says why) without a return to Python: a sweep over a
-hundred contacts costs a few microseconds.
+A sweep goes by the velocities of the bodies (`rigid_lcp.body_sweeps`) or by the rows of W.  A
+contact that has no solution keeps its force.  `sweeps_until` repeats them with momentum
+(`rigid_lcp.gauss_seidel` says why) without a return to Python: a sweep over a hundred contacts
+costs a few microseconds.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rigid_lcp.body_sweeps import sweep_bodies_2d, sweep_bodies_3d
 from rigid_lcp.cones import natural_map
 from rigid_lcp.contact_blocks import add_impulses, velocities_relative
 from rigid_lcp.local_contact import NONE, contact_2d, contact_3d
@@ -35,6 +36,8 @@ class SweepBlocks(NamedTuple):
     offset: Floats
     friction: Floats
     local: Floats
+    packed: Floats
+    """`rigid_lcp.body_sweeps.contacts_packed` where ``body`` is not empty."""
     body: Integers
     block: Floats
     start: Integers
@@ -57,22 +60,31 @@ class Momentum(NamedTuple):
 
 
 @njit(cache=True)
-def visit_all(blocks: SweepBlocks, force: Floats, velocity: Floats, visit: Integers) -> int:
-    """One plain sweep; returns how many contacts have no answer."""
+def visit_all(
+    blocks: SweepBlocks, force: Floats, last: Floats, velocity: Floats, part: float,
+    visit: Integers,
+) -> tuple[int, float, float]:  # fmt: skip
+    """One sweep from ``y = force + part (force - last)``, ``velocity`` being that of y.
+
+    Returns as `rigid_lcp.body_sweeps.sweep_bodies_2d`, and leaves what it leaves.
+    """
     if len(blocks.body) == 0:
-        return sweep_matrix(
+        before = force.copy()
+        extrapolate(force, last, part)
+        origin = force.copy()
+        stuck = sweep_matrix(
             blocks.start, blocks.column, blocks.entry, blocks.local, blocks.offset,
             blocks.friction, force, visit,
         )  # fmt: skip
+        product, square = step_made(origin, force, before, blocks.local)
+        return stuck, product, square
     if force.shape[1] == 2:
         return sweep_bodies_2d(
-            blocks.body, blocks.block, blocks.local, blocks.offset, blocks.friction, force,
-            velocity, visit,
-        )  # fmt: skip
+            blocks.body, blocks.packed, blocks.local, force, last, velocity, part, visit
+        )
     return sweep_bodies_3d(
-        blocks.body, blocks.block, blocks.local, blocks.offset, blocks.friction, force, velocity,
-        visit,
-    )  # fmt: skip
+        blocks.body, blocks.packed, blocks.local, force, last, velocity, part, visit
+    )
 
 
 @njit(cache=True)
@@ -84,20 +96,19 @@ def sweep_once(
 
     Called with the forces it left; returns as `visit_all`.
     """
-    tally = state.tally
+    tally, part = state.tally, 0.0
     back = symmetric and int(tally[0]) % 2 == 1
-    origin = force
     if momentum and not back:
         later = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * tally[1] ** 2))
         part = (tally[1] - 1.0) / later
-        extrapolate(force, state.last, part)
         extrapolate(state.velocity, state.last_velocity, part)
         tally[1] = later
-        origin = force.copy()
-    stuck = visit_all(blocks, force, state.velocity, backward if back else visit)
+    last = state.last.copy() if back else state.last  # the way made is that of there and back
+    stuck, product, square = visit_all(
+        blocks, force, last, state.velocity, part, backward if back else visit
+    )
     tally[0] += 1.0
     if momentum and (not symmetric or back):
-        product, square = step_made(origin, force, state.last, blocks.local)
         tally[3] = np.sqrt(square)
         tally[2] = min(tally[2], tally[3])
         if product > 0.0 or tally[3] > GROWTH * tally[2]:
@@ -196,76 +207,6 @@ def step_made(origin: Floats, values: Floats, last: Floats, local: Floats) -> tu
             product += weight * back * (values[i, k] - last[i, k])
             square += weight * back * back
     return product, square
-
-
-@njit(cache=True)
-def sweep_bodies_2d(
-    body: Integers, block: Floats, local: Floats, offset: Floats, friction: Floats,
-    force: Floats, velocity: Floats, visit: Integers,
-) -> int:  # fmt: skip
-    """A sweep in the plane, in body space; changes ``force`` and the bodies' ``velocity``.
-
-    ``body`` (nc, 2) holds rows of ``velocity``.  Returns how many contacts found no force and
-    kept theirs.
-    """
-    stuck = 0
-    for c in visit:
-        a, b = body[c, 0], body[c, 1]
-        r_n, r_t = force[c, 0], force[c, 1]
-        q_n = offset[c, 0] - local[c, 0, 0] * r_n - local[c, 0, 1] * r_t
-        q_t = offset[c, 1] - local[c, 1, 0] * r_n - local[c, 1, 1] * r_t
-        for k in range(3):
-            v_a, v_b = velocity[a, k], velocity[b, k]
-            q_n += block[c, 0, 0, k] * v_a + block[c, 1, 0, k] * v_b
-            q_t += block[c, 0, 1, k] * v_a + block[c, 1, 1, k] * v_b
-        new_n, new_t, status = contact_2d(local[c], q_n, q_t, friction[c])
-        if status == NONE:
-            stuck += 1
-            continue
-        force[c, 0], force[c, 1] = new_n, new_t
-        d_n, d_t = new_n - r_n, new_t - r_t
-        if d_n != 0.0 or d_t != 0.0:
-            for k in range(3):
-                velocity[a, k] += block[c, 0, 0, k] * d_n + block[c, 0, 1, k] * d_t
-            for k in range(3):
-                velocity[b, k] += block[c, 1, 0, k] * d_n + block[c, 1, 1, k] * d_t
-    return stuck
-
-
-@njit(cache=True)
-def sweep_bodies_3d(
-    body: Integers, block: Floats, local: Floats, offset: Floats, friction: Floats,
-    force: Floats, velocity: Floats, visit: Integers,
-) -> int:  # fmt: skip
-    """`sweep_bodies_2d` in space."""
-    stuck = 0
-    for c in visit:
-        a, b, w = body[c, 0], body[c, 1], local[c]
-        r_n, r_1, r_2 = force[c, 0], force[c, 1], force[c, 2]
-        q_n = offset[c, 0] - w[0, 0] * r_n - w[0, 1] * r_1 - w[0, 2] * r_2
-        q_1 = offset[c, 1] - w[1, 0] * r_n - w[1, 1] * r_1 - w[1, 2] * r_2
-        q_2 = offset[c, 2] - w[2, 0] * r_n - w[2, 1] * r_1 - w[2, 2] * r_2
-        for k in range(6):
-            v_a, v_b = velocity[a, k], velocity[b, k]
-            q_n += block[c, 0, 0, k] * v_a + block[c, 1, 0, k] * v_b
-            q_1 += block[c, 0, 1, k] * v_a + block[c, 1, 1, k] * v_b
-            q_2 += block[c, 0, 2, k] * v_a + block[c, 1, 2, k] * v_b
-        new_n, new_1, new_2, status = contact_3d(w, q_n, q_1, q_2, friction[c], -r_1, -r_2)
-        if status == NONE:
-            stuck += 1
-            continue
-        force[c, 0], force[c, 1], force[c, 2] = new_n, new_1, new_2
-        d_n, d_1, d_2 = new_n - r_n, new_1 - r_1, new_2 - r_2
-        if d_n != 0.0 or d_1 != 0.0 or d_2 != 0.0:
-            for k in range(6):
-                velocity[a, k] += (
-                    block[c, 0, 0, k] * d_n + block[c, 0, 1, k] * d_1 + block[c, 0, 2, k] * d_2
-                )
-            for k in range(6):
-                velocity[b, k] += (
-                    block[c, 1, 0, k] * d_n + block[c, 1, 1, k] * d_1 + block[c, 1, 2, k] * d_2
-                )
-    return stuck
 
 
 @njit(cache=True)

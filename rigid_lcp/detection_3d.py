@@ -1,7 +1,8 @@
 """Contacts in space: which pairs are near, and the point contacts of every pair (eq. 9).
 
-Polyhedra: corners on faces and crossing edges, at most four a pair (`rigid_lcp.manifold_3d`);
-spheres: the nearest point of the other body (`rigid_lcp.sphere_contact`).
+Polyhedra: corners on faces and crossing edges, else on edges and corners, at most four a pair
+(`rigid_lcp.solid_contacts`); spheres: the nearest point of the other body
+(`rigid_lcp.sphere_contact`).
 """
 
 from __future__ import annotations
@@ -11,15 +12,16 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.contacts import Contacts
+from rigid_lcp.corner_contacts import CORNER_EDGE, CORNERS, EDGE_CORNER
 from rigid_lcp.manifold_3d import (
     COLUMNS,
     CORNER_FACE,
     EDGES,
+    FACE_CORNER,
     ROOM,
     TIE,
     add_candidate,
     four_of,
-    solids_contacts,
 )
 from rigid_lcp.near_pairs import HALF_SPACE, near_pairs
 from rigid_lcp.placed_solids import (
@@ -33,6 +35,7 @@ from rigid_lcp.placed_solids import (
     shapes_3d,
 )
 from rigid_lcp.separation_3d import Solids, dot
+from rigid_lcp.solid_contacts import solids_contacts
 from rigid_lcp.sphere_contact import sphere_on_plane, sphere_on_solid, sphere_on_sphere
 
 __all__ = ["detect_3d", "shapes_3d"]
@@ -48,8 +51,7 @@ def detect_3d(
 
     ``position`` (n, 3) [m], ``quaternion`` (n, 4), unit; ``margin`` [m] one number or (n,).  The
     order of the contacts depends on the numbers of the bodies only.  Friction and restitution are
-    zero: they belong to the scene.  Bodies that meet corner to corner have no contact until they
-    overlap: no face or edge names its normal.
+    zero: they belong to the scene.
     """
     margins = np.ascontiguousarray(np.broadcast_to(np.asarray(margin, float), (len(shapes.kind),)))
     position = np.ascontiguousarray(position, dtype=float)
@@ -76,7 +78,8 @@ def edge_directions(kind: Ints, solids: Solids, bodies: Ints, key: Ints) -> tupl
     directions = np.zeros((2, len(key), 3))
     feature_a = (key >> FEATURE_BITS) & (2 * MOST_EDGES - 1)
     feature_b = key & (2 * MOST_EDGES - 1)
-    crossing = (kind[a] == POLYHEDRON) & (feature_a >= MOST_EDGES)
+    solid = (kind[a] == POLYHEDRON) & (kind[b] == POLYHEDRON)
+    crossing, on_edge = solid & (feature_a >= MOST_EDGES), solid & (feature_b >= MOST_EDGES)
     on_sphere = key & ((1 << 2 * FEATURE_BITS) - 1)  # a sphere has no features of its own
     past_faces = on_sphere - np.diff(solids.first_face)[b]
     edges = np.diff(solids.first_edge)[b]
@@ -84,7 +87,7 @@ def edge_directions(kind: Ints, solids: Solids, bodies: Ints, key: Ints) -> tupl
     rolling &= (past_faces >= 0) & (past_faces < edges)
     for side, rows, body, edge in (
         (0, crossing, a, feature_a - MOST_EDGES),
-        (1, crossing, b, feature_b - MOST_EDGES),
+        (1, on_edge, b, feature_b - MOST_EDGES),
         (1, rolling, b, past_faces),
     ):
         ends = solids.edge[solids.first_edge[body[rows]] + edge[rows]]
@@ -156,16 +159,21 @@ def pair_contacts(
         for k in range(count):
             form, first, second = int(found[k, 0]), int(found[k, 1]), int(found[k, 2])
             a, b, sign = i, j, 1.0
+            if form in (FACE_CORNER, EDGE_CORNER):  # the corner is body j's
+                a, b, sign, first, second = j, i, -1.0, second, first
             if form == EDGES:
                 first, second = first + MOST_EDGES, second + MOST_EDGES
-            elif form != CORNER_FACE:  # the corner is body j's
-                a, b, sign, first, second = j, i, -1.0, second, first
+            elif form in (CORNER_EDGE, EDGE_CORNER):
+                second += MOST_EDGES
+            elif form == CORNERS:
+                second += solids.first_face[j + 1] - solids.first_face[j]
             bodies[c, 0], bodies[c, 1] = a, b
             key[c] = contact_key(a, b, first, second)
             for axis in range(3):
                 numbers[c, axis] = found[k, 7 + axis]
                 numbers[c, 3 + axis] = sign * found[k, 4 + axis]
-            numbers[c, 6], numbers[c, 7], numbers[c, 8] = found[k, 3], 0.0, np.inf
+            numbers[c, 6], numbers[c, 7] = found[k, 3], 0.0
+            numbers[c, 8] = np.inf if form <= EDGES else 0.0
             c += 1
     return bodies[:c], numbers[:c], key[:c]
 

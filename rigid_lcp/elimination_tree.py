@@ -24,6 +24,8 @@ PANEL = 32
 """Columns of a front that are eliminated at a time."""
 FRONT_COLUMNS = 192
 """Columns of a front at most: longer ones are split, child under child."""
+FEW_BLOCKS = 1000
+"""Up to so many blocks the order is found by a full table."""
 FRONT_COST, ENTRY_COST = 2e4, 10.0
 """Cost of a front and of each of its entries, in flops of a dense product: calls and copies."""
 
@@ -65,11 +67,8 @@ def elimination_tree(blocks: int, size: int, rows: Integers, columns: Integers) 
     ``size``: rows of a block.  The pattern is taken for symmetric: where (i, j) is an entry, (j, i)
     may become one.
     """
-    graph = sp.csr_array((np.ones(len(rows)), (rows, columns)), (blocks, blocks))
-    graph = sp.csr_array(graph + graph.T + sp.eye_array(blocks))
-    graph.sort_indices()
-    start, neighbour = graph.indptr.astype(np.int64), graph.indices.astype(np.int64)
-    order = minimum_degree(graph)
+    start, neighbour = symmetric_pattern(blocks, np.asarray(rows), np.asarray(columns))
+    order = minimum_degree(start, neighbour)
     parent, count = column_parents(start, neighbour, order)
     after = postorder(parent)
     order = order[after]
@@ -91,17 +90,78 @@ def elimination_tree(blocks: int, size: int, rows: Integers, columns: Integers) 
     )  # fmt: skip
 
 
-def minimum_degree(graph: sp.csr_array) -> Integers:
-    """Blocks in the order of multiple minimum degree, as SuperLU finds it."""
-    blocks = graph.shape[0]
-    laplacian = sp.csc_array(
-        (np.full(graph.nnz, -1.0), graph.indices, graph.indptr), graph.shape
-    ) + sp.diags_array(np.full(blocks, 2.0 * blocks))
-    found = splu(
+@njit(cache=True)
+def symmetric_pattern(blocks: int, rows: Integers, columns: Integers) -> tuple[Integers, Integers]:
+    """Neighbours of each block, itself among them, rising: ``neighbour[start[i]:start[i + 1]]``."""
+    start = np.zeros(blocks + 1, dtype=np.int64)
+    for k in range(len(rows)):
+        start[rows[k] + 1] += 1
+        start[columns[k] + 1] += 1
+    start = np.cumsum(start + 1) - 1  # one more for each block itself
+    filled, every = start[:-1].copy(), np.empty(start[-1], dtype=np.int64)
+    for i in range(blocks):
+        every[filled[i]] = i
+        filled[i] += 1
+    for k in range(len(rows)):
+        i, j = rows[k], columns[k]
+        every[filled[i]], every[filled[j] + (i == j)] = j, i
+        filled[i] += 1
+        filled[j] += 1
+    done = 0
+    for i in range(blocks):
+        own = np.unique(every[start[i] : start[i + 1]])
+        every[done : done + len(own)] = own
+        start[i] = done
+        done += len(own)
+    start[blocks] = done
+    return start, every[:done].copy()
+
+
+def minimum_degree(start: Integers, neighbour: Integers) -> Integers:
+    """Blocks in an order of minimum degree: that of SuperLU (multiple), or for few blocks our own,
+    which costs less than to call it."""
+    blocks = len(start) - 1
+    if blocks <= FEW_BLOCKS:
+        found: Integers = minimum_degree_dense(start, neighbour)
+        return found
+    graph = sp.csc_array((np.full(len(neighbour), -1.0), neighbour, start), (blocks, blocks))
+    laplacian = graph + sp.diags_array(np.full(blocks, 2.0 * blocks))
+    factors = splu(
         sp.csc_array(laplacian), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )  # fmt: skip
-    return np.argsort(found.perm_c).astype(np.int64)
+    return np.argsort(factors.perm_c).astype(np.int64)
+
+
+@njit(cache=True)
+def minimum_degree_dense(start: Integers, neighbour: Integers) -> Integers:
+    """The same by a full table of neighbours, in the time of its size."""
+    blocks = len(start) - 1
+    linked = np.zeros((blocks, blocks), dtype=np.bool_)
+    degree, order = np.zeros(blocks, dtype=np.int64), np.empty(blocks, dtype=np.int64)
+    for i in range(blocks):
+        for place in range(start[i], start[i + 1]):
+            if neighbour[place] != i:
+                linked[i, neighbour[place]] = True
+                degree[i] += 1
+    near = np.empty(blocks, dtype=np.int64)
+    for k in range(blocks):
+        least = np.argmin(degree)
+        order[k] = least
+        degree[least] = 2 * blocks  # gone
+        count = 0
+        for i in range(blocks):
+            if linked[least, i]:
+                near[count] = i
+                linked[i, least] = False
+                degree[i] -= 1
+                count += 1
+        for a in range(count):
+            for b in range(count):
+                if a != b and not linked[near[a], near[b]]:
+                    linked[near[a], near[b]] = True
+                    degree[near[a]] += 1
+    return order
 
 
 @njit(cache=True)

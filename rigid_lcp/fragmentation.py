@@ -214,6 +214,7 @@ def _parts_2d(body: Body, point: ArrayLike, direction: ArrayLike) -> tuple[Body,
 
 def _parts_3d(body: Body, point: ArrayLike, normal: ArrayLike) -> tuple[Body, Body]:
     from rigid_lcp.polyhedra import fragments
+    from rigid_lcp.shapes_3d import Polyhedron
 
     parts = fragments(
         body.shape, body.position, body.angle, body.velocity, body.spin, normal, point
@@ -221,9 +222,10 @@ def _parts_3d(body: Body, point: ArrayLike, normal: ArrayLike) -> tuple[Body, Bo
     density = body.mass / body.shape.mass_properties(1.0)[0]
     made = []
     for each in parts:
-        mass, inertia = each.shape.mass_properties(density)
+        shape = Polyhedron.of_corners(each.shape.vertices)  # as a run that goes on makes it again
+        mass, inertia = shape.mass_properties(density)
         made.append(replace(
-            body, shape=each.shape, mass=mass, inertia=inertia, position=each.position,
+            body, shape=shape, mass=mass, inertia=inertia, position=each.position,
             velocity=each.velocity,
         ))  # fmt: skip
     return made[0], made[1]

@@ -15,7 +15,9 @@ from rigid_lcp.breakage import Broken
 from rigid_lcp.scene import Scene, world_of
 from rigid_lcp.shapes_2d import Polygon
 from rigid_lcp.wear import WearState
+from rigid_lcp.wear_3d import SolidWear
 from rigid_lcp.worn_polygon import WornPolygon
+from rigid_lcp.worn_polyhedron import WornPolyhedron
 
 if TYPE_CHECKING:
     from rigid_lcp.scene import Body
@@ -41,19 +43,28 @@ def bodies_arrays(run: Simulation) -> dict[str, Any]:
         .reshape(-1, len(BROKEN)),
     }  # fmt: skip
     if run.worn is not None:
-        grains = [grain for grain in run.worn.grains if grain is not None]
-        arrays |= {
-            f"wear_{name}": np.concatenate([getattr(grain, name) for grain in grains])
-            for name in ("sharp", "lost", "vertices", "owner", "total")
-        }
-        arrays |= {
-            "wear_counts": np.array([
-                (0, 0) if g is None else (len(g.sharp), len(g.vertices)) for g in run.worn.grains
-            ]),
-            "wear_pending": run.worn.pending,
-            "wear_sums": np.array([run.worn.volume, run.worn.work]),
-        }  # fmt: skip
+        arrays |= _wear_arrays(run.worn)
     return arrays
+
+
+def _wear_arrays(worn: WearState | SolidWear) -> dict[str, Any]:
+    arrays = {
+        "wear_pending": worn.pending,
+        "wear_sums": np.array([worn.volume, worn.work, worn.mass, worn.energy]),
+    }
+    grains: list[Any] = [grain for grain in worn.grains if grain is not None]
+    if isinstance(worn, SolidWear):
+        arrays["wear_counts"] = np.array([-1 if g is None else len(g.lost) for g in worn.grains])
+        names: tuple[str, ...] = ("normal", "lost")
+    else:
+        arrays["wear_counts"] = np.array([
+            (0, 0) if g is None else (len(g.sharp), len(g.vertices)) for g in worn.grains
+        ])  # fmt: skip
+        names = ("sharp", "lost", "vertices", "owner", "total")
+    return arrays | {
+        f"wear_{name}": np.concatenate([getattr(grain, name) for grain in grains])
+        for name in (names if grains else ())
+    }
 
 
 def bodies_restore(run: Simulation, frame: dict[str, Any]) -> None:
@@ -65,8 +76,15 @@ def bodies_restore(run: Simulation, frame: dict[str, Any]) -> None:
         Broken(float(t), int(body), int(part), float(tension), float(strength))
         for t, body, part, tension, strength in frame["broken"]
     ]
-    if "wear_counts" not in frame:
-        return
+    if "wear_counts" in frame:
+        restored = _wear_2d if run.world.scene.dim == 2 else _wear_3d
+        run.worn = restored(frame, run.world.scene)
+        volume, work, mass, energy = (float(value) for value in frame["wear_sums"])
+        run.worn.volume, run.worn.work = volume, work
+        run.worn.mass, run.worn.energy = mass, energy
+
+
+def _wear_2d(frame: dict[str, Any], _: Scene) -> WearState:
     counts = frame["wear_counts"]
     ends = np.cumsum(counts, axis=0)
     grains: list[WornPolygon | None] = []
@@ -77,8 +95,20 @@ def bodies_restore(run: Simulation, frame: dict[str, Any]) -> None:
             frame["wear_owner"][b], frame["wear_total"][b],
         ))  # fmt: skip
     first = np.concatenate([[0], ends[:, 1]]).astype(np.int64)
-    volume, work = frame["wear_sums"]
-    run.worn = WearState(grains, first, frame["wear_pending"], float(volume), float(work))
+    return WearState(grains, first, frame["wear_pending"])
+
+
+def _wear_3d(frame: dict[str, Any], scene: Scene) -> SolidWear:
+    counts = frame["wear_counts"]
+    ends = np.cumsum(np.maximum(counts, 0))
+    grains: list[WornPolyhedron | None] = []
+    for body, count, end in zip(scene.bodies, counts, ends, strict=True):
+        mine = slice(end - count, end)
+        grains.append(None if count < 0 else WornPolyhedron(
+            body.shape, frame["wear_normal"][mine], frame["wear_lost"][mine],
+            frame["wear_pending"][mine],
+        ))  # fmt: skip
+    return SolidWear(grains)
 
 
 def frame_scene(frame: dict[str, Any], scene: Scene) -> Scene:
@@ -96,7 +126,7 @@ def frame_scene(frame: dict[str, Any], scene: Scene) -> Scene:
             inertia = float(inertia) if scene.dim == 2 else inertia
             mass = float(frame["body_mass"][number])
             body = replace(body, mass=mass, inertia=inertia)
-            if len(corners):
+            if len(corners) and not np.array_equal(corners, body.shape.vertices):
                 body = replace(body, shape=_shape(corners, scene.dim))
         made.bodies.append(body)
     return made
@@ -121,7 +151,7 @@ def _shape(corners: Floats, dim: int) -> Any:
     if dim == 3:
         from rigid_lcp.shapes_3d import Polyhedron
 
-        return Polyhedron(corners)
+        return Polyhedron.of_corners(corners)
     made = Polygon(corners)
     object.__setattr__(made, "vertices", corners)  # to the last digit, without a new centroid
     return made

@@ -12,12 +12,13 @@ from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from rigid_lcp.body_matrix import diagonal_blocks
 from rigid_lcp.cones import length, natural_map, natural_residual
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.problem_input import check_factors, finite_numbers, in_range, matrix_given
+from rigid_lcp.sparse_products import factors_product, row_forms, rows_product
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int32]
@@ -48,20 +49,11 @@ class BodySpace:
     body_size: int
 
     @cached_property
-    def mass(self) -> sp.csr_array:
-        """M, (ndof, ndof): the blocks of ``inverse_mass``, one a body, inverted [kg, kg m^2]."""
-        size = self.body_size
-        bodies = self.inverse_mass.shape[0] // size
-        here = self.inverse_mass.tocoo()
-        blocks = np.zeros((bodies, size, size))
-        np.add.at(blocks, (here.row // size, here.row % size, here.col % size), here.data)
-        inverse = np.linalg.inv(blocks)
-        rows = np.arange(bodies * size).reshape(bodies, size)
-        where = np.repeat(rows[:, :, None], size, 2), np.repeat(rows[:, None, :], size, 1)
-        kept = inverse != 0.0
-        return sp.csr_array(
-            (inverse[kept], (where[0][kept], where[1][kept])), self.inverse_mass.shape
-        )
+    def mass_blocks(self) -> Floats:
+        """M by its blocks, (bodies, size, size) [kg, kg m^2]."""
+        rows = self.inverse_mass
+        blocks = diagonal_blocks(rows.indptr, rows.indices, rows.data, self.body_size)
+        return np.asarray(np.linalg.inv(blocks), dtype=float)
 
     @cached_property
     def spread(self) -> sp.csr_array:
@@ -77,20 +69,20 @@ class BodySpace:
     def diagonal(self) -> Floats:
         """The diagonal of W, without W."""
         rows, mass = self.jacobian, self.inverse_mass
-        found: Floats = _row_forms(
+        found: Floats = row_forms(
             rows.indptr, rows.indices, rows.data, mass.indptr, mass.indices, mass.data,
             rows.shape[1],
         )  # fmt: skip
         return found
 
-    @cached_property
-    def transposed(self) -> sp.csc_array:
-        """J^T, a view."""
-        return self.jacobian.T
-
     def product(self, force: Floats) -> Floats:
         """``W r``."""
-        return np.asarray(self.jacobian @ (self.inverse_mass @ (self.transposed @ force)))
+        rows, mass = self.jacobian, self.inverse_mass
+        made: Floats = factors_product(
+            rows.indptr, rows.indices, rows.data, mass.indptr, mass.indices, mass.data,
+            np.ascontiguousarray(force, dtype=float),
+        )  # fmt: skip
+        return made
 
 
 @dataclass(frozen=True)
@@ -145,7 +137,10 @@ class FrictionProblem:
         """``u = W r + q``, (nc * dim,)."""
         if self.matrix is None and self.bodies is not None:
             return self.bodies.product(force) + self.offset
-        return np.asarray(self.delassus @ force) + self.offset
+        rows = self.delassus
+        force = np.ascontiguousarray(force, dtype=float)
+        made: Floats = rows_product(rows.indptr, rows.indices, rows.data, force)
+        return made + self.offset
 
     def residual(self, force: Floats, velocity: Floats | None = None) -> float:
         """Scale-free natural residual of forces r (nc * dim,), see `rigid_lcp.cones`.
@@ -274,21 +269,3 @@ def friction_problem(
             remedy="give a square W with a row for every number of q",
         )  # fmt: skip
     return FrictionProblem(w, q, mu, int(dim), bodies)
-
-
-@njit(cache=True)
-def _row_forms(
-    start: Integers, index: Integers, value: Floats,
-    mass_start: Integers, mass_index: Integers, inverse_mass: Floats, freedoms: int,
-) -> Floats:  # fmt: skip
-    """``J_i M^-1 J_i^T`` of every row i of J; both matrices by rows, M^-1 symmetric."""
-    found, row = np.zeros(len(start) - 1), np.zeros(freedoms)
-    for i in range(len(found)):
-        for k in range(start[i], start[i + 1]):
-            row[index[k]] += value[k]
-        for k in range(start[i], start[i + 1]):
-            for m in range(mass_start[index[k]], mass_start[index[k] + 1]):
-                found[i] += value[k] * inverse_mass[m] * row[mass_index[m]]
-        for k in range(start[i], start[i + 1]):
-            row[index[k]] = 0.0
-    return found

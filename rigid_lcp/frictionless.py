@@ -16,6 +16,7 @@ regular, and proximal steps with the same factor take it out.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from rigid_lcp.errors import ProblemError
+from rigid_lcp.force_proof import forces_insufficient
 from rigid_lcp.friction_problem import (
     FrictionProblem,
     FrictionSolution,
@@ -40,6 +42,7 @@ from rigid_lcp.normal_matrices import (
     pick_rows,
 )
 from rigid_lcp.normal_sweeps import normal_sweeps
+from rigid_lcp.problem_input import finite_numbers, matrix_given, one_number
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -73,8 +76,8 @@ def lcp(
     The solution has one number a contact in ``r`` (f) and ``u`` (a).
     Raises `ProblemError` if A or b are malformed.
     """
-    b = np.asarray(offset, dtype=float).ravel()
-    a = sp.csr_array(matrix)
+    b = finite_numbers(offset, "b").ravel()
+    a = matrix_given(matrix, "A")
     if a.shape != (len(b), len(b)):
         raise ProblemError(
             f"A is {a.shape[0]} x {a.shape[1]} and b has {len(b)} numbers", where="A",
@@ -84,8 +87,20 @@ def lcp(
     place = 2 * np.arange(len(b))
     wide = sp.csr_array(sp.kron(a, sp.csr_array([[1.0, 0.0], [0.0, 0.0]])))
     problem = friction_problem(wide, np.column_stack([b, zeros]).ravel(), 0.0, 2)
-    started = None if start is None else np.column_stack([start, zeros]).ravel()
-    found = frictionless(problem, started, tolerance)
+    first = None if start is None else finite_numbers(start, "start").ravel()
+    if first is not None and first.shape != b.shape:
+        raise ProblemError(
+            f"it has {len(first)} numbers and b has {len(b)}", where="start",
+            remedy="give f of all contacts, in the order of b",
+        )  # fmt: skip
+    started = None if first is None else np.column_stack([first, zeros]).ravel()
+    found = frictionless(problem, started, one_number(tolerance, "tolerance"))
+    if not found.solved and forces_insufficient(problem):
+        found = replace(
+            found, status="no solution",
+            message="no f >= 0 makes a = b + A f >= 0 (proved by a linear programme)\n  -> look for"
+            " rows of A that nothing can lift, or an entry of the wrong sign",
+        )  # fmt: skip
     return FrictionSolution(
         found.r[place], found.u[place], found.residual, found.status, found.method, found.work,
         found.message,

@@ -32,6 +32,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid_lcp.body_sweeps import contacts_packed
 from rigid_lcp.contact_blocks import BodyBlocks, body_blocks, matrix_blocks
 from rigid_lcp.contact_sweeps import Momentum, SweepBlocks, residual_of, sweep_once, sweeps_until
 from rigid_lcp.errors import UsageError
@@ -145,12 +146,15 @@ def sweep_blocks(problem: FrictionProblem, bodies: BodyBlocks | None) -> SweepBl
     offset = np.ascontiguousarray(problem.offset.reshape(-1, dim))
     if bodies is not None:
         return SweepBlocks(
-            offset, problem.friction, bodies.local, bodies.body, bodies.block, none, none,
-            np.zeros((0, dim, dim)), bodies.bodies, problem.rho,
+            offset, problem.friction, bodies.local,
+            contacts_packed(bodies.block, bodies.local, offset, problem.friction),
+            bodies.body, bodies.block, none, none, np.zeros((0, dim, dim)), bodies.bodies,
+            problem.rho,
         )  # fmt: skip
     rows = matrix_blocks(problem)
     return SweepBlocks(
-        offset, problem.friction, rows.local, np.zeros((0, 2), dtype=np.int64),
+        offset, problem.friction, rows.local, np.zeros((0, 0)),
+        np.zeros((0, 2), dtype=np.int64),
         np.zeros((0, 2, dim, 3 * dim - 3)), rows.start, rows.column, rows.block, 0, problem.rho,
     )  # fmt: skip
 

@@ -33,12 +33,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigid_lcp.body_factorisation import (
-    Factorisation,
-    SingularSystem,
-    factorisation,
-    multiply_blocks,
-)
+from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factorisation
+from rigid_lcp.body_matrix import multiply_blocks
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
 from rigid_lcp.lorentz_cones import (
     cone_divide,
@@ -83,18 +79,19 @@ def interior_point(
     *,
     linear: Factorisation | None = None,
     iterations: int = ITERATIONS,
+    begun: PathStep | None = None,
 ) -> FrictionSolution:
     """Follow the path until the residual is at or below ``tolerance``.
 
     ``start`` is not used: a point on the boundary is a bad one for this method.  ``linear``:
-    factorisations of this problem's W, made if not given.  About 1e-10 is what it can reach,
-    as its matrices become singular; `rigid_lcp.newton` goes on from there.
+    factorisations of this problem's W, made if not given; ``begun``: the path, to go on where an
+    earlier call left it.  About 1e-10 is what it can reach, as its matrices become singular;
+    `rigid_lcp.newton` goes on from there.
     """
     contacts, dim = problem.contacts, problem.dim
-    linear = linear or factorisation(problem)
     best, best_residual, done, short = np.zeros(contacts * dim), np.inf, 0, 0
     try:
-        step = PathStep(problem, path, linear)
+        step = begun or PathStep(problem, path, linear or factorisation(problem))
     except SingularSystem:
         return friction_solution(problem, best, tolerance, "interior-point", status="singular")
     while True:
@@ -111,7 +108,7 @@ def interior_point(
         done, short = done + 1, short + 1 if length < SHORT_STEP else 0
     return friction_solution(
         problem, best, tolerance, "interior-point",
-        {"iterations": float(done), "factorisations": float(done + 1)},
+        {"iterations": float(done), "factorisations": float(done + (begun is None))},
     )  # fmt: skip
 
 
@@ -121,11 +118,11 @@ class PathStep:
     def __init__(self, problem: FrictionProblem, path: Path, linear: Factorisation) -> None:
         contacts, dim = problem.contacts, problem.dim
         self.problem, self.path, self.linear = problem, path, linear
-        self.slides = problem.friction > 0.0
-        self.mu = np.where(self.slides, problem.friction, 1.0)
+        slides = problem.friction > 0.0
+        self.mu = np.where(slides, problem.friction, 1.0)
         self.unit = np.zeros((contacts, dim))
         self.unit[:, 0] = 1.0
-        self.tangent = np.where(self.slides[:, None], 1.0, self.unit)  # r_T = 0 without friction
+        self.tangent = np.where(slides[:, None], 1.0, self.unit)  # r_T = 0 without friction
         speed = float(np.sqrt(np.mean(problem.offset**2))) or 1.0
         # forces of the size that contacts would have as springs, soft enough to share the load
         identity = np.broadcast_to(np.eye(dim), (contacts, dim, dim)).copy()
@@ -142,48 +139,111 @@ class PathStep:
 
     def take(self) -> float:
         """One predictor-corrector step; returns its length.  Raises `SingularSystem`."""
-        x, s, path, contacts = self.x, self.s, self.path, self.problem.contacts
-        gap = float(np.sum(x * s)) / contacts
+        x, s, path = self.x, self.s, self.path
+        gap = path_gap(x, s)
         if not gap > 0.0:  # round-off has put a point on the boundary of its cone, or beyond
             raise SingularSystem
         eps = path.rounding * np.sqrt(gap / self.problem.rho)
-        at = self.problem.velocity(self.force()).reshape(x.shape)
         velocity, slope = coulomb_velocity(s, self.mu, eps, path.convex)
-        lack = (at - velocity) * self.tangent
+        at = self.problem.velocity(self.force()).reshape(x.shape)
         eta, point = cone_scaling(x, s)
         scaled = cone_scale(eta, point, x, False)
-        blocks = np.matmul(slope, cone_scaling_square(eta, point) * self.stretch[:, None, :])
-        identity = np.zeros_like(blocks)
-        each = np.arange(x.shape[1])
-        identity[:, each, each] = self.tangent
-        blocks[~self.slides] *= self.unit[0, :, None] * self.unit[0]
-        blocks[:, each, each] += 1.0 - self.tangent
-        solve = self.linear.factor(blocks, identity)
+        solve = self.linear.factor(*path_blocks(eta, point, slope, self.tangent, self.stretch))
 
         def direction(target: Floats, share: float = 1.0) -> tuple[Floats, Floats]:
             """dx, ds that bring ``x o s`` to the target and ``W r + q`` nearer to u(s)."""
-            part = cone_scale(eta, point, cone_divide(scaled, target), False)
-            right = multiply_blocks(slope, part.ravel()) - share * lack.ravel()
-            dx = solve(right * self.tangent.ravel()).reshape(x.shape) * self.stretch
-            there = cone_scale(eta, point, cone_scale(eta, point, dx, False), False)
-            return dx, (part - there) * self.tangent
+            lack = share * (at - velocity)
+            part, right = path_right(eta, point, scaled, slope, target, lack, self.tangent)
+            force = solve(right.ravel()).reshape(x.shape)
+            return path_direction(eta, point, part, force, self.tangent, self.stretch)
 
         square = cone_product(scaled, scaled)
         dx, ds = direction(-square)
-        length = min(1.0, cone_step(x, dx), cone_step(s, ds))
-        ahead = float(np.sum((x + length * dx) * (s + length * ds))) / contacts
-        centring = max(LEAST_CENTRING, min(1.0, max(0.0, ahead / gap) ** 2))
-        second = cone_product(cone_scale(eta, point, dx, False), cone_scale(eta, point, ds, True))
-        dx, ds = direction(centring * gap * self.unit - square - second)
-        length = BOUNDARY_SHARE * min(cone_step(x, dx), cone_step(s, ds))
+        dx, ds = direction(corrector_target(x, s, dx, ds, eta, point, square))
+        length = BOUNDARY_SHARE * step_length(x, s, dx, ds)
         if length < BACK_OFF_STEP:  # off the path: back to its middle, higher up
             dx, ds = direction(BACK_OFF_GAP * gap * self.unit - square, 0.0)
-            length = BOUNDARY_SHARE * min(cone_step(x, dx), cone_step(s, ds))
+            length = BOUNDARY_SHARE * step_length(x, s, dx, ds)
         length = min(1.0, length)
         if not np.isfinite(length) or not (np.isfinite(dx).all() and np.isfinite(ds).all()):
             raise SingularSystem
         self.x, self.s = x + length * dx, s + length * ds
         return length
+
+
+@njit(cache=True)
+def path_gap(x: Floats, s: Floats) -> float:
+    """``x . s`` of a contact, on average."""
+    total = 0.0
+    for c in range(x.shape[0]):
+        for k in range(x.shape[1]):
+            total += x[c, k] * s[c, k]
+    return total / x.shape[0]
+
+
+@njit(cache=True)
+def step_length(x: Floats, s: Floats, dx: Floats, ds: Floats) -> float:
+    """How far x and s may go before one leaves its cone."""
+    return min(cone_step(x, dx), cone_step(s, ds))
+
+
+@njit(cache=True)
+def corrector_target(
+    x: Floats, s: Floats, dx: Floats, ds: Floats, eta: Floats, point: Floats, square: Floats
+) -> Floats:
+    """``sigma e - x o x - (W dx) o (W^-1 ds)`` in scaled x (Mehrotra), dx and ds the predictor's:
+    sigma is the less the further that can go."""
+    gap, length = path_gap(x, s), min(1.0, step_length(x, s, dx, ds))
+    ahead = max(0.0, path_gap(x + length * dx, s + length * ds) / gap)
+    centring = max(LEAST_CENTRING, min(1.0, ahead**2))
+    second = cone_product(cone_scale(eta, point, dx, False), cone_scale(eta, point, ds, True))
+    target = -square - second
+    target[:, 0] += centring * gap
+    return target
+
+
+@njit(cache=True)
+def path_blocks(
+    eta: Floats, point: Floats, slope: Floats, tangent: Floats, stretch: Floats
+) -> tuple[Floats, Floats]:
+    """A and B of ``(A + B W) dr = b``, (nc, dim, dim): C of the module's head, and one.
+
+    Where ``tangent`` is zero (no friction) the row says ``dr = 0``.
+    """
+    blocks = np.zeros(slope.shape)
+    identity = np.zeros(slope.shape)
+    square = cone_scaling_square(eta, point)
+    for c in range(len(eta)):
+        for i in range(slope.shape[1]):
+            identity[c, i, i] = tangent[c, i]
+            if tangent[c, i] == 0.0:
+                blocks[c, i, i] = 1.0
+                continue
+            for j in range(slope.shape[1]):
+                if tangent[c, j] != 0.0:
+                    for k in range(slope.shape[1]):
+                        blocks[c, i, j] += slope[c, i, k] * square[c, k, j] * stretch[c, j]
+    return blocks, identity
+
+
+@njit(cache=True)
+def path_right(
+    eta: Floats, point: Floats, scaled: Floats, slope: Floats, target: Floats, lack: Floats,
+    tangent: Floats,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """What ds is at dx = 0 for ``x o s`` to reach the ``target``, and b of the system."""
+    part = cone_scale(eta, point, cone_divide(scaled, target), False)
+    return part, (multiply_blocks(slope, part) - lack) * tangent
+
+
+@njit(cache=True)
+def path_direction(
+    eta: Floats, point: Floats, part: Floats, force: Floats, tangent: Floats, stretch: Floats
+) -> tuple[Floats, Floats]:
+    """dx and ds of the change of the forces, dr (nc, dim)."""
+    dx = force * stretch
+    there = cone_scale(eta, point, cone_scale(eta, point, dx, False), False)
+    return dx, (part - there) * tangent
 
 
 @njit(cache=True)

@@ -25,6 +25,8 @@ Bools = NDArray[np.bool_]
 
 TOUCH = 1e-9
 """Gap below which two bodies touch, as a share of the smallest body's size."""
+AIM = 0.25
+"""Gap at which a step that would end in an overlap is to end, in touches."""
 OVERLAP = 1e-11
 """Overlap that makes a step too long, likewise."""
 DRIFT = 1e-3
@@ -74,11 +76,7 @@ def contacts_again(
     """The lasting contacts at a stage of the step, and the slip that directs their friction."""
     if len(lasting.contacts) == 0:
         return lasting.contacts, lasting.slip
-    travel = h * (
-        np.linalg.norm(motion.velocity, axis=1)
-        + np.linalg.norm(motion.rates[:, motion.dim :], axis=1) * world.reach
-    )
-    found = world.contacts(motion, travel + 10 * TOUCH * world.length)
+    found = world.contacts(motion, travel(world, motion, h) + 10 * TOUCH * world.length)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     contacts, slip = found[rows[there]], lasting.slip[there]
     if motion.dim == 3:  # the direction turns with the velocity, until that has reversed
@@ -86,6 +84,14 @@ def contacts_again(
         now = relative_velocity(contacts, motion)[:, 1:]
         slip = np.where(((now * slip).sum(axis=1) > 0)[:, None], now, slip)
     return contacts, slip
+
+
+def travel(world: World, motion: Motion, h: float) -> Floats:
+    """How far each body's points get in ``h`` [s] at their speeds now [m], (n,)."""
+    return h * (
+        np.linalg.norm(motion.velocity, axis=1)
+        + np.linalg.norm(motion.rates[:, motion.dim :], axis=1) * world.reach
+    )
 
 
 def slip_carried(lasting: Lasting, rows: Bools, contacts: Contacts) -> Floats:
@@ -155,6 +161,41 @@ def overlap_beyond(world: World, motion: Motion, pressed: Ints) -> float:
     overlap = -found.gap
     overlap[lasting & (overlap < DRIFT * world.length)] = 0.0
     return float(overlap.max(initial=0.0))
+
+
+def share_until_touch(
+    world: World, motion: Motion, after: Motion, h: float, pressed: Ints
+) -> float | None:
+    """Share of a step of ``h`` [s], from ``motion`` to ``after``, at which a first gap closes.
+
+    By the cubic through gap and normal velocity at both ends, of every contact not ``pressed``
+    (keys) that overlaps in the end; closed is a gap of ``AIM`` touches, as a touch is what the
+    collision needs.  None where none of these contacts was in sight at the start.
+    """
+    found = world.contacts(after, 0.0)
+    found = found[(found.gap < -OVERLAP * world.length) & ~np.isin(found.key, pressed)]
+    start = world.contacts(motion, travel(world, motion, h) + travel(world, after, h))
+    rows, there = contact_rows(start.key, found.key)
+    found, start = found[there], start[rows[there]]
+    aim = AIM * TOUCH * world.length
+    ends = zip(
+        start.gap - aim, h * relative_velocity(start, motion)[:, 0], found.gap - aim,
+        h * relative_velocity(found, after)[:, 0], strict=True,
+    )  # fmt: skip
+    shares = [share for each in ends if (share := first_fall(*map(float, each))) is not None]
+    return min(shares, default=None)
+
+
+def first_fall(start: float, slope: float, end: float, slope_end: float) -> float | None:
+    """Where in (0, 1) the cubic of these values and slopes at 0 and 1 first falls through zero."""
+    cubic = [
+        2 * (start - end) + slope + slope_end, 3 * (end - start) - 2 * slope - slope_end, slope,
+        start,
+    ]  # fmt: skip
+    roots = np.roots(cubic)
+    real = np.sort(roots.real[np.abs(roots.imag) <= 1e-9 * np.abs(roots)])
+    falls = [x for x in real if 0.0 < x < 1.0 and np.polyval(np.polyder(cubic), x) < 0.0]
+    return float(falls[0]) if falls else None
 
 
 def drift_removed(world: World, motion: Motion, pressed: Ints, stuck: Ints) -> Motion:

@@ -17,9 +17,6 @@ from rigid_lcp.separation_3d import (
     cross,
     dot,
     edge_crossing,
-    edge_separation,
-    edges_near,
-    face_separation,
 )
 
 Floats = NDArray[np.float64]
@@ -31,6 +28,9 @@ SAME = 1e-6
 """Contacts of a pair nearer than this share of the reach are one."""
 CORNER_FACE, FACE_CORNER, EDGES = 0, 1, 2
 """Corner of a on a face of b; corner of b on a face of a; an edge of a across one of b."""
+STEEP = 10.0
+"""How much farther out [m] a contact must be for each metre of gap; faces that share contacts are
+tilted by less than its inverse, see `rigid_lcp.separation_3d.NEARLY`."""
 ROOM = 256
 """Candidates looked at for one pair; there are a few dozen for grains of a hundred corners."""
 COLUMNS = 10
@@ -162,13 +162,23 @@ def edge_of_face(solids: Solids, edge: int, start: int, stop: int) -> bool:
 
 
 @njit(cache=True)
+def least_gap(found: Floats, count: int) -> float:
+    """Least gap of the candidates [m]; inf without any."""
+    least = np.inf
+    for k in range(count):
+        least = min(least, found[k, 3])
+    return least
+
+
+@njit(cache=True)
 def farthest_from(found: Floats, count: int, x: float, y: float, z: float, tie: float) -> int:
-    """Row of the candidate farthest from a point; the first of those within ``tie`` [m]."""
-    best, most = 0, -1.0
+    """Row of the candidate farthest from a point, less `STEEP` gaps; the first within ``tie``."""
+    best, most = 0, -np.inf
     for k in range(count):
         away = np.sqrt(
             (found[k, 7] - x) ** 2 + (found[k, 8] - y) ** 2 + (found[k, 9] - z) ** 2
         )  # fmt: skip
+        away -= STEEP * found[k, 3]
         if away > most + tie:
             best, most = k, away
     return best
@@ -178,17 +188,20 @@ def farthest_from(found: Floats, count: int, x: float, y: float, z: float, tie: 
 def farthest_along(
     found: Floats, count: int, start: int, d0: float, d1: float, d2: float, tie: float
 ) -> int:
-    """Row of the candidate farthest from row ``start`` along d, -1 if none is beyond ``tie``."""
-    best, most = -1, tie * np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-    step = most
+    """Row of the candidate farthest from row ``start`` along d, less `STEEP` gaps; -1 if none is
+    beyond ``tie`` [m]."""
+    best, most = -1, -np.inf
+    length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    step = tie * length
     for k in range(count):
         along = (
             d0 * (found[k, 7] - found[start, 7])
             + d1 * (found[k, 8] - found[start, 8])
             + d2 * (found[k, 9] - found[start, 9])
         )
-        if along > most + step:
-            best, most = k, along
+        worth = along - STEEP * length * (found[k, 3] - found[start, 3])
+        if along > step and worth > most + step:
+            best, most = k, worth
     return best
 
 
@@ -198,6 +211,8 @@ def four_of(found: Floats, count: int, size: float) -> int:
 
     The farthest from the middle, the farthest from that, and on either side of the line through
     both the farthest; the deepest of all takes the place of the nearest of them if it is deeper.
+    One that is higher by g must be `STEEP` g farther out to be taken: of a worn corner the ends
+    that touch, not the one beside them.
     Lengths within `TIE` of each other count as equal: the first is taken.
     """
     if count <= 4:
@@ -237,51 +252,3 @@ def four_of(found: Floats, count: int, size: float) -> int:
         for column in range(COLUMNS):
             found[row, column] = kept[row, column]
     return number
-
-
-@njit(cache=True)
-def solids_contacts(
-    solids: Solids, a: int, b: int, box_a: Floats, box_b: Floats, margin: float, size: float,
-    found: Floats,
-) -> int:  # fmt: skip
-    """Point contacts of two polyhedra with a gap up to ``margin`` [m]; returns how many.
-
-    ``box_a``, ``box_b``: bounding boxes swollen by the margin; ``size``: the smaller reach of the
-    two [m].  Rows of ``found`` as `COLUMNS` says.
-    """
-    face_a, gap_a = face_separation(solids, a, b, margin)
-    if gap_a > margin:
-        return 0
-    face_b, gap_b = face_separation(solids, b, a, margin)
-    if gap_b > margin:
-        return 0
-    edge_a, edge_b, gap_edges = edge_separation(solids, a, b, box_a, box_b, margin)
-    if gap_edges > margin:
-        return 0
-    own_is_b = gap_b >= gap_a - TIE * size
-    face, own, other = (face_b, b, a) if own_is_b else (face_a, a, b)
-    crossing = np.empty(9)
-    towards = solids.normal[face] * (1.0 if own_is_b else -1.0)
-    # The normal is on the outer side of b's edge; grains with sharp edges may have it at more than
-    # a right angle to that of the face.
-    crosses = (
-        edge_a >= 0
-        and edge_crossing(solids, a, edge_a, b, edge_b, solids.bisector[edge_b], crossing)
-        and 0.0 <= crossing[0] <= 1.0
-        and 0.0 <= crossing[1] <= 1.0
-    )
-    alone = (
-        crosses
-        and gap_edges > max(gap_a, gap_b) + TIE * size
-        and dot(crossing[3:6], towards) < np.cos(NEARLY)
-    )
-    count = 0
-    if not alone:
-        near = edges_near(solids, other, box_b if own_is_b else box_a)
-        count = face_candidates(solids, face, own, other, own_is_b, near, margin, size, found)
-    if alone or (crosses and count == 0):
-        count = add_candidate(
-            found, count, EDGES, edge_a - solids.first_edge[a], edge_b - solids.first_edge[b],
-            crossing[2], crossing[3:6], 1.0, crossing[6:9], SAME * size,
-        )  # fmt: skip
-    return four_of(found, count, size)

@@ -48,10 +48,10 @@ def shapes_3d(shapes: Sequence[object], movable: Bools) -> Shapes3D:
         if isinstance(shape, Polyhedron):
             kind.append(POLYHEDRON)
             reach.append(shape.reach)
-            if len(shape.edges) >= MOST_EDGES:
+            if len(shape.edges) + 2 > MOST_EDGES:  # as many faces and corners together
                 raise SceneError(
                     f"it has {len(shape.edges)} edges", where=where,
-                    remedy=f"use fewer than {MOST_EDGES}, or a sphere",
+                    remedy=f"use at most {MOST_EDGES - 2}, or a sphere",
                 )  # fmt: skip
             parts.append(_solid(shape))
         elif isinstance(shape, Sphere):

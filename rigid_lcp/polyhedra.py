@@ -65,17 +65,23 @@ def cut(shape: Polyhedron, normal: ArrayLike, offset: float) -> tuple[Polyhedron
             "the plane does not cut the polyhedron", where="cut",
             remedy=f"its corners lie {height.min():.3g} to {height.max():.3g} m from the plane",
         )  # fmt: skip
-    # Corners nearly in the plane go to both parts as they are: slivers would have no faces.
-    on = np.abs(height) <= slack
+    beyond = Polyhedron(points_before(shape, -height))
+    before = Polyhedron(points_before(shape, height))
+    return beyond, before
+
+
+def points_before(shape: Polyhedron, height: Floats) -> Floats:
+    """Corners (n, 3) of the part of a polyhedron where ``height`` (v,) over a plane is negative.
+
+    Corners nearly in the plane go to both parts as they are: slivers would have no faces.
+    """
+    on = np.abs(height) <= CLEARANCE * shape.reach
     first, second = shape.edges[:, 0], shape.edges[:, 1]
     through = ~on[first] & ~on[second] & (height[first] * height[second] < 0)
     first, second = first[through], second[through]
     share = (height[first] / (height[first] - height[second]))[:, None]
     crossing = (1 - share) * shape.vertices[first] + share * shape.vertices[second]
-    rim = np.vstack([shape.vertices[on], crossing])
-    beyond = Polyhedron(np.vstack([shape.vertices[~on & (height > 0)], rim]))
-    before = Polyhedron(np.vstack([shape.vertices[~on & (height < 0)], rim]))
-    return beyond, before
+    return np.vstack([shape.vertices[~on & (height < 0)], shape.vertices[on], crossing])
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.errors import ProblemError
+from rigid_lcp.errors import ProblemError, UsageError
 
 if TYPE_CHECKING:
     from rigid_lcp.friction_problem import BodySpace
@@ -50,6 +50,20 @@ def finite_numbers(values: ArrayLike, name: str) -> Floats:
     return array
 
 
+def one_number(value: Any, name: str, *, zero: bool = False) -> float:
+    """A number above zero, or also zero, as a float; `UsageError`, with ``name``, for all else."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not (0.0 < number < np.inf or (zero and number == 0.0)):
+        raise UsageError(
+            f"the {name} is {value!r}", where=name,
+            remedy="give a number " + ("of zero or more" if zero else "above zero"),
+        )  # fmt: skip
+    return number
+
+
 def in_range(values: Floats, name: str, least: float = LEAST) -> None:
     """Raise `ProblemError` where the largest of the numbers can not be squared in floats."""
     largest = float(np.abs(values).max(initial=0.0))
@@ -60,20 +74,23 @@ def in_range(values: Floats, name: str, least: float = LEAST) -> None:
         )  # fmt: skip
 
 
-def matrix_given(matrix: Any) -> sp.csr_array:
-    """W from a dense or sparse matrix, or a scipy `LinearOperator` (n products with columns)."""
+def matrix_given(matrix: Any, name: str = "W") -> sp.csr_array:
+    """W from a dense or sparse matrix, or a scipy `LinearOperator` (n products with columns).
+
+    ``name``: what messages call it.
+    """
     if hasattr(matrix, "matmat") and not sp.issparse(matrix):
         matrix = operator_written(matrix)
     if not sp.issparse(matrix):
-        dense = finite_numbers(matrix, "W")
+        dense = finite_numbers(matrix, name)
         if dense.ndim != 2:
             raise ProblemError(
-                f"it has {dense.ndim} dimensions, not 2", where="W",
+                f"it has {dense.ndim} dimensions, not 2", where=name,
                 remedy="give a square matrix; for no contacts numpy.zeros((0, 0))",
             )  # fmt: skip
         return sp.csr_array(dense)
     rows = sp.csr_array(matrix)
-    w = sp.csr_array((finite_numbers(rows.data, "W"), rows.indices, rows.indptr), rows.shape)
+    w = sp.csr_array((finite_numbers(rows.data, name), rows.indices, rows.indptr), rows.shape)
     if not w.has_canonical_format:
         w = w.copy()  # the caller's indices are not ours to sort
         w.sum_duplicates()

@@ -12,7 +12,7 @@ from importlib import metadata
 def provenance(command: Sequence[str]) -> dict[str, object]:
     """What is needed to make a run again: ``command``, ``versions``, ``machine``, ``started``."""
     found = {"python": platform.python_version()}
-    for name in ("trackbed", "numpy", "scipy", "numba", "coal"):
+    for name in ("trackbed", "numpy", "scipy", "numba"):
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:

@@ -41,18 +41,21 @@ def proximal_newton(
     *,
     linear: Factorisation | None = None,
     factorisations: int = FACTORISATIONS,
+    first_shift: float | None = None,
 ) -> FrictionSolution:
     """Proximal points from ``start`` (zero forces if None) until the residual is small enough.
 
     ``linear``: factorisations of this problem's W, made if not given; at most ``factorisations``
-    are spent.  Good from a rough point on (a few dozen sweeps, or the forces of the step before);
-    where `rigid_lcp.newton` converges it needs fewer.
+    are spent.  ``first_shift``: alpha over mean(diag W) to begin with; the default is small, to
+    end fast; a great one takes off what is stiff of the error.  Good from a rough point on (a few
+    dozen sweeps, or the forces of the step before); where `rigid_lcp.newton` converges it needs
+    fewer factorisations.
     """
     linear = linear or factorisation(problem)
     centre = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
     best, best_residual = centre, problem.residual(centre)
     residual, spent, points = best_residual, 0, 0
-    shift = max(LEAST_SHIFT, min(FIRST_SHIFT, residual))
+    shift = max(LEAST_SHIFT, min(FIRST_SHIFT, residual)) if first_shift is None else first_shift
     while best_residual > tolerance and spent < factorisations and shift <= GREATEST_SHIFT:
         enough = max(FINER * residual, FINEST)
         force, found, steps = proximal_point(

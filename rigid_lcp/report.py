@@ -8,11 +8,16 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rigid_lcp import pictures
 from rigid_lcp.frame_bodies import frame_scene
 from rigid_lcp.run_folder import RunFolder, frame_read, write_whole
 from rigid_lcp.scene import Scene
 from rigid_lcp.scene_run import history_of, history_write
+
+Floats = NDArray[np.float64]
 
 STYLE = """
 :root { color-scheme: light; }
@@ -32,13 +37,16 @@ ROWS = (
     ("bodies that move", "bodies", "{:,}"),
     ("time", "time", "{:.6g} s"),
     ("steps", "steps", "{:,}"),
-    ("length of a step", "step", "{:.4g} s"),
+    ("mean length of a step", "step", "{:.4g} s"),
+    ("unknowns a contact", "unknowns_a_contact", "{:d}"),
     ("contacts that carry at the end", "contacts", "{:,}"),
     ("of these sliding", "sliding", "{:,}"),
     ("largest normal force at the end", "largest_normal_force", "{:.4g} N"),
     ("largest speed at the end", "speed_largest", "{:.3g} m/s"),
     ("largest overlap in any frame", "overlap_largest", "{:.3g} m"),
+    ("tolerance of the residual", "tolerance", "{:.2g}"),
     ("worst residual of any step", "residual_worst", "{:.2g}"),
+    ("steps left above the tolerance", "steps_above", "{:,}"),
     ("processor time", "cpu_s", "{:.3g} s"),
     ("processor time a step", "cpu_a_step", "{:.3g} s"),
 )
@@ -53,18 +61,22 @@ def report_write(
     history_write(folder.path / "history.csv", history)
     figures = []
     if draw:
-        drawn = frames_draw(folder, scene, summary["title"])
-        figures.append((drawn[-1], "Force chains at the end: width by normal force, blue contacts "
-                        "stick, red ones slide."))  # fmt: skip
-        balance = folder.path / "picture-history.png"
-        pictures.picture_history(balance, history)
-        figures.append((balance, "Energy (kinetic and potential), contacts that carry, and the "
-                        "greatest overlap, at the frames."))  # fmt: skip
+        frames_draw(folder, scene, summary["title"])
+        figures = [
+            (end_draw(folder, scene, summary["title"]),
+             "Force chains at the end: lines from the bodies' centres to their contacts, as wide "
+             "as the normal force; blue contacts stick, red ones slide."),
+            (picture_write(folder, "history", pictures.picture_history(history)),
+             "Energy (kinetic and potential), contacts that carry, and the greatest overlap, at "
+             "the frames."),
+        ]  # fmt: skip
     title = summary["title"] or "Rigid grains"
+    above = f" ({summary['steps_above']:,} steps above the tolerance)"
     claim = (
         f"{summary['bodies']:,} rigid bodies, {summary['time']:.4g} s in {summary['steps']:,} "
         f"steps by {summary['method']}; contact forces to a residual of "
-        f"{summary['residual_worst']:.1g}, overlaps below {summary['overlap_largest']:.1g} m, "
+        f"{summary['residual_worst']:.2g}{above if summary['steps_above'] else ''}, overlaps up to "
+        f"{summary['overlap_largest']:.2g} m, "
         f"{summary['cpu_s']:.3g} s of processor time."
     )
     rows = "".join(
@@ -89,21 +101,45 @@ def report_write(
 
 
 def frames_draw(folder: RunFolder, scene: Scene, title: str) -> list[Path]:
-    """Draw every frame as ``picture-NUMBER.png`` with one scale, and all as ``movie.gif``."""
+    """Draw every frame as ``picture-NUMBER.png`` with one window and one scale, and all as
+    ``movie.gif``; the paths of the pictures.  Raises `UsageError` when one can not be written."""
     frames = [frame_read(path) for path in folder.frames()]
     positions = [frame["motion"].position[: len(scene.bodies)] for frame in frames]
     window = pictures.window_of(scene, positions)
     scale = pictures.force_scale([frame["contacts"].normal_force for frame in frames])
-    drawn = []
-    for number, frame in enumerate(frames):
-        head = f"{title}   t = {float(frame['time']):.3f} s, widest line {scale:.3g} N"
-        figure = pictures.picture_state(
-            frame_scene(frame, scene), frame["motion"], frame["contacts"], window, scale, head
-        )
-        drawn.append(folder.path / f"picture-{number:06d}.png")
-        figure.savefig(drawn[-1])
-    pictures.movie_write(folder.path / "movie.gif", drawn)
+    drawn = [
+        picture_write(folder, f"{number:06d}", frame_figure(frame, scene, window, scale, title))
+        for number, frame in enumerate(frames)
+    ]
+    movie = pictures.movie_gif([path.read_bytes() for path in drawn])
+    write_whole(folder.path / "movie.gif", movie)
     return drawn
+
+
+def end_draw(folder: RunFolder, scene: Scene, title: str) -> Path:
+    """Draw the last frame in a window and with a scale of its own; the picture's path."""
+    frame = frame_read(folder.frames()[-1])
+    bodies = frame_scene(frame, scene)
+    window = pictures.window_of(bodies, [frame["motion"].position])
+    scale = pictures.force_scale([frame["contacts"].normal_force])
+    return picture_write(folder, "end", frame_figure(frame, scene, window, scale, title))
+
+
+def frame_figure(
+    frame: dict[str, Any], scene: Scene, window: tuple[Floats, Floats], scale: float, title: str
+) -> Any:
+    """Bodies and force chains of a frame, its time above them."""
+    head = f"{title}   t = {frame['time']:.3f} s"
+    return pictures.picture_state(
+        frame_scene(frame, scene), frame["motion"], frame["contacts"], window, scale, head
+    )
+
+
+def picture_write(folder: RunFolder, name: str, figure: Any) -> Path:
+    """Write a figure as ``picture-NAME.png``; its path.  Raises `UsageError` as `write_whole`."""
+    path = folder.path / f"picture-{name}.png"
+    write_whole(path, pictures.figure_png(figure))
+    return path
 
 
 def _figure(path: Path, caption: str) -> str:

@@ -14,16 +14,19 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import fields
+from errno import EDQUOT, EFBIG, ENOSPC
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rigid_lcp.contacts import ContactForces
+from rigid_lcp.damaged_files import DAMAGED
 from rigid_lcp.errors import SceneError, UsageError
 from rigid_lcp.frame_bodies import bodies_arrays, bodies_restore
 from rigid_lcp.motion import Motion
-from rigid_lcp.problem_files import DAMAGED
+from rigid_lcp.runge_kutta import Pace
 from rigid_lcp.simulation import Simulation
 
 FRAME = "frame_{:06d}.npz"
@@ -33,7 +36,23 @@ OURS = (
     "movie.gif", ".*.partial",
 )  # fmt: skip
 """Files of a run; what starts anew removes these and no other."""
-COUNTERS = ("time", "steps", "worst_residual")
+COUNTERS = ("time", "steps", "worst_residual", "steps_above")
+DISK_FULL = (ENOSPC, EDQUOT, EFBIG)
+"""No space on the disk, none left in the user's quota, or a longer file than is allowed."""
+
+
+@contextmanager
+def refusal_told(path: Path) -> Iterator[None]:
+    """`UsageError` in place of what the system raises when it refuses to write ``path``."""
+    try:
+        yield
+    except OSError as error:
+        room = "make room" if error.errno in DISK_FULL else "get leave to write there"
+        raise UsageError(
+            f"can not be written ({error.strerror or error})", where=str(path),
+            remedy=f"{room}, then the same command with --resume goes on from the last frame; "
+            "or give another --run-folder",
+        ) from error  # fmt: skip
 
 
 def write_whole(path: Path, content: bytes | str) -> None:
@@ -43,16 +62,12 @@ def write_whole(path: Path, content: bytes | str) -> None:
     """
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        with partial.open("wb") as stream:
-            stream.write(content.encode() if isinstance(content, str) else content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        partial.replace(path)
-    except OSError as error:
-        raise UsageError(
-            f"can not be written ({error.strerror or error})", where=str(path),
-            remedy="make room or leave to write there, or give another folder",
-        ) from error  # fmt: skip
+        with refusal_told(path):
+            with partial.open("wb") as stream:
+                stream.write(content.encode() if isinstance(content, str) else content)
+                stream.flush()
+                os.fsync(stream.fileno())
+            partial.replace(path)
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
@@ -63,6 +78,8 @@ class RunFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._lock: os.stat_result | None = None
+        """Identity of the lock while we hold it."""
 
     @property
     def summary(self) -> dict[str, Any] | None:
@@ -75,27 +92,43 @@ class RunFolder:
 
         Raises `UsageError` when another process has it, or the folder can not be written.
         """
-        try:
+        lock = self.path / ".lock"
+        with refusal_told(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
-            stream = (self.path / ".lock").open("a+", encoding="utf-8")
-        except OSError as error:
-            raise UsageError(
-                f"can not be written ({error.strerror or error})", where=str(self.path),
-                remedy="give another --run-folder",
-            ) from error  # fmt: skip
-        with stream:
-            try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                stream.seek(0)
-                raise UsageError(
-                    f"another process writes to this run ({stream.read().strip()})",
-                    where=str(self.path), remedy="wait for it, or stop it; nothing was changed",
-                ) from error  # fmt: skip
-            stream.truncate(0)
-            stream.write(f"pid {os.getpid()} on {socket.gethostname()}")
-            stream.flush()
+            stream = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            with refusal_told(self.path):
+                try:
+                    fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError as error:
+                    owner = os.read(stream, 200).decode(errors="replace").strip()
+                    raise UsageError(
+                        f"another process writes to this run ({owner})", where=str(self.path),
+                        remedy="wait for it, or stop it; nothing was changed",
+                    ) from error  # fmt: skip
+                os.truncate(stream, 0)
+                os.write(stream, f"pid {os.getpid()} on {socket.gethostname()}".encode())
+                for leftover in self.path.glob(".*.partial"):  # of a killed writer
+                    leftover.unlink()
+            self._lock = os.fstat(stream)
             yield
+        finally:
+            self._lock = None
+            os.close(stream)
+
+    def _refuse_if_replaced(self) -> None:
+        """Raise `UsageError` if the folder whose lock we hold is not the one that is there now."""
+        if self._lock is None:
+            return
+        try:
+            same = os.path.samestat(self._lock, os.stat(self.path / ".lock"))
+        except OSError:
+            same = False
+        if not same:
+            raise UsageError(
+                "this folder was removed or replaced while the run went on", where=str(self.path),
+                remedy="leave the folder of a run alone; start it anew",
+            )  # fmt: skip
 
     def settle(self, manifest: dict[str, Any], scene: str, *, resume: bool, force: bool) -> bool:
         """Make the folder ready for a run of ``manifest``; whether a run that is there goes on.
@@ -104,21 +137,24 @@ class RunFolder:
         left as it is, unless ``force``: then the run's own files are removed.  So does a folder
         with other people's files, always.
         """
+        names = sorted(path.name for path in self.path.iterdir())
         strangers = [
-            path.name
-            for path in self.path.iterdir()
-            if path.name != ".lock" and not any(path.match(pattern) for pattern in OURS)
-        ]
+            name for name in names
+            if name != ".lock" and not any(fnmatch(name, pattern) for pattern in OURS)
+        ]  # fmt: skip
         if strangers:
             raise UsageError(
-                f"this folder has files that are no run's ({', '.join(sorted(strangers)[:3])})",
+                f"this folder has files that are no run's ({', '.join(strangers[:3])})",
                 where=str(self.path), remedy="give an empty --run-folder",
             )  # fmt: skip
         there = _json_object(self.path / MANIFEST)
+        if there is None and any(fnmatch(name, "frame_*.npz") for name in names):
+            there = {}  # frames are written after it: it was there
         if there is not None and not force:
             if not there:
                 raise UsageError(
-                    f"the {MANIFEST} of this run can not be read", where=str(self.path),
+                    f"the {MANIFEST} of this run is missing or can not be read",
+                    where=str(self.path),
                     remedy="give another --run-folder, or --force to lose that run",
                 )  # fmt: skip
             if there.get("scene") != manifest["scene"]:
@@ -133,9 +169,10 @@ class RunFolder:
                 f"this run is there already and {state}", where=str(self.path),
                 remedy="--resume to go on with it, or --force to compute it anew",
             )  # fmt: skip
-        for pattern in OURS:
-            for path in self.path.glob(pattern):
-                path.unlink()
+        with refusal_told(self.path):
+            for pattern in OURS:
+                for path in self.path.glob(pattern):
+                    path.unlink()
         write_whole(self.path / "scene.toml", scene)
         write_whole(self.path / MANIFEST, json.dumps(manifest, indent=1) + "\n")
         return False
@@ -143,13 +180,18 @@ class RunFolder:
     # --- frames ---------------------------------------------------------------------------------
 
     def frame_write(self, number: int, run: Simulation, cpu: float) -> None:
-        """Keep the state of a run as frame ``number``; ``cpu``: processor time so far [s]."""
+        """Keep the state of a run as frame ``number``; ``cpu``: processor time so far [s].
+
+        Raises `UsageError` when it can not be written, or the folder is not the one we locked.
+        """
+        self._refuse_if_replaced()
         arrays = {f"motion_{f.name}": getattr(run.motion, f.name) for f in fields(Motion)}
         arrays |= {
             f"contact_{f.name}": getattr(run.contacts, f.name) for f in fields(ContactForces)
         }
         arrays |= {name: np.asarray(getattr(run, name)) for name in COUNTERS}
         arrays |= {"energy": np.asarray(run.energy), "overlap": np.asarray(run.overlap)}
+        arrays |= {f"pace_{f.name}": np.asarray(getattr(run.pace, f.name)) for f in fields(Pace)}
         arrays |= bodies_arrays(run)
         buffer = io.BytesIO()
         np.savez_compressed(buffer, cpu=np.asarray(cpu), **arrays)
@@ -179,9 +221,12 @@ def _json_object(path: Path) -> dict[str, Any] | None:
 
 
 def frame_read(path: Path) -> dict[str, Any]:
-    """Arrays of a frame by name, with ``motion`` and ``contacts`` put together."""
-    with np.load(path) as file:
+    """Arrays of a frame by name, with ``motion``, ``contacts`` and ``pace`` put together, counters
+    as numbers.  Raises one of `DAMAGED` if it can not be read, or is of another version."""
+    with path.open("rb") as stream, np.load(stream) as file:  # it leaves damaged ones open
         arrays = {name: file[name] for name in file.files}
+    arrays |= {name: arrays[name].item() for name in (*COUNTERS, "energy", "overlap", "cpu")}
+    arrays["pace"] = Pace(**{f.name: arrays[f"pace_{f.name}"].item() for f in fields(Pace)})
     arrays["motion"] = Motion(**{f.name: arrays[f"motion_{f.name}"] for f in fields(Motion)})
     arrays["contacts"] = ContactForces(
         **{f.name: arrays[f"contact_{f.name}"] for f in fields(ContactForces)}
@@ -202,7 +247,6 @@ def frame_restore(path: Path, run: Simulation) -> float:
             f"the frame has {len(frame['motion'].position)} bodies, the scene {bodies}",
             where=str(path), remedy="--force to compute it anew",
         )  # fmt: skip
-    run.motion, run.contacts = frame["motion"], frame["contacts"]
-    run.time, run.steps = float(frame["time"]), int(frame["steps"])
-    run.worst_residual = float(frame["worst_residual"])
+    for name in ("motion", "contacts", "pace", *COUNTERS):
+        setattr(run, name, frame[name])
     return float(frame["cpu"])

@@ -89,6 +89,8 @@ class Scene:
                 f"{type(shape).__name__} is no shape of {self.dim} dimensions", where=where,
                 remedy=f"use a shape with dim {self.dim}",
             )  # fmt: skip
+        if not isinstance(fixed, bool | np.bool_):
+            raise SceneError(f"fixed is {fixed!r}", where=where, remedy="give True or False")
         if isinstance(shape, HalfSpace):
             check_half_space(shape, position, angle, velocity, spin, where)
             fixed = True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -150,7 +150,9 @@ def scene_build(file: SceneFile) -> Scene:
             if (value := getattr(body, key)) is not None
         }
         shape = shape_of(body, tables.dimensions)
-        scene.add(shape, fixed=body.fixed, name=body.name, **given, **own(body))
+        number = scene.add(shape, fixed=body.fixed, name=body.name, **given, **own(body))
+        if body.inertia is not None:
+            scene.bodies[number] = replace(scene.bodies[number], inertia=body.inertia)
     for grains in tables.grains:
         for shape, position, angle in grains_place(grains, tables.dimensions):
             scene.add(shape, density=grains.density, position=position, angle=angle, **own(grains))
@@ -201,12 +203,12 @@ def loads_of(file: SceneFile) -> Loads | None:
 
 
 def force_at(load: Load, time: float) -> NDArray[np.float64]:
-    """Force of a load [N] at a time [s]: cyclic ones start at their least force."""
+    """Force of a load [N] at a time [s]: cyclic ones start at their least force, or its phase."""
     most = np.array(load.force)
     if time < load.begin or (load.end is not None and time > load.end):
         return np.zeros_like(most)
     if load.frequency is None:
         return most
     least = np.zeros_like(most) if load.least is None else np.array(load.least)
-    phase = 0.5 - 0.5 * np.cos(2 * np.pi * load.frequency * (time - load.begin))
-    return np.asarray(least + phase * (most - least))
+    angle = 2 * np.pi * load.frequency * (time - load.begin) + load.phase
+    return np.asarray(least + (0.5 - 0.5 * np.cos(angle)) * (most - least))

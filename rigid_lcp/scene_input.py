@@ -25,6 +25,8 @@ Loads = Callable[[float, Motion], ArrayLike | None]
 def vector_given(values: ArrayLike, size: int, what: str, where: str) -> Floats:
     """A copy of ``size`` finite numbers; `SceneError` for anything else."""
     try:
+        if np.iscomplexobj(values):
+            raise TypeError
         vector = np.atleast_1d(np.array(values, dtype=float))
     except (TypeError, ValueError):
         vector = np.zeros(0)
@@ -43,6 +45,14 @@ def number_in(
     if not least <= number <= most or (above and number == least):
         raise SceneError(f"{what} is {value!r}", where=where, remedy=remedy)
     return number
+
+
+def whole_in(value: Any, least: int, what: str, where: str, remedy: str) -> int:
+    """A whole number of ``least`` or more; else `SceneError`."""
+    sound = isinstance(value, Integral) and not isinstance(value, bool)
+    if not sound or value < least:
+        raise SceneError(f"{what} is {value!r}", where=where, remedy=remedy)
+    return int(value)
 
 
 def seconds_given(value: Any, what: str, least: float = 0.0) -> float:

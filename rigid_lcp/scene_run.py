@@ -6,6 +6,7 @@ import csv
 import io
 import time
 from collections.abc import Callable
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.breakage import Breakage
+from rigid_lcp.errors import UsageError
 from rigid_lcp.run_folder import FRAME, RunFolder, frame_read, frame_restore, write_whole
 from rigid_lcp.scene import Scene
 from rigid_lcp.scene_file import SceneFile, loads_of, scene_build
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.simulation import NO_STEP, Simulation
 from rigid_lcp.wear import Wear
 
 Floats = NDArray[np.float64]
@@ -91,11 +93,11 @@ def history_of(folder: RunFolder) -> dict[str, Floats]:
         frame = frame_read(path)
         status = frame["contacts"].status
         rows.append((
-            float(frame["time"]), float(frame["energy"]), float((status != "open").sum()),
-            float((status == "slide").sum()), float(frame["overlap"]),
-            float(frame["worst_residual"]), float(frame["cpu"]),
+            frame["time"], frame["energy"], float((status != "open").sum()),
+            float((status == "slide").sum()), frame["overlap"], frame["worst_residual"],
+            frame["cpu"],
         ))  # fmt: skip
-    return dict(zip(HISTORY, np.array(rows).T, strict=True))
+    return dict(zip(HISTORY, np.array(rows).reshape(-1, len(HISTORY)).T, strict=True))
 
 
 def history_write(path: Path, history: dict[str, Floats]) -> None:
@@ -107,14 +109,34 @@ def history_write(path: Path, history: dict[str, Floats]) -> None:
     write_whole(path, text.getvalue())
 
 
+def steps_planned(file: SceneFile) -> tuple[int, float]:
+    """Number of the steps of a whole run and the length of each [s]: equal steps, not longer than
+    the scene's, that end at every frame.  At acceleration level the fewest and the longest."""
+    table = file.tables.run
+    span = table.duration / table.frames
+    count = max(ceil(span / table.step - NO_STEP), 1)
+    return count * table.frames, span / count
+
+
+def unknowns_a_contact(file: SceneFile) -> int:
+    """Forces that are solved for at a contact: the normal one alone where no surface has friction,
+    else one for each dimension."""
+    return file.tables.dimensions if _any_has(file, "friction") else 1
+
+
+def _any_has(file: SceneFile, property_: str) -> bool:
+    tables = file.tables
+    bodies: list[Any] = [tables.surface, *tables.ground, *tables.body, *tables.grains]
+    return any(getattr(body, property_) for body in bodies)
+
+
 def left_out(file: SceneFile) -> list[str]:
     """Physics that the scene does not name, and that is therefore not computed."""
     tables = file.tables
-    bodies: list[Any] = [tables.surface, *tables.ground, *tables.body, *tables.grains]
     absent = []
-    if not any(body.friction for body in bodies):
-        absent.append("friction: no surface has any; one unknown a contact is solved for")
-    if not any(body.restitution for body in bodies):
+    if not _any_has(file, "friction"):
+        absent.append("friction: no surface has any; one unknown a contact, no tangential forces")
+    if not _any_has(file, "restitution"):
         absent.append("restitution: every impact is inelastic")
     if not tables.load:
         absent.append("loads: none but gravity")
@@ -128,10 +150,19 @@ def left_out(file: SceneFile) -> list[str]:
 
 
 def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder) -> dict[str, Any]:
-    """What a run came to, for people and for ``--json``."""
+    """What a run came to, for people and for ``--json``.
+
+    Raises `UsageError` if a frame is gone or damaged since it was written.
+    """
     history = history_of(folder)
     contacts = run.contacts
-    frames = len(history["time"]) - 1
+    frames = file.tables.run.frames
+    if len(history["time"]) <= frames:
+        raise UsageError(
+            "this frame is missing or damaged",
+            where=str(folder.path / FRAME.format(len(history["time"]))),
+            remedy="the same command with --resume computes it again",
+        )
     moves = int(run.world.movable.sum())
     return {
         "title": file.tables.title,
@@ -139,13 +170,16 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
         "bodies": moves,
         "time": run.time,
         "steps": run.steps,
-        "step": file.tables.run.step,
+        "step": run.time / max(run.steps, 1),
+        "unknowns_a_contact": unknowns_a_contact(file),
         "contacts": int((contacts.status != "open").sum()),
         "sliding": int((contacts.status == "slide").sum()),
         "largest_normal_force": float(contacts.normal_force.max(initial=0.0)),
         "energy": float(history["energy"][-1]),
         "overlap_largest": float(history["overlap"].max()),
+        "tolerance": run.tolerance,
         "residual_worst": run.worst_residual,
+        "steps_above": run.steps_above,
         "speed_largest": float(np.abs(run.velocities).max(initial=0.0)),
         "positions": {
             body.name: run.positions[n].tolist()
@@ -154,7 +188,16 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
         },
         "cpu_s": float(history["cpu"][-1]),
         "cpu_a_step": float(history["cpu"][-1]) / max(run.steps, 1),
-        **({} if run.worn is None else {"worn": run.worn.volume, "friction_work": run.worn.work}),
+        **(
+            {}
+            if run.worn is None
+            else {
+                "worn": run.worn.volume,
+                "friction_work": run.worn.work,
+                "worn_mass": run.worn.mass,
+                "worn_energy": run.worn.energy,
+            }
+        ),
         **({} if run.breakage is None else {"broken": len(run.broken)}),
         "frames": frames,
         "last_frame": FRAME.format(frames),

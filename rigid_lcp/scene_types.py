@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Positive = Annotated[FiniteFloat, Field(gt=0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
-Vector = Annotated[list[FiniteFloat], Field(min_length=2, max_length=3)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""Whole numbers too, but neither true nor a word."""
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]{0,59}$")]
+MOST_STEPS, LEAST_OF_A_STEP = 1e10, 1e-6
+"""Steps of a run, more than any machine makes; shortest time between two frames in steps."""
 
 
 class Table(BaseModel):
@@ -22,7 +26,7 @@ class Surface(Table):
     """What bodies without values of their own get."""
 
     friction: NotNegative = 0.0
-    restitution: Annotated[FiniteFloat, Field(ge=0, le=1)] = 0.0
+    restitution: Annotated[Number, Field(ge=0, le=1)] = 0.0
 
 
 class Run(Table):
@@ -33,19 +37,29 @@ class Run(Table):
     step: Positive = 1e-3
     """Length of a step, the longest one at acceleration level [s]."""
     method: Literal["time-stepping", "acceleration"] = "time-stepping"
-    tolerance: Annotated[FiniteFloat, Field(ge=1e-14, le=1e-3)] = 1e-10
+    tolerance: Annotated[Number, Field(ge=1e-14, le=1e-3)] = 1e-10
     """Scale-free residual of the contact forces [-]."""
     frames: Annotated[int, Field(ge=1, le=100_000)] = 20
     """States that are kept, at equal times."""
+
+    @model_validator(mode="after")
+    def _comes_to_an_end(self) -> Run:
+        steps = self.duration / self.step
+        if not LEAST_OF_A_STEP * self.frames <= steps <= MOST_STEPS:
+            raise ValueError(
+                f"duration is {steps:.3g} steps: at most {MOST_STEPS:.0e} can be made, and the "
+                f"time between two frames must be at least {LEAST_OF_A_STEP:g} of one"
+            )
+        return self
 
 
 class Ground(Table):
     """A half-space: everything with ``normal . x <= offset``."""
 
     normal: Vector
-    offset: FiniteFloat = 0.0
+    offset: Number = 0.0
     friction: NotNegative | None = None
-    restitution: Annotated[FiniteFloat, Field(ge=0, le=1)] | None = None
+    restitution: Annotated[Number, Field(ge=0, le=1)] | None = None
 
 
 class BodyTable(Table):
@@ -60,16 +74,17 @@ class BodyTable(Table):
     """Of a convex polygon (anticlockwise) or polyhedron [m]."""
     density: Positive | None = None
     """[kg/m^3]; in 2D [kg/m^2], or per metre of depth."""
+    inertia: Positive | None = None
+    """Moment of inertia in place of the shape's own, in 2D [kg m^2]; a huge one holds the body
+    upright."""
     fixed: bool = False
     position: Vector | None = None
-    angle: FiniteFloat | Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)] | None = (
-        None
-    )
+    angle: Number | Annotated[list[Number], Field(min_length=4, max_length=4)] | None = None
     """[rad]; in 3D a quaternion w, x, y, z."""
     velocity: Vector | None = None
-    spin: FiniteFloat | Vector | None = None
+    spin: Number | Vector | None = None
     friction: NotNegative | None = None
-    restitution: Annotated[FiniteFloat, Field(ge=0, le=1)] | None = None
+    restitution: Annotated[Number, Field(ge=0, le=1)] | None = None
 
     @model_validator(mode="after")
     def _one_shape(self) -> BodyTable:
@@ -95,7 +110,7 @@ class Grains(Table):
     """Fewest and most corners of a stone."""
     seed: Annotated[int, Field(ge=0)] = 1
     friction: NotNegative | None = None
-    restitution: Annotated[FiniteFloat, Field(ge=0, le=1)] | None = None
+    restitution: Annotated[Number, Field(ge=0, le=1)] | None = None
 
     @model_validator(mode="after")
     def _in_order(self) -> Grains:
@@ -120,19 +135,27 @@ class Load(Table):
     """The smallest force of a cyclic load [N]; zero if not given."""
     frequency: Positive | None = None
     """[Hz]; without it the load is constant."""
+    phase: Number = 0.0
+    """Of a cyclic load at its begin [rad]; at zero it starts from the smallest force."""
     begin: NotNegative = 0.0
     end: Positive | None = None
 
+    @model_validator(mode="after")
+    def _ends_after_it_begins(self) -> Load:
+        if self.end is not None and self.end <= self.begin:
+            raise ValueError(f"end ({self.end:g} s) is not after begin ({self.begin:g} s)")
+        return self
+
 
 class WearTable(Table):
-    """Corners of polygons worn by the work of friction."""
+    """Corners of polygons, corners and edges of polyhedra worn by the work of friction."""
 
     coefficient: Positive
     """Volume per work of friction [m^3/J]."""
     every: Annotated[int, Field(ge=1)] = 20
     """Steps between cuts."""
     volume_scale: Positive | None = None
-    """Wear that changes the stiffness of a corner [m^2]; without it none does."""
+    """Wear that changes the stiffness of a corner [m^3], in 2D [m^2]; without it none does."""
 
 
 class StrengthTable(Table):
@@ -197,8 +220,9 @@ class SceneTables(Table):
         for i, load in enumerate(self.load):
             if load.body not in names:
                 raise ValueError(f"load.{i}.body: there is no body {load.body}")
-        if self.wear is not None and self.dimensions == 3:
-            raise ValueError("wear: only polygons wear in a run, leave [wear] out in 3 dimensions")
+        for i, body in enumerate(self.body):
+            if body.inertia is not None and (self.dimensions == 3 or body.fixed):
+                raise ValueError(f"body.{i}.inertia: for bodies that move, in 2 dimensions")
         if self.run.method == "acceleration" and (self.wear or self.strength):
             raise ValueError("run.method: nothing wears or breaks at acceleration level")
         if self.strength and (self.strength.modulus is None) != (

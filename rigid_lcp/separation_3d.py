@@ -91,8 +91,8 @@ def face_separation(solids: Solids, own: int, other: int, margin: float) -> tupl
 
 
 @njit(cache=True)
-def edges_near(solids: Solids, own: int, box: Floats) -> Ints:
-    """Edges of a body whose own boxes touch ``box`` (x0, y0, z0, x1, y1, z1)."""
+def edges_near(solids: Solids, own: int, box: Floats, margin: float) -> Ints:
+    """Edges of a body whose own boxes come within ``margin`` [m] of ``box`` (x0, y0, z0, x1...)."""
     near = np.empty(solids.first_edge[own + 1] - solids.first_edge[own], np.int64)
     count = 0
     base = solids.first_vertex[own]
@@ -102,7 +102,7 @@ def edges_near(solids: Solids, own: int, box: Floats) -> Ints:
         touches = True
         for axis in range(3):
             low, high = min(p[axis], q[axis]), max(p[axis], q[axis])
-            if low > box[3 + axis] or high < box[axis]:
+            if low > box[3 + axis] + margin or high < box[axis] - margin:
                 touches = False
         if touches:
             near[count] = e
@@ -112,15 +112,14 @@ def edges_near(solids: Solids, own: int, box: Floats) -> Ints:
 
 @njit(cache=True)
 def edge_separation(
-    solids: Solids, a: int, b: int, box_a: Floats, box_b: Floats, margin: float
+    solids: Solids, a: int, b: int, near_a: Ints, near_b: Ints, margin: float
 ) -> tuple[int, int, float]:
     """Edges of a and b whose common normal keeps the bodies farthest apart, and how far [m].
 
     Only edges that see each other count: the normal lies between those of the faces at each.
-    ``box_a``, ``box_b``: bounding boxes swollen by the margin.  (-1, -1, -inf) if there are none.
+    ``near_a``, ``near_b``: the edges looked at (`edges_near`).  (-1, -1, -inf) if there are none.
     """
     best_a, best_b, separation = -1, -1, -np.inf
-    near_a, near_b = edges_near(solids, a, box_b), edges_near(solids, b, box_a)
     base_a, base_b = solids.first_vertex[a], solids.first_vertex[b]
     for e in near_a:
         p = solids.vertex[base_a + solids.edge[e, 0]]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import hypot, inf, pi
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,8 +57,17 @@ class Polygon:
 
     @classmethod
     def regular(cls, corners: int, radius: float) -> Polygon:
-        """Regular polygon with ``corners`` vertices on a circle of ``radius`` [m]."""
+        """Regular polygon with ``corners`` vertices on a circle of ``radius`` [m].
+
+        Raises `ShapeError`.
+        """
         radius = _length(radius, "radius", "polygon")
+        if not isinstance(corners, Integral) or corners < 3:
+            raise ShapeError(
+                f"it has {corners!r} corners",
+                where="polygon",
+                remedy="give a whole number, 3 or more",
+            )
         angle = 2 * pi * np.arange(corners) / corners
         return cls(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
 
@@ -190,6 +200,8 @@ def _outline(vertices: ArrayLike) -> Floats:
 def _given(values: ArrayLike, what: str, where: str) -> Floats:
     """A copy of finite numbers; a `ShapeError` for anything else."""
     try:
+        if np.iscomplexobj(values):
+            raise TypeError("complex ones")
         array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise ShapeError(f"the {what} holds what are not numbers ({error})", where=where) from error

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -97,11 +98,26 @@ class Polyhedron:
     dim = 3
 
     def __init__(self, points: ArrayLike) -> None:
-        triangles, self.vertices = _hull(points)
-        found = solid_integrals(self.vertices, triangles)
+        triangles, corners = _hull(points)
+        found = solid_integrals(corners, triangles)
+        self._settle(corners - found.centroid, triangles, found)
+
+    @classmethod
+    def of_corners(cls, vertices: ArrayLike) -> Self:
+        """The polyhedron with the ``vertices`` (v, 3) [m] of another in its body frame.
+
+        They are taken as they are, the round-off of their centre of mass and all: so a shape made
+        here is made again from its corners to the last bit.
+        """
+        made = cls.__new__(cls)
+        triangles, corners = _hull(vertices)
+        made._settle(corners, triangles, solid_integrals(corners, triangles))
+        return made
+
+    def _settle(self, vertices: Floats, triangles: Ints, found: SolidIntegrals) -> None:
         self.centroid: Floats = found.centroid
         """Centre of mass in the coordinates of the points given [m], (3,)."""
-        self.vertices = self.vertices - found.centroid
+        self.vertices = vertices
         """Corners in the body frame [m], (v, 3)."""
         self.volume: float = found.volume
         """Volume [m^3]."""
@@ -110,6 +126,11 @@ class Polyhedron:
         self.faces, self.normals, self.distances = _faces(self.vertices, triangles)
         """Corners of each face, anticlockwise from outside; outward unit normals (f, 3);
         distances d of the faces from the centre of mass [m], (f,), as in eq. 9."""
+        if len(self.faces) < 4 or self.width <= FLATNESS * self.reach:
+            raise ShapeError(
+                f"its points lie in a plane within {FLATNESS:g} of its size", where="Polyhedron",
+                remedy="give at least four points that span a volume",
+            )  # fmt: skip
 
     @cached_property
     def edges(self) -> Ints:

@@ -87,7 +87,7 @@ class Simulation:
         self.worst_residual = 0.0
         """Greatest residual of any step so far [-]."""
         self.steps_above = 0
-        """Steps whose residual was above ``tolerance`` (time stepping)."""
+        """Steps whose residual was above ``tolerance``."""
         self.contacts: ContactForces = contact_forces(
             self.world.contacts(self.motion, 0.0)[np.zeros(0, np.int64)],
             np.zeros((0, scene.dim)), None, 1.0,
@@ -217,6 +217,7 @@ class Simulation:
         self.time += seconds
         self.steps = self.pace.accepted
         self.worst_residual = self.pace.worst_residual
+        self.steps_above = self.pace.steps_above
 
     def _judge(self, residual: float, message: str) -> None:
         self.worst_residual = max(self.worst_residual, residual)

@@ -5,14 +5,17 @@
     no forces        where nothing approaches
     frictionless     where no contact has friction: sweeps and principal pivoting, exact; there are
                      no tangential unknowns
-    all stick        where the start, or a few sweeps, find nothing open and little that slides: one
-                     factorisation; exact for towers and much of what stands
-    convex path      without a start: a part of it, and Newton; solves most static piles
+    all stick        one factorisation; exact for towers and much of what stands.  Large problems
+                     are swept a few times before, which ends what is loose or regular
+    convex path      without a start: a part of it, and Newton; solves most static piles.  Where it
+                     does not, the path is bent to Coulomb's law, and Newton again
     Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
                      Newton at its end: first few sweeps and factorisations, then many, as what is
                      hard for the one is often easy for the other
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
-                     goes to Newton, and if that is not enough to Gauss-Seidel and Newton again
+                     goes to Newton, and if that is not enough to Gauss-Seidel and Newton again.
+                     They end after the effort that `FALLBACK_SHARE` names, or before they begin
+                     where a linear programme proves that there is no solution
     islands          what is still not solved, each island apart, by all of this (large problems
                      of few islands at once)
 
@@ -49,8 +52,9 @@ from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.interior_point import Path, interior_point
 from rigid_lcp.islands import islands, solve_islands
 from rigid_lcp.newton import newton
+from rigid_lcp.problem_input import finite_numbers, in_range, one_number
 from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
-from rigid_lcp.solver_trial import CONVEX_CONTACTS, HAND_OVER, LAST_WORD, Trial
+from rigid_lcp.solver_trial import CONVEX_CONTACTS, FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
 
 Floats = NDArray[np.float64]
 Method = Literal["auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig"]
@@ -66,9 +70,9 @@ PATHS = (
     (Path(convex=True, compliance=1e-4), 300),
 )
 """Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
-FEW_SWEEPS, FEW, FEW_CONTACTS = 100, 20, 300
-"""Sweeps and factorisations that are tried first, up to so many contacts: enough for most steps of
-a pile in motion; where there are more, news need more sweeps to get through it."""
+FEW_SWEEPS, FEW = 100, 20
+"""Sweeps and factorisations that are tried first on small problems: enough for most steps of a pile
+in motion; where there are more contacts, news need more sweeps to get through them."""
 FEW_ISLANDS = 20
 """Up to so many islands, single contacts not counted, of a large problem are solved apart at once:
 a few grains that lie loose can keep a whole bed from converging.  More cost more than they gain."""
@@ -77,6 +81,11 @@ FIRST_SWEEPS = 1000
 LAST_SWEEPS = 2000
 DEAR_SWEEPS = 6000
 """What is spent before a factorisation that is dear."""
+FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
+"""What the paths of the interior point may cost in all before no further one is begun: so many
+times what was spent before them, or so many flops (some seconds) if that is more."""
+ENDLESS = 1e6
+"""Forces over ``rho |q|`` that look endless: a proof is looked for before the paths."""
 PROOF_CONTACTS = 3000
 """Up to so many contacts a linear programme looks for the proof that there is no solution."""
 
@@ -116,10 +125,7 @@ def solve_friction(
             f"there is no method {method!r}", where="method",
             remedy="one of " + ", ".join(get_args(Method)),
         )  # fmt: skip
-    if not 0.0 < tolerance < np.inf:
-        raise UsageError(
-            f"the tolerance is {tolerance!r}", where="tolerance", remedy="give one above zero"
-        )
+    tolerance, accept = one_number(tolerance, "tolerance"), one_number(accept, "accept", zero=True)
     begin = None if start is None else _start(start, problem)
     if problem.contacts == 0:
         return friction_solution(problem, problem.offset.copy(), tolerance, method)
@@ -159,7 +165,7 @@ def solve_auto(
     ):  # fmt: skip
         return trial.solution()
     parts = parts or islands(problem)
-    if len(parts) > 1 and not split:
+    if len(parts) > 1 and not split and trial.best.status != "no solution":
         apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
         if _error(apart) < _error(trial.best):  # endless forces on one hide the errors of others
             trial.best = apart
@@ -187,16 +193,21 @@ def _attempts(
     rough = tolerance if tolerance > LAST_WORD else HAND_OVER
     small = problem.contacts <= FEW_CONTACTS
     cold = start is None and tolerance < HAND_OVER and problem.contacts <= CONVEX_CONTACTS
-    if trial.convex_start() if cold else trial.stick():
+    if trial.convex_start() if cold else trial.stick_if_likely():
         return trial
     if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
         return trial
-    if not small and trial.dear and trial.sweep(start, DEAR_SWEEPS, factorisations=0):
-        trial.sharpen()
-        return trial
-    # a large bed in motion: where one place of it resists, proximal points fail for all
     moving = not small and start is not None
-    plan = ((FIRST_SWEEPS, 0), (LAST_SWEEPS, FEW)) if moving else ((FIRST_SWEEPS, MANY),)
+    if tolerance >= HAND_OVER and not small:  # rough answers need few factorisations or none
+        if trial.yielding(start) if moving else trial.sweep(None, FIRST_SWEEPS, factorisations=0):
+            return trial
+        if trial.best.residual <= accept:
+            return trial
+    if not small and trial.dear and trial.sweep(start, DEAR_SWEEPS, factorisations=0):
+        return trial
+    plan: tuple[tuple[int, int], ...] = ((FIRST_SWEEPS, MANY if small else FEW),)
+    if moving:  # where one place of a large bed resists, proximal points fail for all
+        plan = ((FIRST_SWEEPS, 0), (LAST_SWEEPS, FEW))
     for count, factorisations in plan:
         if trial.sweep(
             trial.best.r, count, until=max(rough, HAND_OVER), factorisations=factorisations
@@ -206,17 +217,29 @@ def _attempts(
         return trial
     if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
         return trial
+    _paths(trial, accept)
+    return trial
+
+
+def _paths(trial: Trial, accept: float) -> None:
+    """The interior point along one path after another, within the effort of `FALLBACK_SHARE`."""
+    problem, tolerance = trial.problem, trial.tolerance
+    if trial.forces > ENDLESS and _proved_insoluble(problem):
+        trial.best = replace(trial.best, status="no solution")
+        return
+    most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
     for path, sweeps in PATHS:
+        if trial.effort > most:
+            return
         trial.linear = trial.linear or factorisation(problem)
         found = trial.keep(
             interior_point(problem, None, max(HAND_OVER, tolerance), path, linear=trial.linear)
         )
         if trial.polish(found) or trial.sweep(found.r, sweeps, "interior-point"):
-            return trial
-        if trial.best.residual <= accept and not small:
-            return trial
+            return
+        if trial.best.residual <= accept and problem.contacts > FEW_CONTACTS:
+            return
     trial.sweep(None, LAST_SWEEPS)
-    return trial
 
 
 def _error(found: FrictionSolution) -> float:
@@ -263,14 +286,11 @@ def _proved_insoluble(problem: FrictionProblem) -> bool:
 
 
 def _start(start: ArrayLike, problem: FrictionProblem) -> Floats:
-    force = np.array(start, dtype=float).ravel()
+    force = finite_numbers(start, "start").ravel()
     if force.shape != problem.offset.shape:
         raise ProblemError(
             f"it has {len(force)} numbers and q has {len(problem.offset)}", where="start",
             remedy="give the forces of all contacts, in the order of q",
         )  # fmt: skip
-    if not np.isfinite(force).all():
-        raise ProblemError(
-            "some of its numbers are not finite", where="start", remedy="leave the start out"
-        )
+    in_range(force, "start", least=0.0)
     return force

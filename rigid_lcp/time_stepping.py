@@ -14,9 +14,8 @@ energy: the mean of ``u_N-`` and ``u_N+`` is never positive where p_N is not zer
 1 a bounce keeps it to round-off.  With friction a body that comes to rest within a step may gain
 up to ``m (h |f/m|)^2 / 8``.
 
-What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart by
-the smallest mass-weighted displacement; it changes no velocity (split impulse), and keeps the
-centre of mass, but not quite the angular momentum of bodies that are moved while they fly.
+What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart
+(`rigid_lcp.overlap_removal`).
 
 Use it where forces do not exist (Painleve) or where events are too many to be met one by one; it
 is of first order in h where contacts open and close, of second order in between.
@@ -24,7 +23,7 @@ is of first order in h where contacts open and close, of second order in between
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,19 +32,13 @@ from rigid_lcp.contacts import ContactForces, Contacts, contact_frames, contact_
 from rigid_lcp.equations import body_space, inertial_acceleration, relative_velocity
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction_problem import BodySpace, FrictionSolution
-from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
+from rigid_lcp.motion import Motion, motion_with_rates
+from rigid_lcp.overlap_removal import OVERLAP, bodies_parted
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
 
 Floats = NDArray[np.float64]
 
-OVERLAP = 1e-12
-"""Overlap that is left alone, as a share of the smallest body's size."""
-PROJECTION_TOLERANCE = 1e-9
-"""Residual of the displacements that take overlaps out; what is left is seen in the next step."""
-PROJECTIONS, OVERLAP_LEFT = 4, 1e-9
-"""Most times that overlaps are taken out after a step, and the share of the smallest body's size
-below which what a first time left (of second order) is left to the next step."""
 SHARE_LEFT = 0.1
 """Part of the offending velocities that a solution may leave before its forces are called wrong."""
 START_AGAIN = 1e-4
@@ -80,15 +73,16 @@ def moreau_step(
     """
     _refuse_fast_spin(motion, h)
     middle = world.drifted(motion, 0.5 * h)
-    accelerations = world.accelerations(middle, loads, gyroscopic=False)
+    pull = None if loads is None else np.asarray(loads, dtype=float)
+    accelerations = world.accelerations(middle, pull, gyroscopic=False)
     free = motion_with_rates(middle, middle.rates + h * accelerations)
     contacts = world.contacts(middle, moreau_margin(world, motion, accelerations, h))
     if len(contacts) == 0:
-        end = overlap_removed(world, world.drifted(free, 0.5 * h))
+        end = bodies_parted(world, motion, world.drifted(free, 0.5 * h), pull, h)
         return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
     inverse_mass = world.inverse_mass(middle)
     bodies = body_space(contacts, middle.position, world.columns, inverse_mass)
-    turning = 0.5 * h * inertial_acceleration(contacts, middle)
+    turning = 0.5 * h * inertial_acceleration(planes_at_corners(contacts), middle)
     if motion.dim == 3:  # spins change also while no force acts
         coasting = motion_with_rates(middle, world.coasting(middle))
         turning += 0.5 * h * relative_velocity(contacts, coasting)
@@ -113,8 +107,23 @@ def moreau_step(
     after = solution.u.reshape(-1, motion.dim) - shift
     rates = free.rates
     rates[world.movable] += _velocities(bodies, impulse, world.size)
-    end = overlap_removed(world, world.drifted(motion_with_rates(middle, rates), 0.5 * h))
+    end = world.drifted(motion_with_rates(middle, rates), 0.5 * h)
+    end = bodies_parted(world, motion, end, pull, h)
     return Step(end, contact_forces(contacts, impulse, after, h), error, solution.message)
+
+
+def planes_at_corners(contacts: Contacts) -> Contacts:
+    """Contacts whose corners on corners and edges are corners on the plane across the normal.
+
+    The distance of two points has a curvature of 1 over itself: it tells how the gap grows only
+    for times far below a step.  The plane parts the two bodies, so it is safe, and at most the
+    way of a step too careful with bodies that would just pass.
+    """
+    corners = (contacts.radius_a == 0) & (contacts.radius_b == 0)
+    if not corners.any():
+        return contacts
+    flat = np.where(corners, np.inf, contacts.radius_b)
+    return replace(contacts, radius_b=flat, edge_b=np.where(corners[:, None], 0.0, contacts.edge_b))
 
 
 def impulses_found(
@@ -209,28 +218,6 @@ def contact_forces(
         tangential = tangential[:, 0]
     given = {name: getattr(contacts, name) for name in Contacts.__dataclass_fields__}
     return ContactForces(**given, normal_force=normal, tangential_force=tangential, status=status)
-
-
-def overlap_removed(world: World, motion: Motion) -> Motion:
-    """Bodies moved apart until no two overlap: what turning, and impacts of more speed than the
-    contacts were looked for with, leave at the end of a step.
-
-    Each round moves by the smallest displacement weighted with mass, ``M^-1 J_N^T lambda`` with
-    ``lambda >= 0``, exact to the first order in it; no velocity changes.
-    """
-    for done in range(PROJECTIONS):
-        deepest = -float(world.contacts(motion, 0.0).gap.min(initial=0.0))
-        if deepest <= (OVERLAP_LEFT if done else OVERLAP) * world.length:
-            break
-        found = world.contacts(motion, deepest)  # neighbours that the move may reach stay clear
-        bodies = body_space(found, motion.position, world.columns, world.inverse_mass(motion))
-        offset = np.zeros((len(found), motion.dim))
-        offset[:, 0] = found.gap
-        apart = impulses_found(bodies, offset, np.zeros(len(found)), None, PROJECTION_TOLERANCE)
-        move = np.zeros_like(motion.rates)
-        move[world.movable] = _velocities(bodies, apart.r.reshape(-1, motion.dim), world.size)
-        motion = motion_displaced(motion, move)
-    return motion
 
 
 def _refuse_fast_spin(motion: Motion, h: float) -> None:

@@ -19,6 +19,7 @@ from rigid_lcp.motion import Motion, motion_with_rates
 from rigid_lcp.scene import World
 from rigid_lcp.time_stepping import contact_forces
 from rigid_lcp.wear import Wear, WearState, contact_stiffness_worn
+from rigid_lcp.wear_3d import SolidWear
 
 CLOSED = 1e-6
 """Contacts are closed up to this share of the smallest body's size: time steps leave gaps of their
@@ -27,7 +28,7 @@ accuracy."""
 
 def unique_forces(
     world: World, motion: Motion, loads: ArrayLike | None = None, stiffness: float = 1.0,
-    wear: Wear | None = None, worn: WearState | None = None, tolerance: float = 1e-10,
+    wear: Wear | None = None, worn: WearState | SolidWear | None = None, tolerance: float = 1e-10,
 ) -> ContactForces:  # fmt: skip
     """Forces of elastic contacts at the state ``motion``, the same for any order and solver.
 

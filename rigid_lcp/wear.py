@@ -1,4 +1,4 @@
-"""Wear in a run: the work of friction takes the corners off polygons (Archard, Reye; section 8).
+"""Wear in a run: friction takes corners and edges off grains (Archard, Reye; section 8).
 
 The work at a contact, ``-f_T . s`` over the slip s, belongs to the corner that makes the contact
 (the vertex of body a, or the corner of b that a disc touches); a corner loses ``V = k W``
@@ -7,13 +7,16 @@ corner of the polygon as it was first is replaced by a chamfer of all that it ha
 only shrink, chamfers grow parallel to themselves, and nothing can overlap.  Where a chamfer meets
 its neighbour or takes half of an edge, the worn shape becomes the one to wear from.
 
+In space edges rub too, and chamfers are plane cuts (`rigid_lcp.wear_3d`).
+
 What stays goes on as part of the rigid motion of the whole; what is worn off takes its momentum
-and energy away.  Faces, discs, half-spaces and fixed bodies keep their shape.
+and energy away.  Faces, discs, spheres, half-spaces and fixed bodies keep their shape.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from sys import float_info
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,10 +26,19 @@ from rigid_lcp.abrasion import friction_work, worn_stiffness, worn_volume
 from rigid_lcp.contacts import ContactForces, Contacts, contact_frames
 from rigid_lcp.detection_2d import FACE_BITS
 from rigid_lcp.equations import relative_velocity
-from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.fragmentation import scene_at
 from rigid_lcp.motion import Motion
+from rigid_lcp.scene_input import number_in, whole_in
 from rigid_lcp.shapes_2d import Polygon
+from rigid_lcp.wear_3d import (
+    SolidWear,
+    energy_of,
+    solids_after_break,
+    solids_rubbed,
+    solids_scene_worn,
+    solids_unworn,
+    volume_lost,
+)
 from rigid_lcp.worn_polygon import WornPolygon, polygon_worn
 
 if TYPE_CHECKING:
@@ -51,11 +63,11 @@ class Wear:
     """Share of the stiffness that stays at a worn corner [-]."""
 
     def __post_init__(self) -> None:
-        worn_volume(np.zeros(1), self.coefficient)
-        if self.every < 1:
-            raise ShapeError(
-                f"every is {self.every}", where="wear", remedy="give 1 or more steps between cuts"
-            )
+        number_in(
+            self.coefficient, 0.0, float_info.max, "the wear coefficient", "wear",
+            "give zero or more, in m^3/J (1e-15 to 1e-12 for rock)",
+        )  # fmt: skip
+        whole_in(self.every, 1, "every", "wear", "give 1 or more steps between cuts")
         worn_stiffness(1.0, 0.0, self.volume_scale or 1.0, self.stiffness_left)
 
 
@@ -73,24 +85,29 @@ class WearState:
     """All that has been worn, cut off or not [m^2]."""
     work: float = 0.0
     """All work of friction, at corners that wear and elsewhere [J]."""
+    mass: float = 0.0
+    """Mass cut off [kg]."""
+    energy: float = 0.0
+    """Kinetic and potential energy that went with it [J]."""
 
 
-def wear_start(scene: Scene) -> WearState:
-    """The polygons of a scene as they are, nothing lost.  Raises `SceneError` in 3D."""
-    if scene.dim != 2:
-        raise SceneError(
-            "only polygons wear in a run", where="wear",
-            remedy="leave wear out in 3D; rigid_lcp.abrasion has the laws",
-        )  # fmt: skip
+def wear_start(scene: Scene) -> WearState | SolidWear:
+    """The polygons, or polyhedra, of a scene as they are, nothing lost."""
+    if scene.dim == 3:
+        return solids_unworn(scene)
     grains = [_unworn(body) for body in scene.bodies]
     return _state_of(grains, [_nothing(grain) for grain in grains])
 
 
-def wear_after_break(state: WearState, scene: Scene, body: int) -> WearState:
+def wear_after_break(
+    state: WearState | SolidWear, scene: Scene, body: int
+) -> WearState | SolidWear:
     """The state of a scene in which ``body`` was broken and its second part added at the end.
 
     The parts are wear's new beginning; what the whole had not yet lost is dropped.
     """
+    if isinstance(state, SolidWear):
+        return solids_after_break(state, scene, body)
     grains = list(state.grains)
     pending = _parts(state)
     grains[body], added = _unworn(scene.bodies[body]), _unworn(scene.bodies[-1])
@@ -122,6 +139,7 @@ def _state_of(
     made = WearState(grains, first, np.concatenate(pending))
     if before is not None:
         made.volume, made.work = before.volume, before.work
+        made.mass, made.energy = before.mass, before.energy
     return made
 
 
@@ -153,12 +171,17 @@ def slip_work(contacts: ContactForces, before: Motion, after: Motion, h: float) 
 
 
 def wear_step(
-    state: WearState, wear: Wear, contacts: ContactForces, before: Motion, after: Motion, h: float
-) -> None:
+    state: WearState | SolidWear, wear: Wear, contacts: ContactForces, before: Motion,
+    after: Motion, h: float,
+) -> None:  # fmt: skip
     """Add the wear of a step of ``h`` [s] between the states ``before`` and ``after``."""
     if len(contacts) == 0:
         return
     work = slip_work(contacts, before, after, h)
+    if isinstance(state, SolidWear):
+        state.work += float(work.sum())
+        solids_rubbed(state, contacts, worn_volume(work, wear.coefficient))
+        return
     corner = corner_of_contacts(state, contacts)
     made = corner >= 0
     volume = worn_volume(work[made], wear.coefficient)
@@ -168,12 +191,18 @@ def wear_step(
 
 
 def contact_stiffness_worn(
-    state: WearState, wear: Wear, contacts: Contacts, stiffness: float = 1.0
+    state: WearState | SolidWear, wear: Wear, contacts: Contacts, stiffness: float = 1.0
 ) -> Floats:
     """Stiffness of contacts at their worn corners, (nc,) [N/m], for `rigid_lcp.elastic_limit`.
 
     Contacts that no corner makes keep ``stiffness``, and so do all without ``volume_scale``.
     """
+    if isinstance(state, SolidWear):
+        whole = np.full(len(contacts), float(stiffness))
+        if wear.volume_scale is None:
+            return whole
+        lost = volume_lost(state, contacts)
+        return worn_stiffness(whole, lost, wear.volume_scale, wear.stiffness_left)
     corner = corner_of_contacts(state, contacts)
     k = np.full(len(contacts), float(stiffness))
     if wear.volume_scale is None or not (corner >= 0).any():
@@ -183,16 +212,21 @@ def contact_stiffness_worn(
     return worn_stiffness(k, lost, wear.volume_scale, wear.stiffness_left)
 
 
-def scene_worn(scene: Scene, motion: Motion, state: WearState) -> tuple[Scene, WearState] | None:
+def scene_worn(
+    scene: Scene, motion: Motion, state: WearState | SolidWear
+) -> tuple[Scene, WearState | SolidWear] | None:
     """The scene at ``motion`` with all pending wear cut off; None where there is none to cut.
 
     Grains keep the motion of the whole: velocity ``v + w x d`` where the centre of mass is now.
-    Raises `ShapeError` as `polygon_worn` does.
+    Raises `ShapeError` as `polygon_worn` and `polyhedron_worn` do.
     """
+    if isinstance(state, SolidWear):
+        return solids_scene_worn(scene, motion, state)
     from rigid_lcp.scene import Scene
 
     grains, bodies = list(state.grains), scene_at(scene, motion).bodies
     pending = _parts(state)
+    mass, energy = state.mass, state.energy
     changed = False
     for k in np.flatnonzero([part.any() for part in pending]):
         grain = state.grains[k]
@@ -200,12 +234,17 @@ def scene_worn(scene: Scene, motion: Motion, state: WearState) -> tuple[Scene, W
         if grain is None or made is None:
             continue
         grains[k], pending[k] = made
-        bodies[k], changed = _body_worn(bodies[k], grain, made[0]), True
+        after, changed = _body_worn(bodies[k], grain, made[0]), True
+        mass += bodies[k].mass - after.mass
+        energy += energy_of(bodies[k], scene.gravity) - energy_of(after, scene.gravity)
+        bodies[k] = after
     if not changed:
         return None
     worn = Scene(scene.dim, scene.gravity)
     worn.bodies = bodies
-    return worn, _state_of(grains, pending, state)
+    result = _state_of(grains, pending, state)
+    result.mass, result.energy = mass, energy
+    return worn, result
 
 
 def _body_worn(body: Body, before: WornPolygon, after: WornPolygon) -> Body:

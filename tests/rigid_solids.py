@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from rigid_lcp.contacts import Contacts
 from rigid_lcp.detection_3d import detect_3d, shapes_3d
 from rigid_lcp.polyhedra import ballast_stone
-from rigid_lcp.rotations import Floats, unit_quaternion
+from rigid_lcp.rotations import Floats, rotation_matrix, unit_quaternion
 from rigid_lcp.shapes_2d import HalfSpace
-from rigid_lcp.shapes_3d import box
+from rigid_lcp.shapes_3d import Polyhedron, box
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)
@@ -26,6 +27,22 @@ def contacts(
     movable = np.array([not isinstance(shape, HalfSpace) for shape in shapes])
     turns = np.array([UPRIGHT] * len(shapes)) if quaternion is None else np.array(quaternion)
     return detect_3d(shapes_3d(shapes, movable), np.array(position, dtype=float), turns, margin)
+
+
+def coal_distance(shapes: Sequence[Polyhedron], position: Floats, turns: Floats) -> Any:
+    """What coal finds for two polyhedra: ``min_distance`` and the nearest points."""
+    import coal
+
+    hulls, places = [], []
+    for shape, x, turn in zip(shapes, position, rotation_matrix(turns), strict=True):
+        points = coal.StdVec_Vec3s()
+        for corner in shape.vertices:
+            points.append(corner)
+        hulls.append(coal.Convex.convexHull(points, False, "Qt"))
+        places.append(coal.Transform3s(turn, x))
+    result = coal.DistanceResult()
+    coal.distance(hulls[0], places[0], hulls[1], places[1], coal.DistanceRequest(), result)
+    return result
 
 
 def sorted_points(found: Contacts) -> Floats:

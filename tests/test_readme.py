@@ -67,8 +67,8 @@ def test_links_into_the_repository_exist() -> None:
 
 def test_make_targets_exist() -> None:
     """Each ``make`` command of README and CONTRIBUTING is a target of the Makefile."""
-    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    named = re.findall(r"(?:\$ |`)make ([a-z]+)", README + (ROOT / "CONTRIBUTING.md").read_text())
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    named = re.findall(r"(?:\$ |`)make ([a-z-]+)", README + (ROOT / "CONTRIBUTING.md").read_text())
     assert {"demo", "test", "lint", "bench", "validate"} <= targets
     assert named
     assert set(named) <= targets

@@ -1,12 +1,11 @@
 """What the record of the ballast study says: errors of every level, their cost, the two limits.
 
 Rigid grains with ever shorter steps and soft grains with ever stiffer contacts should meet: in hard
-grains.  Whether they do is measured (`Limits`), bed by bed.  The reference is the finest rigid
-level, for at the stiffnesses that can be paid for the soft ones still come nearer to it; so the
-errors of rigid levels are those of their own convergence.  An error is that of the ensemble: the
-mean over the beds of the difference to the reference, over the mean of the reference; its interval
-is Student's for paired differences.  No single bed is judged.  Levels are compared by the median,
-as a slip of one bed moves a mean by more than all levels differ.
+grains.  Whether they do is measured bed by bed (`Limits`).  The reference of a level is the mean of
+the finest level of each method, so that it favours neither; a finest level itself is judged by that
+of the other method.  An error is that of the ensemble: the mean over the beds of the difference to
+the reference, over the mean of the reference; its interval is Student's for paired differences.  No
+single bed is judged: they are chaotic.
 """
 
 from __future__ import annotations
@@ -22,24 +21,31 @@ from validation.rigid_ballast_measures import mean_with_interval
 
 Floats = NDArray[np.float64]
 Row = dict[str, Any]
+Settled = dict[int, float]
 FEWEST = 5
 """Beds that make an ensemble."""
+WITHIN = (0.5, 0.25)
+"""Errors of the mean settlement at which costs are compared [-]."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The finest level of each method, and the reference made of them."""
+    """The finest level of each method, and whether the two meet."""
 
     rigid: str
     soft: str
-    reference: dict[int, float]
-    """Settlement after the last cycle by the finest rigid level [m], by seed."""
+    ends: dict[str, Settled]
+    """Settlement after the last cycle [m] by method and seed."""
     difference: float
     """Mean of rigid less soft settlement [m] ..."""
     interval: float
     """... and the half width of its 95 % interval [m]."""
-    soft_limit: float
-    """Mean settlement to which three soft levels of equal ratio tend (Aitken) [m]; nan without."""
+
+    @property
+    def reference(self) -> Settled:
+        """Mean of both limits [m], by seed."""
+        both = self.ends["rigid"].keys() & self.ends["soft"].keys()
+        return {s: 0.5 * (self.ends["rigid"][s] + self.ends["soft"][s]) for s in sorted(both)}
 
     @property
     def mean(self) -> float:
@@ -50,6 +56,12 @@ class Limits:
     def agree(self) -> bool:
         """The two methods can not be told apart by these beds."""
         return abs(self.difference) <= self.interval
+
+    def reference_of(self, name: str) -> Settled:
+        """What a level is judged by: both limits; a limit itself by the other one."""
+        if name == self.rigid:
+            return self.ends["soft"]
+        return self.ends["rigid"] if name == self.soft else self.reference
 
 
 @dataclass(frozen=True)
@@ -63,17 +75,18 @@ class Summary:
     settlement: float
     """Mean settlement after the last cycle [m], and the half width of its interval."""
     interval: float
+    median: float
+    """Median of it [m]."""
     curve: Floats
     """Mean settlement after each cycle [m]."""
-    median: float
-    """Median settlement after the last cycle [m]: a single slip of one bed does not move it."""
-    median_bias: float
-    """Median less the reference's, over the latter [-]."""
-    bias: float
+    error: float
     """Mean difference to the reference over the reference's mean [-], and its half width."""
-    bias_interval: float
+    error_interval: float
     cost: float
-    """Mean processor time of a run [s]."""
+    """Mean processor time of a run [s], and the half width of its interval."""
+    cost_interval: float
+    costs: Settled
+    """Processor time [s] by seed."""
     step: float
     """Mean length of a step [s]."""
     deflection: float
@@ -85,11 +98,18 @@ class Summary:
     is_limit: bool
     """It is the finest of its method."""
 
+    def within(self, most: float) -> str:
+        """Is the error at most ``most`` [-]?  ``yes`` or ``no`` where the whole interval says so,
+        else ``open``."""
+        if abs(self.error) + self.error_interval <= most:
+            return "yes"
+        return "no" if abs(self.error) - self.error_interval > most else "open"
+
 
 def runs_of(rows: Sequence[Row], name: str) -> dict[int, Row]:
     """Runs of a level that went to their end, by seed."""
-    return {row["bed"]["seed"]: row for row in rows if row.get("name") == name and row.get("ok")
-            and row["kind"] != "state"}  # fmt: skip
+    return {row["bed"]["seed"]: row for row in rows
+            if row["kind"] in ("rigid", "soft") and row["name"] == name and row["ok"]}  # fmt: skip
 
 
 def level_names(rows: Sequence[Row], method: str) -> list[str]:
@@ -100,74 +120,43 @@ def level_names(rows: Sequence[Row], method: str) -> list[str]:
 
 
 def limits_of(rows: Sequence[Row]) -> Limits:
-    """The finest levels that have an ensemble of beds, else the most beds; the reference."""
+    """The finest levels that have an ensemble of beds, else those of the most beds."""
     finest = {}
     for method in ("rigid", "soft"):
-        usual = [row["level"]["extra"] for row in rows if row["kind"] == method]
-        main = max(set(usual), key=usual.count)  # the controls differ in it
-        names = [
-            name for name in level_names(rows, method)
-            if next(iter(runs_of(rows, name).values()), {"level": {"extra": None}})["level"][
-                "extra"
-            ] == main
-        ]  # fmt: skip
+        names = level_names(rows, method)
         whole = [name for name in names if len(runs_of(rows, name)) >= FEWEST]
         best = whole or sorted(names, key=lambda name: len(runs_of(rows, name)))
         finest[method] = best[-1]
-    rigid, soft = (last_settlement(runs_of(rows, finest[m])) for m in ("rigid", "soft"))
-    both = sorted(rigid.keys() & soft.keys())
-    difference, interval = mean_with_interval([rigid[s] - soft[s] for s in both])
-    reference = {s: rigid[s] for s in both}
-    limit = soft_limit(rows, both)
-    return Limits(finest["rigid"], finest["soft"], reference, difference, interval, limit)
+    ends = {m: last_settlement(runs_of(rows, finest[m])) for m in ("rigid", "soft")}
+    both = sorted(ends["rigid"].keys() & ends["soft"].keys())
+    apart = mean_with_interval([ends["rigid"][s] - ends["soft"][s] for s in both])
+    return Limits(finest["rigid"], finest["soft"], ends, *apart)
 
 
-def soft_limit(rows: Sequence[Row], seeds: Sequence[int]) -> float:
-    """Aitken's extrapolation of mean settlements of the three stiffest levels [m].
-
-    They must be a constant factor of stiffness apart, have all these seeds and go down ever less;
-    nan otherwise.
-    """
-    found = []
-    for name in level_names(rows, "soft"):
-        runs = runs_of(rows, name)
-        if runs.keys() >= set(seeds):
-            settled = last_settlement(runs)
-            found.append((runs[seeds[0]]["level"]["value"], np.mean([settled[s] for s in seeds])))
-    if len(found) < 3:
-        return float("nan")
-    (k1, s1), (k2, s2), (k3, s3) = found[-3:]
-    if not (np.isclose(k2 / k1, k3 / k2) and s1 > s2 > s3 and s1 - s2 > s2 - s3):
-        return float("nan")
-    return float(s3 - (s3 - s2) ** 2 / ((s3 - s2) - (s2 - s1)))
-
-
-def last_settlement(runs: dict[int, Row]) -> dict[int, float]:
+def last_settlement(runs: dict[int, Row]) -> Settled:
     """Settlement after the last cycle [m] by seed."""
     return {seed: row["settlement"][-1] for seed, row in runs.items()}
 
 
 def summaries(rows: Sequence[Row], limits: Limits) -> list[Summary]:
-    """Every level that has at least two beds in common with the reference."""
+    """Every level that has at least two beds in common with its reference."""
     found = []
     for method in ("rigid", "soft"):
         for name in level_names(rows, method):
-            runs = runs_of(rows, name)
-            seeds = sorted(runs.keys() & limits.reference.keys())
+            runs, reference = runs_of(rows, name), limits.reference_of(name)
+            seeds = sorted(runs.keys() & reference.keys())
             if len(seeds) < 2:
                 continue
             mine = [runs[seed] for seed in seeds]
-            settled = last_settlement(runs)
-            mean, interval = mean_with_interval([settled[s] for s in seeds])
-            scale = abs(float(np.mean([limits.reference[s] for s in seeds])))
-            middle = float(np.median([settled[s] for s in seeds]))
-            own = float(np.median([limits.reference[s] for s in seeds]))
-            bias, wide = mean_with_interval([settled[s] - limits.reference[s] for s in seeds])
+            settled = [row["settlement"][-1] for row in mine]
+            scale = abs(float(np.mean([reference[s] for s in seeds])))
+            off, wide = mean_with_interval([runs[s]["settlement"][-1] - reference[s]
+                                            for s in seeds])  # fmt: skip
+            costs = {seed: row["cpu_s"] for seed, row in zip(seeds, mine, strict=True)}
             found.append(Summary(
-                name, method, mine[0]["level"], len(seeds), mean, interval,
-                np.mean([row["settlement"] for row in mine], axis=0), middle,
-                (middle - own) / abs(own), bias / scale, wide / scale,
-                float(np.mean([row["cpu_s"] for row in mine])),
+                name, method, mine[0]["level"], len(seeds), *mean_with_interval(settled),
+                float(np.median(settled)), np.mean([row["settlement"] for row in mine], axis=0),
+                off / scale, wide / scale, *mean_with_interval(list(costs.values())), costs,
                 float(np.mean([row["step_s"] for row in mine])),
                 float(np.median([row["deflection"] for row in mine])),
                 np.mean([row["dissipated"] for row in mine], axis=0),
@@ -178,33 +167,19 @@ def summaries(rows: Sequence[Row], limits: Limits) -> list[Summary]:
     return found
 
 
-@dataclass(frozen=True)
-class Duel:
-    """A rigid level against the soft one that errs no more than it, at the least cost."""
-
-    rigid: Summary
-    soft: Summary | None
-    """None where no soft level errs as little."""
-
-    @property
-    def cost_ratio(self) -> float:
-        """Cost of soft over rigid grains at equal error [-]; inf where none errs as little."""
-        return float("inf") if self.soft is None else self.soft.cost / self.rigid.cost
+def cheapest(found: Sequence[Summary], method: str, most: float, shown: bool) -> Summary | None:
+    """The cheapest level of a method whose error is ``shown`` to be at most ``most`` [-], or, if
+    not ``shown``, is not shown to be larger; None if there is none."""
+    good = ("yes",) if shown else ("yes", "open")
+    mine = [s for s in found if s.method == method and s.within(most) in good]
+    return min(mine, key=lambda s: s.cost, default=None)
 
 
-def near(summary: Summary) -> float:
-    """Error of the median without its sign [-]: what levels are compared by."""
-    return abs(summary.median_bias)
-
-
-def duels(found: Sequence[Summary]) -> list[Duel]:
-    """Every rigid level but the reference against the cheapest soft one of no larger error."""
-    result = []
-    for mine in found:
-        if mine.method == "rigid" and not mine.is_limit:
-            good = [s for s in found if s.method == "soft" and near(s) <= near(mine)]
-            result.append(Duel(mine, min(good, key=lambda s: s.cost, default=None)))
-    return result
+def cost_ratio(soft: Summary, rigid: Summary) -> tuple[float, float, float]:
+    """Cost of soft over that of rigid grains on the same beds: geometric mean and 95 % interval."""
+    both = sorted(soft.costs.keys() & rigid.costs.keys())
+    mean, half = mean_with_interval([np.log(soft.costs[s] / rigid.costs[s]) for s in both])
+    return float(np.exp(mean)), float(np.exp(mean - half)), float(np.exp(mean + half))
 
 
 def gain_most(rows: Sequence[Row]) -> float:

@@ -68,6 +68,8 @@ class SoftGrains:
     """[s]"""
     contacts: tuple[Ints, Floats, Floats]
     """Bodies (nc, 2), numbers (nc, 7) as in `pair_contacts`, forces (nc, 2) (n, t) [N], last."""
+    damping: float = DAMPING
+    """Share of critical damping of a contact [-]."""
     work: float = 0.0
     """Work of the loads so far [J]."""
     steps: int = 0
@@ -97,7 +99,7 @@ def soft_advance(run: SoftGrains, body: int, forces: Floats, seconds: float) -> 
     moving = world.movable
     inverse[moving, 0] = inverse[moving, 1] = 1.0 / world.mass[moving]
     inverse[moving, 2] = 1.0 / world.inertia[moving]
-    law = np.array([run.stiffness, TANGENTIAL * run.stiffness, DAMPING, run.friction])
+    law = np.array([run.stiffness, TANGENTIAL * run.stiffness, run.damping, run.friction])
     springs = run.springs
     done = soft_run(
         shapes.kind, shapes.first, shapes.vertices, shapes.normals, shapes.radius, shapes.movable,

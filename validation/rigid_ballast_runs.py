@@ -1,9 +1,11 @@
 """The runs of the ballast study, one line each in validation/results/rigid-ballast.jsonl.
 
-    python -m validation.rigid_ballast_runs [--beds 12] [--out FILE]    go on where the record ends
+    python -m validation.rigid_ballast_runs [--beds 30] [--out FILE]    go on where the record ends
 
 Lines: ``bed`` (the tamped state that a seed's runs start from), ``rigid`` and ``soft`` (a run),
-``state`` (the contacts of the first seed under the last peak load, for the picture).
+``state`` (the contacts of the first seed under the last peak load, for the picture), ``push`` (the
+first push alone, by steps and stiffnesses finer than a whole run can be given), ``damped``
+(the same with dashpots that let nothing ring), ``long`` (many cycles on a few beds).
 """
 
 from __future__ import annotations
@@ -38,7 +40,12 @@ from validation.rigid_ballast_measures import dissipated, fabric_of
 
 RECORD = Path(__file__).parent / "results" / "rigid-ballast.jsonl"
 Row = dict[str, Any]
-CYCLES, BEDS, SEEDS = 10, 12, 60
+CYCLES, BEDS = 5, 30
+PUSHED, PUSH_PARTS = 8, 20
+"""Beds whose first push is followed, and moments in a cycle there."""
+CONTROLLED = 15
+LONG, LONG_CYCLES = 4, 40
+"""Beds of the long runs, and their cycles."""
 
 
 @dataclass(frozen=True)
@@ -51,32 +58,52 @@ class Level:
     """Step [s] of rigid grains, normal stiffness [N/m] of soft ones."""
     extra: float
     """Residual asked for [-] (rigid); step as a share of ``2 sqrt(m / k)`` (soft)."""
+    damping: float = DAMPING
+    """Share of critical damping of a soft contact [-]."""
 
     @property
     def name(self) -> str:
         """How the record and the page call it."""
         if self.method == "rigid":
             return f"h = {self.value:.3g} s, residual {self.extra:.0e}"
-        return f"k = {self.value:.0e} N/m, step share {self.extra:g}"
+        own = "" if self.damping == DAMPING else f", damping {self.damping:g}"
+        return f"k = {self.value:.0e} N/m, step share {self.extra:g}{own}"
 
 
-TOLERANCE, ROUGH = 1e-9, 1e-6
+TOLERANCE, FINE = 1e-6, 1e-9
+"""Residual of the rigid levels; of the control and of the finest first push [-]."""
 LEVELS = (
-    *(Level("rigid", step, TOLERANCE) for step in (4e-3, 2e-3, 1e-3)),
-    *(Level("soft", stiffness, STEP_SHARE) for stiffness in (1e7, 1e8, 1e9)),
-    Level("rigid", 1e-3, ROUGH), Level("rigid", 5e-4, TOLERANCE), Level("soft", 1e10, STEP_SHARE),
+    *(Level("rigid", step, TOLERANCE) for step in (1e-3, 2e-3, 4e-3)),
+    *(Level("soft", stiffness, STEP_SHARE) for stiffness in (1e7, 1e8, 1e9, 1e10)),
+    Level("rigid", 5e-4, TOLERANCE),
 )  # fmt: skip
-"""In the order of their runs."""
+"""Run on one bed after the other, so that the record is always of whole beds."""
+CONTROLS = (
+    *(Level("soft", stiffness, 2 * STEP_SHARE) for stiffness in (1e8, 1e9)),
+    Level("rigid", 1e-3, FINE),
+)  # fmt: skip
+"""Run on the first `CONTROLLED` beds when every bed has its levels."""
+PUSHES = (
+    *(Level("rigid", step, TOLERANCE) for step in (2e-3, 1e-3, 5e-4, 2.5e-4)),
+    Level("rigid", 1e-4, FINE),
+    *(Level("soft", stiffness, STEP_SHARE) for stiffness in (1e8, 1e9, 1e10, 1e11)),
+)  # fmt: skip
+DAMPED = (Level("soft", 1e10, 0.25 * STEP_SHARE, 4.0),)
+"""First pushes that do not ring; kind ``damped``."""
 QUICK_LEVELS = (
     *(Level("rigid", step, TOLERANCE) for step in (4e-3, 2e-3)),
     *(Level("soft", stiffness, STEP_SHARE) for stiffness in (1e8, 1e9)),
 )  # fmt: skip
 PICTURED = (Level("rigid", 1e-3, TOLERANCE), Level("soft", 1e9, STEP_SHARE))
+"""Levels whose state is drawn; those of the long runs too."""
 
 
 def bed_row(bed: Bed) -> Row:
     """Pour and tamp; the line to record."""
-    _, motion, cpu = bed_prepared(bed)
+    try:
+        _, motion, cpu = bed_prepared(bed)
+    except RigidError as error:
+        return {"kind": "no bed", "bed": asdict(bed), "why": str(error)}
     return {
         "kind": "bed", "bed": asdict(bed), "cpu_s": cpu, "position": motion.position.tolist(),
         "angle": motion.angle.tolist(),
@@ -93,12 +120,12 @@ def bed_again(row: Row) -> tuple[Bed, Scene, Motion]:
 
 
 def level_moments(
-    level: Level, bed: Bed, scene: Scene, start: Motion, cycles: int
+    level: Level, bed: Bed, scene: Scene, start: Motion, count: int, parts: int = 2
 ) -> Iterator[Moment]:
-    """The run of a level, twice a cycle a moment."""
+    """The run of a level: ``count`` moments, ``parts`` in a cycle."""
     if level.method == "rigid":
-        return rigid_moments(bed, scene, start, cycles, level.value, level.extra)
-    return soft_moments(bed, scene, start, cycles, level.value, level.extra)
+        return rigid_moments(bed, scene, start, count, level.value, level.extra, parts)
+    return soft_moments(bed, scene, start, count, level.value, level.extra, parts, level.damping)
 
 
 def run_row(
@@ -113,7 +140,7 @@ def run_row(
     }
     moments, why = [], ""
     try:
-        for moment in level_moments(level, bed, scene, start, cycles):
+        for moment in level_moments(level, bed, scene, start, 2 * cycles):
             moments.append(moment)
     except RigidError as error:
         why = str(error)
@@ -128,6 +155,7 @@ def run_row(
     last = moments[-1]
     row |= {
         "settlement": (height[0] - height[1:]).tolist(),
+        "at_peaks": [float(height[0] - m.place[1]) for m in peaks],
         "rest_drift": float(start.position[sleeper_of(scene), 1] - height[0]),
         "deflection": float(whole[-1].place[1] - peaks[-1].place[1]),
         "tilt": float(last.place[2] - whole[0].place[2]),
@@ -142,6 +170,24 @@ def run_row(
     if drawn:
         rows.append(state_row(level, bed, peaks[-1]))
     return rows
+
+
+def push_row(level: Level, bed: Bed, scene: Scene, start: Motion) -> Row:
+    """The line of the first push: sleeper and energies from the rest to the first peak."""
+    row: Row = {"kind": "push", "level": asdict(level), "name": level.name, "bed": asdict(bed)}
+    count = PUSH_PARTS // 2
+    try:
+        moments = list(level_moments(level, bed, scene, start, count, PUSH_PARTS))
+    except RigidError as error:
+        return row | {"ok": False, "why": str(error)}
+    height = [m.place[1] for m in moments]
+    last = moments[-1]
+    return row | {
+        "ok": True, "sunk": [height[0] - y for y in height], "cpu_s": last.cpu,
+        "steps": last.steps, "residual": last.residual,
+        "pushed": [float(m.place[0] - moments[0].place[0]) for m in moments],
+        "work": [m.work for m in moments], "energy": [m.energy for m in moments],
+    }  # fmt: skip
 
 
 def overlap_of(scene: Scene, motion: Motion) -> float:
@@ -168,46 +214,46 @@ def _seven(text: str) -> float:
 
 
 def study(
-    beds: Sequence[Bed], wanted: int, levels: Sequence[Level], cycles: int,
-    known: Sequence[Row], write: Callable[[Row], None],
+    beds: Sequence[Bed], levels: Sequence[Level], cycles: int, known: Sequence[Row],
+    write: Callable[[Row], None], controls: Sequence[Level] = (), pushed: int = 0, long: int = 0,
 ) -> None:  # fmt: skip
-    """All runs that ``known`` lacks: the first ``wanted`` of the beds that can be used, then level
-    after level; each line is written when it is there."""
+    """All runs that ``known`` lacks; each line is written when it is there.
+
+    The first push of the first ``pushed`` beds; one bed after the other, on each the ``levels``;
+    the ``controls`` of some, and the ``long`` runs of so many beds.
+    """
     _compile()
-    poured = {row["bed"]["seed"]: row for row in known if row["kind"] == "bed"}
-    failed = {row["bed"]["seed"] for row in known if row["kind"] == "no bed"}
-    for bed in beds:
-        if bed.seed in poured or bed.seed in failed or len(poured) >= wanted:
-            continue
-        try:
+    poured = {row["bed"]["seed"]: row for row in known if row["kind"] in ("bed", "no bed")}
+    done = {(row["kind"], row["bed"]["seed"], row["name"]) for row in known if "name" in row}
+    plan = [("push", bed, level) for bed in beds[:pushed] for level in PUSHES]
+    plan += [("damped", bed, level) for bed in beds[:pushed] for level in DAMPED]
+    plan += [(level.method, bed, level) for bed in beds for level in levels]
+    plan += [(level.method, bed, level) for bed in beds[:CONTROLLED] for level in controls]
+    plan += [("long", bed, level) for bed in beds[:long] for level in PICTURED]
+    for kind, bed, level in plan:
+        if bed.seed not in poured:
             poured[bed.seed] = bed_row(bed)
             write(poured[bed.seed])
-        except RigidError as error:
-            write(
-                {
-                    "kind": "no bed",
-                    "bed": asdict(bed),
-                    "why": str(error),
-                    "error": type(error).__name__,
-                }
-            )
-    done = {(row["bed"]["seed"], row["name"]) for row in known if row["kind"] in ("rigid", "soft")}
-    usable = [bed for bed in beds if bed.seed in poured][:wanted]
-    for level in levels:
-        for bed in usable:
-            if (bed.seed, level.name) not in done:
-                drawn = level in PICTURED and bed is usable[0]
-                for row in run_row(level, *bed_again(poured[bed.seed]), cycles, drawn):
-                    write(row)
+        state = poured[bed.seed]
+        if state["kind"] == "no bed" or (kind, bed.seed, level.name) in done:
+            continue
+        again = bed_again(state)
+        if kind in ("push", "damped"):
+            write(push_row(level, *again) | {"kind": kind})
+        elif kind == "long":
+            write(run_row(level, *again, LONG_CYCLES)[0] | {"kind": "long"})
+        else:
+            for row in run_row(level, *again, cycles, level in PICTURED and bed is beds[0]):
+                write(row)
 
 
 def _compile() -> None:
     """Few stones that fall, by both methods, so that no cost holds the time of a compiler."""
-    bed = Bed(1, stones=4, width=0.15, sleeper=0.08, peak=2e3)
+    bed = Bed(1, stones=4, crib=1, width=0.22, sleeper=0.08, peak=2e3)
     scene = bed_scene(bed)
     start = world_of(scene)[1]
     for level in QUICK_LEVELS[::2]:
-        list(level_moments(level, bed, scene, start, 1))
+        list(level_moments(level, bed, scene, start, 2))
 
 
 def rows_read(path: Path = RECORD) -> list[Row]:
@@ -232,8 +278,8 @@ def main(words: Sequence[str] | None = None) -> None:
         with arguments.out.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row | kept) + "\n")
 
-    beds = [Bed(seed) for seed in range(1, SEEDS + 1)]
-    study(beds, arguments.beds, LEVELS, CYCLES, rows_read(arguments.out), write)
+    beds = [Bed(seed) for seed in range(1, arguments.beds + 1)]
+    study(beds, LEVELS, CYCLES, rows_read(arguments.out), write, CONTROLS, PUSHED, LONG)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from math import nan, radians
+from math import nan, radians, tan
 
 import numpy as np
 
@@ -21,6 +21,35 @@ from validation.rigid_hard_equilibrium import rest_residual
 from validation.rigid_hard_trials import OURS, Floats, Row, Trial, greatest, trial_rows
 
 RESTS = "rests: nothing moves"
+
+
+def space_incline_rows(quick: bool) -> list[Row]:
+    """A block in space at Coulomb's threshold, pulled down the slope across both its tangents.
+
+    ``g (sin - mu cos) t^2 / 2`` is what it slides; its four contacts must agree on the direction.
+    """
+    slope, across, seconds, rows = radians(20), 0.9273, 0.05 if quick else 0.2, list[Row]()
+    for off in (-1e-9, 0.0, 1e-9):
+        mu = (1 + off) * tan(slope)
+        run = further.block_in_space(slope, across, mu)
+        place = run.positions[0].copy()
+        way = scenes.block_on_incline_way(slope, mu, seconds) if off else 0.0
+        start, error, why = time.process_time(), nan, ""
+        try:
+            run.advance(seconds)
+            down = np.array([np.cos(across), np.sin(across), 0.0])
+            error = float(np.linalg.norm(run.positions[0] - place - way * down))
+        except RigidError as failure:
+            why = f"{type(failure).__name__}: {failure}"
+        bar = 0.01 * way if way else 1e-12
+        words = f"1 {'-' if off < 0 else '+'} 1e-9 times tan 20°" if off else "tan 20°"
+        rows.append(Row(
+            f"block in space at mu = {words}, pulled across its tangents",
+            f"slides {way:.3g} m in {seconds:g} s" if way else "rests", run.method,
+            "off its place", error, f"<= {bar:.3g}", error <= bar, "m",
+            time.process_time() - start, run.steps, why,
+        ))  # fmt: skip
+    return rows
 
 
 def storey_rows(peers: Sequence[str]) -> list[Row]:

@@ -9,7 +9,13 @@ from typing import Any
 LEAST = 1e-17
 """Errors below it are drawn on it [m]."""
 OURS = ("time-stepping", "acceleration")
-MARKS = {"time-stepping": "o", "acceleration": "s", "MuJoCo": "^", "ODE": "v", "LMGC90": "D"}
+LOOKS = {
+    "time-stepping": ("o", "#0072B2"), "acceleration": ("s", "#56B4E9"),
+    "MuJoCo": ("^", "#D55E00"), "ODE": ("v", "#009E73"), "LMGC90": ("D", "#CC79A7"),
+}  # fmt: skip
+"""Mark and colour of each engine; colours of Okabe and Ito, which the colour-blind tell apart."""
+BAR = 1e-9
+"""The bar of most scenes [m]."""
 
 
 def picture_points(lines: Sequence[dict[str, Any]]) -> dict[str, list[tuple[float, float]]]:
@@ -32,16 +38,16 @@ def picture_draw(lines: Sequence[dict[str, Any]], path: Path) -> None:
         xscale="log", yscale="log", xlabel="CPU time a step [ms], one thread",
         ylabel="distance from the exact answer [m]",
     )  # fmt: skip
-    for number, (method, points) in enumerate(picture_points(lines).items()):
+    for method, points in picture_points(lines).items():
         cost, error = zip(*points, strict=True)
         ours = method in OURS
-        colour = f"C{number}"
+        mark, colour = LOOKS[method.partition(" ")[0]]
         axes.scatter(
-            cost, error, s=26, marker=MARKS.get(method.partition(" ")[0], "x"),
-            facecolors=colour if ours else "none", edgecolors=colour,
-            label=f"rigid_lcp, {method}" if ours else method,
+            cost, error, s=26, marker=mark, facecolors=colour if ours else "none",
+            edgecolors=colour, label=f"rigid_lcp, {method}" if ours else method,
         )  # fmt: skip
-    axes.axhline(1e-9, color="0.6", linewidth=0.8)
+    axes.axhline(BAR, color="0.4", linewidth=0.8, label=f"bar of most scenes, {BAR:g} m")
+    axes.axhline(LEAST, color="0.8", linewidth=0.8, linestyle=":", label=f"{LEAST:g} m or less")
     axes.grid(alpha=0.3)
     axes.legend(fontsize="small")
     figure.savefig(path, dpi=150)

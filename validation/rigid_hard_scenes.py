@@ -14,10 +14,23 @@ from numpy.typing import NDArray
 
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
+from rigid_lcp.shapes_3d import box
 from rigid_lcp.simulation import Simulation
-from validation.rigid_scenes import DENSITY, FLOOR, card_house_friction, stack
+from validation.rigid_scenes import DENSITY, FLOOR, G, card_house_friction, stack
 
 Floats = NDArray[np.float64]
+
+
+def block_in_space(slope: float, across: float, mu: float) -> Simulation:
+    """A flat block (body 0) at rest on a plane inclined by ``slope`` [rad], in its frame.
+
+    Downhill is turned from x by ``across`` [rad] about the normal of the plane, z.
+    """
+    down = np.array([sin(slope) * cos(across), sin(slope) * sin(across), -cos(slope)])
+    scene = Scene(3, G * down)
+    scene.add(box(0.3, 0.2, 0.1), density=DENSITY, position=(0, 0, 0.05), friction=mu)
+    scene.add(HalfSpace((0, 0, 1)), friction=mu)
+    return Simulation(scene)
 
 
 def turned(run: Simulation, angle: float) -> Simulation:

@@ -11,6 +11,9 @@ from validation.rigid_indeterminacy import LIGGGHTS, LIMIT, RELAXATION, SPRINGS
 LEAST = 1e-16
 """Smaller errors are drawn there."""
 MARKS = {SPRINGS: "o", LIGGGHTS: "^", RELAXATION: "s", LIMIT: "*"}
+COLOURS = ("#0072B2", "#D55E00", "#009E73")
+LINES = ("-", "--", ":")
+"""Colours of Okabe and Ito, which the colour-blind tell apart, and a line each."""
 SHOWN = ("beam on three supports", "pyramid of 15", "pyramid of 55")
 SLIDING = ("pyramid of 15, friction 0.3", "pyramid of 55, friction 0.3")
 Lines = Sequence[dict[str, Any]]
@@ -38,21 +41,22 @@ def picture_draw(lines: Lines, path: Path) -> None:
         for method in (SPRINGS, LIGGGHTS):
             x, y = curve(lines, scene, method, "stiffness")
             if x:
-                stiff.plot(x, y, MARKS[method] + "-", color=f"C{number}", markersize=4,
+                stiff.plot(x, y, MARKS[method] + LINES[number], color=COLOURS[number], markersize=4,
                            label=f"{method}, {scene}")  # fmt: skip
         for method in (SPRINGS, LIGGGHTS, RELAXATION, LIMIT):
             x, y = curve(lines, scene, method, "cpu_s")
-            style = "" if method == LIMIT else "-"
+            style = "" if method == LIMIT else LINES[number]
             if x:
-                cost.plot(x, y, MARKS[method] + style, color=f"C{number}", linewidth=0.8,
+                cost.plot(x, y, MARKS[method] + style, color=COLOURS[number], linewidth=0.8,
                           markersize=11 if method == LIMIT else 4,
                           label=method if number == 2 else None)  # fmt: skip
     for number, scene in enumerate(SLIDING):
         for method in (SPRINGS, LIGGGHTS):
             x, y = curve(lines, scene, method, "ramp")
             if x:
-                slow.plot([max(v, 100) for v in x], y, MARKS[method] + "-", color=f"C{number + 3}",
-                          markersize=4, label=f"{method}, {scene}")  # fmt: skip
+                slow.plot([max(v, 100) for v in x], y, MARKS[method] + LINES[number],
+                          color=COLOURS[number], markersize=4,
+                          label=f"{method}, {scene}")  # fmt: skip
     stiff.set(xscale="log", yscale="log", xlabel="stiffness, weights a metre",
               ylabel="greatest error of a contact force / weight", title="stiff limit")  # fmt: skip
     cost.set(xscale="log", yscale="log", xlabel="CPU time [s], one thread", title="cost")

@@ -126,6 +126,22 @@ def bed(
     return made
 
 
+def crystal(layers: int, *, friction: float = 0.35, step: float = 1e-3) -> FrictionProblem:
+    """Equal spheres in layers of squares, each in the hollows of the one below, in a box that
+    touches all its sides (face-centred cubic): regular, where packings are not."""
+    radius, centre = float(np.mean(RADII)), []
+    for k in range(layers):
+        along = radius * (1 + k % 2) + 2.0 * radius * np.arange(layers - k % 2)
+        x, y = (each.ravel() for each in np.meshgrid(along, along))
+        centre.append(np.column_stack([x, y, np.full(len(x), radius * (1.0 + np.sqrt(2.0) * k))]))
+    place = np.concatenate(centre)
+    made = Bed(
+        place, np.full(len(place), radius), 2.0 * radius * layers, 3, friction,
+        np.zeros((0, 2), int), np.zeros((0, 3)), 1.0,
+    )  # fmt: skip
+    return bed_problem(bed_pairs(made, TOUCH * radius), step)
+
+
 def bed_read(path: Path) -> Bed:
     """A bed from its file."""
     with np.load(path) as data:

@@ -35,7 +35,7 @@ UNSEEN = (
     ),
     (
         "Unseen: packings of other seeds",
-        "Discs and spheres, friction from 0.1 to 1.2; no setting was chosen by them.",
+        "Discs and spheres, friction from 0.1 to 1.5; no setting was chosen by them.",
         "other packings",
     ),
 )

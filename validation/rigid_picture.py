@@ -63,7 +63,8 @@ def picture(rows: Sequence[Row], path: Path) -> None:
         panel.set_axis_off()
     drawn: dict[str, Any] = {}
     for panel in axes[: len(names) + 1]:
-        drawn |= dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
+        handles, names_of = panel.get_legend_handles_labels()
+        drawn = dict(zip(names_of, handles, strict=True)) | drawn  # the first have markers
     figure.legend(
         list(drawn.values()), list(drawn), loc="outside lower center", ncols=6, fontsize=8
     )
@@ -96,7 +97,7 @@ def _work_precision(axes: Any, rows: Sequence[Row], family: str) -> None:
     contacts = [each[0]["contacts"] for each in found.values()]
     axes.set(
         xscale="log", yscale="log", ylim=(ROUND_OFF, 10),
-        title=f"{family}: {len(found)} problems, {min(contacts):,} to {max(contacts):,} contacts",
+        title=f"{family}:\n{len(found)} problems, {min(contacts):,} to {max(contacts):,} contacts",
         xlabel="processor time of one thread [s]", ylabel="scale-free natural residual",
     )  # fmt: skip
     axes.grid(True, alpha=0.25)

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.problem_files import read_problem
-from validation.rigid_packings import packing, tower
+from validation.rigid_packings import crystal, packing, tower
 
 NONUNIQUE = "nonunique_discs_125"
 """The stored problem that comes with several solutions; not raced."""
@@ -144,15 +144,24 @@ def generated_problems(quick: bool) -> list[NamedProblem]:
         for count, dim in grains
         for mu in ((0.5,) if count > 1000 or quick else (0.3, 0.8))
     ]  # fmt: skip
+    if not quick:
+        problems += [
+            NamedProblem(f"spheres_crystal{layers}", "packings 3D", partial(crystal, layers))
+            for layers in (5, 9)
+        ]
     return problems
 
 
 OTHERS = (
     (100, 2, 0.1), (200, 2, 1.2), (300, 2, 0.6), (600, 2, 0.2), (600, 2, 1.0),
     (60, 3, 0.1), (80, 3, 1.2), (150, 3, 0.2), (300, 3, 0.6), (300, 3, 1.0),
+    (30, 2, 1.5), (30, 3, 0.6), (1500, 2, 0.3), (600, 3, 0.2), (1000, 3, 0.5), (1500, 3, 0.8),
 )  # fmt: skip
 """Grains, dimension and friction of packings that are raced only against the nearest rival."""
 OTHER_SEEDS = (11, 12)
+HARD = ((100, 3, 0.1, 101),)
+"""The same with its seed: one of 80 such packings (30 to 250 grains, friction 0.1 to 1.5), and the
+only one, that the default was found not to solve."""
 FRICTIONLESS = (
     (60, 2, 1), (125, 2, 1), (250, 2, 1), (700, 2, 1), (1500, 2, 1), (2500, 2, 1), (90, 2, 11),
     (400, 2, 12), (40, 3, 1), (120, 3, 1), (200, 3, 1), (400, 3, 1), (1500, 3, 1), (80, 3, 11),
@@ -162,14 +171,14 @@ FRICTIONLESS = (
 
 
 def other_packings() -> list[NamedProblem]:
-    """Packings of other seeds and frictions from 0.1 to 1.2."""
+    """Packings of other seeds and frictions from 0.1 to 1.5."""
+    beds = [(*other, seed) for other in OTHERS for seed in OTHER_SEEDS]
     return [
         NamedProblem(
             f"{GRAINS[dim]}{count}_mu{mu:g}_seed{seed}", f"other packings {dim}D",
             partial(_packing, count, dim, mu, seed), seed,
         )
-        for count, dim, mu in OTHERS
-        for seed in OTHER_SEEDS
+        for count, dim, mu, seed in (*beds, *HARD)
     ]  # fmt: skip
 
 

@@ -10,7 +10,15 @@ import pytest
 
 from adapters.run_folder import write_atomically
 from validation import rigid_hard_page
-from validation.rigid_hard_page import PAGE, RECORD, page, record_lines, record_read
+from validation.rigid_hard_page import (
+    NAMED,
+    PAGE,
+    RECORD,
+    page,
+    record_lines,
+    record_read,
+    with_known_peers,
+)
 from validation.rigid_hard_trials import Row
 
 ORIGIN = {"commit": "c", "command": "x", "machine": "m", "started": "now"}
@@ -45,11 +53,31 @@ def test_every_case_has_a_row_of_ours_and_misses_are_told() -> None:
         "wedge", "arch of", "Painleve rod", "bouncing", "needles", "coincident edges",
         "tower of 200", "jammed hopper", "light on heavy", "storeys", "tan a exactly",
         "lowest kicked", "needles of 1000", "by up to 1e-12", "in mm and g", "turned by 45",
-        "1e+08 times heavier", "rocking block", "disc rolling",
+        "1e+08 times heavier", "rocking block", "disc rolling", "block in space",
     ],
 )  # fmt: skip
 def test_no_hard_case_is_missing(family: str) -> None:
     assert any(family in line["case"] for line in record_read())
+
+
+@pytest.mark.parametrize("named", NAMED, ids=lambda named: str(named[0]))
+def test_every_named_case_is_met(named: tuple[str, ...]) -> None:
+    """Each has a row of ours, and all its rows meet their bars."""
+    rows = [line for line in record_read() if not line["peer"]]
+    rows = [line for line in rows if line["case"].startswith(named[1:])]
+    assert rows
+    assert all(line["ok"] for line in rows)
+    assert f"| {named[0]} | {len(rows)} of {len(rows)} |" in PAGE.read_text(encoding="utf-8")
+
+
+def test_rows_of_peers_are_kept() -> None:
+    """A run of ours alone: new lines of ours, old ones of peers after those of the same case."""
+    known = record_lines([row(), row(method="ODE", peer=True), row(case="gone", peer=True)], ORIGIN)
+    made = record_lines([row(value=2e-12), row(case="new")], ORIGIN)
+    lines = with_known_peers(made, known)
+    assert [(line["case"], line["method"], line["value"]) for line in lines] == [
+        ("box", "time-stepping", 2e-12), ("box", "ODE", 1e-12), ("new", "time-stepping", 1e-12),
+    ]  # fmt: skip
 
 
 def test_a_miss_is_bold_and_told() -> None:

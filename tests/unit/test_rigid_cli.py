@@ -10,35 +10,13 @@ import pytest
 
 import trackbed
 from rigid_lcp.run_folder import RunFolder, frame_read
-
-SCENE = """\
-title = "A block slides and stops"
-dimensions = 2
-
-[run]
-duration = 0.06
-step = 2e-3
-frames = 3
-
-[surface]
-friction = 0.5
-
-[[ground]]
-normal = [0, 1]
-
-[[body]]
-name = "block"
-box = [0.2, 0.1]
-density = 2000.0
-position = [0.0, 0.05]
-velocity = [0.1, 0.0]
-"""
+from tests.rigid_runs import SLIDING_BLOCK
 
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
     path = tmp_path / "slide.toml"
-    path.write_text(SCENE, encoding="utf-8")
+    path.write_text(SLIDING_BLOCK, encoding="utf-8")
     return path
 
 
@@ -107,7 +85,7 @@ def test_a_dry_run_writes_nothing(scene: Path, capsys: pytest.CaptureFixture[str
 )
 def test_bad_scenes_have_their_exit_codes(scene: Path, change: str, code: int) -> None:
     key = change.partition(" ")[0]
-    kept = [line for line in SCENE.splitlines() if not line.startswith(f"{key} =")]
+    kept = [line for line in SLIDING_BLOCK.splitlines() if not line.startswith(f"{key} =")]
     if key != "density":
         table = "[run]" if key == "step" else "[[body]]"
         kept.insert(kept.index(table) + 1, change)
@@ -118,3 +96,65 @@ def test_bad_scenes_have_their_exit_codes(scene: Path, change: str, code: int) -
 
 def test_resume_and_force_exclude_each_other(scene: Path) -> None:
     assert trackbed.main(["rigid", str(scene), "--resume", "--force"]) == 2
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [], ["slide.toml", "--frames", "3"], ["slide.toml", "slide.toml"], ["slide.toml", "--set"],
+        ["slide.toml", "--run-folder"], ["slide.toml", "--res"],
+    ],
+)  # fmt: skip
+def test_flags_that_are_none_are_named(
+    words: list[str], scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        trackbed.main(["rigid", *(str(scene) if word == scene.name else word for word in words)])
+    assert ended.value.code == 2
+    assert "error: " in capsys.readouterr().err
+    assert not scene.with_name("slide-run").exists()
+
+
+@pytest.mark.parametrize(
+    ("override", "code", "said"),
+    [
+        ("nokey", 2, "is no KEY=VALUE"), ("body.7.density=1", 2, "names no key"),
+        ("run.step=abc", 3, ":6: run.step: "), ("run.nokey=1", 3, "run.nokey: "),
+        ("run=3", 3, "run: "), ("run.frames=2.5", 3, ":7: run.frames: "),
+        ("dimensions=3", 3, "normal has 2 numbers in 3 dimensions"),
+    ],
+)  # fmt: skip
+def test_overrides_that_are_none_are_named(
+    override: str, code: int, said: str, scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert trackbed.main(["rigid", str(scene), "--set", override]) == code
+    message = capsys.readouterr().err
+    assert said in message
+    assert "\n  -> " in message
+    assert not scene.with_name("slide-run").exists()
+
+
+@pytest.mark.parametrize("path", ["nowhere.toml", "."])
+def test_a_scene_that_can_not_be_read_is_named(
+    path: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert trackbed.main(["rigid", str(tmp_path / path)]) == 2
+    assert "the scene can not be read" in capsys.readouterr().err
+
+
+def test_report_and_summary_say_what_was_left_out_and_what_was_not_reached(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without friction one unknown a contact; steps above the tolerance are counted."""
+    words = ["rigid", str(scene), "--no-pictures", "--json", "--set", "surface.friction=0"]
+    assert trackbed.main([*words, "--set", "run.tolerance=1e-14"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["unknowns_a_contact"] == 1
+    assert any(text.startswith("friction: ") for text in answer["left_out"])
+    assert answer["tolerance"] == 1e-14
+    assert (answer["steps_above"] > 0) == (answer["residual_worst"] > 1e-14)
+    page = (scene.with_name("slide-run") / "report.html").read_text(encoding="utf-8")
+    row = "<tr><td>steps left above the tolerance</td><td>{:,}</td></tr>"
+    assert row.format(answer["steps_above"]) in page
+    for text in answer["left_out"]:
+        assert f"<li>{text}</li>" in page

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import copy
-import json
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import trackbed
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
 from rigid_lcp.errors import RigidError, SceneError, ShapeError, UsageError
-from rigid_lcp.run_folder import RunFolder
 
 BLOCK = Polygon.rectangle(0.2, 0.1)
 
@@ -34,7 +30,8 @@ def at_rest(method: str = "time-stepping", **given: object) -> Simulation:
     [
         lambda: Polygon.rectangle(-1, -1), lambda: Polygon.rectangle(1, 0),
         lambda: Polygon.rectangle("a", 1), lambda: Polygon.regular(5, -1.0),
-        lambda: Polygon.regular(2, 1.0), lambda: Disc("a"), lambda: Disc(1e-200),
+        lambda: Polygon.regular(2, 1.0), lambda: Polygon.regular(3.5, 1.0), lambda: Disc("a"),
+        lambda: Polygon(1j * BLOCK.vertices), lambda: Disc(1e-200),
         lambda: Polygon(1e-160 * BLOCK.vertices), lambda: Polygon(1e160 * BLOCK.vertices),
         lambda: Polygon([*BLOCK.vertices, *BLOCK.vertices]), lambda: Polygon(np.zeros((0, 2))),
         lambda: Polygon([(0, 0), (1j, 0), (0, 1)]), lambda: HalfSpace("ab"),
@@ -62,6 +59,7 @@ def test_a_normal_of_any_length_is_a_direction(length):
         {"restitution": "a"}, {"restitution": np.nan}, {"restitution": 1.1},
         {"position": "a"}, {"position": [[1], 2]}, {"position": (0, 0, 0)}, {"angle": "x"},
         {"spin": (1, 2, 3)}, {"velocity": (np.nan, 0)}, {"shape": Disc}, {"shape": None},
+        {"fixed": "no"}, {"fixed": None}, {"position": np.array([1j, 0])},
     ],
 )  # fmt: skip
 def test_bodies_that_are_none_are_named(given):
@@ -211,71 +209,3 @@ def test_a_run_copied_or_pickled_goes_on_the_same(method, clone):
     other.advance(0.01)
     np.testing.assert_array_equal(other.positions, run.positions)
     np.testing.assert_array_equal(other.motion.rates, run.motion.rates)
-
-
-# --- run folders ----------------------------------------------------------------------------------
-
-SCENE = """\
-title = "A block slides"
-dimensions = 2
-[run]
-duration = 0.006
-step = 2e-3
-frames = 3
-[[ground]]
-normal = [0, 1]
-[[body]]
-name = "block"
-box = [0.2, 0.1]
-density = 2000.0
-position = [0.0, 0.05]
-velocity = [0.1, 0.0]
-"""
-
-
-@pytest.fixture
-def words(tmp_path: Path) -> list[str]:
-    path = tmp_path / "slide.toml"
-    path.write_text(SCENE, encoding="utf-8")
-    return ["rigid", str(path), "--no-pictures", "--run-folder", str(tmp_path / "run")]
-
-
-def test_a_run_whose_result_is_spoilt_is_finished_again(words, tmp_path):
-    assert trackbed.main(words) == 0
-    result = tmp_path / "run" / "result.json"
-    for spoilt in ("{", "", "[1]", "\0"):
-        result.write_text(spoilt, encoding="utf-8")
-        assert trackbed.main([*words, "--resume"]) == 0
-        assert json.loads(result.read_text(encoding="utf-8"))["time"] == pytest.approx(0.006)
-
-
-def test_a_manifest_that_can_not_be_read_is_not_called_another_scene(words, tmp_path, capsys):
-    assert trackbed.main(words) == 0
-    (tmp_path / "run" / "manifest.json").write_text("{", encoding="utf-8")
-    assert trackbed.main([*words, "--resume"]) == 2
-    assert "can not be read" in capsys.readouterr().err
-    assert trackbed.main([*words, "--force"]) == 0
-
-
-def test_frames_spoilt_anywhere_are_computed_again(words, tmp_path):
-    """A flipped byte within a frame, as a disk makes it, and not its end only."""
-    assert trackbed.main(words) == 0
-    folder = RunFolder(tmp_path / "run")
-    frame, rng = folder.frames()[2], np.random.default_rng(1)
-    content = frame.read_bytes()
-    for place in rng.integers(60, len(content) - 60, 12):
-        spoilt = bytearray(content)
-        spoilt[place] ^= 0xFF
-        frame.write_bytes(bytes(spoilt))
-        (folder.path / "result.json").unlink()
-        assert trackbed.main([*words, "--resume"]) == 0
-        assert len(folder.frames()) == 4
-        frame.write_bytes(content)
-
-
-def test_a_folder_has_one_writer(words, tmp_path, capsys):
-    folder = RunFolder(tmp_path / "run")
-    with folder.locked():
-        assert trackbed.main(words) == 2
-    assert "another process writes" in capsys.readouterr().err
-    assert trackbed.main(words) == 0

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -234,6 +236,31 @@ def test_unknown_suffix(tmp_path: Path) -> None:
     """A file of another kind, with those that are known."""
     with pytest.raises(ProblemError, match=r"end in \.dat are not known(?s:.*)\.npz, \.hdf5"):
         read_problem(tmp_path / "one.dat")
+
+
+@pytest.mark.parametrize("path", [3, None, 1.5, []])
+def test_a_path_that_is_none(path: Any) -> None:
+    for read in (read_problem, read_forces):
+        with pytest.raises(ProblemError, match="name a file"):
+            read(path)
+
+
+def test_bytes_that_are_wrong_in_headers(tmp_path: Path) -> None:
+    """Headers of stored arrays are read as Python text: whatever that raises is a sentence.
+
+    Arrays are longer than what is read at once, or their checksum would tell first.
+    """
+    path = tmp_path / "bad.npz"
+    np.savez(path, q=np.zeros(2000), mu=np.zeros(1000))
+    sound, draw = path.read_bytes(), np.random.default_rng(4)
+    headers = [found.start() for found in re.finditer(rb"\x93NUMPY", sound)]
+    for _ in range(300):
+        damaged = bytearray(sound)
+        for place in draw.choice(headers) + draw.integers(80, size=draw.integers(1, 4)):
+            damaged[place] = draw.integers(256)
+        path.write_bytes(damaged)
+        with suppress(ProblemError):
+            read_problem(path)
 
 
 def no_group(file: Any) -> None:

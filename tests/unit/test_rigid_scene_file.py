@@ -85,6 +85,14 @@ def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
         ("density = 2000.0", "density = nan", "finite"),
         ("duration = 0.01", 'duration = "long"', "duration"),
         ("density = 2000.0", "fixed = true", "no body can move"),
+        ("density = 2000.0", "density = 2000.0\nfriction = true", "friction: .*valid number"),
+        ("duration = 0.01", "duration = 1e300", "at most 1e.10 can be made"),
+        ("duration = 0.01", "duration = 1e-300", "between two frames"),
+        (
+            "[[body]]",
+            '[[load]]\nbody = "block"\nforce = [1, 0]\nbegin = 2\nend = 1\n[[body]]',
+            "load.0: end .1 s. is not after begin",
+        ),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
@@ -180,3 +188,24 @@ def test_lines_of_keys() -> None:
     assert key_line(text, ["body", "1", "c"]) == 8
     assert key_line(text, ["body", "1", "d"]) == 6
     assert key_line(text, ["none"]) == 0
+
+
+def test_cyclic_load_starts_at_its_phase() -> None:
+    """Between -3 and 3 N from a quarter of a cycle on: 3 sin(2 pi f t)."""
+    load = Load(body="block", force=[3.0, 0.0], least=[-3.0, 0.0], frequency=2.0, phase=np.pi / 2)
+    for time in (0.0, 0.05, 0.2, 0.4):
+        expected = [3 * np.sin(4 * np.pi * time), 0.0]
+        np.testing.assert_allclose(force_at(load, time), expected, atol=1e-12)
+
+
+def test_inertia_of_a_body_can_be_given(tmp_path: Path) -> None:
+    scene = scene_build(scene_read(written(tmp_path, SMALL + "inertia = 1e6\n")))
+    assert scene.bodies[1].inertia == 1e6
+    assert scene.bodies[1].mass == pytest.approx(2000 * 0.2 * 0.1)
+
+
+def test_inertia_of_a_fixed_body_is_refused(tmp_path: Path) -> None:
+    text = SMALL.replace("density = 2000.0", "fixed = true\ninertia = 1.0")
+    text += '\n[[body]]\nname = "free"\nradius = 1.0\ndensity = 1.0\n'
+    with pytest.raises(SceneError, match="inertia: for bodies that move"):
+        scene_read(written(tmp_path, text))

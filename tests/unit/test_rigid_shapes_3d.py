@@ -92,3 +92,20 @@ def test_a_sphere_needs_a_radius(radius: float) -> None:
 def test_what_is_no_size_is_refused(make: Callable[[], object]) -> None:
     with pytest.raises(ShapeError):
         make()
+
+
+@pytest.mark.parametrize("high", [1e-13, 1e-10])
+def test_flatter_than_faces_are_told_apart_is_flat(high: float) -> None:
+    with pytest.raises(ShapeError, match="in a plane"):
+        Polyhedron([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, high]])
+
+
+def test_a_shape_of_corners_is_made_again_to_the_last_bit() -> None:
+    stone = Polyhedron.of_corners(
+        Polyhedron(np.random.default_rng(3).normal(size=(20, 3))).vertices
+    )
+    again = Polyhedron.of_corners(stone.vertices)
+    assert np.array_equal(again.vertices, stone.vertices)
+    assert np.array_equal(again.normals, stone.normals)
+    assert np.array_equal(again.inertia, stone.inertia)
+    assert np.linalg.norm(stone.centroid) < 1e-15

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from rigid_lcp import solve_friction
 from rigid_lcp.errors import ProblemError, UsageError
+from rigid_lcp.frictionless import lcp
 
 W = np.diag([1.0, 2.0, 1.0, 2.0])
 Q = np.array([-1.0, 0.5, 1.0, 0.0])
@@ -79,3 +80,31 @@ def test_the_work_of_one_failed_contact_does_not_spoil_the_others():
     found = solve_friction(w, [-1.0, 0.0, -3.0, 0.0], 0.5, 2)
     assert found.status == "no solution"
     np.testing.assert_allclose(found.r[2:], [3.0, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"tolerance": "x"}, UsageError, "the tolerance is 'x'"),
+        ({"tolerance": np.nan}, UsageError, "the tolerance is nan"),
+        ({"accept": "x"}, UsageError, "the accept is 'x'"),
+        ({"accept": -1.0}, UsageError, "zero or more"),
+        ({"accept": np.nan}, UsageError, "the accept is nan"),
+        ({"start": "x"}, ProblemError, "not made of numbers"),
+        ({"start": [1j, 0.0]}, ProblemError, "complex"),
+        ({"start": [1e300, 0.0]}, ProblemError, "choose other units"),
+    ],
+)
+def test_options_that_are_no_numbers_get_a_sentence(options, error, words):
+    with pytest.raises(error, match=words):
+        solve_friction(np.eye(2), [-1.0, 0.0], 0.5, 2, **options)
+
+
+def test_the_frictionless_problem_refuses_and_proves_as_the_one_with_friction_does():
+    with pytest.raises(ProblemError, match="b is not made of numbers"):
+        lcp(np.eye(2), "ab")
+    with pytest.raises(ProblemError, match="it has 1 numbers and b has 2"):
+        lcp(np.eye(2), [-1.0, 1.0], start=[1.0])
+    found = lcp(-np.eye(2), [-1.0, -1.0])  # f >= 0 only adds to the approach
+    assert found.status == "no solution"
+    assert "->" in found.message

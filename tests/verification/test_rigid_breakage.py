@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigid_lcp.breakage import Breakage, breaks
-from rigid_lcp.errors import ShapeError
+from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
@@ -124,11 +124,15 @@ def test_broken_grains_wear_on():
 def test_breakage_that_is_refused():
     for bad in (
         {"strength": 0.0},
+        {"strength": "a"},
         {"strength": 1.0, "every": 0},
-        {"strength": 1.0, "modulus": 2.0},
+        {"strength": 1.0, "every": 2.5},
+        {"strength": 1.0, "smallest": np.nan},
     ):
-        with pytest.raises(ShapeError):
+        with pytest.raises(SceneError):
             Breakage(**bad)
+    with pytest.raises(ShapeError, match="both modulus"):
+        Breakage(1.0, modulus=2.0)
 
 
 def test_a_pressed_cube_breaks_in_space():

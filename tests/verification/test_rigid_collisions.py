@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.collisions import Collision, Floats, Law, collide, kinetic_energy
-from rigid_lcp.errors import ProblemError
+from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import BodySpace
 from tests.rigid_networks import contact_rows, network_bodies
 
@@ -269,3 +270,30 @@ def test_malformed_input(
     """What is wrong is named."""
     with pytest.raises(ProblemError, match=where):
         collide(cradle(3), velocity, eps, mu)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"law": "x"}, {"energy": "zz"}, {"still": np.nan}, {"rest_speed": -1.0},
+        {"tolerance": 0.0}, {"tolerance": np.nan}, {"max_rounds": -1}, {"max_rounds": 0.5},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_choices_that_there_are_not(wrong: dict[str, Any]) -> None:
+    """Named, with what there is; nothing is run as something else."""
+    with pytest.raises(UsageError, match=next(iter(wrong))):
+        collide(cradle(3), [0.0] * 9, 0.5, **wrong)
+
+
+@pytest.mark.parametrize("drive", [[1.0], [np.nan] * 4, "abcd"])
+def test_a_drive_that_is_none(drive: Any) -> None:
+    """One number does not stand for all, text for none."""
+    with pytest.raises(ProblemError, match="drive"):
+        collide(cradle(3), [0.0] * 9, 0.5, drive=drive)
+
+
+def test_a_matrix_is_no_bodies() -> None:
+    """W alone does not say how velocities of bodies change."""
+    with pytest.raises(ProblemError, match="BodySpace"):
+        collide(np.eye(4), [0.0] * 4, 0.5)  # type: ignore[arg-type]

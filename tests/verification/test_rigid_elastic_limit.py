@@ -19,6 +19,7 @@ from tests.rigid_static_problems import (
     pyramid,
     tower,
 )
+from validation.rigid_packings import packing
 
 
 @pytest.mark.parametrize("top", [1.0, 1e4])
@@ -109,3 +110,27 @@ def test_friction_can_be_mobilised_in_more_ways_than_one():
     assert far.solved
     assert max(near.residual, far.residual) < 1e-12
     assert difference(far.r, near.r) > 0.1
+
+
+def test_grains_that_go_on_sliding_in_space():
+    """Friction along the velocity: springs alone turn into it as 1 over the way, and ended with a
+    residual of 3e-9.  The same forces with the contacts the other way round."""
+    problem = packing(60, 3, seed=99, friction=1.0)
+    answer = elastic_limit(problem)
+    assert answer.solved
+    assert problem.residual(answer.r) < 1e-12
+    velocity = problem.velocity(answer.r).reshape(-1, 3)
+    force = answer.r.reshape(-1, 3)
+    speed = np.linalg.norm(velocity[:, 1:], axis=1)
+    slides = (speed > 1e-6 * speed.max()) & (force[:, 0] > 0)
+    assert slides.any()
+    along = -velocity[slides, 1:] / speed[slides, None]
+    grip = force[slides, 1:] / (problem.friction[slides] * force[slides, 0])[:, None]
+    np.testing.assert_allclose(grip, along, atol=1e-8)
+    bodies = problem.bodies
+    backwards = np.arange(len(answer.r)).reshape(-1, 3)[::-1].ravel()
+    other = friction_problem(
+        BodySpace(bodies.jacobian[backwards], bodies.inverse_mass, bodies.body_size),
+        problem.offset[backwards], problem.friction[::-1].copy(), 3,
+    )  # fmt: skip
+    assert difference(elastic_limit(other).r, answer.r[backwards]) < 1e-10

@@ -13,12 +13,11 @@ from rigid_lcp.rotations import (
     quaternion_of_rotation,
     quaternion_product,
     rotate,
-    rotation_matrix,
     unit_quaternion,
 )
 from rigid_lcp.separation_3d import PARALLEL
 from rigid_lcp.shapes_3d import Polyhedron, box
-from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, contacts
+from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, coal_distance, contacts
 
 
 def placed_corners(shapes: list[Polyhedron], position: Floats, turns: Floats) -> list[Floats]:
@@ -124,25 +123,16 @@ def test_an_overlap_has_a_contact_with_its_depth(name: str, seed: int, share: fl
 @settings(max_examples=40, deadline=None)
 @given(st.sampled_from(FAMILIES), st.integers(0, 10_000), st.sampled_from([1e-6, 1e-3, 3e-2]))
 def test_the_least_gap_is_the_distance_that_coal_finds(name: str, seed: int, share: float) -> None:
-    """No contact is nearer than the distance; none is missing but where corners meet corners or
-    edges, whose distance is greater than the separation along any face or pair of edges."""
-    coal = pytest.importorskip("coal")
+    """No contact is nearer than the distance, and none is missing; the separation along faces and
+    pairs of edges bounds it from below."""
+    pytest.importorskip("coal")
     shapes, position, turns, axes = touching(name, seed, share)
-    hulls, places = [], []
-    for shape, x, turn in zip(shapes, position, rotation_matrix(turns), strict=True):
-        points = coal.StdVec_Vec3s()
-        for corner in shape.vertices:
-            points.append(corner)
-        hulls.append(coal.Convex.convexHull(points, False, "Qt"))
-        places.append(coal.Transform3s(turn, x))
-    result = coal.DistanceResult()
-    coal.distance(hulls[0], places[0], hulls[1], places[1], coal.DistanceRequest(), result)
+    result = coal_distance(shapes, position, turns)
     lower = separation(shapes, position, turns, axes)
-    found = contacts(shapes, position, turns, margin=share * min(s.width for s in shapes))
+    found = contacts(shapes, position, turns, margin=result.min_distance + 1e-5)
     accuracy = 2e-6  # GJK's tolerance is 1e-6
-    assert found.gap.min(initial=np.inf) > result.min_distance - accuracy
-    if result.min_distance < lower + 1e-9:
-        assert found.gap.min() == pytest.approx(lower, abs=accuracy)
+    assert found.gap.min() == pytest.approx(result.min_distance, abs=accuracy)
+    assert found.gap.min() > lower - 2e-9 * min(shape.reach for shape in shapes)
 
 
 # --- coincident features ---
@@ -160,14 +150,14 @@ def on_corner(shape: Polyhedron, way: Floats) -> tuple[Floats, Floats]:
 @pytest.mark.parametrize("overlap", [1e-9, 1e-6, 1e-3])
 @pytest.mark.parametrize("offset", [0.0, 1e-12, 1e-7])
 def test_corner_on_corner(overlap: float, offset: float) -> None:
-    """Corner exactly upon corner: nothing before they overlap, then a contact no deeper than it."""
+    """Corner exactly upon corner: a contact before they overlap, and then one no deeper than it."""
     up = np.array([1.0, 1.0, 1.0])
     turn, high = on_corner(CUBE, up)
     below, low = on_corner(CUBE, -up)
     upside = quaternion_product(quaternion_of_rotation([np.pi, 0.0, 0.0]), below)
     assert high == low
     apart = contacts([CUBE, CUBE], [[0, 0, 0], [offset, 0, 2 * high + 1e-6]], [turn, upside])
-    assert len(apart) == 0 or apart.gap.min() > 0
+    assert apart.gap == pytest.approx([np.hypot(offset, 1e-6)], abs=1e-14)
     found = contacts([CUBE, CUBE], [[0, 0, 0], [offset, 0, 2 * high - overlap]], [turn, upside])
     assert len(found) > 0
     assert np.isfinite(found.normal).all()

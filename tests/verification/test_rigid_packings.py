@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.solver import solve_auto
 from validation.rigid_packings import (
     DENSITY,
     GRAVITY,
@@ -19,6 +20,7 @@ from validation.rigid_packings import (
     bed_pairs,
     bed_problem,
     bed_start,
+    crystal,
     free_fall,
     tower,
 )
@@ -117,3 +119,21 @@ def test_towers_are_redundant(dim: int) -> None:
     matrix = problem.delassus.toarray()
     assert np.linalg.matrix_rank(matrix, tol=1e-12 * np.abs(matrix).max()) <= 4 * (3 * dim - 3)
     np.testing.assert_allclose(problem.offset[: 2 * dim : dim], -GRAVITY * 1e-3)
+
+
+def test_a_crystal_has_all_its_contacts_and_stands_on_its_floor() -> None:
+    """Layers of n^2 and (n-1)^2 spheres in turn: 2 m (m-1) contacts in a layer of m^2, eight for
+    each sphere of a small layer above and below, n^2 with the floor, 4 n with the sides in every
+    large layer.  The floor bears the weight: its spheres are the first n^2."""
+    n = 3
+    problem = crystal(n)
+    large, small = (n + 1) // 2, n // 2
+    inside = large * 2 * n * (n - 1) + small * 2 * (n - 1) * (n - 2)
+    assert problem.contacts == inside + small * 8 * (n - 1) ** 2 + n * n + large * 4 * n
+    found = solve_auto(problem)
+    assert found.solved
+    space = problem.bodies
+    assert space is not None
+    impulse = space.jacobian.T @ found.r
+    weight = free_fall(space, 1e-3, 3) / space.inverse_mass.diagonal()
+    np.testing.assert_allclose(impulse, -weight, atol=1e-10 * np.abs(weight).max())

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rigid_lcp.errors import NoSolution, NotConverged
+from rigid_lcp.lasting_contacts import first_fall
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
@@ -22,6 +23,7 @@ from validation.rigid_scenes import (
     disc_on_incline_acceleration,
     sliding_rod,
     sliding_rod_limit,
+    stack,
 )
 
 Floats = NDArray[np.float64]
@@ -150,11 +152,86 @@ def test_zeno_is_cut_off() -> None:
 def test_step_is_halved_and_doubled() -> None:
     """Section 9: overlaps halve the step; three clean steps double it, up to the longest one."""
     run = bouncing_disc(0.1, 0.5, method="acceleration", step=0.01)
+    run.pace.locating = False
     run.advance(0.15)
     assert run.pace.halved > 5
     assert run.pace.step < 0.01
     run.advance(0.45)
     assert run.pace.step == 0.01
+
+
+def grains_in_a_box(seed: int) -> Scene:
+    """Discs and boxes that fly about."""
+    generator = np.random.default_rng(seed)
+    scene = Scene(2)
+    for k in range(5):
+        shape = Disc(0.04) if k % 2 else Polygon.rectangle(0.07, 0.05)
+        scene.add(
+            shape, density=2700, position=(0.1 + 0.12 * (k % 3), 0.1 + 0.12 * (k // 3)),
+            angle=generator.uniform(-1, 1), velocity=generator.uniform(-1, 1, 2), friction=0.3,
+            restitution=0.7,
+        )  # fmt: skip
+    for normal, offset in (((0, 1), 0.0), ((1, 0), 0.0), ((-1, 0), -0.44)):
+        scene.add(HalfSpace(normal, offset), restitution=0.7)
+    return scene
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_where_a_gap_closes_is_located(seed: int) -> None:
+    """The same motion as by halving alone, as many collisions, at an eighth of the steps or less.
+
+    Both end a step at gaps below 1e-9 of a body, at speeds of 1 m/s: times of impact, and so
+    places, differ by that, and by what some impacts after one another make of it.
+    """
+    runs = [Simulation(grains_in_a_box(seed), "acceleration", step=5e-3) for _ in range(2)]
+    runs[1].pace.locating = False
+    for run in runs:
+        run.advance(0.12)
+        assert run.overlap <= 1e-11 * run.world.length
+    paces = [run.pace for run in runs]
+    assert paces[0].collisions == paces[1].collisions > 2
+    np.testing.assert_allclose(runs[0].positions, runs[1].positions, atol=1e-8)
+    np.testing.assert_allclose(runs[0].angles, runs[1].angles, atol=1e-7)
+    steps = [pace.accepted + pace.halved for pace in paces]
+    quiet = 0.12 / 5e-3
+    assert steps[0] - quiet < 0.125 * (steps[1] - quiet)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ((1.0, -2.0, -1.0, -2.0), 0.5),  # a straight line
+        ((0.75, 0.0, -0.25, -2.0), 0.75**0.5),  # 0.75 - x^2
+        ((-1e-12, 1.0, -1.0, -3.0), 0.5),  # x (1 - 2 x): just left, flies up, comes back
+        ((1.0, -3.0, -1.0, 0.0), None),  # by Hermite's own formula
+        ((-0.1, -1.0, -1.1, -1.0), None),  # overlaps all the time
+    ],
+)
+def test_first_fall(values: tuple[float, ...], expected: float | None) -> None:
+    """Roots of cubics that are known; the cubic of ends is met at its ends."""
+    found = first_fall(*values)
+    if expected is not None:
+        assert found == pytest.approx(expected, abs=1e-10)
+    elif values[0] < 0:
+        assert found is None
+    else:
+        start, slope, end, slope_end = values
+        assert found is not None
+        x = found
+        hermite = (
+            start * (1 + 2 * x) * (1 - x) ** 2 + slope * x * (1 - x) ** 2
+            + end * x * x * (3 - 2 * x) + slope_end * x * x * (x - 1)
+        )  # fmt: skip
+        assert hermite == pytest.approx(0.0, abs=1e-12)
+
+
+def test_steps_with_rough_forces_are_counted() -> None:
+    """A tolerance below round-off is met by no step, the default one by all."""
+    for tolerance, above in ((1e-12, 0), (1e-30, 3)):
+        run = Simulation(stack(4).world.scene, "acceleration", step=1e-3, tolerance=tolerance)
+        run.advance(3e-3)
+        assert run.pace.accepted == 3
+        assert run.pace.steps_above == above
 
 
 def test_nothing_jumps_over_another() -> None:

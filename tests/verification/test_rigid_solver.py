@@ -16,9 +16,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import BodySpace, solve_friction
-from rigid_lcp.friction_problem import friction_problem
+from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.problem_files import read_problem
 from rigid_lcp.solver import solve_auto
+from rigid_lcp.solver_trial import CONVEX_STEPS
+from validation.rigid_packings import packing
 
 FOLDER = Path(os.environ.get("TRACKBED_DATA", "")) / "friction_problems"
 STORED = (
@@ -174,6 +176,9 @@ def problem_residual(w, q, mu, dim, r) -> float:
 
 def test_a_warm_start_costs_less_and_a_wrong_one_does_no_harm():
     bodies, q = tower(60, 1.0, 3)
+    kick = np.zeros(360)
+    kick[-6] = 0.7  # of the top box: more than friction holds, so that not all sticks
+    q = q + bodies.jacobian @ kick
     cold = solve_friction(bodies, q, 0.5, 3)
     push = bodies.jacobian @ np.random.default_rng(5).standard_normal(360)
     changed = q + 1e-3 * push
@@ -185,6 +190,43 @@ def test_a_warm_start_costs_less_and_a_wrong_one_does_no_harm():
     assert "interior-point iterations" not in warm.work
     wrong = solve_friction(bodies, changed, 0.5, 3, start=-1e3 * cold.r)
     assert wrong.solved
+
+
+def test_low_friction_is_reached_along_the_convex_path_bent_to_coulombs():
+    """At friction .1 much of a bed slides: the convex answer is wrong by 1e-3 and Newton fails from
+    there; the same path with the term |u_T| ends at Coulomb's law, without a sweep."""
+    problem = packing(60, 2, seed=3, friction=0.1)
+    found = solve_auto(problem)
+    assert found.solved
+    assert found.method == "interior-point + newton"
+    assert "sweeps" not in found.work
+    assert found.work["interior-point iterations"] > CONVEX_STEPS
+
+
+def random_problem(contacts: int, rank: int, friction: float, seed: int) -> FrictionProblem:
+    """W = B B^T of low rank, q at random: with q out of its image there may be no solution."""
+    g = np.random.default_rng(seed)
+    b = g.standard_normal((3 * contacts, rank))
+    return friction_problem(b @ b.T, g.standard_normal(3 * contacts), friction, 3)
+
+
+def test_where_a_proof_is_at_hand_no_path_is_tried():
+    """20 freedoms for 100 contacts: no force keeps all from approaching, by a linear programme."""
+    found = solve_auto(random_problem(100, 20, 0.5, 1))
+    assert found.status == "no solution"
+    assert "linear programme" in found.message
+    assert "interior-point iterations" not in found.work
+
+
+def test_the_search_ends_after_the_effort_that_is_stated(monkeypatch):
+    """With no floor of flops, paths end once they cost `FALLBACK_SHARE` of what went before, the
+    last one included: six paths and twice the factorisations otherwise."""
+    monkeypatch.setattr("rigid_lcp.solver.FALLBACK_FLOPS", 0.0)
+    problem = random_problem(40, 30, 0.5, 3)
+    found = solve_auto(problem)
+    assert not found.solved
+    assert "->" in found.message
+    assert found.work["factorisations"] < 600
 
 
 @pytest.mark.parametrize("method", ["newton", "interior-point", "gauss-seidel", "pivoting"])

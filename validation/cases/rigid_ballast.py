@@ -15,14 +15,24 @@ import numpy as np
 
 from validation.case import Check
 from validation.rigid_ballast_bed import Bed
-from validation.rigid_ballast_judge import FEWEST, duels, gain_most, limits_of, summaries
+from validation.rigid_ballast_judge import (
+    FEWEST,
+    WITHIN,
+    cheapest,
+    cost_ratio,
+    gain_most,
+    limits_of,
+    summaries,
+)
 from validation.rigid_ballast_runs import (
     BEDS,
+    CONTROLS,
     CYCLES,
     LEVELS,
+    LONG,
+    PUSHED,
     QUICK_LEVELS,
     RECORD,
-    SEEDS,
     rows_read,
     study,
 )
@@ -33,18 +43,21 @@ OVERLAP, PAPER_STEP = 1e-6, 1e-3
 the step [s] from which on energy may not be gained."""
 SMALLEST = 0.025
 """Diameter of the smallest stone [m]."""
+UPRIGHT = 1e-3
+"""Angle by which the sleeper may turn in a run [rad]."""
 
 
 def run(quick: bool) -> list[Check]:
     """All checks; the quick form makes runs of its own."""
     if quick:
         rows: list[Row] = []
-        beds = [Bed(seed, stones=20, width=0.22, sleeper=0.09, peak=18e3) for seed in range(1, 9)]
-        study(beds, 2, QUICK_LEVELS, 3, rows, rows.append)
+        beds = [Bed(seed, stones=30, crib=3, width=0.28, sleeper=0.12, peak=16e3)
+                for seed in (1, 2)]  # fmt: skip
+        study(beds, QUICK_LEVELS, 3, rows, rows.append)
         return record_checks(rows)
     rows = rows_read(RECORD)
-    beds = [Bed(seed) for seed in range(1, SEEDS + 1)]
-    study(beds, BEDS, LEVELS, CYCLES, rows, rows.append)
+    beds = [Bed(seed) for seed in range(1, BEDS + 1)]
+    study(beds, LEVELS, CYCLES, rows, rows.append, CONTROLS, PUSHED, LONG)
     return record_checks(rows)
 
 
@@ -53,14 +66,14 @@ def record_checks(rows: Sequence[Row]) -> list[Check]:
     ours = [row for row in rows if row["kind"] == "rigid"]
     soft = [row for row in rows if row["kind"] == "soft"]
     lost = sum(not row["ok"] for row in ours)
-    unused = ["tilted" in row["why"] for row in rows if row["kind"] == "no bed"]
-    lost += len(unused) - sum(unused)
+    lost += sum(row["kind"] == "no bed" for row in rows)
     blown = sum(not row["ok"] for row in soft)
     ours = [row for row in ours if row["ok"]]
     fine = [row for row in ours if row["level"]["value"] <= PAPER_STEP]
     checks = [
         Check("rigid runs and beds that did not go to their end", lost, "= 0", lost == 0),
-        Check("beds not used: sleeper tilted", sum(unused), "reported", True),
+        Check("the sleeper's turn, held by the rail", max(abs(row["tilt"]) for row in ours),
+              f"<= {UPRIGHT:g}", all(abs(row["tilt"]) <= UPRIGHT for row in ours), "rad"),
         Check("soft runs that did not go to their end", blown, "reported", True),
         Check("rigid: deepest approach at the middle of a step, of the smallest stone",
               max(row["overlap"] for row in ours) / SMALLEST, "reported", True),
@@ -89,34 +102,32 @@ def limit_checks(rows: Sequence[Row]) -> list[Check]:
     """The reference, every level's error, and the cost at equal error."""
     limits = limits_of(rows)
     found = summaries(rows, limits)
-    apart = abs(limits.difference) / abs(limits.mean)
-    noise = limits.interval / abs(limits.mean)
+    scale = abs(limits.mean)
     ensemble = len(limits.reference) >= FEWEST  # two small beds may heave
     checks = [
-        Check(
-            "mean settlement of the reference",
-            limits.mean,
-            "> 0" if ensemble else "reported",
-            not ensemble or limits.mean > 0,
-            "m",
-        ),
-        Check("the two limits: their difference, of the mean", apart, "reported", True),
-        Check("95 % interval of that", noise if np.isfinite(noise) else np.nan, "reported", True),
-    ]
+        Check("mean settlement of the reference", limits.mean, "> 0" if ensemble else "reported",
+              not ensemble or limits.mean > 0, "m"),
+        Check("the two limits: their difference, of the mean", limits.difference / scale,
+              "reported", True),
+        Check("half width of its 95 % interval", limits.interval / scale, "reported", True),
+    ]  # fmt: skip
     for s in found:
-        checks.append(Check(f"{s.method}, {s.name}: error of the mean settlement", s.bias,
+        checks.append(Check(f"{s.method}, {s.name}: error of the mean settlement", s.error,
                             "reported", True))  # fmt: skip
         checks.append(Check(f"{s.method}, {s.name}: cost of a run", s.cost, "reported", True, "s"))
-    for duel in duels(found):
-        if duel.soft is not None:
-            title = f"{duel.rigid.name}: cost of soft over rigid grains at equal error"
-            checks.append(Check(title, duel.cost_ratio, "reported", True))
+    for most in WITHIN:
+        ours, theirs = (cheapest(found, method, most, True) for method in ("rigid", "soft"))
+        if ours is not None and theirs is not None:
+            checks.append(Check(f"cost of soft over rigid grains, errors shown within {most:g}",
+                                cost_ratio(theirs, ours)[0], "reported", True))  # fmt: skip
     return [*checks, *rest_checks(rows)]
 
 
 def rest_checks(rows: Sequence[Row]) -> list[Check]:
-    """Rigid beds at rest under the least load keep still before the first cycle."""
-    drift = [abs(row["rest_drift"]) for row in rows if row["kind"] == "rigid" and row["ok"]]
-    found = float(np.median(drift))
-    return [Check("rigid: median drift in 50 ms under the least load", found, "<= 1e-05",
-                  found <= 1e-5, "m")]  # fmt: skip
+    """Rigid beds at rest under the least load keep still before the first cycle; a few small ones
+    may not have come to rest."""
+    mine = [row for row in rows if row["kind"] == "rigid" and row["ok"]]
+    found = float(np.median([abs(row["rest_drift"]) for row in mine]))
+    few = len({row["bed"]["seed"] for row in mine}) < FEWEST
+    return [Check("rigid: median drift in 50 ms under the least load", found,
+                  "reported" if few else "<= 1e-05", few or found <= 1e-5, "m")]  # fmt: skip

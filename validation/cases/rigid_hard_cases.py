@@ -18,6 +18,7 @@ from validation.rigid_hard_further import (
     motion_rows,
     ratio_trials,
     rocking_rows,
+    space_incline_rows,
     storey_rows,
 )
 from validation.rigid_hard_measures import (
@@ -41,7 +42,9 @@ from validation.rigid_hard_trials import (
 Family = Callable[[bool, Sequence[str]], list[Row]]
 
 FAMILIES: dict[str, Family] = {
-    "incline": lambda quick, peers: trial_rows(incline_trials(), peers),
+    "incline": lambda quick, peers: (
+        trial_rows(incline_trials(quick), peers) + space_incline_rows(quick)
+    ),
     "creep": lambda quick, peers: trial_rows(creep_trials(2_000 if quick else 100_000), peers),
     "cards": lambda quick, peers: trial_rows(card_trials(), peers) + card_threshold_rows(),
     "storeys": lambda quick, peers: storey_rows(peers),

@@ -1,0 +1,137 @@
+"""Compiled kernels beside their plain NumPy and scipy twins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from rigid_lcp.body_matrix import (
+    add_contacts,
+    bodies_pushed,
+    body_pairs,
+    contact_stiffness,
+    dense_delassus,
+    diagonal_blocks,
+    force_left,
+    jacobian_blocks,
+    multiply_blocks,
+)
+from rigid_lcp.elimination_tree import FEW_BLOCKS, minimum_degree, symmetric_pattern
+from rigid_lcp.sparse_products import columns_product, factors_product, row_forms, rows_product
+
+BODIES, CONTACTS = 7, 12
+Floats = NDArray[np.float64]
+
+
+def arrays(matrix: sp.csr_array) -> tuple[Floats, ...]:
+    return matrix.indptr, matrix.indices, matrix.data
+
+
+def random_bodies(dim: int) -> tuple[sp.csr_array, sp.csr_array]:
+    """J of contacts between pairs of bodies, some with one only, and a full M^-1 of each."""
+    g, size = np.random.default_rng(dim), 3 * dim - 3
+    jacobian = np.zeros((CONTACTS * dim, BODIES * size))
+    for c in range(CONTACTS):
+        for body in g.choice(BODIES, size=g.integers(1, 3), replace=False):
+            jacobian[c * dim : (c + 1) * dim, body * size : (body + 1) * size] = g.standard_normal(
+                (dim, size)
+            )
+    blocks = [b @ b.T + np.eye(size) for b in g.standard_normal((BODIES, size, size))]
+    return sp.csr_array(jacobian), sp.csr_array(sp.block_diag(blocks, format="csr"))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_products_are_those_of_the_matrices(dim):
+    jacobian, inverse = random_bodies(dim)
+    g = np.random.default_rng(1)
+    r, v = g.standard_normal(jacobian.shape[0]), g.standard_normal(jacobian.shape[1])
+    w = (jacobian @ inverse @ jacobian.T).toarray()
+    np.testing.assert_allclose(rows_product(*arrays(jacobian), v), jacobian @ v, atol=1e-13)
+    found = columns_product(*arrays(jacobian), len(v), r)
+    np.testing.assert_allclose(found, jacobian.T @ r, atol=1e-13)
+    both = (*arrays(jacobian), *arrays(inverse))
+    np.testing.assert_allclose(factors_product(*both, r), w @ r, atol=1e-11)
+    np.testing.assert_allclose(row_forms(*both, len(v)), np.diag(w), atol=1e-12)
+    np.testing.assert_allclose(dense_delassus(*both), w, atol=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_blocks_of_the_jacobian_assemble_the_matrix_of_bodies(dim):
+    """``J^T K J`` block by block, and the way there and back, ``J^T r`` and ``r - K J v``."""
+    jacobian, inverse = random_bodies(dim)
+    size, g = 3 * dim - 3, np.random.default_rng(2)
+    first, body, block = jacobian_blocks(*arrays(jacobian), dim, size)
+    again = np.zeros(jacobian.shape)
+    for c in range(CONTACTS):
+        for k in range(first[c], first[c + 1]):
+            rows, columns = slice(c * dim, (c + 1) * dim), body[k] * size
+            again[rows, columns : columns + size] = block[k]
+    np.testing.assert_array_equal(again, jacobian.toarray())
+    stiffness = g.standard_normal((CONTACTS, dim, dim))
+    full = sp.block_diag(list(stiffness)).toarray()
+    keys, places = np.unique(body_pairs(first, body, BODIES), return_inverse=True)
+    matrix = np.zeros((len(keys), size, size))
+    add_contacts(matrix, first, block, places, stiffness)
+    whole = np.zeros((BODIES, size, BODIES, size))
+    whole[keys // BODIES, :, keys % BODIES, :] = matrix
+    expected = jacobian.T @ full @ jacobian.toarray()
+    np.testing.assert_allclose(whole.reshape(expected.shape), expected, atol=1e-12)
+    r, v = g.standard_normal((CONTACTS, dim)), g.standard_normal(BODIES * size)
+    pushed = bodies_pushed(first, body, block, BODIES, r)
+    np.testing.assert_allclose(pushed, jacobian.T @ r.ravel(), atol=1e-13)
+    left = force_left(first, body, block, stiffness, r, v)
+    np.testing.assert_allclose(left, r.ravel() - full @ (jacobian @ v), atol=1e-12)
+    np.testing.assert_array_equal(
+        diagonal_blocks(*arrays(inverse), size)[3],
+        inverse.toarray()[3 * size : 4 * size, 3 * size : 4 * size],
+    )
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_small_inverses_keep_their_digits(dim):
+    """Sizes of 1e-8 to 1e8, zeros on the diagonal: A^-1 A is one to round-off and condition."""
+    g = np.random.default_rng(4)
+    a = g.standard_normal((200, dim, dim)) * 10.0 ** g.uniform(-8, 8, (200, 1, 1))
+    a[:50, 0, 0] = 0.0
+    b = g.standard_normal((200, dim, dim))
+    inverse, stiffness, regular = contact_stiffness(a, b)
+    assert regular
+    error = np.abs(np.matmul(inverse, a) - np.eye(dim)).max(axis=(1, 2))
+    assert (error <= 20 * 2.2e-16 * np.linalg.cond(a)).all()
+    np.testing.assert_allclose(stiffness, np.matmul(inverse, b), rtol=1e-12, atol=1e-300)
+    a[7] = 0.0
+    assert not contact_stiffness(a, b)[2]
+    vectors = g.standard_normal((200, dim))
+    twin = np.einsum("cij,cj->ci", b, vectors)
+    np.testing.assert_allclose(multiply_blocks(b, vectors), twin, atol=1e-13)
+
+
+@pytest.mark.parametrize("blocks", [1, 30, FEW_BLOCKS + 50])
+def test_the_pattern_is_symmetric_and_the_order_a_permutation(blocks):
+    g = np.random.default_rng(blocks)
+    rows, columns = g.integers(0, blocks, (2, 2 * blocks))
+    start, neighbour = symmetric_pattern(blocks, rows, columns)
+    twin = np.eye(blocks, dtype=bool)
+    twin[rows, columns] = twin[columns, rows] = True
+    found = sp.csr_array((np.ones(len(neighbour)), neighbour, start), (blocks, blocks))
+    np.testing.assert_array_equal(found.toarray() > 0, twin)
+    assert found.has_sorted_indices
+    np.testing.assert_array_equal(np.sort(minimum_degree(start, neighbour)), np.arange(blocks))
+
+
+def test_the_order_of_a_chain_fills_nothing_in():
+    """A chain joined to a ring: its degree is at most 2 throughout, whatever the numbers."""
+    blocks = 40
+    name = np.random.default_rng(0).permutation(blocks)
+    rows, columns = name, np.roll(name, 1)
+    start, neighbour = symmetric_pattern(blocks, rows, columns)
+    order = minimum_degree(start, neighbour)
+    linked = np.zeros((blocks, blocks), dtype=bool)
+    linked[rows, columns] = linked[columns, rows] = True
+    for k in order:
+        near = np.flatnonzero(linked[k])
+        assert len(near) <= 2
+        linked[near, k] = linked[k, near] = False
+        linked[np.ix_(near, near)] |= ~np.eye(len(near), dtype=bool)

@@ -1,0 +1,124 @@
+"""Sweeps in body space: every visit is the exact answer of `rigid_lcp.local_contact`.
+
+A twin in plain NumPy visits one contact after another (Jean 1999): ``q_c = u_c - W_cc y_c`` with
+``u = W y + q`` of all forces at present, ``r_c`` by `local_solution`.  The kernels carry body
+velocities, packed rows and inverse blocks instead; they have to give the same forces.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rigid_lcp.body_sweeps import REGULAR, contacts_packed, inverses
+from rigid_lcp.contact_blocks import body_blocks
+from rigid_lcp.contact_sweeps import visit_all
+from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.gauss_seidel import sweep_blocks
+from rigid_lcp.local_contact import local_solution
+
+Floats = NDArray[np.float64]
+
+
+def some_problem(seed: int, dim: int, contacts: int, mu: float) -> FrictionProblem:
+    """Random J of pairs of few bodies, some of them the ground: redundant and strongly coupled."""
+    random = np.random.default_rng(seed)
+    size, bodies = 3 * dim - 3, max(2, contacts // 2)
+    rows = np.zeros((contacts * dim, bodies * size))
+    for c in range(contacts):
+        a, b = random.choice(bodies + 1, size=2, replace=False)
+        for body in (a, b):
+            if body < bodies:
+                rows[c * dim : (c + 1) * dim, body * size : (body + 1) * size] = random.normal(
+                    size=(dim, size)
+                )
+    inverse_mass = sp.diags_array(random.uniform(0.1, 10.0, bodies * size))
+    space = BodySpace(sp.csr_array(rows), sp.csr_array(inverse_mass), size)
+    return friction_problem(space, random.normal(size=contacts * dim), mu, dim)
+
+
+def twin_sweep(
+    problem: FrictionProblem, force: Floats, last: Floats, part: float
+) -> tuple[Floats, float, float]:
+    """Forces after a sweep from ``y = r + part (r - last)``, and its two products."""
+    dim, w = problem.dim, problem.delassus.toarray()
+    y = force + part * (force - last)
+    now = y.copy()
+    for c in range(problem.contacts):
+        here = slice(c * dim, (c + 1) * dim)
+        u = w[here] @ now.ravel() + problem.offset[here]
+        block = w[here, here]
+        found, status = local_solution(block, u - block @ now[c], problem.friction[c])
+        if status != "no solution":
+            now[c] = found
+    weight = np.abs(w.diagonal()).reshape(now.shape)
+    product = float((weight * (y - now) * (now - force)).sum())
+    return now, product, float((weight * (y - now) ** 2).sum())
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 10_000), dim=st.sampled_from([2, 3]), contacts=st.integers(1, 8),
+    mu=st.sampled_from([0.0, 0.05, 0.5, 1.2, 30.0]), part=st.sampled_from([0.0, 0.7]),
+)  # fmt: skip
+def test_a_sweep_is_that_of_the_exact_local_solutions(
+    seed: int, dim: int, contacts: int, mu: float, part: float
+) -> None:
+    problem = some_problem(seed, dim, contacts, mu)
+    bodies = body_blocks(problem)
+    assert bodies is not None
+    random = np.random.default_rng(seed + 1)
+    force, last = random.normal(size=(2, contacts, dim))
+    expected, product, square = twin_sweep(problem, force, last, part)
+    before = force.copy()
+    velocity = bodies.body_velocity(force + part * (force - last))
+    _, made_product, made_square = visit_all(
+        sweep_blocks(problem, bodies), force, last, velocity, part, np.arange(contacts)
+    )
+    scale = max(1.0, float(np.abs(expected).max()))
+    # the direction of sliding in 3D is a root of a quartic, found to some 1e-12
+    np.testing.assert_allclose(force, expected, atol=1e-9 * scale)
+    np.testing.assert_array_equal(last, before)
+    np.testing.assert_allclose(velocity, bodies.body_velocity(force), atol=1e-9 * scale)
+    bulk = float((np.abs(problem.diagonal)).max()) * contacts * dim * (scale + 10.0) ** 2
+    assert made_product == pytest.approx(product, abs=1e-8 * bulk)
+    assert made_square == pytest.approx(square, abs=1e-8 * bulk)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_inverses_invert_or_are_zero(dim: int) -> None:
+    """``G W = 1`` to round-off over the determinant; singular or strongly coupled: none."""
+    random = np.random.default_rng(dim)
+    factor = random.normal(size=(200, dim, dim))
+    factor[:20, 0] = 2.0 * factor[:20, 1]  # of lower rank
+    local = np.einsum("cij,ckj->cik", factor, factor)
+    found = inverses(local, np.full(200, 0.3))
+    known = found[:, 0, 0] != 0.0
+    assert not known[:20].any()
+    assert known.sum() > 100
+    size = np.einsum("cii->c", local[known]) * np.einsum("cii->c", found[known])
+    error = np.abs(found[known] @ local[known] - np.eye(dim)).max(axis=(1, 2))
+    assert (error <= 1e-14 * size).all()
+    if dim == 2:  # with mu |W_NT| >= W_NN two answers are possible: left to the general solution
+        strong = 0.3 * np.abs(local[:, 0, 1]) >= local[:, 0, 0]
+        assert strong.any()
+        assert not known[strong].any()
+    assert REGULAR > 0.0
+
+
+def test_packed_rows_hold_what_a_visit_reads() -> None:
+    problem = some_problem(5, 2, 3, 0.4)
+    bodies = body_blocks(problem)
+    assert bodies is not None
+    rows = contacts_packed(
+        bodies.block, bodies.local, problem.offset.reshape(-1, 2), problem.friction
+    )
+    assert rows.shape == (3, 21)
+    np.testing.assert_array_equal(rows[:, :3], bodies.block[:, 0, 0])
+    np.testing.assert_array_equal(rows[:, 9:12], bodies.block[:, 1, 1])
+    np.testing.assert_array_equal(rows[:, 15], bodies.local[:, 0, 1])
+    np.testing.assert_array_equal(rows[:, 20], 0.4)

@@ -1,0 +1,324 @@
+"""Whatever befalls a rigid run, its frames stay, and resumed it ends with the same bits."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import trackbed
+from rigid_lcp.run_folder import RunFolder
+from rigid_lcp.simulation import Simulation
+from tests.forked_commands import Commands
+from tests.rigid_runs import SLIDING_BLOCK, frame_bits
+
+SEED = 2002
+
+
+@pytest.fixture(scope="module")
+def commands(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commands]:
+    """A server that has run the scene once, uninterrupted, in ``whole``."""
+    folder = tmp_path_factory.mktemp("rigid")
+    (folder / "scene.toml").write_text(SLIDING_BLOCK, encoding="utf-8")
+    server = Commands(folder)
+    server.run(*run_words(folder / "scene.toml", folder / "whole"), here=True)
+    yield server
+    server.close()
+
+
+@pytest.fixture
+def scene(commands: Commands) -> Path:
+    return commands.folder / "scene.toml"
+
+
+@pytest.fixture
+def whole(commands: Commands) -> list[dict[str, Any]]:
+    """Frames of the uninterrupted run."""
+    frames = frame_bits(commands.folder / "whole")
+    assert len(frames) == 4
+    return frames
+
+
+def run_words(scene: Path, folder: Path, *more: str) -> list[str]:
+    return ["rigid", str(scene), "--run-folder", str(folder), "--no-pictures", *more]
+
+
+def goes_on(scene: Path, folder: Path, whole: list[dict[str, Any]]) -> None:
+    """The same command with --resume brings the run to the end it would have had."""
+    assert trackbed.main(run_words(scene, folder, "--resume")) == 0
+    assert frame_bits(folder) == whole
+    assert RunFolder(folder).summary is not None
+    assert not list(folder.glob(".*.partial"))
+
+
+# --- the disk ---------------------------------------------------------------------------------
+
+
+class RefusingDisk:
+    """Counts what changes files below a folder; refuses number ``refused`` and all after it."""
+
+    def __init__(self, root: Path, patch: pytest.MonkeyPatch, refused: int) -> None:
+        self.root, self.refused, self.count = str(root), refused, 0
+        for name in ("mkdir", "open", "write", "truncate", "fsync", "replace"):
+            patch.setattr(os, name, self.refusing(getattr(os, name), name))
+        patch.setattr(Path, "open", self.refusing(Path.open, "open"))
+
+    def refusing(self, function: Callable[..., Any], name: str) -> Callable[..., Any]:
+        def refuse(*arguments: Any, **named: Any) -> Any:
+            place = arguments[0]
+            if isinstance(place, int):
+                place = os.readlink(f"/proc/self/fd/{place}")
+            reads = name == "open" and "r" in str(arguments[1:2] or "r")
+            if str(place).startswith(self.root) and not reads:
+                self.count += 1
+                if self.count >= self.refused:
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            return function(*arguments, **named)
+
+        return refuse
+
+
+def test_full_disk_at_every_write(
+    scene: Path, whole: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2 and a sentence, no part of a file; with room again it goes on."""
+    for refused in range(1, 1000):
+        folder = tmp_path / str(refused)
+        with pytest.MonkeyPatch.context() as patch:
+            disk = RefusingDisk(folder, patch, refused)
+            code = trackbed.main(run_words(scene, folder))
+        said = capsys.readouterr().err
+        if disk.count < refused:
+            break
+        assert code == 2, said
+        assert "can not be written (No space left on device)" in said
+        assert "make room" in said
+        assert not list(folder.glob(".*.partial"))
+        frames = frame_bits(folder) if folder.exists() else []
+        assert frames == whole[: len(frames)]
+        goes_on(scene, folder, whole)
+    assert code == 0
+    assert refused > 4 + 3 * 9  # folder and lock; scene, manifest, frames, table, report, result
+
+
+@pytest.mark.parametrize("name", ["picture-000002.png", "movie.gif", "picture-end.png"])
+def test_full_disk_at_a_picture(
+    scene: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = ["rigid", str(scene), "--run-folder", str(tmp_path / "run"), "--set", "run.frames=2"]
+    with pytest.MonkeyPatch.context() as patch:
+        disk = RefusingDisk(tmp_path / "run" / f".{name}", patch, 1)
+        assert trackbed.main(run) == 2
+    assert disk.count == 1
+    assert f"{name}: can not be written (No space left" in capsys.readouterr().err
+    assert trackbed.main([*run, "--resume"]) == 0
+    assert (tmp_path / "run" / name).stat().st_size > 0
+
+
+def test_files_that_the_system_cuts_short(
+    scene: Path, whole: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    """A limit on the length of files, set by the system, is told like a full disk."""
+    command = [sys.executable, trackbed.__file__, *run_words(scene, tmp_path / "run")]
+    limited = ["bash", "-c", 'ulimit -f 2; exec "$@"', "bash", *command]  # 2 KiB; a frame has 7
+    ended = subprocess.run(
+        limited, capture_output=True, text=True, cwd=Path(trackbed.__file__).parent
+    )
+    assert ended.returncode == 2, ended.stderr
+    assert "frame_000000.npz: can not be written (File too large)" in ended.stderr
+    goes_on(scene, tmp_path / "run", whole)
+
+
+def test_folder_that_can_not_be_made(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    for folder in (tmp_path / "file", tmp_path / "file" / "run", Path("/proc/run")):
+        assert trackbed.main(run_words(scene, folder)) == 2
+        said = capsys.readouterr().err
+        assert f"{folder}: can not be written (" in said
+        assert "give another --run-folder" in said
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("comes_back", [False, True])
+def test_folder_that_vanishes(
+    scene: Path,
+    whole: list[dict[str, Any]],
+    tmp_path: Path,
+    comes_back: bool,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Removed, or replaced by another's of the same name: nothing is written there."""
+    folder, advance = tmp_path / "run", Simulation.advance
+
+    def remove(run: Simulation, seconds: float) -> None:
+        advance(run, seconds)
+        if run.steps == 20:
+            shutil.rmtree(folder)
+            if comes_back:
+                folder.mkdir()
+                (folder / ".lock").touch()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Simulation, "advance", remove)
+        assert trackbed.main(run_words(scene, folder)) == 2
+    assert "removed or replaced while the run went on" in capsys.readouterr().err
+    assert [path.name for path in folder.glob("*")] == ([".lock"] if comes_back else [])
+    goes_on(scene, folder, whole)
+
+
+# --- killed and stopped -----------------------------------------------------------------------
+
+
+def test_killed_at_every_file_operation(
+    commands: Commands, scene: Path, whole: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    """A kill in place of any one change: what is there is whole, and the run goes on."""
+    assert commands.run(*run_words(scene, tmp_path / "0"), root=str(tmp_path)) == 0
+    count = commands.operations
+    assert count > 20
+    for number in range(1, count + 1):
+        folder = tmp_path / str(number)
+        words = run_words(scene, folder, "--resume")
+        assert commands.run(*words, root=str(tmp_path), crash=number) == -signal.SIGKILL
+        found = frame_bits(folder) if folder.exists() else []
+        assert len(found) == len(list(folder.glob("frame_*")))
+        assert found == whole[: len(found)]
+        goes_on(scene, folder, whole)
+
+
+def test_killed_at_random_times(
+    commands: Commands, scene: Path, whole: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    """A run that is killed again and again loses no frame that it had, and comes to its end."""
+    began = time.monotonic()
+    assert commands.run(*run_words(scene, tmp_path / "timed")) == 0
+    span, times, kills, number = time.monotonic() - began, random.Random(SEED), 0, 0
+    while kills < 20:
+        folder = tmp_path / f"run_{number}"
+        kept = len(frame_bits(folder)) if folder.exists() else 0
+        commands.start(*run_words(scene, folder, "--resume"))
+        time.sleep(times.uniform(0.0, span))
+        if commands.kill() == -signal.SIGKILL:
+            kills += 1
+            found = frame_bits(folder) if folder.exists() else []
+            assert len(found) == len(list(folder.glob("frame_*"))) >= kept
+            assert found == whole[: len(found)], f"kill {kills}, seed {SEED}"
+        else:  # it came to its end before
+            assert frame_bits(folder) == whole
+            number += 1
+    goes_on(scene, folder, whole)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_stopped_by_a_signal(
+    scene: Path,
+    whole: list[dict[str, Any]],
+    tmp_path: Path,
+    number: signal.Signals,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Exit code 130, and what to do next."""
+    advance, before = Simulation.advance, signal.getsignal(number)
+
+    def stop(run: Simulation, seconds: float) -> None:
+        advance(run, seconds)
+        if run.steps == 20:
+            os.kill(os.getpid(), number)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Simulation, "advance", stop)
+        assert trackbed.main(run_words(scene, tmp_path / "run")) == 130
+    said = capsys.readouterr().err
+    assert f"stopped by {number.name}; every finished frame is saved" in said
+    assert "--resume" in said
+    assert signal.getsignal(number) is before
+    assert len(frame_bits(tmp_path / "run")) == 2
+    goes_on(scene, tmp_path / "run", whole)
+
+
+def test_the_reader_of_the_progress_goes_away(scene: Path, tmp_path: Path) -> None:
+    """As in ``trackbed rigid ... 2>&1 | head -1``: the run comes to its end all the same."""
+    command = [sys.executable, trackbed.__file__, *run_words(scene, tmp_path / "run")]
+    piped = ["bash", "-c", '"$@" 2>&1 | true', "bash", *command]
+    subprocess.run(piped, check=True, cwd=Path(trackbed.__file__).parent)
+    assert RunFolder(tmp_path / "run").summary is not None
+
+
+# --- other writers, damage --------------------------------------------------------------------
+
+
+def test_two_writers(
+    scene: Path,
+    whole: list[dict[str, Any]],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The second one is refused with the first one's pid, --force or not; nothing changes."""
+    folder = RunFolder(tmp_path / "run")
+    assert trackbed.main(run_words(scene, folder.path)) == 0
+    with folder.locked():
+        for flag in ("--resume", "--force"):
+            assert trackbed.main(run_words(scene, folder.path, flag)) == 2
+            assert f"another process writes to this run (pid {os.getpid()} on " in (
+                capsys.readouterr().err
+            )
+    assert frame_bits(folder.path) == whole
+
+
+def test_damage_to_a_frame(scene: Path, whole: list[dict[str, Any]], tmp_path: Path) -> None:
+    """Bytes that are lost or wrong, anywhere: from that frame on it is computed again."""
+    folder, draw = tmp_path / "run", random.Random(SEED)
+    shutil.copytree(scene.parent / "whole", folder)
+    for trial in range(12):
+        frame = folder / f"frame_{draw.choice([0, 2, 3, 3]):06d}.npz"
+        damaged = bytearray(frame.read_bytes())
+        place = draw.randrange(len(damaged) - 8)
+        if trial % 2:
+            del damaged[place:]
+        else:
+            damaged[place : place + 8] = draw.randbytes(8)
+        frame.write_bytes(damaged)
+        (folder / "result.json").unlink()
+        goes_on(scene, folder, whole)
+
+
+def test_frames_without_their_manifest_are_not_lost(
+    scene: Path, whole: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for damage in ("", "[]", '{"scene": '):
+        folder = tmp_path / f"run{len(damage)}"
+        shutil.copytree(scene.parent / "whole", folder)
+        manifest = folder / "manifest.json"
+        manifest.write_text(damage, encoding="utf-8") if damage else manifest.unlink()
+        for flags in ([], ["--resume"]):
+            assert trackbed.main(run_words(scene, folder, *flags)) == 2
+            assert "manifest.json of this run is missing or can not be read" in (
+                capsys.readouterr().err
+            )
+        assert frame_bits(folder) == whole
+
+
+def test_a_damaged_result_is_made_again(
+    scene: Path, whole: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(scene.parent / "whole", folder)
+    result = folder / "result.json"
+    sound = json.loads(result.read_text(encoding="utf-8"))
+    for damage in ('{"title": "A bl', "", "[1]", "\0"):
+        result.write_text(damage, encoding="utf-8")
+        goes_on(scene, folder, whole)
+        assert json.loads(result.read_text(encoding="utf-8")).keys() == sound.keys()
