@@ -115,12 +115,11 @@ piles too, but not unique ones.
 WEAR_TEXT = """## Wear and breakage in a run
 
 `Simulation(scene, wear=Wear(k), breakage=Breakage(strength))`, or `[wear]` and `[strength]` in a
-scene file: the work of friction takes corners off polygons, corners and edges off polyhedra by ``V = k W``
-(Archard, Reye),
-grains whose contact forces pull them apart harder than their strength are split, in 2D by the
-Brazilian criterion.  Where neither is named nothing of it is computed.  Where a criterion hangs on
-forces that are not unique, `Breakage(unique=True)` judges by those of elastic contacts: in the
-tower below, the time stepping's own forces hold friction that squeezes the boxes sideways, and its
+scene file: the work of friction takes corners off polygons, corners and edges off polyhedra, by
+``V = k W`` (Archard, Reye); grains whose contact forces pull them apart harder than their strength
+are split, in 2D by the Brazilian criterion.  Where neither is named nothing of it is computed.
+Where a criterion hangs on forces that are not unique, `Breakage(unique=True)` judges by those of
+elastic contacts: in the tower below, the time stepping's own forces hold friction that squeezes the boxes sideways, and its
 boxes do not break.
 """
 
