@@ -119,8 +119,8 @@ scene file: the work of friction takes corners off polygons, corners and edges o
 ``V = k W`` (Archard, Reye); grains whose contact forces pull them apart harder than their strength
 are split, in 2D by the Brazilian criterion.  Where neither is named nothing of it is computed.
 Where a criterion hangs on forces that are not unique, `Breakage(unique=True)` judges by those of
-elastic contacts: in the tower below, the time stepping's own forces hold friction that squeezes the boxes sideways, and its
-boxes do not break.
+elastic contacts: in the tower below, the time stepping's own forces hold friction that squeezes the
+boxes sideways, and its boxes do not break.
 """
 
 
