@@ -47,6 +47,12 @@ def number_in(
     return number
 
 
+def residual_given(value: Any, what: str, zero: bool = False) -> float:
+    """A residual [-] of a run, above zero or ``zero`` as well; else `SceneError`."""
+    remedy = "give a positive number, say 1e-9" + (", or 0" if zero else "")
+    return number_in(value, 0.0, inf, what, "Simulation", remedy, above=not zero)
+
+
 def whole_in(value: Any, least: int, what: str, where: str, remedy: str) -> int:
     """A whole number of ``least`` or more; else `SceneError`."""
     sound = isinstance(value, Integral) and not isinstance(value, bool)

@@ -20,7 +20,13 @@ from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.motion import Motion
 from rigid_lcp.runge_kutta import Pace, runge_kutta_advance
 from rigid_lcp.scene import Scene, world_of
-from rigid_lcp.scene_input import CheckedLoads, Loads, body_given, seconds_given
+from rigid_lcp.scene_input import (
+    CheckedLoads,
+    Loads,
+    body_given,
+    residual_given,
+    seconds_given,
+)
 from rigid_lcp.time_stepping import contact_forces, moreau_step
 from rigid_lcp.unique_forces import unique_forces
 from rigid_lcp.wear import Wear, scene_worn, wear_after_break, wear_start, wear_step
@@ -62,7 +68,18 @@ class Simulation:
             raise UsageError(
                 f"method is {method!r}", remedy="give 'time-stepping' or 'acceleration'"
             )
+        if not isinstance(scene, Scene):
+            raise SceneError(f"the scene is {scene!r}", remedy="give a rigid_lcp.Scene")
         step = seconds_given(step, "step", least=SHORTEST_STEP)
+        tolerance = residual_given(tolerance, "tolerance")
+        accept = residual_given(accept, "accept", zero=True)
+        give_up = residual_given(give_up, "give_up")
+        for given, kind, what in ((wear, Wear, "wear"), (breakage, Breakage, "breakage")):
+            if given is not None and not isinstance(given, kind):
+                raise SceneError(
+                    f"{what} is {given!r}", where="Simulation",
+                    remedy=f"give a rigid_lcp.{kind.__name__}, or None",
+                )  # fmt: skip
         if loads is not None and not callable(loads):
             raise UsageError("loads are no function", remedy="give loads(time, motion)")
         if method == "acceleration" and (wear is not None or breakage is not None):

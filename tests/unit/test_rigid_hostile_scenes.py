@@ -133,6 +133,23 @@ def test_no_time_is_no_step(method):
     assert (run.time, run.steps) == (1e-5, 1)
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        *({what: bad} for what in ("tolerance", "accept", "give_up") for bad in (-1, np.nan, "a")),
+        {"tolerance": 0}, {"give_up": 0}, {"wear": 1e-9}, {"wear": "x"}, {"breakage": 1.0},
+    ],
+)  # fmt: skip
+def test_residuals_wear_and_breakage_that_are_none_are_named(given):
+    with pytest.raises(SceneError, match=next(iter(given))):
+        at_rest(**given)
+
+
+def test_a_run_of_no_scene_is_refused():
+    with pytest.raises(SceneError, match="give a rigid_lcp"):
+        Simulation(None)
+
+
 @pytest.mark.parametrize("step", [0, -1e-3, np.nan, np.inf, "1", 1e-300])
 def test_a_step_that_is_none_is_named(step):
     with pytest.raises(UsageError, match="step is"):

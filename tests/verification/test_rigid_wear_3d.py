@@ -135,11 +135,15 @@ def test_depth_of_a_cut_in_closed_form(share):
 
 @settings(max_examples=25, deadline=None)
 @given(
-    seed=st.integers(0, 10**6), share=st.floats(1e-9, 0.1),
+    seed=st.integers(0, 10**6), share=st.floats(1e-9, 0.03),
     form=st.sampled_from(["stone", "needle", "sliver", "tetrahedron", "plate"]),
 )  # fmt: skip
 def test_worn_polyhedra_lose_exactly_what_they_shall(seed, share, form):
-    """Any polyhedron, worn at any features, repeatedly: volume to round-off, inside the first."""
+    """Any polyhedron, worn at any features, repeatedly: volume to round-off, inside the first.
+
+    Twelve shares are 0.36 of the grain at most, so that no cut takes half of what is left: what
+    waits at one feature, y, and what went before, x, have y <= 0.36 - x < (1 - x) / 2.
+    """
     rng = np.random.default_rng(seed)
     shape = {
         "stone": lambda: ballast_stone(rng, 1.0),
