@@ -18,7 +18,7 @@ demo-rigid: setup
 
 test:
 	@./setup.sh test
-	$(bin)/python -m pytest
+	$(bin)/python -m pytest -n 2 --dist worksteal
 
 lint:
 	@./setup.sh lint

@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from errno import EDQUOT, EFBIG, ENOSPC
 from importlib import import_module
 from textwrap import wrap
 
@@ -30,7 +31,7 @@ VERBS = {
 
 EXIT_CODES = """\
 exit codes:
-  0  ok                     5  engine failed
+  0  ok                     5  engine failed, or disk full
   1  bug in trackbed        6  result not credible
   2  usage                  7  not converged
   3  scene invalid        130  interrupted, state saved
@@ -108,7 +109,7 @@ def explained(error: BaseException) -> tuple[str, int]:
     if isinstance(error, ImportError) and (why := import_failed(error)):
         return why, 4
     if isinstance(error, OSError):
-        return str(error), 2
+        return str(error), 5 if error.errno in (ENOSPC, EDQUOT, EFBIG) else 2
     return (
         f"{type(error).__name__}: {error}\n  -> this is a bug in trackbed; run again with --debug "
         "and report the traceback",

@@ -53,6 +53,12 @@ class LibraryMissing(QdemError):
     exit_code = 4
 
 
+class DiskFull(QdemError):
+    """There is no room for what a run writes: the disk or the quota is full, or a file too long."""
+
+    exit_code = 5
+
+
 class Unstable(QdemError):
     """The motion grew without bound: the time step is above the critical one."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from errno import EDQUOT, EFBIG, ENOSPC
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -16,20 +17,22 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.errors import UsageError
+from qdem_fem.errors import DiskFull, UsageError
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 TETRAHEDRON = 10
 """VTK's number of the linear tetrahedron."""
+NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
+"""No space on the disk, none left in the user's quota, or a longer file than is allowed."""
 VTK_TYPES = {"float64": "Float64", "float32": "Float32", "int64": "Int64", "uint8": "UInt8"}
 
 
 def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
     """Write a file: whatever kills the writer leaves the old file or the new, never a part.
 
-    Raises `UsageError` when the system refuses.
+    Raises `DiskFull` when there is no room, `UsageError` when the system refuses otherwise.
     """
     temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
     parts: Iterable[bytes]
@@ -51,9 +54,10 @@ def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
             temporary.unlink(missing_ok=True)
 
 
-def can_not_write(path: Path, error: OSError) -> UsageError:
+def can_not_write(path: Path, error: OSError) -> DiskFull | UsageError:
     """What to raise when the system refuses to write: no space, no permission, no folder."""
-    return UsageError(
+    refusal = DiskFull if error.errno in NO_ROOM else UsageError
+    return refusal(
         f"can not be written ({error.strerror or error})",
         where=str(path),
         remedy="make room or leave to write there, or give another folder",

@@ -32,7 +32,6 @@ from rigid_lcp.body_matrix import (
     contact_stiffness,
     dense_delassus,
     force_left,
-    jacobian_blocks,
     multiply_blocks,
 )
 from rigid_lcp.elimination_tree import EliminationTree, elimination_tree
@@ -152,12 +151,9 @@ class BodyFactorisation:
     def __init__(self, problem: FrictionProblem) -> None:
         assert problem.bodies is not None
         space, size = problem.bodies, problem.bodies.body_size
-        rows = space.jacobian
-        bodies = self.bodies = rows.shape[1] // size
+        bodies = self.bodies = space.jacobian.shape[1] // size
         self.dim = problem.dim
-        self.first, self.body, self.block = jacobian_blocks(
-            rows.indptr, rows.indices, rows.data, problem.dim, size
-        )
+        self.first, self.body, self.block = problem.body_jacobians
         own = np.arange(bodies) * (bodies + 1)
         key = np.concatenate([own, body_pairs(self.first, self.body, bodies)])
         found, places = np.unique(key, return_inverse=True)

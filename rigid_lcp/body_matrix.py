@@ -25,21 +25,27 @@ def jacobian_blocks(
     contacts = (len(start) - 1) // dim
     first = np.zeros(contacts + 1, dtype=np.int64)
     body = np.empty(len(index), dtype=np.int64)
-    block = np.zeros((len(index), dim, size))
+    place = np.empty(len(index), dtype=np.int64)
     count = 0
+    for c in range(contacts):
+        at = count
+        for k in range(start[c * dim], start[c * dim + dim]):
+            moved = index[k] // size
+            if at == count or body[at] != moved:  # entries of a body lie side by side, mostly
+                at = first[c]
+                while at < count and body[at] != moved:
+                    at += 1
+                if at == count:
+                    body[at] = moved
+                    count += 1
+            place[k] = at
+        first[c + 1] = count
+    block = np.zeros((count, dim, size))
     for c in range(contacts):
         for i in range(dim):
             for k in range(start[c * dim + i], start[c * dim + i + 1]):
-                moved = index[k] // size
-                place = first[c]
-                while place < count and body[place] != moved:
-                    place += 1
-                if place == count:
-                    body[place] = moved
-                    count += 1
-                block[place, i, index[k] - moved * size] += value[k]
-        first[c + 1] = count
-    return first, body[:count].copy(), block[:count].copy()
+                block[place[k], i, index[k] - body[place[k]] * size] += value[k]
+    return first, body[:count].copy(), block
 
 
 @njit(cache=True)

@@ -29,25 +29,6 @@ COUPLED = 0.999
 """Greatest ``mu |W_NT| / W_NN`` at which the sign of sliding is told without a test."""
 
 
-def contacts_packed(block: Floats, local: Floats, offset: Floats, friction: Floats) -> Floats:
-    """All that a visit reads of a contact, in one row.
-
-    In 2D (nc, 21): B_N of both bodies (6), B_T (6), q (2), W_cc as NN, NT, TT, its inverse in the
-    same order, mu; in 3D (nc, 52): B_N, B_1, B_2 of both bodies (36), q (3), the upper triangles
-    of W_cc and of its inverse by rows (6 each), mu.  W_cc = B B^T is symmetric.
-    """
-    contacts, dim = offset.shape
-    upper = np.triu_indices(dim)
-    inverse = inverses(local, friction)
-    return np.concatenate(
-        [
-            block.transpose(0, 2, 1, 3).reshape(contacts, -1), offset,
-            local[:, upper[0], upper[1]], inverse[:, upper[0], upper[1]], friction[:, None],
-        ],
-        axis=1,
-    )  # fmt: skip
-
-
 @njit(cache=True)
 def inverses(local: Floats, friction: Floats) -> Floats:
     """W_cc^-1 of every block (nc, dim, dim); zeros where the general solution has to be used."""
@@ -76,6 +57,36 @@ def inverses(local: Floats, friction: Floats) -> Floats:
 
 
 @njit(cache=True)
+def contacts_packed(block: Floats, local: Floats, offset: Floats, friction: Floats) -> Floats:
+    """All that a visit reads of a contact, in one row.
+
+    In 2D (nc, 21): B_N of both bodies (6), B_T (6), q (2), W_cc as NN, NT, TT, its inverse in the
+    same order, mu; in 3D (nc, 52): B_N, B_1, B_2 of both bodies (36), q (3), the upper triangles
+    of W_cc and of its inverse by rows (6 each), mu.  W_cc = B B^T is symmetric.
+    """
+    contacts, dim = offset.shape
+    size, upper = block.shape[3], dim * (dim + 1) // 2
+    inverse = inverses(local, friction)
+    packed = np.empty((contacts, 2 * dim * size + dim + 2 * upper + 1))
+    for c in range(contacts):
+        at = 0
+        for i in range(dim):
+            for side in range(2):
+                for m in range(size):
+                    packed[c, at] = block[c, side, i, m]
+                    at += 1
+        for i in range(dim):
+            packed[c, at] = offset[c, i]
+            at += 1
+        for i in range(dim):
+            for j in range(i, dim):
+                packed[c, at], packed[c, at + upper] = local[c, i, j], inverse[c, i, j]
+                at += 1
+        packed[c, at + upper] = friction[c]
+    return packed
+
+
+@njit(cache=True)
 def sweep_bodies_2d(
     body: Integers, packed: Floats, local: Floats, force: Floats, last: Floats, velocity: Floats,
     part: float, visit: Integers,
@@ -88,8 +99,9 @@ def sweep_bodies_2d(
     positive if the sweep went against the way made.
     """
     stuck, product, square = 0, 0.0, 0.0
-    for c in visit:
-        a, b, p = body[c, 0], body[c, 1], packed[c]
+    for place in visit:
+        c = np.uint64(place)  # a number without a sign is not tested for counting from the end
+        a, b, p = np.uint64(body[c, 0]), np.uint64(body[c, 1]), packed[c]
         x_n, x_t = force[c, 0], force[c, 1]
         y_n, y_t = x_n + part * (x_n - last[c, 0]), x_t + part * (x_t - last[c, 1])
         a_0, a_1, a_2 = velocity[a, 0], velocity[a, 1], velocity[a, 2]
@@ -132,8 +144,9 @@ def sweep_bodies_3d(
 ) -> tuple[int, float, float]:  # fmt: skip
     """`sweep_bodies_2d` in space."""
     stuck, product, square = 0, 0.0, 0.0
-    for c in visit:
-        a, b, p = body[c, 0], body[c, 1], packed[c]
+    for place in visit:
+        c = np.uint64(place)
+        a, b, p = np.uint64(body[c, 0]), np.uint64(body[c, 1]), packed[c]
         x_n, x_1, x_2 = force[c, 0], force[c, 1], force[c, 2]
         y_n, y_1 = x_n + part * (x_n - last[c, 0]), x_1 + part * (x_1 - last[c, 1])
         y_2 = x_2 + part * (x_2 - last[c, 2])

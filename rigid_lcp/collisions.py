@@ -1,6 +1,6 @@
 """Collisions (section 7): impulses of hard grains that approach at their contacts, all at once.
 
-Where a contact approaches, no finite force stops it in time, only an impulse (eq. 32).  The seed's
+Where a contact approaches, no finite force stops it in time, only an impulse (eq. 32).  The paper's
 assumptions: all pairs collide at once; impulses push; a contact leaves at least at ``-eps v``; one
 that leaves faster had no impulse.  With the excess velocity ``dv = v' + eps v`` (eq. 34) that is
 
@@ -186,14 +186,6 @@ def impulses_of(problem: FrictionProblem, tolerance: float) -> FrictionSolution:
         problem.bodies, problem.offset, problem.friction, problem.dim, tolerance=tolerance
     )
     return solution
-
-
-def kinetic_energy(bodies: BodySpace, velocity: Floats) -> float:
-    """``v M v / 2`` [J] of all bodies; freedoms of infinite mass (M^-1 = 0) have none."""
-    inverse = bodies.inverse_mass.toarray()
-    moves = np.flatnonzero(inverse.any(axis=1))
-    v = velocity[moves]
-    return 0.5 * float(v @ np.linalg.solve(inverse[np.ix_(moves, moves)], v))
 
 
 def _moving(bodies: BodySpace, velocity: ArrayLike) -> tuple[int, Floats]:

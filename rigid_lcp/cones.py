@@ -1,4 +1,4 @@
-"""Coulomb's law as complementarity on cones: projections and the natural map.
+"""Coulomb's law as complementarity on cones: the natural map and the error of a solution.
 
 With ``K = {r_N >= 0, |r_T| <= mu r_N}`` and its dual ``K* = {s_N >= mu |s_T|}``, a force r and a
 relative velocity (or acceleration) u obey Signorini's condition and Coulomb's law (eq. 27) if and
@@ -16,46 +16,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-
-
-@njit(cache=True)
-def project_cone(normal: float, tangential: float, mu: float) -> tuple[float, float]:
-    """Nearest point of the cone ``t <= mu n`` to ``(n, t)``, ``t = |r_T| >= 0``; returns it."""
-    if mu * tangential <= -normal:  # first: with mu = 0 the other test holds below the cone too
-        return 0.0, 0.0
-    if tangential <= mu * normal:
-        return normal, tangential
-    nearest = (normal + mu * tangential) / (1.0 + mu * mu)
-    return nearest, mu * nearest
-
-
-@njit(cache=True)
-def project_cones(points: Floats, mu: Floats) -> Floats:
-    """Project every contact's vector onto its Coulomb cone; ``points`` (nc, dim), ``mu`` (nc,)."""
-    projected = np.zeros_like(points)
-    for c in range(points.shape[0]):
-        squares = 0.0
-        for k in range(1, points.shape[1]):
-            squares += points[c, k] ** 2
-        tangential = np.sqrt(squares)
-        normal, allowed = project_cone(points[c, 0], tangential, mu[c])
-        projected[c, 0] = normal
-        if allowed > 0.0:
-            for k in range(1, points.shape[1]):
-                projected[c, k] = points[c, k] * (allowed / tangential)
-    return projected
-
-
-@njit(cache=True)
-def dual_velocity(velocity: Floats, mu: Floats) -> Floats:
-    """``u + mu |u_T| n`` of every contact (De Saxce); ``velocity`` (nc, dim), ``mu`` (nc,)."""
-    shifted = velocity.copy()
-    for c in range(velocity.shape[0]):
-        squares = 0.0
-        for k in range(1, velocity.shape[1]):
-            squares += velocity[c, k] ** 2
-        shifted[c, 0] += mu[c] * np.sqrt(squares)
-    return shifted
 
 
 @njit(cache=True)

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
 
-from rigid_lcp.body_matrix import diagonal_blocks, jacobian_blocks
+from rigid_lcp.body_matrix import diagonal_blocks
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem
 
 Floats = NDArray[np.float64]
@@ -51,11 +51,16 @@ class BodyBlocks:
 def add_impulses(body: Integers, block: Floats, force: Floats, velocity: Floats) -> None:
     """``w += B^T r``: changes ``velocity`` (bodies + 1, size) by the forces (nc, dim)."""
     for c in range(len(body)):
+        bears = False  # few contacts of a bed in motion do
+        for i in range(force.shape[1]):
+            bears = bears or force[c, i] != 0.0
+        if not bears:
+            continue
         for side in range(2):
-            target = velocity[body[c, side]]
+            moved = body[c, side]
             for i in range(force.shape[1]):
-                for k in range(len(target)):
-                    target[k] += block[c, side, i, k] * force[c, i]
+                for k in range(velocity.shape[1]):
+                    velocity[moved, k] += block[c, side, i, k] * force[c, i]
 
 
 @njit(cache=True)
@@ -64,10 +69,10 @@ def velocities_relative(body: Integers, block: Floats, velocity: Floats) -> Floa
     relative = np.zeros((len(body), block.shape[2]))
     for c in range(len(body)):
         for side in range(2):
-            source = velocity[body[c, side]]
+            moved = body[c, side]
             for i in range(relative.shape[1]):
-                for k in range(len(source)):
-                    relative[c, i] += block[c, side, i, k] * source[k]
+                for k in range(velocity.shape[1]):
+                    relative[c, i] += block[c, side, i, k] * velocity[moved, k]
     return relative
 
 
@@ -87,15 +92,13 @@ def body_blocks(problem: FrictionProblem) -> BodyBlocks | None:
     None too if M^-1 is not positive semi-definite.
     """
     space = problem.bodies
-    size, dim, contacts = 3 * problem.dim - 3, problem.dim, problem.contacts
+    size, contacts = 3 * problem.dim - 3, problem.contacts
     if space is None or space.body_size != size or space.jacobian.shape[1] % size or not contacts:
         return None
     root = inverse_mass_root(space)
     if root is None:
         return None
-    rows = space.jacobian
-    first, moved, part = jacobian_blocks(rows.indptr, rows.indices, rows.data, dim, size)
-    laid_out = pairs_of_blocks(first, moved, part, root)
+    laid_out = pairs_of_blocks(*problem.body_jacobians, root)
     if laid_out is None:
         return None
     return BodyBlocks(*laid_out, len(root))
@@ -112,25 +115,47 @@ def pairs_of_blocks(
     contacts, (dim, size) = len(first) - 1, part.shape[1:]
     body = np.full((contacts, 2), len(root))
     block, local = np.zeros((contacts, 2, dim, size)), np.zeros((contacts, dim, dim))
+    diagonal = True
+    for b in range(len(root)):
+        for m in range(size):
+            for n in range(size):
+                diagonal = diagonal and (m == n or root[b, m, n] == 0.0)
     for c in range(contacts):
         side = 0
         for k in range(first[c], first[c + 1]):
-            if not part[k].any():
+            if not moves(part[k]):
                 continue
             if side == 2:
                 return None
             body[c, side] = moved[k]
-            own = block[c, side]
             for i in range(dim):
                 for m in range(size):
-                    if part[k, i, m] != 0.0:
-                        own[i] += part[k, i, m] * root[moved[k], m]
+                    value = part[k, i, m]
+                    if diagonal:
+                        block[c, side, i, m] = value * root[moved[k], m, m]
+                    elif value != 0.0:
+                        for n in range(size):
+                            block[c, side, i, n] += value * root[moved[k], m, n]
             for i in range(dim):
-                for j in range(dim):
+                for j in range(i + 1):
+                    total = 0.0
                     for m in range(size):
-                        local[c, i, j] += own[i, m] * own[j, m]
+                        total += block[c, side, i, m] * block[c, side, j, m]
+                    local[c, i, j] += total
+                    if j < i:
+                        local[c, j, i] += total
             side += 1
     return body, block, local
+
+
+@njit(cache=True)
+def moves(part: Floats) -> bool:
+    """Whether a block of J has an entry that is not zero."""
+    for i in range(part.shape[0]):
+        for m in range(part.shape[1]):
+            if part[i, m] != 0.0:
+                return True
+    return False
 
 
 def inverse_mass_root(space: BodySpace) -> Floats | None:

@@ -25,9 +25,18 @@ Integers = NDArray[np.int64]
 GROWTH = 1.5
 """Momentum starts again when a sweep changes the forces by so many times the least change since
 it last did: without this large beds (10,000 contacts) swing on at 1e-4, as nothing turns back."""
-CHECK_EVERY = 0.1
-"""The residual costs about a sweep: it is taken when the sweeps have grown by this part, and when
-the change a sweep makes has fallen as far as the residual should."""
+CHECK_EVERY, CHECK_AFTER = 0.1, 5.0
+"""The residual costs about a sweep: it is taken when the sweeps have grown by this part, and by so
+many at least, and when the change a sweep makes has fallen as far as the residual should."""
+
+
+MANY_CONTACTS, ALL_EVERY = 2000, 10
+"""From so many contacts on only one sweep of so many goes over all of them, and the others over
+those that bear: beds in motion have two open contacts for one that does."""
+STALLED, STALLS = 100.0, 0.7
+"""Where the sweeps since the last look, so many at least and as many as all before, leave more than
+this part of the residual, the order is turned round: in one order sweeps may go round in circles,
+at a few contacts that slide, which in the other they leave at once."""
 
 
 class SweepBlocks(NamedTuple):
@@ -56,7 +65,8 @@ class Momentum(NamedTuple):
     """``w = B^T r`` of the bodies (`BodyBlocks`)."""
     last_velocity: Floats
     tally: Floats
-    """Sweeps done, Nesterov's time t_k, least change since the restart, last change."""
+    """Sweeps done (a sweep over some counts as their share of all contacts), Nesterov's time t_k,
+    least change since the restart, last change."""
 
 
 @njit(cache=True)
@@ -107,7 +117,7 @@ def sweep_once(
     stuck, product, square = visit_all(
         blocks, force, last, state.velocity, part, backward if back else visit
     )
-    tally[0] += 1.0
+    tally[0] += len(visit) / len(force)
     if momentum and (not symmetric or back):
         tally[3] = np.sqrt(square)
         tally[2] = min(tally[2], tally[3])
@@ -127,17 +137,31 @@ def sweeps_until(
     """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done in all.
 
     Returns the best forces of those looked at, their residual, and the contacts without an answer
-    in the last sweep.
+    in the last sweep over all.
     """
     best, stuck, enough = force.copy(), 0, 0.0
     best_residual = residual_of(blocks, force)
+    mark, marked = best_residual, 0.0
+    some = momentum and not symmetric and len(visit) >= MANY_CONTACTS
+    count, carry = 0, visit
     while best_residual > tolerance and state.tally[0] < sweeps:
         done = state.tally[0]
-        check = min(float(sweeps), done + max(1.0, np.ceil(CHECK_EVERY * done)))
+        check = min(float(sweeps), done + max(CHECK_AFTER, np.ceil(CHECK_EVERY * done)))
         while state.tally[0] < check:
-            stuck = sweep_once(blocks, state, force, visit, backward, symmetric, momentum)
+            if some and count % ALL_EVERY > 0:
+                sweep_once(blocks, state, force, carry, carry, symmetric, momentum)
+            else:
+                stuck = sweep_once(blocks, state, force, visit, backward, symmetric, momentum)
+                if some:
+                    carry = carrying(force, state.last, visit)
+            count += 1
             if state.tally[3] <= enough:
                 break
+        if momentum and state.tally[0] >= max(STALLED, 2.0 * marked):
+            if best_residual > STALLS * mark:
+                visit, backward, count = backward, visit, 0
+                state.tally[1], state.tally[2] = 1.0, np.inf
+            mark, marked = best_residual, state.tally[0]
         residual = residual_of(blocks, force)
         if not np.isfinite(residual):
             break
@@ -147,6 +171,20 @@ def sweeps_until(
         if momentum and residual > 0.0:
             enough = state.tally[3] * min(0.9, tolerance / residual)
     return best, best_residual, stuck
+
+
+@njit(cache=True)
+def carrying(force: Floats, last: Floats, visit: Integers) -> Integers:
+    """Those of the contacts ``visit`` that bear, or did before the last sweep, in their order."""
+    found, count = np.empty_like(visit), 0
+    for c in visit:
+        bears = False
+        for k in range(force.shape[1]):
+            bears = bears or force[c, k] != 0.0 or last[c, k] != 0.0
+        if bears:
+            found[count] = c
+            count += 1
+    return found[:count]
 
 
 @njit(cache=True)

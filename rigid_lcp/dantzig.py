@@ -1,4 +1,4 @@
-"""The seed's modified Dantzig algorithm (section 6): exact forces in 2D, contact after contact.
+"""The paper's modified Dantzig algorithm (section 6): exact forces in 2D, contact after contact.
 
 The contacts are considered one by one.  All before are consistent (eq. 27), each on its list:
 
@@ -17,7 +17,7 @@ What it can and can not do: a settled packing of discs, 227 contacts, solved of 
 contacts (pivots, CPU time of one thread, provisional):
 
 =====  =====================  ======================  ==========================================
-mu     driven as in the seed  with reversal           what stops it
+mu     as in the paper        with reversal           what stops it
 =====  =====================  ======================  ==========================================
 0      10  (290, 0.01 s)      10  (290, 0.01 s)
 0.1    9   (1210, 0.05 s)     10  (1230, 0.05 s)      cycle
@@ -33,7 +33,7 @@ sliding columns the matrix of eq. 28 need not have positive principal minors.  T
 
 Redundant contacts make eq. 28 singular, ties (b = 0, symmetric piles) make lists cycle: a shift of
 A and a perturbation of b, in the range of A, prevent that, and are driven out at the end
-(`rigid_lcp.pivot_shift`).  A pivot costs O(k^2) for k unknown forces, the seed's way O(k^3).
+(`rigid_lcp.pivot_shift`).  A pivot costs O(k^2) for k unknown forces, the paper's way O(k^3).
 """
 
 from __future__ import annotations
@@ -112,13 +112,13 @@ def dantzig(
     max_pivots: int | None = None,
     trace: list[Event] | None = None,
 ) -> FrictionSolution:
-    """Solve a 2D friction problem by the seed's modified Dantzig algorithm (section 6).
+    """Solve a 2D friction problem by the paper's modified Dantzig algorithm (section 6).
 
     ``start`` is not used: the algorithm begins with no forces.  ``order`` (nc,): the contacts in
     the order they are considered in (default: as numbered).  ``tangential_velocity`` u_T (nc,)
     [m/s]: where it is not zero the contact slides already, friction opposes u_T, and the contact
     can not become static (event 3c); the residual is then that of ``f_T = -sign(u_T) mu f_N``.
-    ``reversal``: after an event the driven force may fall as well (Keller's path), which the seed
+    ``reversal``: after an event the driven force may fall as well (Keller's path), which the paper
     does not do.  ``perturbation``: of b, relative to its size, against ties; removed at the end.
     ``shift``: added to the diagonal, relative to its mean, against redundance; removed at the end.
     ``max_pivots``: most changes of lists (default 40 a contact).  ``trace``: a list that takes

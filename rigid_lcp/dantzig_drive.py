@@ -1,4 +1,4 @@
-"""Steps 2 to 4 of the seed's section 6 as kernels: drive a force and keep every contact consistent.
+"""Steps 2 to 4 of the paper's section 6 as kernels: drive a force, keep every contact consistent.
 
 A drive increases one parameter s: the normal force of a new contact, then its tangential force, or
 the share of a change of b (`rigid_lcp.pivoting` lives on that).  ``rate`` is what the driven

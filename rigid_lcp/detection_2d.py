@@ -96,11 +96,11 @@ def detect_2d(
     of the contacts depends on the numbers of the bodies only.  Friction and restitution are zero:
     they belong to the scene.
     """
-    margins = np.ascontiguousarray(np.broadcast_to(np.asarray(margin, float), (len(shapes.kind),)))
+    margins = np.full(len(shapes.kind), margin, dtype=float)
     position = np.ascontiguousarray(position)
     vertices, normals = place_shapes(shapes.kind, shapes.first, shapes.vertices, shapes.normals,
                                      position, angle)  # fmt: skip
-    boxes = bounding_boxes(shapes.kind, shapes.first, vertices, shapes.radius, position, margins)
+    boxes = bounding_boxes(shapes.first, vertices, shapes.radius, position, margins)
     pairs = near_pairs(shapes.kind, boxes, shapes.movable)
     bodies, numbers, key = pair_contacts(
         pairs, shapes.kind, shapes.first, vertices, normals, shapes.radius, position, margins

@@ -23,7 +23,7 @@ from rigid_lcp.manifold_3d import (
     add_candidate,
     four_of,
 )
-from rigid_lcp.near_pairs import HALF_SPACE, near_pairs
+from rigid_lcp.near_pairs import HALF_SPACE, bounding_boxes, near_pairs
 from rigid_lcp.placed_solids import (
     BODY_BITS,
     FEATURE_BITS,
@@ -53,10 +53,10 @@ def detect_3d(
     order of the contacts depends on the numbers of the bodies only.  Friction and restitution are
     zero: they belong to the scene.
     """
-    margins = np.ascontiguousarray(np.broadcast_to(np.asarray(margin, float), (len(shapes.kind),)))
+    margins = np.full(len(shapes.kind), margin, dtype=float)
     position = np.ascontiguousarray(position, dtype=float)
     solids = place_solids(shapes, position, quaternion)
-    boxes = bounding_boxes(shapes.kind, solids, shapes.reach, position, margins)
+    boxes = bounding_boxes(solids.first_vertex, solids.vertex, shapes.reach, position, margins)
     pairs = near_pairs(shapes.kind, boxes, shapes.movable)
     bodies, numbers, key = pair_contacts(
         pairs, shapes.kind, solids, shapes.reach, position, margins, boxes
@@ -95,25 +95,6 @@ def edge_directions(kind: Ints, solids: Solids, bodies: Ints, key: Ints) -> tupl
         along = solids.vertex[second] - solids.vertex[first]
         directions[side, rows] = along / np.linalg.norm(along, axis=1)[:, None]
     return directions[0], directions[1]
-
-
-@njit(cache=True)
-def bounding_boxes(
-    kind: Ints, solids: Solids, reach: Floats, position: Floats, margin: Floats
-) -> Floats:
-    """Boxes around polyhedra and spheres, swollen by their margins, (n, 6)."""
-    boxes = np.empty((len(kind), 6))
-    for body in range(len(kind)):
-        for axis in range(3):
-            low, high = position[body, axis] - reach[body], position[body, axis] + reach[body]
-            if kind[body] == POLYHEDRON:
-                low, high = np.inf, -np.inf
-                for v in range(solids.first_vertex[body], solids.first_vertex[body + 1]):
-                    low = min(low, solids.vertex[v, axis])
-                    high = max(high, solids.vertex[v, axis])
-            boxes[body, axis] = low - margin[body]
-            boxes[body, 3 + axis] = high + margin[body]
-    return boxes
 
 
 @njit(cache=True)

@@ -47,6 +47,15 @@ class LibraryMissing(RigidError):
     exit_code = 4
 
 
+class DiskFull(RigidError):
+    """There is no room for what a run writes: the disk or the quota is full, or a file too long.
+
+    Everything finished is saved; with room again the run goes on.
+    """
+
+    exit_code = 5
+
+
 class Overlapping(RigidError):
     """Bodies overlap, at the start or by a step that no smaller step could mend."""
 

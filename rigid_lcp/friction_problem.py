@@ -14,14 +14,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.body_matrix import diagonal_blocks
+from rigid_lcp.body_matrix import diagonal_blocks, jacobian_blocks
 from rigid_lcp.cones import length, natural_map, natural_residual
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.problem_input import check_factors, finite_numbers, in_range, matrix_given
 from rigid_lcp.sparse_products import factors_product, row_forms, rows_product
 
 Floats = NDArray[np.float64]
-Integers = NDArray[np.int32]
+Integers = NDArray[np.int64]
 Status = Literal["solved", "not converged", "no solution", "cycled", "singular"]
 """What became of a problem: ``no solution`` is a proof (a ray), the others are not."""
 
@@ -114,6 +114,16 @@ class FrictionProblem:
         return self.bodies.matrix
 
     @cached_property
+    def body_jacobians(self) -> tuple[Integers, Integers, Floats]:
+        """J of the bodies in blocks: ``first``, ``body``, ``block`` (`rigid_lcp.body_matrix`)."""
+        assert self.bodies is not None
+        rows = self.bodies.jacobian
+        made: tuple[Integers, Integers, Floats] = jacobian_blocks(
+            rows.indptr, rows.indices, rows.data, self.dim, self.bodies.body_size
+        )
+        return made
+
+    @cached_property
     def diagonal(self) -> Floats:
         """The diagonal of W, (nc * dim,)."""
         return self.bodies.diagonal if self.bodies is not None else self.delassus.diagonal()
@@ -154,6 +164,11 @@ class FrictionProblem:
             self.friction, self.rho,
         )  # fmt: skip
 
+    def mended(self, force: Floats, residual: float) -> bool:
+        """Whether forces of this residual leave little of the error without forces."""
+        left = max(residual, ROUND_OFF) * length(force)
+        return left <= SHARE_LEFT * self.error_without_forces
+
 
 @dataclass(frozen=True)
 class FrictionSolution:
@@ -188,17 +203,18 @@ def friction_solution(
     *,
     status: Status = "not converged",
     message: str = "",
+    velocity: Floats | None = None,
 ) -> FrictionSolution:
     """Judge forces by their residual: ``solved`` at or below ``tolerance``, else ``status``.
 
     Forces that grow without bound in a problem that has no solution make the residual, which is
     relative to them, as small as one likes: they are not ``solved`` unless they also leave less
-    than `SHARE_LEFT` of the error that no forces have.
+    than `SHARE_LEFT` of the error that no forces have (`FrictionProblem.mended`).  ``velocity``:
+    ``W r + q``, where it is known already.
     """
-    velocity = problem.velocity(force)
+    velocity = problem.velocity(force) if velocity is None else velocity
     residual = problem.residual(force, velocity)
-    left = max(residual, ROUND_OFF) * length(force)
-    solved = residual <= tolerance and left <= SHARE_LEFT * problem.error_without_forces
+    solved = residual <= tolerance and problem.mended(force, residual)
     if not solved and not message and residual <= tolerance:
         message = (
             f"{method}: forces grow without bound ({float(np.abs(force).max()):.1g}) and mend"

@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
+from rigid_lcp.body_matrix import diagonal_blocks
 from rigid_lcp.friction_problem import (
     BodySpace,
     FrictionProblem,
@@ -28,6 +29,8 @@ from rigid_lcp.local_contact import NONE, contacts_apart
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Indices = NDArray[Any]
+Flags = NDArray[np.bool_]
 Method = Callable[..., FrictionSolution]
 
 ROUNDS = 4
@@ -40,29 +43,79 @@ def islands(problem: FrictionProblem) -> list[Integers]:
     if contacts == 0:
         return []
     if problem.bodies is not None:
-        links = contact_bodies(problem.bodies, dim)
-        graph = sp.block_array([[None, links], [links.T, None]], format="csr")
+        space = problem.bodies
+        rows = space.inverse_mass
+        mass = diagonal_blocks(rows.indptr, rows.indices, rows.data, space.body_size)
+        movable = np.asarray(mass.any(axis=(1, 2)))
+        label, count = labels_by_bodies(*problem.body_jacobians, movable)
     else:
-        graph = blocks_nonzero(problem.delassus, dim, dim)
-    _, label = connected_components(graph, directed=False)
-    _, first, island = np.unique(label[:contacts], return_index=True, return_inverse=True)
-    by_first = np.argsort(np.argsort(first))[island]
-    order = np.argsort(by_first, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(by_first[order])) + 1)
+        rows = problem.delassus
+        label, count = labels_by_contacts(rows.indptr, rows.indices, rows.data, dim)
+    if count == 1:
+        return [np.arange(contacts)]
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
 
 
-def contact_bodies(space: BodySpace, dim: int) -> sp.csr_array:
-    """Which bodies a contact moves, (nc, bodies), entries 1; a body with M^-1 = 0 is not moved."""
-    return blocks_nonzero(sp.csr_array(space.jacobian @ space.inverse_mass), dim, space.body_size)
+@njit(cache=True)
+def labels_by_bodies(
+    first: Integers, body: Integers, block: Floats, movable: Flags
+) -> tuple[Integers, int]:
+    """Number of every contact's island, (nc,), and how many there are.
+
+    J by its blocks; a body that is not ``movable`` joins nothing.
+    """
+    contacts = len(first) - 1
+    parent = np.arange(contacts + len(movable))
+    for c in range(contacts):
+        for k in range(first[c], first[c + 1]):
+            if movable[body[k]] and block[k].any():
+                join(parent, c, contacts + body[k])
+    return labels_in_order(parent, contacts)
 
 
-def blocks_nonzero(matrix: sp.csr_array, rows: int, columns: int) -> sp.csr_array:
-    """1 wherever a block (rows, columns) of the matrix has an entry that is not zero."""
-    entries = sp.coo_array(matrix)
-    kept = entries.data != 0
-    row, column = entries.coords[0][kept] // rows, entries.coords[1][kept] // columns
-    shape = (-(-matrix.shape[0] // rows), -(-matrix.shape[1] // columns))
-    return sp.csr_array((np.ones(len(row)), (row, column)), shape=shape)
+@njit(cache=True)
+def labels_by_contacts(
+    start: Indices, index: Indices, value: Floats, dim: int
+) -> tuple[Integers, int]:
+    """`labels_by_bodies` where only W is known, by rows."""
+    contacts = (len(start) - 1) // dim
+    parent = np.arange(contacts)
+    for row in range(contacts * dim):
+        for k in range(start[row], start[row + 1]):
+            if value[k] != 0.0:
+                join(parent, row // dim, index[k] // dim)
+    return labels_in_order(parent, contacts)
+
+
+@njit(cache=True)
+def join(parent: Integers, a: int, b: int) -> None:
+    """Make one tree of those of a and b; the lesser root stays (Galler and Fischer 1964)."""
+    a, b = root_of(parent, a), root_of(parent, b)
+    parent[max(a, b)] = min(a, b)
+
+
+@njit(cache=True)
+def root_of(parent: Integers, a: int) -> int:
+    """The root of a tree; the way there is halved."""
+    while parent[a] != a:
+        parent[a] = parent[parent[a]]
+        a = parent[a]
+    return a
+
+
+@njit(cache=True)
+def labels_in_order(parent: Integers, contacts: int) -> tuple[Integers, int]:
+    """Trees numbered in the order of their smallest contact, which is their root."""
+    label, count = np.empty(contacts, dtype=np.int64), 0
+    for c in range(contacts):
+        root = root_of(parent, c)
+        if root == c:
+            label[c] = count
+            count += 1
+        else:
+            label[c] = label[root]
+    return label, count
 
 
 def island_problem(problem: FrictionProblem, contacts: Integers) -> FrictionProblem:

@@ -128,13 +128,14 @@ def contact_3d(
         abs(w[1, 0]) + abs(w[2, 0])
         + mu * (abs(w[1, 1]) + abs(w[1, 2]) + abs(w[2, 1]) + abs(w[2, 2]))
     )  # fmt: skip
-    if d_1 == 0.0 and d_2 == 0.0:
-        d_1, d_2 = g_1, g_2
-    d_1, d_2, found = direction_near(g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2)
-    if found:
-        r_n = force_sliding(w, q_n, mu, g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2, size)
-        if r_n > 0.0:
-            return r_n, -mu * r_n * d_1, -mu * r_n * d_2, SLIDE
+    for start in range(2):  # from the last direction; then from that of uncoupled tangents
+        if start == 1 or (d_1 == 0.0 and d_2 == 0.0):
+            d_1, d_2 = g_1, g_2
+        d_1, d_2, found = direction_near(g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2)
+        if found:
+            r_n = force_sliding(w, q_n, mu, g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2, size)
+            if r_n > 0.0:
+                return r_n, -mu * r_n * d_1, -mu * r_n * d_2, SLIDE
     directions, count = directions_all(g_1, g_2, b_11, b_12, b_21, b_22, size)
     for k in range(count):
         d_1, d_2 = directions[k, 0], directions[k, 1]

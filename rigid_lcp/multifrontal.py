@@ -160,60 +160,83 @@ def divide_sides(square: Floats, below: Floats, beside: Floats) -> None:
 def solve_fronts(tree: EliminationTree, factors: Floats, right: Floats) -> Floats:
     """x of ``matrix x = right``, both (blocks * size,) in the caller's order."""
     size, panel, fronts = tree.size, tree.panel, len(tree.parent)
-    x = right.reshape(-1, size)[tree.order]
+    x = right.reshape(-1, size)[tree.order].ravel()
+    space = np.empty(int(np.sqrt(tree.front_most)) + 1)
     for f in range(fronts):
-        part = front_part(tree, f, x)
+        part = front_part(tree, f, x, space)
         at, m = tree.factor_start[f], len(part)
         p = (tree.first[f + 1] - tree.first[f]) * size
         for k in range(0, p, panel):
             end = min(p, k + panel)
-            square, below, _, at = panel_factors(factors, at, end - k, m - end)
-            for i in range(k, end):
-                for j in range(k, i):
-                    part[i] -= square[i - k, j - k] * part[j]
-            part[end:] -= np.dot(part[k:end], below)
+            width, beyond = end - k, m - end
+            below = at + width * width
+            for i in range(width):
+                own = part[k + i]
+                for j in range(i):
+                    own -= factors[at + i * width + j] * part[k + j]
+                part[k + i] = own
+                row = factors[below + i * beyond : below + (i + 1) * beyond]
+                take_row(part[end:], own, row)
+            at = below + 2 * width * beyond
         keep_part(tree, f, x, part)
     for f in range(fronts - 1, -1, -1):
-        part = front_part(tree, f, x)
-        at, m = tree.factor_start[f], len(part)
+        part = front_part(tree, f, x, space)
+        at, m = tree.factor_start[f + 1], len(part)
         p = (tree.first[f + 1] - tree.first[f]) * size
-        panels = np.empty((p + panel - 1) // panel, dtype=np.int64)
-        for k in range(0, p, panel):
-            panels[k // panel] = at
-            at = panel_factors(factors, at, min(p, k + panel) - k, m - min(p, k + panel))[3]
-        for number in range(len(panels) - 1, -1, -1):
-            k = number * panel
+        for k in range((p - 1) // panel * panel, -1, -panel):
             end = min(p, k + panel)
-            square, _, beside, _ = panel_factors(factors, panels[number], end - k, m - end)
-            part[k:end] -= np.dot(beside, part[end:])
-            for i in range(end - 1, k - 1, -1):
-                for j in range(i + 1, end):
-                    part[i] -= square[i - k, j - k] * part[j]
-                part[i] /= square[i - k, i - k]
+            width, beyond = end - k, m - end
+            beside = at - width * beyond
+            at = beside - width * (width + beyond)
+            for i in range(width - 1, -1, -1):
+                row = factors[beside + i * beyond : beside + (i + 1) * beyond]
+                own = part[k + i] - row_product(row, part[end:])
+                for j in range(i + 1, width):
+                    own -= factors[at + i * width + j] * part[k + j]
+                part[k + i] = own / factors[at + i * width + i]
         keep_part(tree, f, x, part)
-    solution = np.empty_like(x)
-    solution[tree.order] = x
+    solution = np.empty((len(x) // size, size))
+    solution[tree.order] = x.reshape(-1, size)
     return solution.ravel()
 
 
 @njit(cache=True)
-def front_part(tree: EliminationTree, f: int, x: Floats) -> Floats:
-    """The numbers of x (blocks, size) that a front works on."""
-    begin, end = tree.first[f], tree.first[f + 1]
+def take_row(values: Floats, share: float, row: Floats) -> None:
+    """``values -= share row``."""
+    for j in range(len(row)):
+        values[j] -= share * row[j]
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def row_product(one: Floats, two: Floats) -> float:
+    """Their inner product, in whatever order is fastest."""
+    total = 0.0
+    for j in range(len(one)):
+        total += one[j] * two[j]
+    return total
+
+
+@njit(cache=True)
+def front_part(tree: EliminationTree, f: int, x: Floats, space: Floats) -> Floats:
+    """The numbers of x (blocks * size,) that a front works on, in ``space``."""
+    size = tree.size
+    begin, end = tree.first[f] * size, tree.first[f + 1] * size
     rows = tree.rows[tree.row_start[f] : tree.row_start[f + 1]]
-    part = np.empty((end - begin + len(rows), tree.size))
+    part = space[: end - begin + len(rows) * size]
     part[: end - begin] = x[begin:end]
     for k in range(len(rows)):
-        part[end - begin + k] = x[rows[k]]
-    return part.ravel()
+        for i in range(size):
+            part[end - begin + k * size + i] = x[rows[k] * size + i]
+    return part
 
 
 @njit(cache=True)
 def keep_part(tree: EliminationTree, f: int, x: Floats, part: Floats) -> None:
     """Put back what `front_part` took."""
-    begin, end = tree.first[f], tree.first[f + 1]
+    size = tree.size
+    begin, end = tree.first[f] * size, tree.first[f + 1] * size
     rows = tree.rows[tree.row_start[f] : tree.row_start[f + 1]]
-    blocks = part.reshape(-1, tree.size)
-    x[begin:end] = blocks[: end - begin]
+    x[begin:end] = part[: end - begin]
     for k in range(len(rows)):
-        x[rows[k]] = blocks[end - begin + k]
+        for i in range(size):
+            x[rows[k] * size + i] = part[end - begin + k * size + i]

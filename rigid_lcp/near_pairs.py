@@ -37,18 +37,22 @@ def place_shapes(
 
 @njit(cache=True)
 def bounding_boxes(
-    kind: Ints, first: Ints, vertices: Floats, radius: Floats, position: Floats, margin: Floats
+    first: Ints, vertices: Floats, radius: Floats, position: Floats, margin: Floats
 ) -> Floats:
-    """Boxes around polygons and discs, swollen by their margins, (n, 4)."""
-    boxes = np.empty((len(kind), 4))
-    for body in range(len(kind)):
-        for axis in range(2):
+    """Boxes around bodies of the plane or of space, swollen by their margins [m], (n, 2 dim).
+
+    Body b has the vertices ``first[b]`` to ``first[b + 1]``, or none: it is a disc or a sphere.
+    """
+    bodies, dim = position.shape
+    boxes = np.empty((bodies, 2 * dim))
+    for body in range(bodies):
+        for axis in range(dim):
             low, high = position[body, axis] - radius[body], position[body, axis] + radius[body]
-            if kind[body] == POLYGON:
+            if first[body + 1] > first[body]:
                 low, high = np.inf, -np.inf
-                for v in range(first[body], first[body + 1]):
-                    low, high = min(low, vertices[v, axis]), max(high, vertices[v, axis])
-            boxes[body, axis], boxes[body, 2 + axis] = low - margin[body], high + margin[body]
+            for v in range(first[body], first[body + 1]):
+                low, high = min(low, vertices[v, axis]), max(high, vertices[v, axis])
+            boxes[body, axis], boxes[body, dim + axis] = low - margin[body], high + margin[body]
     return boxes
 
 

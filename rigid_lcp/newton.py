@@ -91,23 +91,25 @@ def newton(
     *,
     linear: Factorisation | None = None,
     iterations: int = ITERATIONS,
+    patience: int = PATIENCE,
 ) -> FrictionSolution:
     """Newton steps from ``start`` (zero forces if None) until the residual is small enough.
 
     Converges fast near a solution, and may go anywhere from a poor start: give it the point of
-    another method.  Where it does not better its best point in `PATIENCE` steps it goes back to
-    it and on with a greater shift, which is slower and steadier.  ``linear``: factorisations of
-    this problem's W, made if not given.
+    another method.  Where it does not halve its residual in ``patience`` steps it goes back to its
+    best point and on with a greater shift, which is slower and steadier; asked for less patience
+    than `PATIENCE` it ends there.  ``linear``: factorisations of this problem's W, made if not
+    given.
     """
     shape = (problem.contacts, problem.dim)
     linear = linear or factorisation(problem)
     rho = contact_rho(problem)
     best = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
     best_residual, done = problem.residual(best), 0
-    for shift in FIRST_SHIFTS:
+    for shift in FIRST_SHIFTS if patience >= PATIENCE else FIRST_SHIFTS[:1]:
         force, waited, mark = best, 0, best_residual
         status = np.zeros(0, dtype=np.int8)
-        while best_residual > tolerance and done < iterations and waited < PATIENCE:
+        while best_residual > tolerance and done < iterations and waited < patience:
             velocity, last = problem.velocity(force).reshape(shape), status
             f, a, b, status = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
             if np.array_equal(status, last):

@@ -1,7 +1,7 @@
 """A pivoting method that does not cycle: a path of exact solutions from an easy problem to ours.
 
 Lemke's idea (Cottle, Pang and Stone, The Linear Complementarity Problem, 1992, 4.4) on the lists
-of the seed's section 6 in place of the three or four unknowns a contact of Stewart and Trinkle
+of the paper's section 6 in place of the three or four unknowns a contact of Stewart and Trinkle
 (Int. J. Numer. Methods Eng. 39 (1996) 2673): Coulomb's law in 2D with a covering vector d,
 
     u = W r + q + lambda d,    lambda from large (or 1) down to 0.

@@ -136,7 +136,7 @@ def frame_figure(
 
 
 def picture_write(folder: RunFolder, name: str, figure: Any) -> Path:
-    """Write a figure as ``picture-NAME.png``; its path.  Raises `UsageError` as `write_whole`."""
+    """Write a figure as ``picture-NAME.png``; its path.  Raises as `write_whole`."""
     path = folder.path / f"picture-{name}.png"
     write_whole(path, pictures.figure_png(figure))
     return path

@@ -23,7 +23,7 @@ import numpy as np
 
 from rigid_lcp.contacts import ContactForces
 from rigid_lcp.damaged_files import DAMAGED
-from rigid_lcp.errors import SceneError, UsageError
+from rigid_lcp.errors import DiskFull, SceneError, UsageError
 from rigid_lcp.frame_bodies import bodies_arrays, bodies_restore
 from rigid_lcp.motion import Motion
 from rigid_lcp.runge_kutta import Pace
@@ -37,18 +37,20 @@ OURS = (
 )  # fmt: skip
 """Files of a run; what starts anew removes these and no other."""
 COUNTERS = ("time", "steps", "worst_residual", "steps_above")
-DISK_FULL = (ENOSPC, EDQUOT, EFBIG)
+NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 """No space on the disk, none left in the user's quota, or a longer file than is allowed."""
 
 
 @contextmanager
 def refusal_told(path: Path) -> Iterator[None]:
-    """`UsageError` in place of what the system raises when it refuses to write ``path``."""
+    """`DiskFull`, or `UsageError`, in place of what the system raises when it refuses to write."""
     try:
         yield
     except OSError as error:
-        room = "make room" if error.errno in DISK_FULL else "get leave to write there"
-        raise UsageError(
+        full = error.errno in NO_ROOM
+        refusal = DiskFull if full else UsageError
+        room = "make room" if full else "get leave to write there"
+        raise refusal(
             f"can not be written ({error.strerror or error})", where=str(path),
             remedy=f"{room}, then the same command with --resume goes on from the last frame; "
             "or give another --run-folder",
@@ -58,7 +60,7 @@ def refusal_told(path: Path) -> Iterator[None]:
 def write_whole(path: Path, content: bytes | str) -> None:
     """Write a file: whatever kills the writer leaves the old file or the new, never a part.
 
-    Raises `UsageError` when the system refuses.
+    Raises `DiskFull` when there is no room, `UsageError` when the system refuses otherwise.
     """
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
@@ -90,7 +92,8 @@ class RunFolder:
     def locked(self) -> Iterator[None]:
         """Hold the lock of the folder's only writer; the system drops it with the process.
 
-        Raises `UsageError` when another process has it, or the folder can not be written.
+        Raises `UsageError` when another process has it, or the folder can not be written, and
+        `DiskFull` when there is no room.
         """
         lock = self.path / ".lock"
         with refusal_told(self.path):
@@ -182,7 +185,7 @@ class RunFolder:
     def frame_write(self, number: int, run: Simulation, cpu: float) -> None:
         """Keep the state of a run as frame ``number``; ``cpu``: processor time so far [s].
 
-        Raises `UsageError` when it can not be written, or the folder is not the one we locked.
+        Raises as `write_whole`, and `UsageError` if the folder is not the one we locked.
         """
         self._refuse_if_replaced()
         arrays = {f"motion_{f.name}": getattr(run.motion, f.name) for f in fields(Motion)}

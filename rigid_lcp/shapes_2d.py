@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot, inf, pi
+from math import inf, pi
 from numbers import Integral
 
 import numpy as np
@@ -232,9 +232,3 @@ def _moments(outline: Floats) -> tuple[float, Floats, float]:
     first = np.array([((x + x1) * cross).sum(), ((y + y1) * cross).sum()]) / 6
     second = ((x * x + x * x1 + x1 * x1 + y * y + y * y1 + y1 * y1) * cross).sum() / 12
     return float(cross.sum() / 2), first, float(second)
-
-
-def longest_side(polygon: Polygon) -> float:
-    """Length of the longest side [m]."""
-    side = np.roll(polygon.vertices, -1, axis=0) - polygon.vertices
-    return max(hypot(x, y) for x, y in side)

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import ceil, nan
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.breakage import Breakage, Broken, breaks, scene_broken
 from rigid_lcp.contacts import ContactForces
-from rigid_lcp.errors import NotConverged, Overlapping, SceneError, UsageError
+from rigid_lcp.errors import NotConverged, Overlapping, SceneError
 from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.motion import Motion
 from rigid_lcp.runge_kutta import Pace, runge_kutta_advance
@@ -27,12 +26,12 @@ from rigid_lcp.scene_input import (
     residual_given,
     seconds_given,
 )
+from rigid_lcp.simulation_input import Method, check_run
 from rigid_lcp.time_stepping import contact_forces, moreau_step
 from rigid_lcp.unique_forces import unique_forces
 from rigid_lcp.wear import Wear, scene_worn, wear_after_break, wear_start, wear_step
 
 Floats = NDArray[np.float64]
-Method = Literal["time-stepping", "acceleration"]
 
 OVERLAP_AT_START = 1e-6
 """Overlap that a start may have, as a share of the smallest body's size."""
@@ -64,29 +63,11 @@ class Simulation:
         loads: Loads | None = None, wear: Wear | None = None,
         breakage: Breakage | None = None,
     ) -> None:  # fmt: skip
-        if method not in ("time-stepping", "acceleration"):
-            raise UsageError(
-                f"method is {method!r}", remedy="give 'time-stepping' or 'acceleration'"
-            )
-        if not isinstance(scene, Scene):
-            raise SceneError(f"the scene is {scene!r}", remedy="give a rigid_lcp.Scene")
+        check_run(scene, method, loads, wear, breakage)
         step = seconds_given(step, "step", least=SHORTEST_STEP)
         tolerance = residual_given(tolerance, "tolerance")
         accept = residual_given(accept, "accept", zero=True)
         give_up = residual_given(give_up, "give_up")
-        for given, kind, what in ((wear, Wear, "wear"), (breakage, Breakage, "breakage")):
-            if given is not None and not isinstance(given, kind):
-                raise SceneError(
-                    f"{what} is {given!r}", where="Simulation",
-                    remedy=f"give a rigid_lcp.{kind.__name__}, or None",
-                )  # fmt: skip
-        if loads is not None and not callable(loads):
-            raise UsageError("loads are no function", remedy="give loads(time, motion)")
-        if method == "acceleration" and (wear is not None or breakage is not None):
-            raise UsageError(
-                "bodies do not wear or break at acceleration level", where="method",
-                remedy="give method='time-stepping', or leave wear and breakage out",
-            )  # fmt: skip
         self.wear, self.breakage = wear, breakage
         self.worn = None if wear is None else wear_start(scene)
         """What corners have lost; None without wear."""

@@ -1,31 +1,7 @@
 """`solve_friction`: one call for friction problems, and the default that chooses and falls back.
 
-``auto`` takes the first point that is exact enough, and otherwise the best of all:
-
-    no forces        where nothing approaches
-    frictionless     where no contact has friction: sweeps and principal pivoting, exact; there are
-                     no tangential unknowns
-    all stick        one factorisation; exact for towers and much of what stands.  Large problems
-                     are swept a few times before, which ends what is loose or regular
-    convex path      without a start: a part of it, and Newton; solves most static piles.  Where it
-                     does not, the path is bent to Coulomb's law, and Newton again
-    Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
-                     Newton at its end: first few sweeps and factorisations, then many, as what is
-                     hard for the one is often easy for the other
-    interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
-                     goes to Newton, and if that is not enough to Gauss-Seidel and Newton again.
-                     They end after the effort that `FALLBACK_SHARE` names, or before they begin
-                     where a linear programme proves that there is no solution
-    islands          what is still not solved, each island apart, by all of this (large problems
-                     of few islands at once)
-
-Every method alone can fail on real problems: Newton far from a solution, the interior point where
-its path folds back, Gauss-Seidel on tall piles.  Together they fail seldom (`docs/rigid-solvers.md`
-counts it); there is no proof: read ``status`` and ``residual``.
-
-Cost: hundreds of sweeps or some factorisations; the interior point takes some 20 a path.  In 3D
-their fill grows fast: where one costs as much as a hundred sweeps (3D packings above some 3,000
-contacts), thousands of sweeps go first.
+``auto`` tries one method after another, what is cheap before what is dear
+(`rigid_lcp.solver_order`), and takes the first point that is exact enough, and otherwise the best.
 """
 
 from __future__ import annotations
@@ -49,45 +25,21 @@ from rigid_lcp.friction_problem import (
 )
 from rigid_lcp.frictionless import frictionless
 from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.interior_point import Path, interior_point
+from rigid_lcp.interior_point import interior_point
 from rigid_lcp.islands import islands, solve_islands
 from rigid_lcp.newton import newton
 from rigid_lcp.problem_input import finite_numbers, in_range, one_number
-from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
-from rigid_lcp.solver_trial import CONVEX_CONTACTS, FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
+from rigid_lcp.solver_order import PATHS, attempts, proved_insoluble
+from rigid_lcp.solver_trial import FEW_CONTACTS, HAND_OVER, Trial
 
 Floats = NDArray[np.float64]
 Method = Literal["auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig"]
 
 TINY = 1e-60
 """Problems with a smaller q are solved in other units."""
-PATHS = (
-    (Path(rounding=0.3, compliance=0.01), 100),
-    (Path(rounding=0.03, compliance=1.0), 100),
-    (Path(rounding=1.0, compliance=0.1), 100),
-    (Path(rounding=1e-3, compliance=1e-3), 300),
-    (Path(rounding=0.3, compliance=0.1), 300),
-    (Path(convex=True, compliance=1e-4), 300),
-)
-"""Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
-FEW_SWEEPS, FEW = 100, 20
-"""Sweeps and factorisations that are tried first on small problems: enough for most steps of a pile
-in motion; where there are more contacts, news need more sweeps to get through them."""
 FEW_ISLANDS = 20
 """Up to so many islands, single contacts not counted, of a large problem are solved apart at once:
 a few grains that lie loose can keep a whole bed from converging.  More cost more than they gain."""
-FIRST_SWEEPS = 1000
-"""What is spent where the first try was too short."""
-LAST_SWEEPS = 2000
-DEAR_SWEEPS = 6000
-"""What is spent before a factorisation that is dear."""
-FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
-"""What the paths of the interior point may cost in all before no further one is begun: so many
-times what was spent before them, or so many flops (some seconds) if that is more."""
-ENDLESS = 1e6
-"""Forces over ``rho |q|`` that look endless: a proof is looked for before the paths."""
-PROOF_CONTACTS = 3000
-"""Up to so many contacts a linear programme looks for the proof that there is no solution."""
 
 
 def solve_friction(
@@ -159,7 +111,7 @@ def solve_auto(
         trial = Trial(problem, start, tolerance)
         trial.keep(solve_islands(problem, _solve_island, start, tolerance, accept=accept))
     else:
-        trial = _attempts(problem, start, tolerance, accept)
+        trial = attempts(problem, start, tolerance, accept)
     if trial.best.solved or (
         trial.best.residual <= accept and problem.contacts > FEW_CONTACTS
     ):  # fmt: skip
@@ -169,7 +121,7 @@ def solve_auto(
         apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
         if _error(apart) < _error(trial.best):  # endless forces on one hide the errors of others
             trial.best = apart
-    if not trial.best.solved and (trial.best.status == "no solution" or _proved_insoluble(problem)):
+    if not trial.best.solved and (trial.best.status == "no solution" or proved_insoluble(problem)):
         return trial.solution(
             "no solution",
             "no forces within the cones of friction keep all contacts from approaching (proved by"
@@ -177,69 +129,6 @@ def solve_auto(
             " contacts that bear on no mass",
         )
     return trial.solution()
-
-
-def _attempts(
-    problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
-) -> Trial:
-    trial = Trial(problem, start, tolerance)
-    if trial.best.solved:
-        trial.sharpen()
-        return trial
-    if not problem.friction.any():
-        trial.keep(frictionless(problem, start, tolerance))
-        if trial.best.solved:
-            return trial
-    rough = tolerance if tolerance > LAST_WORD else HAND_OVER
-    small = problem.contacts <= FEW_CONTACTS
-    cold = start is None and tolerance < HAND_OVER and problem.contacts <= CONVEX_CONTACTS
-    if trial.convex_start() if cold else trial.stick_if_likely():
-        return trial
-    if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
-        return trial
-    moving = not small and start is not None
-    if tolerance >= HAND_OVER and not small:  # rough answers need few factorisations or none
-        if trial.yielding(start) if moving else trial.sweep(None, FIRST_SWEEPS, factorisations=0):
-            return trial
-        if trial.best.residual <= accept:
-            return trial
-    if not small and trial.dear and trial.sweep(start, DEAR_SWEEPS, factorisations=0):
-        return trial
-    plan: tuple[tuple[int, int], ...] = ((FIRST_SWEEPS, MANY if small else FEW),)
-    if moving:  # where one place of a large bed resists, proximal points fail for all
-        plan = ((FIRST_SWEEPS, 0), (LAST_SWEEPS, FEW))
-    for count, factorisations in plan:
-        if trial.sweep(
-            trial.best.r, count, until=max(rough, HAND_OVER), factorisations=factorisations
-        ):
-            return trial
-    if trial.best.residual <= accept and not small:
-        return trial
-    if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
-        return trial
-    _paths(trial, accept)
-    return trial
-
-
-def _paths(trial: Trial, accept: float) -> None:
-    """The interior point along one path after another, within the effort of `FALLBACK_SHARE`."""
-    problem, tolerance = trial.problem, trial.tolerance
-    if trial.forces > ENDLESS and _proved_insoluble(problem):
-        trial.best = replace(trial.best, status="no solution")
-        return
-    most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
-    for path, sweeps in PATHS:
-        if trial.effort > most:
-            return
-        trial.linear = trial.linear or factorisation(problem)
-        found = trial.keep(
-            interior_point(problem, None, max(HAND_OVER, tolerance), path, linear=trial.linear)
-        )
-        if trial.polish(found) or trial.sweep(found.r, sweeps, "interior-point"):
-            return
-        if trial.best.residual <= accept and problem.contacts > FEW_CONTACTS:
-            return
-    trial.sweep(None, LAST_SWEEPS)
 
 
 def _error(found: FrictionSolution) -> float:
@@ -250,7 +139,7 @@ def _error(found: FrictionSolution) -> float:
 def _solve_island(
     problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
 ) -> FrictionSolution:
-    return _attempts(problem, start, tolerance, accept).solution()
+    return attempts(problem, start, tolerance, accept).solution()
 
 
 def _interior_point(
@@ -277,12 +166,6 @@ def _methods() -> dict[str, Callable[..., FrictionSolution]]:
         "pivoting": pivoting,
         "dantzig": dantzig,
     }
-
-
-def _proved_insoluble(problem: FrictionProblem) -> bool:
-    from rigid_lcp.force_proof import forces_insufficient
-
-    return problem.contacts <= PROOF_CONTACTS and forces_insufficient(problem)
 
 
 def _start(start: ArrayLike, problem: FrictionProblem) -> Floats:

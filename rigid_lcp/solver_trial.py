@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factorisation
+from rigid_lcp.body_factorisation import Factorisation, factorisation
 from rigid_lcp.cones import length
+from rigid_lcp.extrapolated_points import FACTORISATIONS as DRIFT
+from rigid_lcp.extrapolated_points import extrapolated_points
 from rigid_lcp.friction_problem import (
     FrictionProblem,
     FrictionSolution,
@@ -16,11 +18,10 @@ from rigid_lcp.friction_problem import (
     friction_solution,
 )
 from rigid_lcp.gauss_seidel import Sweeper, gauss_seidel, sweeper_of
-from rigid_lcp.interior_point import Path, PathStep, interior_point
-from rigid_lcp.newton import newton
+from rigid_lcp.newton import PATIENCE, newton
 from rigid_lcp.proximal_newton import FACTORISATIONS, proximal_newton
 from rigid_lcp.refinement import refined
-from rigid_lcp.sticking import seem_loose, seem_to_stick, sticking
+from rigid_lcp.sticking import seem_to_stick, sticking
 
 Floats = NDArray[np.float64]
 
@@ -31,17 +32,6 @@ FEW_CONTACTS = 300
 FEW_STEPS = 20
 """Steps of Newton from `HAND_OVER`, where it mostly needs fewer factorisations than proximal
 points."""
-CONVEX_PATH = Path(convex=True, compliance=1e-4)
-CONVEX_SWEEPS, CONVEX_STEPS, CONVEX_CONTACTS = 30, 7, 10_000
-CONVEX_END, CONVEX_USEFUL, CONVEX_NEWTON = 1e-4, 1e-3, 5
-"""Without a start, and up to so many contacts: sweeps where much is loose; steps along the convex
-path to a residual of `CONVEX_END`, and so many of Newton if it came below `CONVEX_USEFUL` (where
-little slides)."""
-FAST, FAST_SWEEPS = 3e-4, 200
-"""A residual that few sweeps leave where so many more may end it."""
-BENT_STEPS, BENT_ROUNDING, BENT_USEFUL = 25, 0.3, 1e-6
-"""Where that is not enough: steps with the term |u_T|, from where the convex path was left, to
-`HAND_OVER`, and Newton from `BENT_USEFUL`.  Coming from there the path folds back seldom."""
 UPDATE_FLOPS = 160.0
 """Flops of a factorisation that cost as much as a contact's update in a sweep, over dim^2."""
 DEAR = 100.0
@@ -52,14 +42,14 @@ measured on the scale of all forces, and only what is exact to round-off is so f
 boulder."""
 REFINEMENTS, REFINED_CONTACTS = 8, 300
 """Most such steps, where factorisations cost next to nothing; one where there are more contacts."""
+FEW_DRIFT = 50
+"""Fewer factorisations than that extrapolated points are not begun with."""
+MOST_FLOPS, MOST_FACTORED = 4e11, 4e6
+"""An effort (some 20 s), and a number of factorisations times contacts (some 10 s), beyond which no
+factorisation is begun.  Only large problems come there: one of 10,400 contacts between spheres
+takes 1.5e10 flops, most of a second, and one of 10,000 between discs 20 ms."""
 GREAT_FORCES = 1e4
 """Forces over what lets go, ``rho |q|``, above which such a residual hides velocities."""
-
-YIELDING_SWEEPS, YIELDING_FEW = 4000, 1000
-NEAR_ENOUGH, SMOOTH_SHIFT, SMOOTH_FACTORISATIONS = 1.4, 1e-2, 4
-"""A bed that yields: sweeps to so many times the tolerance, from where proximal points with a
-great shift, which hardly ever fail, take off what is stiff of the error: a third and more.  After
-fewer sweeps than `YIELDING_FEW` some more cost less than that."""
 
 
 class Trial:
@@ -68,9 +58,12 @@ class Trial:
     def __init__(self, problem: FrictionProblem, start: Floats | None, tolerance: float) -> None:
         zero = np.zeros(len(problem.offset))
         self.problem, self.tolerance, self.work = problem, tolerance, dict[str, float]()
-        self.best = friction_solution(problem, zero, tolerance, "no forces")
+        self.best = friction_solution(
+            problem, zero, tolerance, "no forces", velocity=problem.offset.copy()
+        )
         self.linear: Factorisation | None = None
         self.sweeper: Sweeper | None = None
+        self.path_end: Floats | None = None
         if start is not None:
             self.keep(friction_solution(problem, start, tolerance, "start"))
 
@@ -82,13 +75,16 @@ class Trial:
             self.work[key] = self.work.get(key, 0.0) + count
         if found.residual < self.best.residual or not np.isfinite(self.best.residual):
             name = f"{after} + {found.method}" if after else found.method
-            status = "not converged" if found.status == "solved" else found.status
+            status: Status = "not converged" if found.status == "solved" else found.status
             self.best = replace(found, method=name, status=status)
             if found.residual <= self.tolerance:  # whether it solves is for the tolerance here
-                self.best = friction_solution(
-                    self.problem, found.r, self.tolerance, name, status=status,
-                    message=found.message,
-                )  # fmt: skip
+                if self.problem.mended(found.r, found.residual):
+                    self.best = replace(self.best, status="solved", message="")
+                else:
+                    self.best = friction_solution(
+                        self.problem, found.r, self.tolerance, name, status=status,
+                        message=found.message,
+                    )  # fmt: skip
         return found
 
     def polish(
@@ -105,7 +101,7 @@ class Trial:
         self.keep(
             proximal_newton(
                 self.problem, found.r, self.tolerance, linear=self.linear,
-                factorisations=factorisations,
+                factorisations=min(factorisations, self.affordable),
             ),
             after or found.method,
         )  # fmt: skip
@@ -125,80 +121,22 @@ class Trial:
         name = f"{after} + gauss-seidel" if after else "gauss-seidel"
         return self.best.solved or self.polish(found, name, factorisations)
 
-    def yielding(self, start: Floats | None) -> bool:
-        """Sweeps that drift, as the error falls like one over their number, and a proximal point
-        at their end; whether the tolerance is reached.  In one run: begun again from their best
-        point sweeps may go round in circles."""
-        near = NEAR_ENOUGH * self.tolerance
-        if self.sweep(start, YIELDING_SWEEPS, until=near, factorisations=0):
-            return True
-        done = int(self.work["sweeps"])
-        if done < YIELDING_FEW and self.sweep(
-            self.best.r, FAST_SWEEPS + done // 2, factorisations=0
-        ):  # fmt: skip
-            return True
-        if not self.dear:
-            self.keep(
-                proximal_newton(
-                    self.problem, self.best.r, self.tolerance, linear=self.linear,
-                    factorisations=SMOOTH_FACTORISATIONS, first_shift=SMOOTH_SHIFT,
-                ),
-                self.best.method,
-            )  # fmt: skip
-        return self.best.solved
-
-    def convex_start(self) -> bool:
-        """A few sweeps, for what they solve at once; what sticks; a part of the convex path and
-        Newton, which solve most static piles.  Small problems are swept only where much is loose,
-        and dear ones not factored unless they seem to stick."""
-        small = self.problem.contacts <= FEW_CONTACTS
-        if not small and self.few_sweeps():
-            return True
-        if self.dear:
-            return self.stick_if_likely()
-        stuck = self.stick()
-        if self.best.solved or (small and seem_loose(self.problem, stuck.r) and self.few_sweeps()):
-            return True
-        if self.best.residual <= HAND_OVER:
-            self.newton(self.best.r, FEW_STEPS, self.best.method)
+    def drift(self, flops: float) -> bool:
+        """Extrapolated proximal points from the best, at about such a cost at most; whether the
+        tolerance is reached."""
+        self.linear = self.linear or factorisation(self.problem)
+        count = int(min(DRIFT, flops / self.linear.flops, self.affordable))
+        if count < FEW_DRIFT:
             return self.best.solved
-        return self.convex_path()
-
-    def few_sweeps(self) -> bool:
-        """`CONVEX_SWEEPS`, and more where they converge fast (loose grains, crystals)."""
-        self.sweeper = self.sweeper or sweeper_of(self.problem)
-        for sweeps in (CONVEX_SWEEPS, FAST_SWEEPS):
-            found = gauss_seidel(
-                self.problem, self.best.r, self.tolerance, sweeps, sweeper=self.sweeper
-            )
-            self.keep(found)
-            if self.best.solved or found.residual > FAST:
-                break
-        if self.problem.contacts <= FEW_CONTACTS:
-            self.sharpen()
+        self.keep(
+            extrapolated_points(
+                self.problem, self.best.r, self.tolerance, linear=self.linear,
+                factorisations=count,
+            ),
+            self.best.method,
+        )  # fmt: skip
+        self.sharpen()
         return self.best.solved
-
-    def convex_path(self) -> bool:
-        """A part of the convex path and Newton; then from there on Coulomb's, and Newton."""
-        try:
-            path = PathStep(self.problem, CONVEX_PATH, self.linear or factorisation(self.problem))
-        except SingularSystem:
-            return False
-        found = self.follow(path, CONVEX_END, CONVEX_STEPS)
-        if found.residual < CONVEX_USEFUL:
-            self.newton(found.r, CONVEX_NEWTON, found.method)
-        if not self.best.solved:
-            path.path = replace(CONVEX_PATH, convex=False, rounding=BENT_ROUNDING)
-            found = self.follow(path, HAND_OVER, BENT_STEPS)
-            if found.residual <= BENT_USEFUL:
-                self.newton(found.r, CONVEX_STEPS + 1, found.method)
-        return self.best.solved
-
-    def follow(self, path: PathStep, until: float, steps: int) -> FrictionSolution:
-        """So many steps on a path at most."""
-        return self.keep(
-            interior_point(self.problem, None, until, path.path, iterations=steps, begun=path)
-        )
 
     def stick_if_likely(self) -> bool:
         """Where the best point looks like it: all contacts stick; whether that is the answer."""
@@ -230,18 +168,31 @@ class Trial:
         return factorisations * each + updates * UPDATE_FLOPS * self.problem.dim**2
 
     @property
+    def affordable(self) -> int:
+        """Factorisations up to `MOST_FLOPS` and `MOST_FACTORED`."""
+        self.linear = self.linear or factorisation(self.problem)
+        flops = (MOST_FLOPS - self.effort) / max(1.0, self.linear.flops)
+        count = MOST_FACTORED / self.problem.contacts - self.work.get("factorisations", 0.0)
+        return max(0, int(min(flops, count)))
+
+    @property
     def forces(self) -> float:
         """Size of the best forces over that of what makes the contacts approach, ``rho |q|``."""
         offered = self.problem.rho * length(self.problem.offset)
         return length(self.best.r) / offered if offered > 0.0 else 0.0
 
-    def newton(self, start: Floats, steps: int, after: str) -> FrictionSolution:
+    def newton(
+        self, start: Floats, steps: int, after: str, patience: int = PATIENCE
+    ) -> FrictionSolution:
         """So many steps of Newton, and one more where the answer is to be exact."""
         self.linear = self.linear or factorisation(self.problem)
         found = self.keep(
-            newton(self.problem, start, self.tolerance, linear=self.linear, iterations=steps),
+            newton(
+                self.problem, start, self.tolerance, linear=self.linear,
+                iterations=min(steps, self.affordable), patience=patience,
+            ),
             after,
-        )
+        )  # fmt: skip
         self.sharpen()
         return found
 

@@ -58,6 +58,18 @@ def row_forms(
     """``J_i M^-1 J_i^T`` of every row i of J; both matrices by rows, M^-1 symmetric."""
     found, row = np.zeros(len(start) - 1), np.zeros(freedoms)
     for i in range(len(found)):
+        single, before = True, -1  # every column once, with an entry on M^-1's diagonal only
+        for k in range(start[i], start[i + 1]):
+            column = index[k]
+            m = mass_start[column]
+            single = column > before and mass_start[column + 1] == m + 1 and mass_index[m] == column
+            if not single:
+                break
+            found[i] += value[k] * inverse_mass[m] * value[k]
+            before = column
+        if single:
+            continue
+        found[i] = 0.0
         for k in range(start[i], start[i + 1]):
             row[index[k]] += value[k]
         for k in range(start[i], start[i + 1]):

@@ -9,10 +9,11 @@ where u is J v+ at the end of the step, ``J(q_m) v+ + h/2 J' v`` (the inertial t
 with the normal part shifted by the contact's own law: Newton's restitution ``u_N+ + e u_N-`` where
 two bodies are about to collide, else ``u_N+ + 2 g / h`` for a contact that is open at the midpoint,
 by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur. J. Mech. 13 (1994)
-93; Jean, CMAME 177 (1999) 235).  Where J does not turn and there is no friction, no step adds
-energy: the mean of ``u_N-`` and ``u_N+`` is never positive where p_N is not zero; with restitution
-1 a bounce keeps it to round-off.  With friction a body that comes to rest within a step may gain
-up to ``m (h |f/m|)^2 / 8``.
+93; Jean, CMAME 177 (1999) 235).  Without friction no step adds energy: the mean of ``J v`` and
+``J v+`` is never positive where p_N is not zero (to the second order in h where J turns), and what
+spins freely keeps its energy (`rigid_lcp.gyroscopic.free_rotation`); with restitution 1 a bounce
+keeps it to round-off, of bodies that turn as well.  With friction a body that comes to rest within
+a step may gain up to ``m (h |f/m|)^2 / 8``.
 
 What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart
 (`rigid_lcp.overlap_removal`).

@@ -123,7 +123,7 @@ def pairs_listed(
 ) -> Ints:  # fmt: skip
     """Pairs of bodies that are nearer than ``skin`` [m], a lower bound of their distance taken."""
     margin = np.full(len(kind), 0.5 * skin)
-    boxes = bounding_boxes(kind, first, vertices, radius, position, margin)
+    boxes = bounding_boxes(first, vertices, radius, position, margin)
     pairs = near_pairs(kind, boxes, movable)
     near = np.zeros(len(pairs), dtype=np.bool_)
     for row in range(len(pairs)):

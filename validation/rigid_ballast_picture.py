@@ -38,6 +38,7 @@ def short_name(summary: Summary) -> str:
 
 def draw_pushes(axes: Any, pushes: Sequence[Push]) -> None:
     """The first push: error of the sleeper's way against processor time, all beds and medians."""
+    rigid = sorted(p.cost for p in pushes if p.method == "rigid")
     for p in pushes:
         colour = COLOURS[p.method]
         cost = [p.costs[seed] for seed in p.errors]
@@ -47,8 +48,11 @@ def draw_pushes(axes: Any, pushes: Sequence[Push]) -> None:
                   fillstyle="none" if p.is_limit else "full")  # fmt: skip
         value = p.level["value"]
         name = f"{1e3 * value:g} ms" if p.method == "rigid" else f"{value:.0e}".replace("e+", "e")
-        axes.annotate(name, (p.cost, 1e6 * p.error), fontsize=7, color=colour,
-                      xytext=(6, 4), textcoords="offset points")  # fmt: skip
+        place, side = (6, -9), "left"
+        if p.method == "rigid":  # neighbours cost alike: in turns above and below
+            place, side = (0, (7, -13)[rigid.index(p.cost) % 2]), "center"
+        axes.annotate(name, (p.cost, 1e6 * p.error), fontsize=7, color=colour, ha=side,
+                      xytext=place, textcoords="offset points")  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="processor time, one thread [s]",
              ylabel="distance from the reference [um]")  # fmt: skip
     axes.grid(alpha=0.3, which="both")
@@ -56,7 +60,10 @@ def draw_pushes(axes: Any, pushes: Sequence[Push]) -> None:
 
 
 def draw_errors(axes: Any, found: Sequence[Summary]) -> None:
-    """Every level: error of the mean settlement, with its interval, against processor time."""
+    """Every level: error of the mean settlement, with its interval, against processor time.
+
+    Soft grains have their names at the foot, rigid ones above: levels may cost alike.
+    """
     for method, colour in COLOURS.items():
         for s in found:
             if s.method != method:
@@ -66,8 +73,9 @@ def draw_errors(axes: Any, found: Sequence[Summary]) -> None:
             axes.plot([s.cost, s.cost], ends, color=colour, linewidth=1, alpha=0.5)
             axes.plot([s.cost], [max(abs(s.error), LEAST_ERROR)], "o", color=colour, markersize=7,
                       fillstyle="none" if s.is_limit else "full")  # fmt: skip
-            axes.annotate(short_name(s), (s.cost, LEAST_ERROR), rotation=90, fontsize=7,
-                          xytext=(2 if method == "soft" else -9, 4), color=colour,
+            label_at, place = (LEAST_ERROR, (6, 4)) if method == "soft" else (ends[1], (0, 3))
+            axes.annotate(short_name(s), (s.cost, label_at), rotation=90, fontsize=7,
+                          ha="center", xytext=place, color=colour,
                           textcoords="offset points")  # fmt: skip
         axes.plot([], [], "o", color=colour, label={
             "rigid": "rigid grains (step h)", "soft": "soft grains, MD (k in N/m)",

@@ -1,4 +1,4 @@
-"""Where the seed's modified Dantzig algorithm works: its success by friction, and a cycle of it.
+"""Where the paper's modified Dantzig algorithm works: its success by friction, and a cycle of it.
 
 The same settled packing of discs with other friction and its contacts in random order, as the
 seed drives them and with reversal.  Rows for the record of `rigid_runs`.

@@ -14,7 +14,8 @@ from math import nan, radians, tan
 import numpy as np
 
 from rigid_lcp.errors import RigidError
-from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.simulation import Simulation
+from rigid_lcp.simulation_input import Method
 from validation import rigid_hard_scenes as further
 from validation import rigid_scenes as scenes
 from validation.rigid_hard_equilibrium import rest_residual

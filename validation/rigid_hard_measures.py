@@ -12,7 +12,8 @@ from math import nan, radians, sqrt
 import numpy as np
 
 from rigid_lcp.errors import NoSolution, RigidError
-from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.simulation import Simulation
+from rigid_lcp.simulation_input import Method
 from validation import rigid_scenes as scenes
 from validation.rigid_hard_trials import Row, Trial, greatest, trial_ours, trial_peer
 from validation.rigid_hopper import first_jam

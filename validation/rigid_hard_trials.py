@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from rigid_lcp.errors import RigidError
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Polygon
-from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.simulation import Simulation
+from rigid_lcp.simulation_input import Method
 from validation import rigid_scenes as scenes
 from validation.case import Check
 from validation.rigid_scene_peers import PeerScene, peer_run, scene_data

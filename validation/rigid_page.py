@@ -18,10 +18,18 @@ import numpy as np
 
 from validation import rigid_report as report
 from validation.qdem_record import write_atomically
+from validation.rigid_page_studies import (
+    dantzig_table,
+    ladder_table,
+    motion_table,
+    powers,
+    scale_table,
+    seconds,
+)
 from validation.rigid_peers import SICONOS_MOST, SICONOS_SPARSE
 from validation.rigid_picture import PICTURE, picture
 from validation.rigid_report import HYBRID, OSQP, OURS, Row
-from validation.rigid_runs import LADDER, LARGE, RECORD, rows_read
+from validation.rigid_runs import LARGE, RECORD, rows_read
 
 WORDS = Path(__file__).with_suffix(".md")
 PAGE_PATH = Path(__file__).parents[1] / "docs" / "rigid-solvers.md"
@@ -56,10 +64,10 @@ def page(rows: Sequence[Row]) -> str:
         "tables": _problem_tables(races),
         "failures": _failures(races),
         "frictionless": _frictionless(races),
-        "ladder": _ladder(races),
-        "scale": _scale(rows),
-        "motion": _motion(rows),
-        "dantzig": _dantzig(rows),
+        "ladder": ladder_table(races),
+        "scale": scale_table(rows),
+        "motion": motion_table(rows),
+        "dantzig": dantzig_table(rows),
         "lemke": f"{SICONOS_MOST['2D_LEMKE']:,}",
         "dense": f"{SICONOS_MOST['2D_NSGS']:,}",
         "wide": f"{SICONOS_SPARSE:,}",
@@ -80,14 +88,10 @@ def _asked(rows: Sequence[Row]) -> str:
         )
         for is_large in (False, True)
     )
-    words = _powers(small or large)
+    words = powers(small or large)
     if small and large and small != large:
-        words += f" (those of {LARGE} contacts and more with friction: {_powers(large)})"
+        words += f" (those of {LARGE} contacts and more with friction: {powers(large)})"
     return words
-
-
-def _powers(levels: Sequence[float]) -> str:
-    return ", ".join(f"{level:.0e}".replace("e-0", "e-") for level in levels)
 
 
 def _summary(rows: Sequence[Row]) -> str:
@@ -98,7 +102,7 @@ def _summary(rows: Sequence[Row]) -> str:
         return ""
     return (
         f"`solve_friction` with its default settings brought {len(reached)} of {len(mine)} to it, "
-        f"in {_seconds(float(np.median(reached)))} (median), {_seconds(max(reached))} at most. "
+        f"in {seconds(float(np.median(reached)))} (median), {seconds(max(reached))} at most. "
         + _beside_hybrid(rows)
     )
 
@@ -153,7 +157,7 @@ def _cell(rows: Sequence[Row], named: bool = False) -> str:
         return report.outcome(rows)
     bar = rows[0]["bar"]
     cost = report.cost_to(rows, max(error, bar))
-    text = f"{error:.1e} @ {_seconds(cost)}"
+    text = f"{error:.1e} @ {seconds(cost)}"
     if named:
         best = next(r for r in rows if r["cost_s"] == cost)
         text += f" ({best['method'].removeprefix('Siconos ')[3:]})"
@@ -170,7 +174,7 @@ def _unseen(found: dict[str, list[Row]]) -> list[str]:
         if reached:
             lines.append(
                 f"| {method} | {len(reached)} of {len(mine)} | "
-                f"{_seconds(float(np.median(reached)))} | {_seconds(max(reached))} |"
+                f"{seconds(float(np.median(reached)))} | {seconds(max(reached))} |"
             )
         else:
             lines.append(f"| {method} | 0 of {len(mine)} | | |")
@@ -223,112 +227,6 @@ def _frictionless(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def _ladder(rows: Sequence[Row]) -> str:
-    """Costs at equal residual on packings of `LARGE` to 5,000 contacts, beside Siconos."""
-    found = {
-        name: each for name, each in report.packings_between(rows, LARGE, 5000).items()
-        if report.starting(each, "Siconos")
-    }  # fmt: skip
-    if not found:
-        return ""
-    lines = [
-        "## Packings beside Siconos, at equal residual",
-        "",
-        "Cell: cost of `solve_friction`, of the best solver of Siconos, and the latter over the "
-        "former; -: not reached in the time it had.",
-        "",
-        f"| packing | contacts | {' | '.join(_powers([level]) for level in LADDER)} |",
-        f"|---|---|{'---|' * len(LADDER)}",
-    ]
-    for name, each in found.items():
-        cells = []
-        for _, ours, theirs in report.ladder(each, LADDER):
-            words = [_seconds(cost) if np.isfinite(cost) else "-" for cost in (ours, theirs)]
-            if np.isfinite(ours) and np.isfinite(theirs):
-                words.append(f"{theirs / ours:.2g} x")
-            cells.append(", ".join(words))
-        lines.append(f"| {name} | {each[0]['contacts']:,} | {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _scale(rows: Sequence[Row]) -> str:
-    """Large packings, where they are recorded."""
-    made = [row for row in rows if row["case"] == "rigid-scale"]
-    if not made:
-        return ""
-    lines = [
-        "## Large packings",
-        "",
-        "Warm: from the impulses of the time step before, whose residual is given.",
-        "",
-        "| packing | contacts | residual at the start | residual | cost | bar | by |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for row in made:
-        begun = f"{row['start_error']:.1e}" if row["setting"]["warm"] else "(zero forces)"
-        lines.append(
-            f"| {row['problem']} | {row['contacts']:,} | {begun} | {row['error']:.1e} | "
-            f"{_seconds(row['cost_s'])} | {row['bar_s']:g} s | {row['by']} |"
-        )
-    return "\n".join(lines)
-
-
-def _motion(rows: Sequence[Row]) -> str:
-    """Steps of a large bed in motion, where they are recorded."""
-    made = [row for row in rows if row["case"] == "rigid-motion"]
-    if not made:
-        return ""
-    lines = [
-        "## A large bed in motion",
-        "",
-        "Whole time steps (contacts found, forces solved, overlaps removed), each from the forces"
-        " of the one before; `validation/rigid_motion_runs.py` says what moves.",
-        "",
-        "| bed | contacts | residual asked for | median | worst | steps above it | median step |"
-        " 99 % | worst | bar |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
-    for row in made:
-        lines.append(
-            f"| {row['problem']} | {row['contacts']:,} | {row['setting']['tolerance']:.0e} | "
-            f"{row['error_median']:.1e} | {row['error']:.1e} | {row['steps_above']} of "
-            f"{row['setting']['steps']} | {_seconds(row['cost_s'])} | "
-            f"{_seconds(row['cost_99_s'])} | {_seconds(row['cost_worst_s'])} | {row['bar_s']:g} s |"
-        )
-    return "\n".join(lines)
-
-
-def _dantzig(rows: Sequence[Row]) -> str:
-    monotone, reversal = (
-        report.dantzig_success(rows, method) for method in ("dantzig", "dantzig, reversal")
-    )
-    if not monotone:
-        return ""
-    lines = [
-        "| friction | as in the seed | with reversal of the driven force |",
-        "|---|---|---|",
-    ]
-    for friction, (solved, orders) in monotone.items():
-        other = reversal.get(friction, (0, 0))
-        lines.append(f"| {friction:g} | {solved} of {orders} | {other[0]} of {other[1]} |")
-    ends = report.dantzig_ends(rows)
-    if ends:
-        told = ", ".join(f"{method}: {end} ({n})" for (method, end), n in sorted(ends.items()))
-        lines += ["", f"How the others ended: {told}."]
-    shown = report.trace(rows)
-    if shown is not None:
-        steps = [event[5] for event in shown["events"]]
-        still = next((k for k, step in enumerate(reversed(steps)) if step > 0), len(steps))
-        _, _, contact, origin, target, *_ = shown["events"][-1]
-        lines += [
-            "",
-            f"The run in the picture (friction {shown['setting']['friction']:g}, order "
-            f"{shown['seed']}) ends after {shown['work']} changes of lists with {still} of length "
-            f"zero: contact {contact} goes from {target} to {origin} and back.",
-        ]
-    return "\n".join(lines)
-
-
 def _budgets(rows: Sequence[Row]) -> str:
     """Processor seconds that runs were given, by method."""
     given: dict[str, set[float]] = {}
@@ -337,13 +235,9 @@ def _budgets(rows: Sequence[Row]) -> str:
             name = "Siconos" if row["method"].startswith("Siconos") else row["method"]
             given.setdefault(name, set()).add(row["budget_s"])
     names: dict[str, list[str]] = {}
-    for method, seconds in given.items():
-        names.setdefault(" or ".join(f"{each:g}" for each in sorted(seconds)), []).append(method)
+    for method, budgets in given.items():
+        names.setdefault(" or ".join(f"{each:g}" for each in sorted(budgets)), []).append(method)
     return "; ".join(f"{', '.join(methods)}: {time}" for time, methods in names.items())
-
-
-def _seconds(cost: float) -> str:
-    return f"{cost:.1g} s" if cost < 0.01 else f"{cost:.2g} s"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -12,7 +12,7 @@ The page is made of it by `python -m validation.rigid_page`.
 One JSON line a run in ``validation/results/rigid-solvers.jsonl``: problem, method, what it was
 asked for, its error and its cost.  Every answer is judged by the same residual (`rigid_lcp.cones`),
 with the tolerance asked for, other settings as they come, cold start, one thread.  A run that
-fails is a line that says how.  Costs are processor seconds, where a run takes less than `SHORT_S`
+fails is a line that says how.  Costs are processor seconds (`rigid_timing`), where a run is short
 the median of five means over `rigid_peers.batch_size` runs.  With the variable TRACKBED_DATA set,
 the stored problems are raced too (`rigid_problems`).
 """
@@ -22,7 +22,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -33,13 +32,14 @@ from typing import Any
 import numpy as np
 
 from adapters.provenance import provenance
-from rigid_lcp.errors import RigidError
 from rigid_lcp.friction_problem import FrictionProblem
 from validation import rigid_peers as peers
+from validation.rigid_cone_programs import library_missing
 from validation.rigid_dantzig_runs import dantzig_rows, warm
 from validation.rigid_peers import PeerRun
 from validation.rigid_problems import NamedProblem, all_problems, bodies_anew
 from validation.rigid_scale_runs import SCALES, Scale, scale_row
+from validation.rigid_timing import repeated
 
 Row = dict[str, Any]
 RECORD = Path(__file__).parent / "results" / "rigid-solvers.jsonl"
@@ -63,13 +63,8 @@ FEW_METHODS = {
 }
 """What is run on families of many problems, by the first word of their names: our default and its
 nearest rivals; all methods on the others."""
-REPEATS, SHORT_S = 5, 0.5
 RIVALS = ("Clarabel + Newton", "OSQP polished")
 ORIGIN = ("commit", "command", "machine", "started")
-
-
-class OutOfTime(Exception):
-    """A run took more processor time than it may."""
 
 
 # --- methods ----------------------------------------------------------------------------------
@@ -86,12 +81,12 @@ def methods(problem: FrictionProblem, quick: bool) -> dict[str, Callable[[float]
             title = "rigid_lcp" if name == "auto" else f"rigid_lcp {name}"
             runs[title] = _ours(problem, name)
     frictionless = not problem.friction.any()
-    if not peers.library_missing("clarabel"):
+    if not library_missing("clarabel"):
         runs["Clarabel"] = _each(problem, lambda t, s: peers.clarabel(problem, t, s))
         runs["Clarabel + Newton"] = _each(
             problem, lambda t, s: peers.clarabel_newton(problem, t, s)
         )
-    if frictionless and not peers.library_missing("osqp"):
+    if frictionless and not library_missing("osqp"):
         runs["OSQP polished"] = _each(problem, lambda t, s: peers.osqp(problem, t))
     if not quick and not frictionless and not peers.siconos_missing():
         for solver in peers.siconos_solvers(problem):
@@ -144,51 +139,9 @@ def _each(
     """All tolerances, within the budget each, repeated where short."""
 
     def runs(budget_s: float) -> list[PeerRun]:
-        return [_repeated(solve, tolerance, budget_s) for tolerance in tolerances(problem)]
+        return [repeated(solve, tolerance, budget_s) for tolerance in tolerances(problem)]
 
     return runs
-
-
-def _repeated(
-    solve: Callable[[float, float], PeerRun], tolerance: float, budget_s: float
-) -> PeerRun:
-    setting = {"tolerance": tolerance}
-    try:
-        start = time.perf_counter()
-        first = _limited(lambda: solve(tolerance, budget_s), 2 * budget_s)
-        wall = time.perf_counter() - start
-        costs = [first.cost_s or 0.0]
-        if wall < SHORT_S:
-            batch = peers.batch_size(first.cost_s or 0.0)
-            costs = [
-                float(np.mean([solve(tolerance, budget_s).cost_s or 0.0 for _ in range(batch)]))
-                for _ in range(REPEATS)
-            ]
-    except OutOfTime:
-        return PeerRun(setting, None, why="out of time")
-    except RigidError as error:
-        return PeerRun(setting, None, why=f"{type(error).__name__}: {error.what}")
-    except Exception as error:  # a failure is a result: it is recorded, and the race goes on
-        return PeerRun(setting, None, why=f"{type(error).__name__}: {error}"[:200])
-    return PeerRun(
-        setting, first.force, float(np.median(costs)), tuple(costs), first.work, first.work_unit,
-        first.claims, first.why,
-    )  # fmt: skip
-
-
-def _limited(job: Callable[[], PeerRun], seconds: float) -> PeerRun:
-    """Do a job; raises `OutOfTime` when it has used so many processor seconds."""
-
-    def stop(*_: Any) -> None:
-        raise OutOfTime
-
-    before = signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        return job()
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
 
 
 def _siconos(problem: FrictionProblem, solver: str) -> Callable[[float], list[PeerRun]]:

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from rigid_lcp.motion import Motion
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
-from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.simulation import Simulation
+from rigid_lcp.simulation_input import Method
 
 Floats = NDArray[np.float64]
 G = 9.81

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import shutil
@@ -494,8 +495,11 @@ def test_load_series_across_a_jump(scene_file: Path, tmp_path: Path) -> None:
 def test_launcher(commands: Commands, scene_file: Path, tmp_path: Path) -> None:
     """Two processes under mpirun compute a run; killed, they leave nothing behind."""
     folder = tmp_path / "run"
-    launcher = 'engine.launcher=["mpirun", "--allow-run-as-root", "--oversubscribe", "-np", "2"]'
-    more = ("procedure.k_i=1", "procedure.k=2", "procedure.total_cycles=3", launcher)
+    yielding = ("--mca", "mpi_yield_when_idle", "1")  # or two that wait take turns with no one
+    words = ("mpirun", "--allow-run-as-root", "--oversubscribe", *yielding, "-np", "2")
+    launcher = f"engine.launcher={json.dumps(words)}"
+    softer = "material.grain.young=1e8"  # half the steps
+    more = ("procedure.k_i=1", "procedure.k=2", "procedure.total_cycles=3", softer, launcher)
     commands.start(*words_on(scene_file, folder, *more))
     engine_started(folder, FIRST)
     commands.kill()

@@ -57,6 +57,6 @@ def test_the_case_judges_the_record() -> None:
 
 @pytest.mark.parametrize("method", ["dantzig", "dantzig, reversal"])
 def test_without_friction_dantzig_always_solves(method: str) -> None:
-    """The seed's algorithm at friction zero, all orders of contacts."""
+    """The paper's algorithm at friction zero, all orders of contacts."""
     solved, orders = report.dantzig_success(ROWS, method)[0.0]
     assert solved == orders == 10

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
+import os
 import subprocess
 import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -319,6 +323,27 @@ def test_validate_record(
     assert set(origin) == {"commit", "versions", "machine", "command", "started"}
     assert origin["command"] == "trackbed validate my-case --quick"
     assert origin["versions"]["numpy"]
+
+
+def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
+    """5 in all packages, and no other refusal to write has it."""
+    from adapters.run_folder import disk_full_named
+    from qdem_fem.output import can_not_write
+    from rigid_lcp.run_folder import refusal_told
+
+    def code(number: int, told: Callable[[Path], AbstractContextManager[None]]) -> int:
+        with pytest.raises(Exception, match=os.strerror(number)) as caught, told(tmp_path):
+            raise OSError(number, os.strerror(number))
+        return trackbed.explained(caught.value)[1]
+
+    for number, wanted in (
+        (errno.ENOSPC, 5), (errno.EDQUOT, 5), (errno.EFBIG, 5), (errno.EACCES, 2), (errno.EIO, 2)
+    ):  # fmt: skip
+        assert code(number, disk_full_named) == wanted
+        assert code(number, refusal_told) == wanted
+        found = can_not_write(tmp_path, OSError(number, os.strerror(number)))
+        assert trackbed.explained(found)[1] == wanted
+        assert trackbed.explained(OSError(number, os.strerror(number)))[1] == wanted
 
 
 def test_validate_refuses_a_record_it_can_not_write(

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import qdem_fem as q
-from qdem_fem.errors import CheckpointError, UsageError
+from qdem_fem.errors import CheckpointError, DiskFull
 from qdem_fem.mesh_generation import box_mesh
 
 CELLS = (5, 2, 2)
@@ -234,7 +234,8 @@ def test_failed_write_keeps_the_old_file(saved: Path, monkeypatch: pytest.Monkey
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(UsageError, match="No space"):
+    with pytest.raises(DiskFull, match="No space") as told:
         made().save(saved)
+    assert told.value.exit_code == 5
     assert saved.read_bytes() == before
     assert [path.name for path in saved.parent.iterdir()] == [saved.name]

@@ -107,7 +107,7 @@ NOT_REAL = [
 ]
 
 
-@pytest.mark.parametrize("value", NOT_REAL, ids=repr)
+@pytest.mark.parametrize("value", NOT_REAL, ids=lambda value: repr(value).partition(" at 0x")[0])
 @pytest.mark.parametrize(
     "field", ["young", "poisson", "density", "shear_viscosity", "bulk_viscosity"]
 )

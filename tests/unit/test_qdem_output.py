@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.errors import UsageError
+from qdem_fem.errors import DiskFull, UsageError
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, vtu_write, write_whole
 from qdem_fem.pictures import (
@@ -153,7 +153,7 @@ def test_no_space_is_a_sentence_with_the_file(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"full.csv: can not be written \(.+\)\n  -> make room"):
         Table(tmp_path / "none" / "full.csv", ["time"]).begin()
     full = Table(Path("/dev/full"), ["time"])
-    with pytest.raises(UsageError, match=r"/dev/full: can not be written \(No space left"):
+    with pytest.raises(DiskFull, match=r"/dev/full: can not be written \(No space left"):
         full.append(np.zeros((1, 1)))
 
 

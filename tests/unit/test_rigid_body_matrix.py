@@ -18,7 +18,7 @@ from rigid_lcp.body_matrix import (
     jacobian_blocks,
     multiply_blocks,
 )
-from rigid_lcp.elimination_tree import FEW_BLOCKS, minimum_degree, symmetric_pattern
+from rigid_lcp.elimination_order import FEW_BLOCKS, minimum_degree, symmetric_pattern
 from rigid_lcp.sparse_products import columns_product, factors_product, row_forms, rows_product
 
 BODIES, CONTACTS = 7, 12
@@ -55,6 +55,19 @@ def test_products_are_those_of_the_matrices(dim):
     np.testing.assert_allclose(factors_product(*both, r), w @ r, atol=1e-11)
     np.testing.assert_allclose(row_forms(*both, len(v)), np.diag(w), atol=1e-12)
     np.testing.assert_allclose(dense_delassus(*both), w, atol=1e-12)
+
+
+def test_diagonals_of_w_with_masses_alone_and_columns_given_twice():
+    """``J_i M^-1 J_i^T`` where M^-1 is diagonal, and of a row that names a column two times."""
+    jacobian, _ = random_bodies(2)
+    inverse = sp.csr_array(sp.diags_array(np.random.default_rng(5).uniform(1, 3, 3 * BODIES)))
+    both = (*arrays(jacobian), *arrays(inverse))
+    expected = np.diag((jacobian @ inverse @ jacobian.T).toarray())
+    np.testing.assert_allclose(row_forms(*both, 3 * BODIES), expected, rtol=1e-13)
+    value, index, start = np.array([1.0, 2.0, -4.0]), np.array([1, 1, 0]), np.array([0, 3])
+    twice = row_forms(start, index, value, *arrays(inverse), 3 * BODIES)
+    first, second = inverse.diagonal()[:2]
+    np.testing.assert_allclose(twice, [9.0 * second + 16.0 * first], rtol=1e-14)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

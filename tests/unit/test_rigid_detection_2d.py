@@ -120,7 +120,7 @@ def test_broad_phase_finds_every_near_pair(seed: int) -> None:
         arrays.kind, arrays.first, arrays.vertices, arrays.normals, places, angles
     )
     boxes = bounding_boxes(
-        arrays.kind, arrays.first, vertices, arrays.radius, places, np.full(len(shapes), 0.01)
+        arrays.first, vertices, arrays.radius, places, np.full(len(shapes), 0.01)
     )
     x0, y0, x1, y1 = boxes.T
     near = (x0[:, None] <= x1) & (x0 <= x1[:, None]) & (y0[:, None] <= y1) & (y0 <= y1[:, None])

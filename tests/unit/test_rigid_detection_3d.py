@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.detection_3d import bounding_boxes, place_solids, shapes_3d
+from rigid_lcp.detection_3d import place_solids, shapes_3d
 from rigid_lcp.errors import SceneError
-from rigid_lcp.near_pairs import near_pairs
+from rigid_lcp.near_pairs import bounding_boxes, near_pairs
 from rigid_lcp.placed_solids import MOST_EDGES
 from rigid_lcp.polyhedra import ballast_stone
 from rigid_lcp.rotations import quaternion_of_rotation, quaternion_product, rotate, unit_quaternion
@@ -165,6 +165,20 @@ def test_names_last(seed: int) -> None:
 # --- pairs and shapes ---
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_boxes_are_those_of_the_corners(dim: int) -> None:
+    """A body's least and greatest coordinates, and those of a disc or sphere, x -+ radius."""
+    generator = np.random.default_rng(5)
+    first = np.array([0, 4, 4, 11])  # the second has no corners
+    corners = generator.normal(size=(11, dim))
+    place, radius, margin = generator.normal(size=(3, dim)), np.full(3, 0.3), generator.random(3)
+    boxes = bounding_boxes(first, corners, radius, place, margin)
+    ball = place[1] + 0.3 * np.array([[-1.0], [1.0]])
+    for body, points in enumerate((corners[:4], ball, corners[4:])):
+        wanted = [points.min(axis=0) - margin[body], points.max(axis=0) + margin[body]]
+        np.testing.assert_array_equal(boxes[body], np.concatenate(wanted))
+
+
 def test_pairs_are_those_of_all_boxes() -> None:
     generator = np.random.default_rng(0)
     shapes = [ballast_stone(generator, 0.2) for _ in range(40)] + [Sphere(0.1)] * 20 + [FLOOR]
@@ -173,7 +187,9 @@ def test_pairs_are_those_of_all_boxes() -> None:
     movable[60] = False
     arrays = shapes_3d(shapes, movable)
     solids = place_solids(arrays, position, np.tile(UPRIGHT, (61, 1)))
-    boxes = bounding_boxes(arrays.kind, solids, arrays.reach, position, np.full(61, 0.01))
+    boxes = bounding_boxes(
+        solids.first_vertex, solids.vertex, arrays.reach, position, np.full(61, 0.01)
+    )
     wanted = [
         (i, j)
         for i in range(60)

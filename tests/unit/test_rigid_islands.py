@@ -8,6 +8,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import gauss_seidel
@@ -144,3 +145,24 @@ def test_islands_without_a_solution_are_named() -> None:
     assert found.status == "no solution"
     assert "contact 1" in found.message
     np.testing.assert_array_equal(found.r, [1.0, 0.0, 0.0, 0.0])
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 10_000), bodies=st.integers(1, 12), contacts=st.integers(1, 14),
+    factors=st.booleans(),
+)  # fmt: skip
+def test_islands_are_the_connected_parts_of_w(
+    seed: int, bodies: int, contacts: int, factors: bool
+) -> None:
+    """Beside scipy's connected components of the pattern of W, by blocks."""
+    random = np.random.default_rng(seed)
+    pairs = [(int(a), int(b)) for a, b in random.integers(-1, bodies, (contacts, 2))]
+    pairs = [(a, b if b != a else -1) for a, b in pairs]
+    space = pairs_problem(pairs, bodies, seed, 2)
+    problem = FrictionProblem(None, np.zeros(2 * contacts), np.zeros(contacts), 2, space)
+    pattern = np.abs(space.matrix.toarray()).reshape(contacts, 2, contacts, 2).max(axis=(1, 3)) > 0
+    _, label = connected_components(sp.csr_array(pattern), directed=False)
+    expected = sorted(np.flatnonzero(label == k).tolist() for k in np.unique(label))
+    found = islands(problem if factors else as_matrix(problem))
+    assert [part.tolist() for part in found] == expected

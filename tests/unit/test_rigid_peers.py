@@ -20,13 +20,14 @@ from rigid_lcp.solver import solve_friction
 from validation import rigid_peers as peers
 from validation import rigid_report as report
 from validation import rigid_runs as runs
+from validation.rigid_cone_programs import library_missing, library_named
 from validation.rigid_newton_polish import _natural_map, newton_polish
 from validation.rigid_packings import tower
 from validation.rigid_problems import NamedProblem, stored_problems
 
 Floats = NDArray[np.float64]
-needs_clarabel = pytest.mark.skipif(peers.library_missing("clarabel"), reason="needs clarabel")
-needs_osqp = pytest.mark.skipif(peers.library_missing("osqp"), reason="needs osqp")
+needs_clarabel = pytest.mark.skipif(library_missing("clarabel"), reason="needs clarabel")
+needs_osqp = pytest.mark.skipif(library_missing("osqp"), reason="needs osqp")
 needs_siconos = pytest.mark.skipif(
     bool(peers.siconos_missing()), reason=f"needs Siconos: {peers.siconos_missing()}"
 )
@@ -201,7 +202,7 @@ def test_osqp() -> None:
 def test_missing_package() -> None:
     """What to install."""
     with pytest.raises(LibraryMissing, match="pip install no_such_peer"):
-        peers._library("no_such_peer")
+        library_named("no_such_peer")
 
 
 # --- Siconos ----------------------------------------------------------------------------------

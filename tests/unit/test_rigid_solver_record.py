@@ -19,6 +19,7 @@ from validation import rigid_scale_runs as scale_runs
 from validation.cases.rigid import jam_or_part, nonunique_checks, scale_checks
 from validation.rigid_packings import tower
 from validation.rigid_problems import NamedProblem, changed
+from validation.rigid_timing import repeated
 
 # --- runs and record --------------------------------------------------------------------------
 
@@ -31,7 +32,7 @@ def test_out_of_time_is_a_row() -> None:
             pass
 
     before = time.process_time()
-    found = runs._repeated(endless, 1e-8, 0.05)
+    found = repeated(endless, 1e-8, 0.05)
     assert time.process_time() - before < 2.0
     assert (found.force, found.why) == (None, "out of time")
 
@@ -42,7 +43,7 @@ def test_a_peer_that_raises_is_a_row() -> None:
     def broken(*_: float) -> peers.PeerRun:
         raise RuntimeError("it broke")
 
-    assert runs._repeated(broken, 1e-8, 1.0).why == "RuntimeError: it broke"
+    assert repeated(broken, 1e-8, 1.0).why == "RuntimeError: it broke"
 
 
 def test_forces_that_are_not_finite() -> None:

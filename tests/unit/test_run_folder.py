@@ -277,7 +277,8 @@ def test_write_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 @pytest.mark.parametrize(
-    ("number", "named"), [(errno.ENOSPC, True), (errno.EDQUOT, True), (errno.EIO, False)]
+    ("number", "named"),
+    [(errno.ENOSPC, True), (errno.EDQUOT, True), (errno.EFBIG, True), (errno.EIO, False)],
 )
 def test_disk_full_is_named(tmp_path: Path, number: int, named: bool) -> None:
     """A full disk or quota becomes exit code 5 with a remedy; other faults stay what they are."""

@@ -22,36 +22,9 @@ from adapters.errors import EngineFailed, NotCredible
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder
 from adapters.scene import Scene
+from tests.small_bed import small_bed
 
-SCENE = """\
-[sample]
-container = "cylinder"
-radius = 0.02
-symmetry = ["x", "y"]
-count = 60
-grain_radius = { distribution = "uniform", mean = 2e-3, standard_deviation = 2e-4 }
-
-[material]
-grain = { young = 1e9, poisson = 0.25, density = 2710.0, viscous_alpha = 0.4, friction = 0.5 }
-wall = { young = 1e10, poisson = 0.3, friction = 0.5 }
-
-[loading]
-amplitude = 14150.0
-mean = 7075.0
-frequency = 50.0
-piston_mass = 0.005
-
-[procedure]
-k_i = 2
-k = 4
-h = 8
-healing_cycles = 1
-total_cycles = 24
-
-[engine]
-name = "fake"
-rayleigh_share = 0.2
-"""
+SCENE = small_bed(k=4, h=8, total_cycles=24)
 
 FIRST, SECOND, AFTER = "window_000000", "window_000002", "window_000014"
 """The k_i window, the k window, and the window after the jump of 8 cycles from 6."""

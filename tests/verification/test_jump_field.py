@@ -235,10 +235,10 @@ def test_damaged_position_is_named(row: int) -> None:
 
 
 def test_hundred_thousand_grains_take_seconds() -> None:
-    """1e5 grains and 20 cycles: under 3 s (0.7 s measured), the neighbours by a tree."""
+    """1e5 grains and 20 cycles: under 3 s of processor time (0.7 s measured), by a tree."""
     random = np.random.default_rng(0)
     place = random.uniform(0, 0.36, (100_000, 3))  # as dense as a bed of 3.2 mm grains
     position = place - np.multiply.outer(1e-5 * np.log(CYCLE), np.ones((100_000, 3)))
-    start = time.perf_counter()
+    start = time.process_time()
     jump_field(CYCLE, position, np.full(100_000, 3.2e-3), LOG, 30)
-    assert time.perf_counter() - start < 3.0
+    assert time.process_time() - start < 3.0

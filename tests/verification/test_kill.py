@@ -18,6 +18,7 @@ import trackbed
 from adapters.engine import process_run
 from adapters.run_folder import RunFolder
 from tests.forked_commands import Commands, alive, awaited, processes_in
+from tests.small_bed import small_bed
 
 SEED = 2007
 SLOW = 0.04
@@ -25,35 +26,7 @@ SLOW = 0.04
 
 PARTS = ("preparation", "window", "jump", "relaxation")
 
-SCENE = """\
-[sample]
-container = "cylinder"
-radius = 0.02
-symmetry = ["x", "y"]
-count = 60
-grain_radius = { distribution = "uniform", mean = 2e-3, standard_deviation = 2e-4 }
-
-[material]
-grain = { young = 1e9, poisson = 0.25, density = 2710.0, viscous_alpha = 0.4, friction = 0.5 }
-wall = { young = 1e10, poisson = 0.3, friction = 0.5 }
-
-[loading]
-amplitude = 14150.0
-mean = 7075.0
-frequency = 50.0
-piston_mass = 0.005
-
-[procedure]
-k_i = 2
-k = 2
-h = 2
-healing_cycles = 1
-total_cycles = 14
-
-[engine]
-name = "fake"
-rayleigh_share = 0.2
-"""
+SCENE = small_bed(k=2, h=2, total_cycles=14)
 
 
 @pytest.fixture(scope="module")

@@ -304,13 +304,13 @@ def test_a_law_is_added_by_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_hundred_thousand_grains_take_less_than_a_second() -> None:
-    """Fit and increment of 1e5 grains, 3 axes, 100 cycles: under 1 s for every law."""
+    """Fit and increment of 1e5 grains, 3 axes, 100 cycles: under 1 s of one thread, every law."""
     cycle = np.arange(51.0, 151.0)
     displacement = np.random.default_rng(0).random((100, 100_000, 3))
     for law in LAWS:
         seconds = []
         for _ in range(3):
-            start = time.perf_counter()
+            start = time.process_time()
             law.increment(law.fit(cycle, displacement), 150.0, 250.0)
-            seconds.append(time.perf_counter() - start)
+            seconds.append(time.process_time() - start)
         assert min(seconds) < 1.0, law.name

@@ -90,6 +90,31 @@ def test_a_sweep_is_that_of_the_exact_local_solutions(
 
 
 @pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("full", [False, True])
+def test_blocks_of_the_bodies_make_w(dim: int, full: bool) -> None:
+    """``B B^T`` is W, for masses alone and for bodies whose inertia couples its axes."""
+    random, size = np.random.default_rng(7), 3 * dim - 3
+    jacobian = np.zeros((4 * dim, 3 * size))
+    for c, pair in enumerate(((0,), (0, 1), (1, 2), (2, 0))):
+        for body in pair:
+            jacobian[c * dim : (c + 1) * dim, body * size : (body + 1) * size] = random.normal(
+                size=(dim, size)
+            )
+    root = random.normal(size=(3, size, size))
+    masses = [m @ m.T if full else np.diag(np.diag(m) ** 2 + 0.1) for m in root]
+    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.block_diag(masses)), size)
+    problem = friction_problem(space, random.normal(size=4 * dim), 0.4, dim)
+    bodies = body_blocks(problem)
+    assert bodies is not None
+    r = random.normal(size=(4, dim))
+    u = bodies.contact_velocity(bodies.body_velocity(r))
+    w = space.matrix.toarray()
+    np.testing.assert_allclose(u.ravel(), w @ r.ravel(), rtol=1e-10, atol=1e-10)
+    own = [w[k * dim : (k + 1) * dim, k * dim : (k + 1) * dim] for k in range(4)]
+    np.testing.assert_allclose(bodies.local, own, rtol=1e-10, atol=1e-10)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
 def test_inverses_invert_or_are_zero(dim: int) -> None:
     """``G W = 1`` to round-off over the determinant; singular or strongly coupled: none."""
     random = np.random.default_rng(dim)

@@ -8,12 +8,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rigid_lcp.cones import dual_velocity, natural_residual, project_cones
+from rigid_lcp.cones import natural_map, natural_residual
 
+Floats = NDArray[np.float64]
 ROUND_OFF = 1e-12
 """Ten times 2e-16 (mu + 1) (push + rho speed) / push at the ends of the ranges below."""
 NUMBER = st.floats(-1e3, 1e3, allow_nan=False).map(lambda x: 0.0 if abs(x) < 1e-9 else x)
 FRICTION = st.one_of(st.sampled_from([0.0, 1.0, 1e6]), st.floats(0, 2))
+
+
+def projected(points: Floats, mu: Floats) -> Floats:
+    """``P_K(r) = r - F(r)``: at rest the natural map F takes the nearest point of K away."""
+    return points - natural_map(points, np.zeros_like(points), mu, 1.0)
 
 
 @settings(deadline=None)
@@ -21,7 +27,7 @@ FRICTION = st.one_of(st.sampled_from([0.0, 1.0, 1e6]), st.floats(0, 2))
 def test_projection_is_the_nearest_point(n: float, s: float, t: float, mu: float) -> None:
     """Moreau: ``x = P_K(x) + P_K°(x)``, the two orthogonal, the second in the polar cone -K*."""
     point = np.array([[n, s, t]])
-    nearest = project_cones(point, np.array([mu]))[0]
+    nearest = projected(point, np.array([mu]))[0]
     rest = point[0] - nearest
     size = 1e-9 * (1 + np.abs(point).max()) * (1 + mu)
     assert nearest[0] >= 0
@@ -68,7 +74,7 @@ def test_the_residual_has_no_units(mass: float, length: float) -> None:
     assert scaled == pytest.approx(once, rel=1e-12)
 
 
-def twin(points: NDArray[np.float64], mu: NDArray[np.float64]) -> NDArray[np.float64]:
+def twin(points: Floats, mu: Floats) -> Floats:
     """The projection in plain NumPy."""
     n, t = points[:, 0], np.linalg.norm(points[:, 1:], axis=1)
     nearest = np.maximum((n + mu * t) / (1 + mu**2), 0)
@@ -79,11 +85,16 @@ def twin(points: NDArray[np.float64], mu: NDArray[np.float64]) -> NDArray[np.flo
     return np.column_stack([normal, allowed[:, None] * direction])
 
 
-def test_kernels_are_their_numpy_twins() -> None:
-    rng = np.random.default_rng(2)
-    for dim in (2, 3):
-        points, mu = rng.normal(size=(500, dim)), rng.uniform(0, 1, 500)
-        np.testing.assert_allclose(project_cones(points, mu), twin(points, mu), atol=1e-15)
-        shifted = points.copy()
-        shifted[:, 0] += mu * np.linalg.norm(points[:, 1:], axis=1)
-        np.testing.assert_allclose(dual_velocity(points, mu), shifted, atol=1e-15)
+@pytest.mark.parametrize("greatest", [0.0, 0.3, 1.0, 10.0])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_natural_map_is_its_definition(greatest: float, dim: int) -> None:
+    """``r - P_K(r - rho (u + mu |u_T| n))``; terms of ``mu`` cancel to round-off of the largest."""
+    rng = np.random.default_rng(4)
+    force, velocity = rng.normal(size=(2, 500, dim))
+    force[:50], velocity[40:90] = 0.0, 0.0
+    mu = greatest * rng.uniform(0.0, 1.0, 500)
+    dual = velocity.copy()
+    dual[:, 0] += mu * np.linalg.norm(velocity[:, 1:], axis=1)
+    found = natural_map(force, velocity, mu, 0.7)
+    definition = force - twin(force - 0.7 * dual, mu)
+    np.testing.assert_allclose(found, definition, atol=1e-14 * (1 + greatest))

@@ -1,4 +1,4 @@
-"""The seed's modified Dantzig algorithm: its inverse, its lists, where it works and fails."""
+"""The paper's modified Dantzig algorithm: its inverse, its lists, where it works and fails."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ def test_without_friction_it_always_ends(reversal: bool) -> None:
 
 
 def test_success_falls_with_friction() -> None:
-    """Solved of 8 orders as driven in the seed: most at mu = 0.1, hardly one at mu = 0.8.
+    """Solved of 8 orders as driven in the paper: most at mu = 0.1, hardly one at mu = 0.8.
 
     What it does not solve it names, and never calls solved.
     """

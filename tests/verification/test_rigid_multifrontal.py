@@ -14,13 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.body_factorisation import BlockSystem, SingularSystem
-from rigid_lcp.elimination_tree import (
-    FEW_BLOCKS,
-    EliminationTree,
-    elimination_tree,
-    minimum_degree,
-    symmetric_pattern,
-)
+from rigid_lcp.elimination_order import FEW_BLOCKS, minimum_degree, symmetric_pattern
+from rigid_lcp.elimination_tree import EliminationTree, elimination_tree
 from rigid_lcp.multifrontal import factor_fronts, solve_fronts
 
 ROUND_OFF = np.finfo(float).eps

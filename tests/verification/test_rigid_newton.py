@@ -227,3 +227,22 @@ def test_the_convex_path_is_coulombs_where_all_stick_and_not_where_they_slide():
     assert convex.residual > 1e-3
     assert convex.u[0] == pytest.approx(0.2 * abs(convex.u[1]), rel=0.05)
     assert interior_point(loose, None, 1e-9).solved
+
+
+def test_impatient_newton_ends_at_the_first_step_that_does_not_halve_the_residual():
+    """The twin counts steps by asking for one more at a time."""
+    short = 0
+    for seed in range(6):
+        problem = chain(6, 3, seed)
+        start = 3.0 * np.random.default_rng(seed).standard_normal(len(problem.offset))
+        mark, count = problem.residual(start), 0
+        while mark > 1e-12:
+            count += 1
+            reached = newton(problem, start, 1e-12, iterations=count).residual
+            if reached > 1e-12 and not reached < 0.5 * mark:
+                break
+            mark = reached
+        found = newton(problem, start, 1e-12, patience=1)
+        assert found.work["iterations"] == count
+        short += not found.solved
+    assert short > 0

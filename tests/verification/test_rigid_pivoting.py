@@ -23,7 +23,7 @@ Method = Callable[..., FrictionSolution]
 @pytest.mark.parametrize("mu", [0.0, 0.1, 0.3, 0.5, 0.8, 1.0])
 @pytest.mark.parametrize("seed", range(3))
 def test_networks_at_every_friction(mu: float, seed: int) -> None:
-    """Where the seed's driving cycles (mu >= 0.3) the path ends in a solution, to 1e-12."""
+    """Where the paper's driving cycles (mu >= 0.3) the path ends in a solution, to 1e-12."""
     found = pivoting(network(120, mu, seed))
     assert found.solved, found.message
     assert found.residual <= TOLERANCE

@@ -191,10 +191,10 @@ def test_intermediate_axis_flips_when_the_ode_says_so() -> None:
     exact, exact_spin = euler_by_ode(inertia, q, spin, seconds)
     assert rotate_back(exact, exact_spin)[1] < -4.0  # it has turned over
     errors = []
-    for steps in (3000, 6000):
+    for steps in (500, 1000):
         found_spin = march(inertia, q, spin, seconds / steps, steps)[1]
         errors.append(float(np.linalg.norm(found_spin - exact_spin)))
-    assert errors[1] < 1e-2
+    assert errors[1] < 1e-5
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
 
 

@@ -92,7 +92,7 @@ class RefusingDisk:
 def test_full_disk_at_every_write(
     scene: Path, whole: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Exit code 2 and a sentence, no part of a file; with room again it goes on."""
+    """Exit code 5 and a sentence, no part of a file; with room again it goes on."""
     for refused in range(1, 1000):
         folder = tmp_path / str(refused)
         with pytest.MonkeyPatch.context() as patch:
@@ -101,7 +101,7 @@ def test_full_disk_at_every_write(
         said = capsys.readouterr().err
         if disk.count < refused:
             break
-        assert code == 2, said
+        assert code == 5, said
         assert "can not be written (No space left on device)" in said
         assert "make room" in said
         assert not list(folder.glob(".*.partial"))
@@ -119,7 +119,7 @@ def test_full_disk_at_a_picture(
     run = ["rigid", str(scene), "--run-folder", str(tmp_path / "run"), "--set", "run.frames=2"]
     with pytest.MonkeyPatch.context() as patch:
         disk = RefusingDisk(tmp_path / "run" / f".{name}", patch, 1)
-        assert trackbed.main(run) == 2
+        assert trackbed.main(run) == 5
     assert disk.count == 1
     assert f"{name}: can not be written (No space left" in capsys.readouterr().err
     assert trackbed.main([*run, "--resume"]) == 0
@@ -135,7 +135,7 @@ def test_files_that_the_system_cuts_short(
     ended = subprocess.run(
         limited, capture_output=True, text=True, cwd=Path(trackbed.__file__).parent
     )
-    assert ended.returncode == 2, ended.stderr
+    assert ended.returncode == 5, ended.stderr
     assert "frame_000000.npz: can not be written (File too large)" in ended.stderr
     goes_on(scene, tmp_path / "run", whole)
 

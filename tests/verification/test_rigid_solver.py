@@ -19,7 +19,7 @@ from rigid_lcp import BodySpace, solve_friction
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.problem_files import read_problem
 from rigid_lcp.solver import solve_auto
-from rigid_lcp.solver_trial import CONVEX_STEPS
+from rigid_lcp.solver_cold import CONVEX_STEPS
 from validation.rigid_packings import packing
 
 FOLDER = Path(os.environ.get("TRACKBED_DATA", "")) / "friction_problems"
@@ -221,7 +221,7 @@ def test_where_a_proof_is_at_hand_no_path_is_tried():
 def test_the_search_ends_after_the_effort_that_is_stated(monkeypatch):
     """With no floor of flops, paths end once they cost `FALLBACK_SHARE` of what went before, the
     last one included: six paths and twice the factorisations otherwise."""
-    monkeypatch.setattr("rigid_lcp.solver.FALLBACK_FLOPS", 0.0)
+    monkeypatch.setattr("rigid_lcp.solver_order.FALLBACK_FLOPS", 0.0)
     problem = random_problem(40, 30, 0.5, 3)
     found = solve_auto(problem)
     assert not found.solved

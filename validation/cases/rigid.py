@@ -171,7 +171,7 @@ def pivoting_checks(rows: Sequence[Row]) -> list[Check]:
 
 
 def dantzig_checks(rows: Sequence[Row]) -> list[Check]:
-    """Where the seed's algorithm works; what fails must say so."""
+    """Where the paper's algorithm works; what fails must say so."""
     checks = []
     for method in ("dantzig", "dantzig, reversal"):
         for friction, (solved, orders) in report.dantzig_success(rows, method).items():

@@ -1,0 +1,93 @@
+"""Where there is no start: what a few sweeps end, what sticks, and a part of the convex path."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rigid_lcp.body_factorisation import SingularSystem, factorisation
+from rigid_lcp.friction_problem import FrictionSolution
+from rigid_lcp.gauss_seidel import gauss_seidel, sweeper_of
+from rigid_lcp.interior_point import Path, PathStep, interior_point
+from rigid_lcp.solver_trial import FEW_CONTACTS, FEW_STEPS, HAND_OVER, Trial
+from rigid_lcp.sticking import seem_loose
+
+CONVEX_PATH = Path(convex=True, compliance=1e-4)
+CONVEX_SWEEPS, CONVEX_STEPS, CONVEX_CONTACTS = 30, 7, 10_000
+CONVEX_END, CONVEX_USEFUL, CONVEX_NEWTON = 1e-4, 1e-3, 5
+"""Without a start, and up to so many contacts: sweeps where much is loose; steps along the convex
+path to a residual of `CONVEX_END`, and so many of Newton if it came below `CONVEX_USEFUL` (where
+little slides)."""
+FAST, FAST_SWEEPS = 3e-4, 200
+"""A residual that few sweeps leave where so many more may end it."""
+BENT_STEPS, BENT_ROUNDING, BENT_USEFUL = 25, 0.3, 3e-6
+"""Where that is not enough: steps with the term |u_T|, from where the convex path was left, to
+`BENT_USEFUL`, and Newton; if that fails, on to `HAND_OVER`, and Newton again.  Coming from there
+the path folds back seldom."""
+NEWTON_PATIENCE = 3
+"""Steps of Newton that may fail to halve the residual: from the end of a path it begins to converge
+in the first two or not at all."""
+
+
+def convex_start(trial: Trial) -> bool:
+    """A few sweeps, for what they solve at once; what sticks; a part of the convex path and
+    Newton, which solve most static piles.  Small problems are swept only where much is loose,
+    and dear ones not factored unless they seem to stick."""
+    small = trial.problem.contacts <= FEW_CONTACTS
+    if not small and few_sweeps(trial):
+        return True
+    if trial.dear:
+        return trial.stick_if_likely()
+    stuck = trial.stick()
+    if trial.best.solved or (small and seem_loose(trial.problem, stuck.r) and few_sweeps(trial)):
+        return True
+    if trial.best.residual <= HAND_OVER:
+        trial.newton(trial.best.r, FEW_STEPS, trial.best.method)
+        return trial.best.solved
+    return convex_path(trial)
+
+
+def few_sweeps(trial: Trial) -> bool:
+    """`CONVEX_SWEEPS`, and more where they converge fast (loose grains, crystals)."""
+    trial.sweeper = trial.sweeper or sweeper_of(trial.problem)
+    for sweeps in (CONVEX_SWEEPS, FAST_SWEEPS):
+        found = gauss_seidel(
+            trial.problem, trial.best.r, trial.tolerance, sweeps, sweeper=trial.sweeper
+        )
+        trial.keep(found)
+        if trial.best.solved or found.residual > FAST:
+            break
+    if trial.problem.contacts <= FEW_CONTACTS:
+        trial.sharpen()
+    return trial.best.solved
+
+
+def convex_path(trial: Trial) -> bool:
+    """A part of the convex path and Newton; then from there on Coulomb's, and Newton."""
+    if not trial.affordable:
+        return False
+    try:
+        path = PathStep(trial.problem, CONVEX_PATH, trial.linear or factorisation(trial.problem))
+    except SingularSystem:
+        return False
+    found = follow(trial, path, CONVEX_END, CONVEX_STEPS)
+    if found.residual < CONVEX_USEFUL:
+        trial.newton(found.r, CONVEX_NEWTON, found.method, NEWTON_PATIENCE)
+    path.path = replace(CONVEX_PATH, convex=False, rounding=BENT_ROUNDING)
+    steps = BENT_STEPS
+    for until in (BENT_USEFUL, HAND_OVER):
+        if trial.best.solved or steps == 0:
+            break
+        found = follow(trial, path, until, steps)
+        if found.residual > BENT_USEFUL:
+            break
+        steps -= int(found.work["iterations"])
+        trial.newton(found.r, CONVEX_STEPS + 1, found.method, NEWTON_PATIENCE)
+    trial.path_end = found.r
+    return trial.best.solved
+
+
+def follow(trial: Trial, path: PathStep, until: float, steps: int) -> FrictionSolution:
+    """So many steps on a path at most."""
+    return trial.keep(
+        interior_point(trial.problem, None, until, path.path, iterations=steps, begun=path)
+    )

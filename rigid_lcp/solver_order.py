@@ -1,0 +1,158 @@
+"""The order in which the default of `rigid_lcp.solver` tries its methods.
+
+``auto`` takes the first point that is exact enough, and otherwise the best of all:
+
+    no forces        where nothing approaches
+    frictionless     where no contact has friction: sweeps and principal pivoting, exact; there are
+                     no tangential unknowns
+    all stick        one factorisation; exact for towers and much of what stands.  Large problems
+                     are swept a few times before, which ends what is loose or regular
+    convex path      without a start: a part of it, and Newton; solves most static piles.  Where it
+                     does not, the path is bent to Coulomb's law, and Newton again
+    Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
+                     Newton at its end: first few sweeps and factorisations, then many, as what is
+                     hard for the one is often easy for the other
+    extrapolated     proximal points that run ahead of their drift
+                     (`rigid_lcp.extrapolated_points`): beds of low friction whose self-stress has
+                     to grow a long way before a contact lets go
+    interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
+                     goes to Newton, and if that is not enough to Gauss-Seidel and Newton again.
+                     They end after the effort that `FALLBACK_SHARE` names, or before they begin
+                     where a linear programme proves that there is no solution.  Extrapolated
+                     points again go on from the best
+    islands          what is still not solved, each island apart, by all of this (large problems
+                     of few islands at once)
+
+Every method alone can fail on real problems: Newton far from a solution, the interior point where
+its path folds back, Gauss-Seidel on tall piles.  Together they fail seldom (`docs/rigid-solvers.md`
+counts it); there is no proof: read ``status`` and ``residual``.
+
+Cost: hundreds of sweeps or some factorisations; the interior point takes some 20 a path.  In 3D
+their fill grows fast: where one costs as much as a hundred sweeps (3D packings above some 3,000
+contacts), thousands of sweeps go first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.friction_problem import FrictionProblem
+from rigid_lcp.frictionless import frictionless
+from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
+from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
+from rigid_lcp.solver_cold import CONVEX_CONTACTS, convex_start
+from rigid_lcp.solver_trial import FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
+from rigid_lcp.solver_warm import deep, yielding
+
+Floats = NDArray[np.float64]
+
+PATHS = (
+    (Path(rounding=0.3, compliance=0.01), 100),
+    (Path(rounding=0.03, compliance=1.0), 100),
+    (Path(rounding=1.0, compliance=0.1), 100),
+    (Path(rounding=1e-3, compliance=1e-3), 300),
+    (Path(rounding=0.3, compliance=0.1), 300),
+    (Path(convex=True, compliance=1e-4), 300),
+)
+"""Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
+FEW_SWEEPS, FEW = 100, 20
+"""Sweeps and factorisations that are tried first on small problems: enough for most steps of a pile
+in motion; where there are more contacts, news need more sweeps to get through them."""
+FIRST_SWEEPS = 1000
+"""What is spent where the first try was too short."""
+LAST_SWEEPS = 2000
+DEAR_SWEEPS = 6000
+"""What is spent before a factorisation that is dear."""
+FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
+"""What the paths of the interior point may cost in all before no further one is begun: so many
+times what was spent before them, or so many flops (some seconds) if that is more."""
+DRIFT_FLOPS = 5e9
+"""What extrapolated points may cost before the paths (or so much as was spent before, if that is
+more), and again after them."""
+ENDLESS = 1e6
+"""Forces over ``rho |q|`` that look endless: a proof is looked for before the paths."""
+PROOF_CONTACTS = 3000
+"""Up to so many contacts a linear programme looks for the proof that there is no solution."""
+
+
+def attempts(
+    problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
+) -> Trial:
+    """All methods in this order until one reaches ``tolerance``, or ``accept`` where the problem is
+    large; the trial holds the best point."""
+    trial = Trial(problem, start, tolerance)
+    if trial.best.solved:
+        trial.sharpen()
+        return trial
+    if not problem.friction.any():
+        trial.keep(frictionless(problem, start, tolerance))
+        if trial.best.solved:
+            return trial
+    rough = tolerance if tolerance > LAST_WORD else HAND_OVER
+    small = problem.contacts <= FEW_CONTACTS
+    cold = start is None and tolerance < HAND_OVER and problem.contacts <= CONVEX_CONTACTS
+    if convex_start(trial) if cold else trial.stick_if_likely():
+        return trial
+    if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
+        return trial
+    moving = not small and start is not None
+    if moving and tolerance < HAND_OVER and not trial.dear and deep(trial, start, accept):
+        return trial
+    if tolerance >= HAND_OVER and not small:  # rough answers need few factorisations or none
+        if yielding(trial, start) if moving else trial.sweep(None, FIRST_SWEEPS, factorisations=0):
+            return trial
+        if trial.best.residual <= accept:
+            return trial
+    if not small and trial.dear and trial.sweep(start, DEAR_SWEEPS, factorisations=0):
+        return trial
+    plan: tuple[tuple[int, int], ...] = ((FIRST_SWEEPS, MANY if small else FEW),)
+    if moving:  # where one place of a large bed resists, proximal points fail for all
+        plan = ((FIRST_SWEEPS, 0), (LAST_SWEEPS, FEW))
+    for count, factorisations in plan:
+        if trial.sweep(
+            trial.best.r, count, until=max(rough, HAND_OVER), factorisations=factorisations
+        ):
+            return trial
+    if trial.best.residual <= accept and not small:
+        return trial
+    if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
+        return trial
+    fallback_paths(trial, accept)
+    return trial
+
+
+def fallback_paths(trial: Trial, accept: float) -> None:
+    """Extrapolated points, then the interior point along one path after another, within the effort
+    of `FALLBACK_SHARE`, and extrapolated points again."""
+    problem, tolerance = trial.problem, trial.tolerance
+    if trial.forces > ENDLESS and proved_insoluble(problem):
+        trial.best = replace(trial.best, status="no solution")
+        return
+    if trial.drift(max(DRIFT_FLOPS, trial.effort)):
+        return
+    most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
+    for path, sweeps in PATHS:
+        if trial.effort > most or not trial.affordable:
+            break
+        found = trial.keep(
+            interior_point(
+                problem, None, max(HAND_OVER, tolerance), path, linear=trial.linear,
+                iterations=min(ITERATIONS, trial.affordable),
+            )
+        )  # fmt: skip
+        if trial.polish(found) or trial.sweep(found.r, sweeps, "interior-point"):
+            return
+        if trial.best.residual <= accept and problem.contacts > FEW_CONTACTS:
+            return
+    if not trial.drift(DRIFT_FLOPS) and trial.effort <= most:
+        trial.sweep(None, LAST_SWEEPS)
+
+
+def proved_insoluble(problem: FrictionProblem) -> bool:
+    """Whether a linear programme proves that there is no solution."""
+    from rigid_lcp.force_proof import forces_insufficient
+
+    return problem.contacts <= PROOF_CONTACTS and forces_insufficient(problem)

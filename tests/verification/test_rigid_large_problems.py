@@ -1,0 +1,83 @@
+"""Large problems: sweeps over the contacts that bear, warm starts to the last digit, a bound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from rigid_lcp import solver_trial
+from rigid_lcp.contact_sweeps import MANY_CONTACTS, carrying
+from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.solver import solve_friction
+from validation.rigid_packings import crystal, tower
+
+COPIES, BOXES, HELD = 500, 3, 3
+"""So many small towers side by side, of which one of ``HELD`` stands and the others fly up."""
+
+
+def towers_side_by_side() -> FrictionProblem:
+    """Towers that do not touch: ``q`` of those that fly is that of the others, turned round."""
+    one = tower(BOXES, 2)
+    assert one.bodies is not None
+    signs = np.where(np.arange(COPIES) % HELD == 0, 1.0, -1.0)
+    space = BodySpace(
+        sp.csr_array(sp.block_diag([one.bodies.jacobian] * COPIES)),
+        sp.csr_array(sp.block_diag([one.bodies.inverse_mass] * COPIES)), 3,
+    )  # fmt: skip
+    return friction_problem(space, np.outer(signs, one.offset).ravel(), 0.5, 2)
+
+
+def test_sweeps_over_what_bears_end_where_sweeps_over_all_do() -> None:
+    """Contacts that open are left out of most sweeps and found again: the weight above each joint
+    is carried, ``sum r_N = m g h k`` below k boxes, and what flies feels nothing."""
+    problem = towers_side_by_side()
+    assert problem.contacts >= MANY_CONTACTS
+    begin = np.zeros((problem.contacts, 2))
+    begin[:, 0] = 1.0  # everything seems to bear at first
+    found = gauss_seidel(problem, begin.ravel(), 1e-12, 3000)
+    assert found.solved
+    force = found.r.reshape(COPIES, BOXES, 2, 2)
+    flying = np.arange(COPIES) % HELD != 0
+    assert np.abs(force[flying]).max() <= 1e-12 * np.linalg.norm(found.r)
+    own = np.linalg.norm(tower(1, 2).offset) / np.sqrt(2.0)  # g h of a box of 1 kg
+    carried = force[~flying, :, :, 0].sum(axis=2)
+    expected = own * np.arange(BOXES, 0, -1)
+    # the natural map leaves 1e-12 of all forces, and W of such a tower answers within a factor 100
+    assert np.allclose(carried, expected, rtol=0.0, atol=1e-10 * np.linalg.norm(found.r))
+
+
+def test_contacts_that_bear_are_named_in_the_order_of_the_sweep() -> None:
+    force, last = np.zeros((6, 2)), np.zeros((6, 2))
+    force[4, 0], force[1, 1], last[2, 0] = 1.0, -1.0, 1.0
+    visit = np.array([5, 4, 3, 2, 1, 0], dtype=np.int64)
+    assert carrying(force, last, visit).tolist() == [4, 2, 1]
+
+
+@pytest.mark.parametrize("layers", [6])
+def test_a_warm_start_ends_at_the_last_digit(layers: int) -> None:
+    """From forces that are wrong by a thousandth, to a residual of 1e-12."""
+    problem = crystal(layers)
+    cold = solve_friction(problem.bodies, problem.offset, problem.friction, 3)
+    noise = 1.0 + 1e-3 * np.random.default_rng(4).standard_normal(len(cold.r))
+    warm = solve_friction(
+        problem.bodies, problem.offset, problem.friction, 3, start=cold.r * noise
+    )  # fmt: skip
+    assert cold.solved
+    assert warm.solved
+    assert problem.residual(warm.r) <= 1e-12
+
+
+def test_no_factorisation_is_begun_beyond_the_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With nothing to spend Newton's method and the paths are left out, and the answer says what
+    residual it has."""
+    monkeypatch.setattr(solver_trial, "MOST_FLOPS", 0.0)
+    problem = crystal(6)
+    found = solve_friction(
+        problem.bodies, problem.offset, problem.friction, 3,
+        start=np.ones(len(problem.offset)),
+    )  # fmt: skip
+    assert not any("newton" in name or "interior" in name for name, n in found.work.items() if n)
+    assert found.residual == pytest.approx(problem.residual(found.r))
+    assert found.solved == (found.residual <= 1e-12)

@@ -1,0 +1,125 @@
+"""Tables of the solver page beside the race: costs at equal residual, large beds, Dantzig."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from validation import rigid_report as report
+from validation.rigid_report import Row
+from validation.rigid_runs import LADDER, LARGE
+
+
+def ladder_table(rows: Sequence[Row]) -> str:
+    """Costs at equal residual on packings of `LARGE` to 5,000 contacts, beside Siconos."""
+    found = {
+        name: each for name, each in report.packings_between(rows, LARGE, 5000).items()
+        if report.starting(each, "Siconos")
+    }  # fmt: skip
+    if not found:
+        return ""
+    lines = [
+        "## Packings beside Siconos, at equal residual",
+        "",
+        "Cell: cost of `solve_friction`, of the best solver of Siconos, and the latter over the "
+        "former; -: not reached in the time it had.",
+        "",
+        f"| packing | contacts | {' | '.join(powers([level]) for level in LADDER)} |",
+        f"|---|---|{'---|' * len(LADDER)}",
+    ]
+    for name, each in found.items():
+        cells = []
+        for _, ours, theirs in report.ladder(each, LADDER):
+            words = [seconds(cost) if np.isfinite(cost) else "-" for cost in (ours, theirs)]
+            if np.isfinite(ours) and np.isfinite(theirs):
+                words.append(f"{theirs / ours:.2g} x")
+            cells.append(", ".join(words))
+        lines.append(f"| {name} | {each[0]['contacts']:,} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def scale_table(rows: Sequence[Row]) -> str:
+    """Large packings, where they are recorded."""
+    made = [row for row in rows if row["case"] == "rigid-scale"]
+    if not made:
+        return ""
+    lines = [
+        "## Large packings",
+        "",
+        "Warm: from the impulses of the time step before, whose residual is given.",
+        "",
+        "| packing | contacts | residual at the start | residual | cost | bar | by |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in made:
+        begun = f"{row['start_error']:.1e}" if row["setting"]["warm"] else "(zero forces)"
+        lines.append(
+            f"| {row['problem']} | {row['contacts']:,} | {begun} | {row['error']:.1e} | "
+            f"{seconds(row['cost_s'])} | {row['bar_s']:g} s | {row['by']} |"
+        )
+    return "\n".join(lines)
+
+
+def motion_table(rows: Sequence[Row]) -> str:
+    """Steps of a large bed in motion, where they are recorded."""
+    made = [row for row in rows if row["case"] == "rigid-motion"]
+    if not made:
+        return ""
+    lines = [
+        "## A large bed in motion",
+        "",
+        "Whole time steps (contacts found, forces solved, overlaps removed), each from the forces"
+        " of the one before; `validation/rigid_motion_runs.py` says what moves.",
+        "",
+        "| bed | contacts | residual asked for | median | worst | steps above it | median step |"
+        " 99 % | worst | bar |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for row in made:
+        lines.append(
+            f"| {row['problem']} | {row['contacts']:,} | {row['setting']['tolerance']:.0e} | "
+            f"{row['error_median']:.1e} | {row['error']:.1e} | {row['steps_above']} of "
+            f"{row['setting']['steps']} | {seconds(row['cost_s'])} | "
+            f"{seconds(row['cost_99_s'])} | {seconds(row['cost_worst_s'])} | {row['bar_s']:g} s |"
+        )
+    return "\n".join(lines)
+
+
+def dantzig_table(rows: Sequence[Row]) -> str:
+    monotone, reversal = (
+        report.dantzig_success(rows, method) for method in ("dantzig", "dantzig, reversal")
+    )
+    if not monotone:
+        return ""
+    lines = [
+        "| friction | as in the paper | with reversal of the driven force |",
+        "|---|---|---|",
+    ]
+    for friction, (solved, orders) in monotone.items():
+        other = reversal.get(friction, (0, 0))
+        lines.append(f"| {friction:g} | {solved} of {orders} | {other[0]} of {other[1]} |")
+    ends = report.dantzig_ends(rows)
+    if ends:
+        told = ", ".join(f"{method}: {end} ({n})" for (method, end), n in sorted(ends.items()))
+        lines += ["", f"How the others ended: {told}."]
+    shown = report.trace(rows)
+    if shown is not None:
+        steps = [event[5] for event in shown["events"]]
+        still = next((k for k, step in enumerate(reversed(steps)) if step > 0), len(steps))
+        _, _, contact, origin, target, *_ = shown["events"][-1]
+        lines += [
+            "",
+            f"The run in the picture (friction {shown['setting']['friction']:g}, order "
+            f"{shown['seed']}) ends after {shown['work']} changes of lists with {still} of length "
+            f"zero: contact {contact} goes from {target} to {origin} and back.",
+        ]
+    return "\n".join(lines)
+
+
+def powers(levels: Sequence[float]) -> str:
+    return ", ".join(f"{level:.0e}".replace("e-0", "e-") for level in levels)
+
+
+def seconds(cost: float) -> str:
+    return f"{cost:.1g} s" if cost < 0.01 else f"{cost:.2g} s"
