@@ -217,9 +217,10 @@ def friction_solution(
     solved = residual <= tolerance and problem.mended(force, residual)
     if not solved and not message and residual <= tolerance:
         message = (
-            f"{method}: forces grow without bound ({float(np.abs(force).max()):.1g}) and mend"
-            " nothing; relative to them any error is small"
-            "\n  -> look for contacts that bear on no mass, or use impulses"
+            f"{method}: the residual is small, but only beside forces of"
+            f" {float(np.abs(force).max()):.1g}; they leave most of what they have to mend"
+            "\n  -> ask for a smaller tolerance; if that ends so too, forces grow without bound:"
+            " look for contacts that bear on no mass, or use impulses"
         )
     elif not solved and not message:
         message = (

@@ -15,8 +15,11 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.body_factorisation import factorisation
+from rigid_lcp.cones import length
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import (
+    ROUND_OFF,
+    SHARE_LEFT,
     BodySpace,
     FrictionProblem,
     FrictionSolution,
@@ -112,6 +115,10 @@ def solve_auto(
         trial.keep(solve_islands(problem, _solve_island, start, tolerance, accept=accept))
     else:
         trial = attempts(problem, start, tolerance, accept)
+    finer = tolerance
+    while trial.best.residual <= finer and not trial.best.solved and finer > ROUND_OFF:
+        finer = finer_tolerance(problem, trial.best.r, finer)
+        trial.keep(attempts(problem, trial.best.r, finer, accept).solution())
     if trial.best.solved or (
         trial.best.residual <= accept and problem.contacts > FEW_CONTACTS
     ):  # fmt: skip
@@ -129,6 +136,14 @@ def solve_auto(
             " contacts that bear on no mass",
         )
     return trial.solution()
+
+
+def finer_tolerance(problem: FrictionProblem, force: Floats, tolerance: float) -> float:
+    """Half of the residual at which forces of this size leave little of the error without forces,
+    as light bodies that still fall may leave much beside the forces of heavy ones; half of the
+    tolerance so far at most."""
+    enough = SHARE_LEFT * problem.error_without_forces / (length(force) or 1.0)
+    return 0.5 * min(enough, tolerance)
 
 
 def _error(found: FrictionSolution) -> float:

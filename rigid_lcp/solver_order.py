@@ -69,9 +69,12 @@ DEAR_SWEEPS = 6000
 FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
 """What the paths of the interior point may cost in all before no further one is begun: so many
 times what was spent before them, or so many flops (some seconds) if that is more."""
-DRIFT_FLOPS = 5e9
-"""What extrapolated points may cost before the paths (or so much as was spent before, if that is
-more), and again after them."""
+DRIFT, DRIFT_FLOPS = 1500, 5e9
+"""Factorisations of extrapolated points before the paths, and their cost in all (or so much as was
+spent before, if that is more)."""
+LAST_DRIFT, LAST_DRIFT_FLOPS = 4000, 4e10
+"""The same after the paths, when nothing else is left: large packings of little friction take some
+ten seconds of it."""
 ENDLESS = 1e6
 """Forces over ``rho |q|`` that look endless: a proof is looked for before the paths."""
 PROOF_CONTACTS = 3000
@@ -131,7 +134,7 @@ def fallback_paths(trial: Trial, accept: float) -> None:
     if trial.forces > ENDLESS and proved_insoluble(problem):
         trial.best = replace(trial.best, status="no solution")
         return
-    if trial.drift(max(DRIFT_FLOPS, trial.effort)):
+    if trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort)):
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
     for path, sweeps in PATHS:
@@ -147,7 +150,7 @@ def fallback_paths(trial: Trial, accept: float) -> None:
             return
         if trial.best.residual <= accept and problem.contacts > FEW_CONTACTS:
             return
-    if not trial.drift(DRIFT_FLOPS) and trial.effort <= most:
+    if not trial.drift(LAST_DRIFT, LAST_DRIFT_FLOPS) and trial.effort <= most:
         trial.sweep(None, LAST_SWEEPS)
 
 

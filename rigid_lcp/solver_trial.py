@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import Factorisation, factorisation
 from rigid_lcp.cones import length
-from rigid_lcp.extrapolated_points import FACTORISATIONS as DRIFT
 from rigid_lcp.extrapolated_points import extrapolated_points
 from rigid_lcp.friction_problem import (
     FrictionProblem,
@@ -121,11 +120,11 @@ class Trial:
         name = f"{after} + gauss-seidel" if after else "gauss-seidel"
         return self.best.solved or self.polish(found, name, factorisations)
 
-    def drift(self, flops: float) -> bool:
-        """Extrapolated proximal points from the best, at about such a cost at most; whether the
-        tolerance is reached."""
+    def drift(self, most: int, flops: float) -> bool:
+        """Extrapolated proximal points from the best, with so many factorisations at most and at
+        about such a cost; whether the tolerance is reached."""
         self.linear = self.linear or factorisation(self.problem)
-        count = int(min(DRIFT, flops / self.linear.flops, self.affordable))
+        count = int(min(most, flops / self.linear.flops, self.affordable))
         if count < FEW_DRIFT:
             return self.best.solved
         self.keep(
@@ -211,7 +210,7 @@ class Trial:
     def solution(self, status: Status | None = None, message: str = "") -> FrictionSolution:
         """The best point, with the work of all attempts."""
         best = self.best
-        if not best.solved and not message:
+        if not best.solved and not message and best.residual > self.tolerance:
             message = (
                 f"no method reached {self.tolerance:.2g}; the best residual is {best.residual:.2g}"
                 f" by {best.method}\n  -> look at W (a mass of zero? an entry of the wrong sign?),"
@@ -219,5 +218,5 @@ class Trial:
             )
         return FrictionSolution(
             best.r, best.u, best.residual, status or best.status, best.method, self.work,
-            "" if best.solved else message,
+            "" if best.solved else message or best.message,
         )  # fmt: skip

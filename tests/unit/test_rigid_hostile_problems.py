@@ -17,6 +17,7 @@ from rigid_lcp.cones import natural_map, natural_residual
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction_problem import friction_problem, friction_solution
 from rigid_lcp.problem_files import read_problem
+from tests.rigid_static_problems import tower
 
 Floats = NDArray[np.float64]
 
@@ -171,6 +172,17 @@ def test_forces_without_bound_are_no_solution_and_the_message_says_so():
     found = friction_solution(problem, np.array([1e18, 0.0]), 1e-12, "any")
     assert found.status == "not converged"
     assert "without bound" in found.message
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-7, 1e-12])
+@pytest.mark.parametrize("top", [1e4, 1e8])
+def test_light_bodies_rest_at_any_tolerance(top, tolerance):
+    """Beside the forces of a heavy top those of light boxes pass for nothing: a residual within the
+    tolerance is not enough while they still fall, and the default goes on until they do not."""
+    problem = tower(n=6, top=top)
+    found = solve_friction(problem.bodies, problem.offset, problem.friction, 2, tolerance=tolerance)
+    assert found.solved, found.message
+    assert np.abs(found.u).max() <= 0.1 * np.linalg.norm(problem.offset)
 
 
 # --- any 'solved' that is wrong? ------------------------------------------------------------------
