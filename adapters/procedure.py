@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters import stages
-from adapters.engine import engine_named, interruptible
+from adapters.engine import engine_found, engine_named, interruptible
 from adapters.errors import EngineFailed, NotConverged, NotCredible, SceneError, UsageError
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder, disk_full_named, write_atomically
@@ -98,6 +98,10 @@ def run_scene(
     """
     scene = scene_load(scene_path, overrides)
     progress = progress or Progress()
+    if scene.engine.name == "auto":  # from here on, and in the manifest, by its name
+        overrides = [*overrides, f'engine.name="{engine_found().name}"']
+        scene = scene_load(scene_path, overrides)
+        progress.say(f"engine: {scene.engine.name}")
     for warning in scene.warnings:
         progress.say(f"warning: {warning}")
     if dry_run:

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 import os
-import shutil
+from functools import cache
 
 import pytest
 
 
+@cache
+def engine_missing(name: str) -> str:
+    """Why an engine can not be used; empty where it can."""
+    from adapters.engine import engine_named
+    from adapters.errors import EngineMissing
+
+    try:
+        engine_named(name).version()
+    except EngineMissing as error:
+        return error.what
+    return ""
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Look for the program of every ``@pytest.mark.engine`` (default: liggghts)."""
+    """Ask every ``@pytest.mark.engine`` (default: liggghts) for its version."""
     for mark in item.iter_markers("engine"):
         name = mark.args[0] if mark.args else mark.kwargs.get("name", "liggghts")
-        if shutil.which(name) is None:
-            reason = f"the engine {name} is not installed (./setup.sh test installs it)"
+        missing = engine_missing(name)
+        if missing:
+            reason = f"the engine {name} is not usable (./setup.sh test installs it): {missing}"
             if os.environ.get("CI") == "true":
                 pytest.fail(reason, pytrace=False)
             pytest.skip(reason)

@@ -294,7 +294,7 @@ REFUSED = [
     ("procedure.relaxation", 'relaxation = "smallest move"', "did you mean smallest-move?"),
     ("procedure.total_cycles", "total_cycles = 1", "must exceed k_i ="),
     ("engine.name", 'name = "ligghts"', "did you mean liggghts?"),
-    ("engine.name", 'name = "yade"', "must be 'liggghts' or 'fake'"),
+    ("engine.name", 'name = "pfc"', "must be 'auto', 'liggghts', 'lammps', 'yade' or 'fake'"),
     ("engine.rayleigh_share", "rayleigh_share = 1.1", "at most 1"),
     ("engine.rayleigh_share", "time_step = 1.0", "Rayleigh times"),
     ("engine.launcher", 'launcher = "mpirun"', "tuple"),
