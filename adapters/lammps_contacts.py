@@ -10,7 +10,7 @@ import numpy as np
 from adapters import contact_law
 from adapters.dump import Frame, dump_frames, dump_write
 from adapters.scene import Scene
-from adapters.state import FloatArray
+from adapters.state import FloatArray, IntArray
 
 COLUMNS = tuple(f"c_contact[{i}]" for i in range(1, 13))
 """Pair, normal and tangential force on the first grain, tangential spring, overlap."""
@@ -49,7 +49,7 @@ def contact_values(scene: Scene, pairs: FloatArray, grains: Frame) -> FloatArray
 
 
 def elastic_displacement(
-    scene: Scene, force: FloatArray, overlap: FloatArray, grains: Frame, held: FloatArray
+    scene: Scene, force: FloatArray, overlap: FloatArray, grains: Frame, held: IntArray
 ) -> FloatArray:
     """Displacement delta_t that carries the elastic part of F_t = -k_t delta_t - c_t v_t [m].
 
