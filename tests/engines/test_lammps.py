@@ -16,7 +16,7 @@ import pytest
 
 import trackbed
 from adapters import engine_lammps
-from adapters.engine import EngineStart
+from adapters.engine import EngineStart, engine_named
 from adapters.engine_lammps import LammpsEngine, lammps_program
 from adapters.errors import EngineFailed, EngineMissing, TrackbedError
 from adapters.procedure import run_scene
@@ -468,6 +468,14 @@ def test_runs_where_neither_apt_engine_is(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     table = (tmp_path / "run" / "settlement.csv").read_text().splitlines()
     assert [line.split(",")[0] for line in table[1:]] == ["1", "2", "3"]
+
+
+def test_auto_is_lammps_where_nothing_else_is(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The default engine of a user without root."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert engine_named("auto").name == "lammps"
 
 
 def test_lammps_is_never_loaded_into_the_users_python() -> None:
