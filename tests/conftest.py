@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import os
+import shutil
 from functools import cache
 
 import pytest
 
 
+ENGINES = ("liggghts", "lammps", "yade")
+"""Engines that tell their version; other names are those of programs, such as ``chromium``."""
+
+
 @cache
 def engine_missing(name: str) -> str:
-    """Why an engine can not be used; empty where it can."""
+    """Why an engine or a program can not be used; empty where it can."""
+    if name not in ENGINES:
+        return "" if shutil.which(name) else f"the engine {name} is not installed"
     from adapters.engine import engine_named
     from adapters.errors import EngineMissing
 
@@ -27,7 +34,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         name = mark.args[0] if mark.args else mark.kwargs.get("name", "liggghts")
         missing = engine_missing(name)
         if missing:
-            reason = f"the engine {name} is not usable (./setup.sh test installs it): {missing}"
+            reason = f"{missing} (./setup.sh test installs it)"
             if os.environ.get("CI") == "true":
                 pytest.fail(reason, pytrace=False)
             pytest.skip(reason)
