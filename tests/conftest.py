@@ -8,7 +8,6 @@ from functools import cache
 
 import pytest
 
-
 ENGINES = ("liggghts", "lammps", "yade")
 """Engines that tell their version; other names are those of programs, such as ``chromium``."""
 
