@@ -282,6 +282,8 @@ def test_piston_moves_by_its_forces(bed: Bed) -> None:
     assert change == pytest.approx(force, abs=4 * noise)
     assert noise < 1e-3 * track.target_force.max()
     assert len(track.time_step) == 2 * scene.steps_per_cycle  # the seam is among them
+    target = scene.stress_at(track.time_step / scene.steps_per_cycle) * scene.loaded_area
+    assert track.target_force == pytest.approx(target, abs=1e-9 * target.max())
 
 
 def test_window_goes_on_where_the_last_one_ended(bed: Bed) -> None:
