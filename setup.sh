@@ -2,7 +2,7 @@
 # Install what trackbed needs, and only what is missing: the engine (apt) and Python packages
 # (into .venv).  Says first what it will install; a second call takes no time.
 #   ./setup.sh                  for `make demo`
-#   ./setup.sh test,lint        with these extras of pyproject.toml; `test` adds Chromium
+#   ./setup.sh test,lint        with these extras of pyproject.toml; `test` adds YADE and Chromium
 # PYTHON=/path/to/python3 chooses the Python that .venv is made with.
 set -eu
 cd "$(dirname "$0")"
@@ -26,6 +26,7 @@ if command -v "$python" >/dev/null; then
 fi
 case ",$extras," in *,test,*)
     command -v chromium >/dev/null || lacking="$lacking chromium"
+    command -v yade >/dev/null || lacking="$lacking yade"
     # what gmsh's Python wheel is linked to
     for library in libGLU.so.1:libglu1-mesa libXcursor.so.1:libxcursor1 libXft.so.2:libxft2 \
         libXinerama.so.1:libxinerama1 libOpenGL.so.0:libopengl0; do

@@ -51,6 +51,7 @@ def doctor_command(arguments: argparse.Namespace) -> int:
     from dataclasses import asdict
 
     from adapters.doctor import engine_usable, findings
+    from adapters.engine import ENGINE_REMEDY
 
     found = findings()
     if arguments.json:
@@ -62,9 +63,7 @@ def doctor_command(arguments: argparse.Namespace) -> int:
             if one.remedy:
                 print(f"{'':9}-> {one.remedy}")
     if not engine_usable(found):
-        raise EngineMissing(
-            "no engine is installed, so nothing can be run", remedy="sudo apt-get install liggghts"
-        )
+        raise EngineMissing("no engine is installed, so nothing can be run", remedy=ENGINE_REMEDY)
     return 0
 
 
@@ -120,7 +119,10 @@ def run_register(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
         help="change a key of the scene, such as procedure.h=10; may be repeated",
     )  # fmt: skip
-    parser.add_argument("--engine", metavar="NAME", help="short for --set engine.name=NAME")
+    parser.add_argument(
+        "--engine", metavar="NAME",
+        help="liggghts, lammps, yade or auto; short for --set engine.name=NAME",
+    )  # fmt: skip
     parser.add_argument(
         "--launcher", metavar="WORDS", help='before the engine\'s command, as in "mpirun -np 2"'
     )

@@ -169,6 +169,25 @@ def restitution_literal(alpha: float) -> float:
     return restitution_of_alpha(alpha / DAMPING_FACTOR)
 
 
+def damping_of_rebound(restitution: float) -> float:
+    """Damping ratio a of c = 2 a sqrt(m* S_n) with which a contact that can not pull rebounds so.
+
+    For an engine that ends a contact at the first tension; ``restitution`` 0 < e <= 1, the same at
+    every speed, stiffness and size.  Without a pull some of the damping is missing, so a is above
+    `DAMPING_FACTOR` times `alpha_of_restitution`.
+    """
+    from scipy.optimize import brentq
+
+    if restitution == 1:
+        return 0.0
+    least = DAMPING_FACTOR * alpha_of_restitution(restitution)
+
+    def excess(ratio: float) -> float:
+        return collision(1.0, 1.0, 1.0, 1.0, ratio, may_pull=False).restitution - restitution
+
+    return float(brentq(excess, least, 10 * least, xtol=1e-12))
+
+
 @dataclass(frozen=True)
 class Collision:
     """Outcome of two grains, or a grain and a wall, that meet head-on."""

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil, pi, sqrt
 
 import numpy as np
 
 from adapters.state import FloatArray
+
+SIDES_GAP = 0.01
+"""Greatest gap between a cylinder and the polygon around it, over the mean grain radius."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +49,13 @@ class Container:
     """Length of the box along x [m]."""
     size_y: float = np.nan
     """Length of the box along y [m]."""
+    sides: int = 0
+    """Planes that stand for a whole cylinder, tangent to it, in an engine that has none; a
+    multiple of 4, so that mirror planes pass through corners.  0: a true cylinder."""
 
     @property
     def area(self) -> float:
-        """Horizontal section [m^2]."""
+        """Horizontal section [m^2]; that of the cylinder where ``sides`` stand for it."""
         if self.shape == "box":
             return self.size_x * self.size_y
         return np.pi * self.radius**2 / 2 ** len(self.symmetry)
@@ -71,6 +78,10 @@ class Container:
                 far = tuple((self.size_x, self.size_y)[axis] * c for c in inward)
                 outward = tuple(-c for c in inward)
                 planes.append((f"wall_{name}_high", far, outward, False, np.inf))
+        for number, angle in enumerate(self.side_angles(), 1):
+            outward = (np.cos(angle), np.sin(angle), 0.0)
+            side = tuple(self.radius * c for c in outward)
+            planes.append((f"cylinder_{number}", side, tuple(-c for c in outward), False, np.inf))
         if np.isfinite(piston_height):
             planes.append(("piston", (0, 0, piston_height), (0, 0, -1), False, piston_reach))
         name_, point, normal, frictionless, reach = zip(*planes, strict=True)
@@ -80,5 +91,22 @@ class Container:
             np.array(normal, float),
             frictionless,
             np.array(reach, float),
-            self.radius if self.shape == "cylinder" else np.inf,
+            self.radius if self.shape == "cylinder" and not self.sides else np.inf,
         )
+
+    def side_angles(self) -> FloatArray:
+        """Direction of each side's outward normal from the x axis [rad]; none without ``sides``."""
+        angle = (np.arange(self.sides) + 0.5) * 2 * np.pi / max(self.sides, 1)
+        inside = np.ones(self.sides, bool)
+        for axis in self.symmetry:
+            inside &= (np.cos(angle) if axis == "x" else np.sin(angle)) > 0
+        return angle[inside]
+
+
+def sides_needed(radius: float, grain_radius: float) -> int:
+    """Sides of a polygon around a cylinder of ``radius`` [m] whose corners stand out little.
+
+    A corner is radius (1/cos(pi/N) - 1) from the cylinder, at most `SIDES_GAP` times the mean
+    ``grain_radius`` [m]; the section exceeds the circle's by a third of (pi/N)^2.
+    """
+    return 4 * ceil(pi / sqrt(2 * SIDES_GAP * grain_radius / radius) / 4)

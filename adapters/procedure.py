@@ -10,8 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from adapters import stages
-from adapters.engine import engine_named, interruptible
-from adapters.errors import EngineFailed, NotConverged, NotCredible, SceneError, UsageError
+from adapters.engine import REAL_ENGINES, engine_found, engine_named, interruptible
+from adapters.errors import (
+    EngineFailed,
+    EngineMissing,
+    NotConverged,
+    NotCredible,
+    SceneError,
+    UsageError,
+)
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder, disk_full_named, write_atomically
 from adapters.scene import Scene, flat_keys
@@ -98,6 +105,16 @@ def run_scene(
     """
     scene = scene_load(scene_path, overrides)
     progress = progress or Progress()
+    if scene.engine.name == "auto":  # from here on, and in the manifest, by its name
+        try:
+            name = engine_found().name
+        except EngineMissing:
+            if not dry_run:
+                raise
+            name = REAL_ENGINES[0]  # decks can be looked at without it
+        overrides = [*overrides, f'engine.name="{name}"']
+        scene = scene_load(scene_path, overrides)
+        progress.say(f"engine: {scene.engine.name}")
     for warning in scene.warnings:
         progress.say(f"warning: {warning}")
     if dry_run:

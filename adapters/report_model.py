@@ -4,8 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from adapters.contact_law import DAMPING_FACTOR, restitution_literal
+from adapters.contact_law import DAMPING_FACTOR, collision, restitution_literal
 from adapters.scene import Scene
+
+ENGINE_TITLES = {"auto": "LIGGGHTS", "liggghts": "LIGGGHTS", "lammps": "LAMMPS", "yade": "YADE"}
+"""Engines as their users write them."""
+
+KEPT = {
+    "auto": "LIGGGHTS keeps the spring",
+    "liggghts": "LIGGGHTS keeps the spring",
+    "yade": "YADE keeps the force",
+}
+"""What engines without the paper's rule keep when the normal force decreases."""
 
 
 def left_out(scene: Scene) -> tuple[str, ...]:
@@ -30,24 +40,35 @@ def _contacts(scene: Scene) -> Iterator[str]:
     yield "Plastic and adhesive contacts: Hertz's law is elastic, for overlaps far below a radius."
     if grain.friction or scene.material.wall.friction:
         yield "Rolling and spinning resistance: a loose grain may spin without end."
-    if grain.friction:
+    if grain.friction and scene.engine.name in KEPT:
         yield (
             "The paper's rule that rescales the tangential force when the normal one decreases "
-            "(Elata and Berryman): LIGGGHTS keeps the spring and cuts it at Coulomb's limit."
+            f"(Elata and Berryman): {KEPT[scene.engine.name]} and cuts it at Coulomb's limit."
         )
-    else:
+    elif not grain.friction:
         yield "Friction between grains: its coefficient is 0, so the bed has no tangential forces."
     if not scene.material.wall.friction:
         yield "Friction at the walls: its coefficient is 0."
     if grain.viscous_alpha is not None and grain.viscous_alpha < DAMPING_FACTOR:
         literal = restitution_literal(grain.viscous_alpha)
+        rebound, why = scene.restitution, ""
+        if scene.engine.name == "yade":
+            ratio = DAMPING_FACTOR * grain.viscous_alpha
+            rebound = collision(1.0, 1.0, 1.0, 1.0, ratio, may_pull=False).restitution
+            why = ", since its contacts never pull"
         yield (
-            f"A literal eq. 7: LIGGGHTS damps by sqrt(5/6) = {DAMPING_FACTOR:.3f} of it, which "
-            f"makes the restitution {scene.restitution:.4f} at any speed (literal: {literal:.4f})."
+            f"A literal eq. 7: {ENGINE_TITLES.get(scene.engine.name, 'the engine')} damps by "
+            f"sqrt(5/6) = {DAMPING_FACTOR:.3f} of it, which makes the restitution {rebound:.4f} at "
+            f"any speed (literal: {literal:.4f}){why}."
         )
 
 
 def _bed(scene: Scene) -> Iterator[str]:
+    if scene.container.sides:
+        yield (
+            f"The round wall: YADE has none, and {scene.container.sides} planes about the whole "
+            "circle, tangent to the cylinder, stand for it."
+        )
     if scene.sample.symmetry:
         part = {1: "half", 2: "a quarter"}[len(scene.sample.symmetry)]
         yield (

@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 from pydantic_core import PydanticCustomError
 
 from adapters import contact_law
-from adapters.container import Container
+from adapters.container import Container, sides_needed
 from adapters.load_series import LoadSeries, load_series_read
 from adapters.radii import RadiusDistribution, grain_count_expected
 from adapters.scene_checks import COUNT_GREATEST, scene_problems, scene_warnings
@@ -24,8 +24,12 @@ from adapters.state import FloatArray
 TRACK_SAMPLES = 100
 """Least number of samples of the piston's record in a cycle."""
 
-ENGINES = ("liggghts", "fake")
-"""Names of the engines; ``fake`` writes analytic states, for tests."""
+ENGINES = ("auto", "liggghts", "lammps", "yade", "fake")
+"""Names of the engines; ``fake`` writes analytic states, for tests, and ``auto`` stands for the
+first one that is installed (`adapters.engine.engine_found`)."""
+
+FLAT_WALLED = ("yade",)
+"""Engines without a cylinder: planes tangent to it take its place."""
 
 Positive = Annotated[float, Field(ge=1e-15, le=1e18, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, le=1e18, allow_inf_nan=False)]
@@ -204,7 +208,8 @@ class Procedure(Table):
 class Engine(Table):
     """The engine and its time step."""
 
-    name: Literal["liggghts", "fake"]
+    name: Literal["auto", "liggghts", "lammps", "yade", "fake"]
+    """Engine; ``auto`` is the first that is installed: liggghts, lammps, yade."""
     time_step: Positive | None = None
     """Longest time step [s]."""
     rayleigh_share: Share | None = None
@@ -240,12 +245,14 @@ class Scene(Table):
 
     @property
     def container(self) -> Container:
-        """The container's geometry."""
+        """The container's geometry, as the scene's engine has it."""
         sample = self.sample
+        sides = 0
+        if sample.radius is not None and self.engine.name in FLAT_WALLED:
+            sides = sides_needed(sample.radius, sample.grain_radius.mean)
         given = (sample.radius, sample.size_x, sample.size_y)
-        return Container(
-            sample.container, sample.symmetry, *(nan if size is None else size for size in given)
-        )
+        radius, size_x, size_y = (nan if size is None else size for size in given)
+        return Container(sample.container, sample.symmetry, radius, size_x, size_y, sides)
 
     @property
     def loaded_area(self) -> float:

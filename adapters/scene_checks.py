@@ -28,6 +28,9 @@ ALTERNATIVES = (
 COUNT_GREATEST = 10**8
 """Most grains a scene may have."""
 
+MPI_STARTERS = {"mpirun", "mpiexec", "mpiexec.hydra", "orterun"}
+"""Programs that start the program behind them several times."""
+
 RAYLEIGH_SHARE_DOUBTFUL = 0.4
 """Share of the Rayleigh time above which a time step is doubtful."""
 WIDTH_DOUBTFUL = 8
@@ -198,6 +201,14 @@ def _procedure(scene: _Values) -> Iterator[Problem]:
         yield Problem("procedure.total_cycles", f"must exceed k_i = {first}, is {total}")
 
 
+def _launcher(scene: _Values) -> Iterator[Problem]:
+    words = [Path(word).name for word in scene.get("engine.launcher") or ()]
+    if scene.need("engine.name") == "yade" and set(words) & MPI_STARTERS:
+        yield Problem(
+            "engine.launcher", "YADE runs in one process: several would write the same files"
+        )
+
+
 def _law(scene: _Values) -> Iterator[Problem]:
     from adapters.laws import laws_known
 
@@ -254,6 +265,7 @@ CHECKS: tuple[Check, ...] = (
     _series,
     _partial_piston,
     _procedure,
+    _launcher,
     _law,
     _time_step,
 )

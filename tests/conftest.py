@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -34,12 +35,32 @@ def _place(path: Path) -> int:
     return {"qdem": 1, "rigid": 3}.get(path.stem.split("_")[1], 2)  # test_STORY_...
 
 
+ENGINES = ("liggghts", "lammps", "yade")
+"""Engines that tell their version; other names are those of programs, such as ``chromium``."""
+
+
+@cache
+def engine_missing(name: str) -> str:
+    """Why an engine or a program can not be used; empty where it can."""
+    if name not in ENGINES:
+        return "" if shutil.which(name) else f"the engine {name} is not installed"
+    from adapters.engine import engine_named
+    from adapters.errors import EngineMissing
+
+    try:
+        engine_named(name).version()
+    except EngineMissing as error:
+        return error.what
+    return ""
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip a test whose ``@pytest.mark.engine`` (default: liggghts) is missing; fail it in CI."""
     for mark in item.iter_markers("engine"):
         name = mark.args[0] if mark.args else mark.kwargs.get("name", "liggghts")
-        if shutil.which(name) is None:
-            reason = f"the engine {name} is not installed (./setup.sh test installs it)"
+        missing = engine_missing(name)
+        if missing:
+            reason = f"{missing} (./setup.sh test installs it)"
             if os.environ.get("CI") == "true":
                 pytest.fail(reason, pytrace=False)
             pytest.skip(reason)

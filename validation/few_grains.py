@@ -1,4 +1,4 @@
-"""One contact in LIGGGHTS, under the contact law, walls and settings that every scene gets."""
+"""One contact in an engine (LIGGGHTS if no other is named), under every scene's law and walls."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Protocol
 
 import numpy as np
 
@@ -79,6 +80,23 @@ def shear_modulus(scene: Scene) -> float:
     return contact_law.equivalent_shear_modulus(*grain, *grain)
 
 
+class TrackRun(Protocol):
+    """Runs a few grains on an engine; `track_run` does on LIGGGHTS."""
+
+    def __call__(
+        self,
+        scene: Scene,
+        position: FloatArray,
+        velocity: FloatArray,
+        motion: Sequence[str],
+        *,
+        time_step: float,
+        every: int = 1,
+        materials: Callable[[str], str] = str,
+    ) -> Track:
+        """Arguments as of `track_run`."""
+
+
 def track_run(
     scene: Scene,
     position: FloatArray,
@@ -146,6 +164,7 @@ def head_on(
     mirror: bool = False,
     slide: float = 0.0,
     materials: Callable[[str], str] = str,
+    run: TrackRun = track_run,
 ) -> tuple[Collision, Track]:
     """Two grains that meet at ``speed`` [m/s], or one and its image in the mirror plane x = 0.
 
@@ -160,7 +179,7 @@ def head_on(
     position = np.array([middle + apart, middle - apart])
     velocity = np.array([[-speed / 2, 0.0, slide], [speed / 2, 0.0, slide]])
     grains = 1 if mirror else 2
-    track = track_run(
+    track = run(
         scene,
         position[:grains],
         velocity[:grains],
@@ -186,6 +205,7 @@ def driven_contact(
     *,
     speed: float = 1e-3,
     steps: int = 1000,
+    run: TrackRun = track_run,
 ) -> tuple[Track, FloatArray, FloatArray]:
     """One contact driven along straight legs between the corners of a path; the other grain held.
 
@@ -201,7 +221,7 @@ def driven_contact(
         motion.append(f"fix leg grain_1 move linear {leg[0]:.17g} {leg[1]:.17g} 0.0 units box")
         motion += [f"run {steps}", "unfix leg"]
     start = PLACE + np.array([[2 * RADIUS - overlap[0], displacement[0], 0.0], [0.0, 0.0, 0.0]])
-    track = track_run(
+    track = run(
         scene, start, np.zeros((2, 3)), motion, time_step=time_step, every=max(steps // 100, 1)
     )
     apart = track.position[:, 0] - track.position[:, 1]
@@ -209,7 +229,11 @@ def driven_contact(
 
 
 def mirror_slide(
-    scene: Scene, speed: float, runs: int, materials: Callable[[str], str] = str
+    scene: Scene,
+    speed: float,
+    runs: int,
+    materials: Callable[[str], str] = str,
+    run: TrackRun = track_run,
 ) -> Track:
     """A grain that 1 N presses on the mirror plane x = 0 slides along z at ``speed`` [m/s].
 
@@ -218,7 +242,7 @@ def mirror_slide(
     modulus = scene.stiffness.mirror
     overlap = float(contact_law.overlap_under_force(1.0, modulus, RADIUS))
     push = ["fix motion grains nve/sphere", "fix push grains addforce -1.0 0.0 0.0"]
-    return track_run(
+    return run(
         scene,
         np.array([[RADIUS - overlap, *PLACE[1:]]]),
         np.array([[0.0, 0.0, speed]]),

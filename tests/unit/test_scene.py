@@ -61,13 +61,13 @@ def scene_or_refusal(path: Path) -> Scene | None:
 
 
 def test_shipped_scenes_load_without_doubts() -> None:
-    """Every scene that ships is valid and free of warnings, on LIGGGHTS."""
+    """Every scene that ships is valid and free of warnings, on whichever engine there is."""
     names = [name for name in scene_names() if scene_verb(name) == "run"]
     assert names == ["karrech", "karrech-coarse", "karrech-partial"]
     for name in names:
         scene = scene_load(Path(__file__).parents[2] / "scenes" / f"{name}.toml")
         assert scene.warnings == ()
-        assert scene.engine.name == "liggghts"
+        assert scene.engine.name == "auto"
     with pytest.raises(KeyError, match="karrech-coarse"):
         scene_template("carrech")
 
@@ -294,7 +294,7 @@ REFUSED = [
     ("procedure.relaxation", 'relaxation = "smallest move"', "did you mean smallest-move?"),
     ("procedure.total_cycles", "total_cycles = 1", "must exceed k_i ="),
     ("engine.name", 'name = "ligghts"', "did you mean liggghts?"),
-    ("engine.name", 'name = "yade"', "must be 'liggghts' or 'fake'"),
+    ("engine.name", 'name = "pfc"', "must be 'auto', 'liggghts', 'lammps', 'yade' or 'fake'"),
     ("engine.rayleigh_share", "rayleigh_share = 1.1", "at most 1"),
     ("engine.rayleigh_share", "time_step = 1.0", "Rayleigh times"),
     ("engine.launcher", 'launcher = "mpirun"', "tuple"),

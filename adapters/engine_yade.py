@@ -1,0 +1,183 @@
+"""YADE (Debian's 2023.02a) as an engine: static scripts, one JSON file, fresh processes."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from adapters.decks import PISTON_MARGIN, deck_copy
+from adapters.engine import (
+    EngineRun,
+    EngineStart,
+    cycles_in_track,
+    engine_failure,
+    process_run,
+    restart_check,
+)
+from adapters.engine_plan import EQUILIBRIUM_RATIO, SETTLE_TIMES, seat_plan, settle_plan
+from adapters.errors import EngineMissing, NotConverged
+from adapters.scene import Scene
+from adapters.state import FloatArray
+from adapters.yade_parameters import piston_triangles, shared_parameters
+
+SCRIPTS = {"in.prepare": "prepare.py", "in.cycles": "cycles.py"}
+"""Script of each deck."""
+
+PARAMETERS = "params.json"
+
+BANNER = re.compile(r"Yade version: ((\d{4})\S*)")
+YEAR_LEAST = 2023
+"""Oldest version whose walls are known to be flat when asked (``hertzian``)."""
+
+
+class YadeEngine:
+    """Writes the parameters of a window, runs ``yade``, and knows its manners.
+
+    YADE exits 0 with NaN and with escaped grains; the script's last line ``COMPLETE step N`` is
+    the sentinel looked for here, `adapters.checks` does the rest.  ``-x`` has it exit 1 after an
+    exception, ``-n`` open no window, ``-j1`` repeat itself bit for bit.
+    """
+
+    name = "yade"
+
+    def version(self) -> str:
+        """Version banner such as ``Yade 2023.02a``; raises `EngineMissing`."""
+        remedy = "sudo apt-get install yade"
+        program = shutil.which("yade")
+        if program is None:
+            raise EngineMissing("YADE is not installed", remedy=remedy)
+        try:
+            asked = subprocess.run(
+                [program, "--version"],
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=60,
+                stdin=subprocess.DEVNULL,
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise EngineMissing(
+                f"YADE does not start ({error})", where=program, remedy=remedy
+            ) from error
+        answer = asked.stdout + asked.stderr
+        banner = BANNER.search(answer)
+        if banner is None or int(banner[2]) < YEAR_LEAST:
+            said = banner[0] if banner else (answer.strip().splitlines() or ["nothing"])[-1]
+            raise EngineMissing(
+                f"this is not YADE of {YEAR_LEAST} or later; it says: {said}",
+                where=program,
+                remedy=remedy,
+            )
+        return f"Yade {banner[1]}"
+
+    def command(self, scene: Scene, deck: str) -> list[str]:
+        """Command line that runs ``deck`` in its folder."""
+        yade = ["yade", "-n", "-x", "-j1", SCRIPTS.get(deck, deck), PARAMETERS]
+        return [*scene.engine.launcher, *yade]
+
+    def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
+        """Names of the walls whose forces ``states.dump`` holds; see `adapters.engine.Engine`."""
+        names = scene.container.walls().plane_name
+        return (*names, "piston") if piston else names
+
+    def cycles_done(self, scene: Scene, start: EngineStart, folder: Path) -> int:
+        """Load cycles done so far, from ``piston.txt``."""
+        return cycles_in_track(scene, folder)
+
+    def write_preparation(
+        self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
+    ) -> dict[str, str]:
+        """Write the rain of grains; see `adapters.engine.Engine`."""
+        content = shared_parameters(scene, height)
+        content["settle"] = asdict(settle_plan(scene, height))
+        content["settle"]["equilibrium_ratio"] = EQUILIBRIUM_RATIO
+        content["grains"] = {"position": position.tolist(), "radius": radius.tolist()}
+        return self._write(folder, "prepare.py", content)
+
+    def write_cycles(
+        self, scene: Scene, start: EngineStart, cycles: int, folder: Path
+    ) -> dict[str, str]:
+        """Write a window of load cycles; see `adapters.engine.Engine`."""
+        assert scene.loading is not None
+        shutil.copyfile(start.restart, folder / "start.restart")
+        margin = PISTON_MARGIN * scene.sample.grain_radius.greatest
+        steps = scene.steps_per_cycle
+        content = shared_parameters(scene, start.piston_height)
+        content["piston"] = {
+            "mass": scene.loading.piston_mass,
+            "height": start.piston_height,
+            "triangles": piston_triangles(scene.container, scene.piston_reach, margin).tolist(),
+        }
+        content["window"] = {
+            "start": start.kind,
+            "cycles": cycles,
+            "steps_per_cycle": steps,
+            "track_steps": steps // scene.samples_per_cycle,
+            "load": _load(scene),
+        }
+        if start.first:
+            content["window"]["seat"] = asdict(seat_plan(scene))
+        if start.moved is not None:
+            content["window"]["moved"] = start.moved.position.tolist()
+        if start.kind == "perturbed":
+            content["window"]["perturbation"] = start.perturbation
+        return self._write(folder, "cycles.py", content)
+
+    def run(
+        self,
+        scene: Scene,
+        deck: str,
+        folder: Path,
+        watch: Callable[[], None],
+        digests: dict[str, str],
+    ) -> EngineRun:
+        """Run a script; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
+        command = self.command(scene, deck)
+        status, cpu_s, wall_s = process_run(command, folder, watch)
+        text = (folder / "screen.txt").read_text(errors="replace")
+        if "NOT SETTLED" in text:
+            raise NotConverged(
+                f"the bed still moves after {SETTLE_TIMES} falling times",
+                where=str(folder),
+                remedy="more damping (viscous_alpha), or a shorter time step",
+            )
+        if status != 0 or not re.search(r"^COMPLETE step \d+", text, re.MULTILINE):
+            failure = engine_failure(status, folder)
+            failure.from_outside |= "Running script" not in text  # YADE failed before it
+            raise failure
+        restart_check(folder)
+        loop_s = sum(float(s) for s in re.findall(r"^LOOP (\S+) s", text, re.MULTILINE))
+        return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)
+
+    @staticmethod
+    def _write(folder: Path, script: str, content: dict[str, Any]) -> dict[str, str]:
+        """The parameters and the static scripts; returns the digests of the scripts."""
+        (folder / PARAMETERS).write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
+        return deck_copy(folder, (script, "bed.py", "record.py"), "yade_scripts")
+
+
+def _load(scene: Scene) -> dict[str, Any]:
+    """The load as forces [N] on the piston: a mean and a sine, or a period of samples."""
+    assert scene.loading is not None
+    samples = scene.loading.samples
+    if samples is not None:
+        force = samples.stress * scene.loaded_area
+        time = samples.time - samples.time[0]
+        return {
+            "waveform": "series",
+            "mean_force": 0.0,
+            "time": time.tolist(),
+            "force": force.tolist(),
+        }
+    return {
+        "waveform": "sine",
+        "mean_force": scene.loading.mean * scene.loaded_area,  # type: ignore[operator]
+        "amplitude": scene.loading.amplitude * scene.loaded_area,  # type: ignore[operator]
+        "frequency": scene.loading.frequency,
+    }

@@ -1,0 +1,153 @@
+"""Input files of one LAMMPS run that depend on the scene: contact laws, walls, columns, moves.
+
+Static decks live in ``lammps_inputs``; generated are ``parameters.in``, ``scene.in`` (contact law
+and walls), ``piston_wall.in``, ``dump_states.in`` (columns), ``grains.data``, ``moved_x.txt`` and
+its sisters, and the load samples.  `adapters.decks` has what LIGGGHTS needs in the same words.
+"""
+
+from __future__ import annotations
+
+from math import isinf, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from adapters import contact_law
+from adapters.container import Container
+from adapters.decks import piston_atom_place
+from adapters.scene import Scene
+from adapters.state import State
+
+PARTS_PREPARE = ("in.prepare", "settings.in", "bed.in")
+PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
+
+TANGENTIAL_RULES = ("mindlin_rescale/force", "mindlin_rescale", "mindlin/force", "mindlin")
+"""LAMMPS' answers to what becomes of the tangential force when the normal force changes.
+
+The first is the paper's; ``mindlin`` is LIGGGHTS', ``mindlin/force`` YADE's.
+"""
+
+
+def contact_text(
+    modulus: float, shear: float, restitution: float, friction: float, rule: str
+) -> str:
+    """Words of a granular contact law: eqs 5 to 7 for E* = ``modulus`` and G* = ``shear`` [Pa].
+
+    K_n = 4/3 E*, K_t = 8 G*; the damping is that of the ``restitution``, see
+    `adapters.contact_law`; along the tangent it is larger by sqrt(k_t/S_n) = sqrt(4 G*/E*), so
+    that both have the same alpha.  Without ``friction`` there is no tangential force at all.
+    """
+    if friction > 0:
+        ratio = sqrt(4 * shear / modulus)
+        tangential = f"{rule} {8 * shear:.17g} {ratio:.17g} {friction:.17g}"
+    else:
+        tangential = "linear_nohistory 0.0 0.0"
+    normal = f"hertz {4 / 3 * modulus:.17g} {restitution:.17g}"
+    return f"{normal} tangential {tangential} damping coeff_restitution"
+
+
+def wall_contact_text(scene: Scene, rule: str) -> str:
+    """`contact_text` between a grain and a wall."""
+    grain, wall = scene.material.grain, scene.material.wall
+    shear = contact_law.equivalent_shear_modulus(
+        grain.young, grain.poisson, wall.young, wall.poisson
+    )
+    return contact_text(scene.stiffness.wall, shear, scene.restitution, wall.friction, rule)
+
+
+def scene_text(scene: Scene, rule: str) -> str:
+    """``scene.in``: contact law between grains, and every wall that stands still.
+
+    ``rule`` is one of `TANGENTIAL_RULES`.  The cylinder is curved for LAMMPS, which takes
+    1/R* = 1/R - 1/(2 R_c) with its radius R_c where LIGGGHTS takes 1/R* = 1/R.
+    """
+    grain = scene.material.grain
+    shear = contact_law.equivalent_shear_modulus(
+        grain.young, grain.poisson, grain.young, grain.poisson
+    )
+    between = contact_text(scene.stiffness.grain, shear, scene.restitution, grain.friction, rule)
+    wall = wall_contact_text(scene, rule)
+    mirror = contact_text(scene.stiffness.mirror, 0.0, scene.restitution, 0.0, rule)
+    lines = [
+        "# scene.in : generated; contact laws: 4/3 E*, restitution; tangential rule, 8 G*, damping"
+        " ratio, friction",
+        f"pair_coeff * * {between}",
+    ]
+    walls = scene.container.walls()
+    for name, frictionless, point, normal in zip(
+        walls.plane_name,
+        walls.plane_frictionless,
+        walls.plane_point,
+        walls.plane_normal,
+        strict=True,
+    ):
+        axis = int(np.argmax(np.abs(normal)))
+        place = f"{point[axis]:.17g}"
+        sides = f"{place} NULL" if normal[axis] > 0 else f"NULL {place}"
+        law = mirror if frictionless else wall
+        lines.append(
+            f"fix {name} grains wall/gran granular {law} {'xyz'[axis]}plane {sides} contacts"
+        )
+    if np.isfinite(walls.cylinder_radius):
+        lines.append(
+            f"region cylinder cylinder z 0.0 0.0 {walls.cylinder_radius:.17g} INF INF units box"
+        )
+        lines.append(
+            f"fix cylinder grains wall/gran/region granular {wall} region cylinder contacts"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def piston_wall_text(scene: Scene, rule: str) -> str:
+    """``piston_wall.in``: the piston's face at height 0, moved by ``v_piston_position``.
+
+    A whole piston is a plane, a partial one the end of a cylinder of radius ``piston_reach``.
+    """
+    motion = "move NULL NULL v_piston_position units box"
+    if isinf(scene.piston_reach):
+        region = f"plane 0.0 0.0 0.0 0.0 0.0 -1.0 {motion}"
+    else:
+        region = f"cylinder z 0.0 0.0 {scene.piston_reach:.17g} 0.0 INF side out {motion}"
+    return (
+        "# piston_wall.in : generated\n"
+        f"region piston {region}\n"
+        "fix piston_wall grains wall/gran/region granular "
+        f"{wall_contact_text(scene, rule)} region piston contacts\n"
+    )
+
+
+def wall_names(container: Container, piston: bool) -> tuple[str, ...]:
+    """Names of all walls in the order of the columns of ``states.dump``."""
+    walls = container.walls()
+    names = walls.plane_name + (("cylinder",) if np.isfinite(walls.cylinder_radius) else ())
+    return (*names, "piston_wall") if piston else names
+
+
+def dump_states_text(names: tuple[str, ...]) -> str:
+    """``dump_states.in``: full-precision state of the grains at every cycle end.
+
+    The force of a wall on a grain is in columns 2 to 4 of its fix.
+    """
+    columns = ["id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz"]
+    columns += ["radius", "mass"]
+    first = len(columns) + 1
+    forces = [(name, axis) for name in names for axis in (1, 2, 3)]
+    columns += [f"f_{name}[{axis + 1}]" for name, axis in forces]
+    renamed = " ".join(
+        f"colname {first + i} f_force_{name}[{axis}]" for i, (name, axis) in enumerate(forces)
+    )
+    return (
+        "# dump_states.in : generated\n"
+        f"dump states grains custom ${{steps_per_cycle}} states.dump {' '.join(columns)}\n"
+        f"dump_modify states sort id first yes format float %.17g {renamed}\n"
+    )
+
+
+def moved_write(folder: Path, container: Container, moved: State) -> None:
+    """``moved_x.txt``, ``moved_y.txt``, ``moved_z.txt``: new places of grains and piston by id."""
+    piston = (*piston_atom_place(container, moved.radius), moved.piston_height)
+    identifier = np.append(moved.identifier, moved.identifier.max() + 1)
+    for axis, name in enumerate("xyz"):
+        rows = zip(identifier, [*moved.position[:, axis], piston[axis]], strict=True)
+        text = "".join(f"{i} {place:.17g}\n" for i, place in rows)
+        (folder / f"moved_{name}.txt").write_text(f"{len(identifier)}\n{text}")

@@ -1,0 +1,1 @@
+"""Static LAMMPS decks; they also run by hand: see in.prepare and in.cycles."""

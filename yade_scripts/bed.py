@@ -1,0 +1,227 @@
+"""Bodies, walls, contact law and engines of a bed of grains, from the one JSON file of a run.
+
+Grains are bodies 0 ... n-1; walls follow in the order of ``walls``, the piston comes last.
+Standard library and YADE only.
+"""
+
+import json
+import sys
+from math import atan, pi
+
+from yade import Omega, Vector3
+from yade.utils import facet, sphere, wall
+from yade.wrapper import (
+    Bo1_Facet_Aabb,
+    Bo1_Sphere_Aabb,
+    Bo1_Wall_Aabb,
+    ForceResetter,
+    FrictMat,
+    HarmonicForceEngine,
+    Ig2_Facet_Sphere_ScGeom,
+    Ig2_Sphere_Sphere_ScGeom,
+    Ig2_Wall_Sphere_ScGeom,
+    InsertionSortCollider,
+    InteractionLoop,
+    InterpolatingDirectedForceEngine,
+    Ip2_FrictMat_FrictMat_MindlinPhys,
+    Law2_ScGeom_MindlinPhys_Mindlin,
+    LinearDragEngine,
+    MatchMaker,
+    NewtonIntegrator,
+)
+
+O = Omega()
+
+GRAIN_MASK, WALL_MASK, BALLAST_MASK = 1, 3, 4
+"""Group masks: bodies meet when they share a bit; walls, of bit 2, never meet one another."""
+
+STILL = 1e-100
+"""Share of the time step with which forces are worked out anew: no spring stretches, and
+velocities, which the law divides by the step, keep their digits."""
+
+
+def parameters_read():
+    """The JSON file named on the command line."""
+    with open(sys.argv[1], encoding="utf-8") as stream:
+        return json.load(stream)
+
+
+def materials_add(parameters):
+    """Materials by name: grain, wall, and mirror where the scene has one."""
+    return {
+        name: O.materials.append(
+            FrictMat(young=m["young"], poisson=m["poisson"], density=m["density"], label=name)
+        )
+        for name, m in parameters["materials"].items()
+    }
+
+
+def grains_add(parameters):
+    """Grains at rest at the places and with the radii of the parameters [m]."""
+    grains = parameters["grains"]
+    for position, radius in zip(grains["position"], grains["radius"]):
+        O.bodies.append(sphere(position, radius, material="grain", mask=GRAIN_MASK))
+
+
+def walls_add(parameters):
+    """Planes along the axes, and one triangle for each side of a cylinder."""
+    for w in parameters["walls"]:
+        if "vertices" in w:
+            body = facet(
+                [Vector3(*v) for v in w["vertices"]], material=w["material"], mask=WALL_MASK
+            )
+        else:
+            body = wall(
+                w["position"], w["axis"], w["sense"], material=w["material"], mask=WALL_MASK
+            )
+        O.bodies.append(body)
+
+
+class Piston:
+    """A flat face of triangles with a mass: a clump, driven by forces along z.
+
+    Its members have no mass of their own, so that a contact damps with the mass of its grain.
+    YADE makes no clump without a sphere; that sphere touches nothing, and at the face's height
+    gives the clump this height.
+    """
+
+    def __init__(self, parameters):
+        """Find the piston among the bodies, or make it where there is none yet."""
+        piston = parameters["piston"]
+        self.mass = piston["mass"]
+        first = parameters["grain_count"] + len(parameters["walls"])
+        self.faces = list(range(first, first + len(piston["triangles"])))
+        self.ballast = self.faces[-1] + 1
+        self.clump = self.ballast + 1
+        if len(O.bodies) == first:
+            self._make(piston)
+
+    def _make(self, piston):
+        z = piston["height"]
+        members = [
+            facet([Vector3(x, y, z) for x, y in triangle], material="wall", mask=WALL_MASK)
+            for triangle in piston["triangles"]
+        ]
+        members.append(sphere((0, 0, z), 1e-3, material="wall", mask=BALLAST_MASK))
+        made = O.bodies.appendClumped(members)
+        assert made == (self.clump, [*self.faces, self.ballast]), made
+        state = O.bodies[self.clump].state
+        state.mass, state.inertia = self.mass, Vector3(1, 1, 1)
+        state.blockedDOFs = "xyXYZ"
+
+    @property
+    def height(self):
+        """Height of the face [m]."""
+        return O.bodies[self.clump].state.pos[2]
+
+    @property
+    def speed(self):
+        """Velocity along z [m/s]."""
+        return O.bodies[self.clump].state.vel[2]
+
+    def place(self, height):
+        """Put the face, at rest, at a height [m]; the members too, which follow a step later."""
+        shift = Vector3(0, 0, height - self.height)
+        for number in (*self.faces, self.ballast, self.clump):
+            state = O.bodies[number].state
+            state.pos, state.vel = state.pos + shift, Vector3.Zero
+
+    def press(self, force, gravity):
+        """Constant force on the bed [N]; gravity [m/s^2] does not act on the piston.
+
+        YADE does not save it: it is told again after each load.
+        """
+        O.forces.setPermF(self.clump, Vector3(0, 0, self.mass * gravity - force))
+
+    def contact_force(self):
+        """Force of the bed on the face [N], upwards."""
+        return sum(O.forces.f(number, True)[2] for number in self.faces)
+
+    def target_force(self, gravity):
+        """Force that presses the piston on the bed in this step [N], without its contacts."""
+        return self.mass * gravity - O.forces.f(self.clump, True)[2]
+
+
+def contact_law(parameters):
+    """Hertz-Mindlin contacts; damping and friction are those of the pair of materials."""
+
+    def of_pairs(key, value=float):
+        matches = [
+            (O.materials[p["first"]].id, O.materials[p["second"]].id, value(p[key]))
+            for p in parameters["pairs"]
+        ]
+        return MatchMaker(matches=matches, algo="zero")
+
+    physics = Ip2_FrictMat_FrictMat_MindlinPhys(
+        betan=of_pairs("damping_normal"),
+        betas=of_pairs("damping_tangential"),
+        frictAngle=of_pairs("friction", atan),
+    )
+    # hertzian: a wall is flat; by itself YADE takes it for a sphere like the one that touches it.
+    shapes = [
+        Ig2_Sphere_Sphere_ScGeom(),
+        Ig2_Wall_Sphere_ScGeom(hertzian=True),
+        Ig2_Facet_Sphere_ScGeom(hertzian=True),
+    ]
+    return InteractionLoop(shapes, [physics], [Law2_ScGeom_MindlinPhys_Mindlin()])
+
+
+def engines_set(parameters, forces=(), watch=(), behind=()):
+    """The engines of a step: neighbours, contacts, ``forces``, ``watch``, motion, ``behind``."""
+    collider = InsertionSortCollider(
+        [Bo1_Sphere_Aabb(), Bo1_Wall_Aabb(), Bo1_Facet_Aabb()],
+        verletDist=parameters["verlet_distance"],
+        avoidSelfInteractionMask=WALL_MASK & ~GRAIN_MASK,
+    )
+    motion = NewtonIntegrator(damping=0, gravity=(0, 0, -parameters["gravity"]), kinSplit=True)
+    O.engines = [
+        ForceResetter(),
+        collider,
+        contact_law(parameters),
+        *forces,
+        *watch,
+        motion,
+        *behind,
+    ]
+    O.dt = parameters["time_step"]
+
+
+def forces_renew(forces=()):
+    """Work out contacts and forces at the present positions, without a step in time.
+
+    YADE keeps those of the positions a step before, and after a load none at all; it does not
+    notice positions set by hand unless its collider is called.
+    """
+    time_step = O.dt
+    O.dt = STILL * time_step
+    for engine in (*O.engines[:3], *forces):
+        engine()
+    O.forces.f(0, True)  # sum up: what is not summed up outside a step is added to the next one
+    O.dt = time_step
+
+
+def load_engine(load, piston):
+    """What the load adds to its mean force, in C++; cycles start at multiples of the period."""
+    if load["waveform"] == "sine":
+        return HarmonicForceEngine(
+            ids=[piston.clump],
+            A=(0, 0, load["amplitude"] / 2),
+            f=(0, 0, load["frequency"]),
+            fi=(0, 0, pi / 2),
+        )
+    return InterpolatingDirectedForceEngine(
+        ids=[piston.clump],
+        times=load["time"],
+        magnitudes=load["force"],
+        direction=(0, 0, -1),
+        wrap=True,
+    )
+
+
+def drag_engine(piston, coefficient):
+    """Viscous drag on the piston: ``coefficient`` [N s/m] times its speed.
+
+    YADE's Stokes drag 6 pi nu r v needs a sphere: the piston's ballast.
+    """
+    radius = O.bodies[piston.ballast].shape.radius
+    return LinearDragEngine(ids=[piston.ballast], nu=coefficient / (6 * pi * radius))

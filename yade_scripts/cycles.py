@@ -1,0 +1,73 @@
+"""Load cycles from a saved bed, start.restart; every window of cycles is a fresh process.
+
+By hand, after prepare.py or a window before it, in a folder with params.json and the scripts:
+
+    cp end.restart start.restart && yade -n -x -j1 cycles.py params.json
+
+``window.start`` of params.json says how it starts: ``first`` (the piston finds the bed),
+``continue`` (as saved), ``moved`` (grains put at ``window.moved``), ``perturbed``.
+Leaves states.dump and contacts.dump (one frame a cycle end), piston.txt, end.restart.
+"""
+
+import os
+import sys
+import time
+
+from yade import Omega, Vector3
+
+sys.path.insert(0, os.getcwd())
+import bed
+import record
+
+O = Omega()
+parameters = bed.parameters_read()
+gravity, window = parameters["gravity"], parameters["window"]
+record.scene_load()
+piston = bed.Piston(parameters)
+
+
+def seat():
+    """Press the piston on the bed, then let it go, before the first cycle.
+
+    Let loose on the highest grain it would fall through the gap to the next ones and throw up
+    half the bed.  A viscous drag holds it at ``speed`` or less.
+    """
+    press = window["seat"]
+    bed.engines_set(parameters, [bed.drag_engine(piston, press["force"] / press["speed"])])
+    piston.press(press["force"], gravity)
+    O.run(press["steps"], True)
+    piston.press(press["release_force"], gravity)
+    O.run(press["release_steps"], True)
+
+
+def move_grains(positions):
+    """Put the grains at rest at new positions [m]; contacts keep their tangential springs."""
+    for number, position in enumerate(positions):
+        state = O.bodies[number].state
+        state.pos, state.vel, state.angVel = Vector3(*position), Vector3.Zero, Vector3.Zero
+
+
+loop_s = time.monotonic()
+if window["start"] == "first":
+    seat()
+elif window["start"] == "moved":
+    move_grains(window["moved"])
+    piston.place(parameters["piston"]["height"])
+elif window["start"] == "perturbed":
+    O.bodies[0].state.pos += Vector3(window["perturbation"], 0, 0)
+
+load = bed.load_engine(window["load"], piston)
+piston_record = record.PistonRecord(piston, gravity, window["track_steps"])
+bed.engines_set(parameters, [load], [piston_record.watch], [piston_record.watch_behind])
+piston.press(window["load"]["mean_force"], gravity)
+dumps = record.Dumps(parameters, piston)
+bed.forces_renew([load])
+dumps.frame()
+for _ in range(window["cycles"]):
+    O.run(window["steps_per_cycle"], True)
+    bed.forces_renew([load])
+    dumps.frame()
+piston_record.last(record.grain_table(dumps.count))
+loop_s = time.monotonic() - loop_s
+record.scene_save()
+print(f"LOOP {loop_s:.6f} s\nCOMPLETE step {O.iter}", flush=True)

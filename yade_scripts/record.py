@@ -1,0 +1,183 @@
+"""What a run leaves: states, contacts, the piston's record, the saved scene.
+
+The columns are those of the LIGGGHTS decks: a reader need not know which engine wrote a file.
+Standard library, numpy and YADE only.
+"""
+
+import gzip
+import os
+
+import numpy as np
+from yade import Omega
+from yade.wrapper import PyRunner
+
+O = Omega()
+
+SAVED = "end.yade.gz"
+"""YADE knows the format of a saved scene by this ending; whole, it is renamed end.restart."""
+
+STATE_COLUMNS = "id x y z vx vy vz omegax omegay omegaz radius mass"
+
+
+def grain_table(count):
+    """x, v, omega, radius, mass of the grains [SI], shape (count, 11)."""
+    rows = []
+    for number in range(count):
+        body = O.bodies[number]
+        s = body.state
+        rows.append([*s.pos, *s.vel, *s.angVel, body.shape.radius, s.mass])
+    return np.array(rows)
+
+
+def contact_tables(grains):
+    """Contacts between grains, a row each, and the force of every other body on the grains.
+
+    ``grains`` as from `grain_table`.  A row holds both numbers, from 1 on, then on the first
+    grain the normal and the tangential force [N], the tangential spring [m], and the overlap [m];
+    shape (m, 12).  The spring is the elastic part of the tangential force over the stiffness.
+    The second result is a dictionary: number of a wall's body -> force [N], shape (count, 3).
+    """
+    count, position, radius = len(grains), grains[:, :3], grains[:, 9]
+    rows, walls = [], {}
+    for contact in O.interactions:
+        if not contact.isReal:
+            continue
+        first, second, physics = contact.id1, contact.id2, contact.phys
+        normal, shear = -np.array(physics.normalForce), -np.array(physics.shearForce)
+        if first < count and second < count:
+            spring = np.array(physics.shearElastic) / physics.ks
+            distance = np.linalg.norm(position[first] - position[second])
+            overlap = radius[first] + radius[second] - distance
+            rows.append([first + 1, second + 1, *normal, *shear, *spring, overlap])
+        else:
+            grain, wall, sign = (first, second, 1) if first < count else (second, first, -1)
+            walls.setdefault(wall, np.zeros((count, 3)))[grain] += sign * (normal + shear)
+    rows.sort()
+    return np.array(rows).reshape(-1, 12), walls
+
+
+class Dumps:
+    """``states.dump`` and ``contacts.dump``: one frame an instant, text, of full precision."""
+
+    def __init__(self, parameters, piston=None):
+        """Open both files; with a ``piston`` its force on the grains is the last wall's."""
+        self.count = parameters["grain_count"]
+        self.friction = parameters["frictional"]
+        self.bounds = parameters["box"]
+        names = [wall["name"] for wall in parameters["walls"]]
+        self.bodies = [[self.count + index] for index in range(len(names))]
+        if piston is not None:
+            names.append("piston")
+            self.bodies.append(piston.faces)
+        forces = [f"f_force_{name}[{axis}]" for name in names for axis in (1, 2, 3)]
+        self.columns = " ".join([STATE_COLUMNS, *forces])
+        self.states = open("states.dump", "w", encoding="ascii")
+        self.contacts = open("contacts.dump", "w", encoding="ascii")
+
+    def frame(self):
+        """Append the present state; call `bed.forces_renew` before it."""
+        grains = grain_table(self.count)
+        rows, walls = contact_tables(grains)
+        still = np.zeros((self.count, 3))
+        forces = [sum((walls.get(b, still) for b in bodies), still) for bodies in self.bodies]
+        identifier = np.arange(1, self.count + 1)
+        frame_write(
+            self.states, "ATOMS", self.columns, np.column_stack([identifier, grains, *forces]),
+            1, self.bounds,
+        )  # fmt: skip
+        if not self.friction:  # neither tangential force nor spring
+            rows = rows[:, [0, 1, 2, 3, 4, 11]]
+        names = " ".join(f"c_contact[{i + 1}]" for i in range(rows.shape[1]))
+        frame_write(self.contacts, "ENTRIES", names, rows, 2, self.bounds)
+
+
+def frame_write(stream, kind, columns, values, integers, bounds, number="%.17g"):
+    """Append a frame to a text dump; the first ``integers`` columns are whole numbers."""
+    counted = "ATOMS" if kind == "ATOMS" else "ENTRIES"
+    stream.write(f"ITEM: TIMESTEP\n{O.iter}\nITEM: NUMBER OF {counted}\n{len(values)}\n")
+    stream.write("ITEM: BOX BOUNDS ff ff ff\n")
+    stream.writelines(f"{low:.17g} {high:.17g}\n" for low, high in bounds)
+    stream.write(f"ITEM: {kind} {columns}\n")
+    row = " ".join(["%d"] * integers + [number] * (len(columns.split()) - integers)) + "\n"
+    stream.write((row * len(values)) % tuple(values.ravel().tolist()))
+    stream.flush()
+
+
+def kinetic_tracked():
+    """Kinetic energies [J], translational and rotational, that YADE has tracked so far.
+
+    It adds up those of all steps in which ``O.trackEnergy`` was True, for all bodies but walls.
+    """
+    known = O.energy.keys()
+    return [O.energy[name] if name in known else 0.0 for name in ("kinTrans", "kinRot")]
+
+
+class PistonRecord:
+    """``piston.txt``: a row every ``period`` steps, of the piston and the grains' energies."""
+
+    HEADER = "step target_force_N contact_force_N height_m"
+    HEADER += " kinetic_translational_J kinetic_rotational_J\n"
+
+    def __init__(self, piston, gravity, period):
+        """The engines call ``piston_record.before()`` and ``.behind()`` of the main script."""
+        self.piston, self.gravity = piston, gravity
+        self.stream = open("piston.txt", "w", encoding="ascii")
+        self.stream.write(self.HEADER)
+        self.row, self.tracked = (), (0.0, 0.0)
+        when = {"iterPeriod": period, "iterLast": O.iter}
+        self.watch = PyRunner(command="piston_record.before()", **when)
+        self.watch_behind = PyRunner(command="piston_record.behind()", **when)
+
+    def before(self):
+        """In a step, when all forces are known and nothing has moved yet."""
+        piston = self.piston
+        self.row = (
+            O.iter, piston.target_force(self.gravity), piston.contact_force(), piston.height,
+        )  # fmt: skip
+        self.tracked = kinetic_tracked()
+        O.trackEnergy = True  # in this step only: in every one it would cost
+
+    def behind(self):
+        """In the same step, behind the integrator."""
+        O.trackEnergy = False
+        translational, rotational = np.subtract(kinetic_tracked(), self.tracked)
+        translational -= 0.5 * self.piston.mass * self.piston.speed**2
+        self._write(translational, rotational)
+
+    def last(self, grains):
+        """The instant at which the run ends, between two steps; ``grains`` as `grain_table`."""
+        self.before()
+        O.trackEnergy = False
+        self._write(*kinetic_energies(grains))
+
+    def _write(self, translational, rotational):
+        row = (*self.row, translational, rotational)
+        self.stream.write(("%d" + " %.17g" * 5 + "\n") % row)
+        self.stream.flush()
+
+
+def kinetic_energies(grains):
+    """Translational and rotational kinetic energy [J] of the grains of `grain_table`."""
+    mass, radius = grains[:, 10], grains[:, 9]
+    translational = 0.5 * mass @ (grains[:, 3:6] ** 2).sum(axis=1)
+    return translational, 0.2 * (mass * radius**2) @ (grains[:, 6:9] ** 2).sum(axis=1)
+
+
+def scene_save():
+    """Write ``end.restart``; raises OSError or EOFError when it is not whole, as on a full disk."""
+    O.engines = O.engines[:3]  # the commands of the others belong to this script
+    O.save(SAVED)
+    with gzip.open(SAVED) as stream:
+        while stream.read(1 << 20):
+            pass
+    os.replace(SAVED, "end.restart")
+
+
+def scene_load():
+    """Read ``start.restart``."""
+    saved = "start.yade.gz"
+    os.symlink("start.restart", saved)
+    try:
+        O.load(saved)
+    finally:
+        os.remove(saved)
