@@ -16,22 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from adapters import decks, lammps_decks
-from adapters.engine import (
-    EngineRun,
-    EngineStart,
-    cycles_in_track,
-    engine_failure,
-    process_run,
-    restart_check,
-)
-from adapters.engine_plan import (
-    EQUILIBRIUM_RATIO,
-    SETTLE_TIMES,
-    cycle_steps,
-    seat_plan,
-    settle_plan,
-)
-from adapters.errors import EngineFailed, EngineMissing, NotConverged
+from adapters.engine import EngineRun, EngineStart, cycles_in_track
+from adapters.engine_deck import deck_run
+from adapters.engine_plan import EQUILIBRIUM_RATIO, cycle_steps, seat_plan, settle_plan
+from adapters.errors import EngineFailed, EngineMissing
 from adapters.lammps_contacts import contacts_write
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
@@ -42,6 +30,8 @@ BANNER = re.compile(r"Simulator - (\d+ \w+ (\d{4}).*)")
 
 PROCESS = re.compile(r"^LAMMPS \(\d+ \w+ \d{4}", re.MULTILINE)
 """What every run says once, however many processes it has."""
+
+LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
 
 OLDEST = 2025
 """First year of the versions known to have every style of the decks."""
@@ -220,30 +210,27 @@ class LammpsEngine:
         digests: dict[str, str],
     ) -> EngineRun:
         """Run a deck; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
-        command = self.command(scene, deck)
-        status, cpu_s, wall_s = process_run(command, folder, watch)
-        text = (folder / "screen.txt").read_text(errors="replace")
-        if "NOT SETTLED" in text:
-            raise NotConverged(
-                f"the bed still moves after {SETTLE_TIMES} falling times",
-                where=str(folder),
-                remedy="more damping (viscous_alpha), or a shorter time step",
-            )
-        banners = len(PROCESS.findall(text))
-        if banners > 1:
-            raise EngineFailed(
-                f"{banners} runs of LAMMPS started that know nothing of one another",
-                where=str(folder),
-                remedy="launch it by the MPI it is linked to: mpiexec of the wheel mpich",
-            )
-        if status != 0 or not re.search(r"^COMPLETE step \d+", text, re.MULTILINE):
-            failure = engine_failure(status, folder)
-            failure.from_outside |= banners == 0  # MPI or the loader failed before it
-            raise failure
-        restart_check(folder)
+
+        def refuse(status: int, text: str) -> None:
+            banners = len(PROCESS.findall(text))
+            if banners > 1:
+                raise EngineFailed(
+                    f"{banners} runs of LAMMPS started that know nothing of one another",
+                    where=str(folder),
+                    remedy="launch it by the MPI it is linked to: mpiexec of the wheel mpich",
+                )
+
+        made = deck_run(
+            self.command(scene, deck),
+            folder,
+            watch,
+            digests,
+            begun=PROCESS,
+            loop_time=LOOP_TIME,
+            refuse=refuse,
+        )
         contacts_write(scene, folder)
-        loop_s = sum(float(s) for s in re.findall(r"^Loop time of (\S+) on", text, re.MULTILINE))
-        return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)
+        return made
 
     def _write(
         self,

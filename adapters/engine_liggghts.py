@@ -20,18 +20,16 @@ from adapters.engine import (
     EngineStart,
     cycles_in_track,
     engine_failure,
-    process_run,
-    restart_check,
 )
+from adapters.engine_deck import deck_run
 from adapters.engine_plan import (
     EQUILIBRIUM_RATIO,
-    SETTLE_TIMES,
     cycle_steps,
     frictional,
     seat_plan,
     settle_plan,
 )
-from adapters.errors import EngineMissing, NotConverged
+from adapters.errors import EngineMissing
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
 from adapters.state import FloatArray
@@ -39,6 +37,7 @@ from adapters.state import FloatArray
 PARTS = ("load", "run", "output", "start", "seat")
 """Parts of a window's deck that depend on the scene or on where the window starts."""
 
+LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
 BANNER = re.compile(r"LIGGGHTS-PUBLIC (\d+)\.(\d+)[^,)]*")
 
 
@@ -198,24 +197,20 @@ class LiggghtsEngine:
         digests: dict[str, str],
     ) -> EngineRun:
         """Run a deck; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
-        command = self.command(scene, deck)
-        status, cpu_s, wall_s = process_run(command, folder, watch)
-        text = (folder / "screen.txt").read_text(errors="replace")
-        if "NOT SETTLED" in text:
-            raise NotConverged(
-                f"the bed still moves after {SETTLE_TIMES} falling times",
-                where=str(folder),
-                remedy="more damping (viscous_alpha), or a shorter time step",
-            )
-        if status == 0 and "SIGINT/SIGTERM caught" in text:
-            raise engine_failure(-signal.SIGTERM, folder)
-        if status != 0 or not re.search(r"^COMPLETE step \d+", text, re.MULTILINE):
-            failure = engine_failure(status, folder)
-            failure.from_outside |= BANNER.search(text) is None  # MPI failed before it
-            raise failure
-        restart_check(folder)
-        loop_s = sum(float(s) for s in re.findall(r"^Loop time of (\S+) on", text, re.MULTILINE))
-        return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)
+
+        def refuse(status: int, text: str) -> None:
+            if status == 0 and "SIGINT/SIGTERM caught" in text:
+                raise engine_failure(-signal.SIGTERM, folder)
+
+        return deck_run(
+            self.command(scene, deck),
+            folder,
+            watch,
+            digests,
+            begun=BANNER,
+            loop_time=LOOP_TIME,
+            refuse=refuse,
+        )
 
     @staticmethod
     def _kind(scene: Scene) -> str:

@@ -12,16 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from adapters.decks import PISTON_MARGIN, deck_copy
-from adapters.engine import (
-    EngineRun,
-    EngineStart,
-    cycles_in_track,
-    engine_failure,
-    process_run,
-    restart_check,
-)
-from adapters.engine_plan import EQUILIBRIUM_RATIO, SETTLE_TIMES, seat_plan, settle_plan
-from adapters.errors import EngineMissing, NotConverged
+from adapters.engine import EngineRun, EngineStart, cycles_in_track
+from adapters.engine_deck import deck_run
+from adapters.engine_plan import EQUILIBRIUM_RATIO, seat_plan, settle_plan
+from adapters.errors import EngineMissing
 from adapters.scene import Scene
 from adapters.state import FloatArray
 from adapters.yade_parameters import piston_triangles, shared_parameters
@@ -31,6 +25,8 @@ SCRIPTS = {"in.prepare": "prepare.py", "in.cycles": "cycles.py"}
 
 PARAMETERS = "params.json"
 
+BEGUN = re.compile("Running script")
+LOOP_TIME = re.compile(r"^LOOP (\S+) s", re.MULTILINE)
 BANNER = re.compile(r"Yade version: ((\d{4})\S*)")
 YEAR_LEAST = 2023
 """Oldest version whose walls are known to be flat when asked (``hertzian``)."""
@@ -138,22 +134,9 @@ class YadeEngine:
         digests: dict[str, str],
     ) -> EngineRun:
         """Run a script; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
-        command = self.command(scene, deck)
-        status, cpu_s, wall_s = process_run(command, folder, watch)
-        text = (folder / "screen.txt").read_text(errors="replace")
-        if "NOT SETTLED" in text:
-            raise NotConverged(
-                f"the bed still moves after {SETTLE_TIMES} falling times",
-                where=str(folder),
-                remedy="more damping (viscous_alpha), or a shorter time step",
-            )
-        if status != 0 or not re.search(r"^COMPLETE step \d+", text, re.MULTILINE):
-            failure = engine_failure(status, folder)
-            failure.from_outside |= "Running script" not in text  # YADE failed before it
-            raise failure
-        restart_check(folder)
-        loop_s = sum(float(s) for s in re.findall(r"^LOOP (\S+) s", text, re.MULTILINE))
-        return EngineRun(tuple(command), cpu_s, wall_s, max(wall_s - loop_s, 0.0), digests)
+        return deck_run(
+            self.command(scene, deck), folder, watch, digests, begun=BEGUN, loop_time=LOOP_TIME
+        )
 
     @staticmethod
     def _write(folder: Path, script: str, content: dict[str, Any]) -> dict[str, str]:
