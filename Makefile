@@ -34,6 +34,7 @@ bench:
 validate:
 	@./setup.sh test
 	$(bin)/trackbed validate settlement --quick
+	$(bin)/trackbed validate engines --quick
 	$(bin)/trackbed validate qdem --quick
 	$(bin)/trackbed validate qdem-cost --quick
 	$(bin)/trackbed validate qdem-hard-cases --quick
