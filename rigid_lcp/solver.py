@@ -118,7 +118,7 @@ def solve_auto(
     finer = tolerance
     while trial.best.residual <= finer and not trial.best.solved and finer > ROUND_OFF:
         finer = finer_tolerance(problem, trial.best.r, finer)
-        trial.keep(attempts(problem, trial.best.r, finer, accept).solution())
+        trial.keep(attempts(problem, trial.best.r, finer, accept, paths=False).solution())
     if trial.best.solved or (
         trial.best.residual <= accept and problem.contacts > FEW_CONTACTS
     ):  # fmt: skip

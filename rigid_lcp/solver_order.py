@@ -82,10 +82,16 @@ PROOF_CONTACTS = 3000
 
 
 def attempts(
-    problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
+    problem: FrictionProblem,
+    start: Floats | None,
+    tolerance: float,
+    accept: float = 0.0,
+    *,
+    paths: bool = True,
 ) -> Trial:
     """All methods in this order until one reaches ``tolerance``, or ``accept`` where the problem is
-    large; the trial holds the best point."""
+    large; the trial holds the best point.  ``paths``: whether the dear ones at the end are tried
+    too."""
     trial = Trial(problem, start, tolerance)
     if trial.best.solved:
         trial.sharpen()
@@ -123,7 +129,8 @@ def attempts(
         return trial
     if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
         return trial
-    fallback_paths(trial, accept)
+    if paths:
+        fallback_paths(trial, accept)
     return trial
 
 
