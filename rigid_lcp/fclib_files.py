@@ -2,9 +2,11 @@
 
 Acary et al., FCLIB: a collection of discrete 3D frictional contact problems, Inria RT-0444 (2014).
 ``fclib_local`` has spacedim, vectors/q, vectors/mu and W by its parts m, n, nz, p, i, x; nz = -1
-are compressed columns, -2 compressed rows, and nz >= 0 that many triplets, p their rows and i their
-columns (fclib.h).  Order of contacts and signs are ours.  Rolling friction (spacedim 5), equality
-constraints (V, R) and problems by M and H (``fclib_global``) are refused.
+are compressed columns, -2 compressed rows, and nz >= 0 that many triplets, i their rows and p their
+columns, as CSparse has them and the library's own files (its header says the other way round: H,
+which is not square, fits only so).  ``fclib_global`` has M, H, vectors/f, vectors/w instead
+(`rigid_lcp.fclib_global`).  Order of contacts and signs are ours.  Rolling friction (spacedim 5)
+and equality constraints (V, R; G) are refused.
 """
 
 from __future__ import annotations
@@ -20,46 +22,53 @@ from numpy.typing import NDArray
 
 from rigid_lcp.damaged_files import DAMAGED, part_lacking, problem_named
 from rigid_lcp.errors import LibraryMissing, ProblemError
+from rigid_lcp.fclib_global import problem_by_masses
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 
 Floats = NDArray[np.float64]
+PARTS = {
+    "fclib_local": (("W",), ("q", "mu")),
+    "fclib_global": (("M", "H"), ("f", "w", "mu")),
+}
+"""Matrices and vectors of a problem, by its group."""
 
 
 def fclib_problem(path: Path) -> FrictionProblem:
     """The problem of a file.  Raises `ProblemError`, and `LibraryMissing` without h5py."""
     with _fclib_file(path) as file:
-        if "fclib_local" not in file:
+        kind = "fclib_global" if "fclib_global" in file else "fclib_local"
+        if kind not in file:
             raise ProblemError(
-                "it has no group fclib_local" + (
-                    ", but a problem by masses (fclib_global)" if "fclib_global" in file else ""
-                ),
-                where=str(path), remedy="give a problem in W, q and mu",
+                "it has no group fclib_local or fclib_global", where=str(path),
+                remedy="give a problem of FCLIB",
             )  # fmt: skip
-        local = file["fclib_local"]
-        if "V" in local or "R" in local:
+        group = file[kind]
+        if any(name in group for name in ("V", "R", "G")):
             raise ProblemError(
-                "it has equality constraints (V, R) beside its contacts", where=str(path),
+                "it has equality constraints (V, R or G) beside its contacts", where=str(path),
                 remedy="eliminate them first: W - V R^-1 V^T, q - V R^-1 s",
             )  # fmt: skip
-        dim = int(_numbers(local, "spacedim", path).ravel()[0])
+        dim = int(_numbers(group, "spacedim", path).ravel()[0])
         if dim == 5:
             raise ProblemError(
                 "it has rolling friction (spacedim 5)", where=str(path),
                 remedy="only sliding friction is known: spacedim 2 or 3",
             )  # fmt: skip
-        if "W" not in local:
-            raise part_lacking(path, "fclib_local/W", sorted(local))
-        matrix = _fclib_matrix(local["W"], path)
-        q, mu = (_numbers(local, f"vectors/{name}", path) for name in ("q", "mu"))
+        names, vectors = PARTS[kind]
+        matrices = [_fclib_matrix(group, name, path) for name in names]
+        given = [_numbers(group, f"vectors/{name}", path).ravel() for name in vectors]
     with problem_named(path):
-        problem: FrictionProblem = friction_problem(matrix, q, mu, dim)
+        if kind == "fclib_global":
+            return problem_by_masses(matrices[0], matrices[1], given[0], given[1], given[2], dim)
+        problem: FrictionProblem = friction_problem(matrices[0], given[0], given[1], dim)
     return problem
 
 
 def fclib_forces(path: Path) -> Floats:
     """Its solution, (1, nc * dim), or none (0, nc * dim).  Raises as `fclib_problem`."""
     with _fclib_file(path) as file:
-        q = _numbers(file, "fclib_local/vectors/q", path)
+        name = "fclib_global/vectors/w" if "fclib_global" in file else "fclib_local/vectors/q"
+        q = _numbers(file, name, path)
         if "solution" not in file:
             return np.zeros((0, q.size))
         forces = _numbers(file, "solution/r", path)
@@ -108,8 +117,11 @@ def _numbers(group: Any, name: str, path: Path) -> NDArray[Any]:
     return values
 
 
-def _fclib_matrix(group: Any, path: Path) -> sp.csr_array:
-    """W from m, n, nz, p, i, x."""
+def _fclib_matrix(kind: Any, name: str, path: Path) -> sp.csr_array:
+    """A matrix from m, n, nz, p, i, x."""
+    if name not in kind:
+        raise part_lacking(path, f"{kind.name.strip('/')}/{name}", sorted(kind))
+    group = kind[name]
     m, n, nz = (int(_numbers(group, name, path).ravel()[0]) for name in ("m", "n", "nz"))
     p, i, x = (_numbers(group, name, path).ravel() for name in ("p", "i", "x"))
     try:
@@ -118,7 +130,7 @@ def _fclib_matrix(group: Any, path: Path) -> sp.csr_array:
         elif nz == -1:
             matrix = sp.csc_array((x, i, p), shape=(m, n))
         elif nz >= 0:
-            matrix = sp.coo_array((x[:nz], (p[:nz], i[:nz])), shape=(m, n))
+            matrix = sp.coo_array((x[:nz], (i[:nz], p[:nz])), shape=(m, n))
         else:
             raise ValueError(f"nz = {nz} is none of -2 (rows), -1 (columns), >= 0 (triplets)")
         if nz < 0:
@@ -126,6 +138,6 @@ def _fclib_matrix(group: Any, path: Path) -> sp.csr_array:
         return sp.csr_array(matrix)
     except (ValueError, IndexError) as error:
         raise ProblemError(
-            f"its m, n, nz, p, i and x are no matrix: {error}", where=f"{path}: fclib_local/W",
-            remedy="fetch or write the file again",
+            f"its m, n, nz, p, i and x are no matrix: {error}",
+            where=f"{path}: {group.name.strip('/')}", remedy="fetch or write the file again",
         ) from error  # fmt: skip

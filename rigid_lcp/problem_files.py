@@ -1,13 +1,15 @@
-"""Friction problems from files: scipy's npz pairs, and the HDF5 files of FCLIB.
+"""Friction problems from files: scipy's npz pairs, FCLIB's HDF5 and Siconos's text files.
 
     problem = read_problem("discs_125.npz")              # q, mu, dim; W or its factors beside it
-    problem = read_problem("KaplasTower-i1061-4.hdf5")   # group fclib_local
+    problem = read_problem("KaplasTower-i1061-4.hdf5")   # fclib_local, fclib_global
+    problem = read_problem("RockPile_tob1.dat")          # text of Siconos
 
 npz: ``NAME.npz`` holds q (nc * dim,), mu (nc,) and, if it can not be told from their lengths, dim.
 W is an array W in the same file, or ``NAME_W.npz`` of `scipy.sparse.save_npz`; a problem that
 knows its bodies has J (nc * dim, ndof) as ``NAME_H.npz`` and the diagonal of M^-1, Minv (ndof,).
 
-Files that end in ``.hdf5`` or ``.h5`` are read by `rigid_lcp.fclib_files`.
+Files that end in ``.hdf5`` or ``.h5`` are read by `rigid_lcp.fclib_files`, those in ``.dat`` by
+`rigid_lcp.siconos_files`.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from rigid_lcp.damaged_files import DAMAGED, part_lacking, problem_named
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.fclib_files import fclib_forces, fclib_problem
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.siconos_files import siconos_problem
 
 Floats = NDArray[np.float64]
 BODY_SIZE = {2: 3, 3: 6}
@@ -34,7 +37,7 @@ SAME = 1e-8
 
 
 def read_problem(path: Path | str) -> FrictionProblem:
-    """The friction problem of a file, ``.npz``, ``.hdf5`` or ``.h5``.
+    """The friction problem of a file, ``.npz``, ``.hdf5``, ``.h5`` or ``.dat``.
 
     Raises `ProblemError`, which names the file, the part of it and what is wrong with it, and
     `LibraryMissing` for HDF5 without h5py.
@@ -45,7 +48,8 @@ def read_problem(path: Path | str) -> FrictionProblem:
 def read_forces(path: Path | str) -> Floats:
     """The solutions that a file brings along, (number, nc * dim), force or impulse; maybe none.
 
-    npz: array r, one solution or a row each; FCLIB: solution/r.  Raises as `read_problem`.
+    npz: array r, one solution or a row each; FCLIB: solution/r; text has none.  Raises as
+    `read_problem`.
     """
     return _reader(path)[1](Path(path))
 
@@ -60,6 +64,7 @@ def _reader(
         ".npz": (_npz_problem, _npz_forces),
         ".hdf5": (fclib_problem, fclib_forces),
         ".h5": (fclib_problem, fclib_forces),
+        ".dat": (siconos_problem, _no_forces),
     }
     if path.suffix not in readers:
         raise ProblemError(
@@ -69,6 +74,10 @@ def _reader(
     if not path.is_file():
         raise ProblemError("there is no such file", where=str(path))
     return readers[path.suffix]
+
+
+def _no_forces(path: Path) -> Floats:
+    return np.zeros((0, siconos_problem(path).offset.size))
 
 
 # --- npz --------------------------------------------------------------------------------------

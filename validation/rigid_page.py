@@ -33,7 +33,7 @@ from validation.rigid_runs import LARGE, RECORD, rows_read
 
 WORDS = Path(__file__).with_suffix(".md")
 PAGE_PATH = Path(__file__).parents[1] / "docs" / "rigid-solvers.md"
-FEW = ("stored", "packings 2D", "packings 3D", "towers 2D", "towers 3D")
+FEW = ("stored", "test suite", "packings 2D", "packings 3D", "towers 2D", "towers 3D")
 """Families of the table problem by problem."""
 UNSEEN = (
     (

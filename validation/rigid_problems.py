@@ -1,7 +1,9 @@
 """Named friction problems on which solvers are compared: stored real ones, and generated families.
 
 Stored: those of the folder ``friction_problems`` under the environment variable ``TRACKBED_DATA``
-(real ones of the test suite of Siconos, Apache-2.0, and packings).  Unseen: the same, changed: q by
+(real ones of the test suite of Siconos, Apache-2.0, and packings).  Test suite: the other problems
+in Siconos's own files, which no setting was chosen by, in the folder TRACKBED_SICONOS (in its
+source package ``numerics/src/FrictionContact/test/data``).  Unseen: the same, changed: q by
 5 % noise, friction by a factor from 0.7 to 1.3, contacts in another order, all by a seed.
 Generated: towers, and settled packings of discs and spheres (`rigid_packings`), also as problems
 without friction, and others of other seeds and frictions, which no setting was chosen by; large
@@ -27,6 +29,8 @@ NONUNIQUE = "nonunique_discs_125"
 """The stored problem that comes with several solutions; not raced."""
 SIX_DIGITS = ("granularflow",)
 """Problems whose W was printed to six digits: their residual can be asked for 1e-10."""
+OTHER_KINDS = ("GFC3D", "GRFC3D", "LMGC_GFC3D", "RFC3D", "rfc3d", "gfc2d", "ACinputs", "CubeH8")
+"""How the names of problems of other kinds begin (in text by masses, rolling, inputs of tests)."""
 NOISE, FRICTION_FACTORS = 0.05, (0.7, 1.3)
 GRAINS = {2: "discs", 3: "spheres"}
 
@@ -77,6 +81,24 @@ def stored_problems() -> list[NamedProblem]:
 def stored_name(stem: str) -> str:
     """``KaplasTower-i1061-4.hdf5.dat`` without its endings."""
     return stem.removesuffix(".dat").removesuffix(".hdf5")
+
+
+def suite_problems() -> list[NamedProblem]:
+    """Siconos's problems in contact space, and those by masses of FCLIB, that are not stored."""
+    named = os.environ.get("TRACKBED_SICONOS")
+    if named is None or not Path(named).is_dir():
+        return []
+    stored = {each.name for each in stored_problems()}
+    paths = [
+        path for path in Path(named).iterdir()
+        if path.suffix in (".dat", ".hdf5") and not path.name.startswith(OTHER_KINDS)
+        and stored_name(path.name) not in stored
+    ]  # fmt: skip
+    problems = [
+        NamedProblem(stored_name(path.name), "test suite", partial(read_problem, path))
+        for path in paths
+    ]
+    return sorted(problems, key=lambda each: (each.make().contacts, each.name))
 
 
 def unseen_problems(seeds: Iterable[int] = (1, 2)) -> list[NamedProblem]:
@@ -211,4 +233,4 @@ def all_problems(quick: bool) -> list[NamedProblem]:
     problems = generated_problems(quick) + frictionless_problems(quick)
     if quick:
         return problems
-    return [*stored_problems(), *problems, *other_packings(), *unseen_problems()]
+    return [*stored_problems(), *suite_problems(), *problems, *other_packings(), *unseen_problems()]

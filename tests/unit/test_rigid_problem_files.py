@@ -45,7 +45,7 @@ def fclib_write(path: Path, matrix: Any, q: Any, mu: Any, dim: int, nz: int = -2
     h5py = pytest.importorskip("h5py")
     stored = matrix.asformat(FORMATS[nz])
     if nz == 0:
-        nz, p, i = stored.nnz, *stored.coords
+        nz, i, p = stored.nnz, *stored.coords  # as CSparse: rows in i
     else:
         p, i = stored.indptr, stored.indices
     with h5py.File(path, "w") as file:
@@ -234,8 +234,8 @@ def test_forces_of_wrong_length(tmp_path: Path) -> None:
 
 def test_unknown_suffix(tmp_path: Path) -> None:
     """A file of another kind, with those that are known."""
-    with pytest.raises(ProblemError, match=r"end in \.dat are not known(?s:.*)\.npz, \.hdf5"):
-        read_problem(tmp_path / "one.dat")
+    with pytest.raises(ProblemError, match=r"end in \.mat are not known(?s:.*)\.npz, \.hdf5"):
+        read_problem(tmp_path / "one.mat")
 
 
 @pytest.mark.parametrize("path", [3, None, 1.5, []])
@@ -286,7 +286,7 @@ def replaced(name: str, values: Any) -> Callable[[Any], None]:
 
 FCLIB_DAMAGED: dict[str, tuple[Callable[[Any], None], str]] = {
     "another kind": (no_group, "it has no group fclib_local"),
-    "global": (by_masses, r"fclib_global"),
+    "global without masses": (by_masses, "it has no fclib_global/M"),
     "rolling": (replaced("spacedim", [5]), "rolling friction"),
     "dim": (replaced("spacedim", [4]), "dim is 4"),
     "no dim": (replaced("spacedim", None), "it has no fclib_local/spacedim"),
