@@ -16,6 +16,7 @@ The pattern, its order of elimination and where each number goes are found once
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from typing import Protocol
 
@@ -103,7 +104,9 @@ class BlockSystem:
 
     def __init__(self, count: int, size: int, rows: Integers, columns: Integers) -> None:
         """``count`` block rows of ``size`` rows each; blocks at (rows, columns)."""
-        self.tree = elimination_tree(count, size, rows, columns)
+        tree = self.tree = elimination_tree(count, size, rows, columns)
+        self.space = np.empty(tree.rest_most), np.empty(tree.stack_most)
+        self.spare: list[Floats] = []
 
     @property
     def flops(self) -> float:
@@ -114,10 +117,20 @@ class BlockSystem:
 
     def factor(self, blocks: Floats) -> Solve:
         """Factor the matrix with these blocks (entries, size, size).  Raises `SingularSystem`."""
-        factors, regular = factor_fronts(self.tree, blocks)
-        if not regular:
+        factors = self.new_factors()
+        if not factor_fronts(self.tree, blocks, factors, *self.space):
             raise SingularSystem
-        return lambda right: solve_fronts(self.tree, factors, right)
+        return self.kept(lambda right: solve_fronts(self.tree, factors, right), factors)
+
+    def new_factors(self) -> Floats:
+        """Memory for factors: of what no one needs any more, as new memory costs more than it
+        takes to fill it."""
+        return self.spare.pop() if self.spare else np.empty(self.tree.factor_start[-1])
+
+    def kept(self, solve: Solve, factors: Floats) -> Solve:
+        """``solve``, whose factors are free when it is."""
+        weakref.finalize(solve, self.spare.append, factors).atexit = False
+        return solve
 
 
 class ContactFactorisation:
@@ -161,14 +174,15 @@ class BodyFactorisation:
         self.flops = self.system.flops
         self.mass = np.zeros((len(found), size, size))
         self.mass[places[:bodies]] = space.mass_blocks
-        self.places = places[bodies:]
+        self.places, self.matrix = places[bodies:], np.empty_like(self.mass)
 
     def factor(self, a: Floats, b: Floats) -> Solve:
         """See `Factorisation`."""
-        tree = self.system.tree
-        inverse, stiffness, factors, regular = factor_contacts(
-            tree, self.mass, self.first, self.block, self.places, a, b
-        )
+        tree, factors = self.system.tree, self.system.new_factors()
+        inverse, stiffness, regular = factor_contacts(
+            tree, self.mass, self.first, self.block, self.places, a, b, self.matrix, factors,
+            *self.system.space,
+        )  # fmt: skip
         if not regular:
             raise SingularSystem
 
@@ -179,22 +193,24 @@ class BodyFactorisation:
             )  # fmt: skip
             return left
 
-        return solve
+        return self.system.kept(solve, factors)
 
 
 @njit(cache=True)
 def factor_contacts(
     tree: EliminationTree, mass: Floats, first: Integers, block: Floats, places: Integers,
-    a: Floats, b: Floats,
-) -> tuple[Floats, Floats, Floats, bool]:  # fmt: skip
-    """``A^-1``, ``A^-1 B`` and the factors of ``M + J^T A^-1 B J``, and whether there are any."""
+    a: Floats, b: Floats, matrix: Floats, factors: Floats, rest: Floats, stack: Floats,
+) -> tuple[Floats, Floats, bool]:  # fmt: skip
+    """``A^-1``, ``A^-1 B`` and the ``factors`` of ``M + J^T A^-1 B J``, and whether there are any.
+
+    ``matrix``, ``rest``, ``stack``: space to work in.
+    """
     inverse, stiffness, regular = contact_stiffness(a, b)
     if not regular:
-        return inverse, stiffness, np.empty(0), False
-    matrix = mass.copy()
+        return inverse, stiffness, False
+    matrix[:] = mass
     add_contacts(matrix, first, block, places, stiffness)
-    factors, regular = factor_fronts(tree, matrix)
-    return inverse, stiffness, factors, regular
+    return inverse, stiffness, factor_fronts(tree, matrix, factors, rest, stack)
 
 
 @njit(cache=True)

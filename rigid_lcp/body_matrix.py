@@ -123,28 +123,52 @@ def contact_stiffness(a: Floats, b: Floats) -> tuple[Floats, Floats, bool]:
     return inverse, stiffness, True
 
 
+def _add_contacts(dim: int, size: int) -> Any:
+    """The kernel below for blocks of so many rows and columns, whose loops the compiler unrolls; of
+    any where these are zero."""
+
+    @njit(cache=True)
+    def add(
+        matrix: Floats, first: Integers, block: Floats, places: Integers, stiffness: Floats
+    ) -> None:
+        rows = dim if dim > 0 else block.shape[1]
+        columns = size if size > 0 else block.shape[2]
+        half = np.empty((columns, rows))
+        k = 0
+        for c in range(len(first) - 1):
+            for i in range(first[c], first[c + 1]):
+                for m in range(columns):
+                    for b in range(rows):
+                        half[m, b] = 0.0
+                        for a in range(rows):
+                            half[m, b] += block[i, a, m] * stiffness[c, a, b]
+                for j in range(first[c], first[c + 1]):
+                    at = places[k]
+                    for m in range(columns):
+                        for n in range(columns):
+                            total = matrix[at, m, n]
+                            for b in range(rows):
+                                total += half[m, b] * block[j, b, n]
+                            matrix[at, m, n] = total
+                    k += 1
+
+    return add
+
+
+_add_2d, _add_3d, _add_any = (_add_contacts(*shape) for shape in ((2, 3), (3, 6), (0, 0)))
+
+
 @njit(cache=True)
 def add_contacts(
     matrix: Floats, first: Integers, block: Floats, places: Integers, stiffness: Floats
 ) -> None:
     """Add ``J_c^T K_c J_c`` of every contact, ``K = A^-1 B``, to the blocks of the body matrix."""
-    dim, size = block.shape[1:]
-    half = np.empty((size, dim))
-    k = 0
-    for c in range(len(first) - 1):
-        for i in range(first[c], first[c + 1]):
-            for m in range(size):
-                for b in range(dim):
-                    half[m, b] = 0.0
-                    for a in range(dim):
-                        half[m, b] += block[i, a, m] * stiffness[c, a, b]
-            for j in range(first[c], first[c + 1]):
-                sum_block = matrix[places[k]]
-                for m in range(size):
-                    for b in range(dim):
-                        for n in range(size):
-                            sum_block[m, n] += half[m, b] * block[j, b, n]
-                k += 1
+    if block.shape[1:] == (2, 3):
+        _add_2d(matrix, first, block, places, stiffness)
+    elif block.shape[1:] == (3, 6):
+        _add_3d(matrix, first, block, places, stiffness)
+    else:
+        _add_any(matrix, first, block, places, stiffness)
 
 
 @njit(cache=True)

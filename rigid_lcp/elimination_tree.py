@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rigid_lcp.dense_tiles import TILE
 from rigid_lcp.elimination_order import (
     column_parents,
     minimum_degree,
@@ -25,8 +26,6 @@ from rigid_lcp.elimination_order import (
 
 Integers = NDArray[np.int64]
 
-PANEL = 32
-"""Columns of a front that are eliminated at a time."""
 FRONT_COLUMNS = 192
 """Columns of a front at most: longer ones are split, child under child."""
 FRONT_COST, ENTRY_COST = 2e4, 10.0
@@ -38,8 +37,6 @@ class EliminationTree(NamedTuple):
 
     size: int
     """Rows of a block."""
-    panel: int
-    """Columns of a front that are eliminated at a time."""
     order: Integers
     """Which block of the caller's is eliminated at each place, (blocks,)."""
     first: Integers
@@ -60,8 +57,10 @@ class EliminationTree(NamedTuple):
     factor_start: Integers
     """Where the numbers of each front's factors begin, (fronts + 1,)."""
     front_most: int
+    rest_most: int
     stack_most: int
-    """Numbers in the largest front, and in all updates that wait at one time."""
+    """Most padded columns and rows of a front; most numbers on the rows of one, and in all updates
+    that wait at one time."""
 
 
 def elimination_tree(blocks: int, size: int, rows: Integers, columns: Integers) -> EliminationTree:
@@ -85,12 +84,19 @@ def elimination_tree(blocks: int, size: int, rows: Integers, columns: Integers) 
     by_front = np.argsort(front, kind="stable")
     entry_start = np.searchsorted(front[by_front], np.arange(len(first)))
     pivots, below = np.diff(first) * size, np.diff(row_start) * size
-    factor_start = np.concatenate([[0], np.cumsum(factor_numbers(pivots, below, PANEL))])
-    most = int(((pivots + below) ** 2).max(initial=0))
+    p, r = (-(-numbers // TILE) * TILE for numbers in (pivots, below))
+    factor_start = np.concatenate([[0], np.cumsum(2 * p * (p + r))])
     return EliminationTree(
-        size, PANEL, order, first, row_start, found, relative, above, entry_start, by_front,
-        row[by_front], column[by_front], factor_start, most, stack_needed(above, below),
+        size, order, first, row_start, found, relative, above, entry_start, by_front,
+        row[by_front], column[by_front], factor_start, int((p + r).max(initial=0)),
+        int((r**2).max(initial=0)), stack_needed(above, r),
     )  # fmt: skip
+
+
+@njit(cache=True)
+def padded(count: int) -> int:
+    """The next multiple of `TILE`."""
+    return (count + TILE - 1) // TILE * TILE
 
 
 @njit(cache=True)
@@ -217,18 +223,6 @@ def entry_places(
         row[k] = place_in_front(rows[k], f, first, row_start, found)
         column[k] = place_in_front(columns[k], f, first, row_start, found)
     return front, row, column
-
-
-@njit(cache=True)
-def factor_numbers(pivots: Integers, below: Integers, panel: int) -> Integers:
-    """Numbers in the factors of each front, with so many columns and rows below: a square
-    and two sides for each panel."""
-    numbers = np.zeros(len(pivots), dtype=np.int64)
-    for f in range(len(pivots)):
-        for k in range(0, pivots[f], panel):
-            width = min(panel, pivots[f] - k)
-            numbers[f] += width * (2 * (pivots[f] - k + below[f]) - width)
-    return numbers
 
 
 @njit(cache=True)

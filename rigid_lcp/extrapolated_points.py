@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 
 FIRST_SHIFT, LEAST_SHIFT, GREATEST_SHIFT = 1e-5, 1e-9, 10.0
 """alpha over mean(diag W)."""
-STEPS, FEW_STEPS, MANY_STEPS = 8, 2, 4
+STEPS, FEW_STEPS, MANY_STEPS = 8, 3, 5
 """Newton steps in which a point has to be found; the centre runs further ahead after a point that
 took few, and less far after one that took many."""
 FINER, ROUGH = 0.3, 1e-3

@@ -69,6 +69,9 @@ class Path:
     """The path begins at forces as large as those of springs, ``(W + compliance / rho) r = -q``."""
     convex: bool = False
     """Leave out the term |u_T|: the answer is Coulomb's only where nothing slides."""
+    lagged: bool = False
+    """Take the term |u_T| as it is where a step begins, as if it were given: every step is one of a
+    convex problem and the path can not fold, but its end is only near the answer."""
 
 
 def interior_point(
@@ -115,7 +118,10 @@ def interior_point(
 class PathStep:
     """The point x, s (nc, dim) on its way, and how it goes one step."""
 
-    def __init__(self, problem: FrictionProblem, path: Path, linear: Factorisation) -> None:
+    def __init__(
+        self, problem: FrictionProblem, path: Path, linear: Factorisation, size: float = 0.0
+    ) -> None:
+        """``size`` of the forces to begin with [N or N s]; those of springs if it is zero."""
         contacts, dim = problem.contacts, problem.dim
         self.problem, self.path, self.linear = problem, path, linear
         slides = problem.friction > 0.0
@@ -124,11 +130,11 @@ class PathStep:
         self.unit[:, 0] = 1.0
         self.tangent = np.where(slides[:, None], 1.0, self.unit)  # r_T = 0 without friction
         speed = float(np.sqrt(np.mean(problem.offset**2))) or 1.0
-        # forces of the size that contacts would have as springs, soft enough to share the load
-        identity = np.broadcast_to(np.eye(dim), (contacts, dim, dim)).copy()
-        springs = linear.factor(identity * (path.compliance / problem.rho), identity)
-        size = float(np.sqrt(np.mean(springs(-problem.offset) ** 2))) or problem.rho * speed
-        self.x = self.unit * size
+        if size == 0.0:  # what contacts would bear as springs, soft enough to share the load
+            identity = np.broadcast_to(np.eye(dim), (contacts, dim, dim)).copy()
+            springs = linear.factor(identity * (path.compliance / problem.rho), identity)
+            size = float(np.sqrt(np.mean(springs(-problem.offset) ** 2)))
+        self.x = self.unit * (size or problem.rho * speed)
         self.s = self.unit * speed
         self.stretch = np.ones((contacts, dim))
         self.stretch[:, 0] = self.mu
@@ -145,6 +151,8 @@ class PathStep:
             raise SingularSystem
         eps = path.rounding * np.sqrt(gap / self.problem.rho)
         velocity, slope = coulomb_velocity(s, self.mu, eps, path.convex)
+        if path.lagged:
+            slope[:, 0, 1:] = 0.0
         at = self.problem.velocity(self.force()).reshape(x.shape)
         eta, point = cone_scaling(x, s)
         scaled = cone_scale(eta, point, x, False)

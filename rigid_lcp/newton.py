@@ -18,6 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factorisation
+from rigid_lcp.cones import length
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,9 @@ LEAST_SHIFT, QUIET = 1e-10, 0.01
 """The shift falls by `QUIET` at a step on which no contact changes its status: then it is all that
 holds the steps up.  While some do a great one is better: round-off is divided by it, and contacts
 that hardly bear would change at every step."""
+BEARABLE = 1e-2
+"""Part of what makes the contacts approach, ``rho |q|``, that the first shift may hold back of the
+forces: a great weight on light bodies answers at a small eigenvalue of W."""
 PATIENCE = 8
 """Steps that may fail to halve the best residual: contacts change status before it falls."""
 
@@ -106,14 +110,17 @@ def newton(
     rho = contact_rho(problem)
     best = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
     best_residual, done = problem.residual(best), 0
-    for shift in FIRST_SHIFTS if patience >= PATIENCE else FIRST_SHIFTS[:1]:
+    offered = problem.rho * length(problem.offset)
+    first = min(FIRST_SHIFTS[0], BEARABLE * offered / (length(best) or 1.0)) or FIRST_SHIFTS[0]
+    least_shift = min(LEAST_SHIFT, QUIET * first)
+    for shift in (first, *FIRST_SHIFTS[1:]) if patience >= PATIENCE else (first,):
         force, waited, mark = best, 0, best_residual
         status = np.zeros(0, dtype=np.int8)
         while best_residual > tolerance and done < iterations and waited < patience:
             velocity, last = problem.velocity(force).reshape(shape), status
             f, a, b, status = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
             if np.array_equal(status, last):
-                shift = max(LEAST_SHIFT, QUIET * shift)
+                shift = max(least_shift, QUIET * shift)
             done, waited = done + 1, waited + 1
             try:
                 solve = linear.factor(a + (shift / problem.rho) * b, b)

@@ -31,6 +31,9 @@ STEPS = 5
 FINER = 0.1
 """A point is found where its own error is so small a part of the residual of the one before."""
 FINEST = 1e-15
+HOPELESS, SAME, TRIED = 10.0, 1e-3, 4
+"""From so many errors on, a point is given up where the last is so many times that of the first
+step, or is an earlier one again to ``SAME`` of it: the same changes of status come in a circle."""
 FACTORISATIONS = 60
 
 
@@ -89,7 +92,7 @@ def proximal_point(
     shape = (problem.contacts, problem.dim)
     rho = contact_rho(problem)
     force, least = centre, np.inf
-    best = centre
+    best, errors = centre, []
     for step in range(steps + 1):
         velocity = problem.velocity(force) + alpha * (force - centre)
         f, a, b, _ = alart_curnier(
@@ -98,10 +101,21 @@ def proximal_point(
         error = float(np.linalg.norm(f)) / (float(np.linalg.norm(force)) or 1.0)
         if error < least:
             best, least = force, error
-        if (error <= enough and step > 0) or step == steps or not np.isfinite(error):
+        errors.append(error)
+        if (error <= enough and step > 0) or step == steps or hopeless(errors):
             break
         try:
             force = force - linear.factor(a + alpha * b, b)(f.ravel())
         except SingularSystem:
             return best, False, step + 1
     return best, least <= enough, step
+
+
+def hopeless(errors: list[float]) -> bool:
+    """Whether Newton's method goes astray, or in a circle, by the errors of its steps [-]."""
+    now = errors[-1]
+    if not np.isfinite(now):
+        return True
+    if len(errors) < TRIED:
+        return False
+    return now > HOPELESS * errors[1] or any(abs(now - e) < SAME * e for e in errors[1:-1])

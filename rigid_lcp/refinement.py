@@ -32,6 +32,9 @@ and one for all others."""
 STEPS, LEVEL = 8, 2
 """Most Newton steps: where contacts at Coulomb's limit turn the residual rises before it falls.
 They end where so many in turn leave it where it was: at round-off."""
+EXACT, ROUND_OFF = 2.2e-16, 1e-15
+"""A residual that no step betters, and one next to it: a step that does not halve this is the last.
+"""
 ENOUGH = 1e-6
 """Error of a solution over the right hand side that is left: a Newton step needs no less."""
 LITTLE = 1e-14
@@ -52,6 +55,7 @@ def refined(
     linear = linear or factorisation(problem)
     rho = contact_rho(problem)
     force = best = start
+    tolerance = max(tolerance, EXACT)
     least, done, level = problem.residual(start), 0, 0
     try:
         while least > tolerance and done < steps and level < LEVEL:
@@ -62,8 +66,11 @@ def refined(
             residual = problem.residual(force)
             done += 1
             level = level + 1 if 0.5 * least < residual < 10.0 * least else 0
+            last = least <= ROUND_OFF and residual > 0.5 * least
             if residual < least:
                 best, least = force, residual
+            if last:
+                break
     except SingularSystem:
         pass
     return friction_solution(

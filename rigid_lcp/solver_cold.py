@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rigid_lcp.body_factorisation import SingularSystem, factorisation
 from rigid_lcp.friction_problem import FrictionSolution
 from rigid_lcp.gauss_seidel import gauss_seidel, sweeper_of
 from rigid_lcp.interior_point import Path, PathStep, interior_point
 from rigid_lcp.solver_trial import FEW_CONTACTS, FEW_STEPS, HAND_OVER, Trial
-from rigid_lcp.sticking import seem_loose
+from rigid_lcp.sticking import heaviness, seem_loose
+
+Floats = NDArray[np.float64]
 
 CONVEX_PATH = Path(convex=True, compliance=1e-4)
 CONVEX_SWEEPS, CONVEX_STEPS, CONVEX_CONTACTS = 30, 7, 10_000
@@ -23,6 +28,10 @@ BENT_STEPS, BENT_ROUNDING, BENT_USEFUL = 25, 0.3, 3e-6
 """Where that is not enough: steps with the term |u_T|, from where the convex path was left, to
 `BENT_USEFUL`, and Newton; if that fails, on to `HAND_OVER`, and Newton again.  Coming from there
 the path folds back seldom."""
+HEAVY_STEPS, HEAVY_PATIENCE = 12, 5
+HEAVY_PATH, HEAVY_NEWTON = 20, 10
+"""Where light bodies bear heavy ones: steps of Newton from the forces of sticking, steps along a
+path, which has to go further, and of Newton from its end."""
 NEWTON_PATIENCE = 3
 """Steps of Newton that may fail to halve the residual: from the end of a path it begins to converge
 in the first two or not at all."""
@@ -38,11 +47,19 @@ def convex_start(trial: Trial) -> bool:
     if trial.dear:
         return trial.stick_if_likely()
     stuck = trial.stick()
-    if trial.best.solved or (small and seem_loose(trial.problem, stuck.r) and few_sweeps(trial)):
+    if trial.best.solved:
         return True
-    if trial.best.residual <= HAND_OVER:
+    loose, finer = seem_loose(trial.problem, stuck.r), heaviness(trial.problem, stuck.r)
+    if small and loose and finer == 1.0 and few_sweeps(trial):
+        return True
+    if trial.best.residual <= HAND_OVER / finer:
         trial.newton(trial.best.r, FEW_STEPS, trial.best.method)
-        return trial.best.solved
+        if trial.best.solved or finer == 1.0:
+            return trial.best.solved
+    elif finer > 1.0 and not loose:
+        trial.newton(stuck.r, HEAVY_STEPS, stuck.method, HEAVY_PATIENCE)
+    if finer > 1.0:
+        return trial.best.solved or heavy_path(trial, stuck.r, finer)
     return convex_path(trial)
 
 
@@ -82,6 +99,29 @@ def convex_path(trial: Trial) -> bool:
             break
         steps -= int(found.work["iterations"])
         trial.newton(found.r, CONVEX_STEPS + 1, found.method, NEWTON_PATIENCE)
+    trial.path_end = found.r
+    return trial.best.solved
+
+
+def heavy_path(trial: Trial, stuck: Floats, finer: float) -> bool:
+    """The convex path, so much ``finer``, from forces of the size of ``stuck``, and Coulomb's."""
+    if not trial.affordable:
+        return False
+    size = float(np.sqrt(np.mean(stuck**2)))
+    linear = trial.linear or factorisation(trial.problem)
+    path = PathStep(trial.problem, CONVEX_PATH, linear, size)
+    bent = replace(CONVEX_PATH, convex=False, rounding=BENT_ROUNDING)
+    for path.path, until, steps in (
+        (CONVEX_PATH, CONVEX_END, HEAVY_PATH),
+        (bent, BENT_USEFUL, BENT_STEPS),
+        (bent, HAND_OVER, BENT_STEPS),
+    ):
+        found = follow(trial, path, until / finer, steps)
+        if found.residual > CONVEX_USEFUL or not trial.affordable:
+            break
+        trial.newton(found.r, HEAVY_NEWTON, found.method)
+        if trial.best.solved:
+            break
     trial.path_end = found.r
     return trial.best.solved
 

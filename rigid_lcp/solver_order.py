@@ -13,8 +13,9 @@
                      Newton at its end: first few sweeps and factorisations, then many, as what is
                      hard for the one is often easy for the other
     extrapolated     proximal points that run ahead of their drift
-                     (`rigid_lcp.extrapolated_points`): beds of low friction whose self-stress has
-                     to grow a long way before a contact lets go
+                     (`rigid_lcp.extrapolated_points`): beds whose self-stress has to grow a long
+                     way before a contact lets go.  Some from the end of each of three paths of the
+                     interior point, then from the best
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
                      goes to Newton, and if that is not enough to Gauss-Seidel and Newton again.
                      They end after the effort that `FALLBACK_SHARE` names, or before they begin
@@ -41,6 +42,7 @@ from numpy.typing import NDArray
 
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.frictionless import frictionless
+from rigid_lcp.gauss_seidel import gauss_seidel, sweeper_of
 from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
 from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
 from rigid_lcp.solver_cold import CONVEX_CONTACTS, convex_start
@@ -72,6 +74,15 @@ times what was spent before them, or so many flops (some seconds) if that is mor
 DRIFT, DRIFT_FLOPS = 1500, 5e9
 """Factorisations of extrapolated points before the paths, and their cost in all (or so much as was
 spent before, if that is more)."""
+DRIFT_PATHS = (
+    Path(rounding=0.3, compliance=1e-4),
+    Path(rounding=1e-3, compliance=1e-4, lagged=True),
+    Path(convex=True, compliance=1e-4),
+)
+DRIFT_STEPS, DRIFT_SWEEPS, FEW_DRIFTS = 45, 200, 350
+"""Paths from whose ends they go first, steps along each, sweeps from its end, and factorisations:
+how many are needed differs by ten between starts that look alike, so a few of many starts cost
+less than many of one."""
 LAST_DRIFT, LAST_DRIFT_FLOPS = 4000, 4e10
 """The same after the paths, when nothing else is left: large packings of little friction take some
 ten seconds of it."""
@@ -141,9 +152,9 @@ def fallback_paths(trial: Trial, accept: float) -> None:
     if trial.forces > ENDLESS and proved_insoluble(problem):
         trial.best = replace(trial.best, status="no solution")
         return
-    if trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort)):
-        return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
+    if drift_from_paths(trial, most) or trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort)):
+        return
     for path, sweeps in PATHS:
         if trial.effort > most or not trial.affordable:
             break
@@ -159,6 +170,32 @@ def fallback_paths(trial: Trial, accept: float) -> None:
             return
     if not trial.drift(LAST_DRIFT, LAST_DRIFT_FLOPS) and trial.effort <= most:
         trial.sweep(None, LAST_SWEEPS)
+
+
+def drift_from_paths(trial: Trial, most: float) -> bool:
+    """Extrapolated points, not many, from where each of a few paths ends; none is begun after an
+    effort of ``most``.
+
+    Forces there are inside their cones, far from every change of status, and so a self-stress has
+    less way to go than from swept ones, which lie on the cones' boundaries.
+    """
+    problem = trial.problem
+    for path in DRIFT_PATHS:
+        if trial.effort > most or not trial.affordable:
+            break
+        found = interior_point(
+            problem, None, max(HAND_OVER, trial.tolerance), path, linear=trial.linear,
+            iterations=min(DRIFT_STEPS, trial.affordable),
+        )  # fmt: skip
+        if trial.polish(trial.keep(found), factorisations=0):
+            return True
+        trial.sweeper = trial.sweeper or sweeper_of(problem)
+        swept = gauss_seidel(problem, found.r, trial.tolerance, DRIFT_SWEEPS, sweeper=trial.sweeper)
+        trial.keep(swept, "interior-point")
+        start = replace(swept, method="interior-point + gauss-seidel")
+        if trial.best.solved or trial.drift(FEW_DRIFTS, DRIFT_FLOPS, start):
+            return True
+    return False
 
 
 def proved_insoluble(problem: FrictionProblem) -> bool:

@@ -120,19 +120,19 @@ class Trial:
         name = f"{after} + gauss-seidel" if after else "gauss-seidel"
         return self.best.solved or self.polish(found, name, factorisations)
 
-    def drift(self, most: int, flops: float) -> bool:
-        """Extrapolated proximal points from the best, with so many factorisations at most and at
-        about such a cost; whether the tolerance is reached."""
+    def drift(self, most: int, flops: float, start: FrictionSolution | None = None) -> bool:
+        """Extrapolated proximal points from ``start`` (the best if None), with so many
+        factorisations at most and at about such a cost; whether the tolerance is reached."""
         self.linear = self.linear or factorisation(self.problem)
         count = int(min(most, flops / self.linear.flops, self.affordable))
         if count < FEW_DRIFT:
             return self.best.solved
+        start = start or self.best
         self.keep(
             extrapolated_points(
-                self.problem, self.best.r, self.tolerance, linear=self.linear,
-                factorisations=count,
+                self.problem, start.r, self.tolerance, linear=self.linear, factorisations=count
             ),
-            self.best.method,
+            start.method,
         )  # fmt: skip
         self.sharpen()
         return self.best.solved

@@ -5,7 +5,9 @@ W may be singular: proximal steps from nothing,
 
     (W + alpha) (r_(k+1) - r_k) = -(W r_k + q),
 
-converge to forces of least norm among those that fit, all with one factorisation.
+converge to forces of least norm among those that fit, all with one factorisation.  What W answers
+with less than alpha (heavy bodies on light ones) they better little: where a step does not pay, a
+few products by the same factors find it (`rigid_lcp.refinement.gmres`).
 """
 
 from __future__ import annotations
@@ -14,13 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factorisation
+from rigid_lcp.cones import length
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
+from rigid_lcp.refinement import gmres
 
 Floats = NDArray[np.float64]
 
 SHIFT = 1e-9
 """alpha over mean(diag W)."""
 STEPS = 6
+PAYS, STANDS = 0.01, 0.5
+"""What a step leaves of the residual if plain ones are enough; and if no more are of use."""
 HOPELESS = 1e-2
 """A residual above this after a step: some contact does not stick."""
 LOOSE = 0.4
@@ -28,6 +34,11 @@ LOOSE = 0.4
 0.4, as their forces of least norm pull at some)."""
 AT_LIMIT = 1.0 - 1e-9
 """Share of Coulomb's limit from which on a contact is called sliding."""
+STRAIGHT = 0.3
+"""Tangential forces over normal ones, up to which the forces of sticking tell what bears what."""
+HEAVY, GREAT = 1e3, 10.0
+"""Forces over what makes the contacts approach, ``rho |q|``, that heavy bodies on light ones have,
+and from which on their part is asked for more exactly."""
 
 
 def sticking(
@@ -41,17 +52,20 @@ def sticking(
     contacts, dim = problem.contacts, problem.dim
     identity = np.broadcast_to(np.eye(dim), (contacts, dim, dim)).copy()
     force = best = np.zeros(contacts * dim)
-    least = np.inf
+    least, hidden = np.inf, False
     try:
         linear = linear or factorisation(problem)
         solve = linear.factor(identity * (SHIFT / problem.rho), identity)
         for _ in range(STEPS):
-            force = force - solve(problem.velocity(force))
+            velocity = problem.velocity(force)
+            step = gmres(problem, 0.0 * identity, identity, solve, velocity) if hidden else None
+            force = force - (solve(velocity) if step is None else step)
             residual = problem.residual(force)
-            if not residual < least:
-                break
-            best, least = force, residual
-            if residual <= tolerance or residual > HOPELESS:
+            ends = residual <= tolerance or residual > min(HOPELESS, STANDS * least)
+            hidden = hidden or residual > PAYS * least
+            if residual < least:
+                best, least = force, residual
+            if ends:
                 break
     except SingularSystem:
         pass
@@ -71,3 +85,18 @@ def seem_loose(problem: FrictionProblem, force: Floats) -> bool:
     """Whether in these forces, at which all contacts stick, many are pulled."""
     pulled = int((force[:: problem.dim] <= 0.0).sum())
     return pulled >= LOOSE * problem.contacts
+
+
+def heaviness(problem: FrictionProblem, stuck: Floats) -> float:
+    """How much finer than usual the residual has to be, as light bodies bear heavy ones; 1 or more.
+
+    The residual is measured on the forces of all contacts.  ``stuck`` r (nc * dim,) [N or N s]:
+    forces at which all contacts stick; where they are great but not mostly normal they are those
+    of an ill-conditioned W and tell nothing.
+    """
+    offered = problem.rho * length(problem.offset)
+    r = np.abs(stuck.reshape(-1, problem.dim))
+    if offered == 0.0 or r[:, 1:].sum() > STRAIGHT * r[:, 0].sum():
+        return 1.0
+    forces = length(stuck) / offered
+    return max(1.0, min((forces / HEAVY) ** 2, forces / GREAT))

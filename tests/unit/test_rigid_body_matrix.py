@@ -148,3 +148,22 @@ def test_the_order_of_a_chain_fills_nothing_in():
         assert len(near) <= 2
         linked[near, k] = linked[k, near] = False
         linked[np.ix_(near, near)] |= ~np.eye(len(near), dtype=bool)
+
+
+@pytest.mark.parametrize(("dim", "size"), [(2, 3), (3, 6), (3, 3), (2, 6)])
+def test_contacts_of_other_shapes_are_added_alike(dim, size):
+    """Blocks that the compiler unrolls and blocks of other shapes: ``J_i^T K J_j`` by NumPy."""
+    g = np.random.default_rng(4)
+    first = np.array([0, 2, 3, 6])
+    block = g.standard_normal((6, dim, size))
+    stiffness = g.standard_normal((3, dim, dim))
+    places = g.integers(0, 5, 4 + 1 + 9)
+    matrix = g.standard_normal((5, size, size))
+    expected, k = matrix.copy(), 0
+    for c in range(3):
+        for i in range(first[c], first[c + 1]):
+            for j in range(first[c], first[c + 1]):
+                expected[places[k]] += block[i].T @ stiffness[c] @ block[j]
+                k += 1
+    add_contacts(matrix, first, block, places, stiffness)
+    np.testing.assert_allclose(matrix, expected, atol=1e-13)

@@ -112,10 +112,12 @@ def test_friction_can_be_mobilised_in_more_ways_than_one():
     assert difference(far.r, near.r) > 0.1
 
 
-def test_grains_that_go_on_sliding_in_space():
+@pytest.mark.parametrize("seed", [95, 98])
+def test_grains_that_go_on_sliding_in_space(seed):
     """Friction along the velocity: springs alone turn into it as 1 over the way, and ended with a
-    residual of 3e-9.  The same forces with the contacts the other way round."""
-    problem = packing(60, 3, seed=99, friction=1.0)
+    residual of 3e-9.  The same forces with the contacts the other way round, on these beds: of 16
+    (seeds 90 to 105) 11 are found both ways round, and 2 of those have two answers."""
+    problem = packing(60, 3, seed=seed, friction=1.0)
     answer = elastic_limit(problem)
     assert answer.solved
     assert problem.residual(answer.r) < 1e-12

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.body_factorisation import BlockSystem, SingularSystem
+from rigid_lcp.dense_tiles import DEPTH
 from rigid_lcp.elimination_order import FEW_BLOCKS, minimum_degree, symmetric_pattern
 from rigid_lcp.elimination_tree import EliminationTree, elimination_tree
 from rigid_lcp.multifrontal import factor_fronts, solve_fronts
@@ -79,14 +80,41 @@ def test_fronts_wider_than_a_panel_and_split_ones():
     tree = elimination_tree(blocks, size, rows, columns)
     widths = np.diff(tree.first) * size
     assert len(widths) > 1
-    assert widths.max() > tree.panel
-    factors, regular = factor_fronts(tree, values)
+    assert widths.max() > DEPTH
+    factors, rest, stack = (
+        np.full(numbers, np.nan)
+        for numbers in (tree.factor_start[-1], tree.rest_most, tree.stack_most)
+    )
+    regular = factor_fronts(tree, values, factors, rest, stack)
     right = g.standard_normal(blocks * size)
     assert regular
     matrix = full(blocks, rows, columns, values)
     x = solve_fronts(tree, factors, right)
     assert backward_error(matrix, x, right) < 10 * blocks * size * ROUND_OFF
     np.testing.assert_allclose(x, np.linalg.solve(matrix, right), rtol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_memory_of_any_content_is_filled_and_no_other_is_touched(seed):
+    """Factors and space are used again: whatever they held does not matter (not a number here), all
+    of the factors is written, and nothing beside them."""
+    g = np.random.default_rng(seed)
+    blocks, size, guard = int(g.integers(1, 90)), int(g.choice([1, 2, 3, 6])), 64
+    rows, columns = random_pattern(g, blocks, int(g.integers(0, 400)))
+    values = dominant(g, blocks, size, rows, columns)
+    tree = elimination_tree(blocks, size, rows, columns)
+    wanted = (tree.factor_start[-1], tree.rest_most, tree.stack_most)
+    memory = [np.full(numbers + 2 * guard, 7.5) for numbers in wanted]
+    factors, rest, stack = (each[guard:-guard] for each in memory)
+    for part in (factors, rest, stack):
+        part[:] = np.nan
+    right = g.standard_normal(blocks * size)
+    assert factor_fronts(tree, values, factors, rest, stack)
+    x = solve_fronts(tree, factors, right)
+    matrix = full(blocks, rows, columns, values)
+    assert backward_error(matrix, x, right) < 10 * blocks * size * ROUND_OFF
+    assert np.isfinite(factors).all()
+    assert all((each[:guard] == 7.5).all() and (each[-guard:] == 7.5).all() for each in memory)
 
 
 def grid(side: int) -> tuple[np.ndarray, np.ndarray]:

@@ -90,6 +90,26 @@ def test_the_derivative_of_the_rounded_velocity(dim, convex):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("mu", [0.1, 0.7])
+def test_the_lagged_path_ends_at_coulombs_law_where_one_block_slides(dim, mu):
+    """A block of mass one pressed down by 1 and pushed by 1 slides: ``r = (1, -mu)``, where the
+    convex answer lifts it: ``r_N = (1 + mu) / (1 + mu^2)``.
+
+    |u_T| of the step before is wrong by ``mu^2 / (1 + mu^2)`` of its error there, 1/3 at most, so
+    the ten and more steps that the gap takes to vanish leave less than 3^-10 of 1.
+    """
+    offset = np.zeros(dim)
+    offset[0], offset[1] = -1.0, 1.0
+    problem = friction_problem(np.eye(dim), offset, mu, dim)
+    exact = np.zeros(dim)
+    exact[:2] = 1.0, -mu
+    found = interior_point(problem, None, 1e-9, Path(rounding=1e-3, compliance=1e-4, lagged=True))
+    np.testing.assert_allclose(found.r, exact, atol=3.0**-10)
+    convex = interior_point(problem, None, 1e-9, Path(convex=True, compliance=1e-4))
+    assert convex.r[0] == pytest.approx((1.0 + mu) / (1.0 + mu**2), rel=1e-4)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
 def test_the_derivatives_of_the_contact_law(dim):
     """A = dF/dr and B = dF/du by central differences, away from changes of status."""
     g = np.random.default_rng(4)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.proximal_newton import proximal_newton, proximal_point
+from rigid_lcp.proximal_newton import hopeless, proximal_newton, proximal_point
 from validation.rigid_packings import tower
 
 Floats = NDArray[np.float64]
@@ -88,3 +88,17 @@ def test_ends_at_once_at_a_solution_and_without_a_start() -> None:
     again = proximal_newton(problem, found.r, 1e-12)
     assert again.work["factorisations"] == 0
     np.testing.assert_array_equal(again.r, found.r)
+
+
+def test_a_point_that_goes_in_a_circle_is_given_up() -> None:
+    """Errors of a circle, of a way astray, and of points that were found, as they were measured."""
+    circle = [4e-7, 7e-5, 5e-7, 7.00001e-5]
+    astray = [7e-6, 9e-3, 2e-1, 8e-1]
+    found = [2e-4, 2e-5, 9e-4, 6e-5, 3e-5, 3e-5 * 1.1, 6e-17]
+    assert hopeless(circle)
+    assert not hopeless(circle[:3])
+    assert hopeless(astray)
+    assert hopeless([1.0, np.nan])
+    late = [2e-5, 8e-5, 4e-6, 2e-4, 8.5e-5, 3e-6, 6e-17]
+    for errors in (found, late):
+        assert not any(hopeless(errors[: k + 1]) for k in range(len(errors)))
