@@ -84,11 +84,11 @@ WAYS = (
     Way("liggghts, twin", "liggghts", aside=TWIN),
     Way("lammps, mindlin", "lammps", rule="mindlin"),
     Way("lammps, mindlin/force", "lammps", rule="mindlin/force"),
-    Way("yade, rebound e", "yade", ("material.grain.restitution=0.2145",)),
     Way("lammps, mindlin/force, no pull", "lammps", rule="mindlin/force", pulls=False),
     Way("liggghts, half the step", "liggghts", ("engine.rayleigh_share=0.1",)),
     Way("liggghts, walls as grains", "liggghts", ("material.wall.young=1e9",)),
     Way("liggghts, piston of 0.1 kg", "liggghts", ("loading.piston_mass=0.1",)),
+    Way("yade, rebound e", "yade", ("material.grain.restitution=0.2145",)),
 )
 """In the order in which they are run; the first three bed by bed, of the others all beds of one
 before the next."""
