@@ -20,6 +20,7 @@ VERBS = {
     "resume": (ADAPTERS, "go on with an interrupted run"),
     "status": (ADAPTERS, "how far a run is, its settlement and speed-up"),
     "report": (ADAPTERS, "write report.html and the figures of a run"),
+    "export": ("adapters.export_cli", "a run as files of ParaView, OVITO, STL or CSV"),
     "fit": (ADAPTERS, "fit a residual law to a run, dumps or a CSV series and extrapolate it"),
     "relax": (ADAPTERS, "bring the overlaps of a state back to equilibrium"),
     "qdem": ("qdem_fem.cli", "vibration and statics of deformable bodies, from a scene file"),

@@ -36,7 +36,7 @@ def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str])
         main(["--help"])
     assert stop.value.code == 0
     text = capsys.readouterr().out
-    shipped = {"doctor", "new", "run", "resume", "status", "report", "fit", "relax"}
+    shipped = {"doctor", "new", "run", "resume", "status", "report", "export", "fit", "relax"}
     assert shipped | {"qdem", "rigid", "validate", "cite"} == set(trackbed.VERBS)
     for verb in trackbed.VERBS:
         assert f"\n    {verb}" in text
