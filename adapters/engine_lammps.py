@@ -19,7 +19,7 @@ from adapters.engine import EngineRun, EngineStart, cycles_in_track
 from adapters.engine_deck import deck_run
 from adapters.engine_plan import EQUILIBRIUM_RATIO, cycle_steps, seat_plan, settle_plan
 from adapters.engine_program import Program
-from adapters.errors import EngineFailed, EngineMissing
+from adapters.errors import EngineMissing
 from adapters.lammps_contacts import contacts_write
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
@@ -190,16 +190,6 @@ class LammpsEngine:
         digests: dict[str, str],
     ) -> EngineRun:
         """Run a deck; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
-
-        def refuse(status: int, text: str) -> None:
-            banners = len(PROCESS.findall(text))
-            if banners > 1:
-                raise EngineFailed(
-                    f"{banners} runs of LAMMPS started that know nothing of one another",
-                    where=str(folder),
-                    remedy="launch it by the MPI it is linked to: mpiexec of the wheel mpich",
-                )
-
         made = deck_run(
             self.command(scene, deck),
             folder,
@@ -207,7 +197,7 @@ class LammpsEngine:
             digests,
             begun=PROCESS,
             loop_time=LOOP_TIME,
-            refuse=refuse,
+            launch="launch it by the MPI it is linked to: mpiexec of the wheel mpich",
         )
         contacts_write(scene, folder)
         return made

@@ -183,6 +183,7 @@ class LiggghtsEngine:
             digests,
             begun=BANNER,
             loop_time=LOOP_TIME,
+            launch="launch it by the MPI it is linked to: Debian's by mpirun of Open MPI",
             refuse=refuse,
         )
 

@@ -109,7 +109,13 @@ class YadeEngine:
     ) -> EngineRun:
         """Run a script; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
         return deck_run(
-            self.command(scene, deck), folder, watch, digests, begun=BEGUN, loop_time=LOOP_TIME
+            self.command(scene, deck),
+            folder,
+            watch,
+            digests,
+            begun=BEGUN,
+            loop_time=LOOP_TIME,
+            launch="launch it without MPI: YADE runs in one process",
         )
 
     @staticmethod
