@@ -159,11 +159,17 @@ def rained(seed: int, folder: Path) -> tuple[FloatArray, FloatArray]:
 
 
 def run(
-    way: Way, seed: int, start: FloatArray, radius: FloatArray, folder: Path
+    way: Way,
+    seed: int,
+    start: FloatArray,
+    radius: FloatArray,
+    folder: Path,
+    cycles: int = CYCLES,
 ) -> tuple[Figures, float]:
     """One way from the common ``start`` [m], (n, 3): its figures and the engine's CPU time [s].
 
-    ``folder`` is made for it.  Raises `EngineFailed`, `NotCredible`, `NotConverged`.
+    ``cycles`` load cycles; ``folder`` is made for it.  Raises `EngineFailed`, `NotCredible`,
+    `NotConverged`.
     """
     scene, engine = way.scene(seed), way.made()
     position = start.copy()
@@ -179,11 +185,11 @@ def run(
     check_state(scene, state)
     face = float((state.position[:, 2] + radius).max())
     begin = EngineStart(settled / "end.restart", state.time_step, 0, face, first=True)
-    decks = engine.write_cycles(scene, begin, CYCLES, loaded)
+    decks = engine.write_cycles(scene, begin, cycles, loaded)
     _edit(way, loaded)
     done = engine.run(scene, "in.cycles", loaded, lambda: None, decks)
     window = window_read(loaded, 0, engine.wall_names(scene, piston=True), face)
-    check_window(scene, window, CYCLES)
+    check_window(scene, window, cycles)
     common = bed_scene(seed, 'engine.name="liggghts"')
     figures = figures_of(window, start, common if way.engine == "yade" else scene)
     return figures, rest.cpu_s + done.cpu_s

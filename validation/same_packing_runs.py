@@ -13,7 +13,7 @@ import json
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -47,7 +47,7 @@ def plan() -> Iterator[tuple[Way, int]]:
             yield way, seed
 
 
-@lru_cache(maxsize=None)
+@cache
 def start_of(seed: int) -> tuple[FloatArray, FloatArray]:
     """The rained bed of a seed: positions (n, 3), radii (n,) [m]."""
     with TemporaryDirectory() as temporary:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
 from statistics import median
@@ -19,6 +20,7 @@ from adapters import contact_law as law
 from adapters.checks import check_window
 from adapters.decks import PISTON_MARGIN
 from adapters.engine import EngineStart, python_cpu_s
+from adapters.engine_plan import seat_plan
 from adapters.engine_yade import PARAMETERS, YadeEngine
 from adapters.radii import radii_sample
 from adapters.sample import sample_start
@@ -71,9 +73,6 @@ class Bed:
 
     scene: Scene
     start: EngineStart
-    state: Any
-    cpu_s: float
-    """CPU time of the preparation [s]."""
 
 
 def changed(folder: Path, table: str, **values: object) -> None:
@@ -92,21 +91,27 @@ def rested(
     folder: Path,
     edit: Callable[[Path], None] = lambda folder: None,
 ) -> Bed:
-    """Grains at ``position`` [m] below ``height`` [m] come to rest; ``edit`` changes the input."""
-    folder.mkdir(parents=True)
-    digests = ENGINE.write_preparation(scene, position, radius, height, folder)
-    edit(folder)
-    done = ENGINE.run(scene, "in.prepare", folder, lambda: None, digests)
+    """Grains at ``position`` [m] below ``height`` [m] come to rest; ``edit`` changes the input.
+
+    A ``folder`` where they have is read back.
+    """
+    if not (folder / "end.restart").exists():
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        digests = ENGINE.write_preparation(scene, position, radius, height, folder)
+        edit(folder)
+        ENGINE.run(scene, "in.prepare", folder, lambda: None, digests)
     state = state_read(folder, ENGINE.wall_names(scene, piston=False))
     face = float((state.position[:, 2] + state.radius).max())
     start = EngineStart(folder / "end.restart", state.time_step, 0, face, first=True)
-    return Bed(scene, start, state, done.cpu_s)
+    return Bed(scene, start)
 
 
 def window(
     bed: Bed, cycles: int, folder: Path, edit: Callable[[Path], None] = lambda folder: None
 ) -> tuple[Window, float]:
     """``cycles`` load cycles of a bed, and the engine's CPU time [s]; the checks have been made."""
+    shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     digests = ENGINE.write_cycles(bed.scene, bed.start, cycles, folder)
     edit(folder)
@@ -142,7 +147,7 @@ def after(bed: Bed, made: Window, folder: Path) -> Bed:
     end = EngineStart(
         folder / "end.restart", int(made.time_step[-1]), 0, float(made.piston.height[-1])
     )
-    return Bed(bed.scene, end, made.state(-1), 0.0)
+    return Bed(bed.scene, end)
 
 
 @dataclass(frozen=True)
@@ -167,6 +172,7 @@ def python_share(bed: Bed, cycles: int, repeats: int, home: Path) -> Share:
     bare, engine, python = [], [], []
     for number in range(repeats):
         folder = home / f"bare_{number}"
+        shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         ENGINE.write_cycles(bed.scene, bed.start, cycles, folder)
         (folder / "bare.py").write_text(BARE)
@@ -195,7 +201,7 @@ class PaperScale:
 
     steps_per_cycle: int
     cycle_s: float
-    """CPU time of a load cycle [s]."""
+    """CPU time of a load cycle [s], start-up and files shared out."""
     grain_steps: float
     """Grains times steps over the CPU time of the cycles [1/s]."""
     kinetic_share: float
@@ -210,37 +216,31 @@ class PaperScale:
     """Greatest overlap over the smallest radius."""
 
 
-def paper_scale(soft: Bed, seated: Window, cycles: int, home: Path) -> PaperScale:
+def paper_scale(seated: Window, cycles: int, home: Path) -> PaperScale:
     """Give a seated soft bed the paper's stiffness, let it rest, seat the piston, load it.
 
     Rest and seating are a cycle each, as bed and piston have met before.
     """
     scene = scene_of("karrech")
     steps = scene.steps_per_cycle
-    position = seated.position[-1]
     radius = SHRUNK * seated.radius
-    top = float((position[:, 2] + radius).max())
+    top = float((seated.position[-1, :, 2] + radius).max())
 
     def soon(folder: Path) -> None:
         changed(folder, "settle", check_steps=steps, minimum_steps=steps, history_steps=steps // 4)
 
     def short(folder: Path) -> None:
-        changed(folder, "window", seat=_seat(folder) | {"steps": steps, "release_steps": steps})
+        halves = {"steps": steps // 2, "release_steps": steps - steps // 2}
+        changed(folder, "window", seat=asdict(seat_plan(scene)) | halves)
 
-    bed = rested(scene, position, radius, top, home / "stiff", soon)
-    _, seat_s = window(bed, 1, home / "one", short)
-    made, all_s = window(bed, 1 + cycles, home / "more", short)
-    samples = scene.samples_per_cycle
-    piston = made.piston
-    last = slice(-samples, None)
-    height = np.concatenate([piston.height[-samples - 1 : -samples], piston.height[last]])
-    force = np.concatenate(
-        [piston.contact_force[-samples - 1 : -samples], piston.contact_force[last]]
-    )
+    bed = rested(scene, seated.position[-1], radius, top, home / "rest", soon)
+    made, cpu_s = window(bed, cycles, home / "cycles", short)
+    cycle_s = cpu_s / (1 + cycles)
+    piston, last = made.piston, slice(-scene.samples_per_cycle, None)
+    height = np.concatenate([[made.piston_heights()[-2]], piston.height[last]])
+    force = np.concatenate([piston.contact_force[-1:], piston.contact_force[last]])
     work = -float(trapezoid(force, height))
     kinetic = piston.kinetic_translational + piston.kinetic_rotational
-    share = check_window(scene, made, 1 + cycles)["overlap_share"]
-    cycle_s = (all_s - seat_s) / cycles
     return PaperScale(
         steps,
         cycle_s,
@@ -249,13 +249,8 @@ def paper_scale(soft: Bed, seated: Window, cycles: int, home: Path) -> PaperScal
         float(kinetic[-1]) / work,
         work,
         float(piston.force_error(steps)[-1]),
-        share,
+        check_window(scene, made, cycles)["overlap_share"],
     )
-
-
-def _seat(folder: Path) -> dict[str, Any]:
-    seat: dict[str, Any] = json.loads((folder / PARAMETERS).read_text())["window"]["seat"]
-    return seat
 
 
 # --- seams of a partial piston --------------------------------------------------------------
