@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from adapters.engine import REAL_ENGINES
+from adapters.engine_names import REAL_ENGINES
 from validation.case import Check
 from validation.chung_ooi import RESTITUTION, TEST_1, TEST_4, TEST_6, TEST_8, Setting
 from validation.chung_ooi_checks import (

@@ -9,7 +9,8 @@ forms (tests 1 to 3 within 1 %, 4 to 8 within 2 %), and against what each engine
 
 from __future__ import annotations
 
-from adapters.engine import REAL_ENGINES, engine_named
+from adapters.engine import engine_named
+from adapters.engine_names import REAL_ENGINES
 from adapters.errors import EngineMissing
 from validation.case import Check
 from validation.chung_ooi import NORMAL, RESTITUTION, TANGENTIAL
