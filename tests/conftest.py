@@ -38,9 +38,7 @@ def _place(path: Path) -> int:
 @cache
 def engine_missing(name: str) -> str:
     """Why an engine, or a program such as ``chromium``, can not be used; empty where it can."""
-    from adapters.engine_names import REAL_ENGINES
-
-    if name not in REAL_ENGINES:
+    if not (Path(__file__).parents[1] / "adapters" / f"engine_{name}.py").exists():
         return "" if shutil.which(name) else f"the engine {name} is not installed"
     from adapters.engine import engine_named
     from adapters.errors import EngineMissing
