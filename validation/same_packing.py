@@ -13,7 +13,7 @@ The protocol, fixed before any result was looked at:
   engines times three figures (settlement, coordination number, relative density);
 * noise: LIGGGHTS against itself with one grain `TWIN` m aside.  No two engines can be told apart
   by less than what this twin strays;
-* what a gap comes from: one setting is changed at a time (`WAYS` behind the first four).  Nothing
+* what a gap comes from: one setting is changed at a time (`WAYS` behind the first three).  Nothing
   is added, dropped or run again because of what it gave; some 40 CPU minutes in all.
 """
 
@@ -81,17 +81,16 @@ WAYS = (
     Way("liggghts", "liggghts"),
     Way("lammps", "lammps"),
     Way("yade", "yade"),
-    Way("liggghts, twin", "liggghts", aside=TWIN),
     Way("lammps, mindlin", "lammps", rule="mindlin"),
     Way("lammps, mindlin/force", "lammps", rule="mindlin/force"),
-    Way("lammps, mindlin/force, no pull", "lammps", rule="mindlin/force", pulls=False),
+    Way("liggghts, twin", "liggghts", aside=TWIN),
     Way("liggghts, half the step", "liggghts", ("engine.rayleigh_share=0.1",)),
     Way("liggghts, walls as grains", "liggghts", ("material.wall.young=1e9",)),
     Way("liggghts, piston of 0.1 kg", "liggghts", ("loading.piston_mass=0.1",)),
+    Way("lammps, mindlin/force, no pull", "lammps", rule="mindlin/force", pulls=False),
     Way("yade, rebound e", "yade", ("material.grain.restitution=0.2145",)),
 )
-"""In the order in which they are run; the first three bed by bed, of the others all beds of one
-before the next."""
+"""The three engines, then one setting at a time; run in this order, see `same_packing_runs.plan`."""
 
 
 @dataclass(frozen=True)

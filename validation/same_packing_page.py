@@ -1,0 +1,285 @@
+"""docs/engines.md and its plot, from validation/results/same-packing.jsonl and yade.json.
+
+python -m validation.same_packing_page
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adapters.run_folder import write_atomically
+from adapters.state import FloatArray
+from validation.same_packing import CYCLES, SEEDS, WAYS, differences, interval
+from validation.same_packing_runs import Row, record_read
+from validation.tangential_rules import (
+    LOOPS,
+    force_incremental,
+    force_rescaled,
+    force_secant,
+    path,
+    work,
+)
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "engines.md"
+PLOT = ROOT / "docs" / "engines.png"
+TEXT = Path(__file__).parent / "same_packing_page.md"
+YADE = Path(__file__).parent / "results" / "yade.json"
+
+ENGINES = ("liggghts", "lammps", "yade")
+TITLES = {"liggghts": "LIGGGHTS", "lammps": "LAMMPS", "yade": "YADE"}
+COLOURS = {"liggghts": "#0072B2", "lammps": "#E69F00", "yade": "#009E73"}
+"""Told apart by colour-blind readers too (Okabe and Ito)."""
+
+FIGURES = {
+    "settlement": ("settlement, µm", 1e6, 0),
+    "settlement_after_first": ("cycles 2 to 50, µm", 1e6, 0),
+    "coordination": ("coordination number", 1.0, 3),
+    "density": ("relative density", 1.0, 4),
+    "deflection": ("elastic deflection, µm", 1e6, 2),
+}
+"""Key of a row: words, factor, decimals."""
+
+JUDGED = ("settlement", "coordination", "density")
+"""Figures that the protocol judges."""
+
+LEVEL = 1 - 0.05 / 9
+"""Of an interval that is one of nine."""
+
+PAIRS = (
+    ("LIGGGHTS' law in LAMMPS", "lammps, mindlin", "liggghts"),
+    ("YADE's law in LAMMPS", "lammps, mindlin/force, no pull", "yade"),
+    ("tangential rule: LIGGGHTS' for the paper's", "lammps, mindlin", "lammps"),
+    ("tangential rule: YADE's for the paper's", "lammps, mindlin/force", "lammps"),
+    ("no contact pulls", "lammps, mindlin/force, no pull", "lammps, mindlin/force"),
+    ("half the time step", "liggghts, half the step", "liggghts"),
+    ("walls and piston face as soft as grains", "liggghts, walls as grains", "liggghts"),
+    ("piston ten times as heavy", "liggghts, piston of 0.1 kg", "liggghts"),
+    ("YADE's damping by rebound, e = 0.2145", "yade, rebound e", "yade"),
+    ("the twin: noise", "liggghts, twin", "liggghts"),
+)
+"""What changes, with it, without it."""
+
+
+def by_way(rows: Sequence[Row]) -> dict[str, dict[int, Row]]:
+    """Runs that gave figures, by way and seed."""
+    found: dict[str, dict[int, Row]] = {way.name: {} for way in WAYS}
+    for row in rows:
+        if row["ok"]:
+            found[row["way"]][row["seed"]] = row
+    return found
+
+
+def paired(runs: dict[str, dict[int, Row]], way: str, other: str, key: str) -> FloatArray:
+    """Differences ``way`` less ``other`` over the beds that both have, shape (beds,)."""
+    seeds = sorted(runs[way].keys() & runs[other].keys())
+    return differences(
+        [runs[way][seed][key] for seed in seeds], [runs[other][seed][key] for seed in seeds]
+    )
+
+
+def told(values: FloatArray, key: str, signed: bool = True, level: float = 0.95) -> str:
+    """Mean and interval in the units of `FIGURES`."""
+    if not len(values):
+        return "-"
+    _, factor, digits = FIGURES[key]
+    mean, half = interval(values * factor, level)
+    sign = "+" if signed else ""
+    if not np.isfinite(half):
+        return f"{mean:{sign}.{digits}f}"
+    return f"{mean:{sign}.{digits}f} ± {half:.{digits}f}"
+
+
+def real(values: FloatArray, level: float = 0.95) -> bool:
+    """Whether zero is outside of the interval."""
+    mean, half = interval(values, level)
+    return bool(abs(mean) > half)
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+
+
+def table_engines(runs: dict[str, dict[int, Row]]) -> str:
+    """Means over the beds, a line for each engine."""
+    words = [words for words, _, _ in FIGURES.values()]
+    rows = []
+    for name in ENGINES:
+        found = list(runs[name].values())
+        cells = [told(np.array([row[key] for row in found]), key, signed=False) for key in FIGURES]
+        cpu = float(np.median([row["cpu_s"] for row in found])) if found else float("nan")
+        rows.append([TITLES[name], *cells, str(len(found)), f"{cpu:.0f}"])
+    return table(["engine", *words, "beds", "CPU s a run"], rows)
+
+
+def table_differences(runs: dict[str, dict[int, Row]]) -> str:
+    """Engine against engine on the same beds; bold where the protocol calls it real."""
+    rows = []
+    for first, second in combinations(ENGINES, 2):
+        cells = []
+        for key in FIGURES:
+            values = paired(runs, second, first, key)
+            text = told(values, key)
+            marked = key in JUDGED and real(values, LEVEL)
+            cells.append(f"**{text}**" if marked else text)
+        rows.append([f"{TITLES[second]} less {TITLES[first]}", *cells])
+    return table(["difference", *(words for words, _, _ in FIGURES.values())], rows)
+
+
+def table_settings(runs: dict[str, dict[int, Row]]) -> str:
+    """One setting at a time; bold where 95 % leaves out zero."""
+    rows = []
+    for words, way, other in PAIRS:
+        cells = []
+        for key in FIGURES:
+            values = paired(runs, way, other, key)
+            text = told(values, key)
+            cells.append(f"**{text}**" if len(values) > 1 and real(values) else text)
+        beds = len(runs[way].keys() & runs[other].keys())
+        rows.append([words, f"{way} less {other}", *cells, str(beds)])
+    head = ["what changes", "difference", *(words for words, _, _ in FIGURES.values()), "beds"]
+    return table(head, rows)
+
+
+def loop_energies() -> dict[str, list[float]]:
+    """Energy that each rule loses in the first round of each loop, if negative creates.
+
+    Loops and unit of `validation.cases.contact_law`: normal force 0.25 to 1, k_t ~ F_n^(1/3).
+    """
+    laws = {"mindlin": force_secant, "mindlin/force": force_incremental, "paper": force_rescaled}
+    energies: dict[str, list[float]] = {name: [] for name in laws}
+    low, high = 0.25 ** (2 / 3), 1.0
+    for loop in LOOPS.values():
+        overlap, slip = path([low, 0.0] + loop * [high - low, 1.0], 2000).T
+        stiffness = np.sqrt(overlap)
+        unit = (1.0 - np.sqrt(low)) / 2
+        for name, law in laws.items():
+            energies[name].append(work(law(stiffness, slip), slip) / unit)
+    return energies
+
+
+def table_rules(runs: dict[str, dict[int, Row]]) -> str:
+    """Energy per loop, and the settlement of the same beds, rule by rule."""
+    energies = loop_energies()
+    rows = []
+    for name, key, way in (
+        ("`mindlin_rescale/force`, the paper's", "paper", "lammps"),
+        ("`mindlin`, LIGGGHTS'", "mindlin", "lammps, mindlin"),
+        ("`mindlin/force`, YADE's", "mindlin/force", "lammps, mindlin/force"),
+    ):
+        lost = [f"{energy:+.2f}" if abs(energy) > 5e-3 else "0" for energy in energies[key]]
+        values = np.array([row["settlement"] for row in runs[way].values()])
+        less = [
+            "" if way == "lammps" else told(paired(runs, way, "lammps", figure), figure)
+            for figure in ("settlement", "settlement_after_first")
+        ]
+        rows.append([name, *lost, told(values, "settlement", signed=False), *less])
+    head = ["rule in LAMMPS", *(f"lost: {name}" for name in LOOPS), "settlement, µm"]
+    return table([*head, "less the paper's, µm", "the same, cycles 2 to 50"], rows)
+
+
+def table_yade(content: dict[str, Any]) -> str:
+    """The checks of ``trackbed validate yade``."""
+    rows = [
+        [check["name"], f"{check['value']:.4g} {check['unit']}".rstrip(), check["bar"]]
+        for check in content["checks"]
+    ]
+    return table(["what", "figure", "bar"], rows)
+
+
+def failures(rows: Sequence[Row]) -> str:
+    """Runs that failed, and how many of the plan are there."""
+    bad = [f"* {row['way']}, seed {row['seed']}: {row['why']}" for row in rows if not row["ok"]]
+    done = f"{len(rows)} of {len(WAYS) * len(SEEDS)} runs of the plan have been made"
+    spent = sum(row.get("cpu_s", 0.0) for row in rows) / 60
+    first = f"{done} ({spent:.0f} CPU minutes of the engines)"
+    return "\n".join([f"{first}; these failed:", "", *bad]) if bad else f"{first}; none failed."
+
+
+def page(rows: Sequence[Row], yade: dict[str, Any]) -> str:
+    """The page of a record."""
+    runs = by_way(rows)
+    grains = {row["grains"] for row in rows}
+    steps = min(row["steps_per_cycle"] for row in rows)
+    text = TEXT.read_text(encoding="utf-8")
+    parts = {
+        "GRAINS": ", ".join(map(str, sorted(grains))),
+        "STEPS": f"{steps:,}",
+        "BEDS": str(len(SEEDS)),
+        "CYCLES": str(CYCLES),
+        "TABLE_ENGINES": table_engines(runs),
+        "TABLE_DIFFERENCES": table_differences(runs),
+        "TABLE_SETTINGS": table_settings(runs),
+        "TABLE_RULES": table_rules(runs),
+        "TABLE_YADE": table_yade(yade),
+        "RUNS": failures(rows),
+        "MACHINE": rows[0]["machine"],
+        "VERSIONS": ", ".join(dict.fromkeys(row["engine"] for row in rows)),
+        "COMMITS": ", ".join(dict.fromkeys(row["commit"][:7] for row in rows)),
+    }
+    for name, part in parts.items():
+        text = text.replace(f"<{name}>", part)
+    return text
+
+
+def draw(rows: Sequence[Row], target: Path) -> None:
+    """Settlement curves of the engines, and differences bed by bed."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    runs = by_way(rows)
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    cycles = np.arange(CYCLES + 1)
+    for name in ENGINES:
+        curves = 1e6 * np.array([row["curve"] for row in runs[name].values()])
+        middle, half = np.array([interval(column) for column in curves.T]).T
+        left.plot(cycles, middle, color=COLOURS[name], label=TITLES[name])
+        left.fill_between(
+            cycles, middle - half, middle + half, color=COLOURS[name], alpha=0.15, lw=0
+        )
+    left.set(xlabel="load cycle", ylabel="settlement [µm]", title="mean of the beds, 95 %")
+    left.legend(frameon=False)
+    shown = [(f"{TITLES[b]} less {TITLES[a]}", b, a) for a, b in combinations(ENGINES, 2)]
+    shown += [(words, way, other) for words, way, other in PAIRS]
+    names: list[str] = []
+    for words, way, other in shown:
+        values = 1e6 * paired(runs, way, other, "settlement")
+        if len(values) < 2:
+            continue
+        height = -len(names)
+        names.append(words)
+        middle, half = interval(values)
+        right.plot(values, np.full(len(values), height), ".", color="0.7", ms=4)
+        right.errorbar(middle, height, xerr=half, fmt="o", color="k", capsize=3, ms=4)
+    right.axvline(0, color="0.5", lw=0.8)
+    right.set_yticks(-np.arange(len(names)), names, fontsize=8)
+    right.set(xlabel="difference in settlement [µm]", title="bed by bed, mean and 95 %")
+    figure.savefig(target, dpi=130)
+    plt.close(figure)
+
+
+def yade_read() -> dict[str, Any]:
+    """The record of ``trackbed validate yade``."""
+    content: dict[str, Any] = json.loads(YADE.read_text(encoding="utf-8"))
+    return content
+
+
+def main() -> None:
+    """Write page and plot."""
+    rows = record_read()
+    write_atomically(PAGE, page(rows, yade_read()))
+    draw(rows, PLOT)
+
+
+if __name__ == "__main__":
+    main()
