@@ -90,7 +90,7 @@ WAYS = (
     Way("lammps, mindlin/force, no pull", "lammps", rule="mindlin/force", pulls=False),
     Way("yade, rebound e", "yade", ("material.grain.restitution=0.2145",)),
 )
-"""The three engines, then one setting at a time; run in this order, see `same_packing_runs.plan`."""
+"""The three engines, then one setting at a time; `same_packing_runs.plan` has the order."""
 
 
 @dataclass(frozen=True)
