@@ -65,7 +65,7 @@ def scene_or_refusal(path: Path) -> Scene | None:
 def test_shipped_scenes_load_without_doubts() -> None:
     """Every scene that ships is valid and free of warnings, on whichever engine there is."""
     names = [name for name in scene_names() if scene_verb(name) == "run"]
-    assert names == ["karrech", "karrech-coarse", "karrech-partial"]
+    assert names == ["cluster", "karrech", "karrech-coarse", "karrech-partial"]
     for name in names:
         scene = scene_load(Path(__file__).parents[2] / "scenes" / f"{name}.toml")
         assert scene.warnings == ()
