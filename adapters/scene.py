@@ -205,7 +205,7 @@ class Procedure(Table):
 class Engine(Table):
     """The engine and its time step."""
 
-    name: EngineName
+    name: EngineName = "auto"
     """Engine; ``auto`` is the first that is installed: liggghts, lammps, yade."""
     time_step: Positive | None = None
     """Longest time step [s]."""

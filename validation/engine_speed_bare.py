@@ -93,6 +93,9 @@ READ_AFTERWARDS = re.compile(
 TIMINGS = re.compile(r"^(Pair|Neigh|Comm|Modify|Other)\s+(?:time \(%\) = )?([^\n]*)", re.MULTILINE)
 
 
+SHARED = re.compile(r"^(Nlocal|Nghost|Neighs):\s+(\S+) ave\s+(\S+) max", re.MULTILINE)
+
+
 @dataclass(frozen=True)
 class BedRun:
     """A settled bed that an engine ran."""
@@ -179,9 +182,14 @@ def timings(screen: str) -> dict[str, list[float]]:
     for name, text in TIMINGS.findall(screen):
         cells = [cell.strip() for cell in text.replace("(", "|").split("|") if cell.strip()]
         numbers = [float(cell) for cell in cells[:3] if re.fullmatch(r"[-+.\de]+", cell)]
-        if numbers:
-            found[name.lower()] = numbers
+        if numbers:  # of LAMMPS' "Other" there is the mean alone, then a percentage
+            found[name.lower()] = numbers if len(numbers) == 3 else numbers[:1]
     return found
+
+
+def most_shared(screen: str) -> dict[str, float]:
+    """Grains, copies of other processes' grains, and pairs of neighbours of the fullest process."""
+    return {name.lower(): float(most) for name, _, most in SHARED.findall(screen)}
 
 
 def load_average() -> float:

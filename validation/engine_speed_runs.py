@@ -53,7 +53,7 @@ ADAPTER_YOUNG = 1e9
 where the paper's grains need 37,200, so that its cost shows seven times as much."""
 ADAPTER_CYCLES = {"liggghts": 2, "lammps": 2, "yade": 1}
 
-RANKS = {(3, 3): 1000, (10, 9): 150}
+RANKS = {(3, 3): 300, (10, 9): 40}
 """Tiles along x and y -> steps."""
 LAUNCHERS = {"liggghts": ("mpirun", "-np"), "lammps": ("mpiexec", "-n")}
 
@@ -169,6 +169,7 @@ def _ranks_run(
         "cost_s": run.cpu_s,
         "wall_s": run.wall_s,
         "parts_s": bare.timings(run.screen),
+        "fullest": bare.most_shared(run.screen),
         "work": setting["grains"] * setting["steps"],
         "work_unit": "grain-steps",
         "load_average": before,

@@ -526,9 +526,14 @@ def test_runs_where_neither_apt_engine_is(tmp_path: Path) -> None:
 def test_auto_is_lammps_where_nothing_else_is(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """The default engine of a user without root."""
+    """The default engine of a user without root, whose scene need not name one."""
     monkeypatch.setenv("PATH", str(tmp_path))
     assert engine_named("auto").name == "lammps"
+    text = scene_path("karrech-coarse").read_text()
+    scene_file = tmp_path / "scene.toml"
+    scene_file.write_text(re.sub(r'^name = "auto".*\n', "", text, flags=re.MULTILINE))
+    assert scene_file.read_text() != text
+    assert scene_load(scene_file).engine.name == "auto"
 
 
 def test_lammps_is_never_loaded_into_the_users_python() -> None:
