@@ -14,8 +14,22 @@ from typing import Any
 import numpy as np
 
 from adapters.run_folder import write_atomically
-from adapters.state import FloatArray
-from validation.same_packing import CYCLES, SEEDS, WAYS, differences, interval
+from validation.same_packing import CYCLES, SEEDS, WAYS, interval
+from validation.same_packing_reading import (
+    ENGINES,
+    FIGURES,
+    JUDGED,
+    LEVEL,
+    PAIRS,
+    TITLES,
+    by_way,
+    paired,
+    reading_engines,
+    reading_noise,
+    reading_settings,
+    real,
+    told,
+)
 from validation.same_packing_runs import Row, record_read
 from validation.tangential_rules import (
     LOOPS,
@@ -32,74 +46,8 @@ PLOT = ROOT / "docs" / "engines.png"
 TEXT = Path(__file__).parent / "same_packing_page.md"
 YADE = Path(__file__).parent / "results" / "yade.json"
 
-ENGINES = ("liggghts", "lammps", "yade")
-TITLES = {"liggghts": "LIGGGHTS", "lammps": "LAMMPS", "yade": "YADE"}
 COLOURS = {"liggghts": "#0072B2", "lammps": "#E69F00", "yade": "#009E73"}
 """Told apart by colour-blind readers too (Okabe and Ito)."""
-
-FIGURES = {
-    "settlement": ("settlement, µm", 1e6, 0),
-    "settlement_after_first": ("cycles 2 to 50, µm", 1e6, 0),
-    "coordination": ("coordination number", 1.0, 3),
-    "density": ("relative density", 1.0, 4),
-    "deflection": ("elastic deflection, µm", 1e6, 2),
-}
-"""Key of a row: words, factor, decimals."""
-
-JUDGED = ("settlement", "coordination", "density")
-"""Figures that the protocol judges."""
-
-LEVEL = 1 - 0.05 / 9
-"""Of an interval that is one of nine."""
-
-PAIRS = (
-    ("LIGGGHTS' law in LAMMPS", "lammps, mindlin", "liggghts"),
-    ("YADE's law in LAMMPS", "lammps, mindlin/force, no pull", "yade"),
-    ("tangential rule: LIGGGHTS' for the paper's", "lammps, mindlin", "lammps"),
-    ("tangential rule: YADE's for the paper's", "lammps, mindlin/force", "lammps"),
-    ("no contact pulls", "lammps, mindlin/force, no pull", "lammps, mindlin/force"),
-    ("half the time step", "liggghts, half the step", "liggghts"),
-    ("walls and piston face as soft as grains", "liggghts, walls as grains", "liggghts"),
-    ("piston ten times as heavy", "liggghts, piston of 0.1 kg", "liggghts"),
-    ("YADE's damping by rebound, e = 0.2145", "yade, rebound e", "yade"),
-    ("the twin: noise", "liggghts, twin", "liggghts"),
-)
-"""What changes, with it, without it."""
-
-
-def by_way(rows: Sequence[Row]) -> dict[str, dict[int, Row]]:
-    """Runs that gave figures, by way and seed."""
-    found: dict[str, dict[int, Row]] = {way.name: {} for way in WAYS}
-    for row in rows:
-        if row["ok"]:
-            found[row["way"]][row["seed"]] = row
-    return found
-
-
-def paired(runs: dict[str, dict[int, Row]], way: str, other: str, key: str) -> FloatArray:
-    """Differences ``way`` less ``other`` over the beds that both have, shape (beds,)."""
-    seeds = sorted(runs[way].keys() & runs[other].keys())
-    return differences(
-        [runs[way][seed][key] for seed in seeds], [runs[other][seed][key] for seed in seeds]
-    )
-
-
-def told(values: FloatArray, key: str, signed: bool = True, level: float = 0.95) -> str:
-    """Mean and interval in the units of `FIGURES`."""
-    if not len(values):
-        return "-"
-    _, factor, digits = FIGURES[key]
-    mean, half = interval(values * factor, level)
-    sign = "+" if signed else ""
-    if not np.isfinite(half):
-        return f"{mean:{sign}.{digits}f}"
-    return f"{mean:{sign}.{digits}f} ± {half:.{digits}f}"
-
-
-def real(values: FloatArray, level: float = 0.95) -> bool:
-    """Whether zero is outside of the interval."""
-    mean, half = interval(values, level)
-    return bool(abs(mean) > half)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -220,6 +168,9 @@ def page(rows: Sequence[Row], yade: dict[str, Any]) -> str:
         "TABLE_SETTINGS": table_settings(runs),
         "TABLE_RULES": table_rules(runs),
         "TABLE_YADE": table_yade(yade),
+        "READING_ENGINES": reading_engines(runs),
+        "READING_NOISE": reading_noise(runs),
+        "READING_SETTINGS": reading_settings(runs),
         "RUNS": failures(rows),
         "MACHINE": rows[0]["machine"],
         "VERSIONS": ", ".join(dict.fromkeys(row["engine"] for row in rows)),

@@ -17,12 +17,16 @@ from validation.chung_ooi import NORMAL, RESTITUTION, TANGENTIAL
 from validation.chung_ooi_checks import (
     ORDERS,
     Measured,
+    closing_checks,
+    lever_check,
     normal_checks,
     order_check,
     regression_check,
     restitution_checks,
     tangential_checks,
+    tangential_order_checks,
 )
+from validation.chung_ooi_curves import published_checks
 
 
 def engines_present() -> list[str]:
@@ -47,13 +51,15 @@ def measure(engine: str, quick: bool) -> tuple[list[Check], Measured]:
     settings = RESTITUTION[1:4:2] if quick else RESTITUTION
     checks += restitution_checks(settings, engine, measured)
     checks += [order_check(engine, restitution) for restitution in ORDERS]
+    checks += tangential_order_checks(engine)
     checks += [c for s in TANGENTIAL[::part] for c in tangential_checks(s, engine, measured)]
+    checks += [*closing_checks(engine), lever_check(TANGENTIAL[3], engine)]
     return checks, measured
 
 
 def run(quick: bool) -> list[Check]:
     """All tests on all engines: about a minute and a half, half of it when ``quick``."""
-    checks = []
+    checks = published_checks()
     for engine in engines_present():
         found, measured = measure(engine, quick)
         checks += [*found, regression_check(engine, measured)]

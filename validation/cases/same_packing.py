@@ -29,7 +29,7 @@ from validation.same_packing import (
 from validation.same_packing import (
     run as run_way,
 )
-from validation.same_packing_page import FIGURES, JUDGED, LEVEL, by_way, paired
+from validation.same_packing_reading import FIGURES, JUDGED, LEVEL, by_way, paired
 from validation.same_packing_runs import Row, plan, row_of
 
 QUICK_CYCLES = 5
