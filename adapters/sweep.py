@@ -41,11 +41,6 @@ class Member:
     scene: Scene
     """The scene, checked."""
 
-    @property
-    def group(self) -> str:
-        """Settings without the seed, such as ``loading.frequency=10``."""
-        return settings_text(self.settings)
-
 
 @dataclass(frozen=True)
 class Sweep:
@@ -69,10 +64,13 @@ class Sweep:
         return self.folder / "stop"
 
     def groups(self) -> dict[str, list[Member]]:
-        """Members that differ by their seed alone, by their common settings."""
+        """Members that differ by their seed alone, by the settings in which groups differ."""
+        first = self.members[0].settings
+        varied = {k for one in self.members for k, v in one.settings.items() if v != first[k]}
         found: dict[str, list[Member]] = {}
         for member in self.members:
-            found.setdefault(member.group, []).append(member)
+            settings = {key: value for key, value in member.settings.items() if key in varied}
+            found.setdefault(settings_text(settings), []).append(member)
         return found
 
 

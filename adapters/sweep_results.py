@@ -189,10 +189,11 @@ def bands_figure(bands: Sequence[Band]) -> Figure:
         for panel in (linear, logarithmic):
             panel.plot(band.cycle, 1e6 * band.mean, color=colour, label=label)
             low, high = band.mean - band.half, band.mean + band.half
-            panel.fill_between(band.cycle, 1e6 * low, 1e6 * high, color=colour, alpha=0.2, lw=0)
+            panel.fill_between(band.cycle, 1e6 * low, 1e6 * high, color=colour, alpha=0.2, lw=0.8)
     linear.set(ylabel="mean settlement of the grains (µm)", xlabel="load cycles", xlim=(0, None))
     linear.invert_yaxis()
     logarithmic.set(xscale="log", xlabel="load cycles (logarithmic)")
+    logarithmic.xaxis.set_major_formatter("{x:g}")
     logarithmic.set_title(f"mean over seeds, {100 * CONFIDENCE:.0f} % band", loc="right")
     handles, labels = linear.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=2, columnspacing=1.2)

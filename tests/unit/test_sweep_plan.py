@@ -59,6 +59,14 @@ def test_members_are_the_product(scene: Path, tmp_path: Path) -> None:
     assert len({member.name for member in sweep.members}) == 12
 
 
+def test_groups_are_told_by_what_differs(scene: Path, tmp_path: Path) -> None:
+    """A key with one value is part of a member's folder, and of no label."""
+    sweep = sweep_plan(scene, tmp_path, ["procedure.k=3", "loading.frequency=10,20"], 2)
+    assert list(sweep.groups()) == ["loading.frequency=10", "loading.frequency=20"]
+    assert sweep.members[0].name == "procedure.k=3,loading.frequency=10,sample.seed=1"
+    assert list(sweep_plan(scene, tmp_path, ["procedure.k=3"], 2).groups()) == ["the scene"]
+
+
 def test_seeds_count_from_the_scene(scene: Path, tmp_path: Path) -> None:
     """Seeds count up from the scene's; given as values they are those; one by default."""
 
