@@ -49,6 +49,7 @@ def sweep_command(arguments: argparse.Namespace) -> int:
     """Run a sweep; `SweepIncomplete` when a member failed, after all others are finished."""
     from adapters.progress import Progress
     from adapters.sweep import folder_check, sweep_plan
+    from adapters.sweep_cluster import libraries_check
     from adapters.sweep_results import results_write
     from adapters.sweep_run import Cluster, dry_run_lines, record_of, sweep_run
 
@@ -64,6 +65,7 @@ def sweep_command(arguments: argparse.Namespace) -> int:
         folder_check(sweep)
         print("\n".join(dry_run_lines(sweep)))
         return 0
+    libraries_check(arguments.scheduler)
     cluster = Cluster(arguments.scheduler, arguments.cluster_config, arguments.workers)
     progress = Progress()
     for warning in dict.fromkeys(text for one in sweep.members for text in one.scene.warnings):

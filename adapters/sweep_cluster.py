@@ -20,6 +20,16 @@ CONNECT_S = 30
 EXTRA = "pip install 'trackbed[sweep]'"
 
 
+def libraries_check(scheduler: str) -> None:
+    """Raise `EngineMissing` before anything starts where a library of the extra is missing."""
+    from importlib.util import find_spec
+
+    needed = ["distributed", "pyarrow", *["dask_jobqueue"] * (scheduler == SLURM)]
+    missing = [name for name in needed if find_spec(name) is None]
+    if missing:
+        raise EngineMissing(f"a sweep needs {', '.join(missing)}", remedy=EXTRA)
+
+
 @contextmanager
 def cluster_client(
     scheduler: str, config: Path | None, workers: int | None, members: int
@@ -27,13 +37,11 @@ def cluster_client(
     """A `distributed.Client`, closed at the end, and with it what was started for it.
 
     ``workers``: members at a time on this machine, or SLURM jobs; default: as many as processors,
-    or as ``members``.  Raises `EngineMissing` where Dask is not installed, `UsageError` where the
-    scheduler does not answer or the configuration is wrong.
+    or as ``members``.  Raises `UsageError` where the scheduler does not answer or the configuration
+    is wrong.
     """
-    try:
-        import distributed
-    except ImportError as error:
-        raise EngineMissing(f"a sweep runs on Dask ({error})", remedy=EXTRA) from error
+    import distributed
+
     with ExitStack() as stack:
         if scheduler == LOCAL:
             cores = len(os.sched_getaffinity(0))
@@ -65,10 +73,8 @@ def cluster_client(
 
 def _slurm(config: Path | None) -> Any:
     """A `dask_jobqueue.SLURMCluster` with the keywords of a TOML file, besides Dask's own files."""
-    try:
-        from dask_jobqueue.slurm import SLURMCluster
-    except ImportError as error:
-        raise EngineMissing(f"SLURM needs dask-jobqueue ({error})", remedy=EXTRA) from error
+    from dask_jobqueue.slurm import SLURMCluster
+
     keywords: dict[str, Any] = {}
     if config is not None:
         try:

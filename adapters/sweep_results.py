@@ -20,12 +20,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from adapters.errors import EngineMissing
 from adapters.run_folder import COLUMNS, RunFolder
 from adapters.scene import flat_keys
 from adapters.state import FloatArray
 from adapters.sweep import SEED, Member, Sweep
-from adapters.sweep_cluster import EXTRA
 from adapters.sweep_run import Result
 
 if TYPE_CHECKING:
@@ -105,10 +103,7 @@ def bands_of(sweep: Sweep, finished: set[str]) -> list[Band]:
 
 
 def results_write(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], dict[str, str]]:
-    """Write the tables and the picture; the bands, and the path of every file.
-
-    Raises `EngineMissing` where pyarrow is not installed.
-    """
+    """Write the tables and the picture; the bands, and the path of every file."""
     by_name = {result.member: result for result in results}
     bands = bands_of(sweep, {result.member for result in results if result.state == "finished"})
     member_rows, curve_rows = [], []
@@ -149,11 +144,8 @@ def table_write(stem: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]
 
     A column whose values are of several kinds becomes text.
     """
-    try:
-        import pyarrow as pa
-        from pyarrow import csv, parquet
-    except ImportError as error:
-        raise EngineMissing(f"the tables need pyarrow ({error})", remedy=EXTRA) from error
+    import pyarrow as pa
+    from pyarrow import csv, parquet
 
     names = list(rows[0]) if rows else []
     columns = {}

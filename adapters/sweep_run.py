@@ -176,14 +176,14 @@ def _engine_of_auto(
 
 
 def _ended(future: Any) -> Ended:
-    """How a member ended; one whose workers died again and again has no exit code of its own."""
+    """How a member ended; one whose workers died again and again failed as its engine does."""
     if not future.done():
         return STOPPED
     try:
         ended: Ended = future.result()
         return ended
     except Exception as error:
-        return Ended(1, f"its worker failed: {error or type(error).__name__}")
+        return Ended(5, f"its worker failed: {error or type(error).__name__}")
 
 
 def _told(result: Result) -> str:

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.errors import SceneError, UsageError
+from adapters.errors import EngineMissing, SceneError, UsageError
 from adapters.sweep import NAME_LONGEST, member_name, sweep_plan, values_of
+from adapters.sweep_cluster import libraries_check
+from adapters.sweep_member import sentence_of
 from adapters.sweep_results import mean_and_half
 from tests.small_bed import small_bed
 
@@ -128,6 +130,29 @@ def test_a_scene_without_load_is_no_sweep(scene: Path, tmp_path: Path) -> None:
     scene.write_text(text.partition("[loading]")[0] + "[engine]" + text.partition("[engine]")[2])
     with pytest.raises(SceneError, match="no load cycles"):
         sweep_plan(scene, tmp_path / "sweep", [], 2)
+
+
+def test_what_a_member_said(tmp_path: Path) -> None:
+    """The last error sentence with its remedy; without one the signal, or the last words."""
+    screen = tmp_path / "screen.txt"
+    screen.write_text("rain of grains\ntrackbed: x.toml: no engine\n  -> install one\n")
+    assert sentence_of(4, screen) == "x.toml: no engine\n  -> install one"
+    assert sentence_of(0, screen) == ""
+    screen.write_text("rain of grains\n")
+    assert sentence_of(-9, screen) == "the run was ended by SIGKILL"
+    assert sentence_of(1, screen) == "the run ended with exit code 1: rain of grains"
+
+
+@pytest.mark.parametrize("missing", ["distributed", "pyarrow", "dask_jobqueue"])
+def test_a_missing_library_is_told_before_anything_starts(
+    missing: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 4 and how to get it; dask-jobqueue is asked for only where SLURM is."""
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == missing else 1)
+    with pytest.raises(EngineMissing, match=rf"{missing}\n.*trackbed\[sweep\]"):
+        libraries_check("slurm")
+    if missing == "dask_jobqueue":
+        libraries_check("local")
 
 
 def test_band_is_students() -> None:
