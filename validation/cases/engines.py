@@ -1,7 +1,8 @@
 """Chung and Ooi's eight single impacts on every engine that is installed.
 
 Force-displacement curve, contact time, restitution, friction impulses and spins against closed
-forms (tests 1 to 3 within 1 %, 4 to 8 within 2 %), and against what each engine gave before.
+forms (tests 1 to 3 within 1 %, 4 to 8 within 2 %), against each engine's own law integrated on
+paper, partial slip and published curves, and against what each engine gave before.
 
     trackbed validate engines            both materials of each test
     trackbed validate engines --quick    the first material, two restitutions
@@ -58,7 +59,7 @@ def measure(engine: str, quick: bool) -> tuple[list[Check], Measured]:
 
 
 def run(quick: bool) -> list[Check]:
-    """All tests on all engines: about a minute and a half, half of it when ``quick``."""
+    """All tests on all engines: some minutes, half of it when ``quick``."""
     checks = published_checks()
     for engine in engines_present():
         found, measured = measure(engine, quick)
