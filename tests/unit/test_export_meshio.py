@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapters import meshio_dump
-from adapters.dump import Frame, dump_write
+from adapters.dump import Frame, dump_frames, dump_write
 from adapters.errors import DumpError, UsageError
 
 ROOT = Path(__file__).parents[2]
@@ -58,6 +58,8 @@ def test_known_by_its_ending(tmp_path: Path, name: str) -> None:
     dump_write(tmp_path / "first.dump", [frame(7)])
     mesh = meshio.read(tmp_path / "first.dump")
     mesh.write(tmp_path / name)
+    (written,) = dump_frames(tmp_path / name)
+    assert sorted(written.columns) == sorted(COLUMNS)
     again = meshio.read(tmp_path / name)
     assert np.array_equal(again.points, mesh.points)
     assert list(again.point_data) == list(mesh.point_data)
