@@ -10,7 +10,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from validation.engine_speed_accuracy import ERRORS, steps_of_scene
+from validation.engine_speed_accuracy import ERRORS, STEPS, steps_of_scene
 from validation.engine_speed_bed import bed_scene
 from validation.engine_speed_runs import Row, record_read
 
@@ -19,9 +19,16 @@ PAGE = Path(__file__).parents[1] / "docs" / "engine-speed.md"
 PICTURE = PAGE.with_suffix(".png")
 
 NAMES = {"liggghts": "LIGGGHTS", "lammps": "LAMMPS", "yade": "YADE"}
+PAPER_STEPS = 37200
+"""Steps of a load cycle at the paper's stiffness."""
 PROCESSES = 128
 """Of the job that the page estimates."""
-COLOURS = {"liggghts": "#1b6ca8", "lammps": "#c8553d", "yade": "#4b8f4f"}
+STYLES = {
+    "liggghts": {"color": "#1b6ca8", "marker": "o", "ms": 8, "mfc": "none", "lw": 3},
+    "lammps": {"color": "#c8553d", "marker": "s", "ms": 5, "lw": 1.6},
+    "yade": {"color": "#4b8f4f", "marker": "^", "ms": 3, "lw": 0.8},
+}
+"""Where curves lie on one another, each is still to be seen."""
 
 
 def of_kind(rows: Iterable[Row], kind: str) -> list[Row]:
@@ -87,6 +94,16 @@ def speed_table(rows: Sequence[Row]) -> str:
     return table(head, lines)
 
 
+def share_at_paper(alone: float, through: float, steps: int) -> float:
+    """Part of the bare engine's speed that is left in a cycle of `PAPER_STEPS`.
+
+    From times [s] of cycles of ``steps``.
+    A frame costs the same whatever the steps between two.
+    """
+    paper = alone * PAPER_STEPS / steps
+    return paper / (paper + max(through - alone, 0.0))
+
+
 def adapter_table(rows: Sequence[Row]) -> str:
     """What trackbed adds to each engine."""
     chosen = of_kind(rows, "adapter")
@@ -94,6 +111,7 @@ def adapter_table(rows: Sequence[Row]) -> str:
     through = medians(chosen, [], lambda row: row["cost_s"])
     python = medians(chosen, [], lambda row: row["python_s"])
     pairs = medians(chosen, [], lambda row: row["alone_s"] / row["cost_s"])
+    steps = chosen[0]["steps_per_cycle"]
     lines = [
         [
             NAMES[engine],
@@ -102,6 +120,7 @@ def adapter_table(rows: Sequence[Row]) -> str:
             f"{python[engine,][0]:.2f}",
             f"**{alone[engine,][0] / through[engine,][0]:.3f}**",
             f"{pairs[engine,][1]:.3f} to {pairs[engine,][2]:.3f}",
+            f"{share_at_paper(alone[engine,][0], through[engine,][0], steps):.3f}",
             str(alone[engine,][3]),
         ]
         for engine in NAMES
@@ -109,7 +128,7 @@ def adapter_table(rows: Sequence[Row]) -> str:
     ]
     head = [
         "engine", "alone, CPU s", "through trackbed, CPU s", "of it Python, s",
-        "alone / through", "single pairs", "runs",
+        "alone / through", "single pairs", f"follows for {PAPER_STEPS:,} steps a cycle", "runs",
     ]  # fmt: skip
     return table(head, lines)
 
@@ -208,17 +227,27 @@ def told(rows: Sequence[Row]) -> dict[str, str]:
     """Numbers within the page's sentences."""
     scene = bed_scene("lammps", (1, 1))
     few, many = steps_of_scene(scene)
-    fastest = speeds(rows)["liggghts", max(key[1] for key in speeds(rows))][0]
+    found = {key: value[0] for key, value in speeds(rows).items()}
+    few_grains, many_grains = (choose(key[1] for key in found) for choose in (min, max))
+    fastest = found["liggghts", many_grains]
     copies = [
         row["fullest"]["nghost"] / row["fullest"]["nlocal"]
         for row in of_kind(rows, "ranks")
         if row["setting"]["ranks"] == 2
     ]
+    limits = [
+        row["error"]["sliding limit"]
+        for row in of_kind(rows, "accuracy")
+        if row["setting"]["steps_in_contact"] == max(STEPS)
+    ]
     return {
+        "faster": f"{found['liggghts', few_grains] / found['lammps', few_grains]:.1f} times",
+        "fastest": f"{found['liggghts', few_grains] / found['yade', few_grains]:.1f} times",
+        "limit": f"{100 * min(limits):.1f} to {100 * max(limits):.1f} %",
         "step": f"{scene.time_step:.3g} s",
         "band": f"{few:.0f} and {many:.0f}",
         "ghosts": f"{100 * min(copies):.0f} to {100 * max(copies):.0f} % as many",
-        "cycle_minutes": f"{37200e6 / fastest / PROCESSES / 60:.1f}",
+        "cycle_minutes": f"{PAPER_STEPS * 1e6 / fastest / PROCESSES / 60:.1f}",
         "rain_hours": f"{2e12 / fastest / PROCESSES / 3600:.1f}",
     }
 
@@ -234,20 +263,19 @@ def draw(rows: Sequence[Row], target: Path) -> None:
     counts = sorted({key[1] for key in found})
     few, many = steps_of_scene(bed_scene("lammps", (1, 1)))
     chosen = of_kind(rows, "accuracy")
-    figure, axes = pyplot.subplots(2, len(ERRORS), figsize=(11, 6.6), sharey="col")
+    figure, axes = pyplot.subplots(2, len(ERRORS), figsize=(13, 6.4), sharey="col")
     for column, (kind, tests) in enumerate(ERRORS.items()):
         above, below = axes[:, column]
         for engine in NAMES:
             here = [row for row in chosen if row["method"] == engine]
             steps = [row["setting"]["steps_in_contact"] for row in here]
             error = [row["error"][kind] for row in here]
-            style = {"color": COLOURS[engine], "label": NAMES[engine], "marker": "o", "ms": 3.5}
+            style: dict[str, Any] = STYLES[engine] | {"label": NAMES[engine]}
             below.loglog(steps, error, **style)
             for number, count in enumerate(counts):
                 cost = [1e6 * s / found[engine, count][0] for s in steps]
-                if number:
-                    style |= {"lw": 0.8, "ls": "--", "ms": 2, "label": None}
-                above.loglog(cost, error, **style)
+                thin = {"lw": 0.8, "ls": "--", "ms": 2, "label": None} if number else {"lw": 1.5}
+                above.loglog(cost, error, **style | thin)
         below.axvspan(few, many, color="0.9", zorder=0)
         above.set_title(f"{kind}\n({tests})", fontsize=9)
         above.set_xlabel("CPU µs a grain and contact", fontsize=8)
@@ -257,6 +285,7 @@ def draw(rows: Sequence[Row], target: Path) -> None:
             axis.tick_params(labelsize=8)
     for axis in axes[:, 0]:
         axis.set_ylabel("relative error", fontsize=8)
+    axes[0, -1].set_ylim(1e-3, 1e-1)  # two decades, as it hardly changes
     axes[0, 0].legend(fontsize=8)
     figure.suptitle(
         f"Above: error against cost ({counts[0]:,} grains; thin, dashed: {counts[-1]:,}).  "

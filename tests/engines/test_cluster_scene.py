@@ -30,7 +30,12 @@ SMALL = (
     "loading.frequency=1000.0",
 )
 """What the tests change: fewer and softer grains, and cycles of a hundred steps."""
-LAUNCHERS = {"liggghts": ("mpirun", "-np", "2"), "lammps": ("mpiexec", "-n", "2")}
+YIELDING = ("--oversubscribe", "--mca", "mpi_yield_when_idle", "1")
+"""Two processes on a machine with other work: who waits lets the other go on."""
+LAUNCHERS = {
+    "liggghts": ("mpirun", *YIELDING, "-np", "2"),
+    "lammps": ("mpiexec", "-n", "2"),
+}
 
 
 def launcher_of(engine: str) -> tuple[str, ...]:
@@ -88,7 +93,8 @@ def test_srun_takes_the_number_of_processes_from_the_job(
 ) -> None:
     """The scene's own launcher: one word before the command; here a stand-in for SLURM's."""
     srun = tmp_path / "srun"
-    srun.write_text('#!/bin/sh\nexec mpirun -np "$SLURM_NTASKS" "$@"\n')
+    words = " ".join(("mpirun", *YIELDING))
+    srun.write_text(f'#!/bin/sh\nexec {words} -np "$SLURM_NTASKS" "$@"\n')
     srun.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("SLURM_NTASKS", "2")

@@ -106,10 +106,13 @@ def test_checks_can_fail() -> None:
         for engine, cost, contacts in (("a", 1.0, 4.0), ("a", 9.0, 4.0), ("a", 1.0, 4.0))
     ]
     rows += [row("speed", "b", cost_s=2.0, work=1000, contacts_per_grain=4.1)]
-    rows += [row("adapter", "a", alone_s=0.9, cost_s=1.0), row("adapter", "b", alone_s=1, cost_s=1)]
+    rows += [
+        row("adapter", engine, alone_s=alone, cost_s=1.0, steps_per_cycle=18600)
+        for engine, alone in (("a", 0.90), ("b", 0.92))  # 1.80 / 1.90 and 1.84 / 1.92
+    ]
     assert speeds(rows)["a", 100][0] == 1000
     assert medians(rows[:3], [], lambda r: r["cost_s"])["a",] == (1.0, 1.0, 9.0, 3)
     verdict = {check.name: check.ok for check in checks_of(rows)}
-    assert verdict["a: the engine alone over trackbed"] is False
-    assert verdict["b: the engine alone over trackbed"] is True
+    assert verdict["a: the engine alone over trackbed, the paper's cycle"] is False
+    assert verdict["b: the engine alone over trackbed, the paper's cycle"] is True
     assert not verdict["100 grains: contacts per grain, greatest difference of two engines"]
