@@ -26,6 +26,7 @@ from validation.same_packing_reading import (
     paired,
     reading_engines,
     reading_noise,
+    reading_on_the_way,
     reading_settings,
     real,
     told,
@@ -45,6 +46,9 @@ PAGE = ROOT / "docs" / "engines.md"
 PLOT = ROOT / "docs" / "engines.png"
 TEXT = Path(__file__).parent / "same_packing_page.md"
 YADE = Path(__file__).parent / "results" / "yade.json"
+
+ON_THE_WAY = (1, 3, 5, 10, 20, 50)
+"""Cycles at which the curves are compared."""
 
 COLOURS = {"liggghts": "#0072B2", "lammps": "#E69F00", "yade": "#009E73"}
 """Told apart by colour-blind readers too (Okabe and Ito)."""
@@ -97,6 +101,25 @@ def table_settings(runs: dict[str, dict[int, Row]]) -> str:
     return table(head, rows)
 
 
+def table_on_the_way(runs: dict[str, dict[int, Row]]) -> str:
+    """Differences of the settlement after fewer cycles, engines and laws."""
+    shown = [(f"{TITLES[b]} less {TITLES[a]}", b, a) for a, b in combinations(ENGINES, 2)]
+    shown += PAIRS
+    rows = []
+    for words, way, other in shown:
+        curves = np.atleast_2d(paired(runs, way, other, "curve"))
+        if len(curves) < 2:
+            continue
+        cells = [told(curves[:, cycle], "settlement") for cycle in ON_THE_WAY]
+        marked = [
+            f"**{cell}**" if real(curves[:, cycle]) else cell
+            for cell, cycle in zip(cells, ON_THE_WAY, strict=True)
+        ]
+        rows.append([words, *marked, str(len(curves))])
+    head = ["settlement's difference, µm, after cycle", *map(str, ON_THE_WAY), "beds"]
+    return table(head, rows)
+
+
 def loop_energies() -> dict[str, list[float]]:
     """Energy that each rule loses in the first round of each loop, if negative creates.
 
@@ -117,6 +140,9 @@ def loop_energies() -> dict[str, list[float]]:
 def table_rules(runs: dict[str, dict[int, Row]]) -> str:
     """Energy per loop, and the settlement of the same beds, rule by rule."""
     energies = loop_energies()
+    beds = set.intersection(
+        *(set(runs[way]) for way in ("lammps", "lammps, mindlin", "lammps, mindlin/force"))
+    )
     rows = []
     for name, key, way in (
         ("`mindlin_rescale/force`, the paper's", "paper", "lammps"),
@@ -124,7 +150,7 @@ def table_rules(runs: dict[str, dict[int, Row]]) -> str:
         ("`mindlin/force`, YADE's", "mindlin/force", "lammps, mindlin/force"),
     ):
         lost = [f"{energy:+.2f}" if abs(energy) > 5e-3 else "0" for energy in energies[key]]
-        values = np.array([row["settlement"] for row in runs[way].values()])
+        values = np.array([runs[way][bed]["settlement"] for bed in sorted(beds)])
         less = [
             "" if way == "lammps" else told(paired(runs, way, "lammps", figure), figure)
             for figure in ("settlement", "settlement_after_first")
@@ -166,11 +192,13 @@ def page(rows: Sequence[Row], yade: dict[str, Any]) -> str:
         "TABLE_ENGINES": table_engines(runs),
         "TABLE_DIFFERENCES": table_differences(runs),
         "TABLE_SETTINGS": table_settings(runs),
+        "TABLE_ON_THE_WAY": table_on_the_way(runs),
         "TABLE_RULES": table_rules(runs),
         "TABLE_YADE": table_yade(yade),
         "READING_ENGINES": reading_engines(runs),
         "READING_NOISE": reading_noise(runs),
         "READING_SETTINGS": reading_settings(runs),
+        "READING_WAY": reading_on_the_way(runs),
         "RUNS": failures(rows),
         "MACHINE": rows[0]["machine"],
         "VERSIONS": ", ".join(dict.fromkeys(row["engine"] for row in rows)),

@@ -27,7 +27,7 @@ from adapters.sample import sample_start
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
-from adapters.window import Window, state_read, window_read, window_save
+from adapters.window import Window, state_read, window_load, window_read, window_save
 from adapters.yade_parameters import piston_triangles
 from scenes import scene_path
 
@@ -124,7 +124,10 @@ def window(
 
 
 def soft_bed(home: Path, count: int) -> tuple[Bed, Window]:
-    """A rained bed of ``count`` soft grains as deep as the paper's, and its first cycle."""
+    """A rained bed of ``count`` soft grains as deep as the paper's, and its first cycle.
+
+    What of it is in ``home`` is read back.
+    """
     radius = 0.075 * (count / 1085) ** 0.5
     scene = scene_of(
         "karrech",
@@ -138,6 +141,8 @@ def soft_bed(home: Path, count: int) -> tuple[Bed, Window]:
         radii, scene.container, scene.sample.relative_density_start, scene.sample.seed
     )
     bed = rested(scene, position, radii, height, home / "rain")
+    if (home / "first" / "states.npz").exists():
+        return bed, window_load(home / "first" / "states.npz")
     first, _ = window(bed, 1, home / "first")
     return bed, first
 
@@ -219,7 +224,8 @@ class PaperScale:
 def paper_scale(seated: Window, cycles: int, home: Path) -> PaperScale:
     """Give a seated soft bed the paper's stiffness, let it rest, seat the piston, load it.
 
-    Rest and seating are a cycle each, as bed and piston have met before.
+    It rests until its kinetic energy is 1e-5 of its potential one; seating takes one cycle, as bed
+    and piston have met before.
     """
     scene = scene_of("karrech")
     steps = scene.steps_per_cycle
@@ -227,7 +233,8 @@ def paper_scale(seated: Window, cycles: int, home: Path) -> PaperScale:
     top = float((seated.position[-1, :, 2] + radius).max())
 
     def soon(folder: Path) -> None:
-        changed(folder, "settle", check_steps=steps, minimum_steps=steps, history_steps=steps // 4)
+        still = {"equilibrium_ratio": 1e-5, "check_steps": steps, "minimum_steps": steps}
+        changed(folder, "settle", **still, history_steps=steps // 4)
 
     def short(folder: Path) -> None:
         halves = {"steps": steps // 2, "release_steps": steps - steps // 2}

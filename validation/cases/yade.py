@@ -21,7 +21,7 @@ from validation.yade_scale import (
     soft_bed,
 )
 
-CYCLES, REPEATS = 2, 5
+CYCLES, REPEATS = 2, 3
 GRAINS = {True: 150, False: 1085}
 
 
