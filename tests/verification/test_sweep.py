@@ -24,6 +24,7 @@ from tests.forked_commands import processes_in
 from tests.small_bed import small_bed
 
 pytest.importorskip("distributed", reason="the extra sweep is not installed")
+pytest.importorskip("dask_jobqueue", reason="the extra sweep is not installed")
 parquet = pytest.importorskip("pyarrow.parquet", reason="the extra sweep is not installed")
 
 ROOT = Path(__file__).parents[2]
@@ -32,7 +33,7 @@ FREQUENCIES = ("--set", "loading.frequency=10,20")
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
-    """A scene file of the small bed, on the fake engine: jumps from cycle 4 to 6 and 9 to 11."""
+    """A scene file of the small bed, on the fake engine: one jump from cycle 4 to 6."""
     path = tmp_path / "scene.toml"
     path.write_text(small_bed(k=2, h=2, total_cycles=10))
     return path
@@ -178,7 +179,6 @@ def test_wrong_use(
 ) -> None:  # fmt: skip
     """A scheduler that does not answer, and flags that can not be, end with exit code 2."""
     monkeypatch.setattr("adapters.sweep_cluster.CONNECT_S", 1)
-    pytest.importorskip("dask_jobqueue")
     assert trackbed.main(["sweep", str(scene), "--into", str(tmp_path / "sweep"), *words]) == 2
     assert sentence in capsys.readouterr().err
 
@@ -209,32 +209,44 @@ def test_any_dask_cluster_by_its_address(
 SBATCH = """\
 #!/bin/sh
 # A queue of one machine: the job starts at once, from a copy, as the script is removed.
-job=$(mktemp -p "${0%/*}")
+job=$(mktemp -p "${0%/*}/jobs")
 cp "$1" "$job"
-setsid sh "$job" > "$job.out" 2>&1 < /dev/null &
+setsid sh "$job" > /dev/null 2>&1 < /dev/null &
+echo $! > "$job.pid"
 echo "Submitted batch job $!"
 """
 SCANCEL = "#!/bin/sh\nkill -- -$1\n"
 
 
-def test_slurm_through_jobqueue(scene: Path, tmp_path: Path) -> None:
-    """``--scheduler slurm`` submits jobs whose workers run the members, and cancels them after."""
-    pytest.importorskip("dask_jobqueue")
+def test_slurm_jobs_that_are_lost_are_replaced(tmp_path: Path) -> None:
+    """``--scheduler slurm`` submits a job; killed, its member goes on in the next; none is left."""
     for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
         (tmp_path / name).write_text(text)
         (tmp_path / name).chmod(0o755)
-    config = tmp_path / "cluster.toml"
+    scene, config, jobs = tmp_path / "scene.toml", tmp_path / "cluster.toml", tmp_path / "jobs"
+    scene.write_text(small_bed(k=2, h=0, total_cycles=100))
     config.write_text('cores = 1\nprocesses = 1\nmemory = "1GB"\n')
+    jobs.mkdir()
     into = tmp_path / "sweep"
     words = ["sweep", scene, "--into", into, "--scheduler", "slurm", "--cluster-config", config]
     path = f"{tmp_path}{os.pathsep}{os.environ['PATH']}"
-    run = subprocess.run(
+    child = subprocess.Popen(
         [sys.executable, ROOT / "trackbed.py", *words, "--json"],
         env=os.environ | {"PATH": path, "PYTHONPATH": str(ROOT)},  # as if it were installed
-        cwd=tmp_path, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=120,
+        cwd=tmp_path, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
     )  # fmt: skip
-    assert run.returncode == 0, run.stderr
-    assert json.loads(run.stdout)["counts"] == {"finished": 1}
+    deadline = time.monotonic() + 300
+    while not list(into.glob("members/*/window_000002")):
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    (pid,) = (int(file.read_text()) for file in jobs.glob("*.pid"))
+    os.killpg(pid, signal.SIGKILL)
+    printed, _ = child.communicate(timeout=300)
+    assert child.returncode == 0
+    assert json.loads(printed)["counts"] == {"finished": 1}
+    assert len(list(jobs.glob("*.pid"))) == 2
+    (run,) = (into / "members").iterdir()
+    assert "resumed" in [event["event"] for event in RunFolder(run).events()]
     deadline = time.monotonic() + 60
     while processes_in(tmp_path) and time.monotonic() < deadline:
         time.sleep(0.1)
