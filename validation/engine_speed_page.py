@@ -23,12 +23,6 @@ PAPER_STEPS = 37200
 """Steps of a load cycle at the paper's stiffness."""
 PROCESSES = 128
 """Of the job that the page estimates."""
-STYLES = {
-    "liggghts": {"color": "#1b6ca8", "marker": "o", "ms": 8, "mfc": "none", "lw": 3},
-    "lammps": {"color": "#c8553d", "marker": "s", "ms": 5, "lw": 1.6},
-    "yade": {"color": "#4b8f4f", "marker": "^", "ms": 3, "lw": 0.8},
-}
-"""Where curves lie on one another, each is still to be seen."""
 
 
 def of_kind(rows: Iterable[Row], kind: str) -> list[Row]:
@@ -106,28 +100,30 @@ def share_at_paper(alone: float, through: float, steps: int) -> float:
 
 def adapter_table(rows: Sequence[Row]) -> str:
     """What trackbed adds to each engine."""
-    chosen = of_kind(rows, "adapter")
-    alone = medians(chosen, [], lambda row: row["alone_s"])
-    through = medians(chosen, [], lambda row: row["cost_s"])
-    python = medians(chosen, [], lambda row: row["python_s"])
-    pairs = medians(chosen, [], lambda row: row["alone_s"] / row["cost_s"])
-    steps = chosen[0]["steps_per_cycle"]
-    lines = [
-        [
-            NAMES[engine],
-            f"{alone[engine,][0]:.2f}",
-            f"{through[engine,][0]:.2f}",
-            f"{python[engine,][0]:.2f}",
-            f"**{alone[engine,][0] / through[engine,][0]:.3f}**",
-            f"{pairs[engine,][1]:.3f} to {pairs[engine,][2]:.3f}",
-            f"{share_at_paper(alone[engine,][0], through[engine,][0], steps):.3f}",
-            str(alone[engine,][3]),
-        ]
-        for engine in NAMES
-        if (engine,) in alone
-    ]
+    chosen, keys = of_kind(rows, "adapter"), ["young", "cycles"]
+    alone = medians(chosen, keys, lambda row: row["alone_s"])
+    through = medians(chosen, keys, lambda row: row["cost_s"])
+    python = medians(chosen, keys, lambda row: row["python_s"])
+    pairs = medians(chosen, keys, lambda row: row["alone_s"] / row["cost_s"])
+    steps = medians(chosen, keys, lambda row: row["steps_per_cycle"])
+    lines = []
+    for group in sorted(alone, key=lambda group: (group[1], list(NAMES).index(group[0]))):
+        times = (alone[group][0], through[group][0])
+        lines.append(
+            [
+                NAMES[group[0]],
+                f"{group[2]} of {steps[group][0]:,}",
+                f"{times[0]:.2f}",
+                f"{times[1]:.2f}",
+                f"{python[group][0]:.2f}",
+                f"**{times[0] / times[1]:.3f}**",
+                f"{pairs[group][1]:.3f} to {pairs[group][2]:.3f}",
+                f"{share_at_paper(*times, int(steps[group][0])):.3f}",
+                str(alone[group][3]),
+            ]
+        )
     head = [
-        "engine", "alone, CPU s", "through trackbed, CPU s", "of it Python, s",
+        "engine", "cycles, of steps", "alone, CPU s", "through trackbed, CPU s", "of it Python, s",
         "alone / through", "single pairs", f"follows for {PAPER_STEPS:,} steps a cycle", "runs",
     ]  # fmt: skip
     return table(head, lines)
@@ -252,53 +248,10 @@ def told(rows: Sequence[Row]) -> dict[str, str]:
     }
 
 
-def draw(rows: Sequence[Row], target: Path) -> None:
-    """Error against cost above, error against the step below, one column a kind of error."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    found = speeds(rows)
-    counts = sorted({key[1] for key in found})
-    few, many = steps_of_scene(bed_scene("lammps", (1, 1)))
-    chosen = of_kind(rows, "accuracy")
-    figure, axes = pyplot.subplots(2, len(ERRORS), figsize=(13, 6.4), sharey="col")
-    for column, (kind, tests) in enumerate(ERRORS.items()):
-        above, below = axes[:, column]
-        for engine in NAMES:
-            here = [row for row in chosen if row["method"] == engine]
-            steps = [row["setting"]["steps_in_contact"] for row in here]
-            error = [row["error"][kind] for row in here]
-            style: dict[str, Any] = STYLES[engine] | {"label": NAMES[engine]}
-            below.loglog(steps, error, **style)
-            for number, count in enumerate(counts):
-                cost = [1e6 * s / found[engine, count][0] for s in steps]
-                thin = {"lw": 0.8, "ls": "--", "ms": 2, "label": None} if number else {"lw": 1.5}
-                above.loglog(cost, error, **style | thin)
-        below.axvspan(few, many, color="0.9", zorder=0)
-        above.set_title(f"{kind}\n({tests})", fontsize=9)
-        above.set_xlabel("CPU µs a grain and contact", fontsize=8)
-        below.set_xlabel("steps in a contact", fontsize=8)
-        for axis in (above, below):
-            axis.grid(alpha=0.3, which="both", lw=0.4)
-            axis.tick_params(labelsize=8)
-    for axis in axes[:, 0]:
-        axis.set_ylabel("relative error", fontsize=8)
-    axes[0, -1].set_ylim(1e-3, 1e-1)  # two decades, as it hardly changes
-    axes[0, 0].legend(fontsize=8)
-    figure.suptitle(
-        f"Above: error against cost ({counts[0]:,} grains; thin, dashed: {counts[-1]:,}).  "
-        "Below: against the step; grey: rayleigh_share = 0.2",
-        fontsize=9,
-    )
-    figure.tight_layout()
-    figure.savefig(target, dpi=130)
-    pyplot.close(figure)
-
-
 def main() -> None:
     """Write page and picture from the record."""
+    from validation.engine_speed_picture import draw
+
     rows = record_read()
     PAGE.write_text(page(rows), encoding="utf-8")
     draw(rows, PICTURE)

@@ -5,6 +5,7 @@ call goes on behind the last line.  ``--fresh`` begins a record anew, for the ki
 
 ``speed``     the settled bed on each engine, CPU time of two lengths, so that no start-up counts
 ``adapter``   a window of load cycles, the engine alone beside all that `trackbed` does for it
+              (``adapter-paper``: at the paper's stiffness, LIGGGHTS and LAMMPS)
 ``accuracy``  Chung and Ooi's tests at several steps
 ``ranks``     the settled bed on 1 and 2 processes of MPI
 
@@ -16,7 +17,7 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -52,6 +53,8 @@ ADAPTER_YOUNG = 1e9
 """Young's modulus of the grains [Pa] in the windows through trackbed: a frame every 5,500 steps,
 where the paper's grains need 37,200, so that its cost shows seven times as much."""
 ADAPTER_CYCLES = {"liggghts": 2, "lammps": 2, "yade": 1}
+
+PAPER_REPEATS = 3
 
 RANKS = {(3, 3): 300, (10, 9): 40}
 """Tiles along x and y -> steps."""
@@ -89,23 +92,29 @@ def speed_rows(
                 }
 
 
-def adapter_rows(work: Path, done: Done, repeats: int = REPEATS) -> Iterator[Row]:
+def adapter_rows(
+    work: Path,
+    done: Done,
+    repeats: int = REPEATS,
+    young: float = ADAPTER_YOUNG,
+    cycles_of: Mapping[str, int] = ADAPTER_CYCLES,
+) -> Iterator[Row]:
     """The same window of load cycles through trackbed and by hand, on the bed of one tile."""
     position, radius = tile_settled(work)
     starts: dict[str, EngineStart] = {}
     for repeat in range(repeats):
-        for engine in engines_present():
-            cycles = ADAPTER_CYCLES[engine]
+        for engine in (name for name in engines_present() if name in cycles_of):
+            cycles = cycles_of[engine]
             setting = {
                 "grains": len(radius),
-                "young": ADAPTER_YOUNG,
+                "young": young,
                 "cycles": cycles,
                 "repeat": repeat,
             }
             row = {"kind": "adapter", "method": engine, "setting": setting}
             if done(row):
                 continue
-            scene = bed_scene(engine, (1, 1), LOADING, young=ADAPTER_YOUNG)
+            scene = bed_scene(engine, (1, 1), LOADING, young=young)
             if engine not in starts:
                 folder = work / f"start_{engine}"
                 shutil.rmtree(folder, ignore_errors=True)
@@ -122,6 +131,11 @@ def adapter_rows(work: Path, done: Done, repeats: int = REPEATS) -> Iterator[Row
                 "work_unit": "grain-steps",
                 "steps_per_cycle": scene.steps_per_cycle,
             }
+
+
+def adapter_paper_rows(work: Path, done: Done) -> Iterator[Row]:
+    """`adapter_rows` at the paper's stiffness, one cycle."""
+    return adapter_rows(work, done, PAPER_REPEATS, YOUNG, dict.fromkeys(LAUNCHERS, 1))
 
 
 def accuracy_rows(work: Path, done: Done) -> Iterator[Row]:
@@ -209,6 +223,7 @@ def paper_row(run: Path) -> Row:
 KINDS: dict[str, Callable[[Path, Done], Iterator[Row]]] = {
     "speed": speed_rows,
     "adapter": adapter_rows,
+    "adapter-paper": adapter_paper_rows,
     "accuracy": accuracy_rows,
     "ranks": ranks_rows,
 }
