@@ -6,6 +6,7 @@ Standard library, numpy and YADE only.
 
 import gzip
 import os
+import signal
 
 import numpy as np
 from yade import Omega
@@ -187,10 +188,25 @@ def kinetic_energies(grains):
     return translational, 0.2 * (mass * radius**2) @ (grains[:, 6:9] ** 2).sum(axis=1)
 
 
+ROOM, ROOM_OF_BODY = 100_000, 3_000
+"""Room for a saved scene [bytes], and for each body in it; a body takes about 1,000."""
+
+SAVE_S = 600
+"""Longest time to write one [s]."""
+
+
 def scene_save():
-    """Write ``end.restart``; raises OSError or EOFError when it is not whole, as on a full disk."""
+    """Write ``end.restart``; raises OSError or EOFError when it is not whole, as on a full disk.
+
+    On a full disk YADE would try to write for ever: so the room is asked for before.  Should
+    another process take it just then, an alarm ends this one.
+    """
     O.engines = O.engines[:3]  # the commands of the others belong to this script
+    with open(SAVED, "wb") as stream:
+        os.posix_fallocate(stream.fileno(), 0, ROOM + ROOM_OF_BODY * len(O.bodies))
+    signal.alarm(SAVE_S)
     O.save(SAVED)
+    signal.alarm(0)
     with gzip.open(SAVED) as stream:
         while stream.read(1 << 20):
             pass

@@ -205,6 +205,21 @@ def test_full_disk(sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture
     check_goes_on(sample, run)
 
 
+@pytest.mark.engine("yade")
+@pytest.mark.parametrize("sample", ["yade"], indirect=True)
+def test_disk_with_too_little_room_for_a_saved_scene(
+    sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """YADE would write on a full disk for ever: its script asks for the room before.
+
+    200 KiB are enough for each dump, and not for what is asked.
+    """
+    run = sample.copy(tmp_path / "run", *LOST[SECOND])
+    sample.fault(run, 'ulimit -f 400; exec "$@"')
+    check_failure(sample, run, 5, "File too large", capsys)
+    assert RunFolder(run).stage_names() == KEPT[SECOND]
+
+
 # --- no program, another one, no MPI ----------------------------------------------------------
 
 OLD = {
