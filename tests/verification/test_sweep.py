@@ -224,7 +224,7 @@ def test_slurm_jobs_that_are_lost_are_replaced(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
         (tmp_path / name).chmod(0o755)
     scene, config, jobs = tmp_path / "scene.toml", tmp_path / "cluster.toml", tmp_path / "jobs"
-    scene.write_text(small_bed(k=2, h=0, total_cycles=100))
+    scene.write_text(small_bed(k=2, h=0, total_cycles=60))
     config.write_text('cores = 1\nprocesses = 1\nmemory = "1GB"\n')
     jobs.mkdir()
     into = tmp_path / "sweep"
@@ -253,45 +253,65 @@ def test_slurm_jobs_that_are_lost_are_replaced(tmp_path: Path) -> None:
     assert not processes_in(tmp_path)
 
 
-def stopped_in(words: list[str], member: Path, number: signal.Signals) -> tuple[int, str]:
-    """Start a sweep, send it a signal when a member has begun; exit status, standard error."""
-    child = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=member.parents[2])
-    assert child.stderr is not None
+def test_stopped_it_goes_on(
+    scene: Path, tmp_path: Path, in_process: list[list[str]], capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """SIGTERM while the second member runs: exit code 130, what to do; then finished."""
+    into, run = tmp_path / "sweep", sweep_member.process_run
+
+    def stopped_in_the_second(
+        command: Sequence[str], folder: Path, watch: Callable[[], None]
+    ) -> tuple[int, float, float]:
+        if "sample.seed=2" in command:
+            os.kill(os.getpid(), signal.SIGTERM)
+            while True:  # until the sweep has told its members to stop
+                watch()
+                time.sleep(0.01)
+        return run(command, folder, watch)
+
+    words = (scene, "--seeds", 3, "--into", into)
+    with monkeypatch.context() as context:
+        context.setattr(sweep_member, "process_run", stopped_in_the_second)
+        code, told, said = sweep(capsys, *words)
+    assert code == 130
+    assert told is None
+    assert "the same command goes on with the sweep" in said
+    members = json.loads((into / "sweep.json").read_text())["members"]
+    assert [one["state"] for one in members] == ["finished", "stopped", "stopped"]
+    code, told, said = sweep(capsys, *words)
+    assert code == 0
+    assert "3 members, 1 finished" in said
+    assert len(in_process) == 3
+
+
+def test_killed_it_goes_on(
+    scene: Path, tmp_path: Path, in_process: list[list[str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A kill leaves no process behind; the same command ends with the tables of unstopped runs."""
+    into = tmp_path / "sweep"
+    words = ["sweep", str(scene), "--seeds", "2", "--into", str(into), "--workers", "1"]
+    child = subprocess.Popen(
+        [sys.executable, ROOT / "trackbed.py", *words], stderr=subprocess.DEVNULL, cwd=tmp_path
+    )
+    first, second = (into / "members" / f"sample.seed={seed}" for seed in (1, 2))
     deadline = time.monotonic() + 300
-    while not member.exists():
+    while not second.exists():  # the first member is finished, the second has begun
         assert time.monotonic() < deadline
         time.sleep(0.005)
-    child.send_signal(number)
-    said = child.stderr.read()
-    child.stderr.close()
-    status = child.wait()
+    child.kill()
+    assert child.wait() == -signal.SIGKILL
     deadline = time.monotonic() + 60
-    while processes_in(member.parents[2]) and time.monotonic() < deadline:
+    while processes_in(tmp_path) and time.monotonic() < deadline:
         time.sleep(0.05)
-    assert not processes_in(member.parents[2])
-    return status, said
-
-
-def test_stopped_and_killed_it_goes_on(scene: Path, tmp_path: Path) -> None:
-    """SIGTERM ends with 130, a kill leaves no process behind; the same command then finishes.
-
-    The tables are those of runs that nobody stopped.
-    """
-    into = tmp_path / "sweep"
-    words = [sys.executable, str(ROOT / "trackbed.py"), "sweep", str(scene), "--seeds", "2"]
-    words += ["--into", str(into), "--workers", "1"]
-    first, second = (into / "members" / f"sample.seed={seed}" for seed in (1, 2))
-    status, said = stopped_in(words, first, signal.SIGTERM)
-    assert status == 130
-    assert "the same command goes on with the sweep" in said
-    status, _ = stopped_in(words, second, signal.SIGKILL)
-    assert status == -signal.SIGKILL
+    assert not processes_in(tmp_path)
     members = json.loads((into / "sweep.json").read_text())["members"]
     assert [one["state"] for one in members] == ["finished", "waiting"]
 
-    again = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
-    assert again.returncode == 0, again.stderr
-    assert "2 members, 1 finished" in again.stderr
+    code, _, said = sweep(capsys, *words[1:-2])
+    assert code == 0
+    assert "2 members, 1 finished" in said
+    assert len(in_process) == 1
     for seed, run in ((1, first), (2, second)):
         whole = tmp_path / f"whole_{seed}"
         alone = ["run", str(scene), "--run-folder", str(whole), "--set", f"sample.seed={seed}"]
