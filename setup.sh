@@ -27,9 +27,10 @@ fi
 case ",$extras," in *,test,*)
     command -v chromium >/dev/null || lacking="$lacking chromium"
     command -v yade >/dev/null || lacking="$lacking yade"
-    # what gmsh's Python wheel is linked to
+    # what the Python wheels of gmsh and OVITO (Qt) are linked to
     for library in libGLU.so.1:libglu1-mesa libXcursor.so.1:libxcursor1 libXft.so.2:libxft2 \
-        libXinerama.so.1:libxinerama1 libOpenGL.so.0:libopengl0; do
+        libXinerama.so.1:libxinerama1 libOpenGL.so.0:libopengl0 libEGL.so.1:libegl1 \
+        libxkbcommon.so.0:libxkbcommon0 libdbus-1.so.3:libdbus-1-3; do
         /sbin/ldconfig -p | grep -q "${library%%:*}" || lacking="$lacking ${library##*:}"
     done
     ;;

@@ -18,8 +18,10 @@ VERBS = {
     "new": (ADAPTERS, "write a commented example scene into a folder"),
     "run": (ADAPTERS, "the whole procedure of a scene: prepare, compute, jump, relax, repeat"),
     "resume": (ADAPTERS, "go on with an interrupted run"),
+    "sweep": ("adapters.sweep_cli", "several seeds and values of a scene's keys, side by side"),
     "status": (ADAPTERS, "how far a run is, its settlement and speed-up"),
     "report": (ADAPTERS, "write report.html and the figures of a run"),
+    "export": ("adapters.export_cli", "a run as files of ParaView, OVITO, STL or CSV"),
     "fit": (ADAPTERS, "fit a residual law to a run, dumps or a CSV series and extrapolate it"),
     "relax": (ADAPTERS, "bring the overlaps of a state back to equilibrium"),
     "qdem": ("qdem_fem.cli", "vibration and statics of deformable bodies, from a scene file"),
@@ -31,11 +33,11 @@ VERBS = {
 
 EXIT_CODES = """\
 exit codes:
-  0  ok                     5  engine failed, or disk full
-  1  bug in trackbed        6  result not credible
-  2  usage                  7  not converged
-  3  scene invalid        130  interrupted, state saved
-  4  engine or library missing
+  0  ok                            5  engine failed, or disk full
+  1  bug in trackbed               6  result not credible
+  2  usage                         7  not converged
+  3  scene invalid                 8  members of a sweep failed
+  4  engine or library missing   130  interrupted, state saved
 """
 
 

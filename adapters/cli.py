@@ -106,9 +106,21 @@ def new_command(arguments: argparse.Namespace) -> int:
 # --- run, resume, status, report -----------------------------------------------------------
 
 
+def scene_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add SCENE, ``--engine`` and ``--launcher``."""
+    parser.add_argument("scene", metavar="SCENE", type=Path, help="a scene file (TOML)")
+    parser.add_argument(
+        "--engine", metavar="NAME",
+        help="liggghts, lammps, yade or auto; short for --set engine.name=NAME",
+    )  # fmt: skip
+    parser.add_argument(
+        "--launcher", metavar="WORDS", help='before the engine\'s command, as in "mpirun -np 2"'
+    )
+
+
 def run_register(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``run``."""
-    parser.add_argument("scene", metavar="SCENE", type=Path, help="a scene file (TOML)")
+    scene_arguments(parser)
     parser.add_argument(
         "--run-folder", type=Path, metavar="FOLDER", help="default: run/ beside the scene"
     )
@@ -119,13 +131,6 @@ def run_register(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
         help="change a key of the scene, such as procedure.h=10; may be repeated",
     )  # fmt: skip
-    parser.add_argument(
-        "--engine", metavar="NAME",
-        help="liggghts, lammps, yade or auto; short for --set engine.name=NAME",
-    )  # fmt: skip
-    parser.add_argument(
-        "--launcher", metavar="WORDS", help='before the engine\'s command, as in "mpirun -np 2"'
-    )
     parser.add_argument(
         "--dry-run", action="store_true", help="write the decks and print the engine's command"
     )

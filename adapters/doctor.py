@@ -8,16 +8,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 
+from adapters.engine_names import REAL_ENGINES
 from adapters.errors import EngineMissing
 
 LIBRARIES = (
     "numpy", "scipy", "numba", "pydantic", "matplotlib", "rich", "meshio", "scikit-fem",
 )  # fmt: skip
 """Distributions that pyproject.toml asks for."""
-
-
-ENGINES = ("liggghts", "lammps", "yade")
-"""Engines looked for; a scene needs one of them."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,7 @@ def _foreign_adapters() -> Iterator[Finding]:
 def findings() -> list[Finding]:
     """Everything looked for, engines first; a finding with a ``remedy`` asks for a hand."""
     return [
-        *(_engine(name) for name in ENGINES),
+        *(_engine(name) for name in REAL_ENGINES),
         Finding("python", "python", platform.python_version()),
         *(_library(name) for name in LIBRARIES),
         _blas(),

@@ -22,9 +22,11 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Protocol
 
+from adapters.engine_names import ENGINES, REAL_ENGINES
 from adapters.errors import EngineFailed, EngineMissing, Interrupted
 from adapters.scene import Scene
 from adapters.state import FloatArray, State
@@ -208,35 +210,19 @@ def restart_check(folder: Path) -> None:
         )
 
 
-REAL_ENGINES = ("liggghts", "lammps", "yade")
-"""Engines with mechanics, in the order in which ``auto`` asks for them."""
-
-
 def engine_named(name: str) -> Engine:
-    """The engine of a name of `adapters.scene.ENGINES`; ``auto`` as `engine_found`.
+    """The engine of a name of `adapters.engine_names.ENGINES`; ``auto`` as `engine_found`.
 
     Raises `EngineMissing` for a name that is none.
     """
     if name == "auto":
         return engine_found()
-    if name == "fake":
-        from adapters.engine_fake import FakeEngine
-
-        return FakeEngine()
-    if name == "lammps":
-        from adapters.engine_lammps import LammpsEngine
-
-        return LammpsEngine()
-    if name == "yade":
-        from adapters.engine_yade import YadeEngine
-
-        return YadeEngine()
-    if name == "liggghts":
-        from adapters.engine_liggghts import LiggghtsEngine
-
-        return LiggghtsEngine()
-    known = ", ".join(REAL_ENGINES)
-    raise EngineMissing(f"there is no engine {name}", remedy=f"name one of {known}, or auto")
+    if name not in ENGINES:
+        known = ", ".join(REAL_ENGINES)
+        raise EngineMissing(f"there is no engine {name}", remedy=f"name one of {known}, or auto")
+    module = import_module(f"adapters.engine_{name}")
+    engine: Engine = getattr(module, f"{name.capitalize()}Engine")()
+    return engine
 
 
 def engine_found() -> Engine:

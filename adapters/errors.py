@@ -78,6 +78,12 @@ class NotConverged(TrackbedError):
     exit_code = 7
 
 
+class SweepIncomplete(TrackbedError):
+    """Members of a sweep failed; the text names each, and all others are finished."""
+
+    exit_code = 8
+
+
 class Interrupted(KeyboardInterrupt):
     """The user or the system asked us to stop; everything finished is saved.
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from adapters import stages
-from adapters.engine import REAL_ENGINES, engine_found, engine_named, interruptible
+from adapters.engine import engine_found, engine_named, interruptible
+from adapters.engine_names import REAL_ENGINES
 from adapters.errors import (
     EngineFailed,
     EngineMissing,

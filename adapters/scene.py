@@ -16,6 +16,7 @@ from pydantic_core import PydanticCustomError
 
 from adapters import contact_law
 from adapters.container import Container, sides_needed
+from adapters.engine_names import EngineName
 from adapters.load_series import LoadSeries, load_series_read
 from adapters.radii import RadiusDistribution, grain_count_expected
 from adapters.scene_checks import COUNT_GREATEST, scene_problems, scene_warnings
@@ -23,10 +24,6 @@ from adapters.state import FloatArray
 
 TRACK_SAMPLES = 100
 """Least number of samples of the piston's record in a cycle."""
-
-ENGINES = ("auto", "liggghts", "lammps", "yade", "fake")
-"""Names of the engines; ``fake`` writes analytic states, for tests, and ``auto`` stands for the
-first one that is installed (`adapters.engine.engine_found`)."""
 
 FLAT_WALLED = ("yade",)
 """Engines without a cylinder: planes tangent to it take its place."""
@@ -208,7 +205,7 @@ class Procedure(Table):
 class Engine(Table):
     """The engine and its time step."""
 
-    name: Literal["auto", "liggghts", "lammps", "yade", "fake"]
+    name: EngineName = "auto"
     """Engine; ``auto`` is the first that is installed: liggghts, lammps, yade."""
     time_step: Positive | None = None
     """Longest time step [s]."""

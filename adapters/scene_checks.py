@@ -28,7 +28,7 @@ ALTERNATIVES = (
 COUNT_GREATEST = 10**8
 """Most grains a scene may have."""
 
-MPI_STARTERS = {"mpirun", "mpiexec", "mpiexec.hydra", "orterun"}
+MPI_STARTERS = {"mpirun", "mpiexec", "mpiexec.hydra", "orterun", "srun"}
 """Programs that start the program behind them several times."""
 
 RAYLEIGH_SHARE_DOUBTFUL = 0.4

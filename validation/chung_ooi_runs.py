@@ -108,8 +108,19 @@ ImpactRun = Callable[[Scene, Start, float, int, int], Motion]
 """Scene, start, time step [s], steps, steps between two instants -> motion."""
 
 
-LAWS = ("scene", "sliding")
-"""Laws of a run: that of every scene, eqs 5 to 7; and that of rigid bodies' limits, `law_text`."""
+LAWS = ("scene", "unpulled", "undamped", "sliding")
+"""Laws of a run: that of every scene, eqs 5 to 7; without pull; without viscous force along the
+tangent; and without both, as rigid bodies' limits have it."""
+
+
+def law_pulls(law: str) -> bool:
+    """Whether a parting contact pulls, where its engine lets it."""
+    return law in ("scene", "undamped")
+
+
+def law_damps(law: str) -> bool:
+    """Whether a viscous force acts along the tangent."""
+    return law in ("scene", "unpulled")
 
 
 def restitution_given(engine: str, law: str, restitution: float) -> float:
@@ -118,7 +129,7 @@ def restitution_given(engine: str, law: str, restitution: float) -> float:
     Another one where a law that never pulls runs on an engine whose damping is made for one that
     does.
     """
-    if law == "scene" or engine == "yade" or restitution == 1:
+    if law_pulls(law) or engine == "yade" or restitution == 1:
         return restitution
     return restitution_of_alpha(damping_of_rebound(restitution) / DAMPING_FACTOR)
 
@@ -126,20 +137,22 @@ def restitution_given(engine: str, law: str, restitution: float) -> float:
 def law_text(engine: str, law: str, text: str) -> str:
     """A scene's generated text under a law of `LAWS`.
 
-    ``sliding``: no contact pulls, and nothing viscous acts along the tangent, as rigid bodies that
-    slide have it.  Under eq. 7 as engines take it a parting contact pulls, and its friction then
-    adds to the impulse; and a viscous force beside the Coulomb limit adds more.
+    Under eq. 7 as engines take it a parting contact pulls, and its friction then adds to the
+    impulse; and a viscous force beside the Coulomb limit adds more.
     """
-    if law == "scene":
-        return text
+    pulls, damps = law_pulls(law), law_damps(law)
     if engine == "liggghts":
-        settings = "tangential_damping off limitForce on"
+        settings = " tangential_damping off" * (not damps) + " limitForce on" * (not pulls)
         pair = "pair_style gran model ${contact_model}"
-        return text.replace(pair, f"{pair} {settings}").replace("store_force yes", settings)
+        text = text.replace(pair, f"{pair}{settings}")
+        return text.replace("store_force yes", settings.strip()) if settings else text
     if engine == "lammps":
-        text = re.sub(r"(tangential mindlin\S* \S+) \S+", r"\1 0.0", text)
-        return text.replace("coeff_restitution", "coeff_restitution limit_damping")
-    return re.sub(r'("damping_tangential": )[^,}]+', r"\g<1>0.0", text)
+        if not damps:
+            text = re.sub(r"(tangential mindlin\S* \S+) \S+", r"\1 0.0", text)
+        return text.replace(
+            "coeff_restitution", "coeff_restitution" + " limit_damping" * (not pulls)
+        )
+    return text if damps else re.sub(r'("damping_tangential": )[^,}]+', r"\g<1>0.0", text)
 
 
 def grains_data_started(text: str, start: Start) -> str:

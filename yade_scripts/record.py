@@ -6,6 +6,7 @@ Standard library, numpy and YADE only.
 
 import gzip
 import os
+import signal
 
 import numpy as np
 from yade import Omega
@@ -19,13 +20,23 @@ SAVED = "end.yade.gz"
 STATE_COLUMNS = "id x y z vx vy vz omegax omegay omegaz radius mass"
 
 
+def components(vector):
+    """The three numbers of a vector of YADE.
+
+    By index: to unpack one, or to make an array of it, ends in an exception of C++, which costs
+    more than all the rest.
+    """
+    return vector[0], vector[1], vector[2]
+
+
 def grain_table(count):
     """x, v, omega, radius, mass of the grains [SI], shape (count, 11)."""
     rows = []
     for number in range(count):
         body = O.bodies[number]
         s = body.state
-        rows.append([*s.pos, *s.vel, *s.angVel, body.shape.radius, s.mass])
+        motion = components(s.pos) + components(s.vel) + components(s.angVel)
+        rows.append((*motion, body.shape.radius, s.mass))
     return np.array(rows)
 
 
@@ -38,22 +49,36 @@ def contact_tables(grains):
     The second result is a dictionary: number of a wall's body -> force [N], shape (count, 3).
     """
     count, position, radius = len(grains), grains[:, :3], grains[:, 9]
-    rows, walls = [], {}
+    rows, of_walls = [], []
     for contact in O.interactions:
         if not contact.isReal:
             continue
         first, second, physics = contact.id1, contact.id2, contact.phys
-        normal, shear = -np.array(physics.normalForce), -np.array(physics.shearForce)
+        force = components(physics.normalForce) + components(physics.shearForce)
         if first < count and second < count:
-            spring = np.array(physics.shearElastic) / physics.ks
-            distance = np.linalg.norm(position[first] - position[second])
-            overlap = radius[first] + radius[second] - distance
-            rows.append([first + 1, second + 1, *normal, *shear, *spring, overlap])
+            elastic = components(physics.shearElastic)
+            rows.append((first, second, *force, *elastic, physics.ks))
         else:
-            grain, wall, sign = (first, second, 1) if first < count else (second, first, -1)
-            walls.setdefault(wall, np.zeros((count, 3)))[grain] += sign * (normal + shear)
-    rows.sort()
-    return np.array(rows).reshape(-1, 12), walls
+            of_walls.append((first, second, *force))
+    table = np.array(sorted(rows)).reshape(-1, 12)
+    first, second = table[:, :2].astype(int).T
+    apart = np.linalg.norm(position[first] - position[second], axis=1)
+    table[:, :2] += 1
+    table[:, 8:11] /= table[:, 11:]
+    table[:, 2:8] *= -1
+    table[:, 11] = radius[first] + radius[second] - apart
+    return table, wall_forces(of_walls, count)
+
+
+def wall_forces(rows, count):
+    """Force of each wall on each grain [N] from rows of both numbers, normal and shear force."""
+    forces = {}
+    for first, second, *force in rows:
+        grain, wall, sign = (first, second, 1) if first < count else (second, first, -1)
+        if wall not in forces:
+            forces[wall] = np.zeros((count, 3))
+        forces[wall][grain] += [sign * -(force[i] + force[i + 3]) for i in range(3)]
+    return forces
 
 
 class Dumps:
@@ -163,10 +188,25 @@ def kinetic_energies(grains):
     return translational, 0.2 * (mass * radius**2) @ (grains[:, 6:9] ** 2).sum(axis=1)
 
 
+ROOM, ROOM_OF_BODY = 100_000, 3_000
+"""Room for a saved scene [bytes], and for each body in it; a body takes about 1,000."""
+
+SAVE_S = 600
+"""Longest time to write one [s]."""
+
+
 def scene_save():
-    """Write ``end.restart``; raises OSError or EOFError when it is not whole, as on a full disk."""
+    """Write ``end.restart``; raises OSError or EOFError when it is not whole, as on a full disk.
+
+    On a full disk YADE would try to write for ever: so the room is asked for before.  Should
+    another process take it just then, an alarm ends this one.
+    """
     O.engines = O.engines[:3]  # the commands of the others belong to this script
+    with open(SAVED, "wb") as stream:
+        os.posix_fallocate(stream.fileno(), 0, ROOM + ROOM_OF_BODY * len(O.bodies))
+    signal.alarm(SAVE_S)
     O.save(SAVED)
+    signal.alarm(0)
     with gzip.open(SAVED) as stream:
         while stream.read(1 << 20):
             pass

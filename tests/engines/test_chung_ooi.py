@@ -6,17 +6,19 @@ from dataclasses import replace
 
 import pytest
 
-from adapters.engine import REAL_ENGINES
+from adapters.engine_names import REAL_ENGINES
 from validation.case import Check
 from validation.chung_ooi import RESTITUTION, TEST_1, TEST_4, TEST_6, TEST_8, Setting
 from validation.chung_ooi_checks import (
     Measured,
+    closing_checks,
     normal_checks,
     order_check,
     regression_check,
     restitution_checks,
     sliding_impulse_error,
     tangential_checks,
+    tangential_order_checks,
 )
 from validation.chung_ooi_impacts import motion_of, rebound_of
 from validation.chung_ooi_reference import pull_factor
@@ -62,6 +64,18 @@ def test_pull_of_eq_7_is_all_that_lammps_adds() -> None:
     rebound = rebound_of(TEST_6, motion_of(TEST_6, "lammps"))
     excess = sliding_impulse_error(TEST_6, rebound)
     assert excess == pytest.approx(pull_factor(TEST_6.restitution) - 1, rel=2e-2)
+
+
+@pytest.mark.engine("lammps")
+def test_friction_converges_with_the_step() -> None:
+    """First order, elastic and under the scenes' law."""
+    all_hold(tangential_order_checks("lammps"))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_closes_the_gap(engine: str) -> None:
+    """Each of pull and tangential damping adds what its law, integrated on paper, says."""
+    all_hold(closing_checks(engine))
 
 
 @pytest.mark.engine("lammps")

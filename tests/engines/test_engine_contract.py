@@ -1,15 +1,15 @@
 """What every engine promises: one suite, one tiny scene, each engine in turn.
 
-A new engine is added to `ENGINES` below; what it is allowed to differ in is said in its own tests.
+A new engine is added in `adapters.engine_names`; what it is allowed to differ in is said in its own
+tests.  Faults of its process are in ``test_faults.py``.
 """
 
 from __future__ import annotations
 
-import os
-import shutil
+import inspect
+import re
 import signal
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,110 +17,30 @@ import numpy as np
 import pytest
 
 import trackbed
-from adapters import engine_lammps
 from adapters.dump import dump_frames
-from adapters.engine import Engine, EngineStart, engine_named
-from adapters.errors import EngineMissing, TrackbedError
-from adapters.procedure import run_scene
-from adapters.progress import Progress
+from adapters.engine import Engine
 from adapters.run_folder import RunFolder
 from adapters.sample import GRAVITY
-from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import Contacts, State, state_load
-from adapters.window import Window, window_load, window_read
-from scenes import scene_template
+from tests.engine_sample import AFTER, FIRST, JUMP, SECOND, Sample
 from tests.forked_commands import Commands, processes_in
 
-REAL = [
-    pytest.param(name, marks=pytest.mark.engine(name)) for name in ("liggghts", "lammps", "yade")
-]
-"""Engines with mechanics, and with a process to kill."""
-ENGINES = [*REAL, "fake"]
-
-QUIET = Progress(quiet=True)
-TINY = (
-    "sample.radius=0.018",
-    "sample.count=40",
-    "material.grain.young=2e8",
-    "loading.piston_mass=0.001",
-    "procedure.k_i=2",
-    "procedure.k=3",
-    "procedure.h=2",
-    "procedure.healing_cycles=1",
-    "procedure.total_cycles=11",
-)
-"""Forty soft grains, about 2,500 steps a cycle, one jump from cycle 5 to 7."""
-FIRST, SECOND, JUMP, AFTER = "window_000000", "window_000002", "jump_000005_1", "window_000007"
+ROOT = Path(__file__).parents[2]
 HISTORY = 7
 """Columns of ``history.txt``."""
 
 
-class Sample:
-    """A finished run of the tiny scene on one engine."""
-
-    def __init__(self, name: str, folder: Path) -> None:
-        self.name, self.file, self.run = name, folder / "scene.toml", folder / "run"
-        self.file.write_text(scene_template("karrech-coarse"))
-        self.overrides = (*TINY, f'engine.name="{name}"')
-        self.engine: Engine = engine_named(name)
-        self.scene: Scene = scene_load(self.file, self.overrides)
-        run_scene(self.file, self.run, overrides=self.overrides, progress=QUIET)
-
-    @property
-    def table(self) -> bytes:
-        return (self.run / "settlement.csv").read_bytes()
-
-    def words(self, run: Path) -> tuple[object, ...]:
-        """Of the command that starts a run, or goes on with it."""
-        if (run / "manifest.json").exists():
-            return ("resume", run)
-        overrides = [word for override in self.overrides for word in ("--set", override)]
-        return ("run", self.file, "--run-folder", run, *overrides)
-
-    def copy(self, folder: Path, *without: str) -> Path:
-        """The run, less some stages."""
-        shutil.copytree(self.run, folder, ignore=shutil.ignore_patterns(*without))
-        return folder
-
-    def window(self, stage: str) -> Window:
-        return window_load(self.run / stage / "states.npz")
-
-    def start(self, stage: str) -> EngineStart:
-        """That of a window that goes on from a finished one."""
-        outcome = RunFolder(self.run).outcome(stage)
-        assert outcome is not None
-        notes = outcome.notes
-        return EngineStart(
-            self.run / stage / "end.restart",
-            notes["time_step"],
-            notes["piston_mesh"],
-            notes["piston_height"],
-        )
-
-    def computed(self, start: EngineStart, cycles: int, folder: Path) -> Window:
-        """A window computed outside any run folder."""
-        folder.mkdir()
-        digests = self.engine.write_cycles(self.scene, start, cycles, folder)
-        done = self.engine.run(self.scene, "in.cycles", folder, lambda: None, digests)
-        assert done.decks == digests
-        assert done.cpu_s >= 0
-        assert 0 <= done.start_up_s <= max(done.wall_s, done.start_up_s)
-        names = self.engine.wall_names(self.scene, piston=True)
-        return window_read(folder, 0, names, start.piston_height)
-
-
-@pytest.fixture(scope="module", params=ENGINES)
-def sample(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Sample:
-    return Sample(request.param, tmp_path_factory.mktemp(request.param))
-
-
-@pytest.fixture(scope="module")
-def commands(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commands]:
-    """A server of commands."""
-    server = Commands(tmp_path_factory.mktemp("commands"))
-    yield server
-    server.close()
+def test_contributing_shows_the_protocol() -> None:
+    """The block in CONTRIBUTING has every method of an engine with its arguments, and no other."""
+    text = (ROOT / "CONTRIBUTING.md").read_text().partition("class FakeEngine:")[2]
+    shown = dict(re.findall(r"^    def (\w+)\((.*?)\)", text.partition("```")[0], re.MULTILINE))
+    asked = {
+        name: ", ".join(inspect.signature(method).parameters)
+        for name, method in vars(Engine).items()
+        if inspect.isfunction(method) and not name.startswith("_")
+    }
+    assert shown == asked
 
 
 def real(sample: Sample) -> None:
@@ -401,13 +321,20 @@ def gone(folder: Path) -> bool:
 def test_killed_run_resumes_to_the_identical_table(
     sample: Sample, commands: Commands, tmp_path: Path, stage: str
 ) -> None:
-    """SIGKILL while the engine computes: no engine stays, and resumed the table is the same."""
-    real(sample)
+    """SIGKILL while the engine computes: no engine stays, and resumed the table is the same.
+
+    The stage that was killed is computed again; what follows it is known from the sample.
+    """
     without = ("preparation", "window_*", "jump_*") if stage == "preparation" else (AFTER,)
     run = sample.copy(tmp_path / "run", *without)
-    commands.start(*sample.words(run))
-    engine_started(run, stage)
-    time.sleep(0.2)
+    sample.replayed(run, but=stage)
+    if sample.name == "fake":  # no process of its own: made slow
+        commands.start(*sample.words(run), slow=0.2)
+        assert commands.until(stage.partition("_")[0])
+    else:
+        commands.start(*sample.words(run))
+        engine_started(run, stage)
+        time.sleep(0.2)
     assert commands.kill() == -signal.SIGKILL
     assert gone(run)
     assert commands.run(*sample.words(run)) == 0, commands.output.read_text()
@@ -418,68 +345,4 @@ def test_lost_stage_is_computed_again(sample: Sample, tmp_path: Path) -> None:
     """Without its last window a run resumes to the identical table."""
     run = sample.copy(tmp_path / "run", AFTER)
     assert trackbed.main(["resume", str(run)]) == 0
-    assert (run / "settlement.csv").read_bytes() == sample.table
-
-
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_engine_killed_alone(
-    sample: Sample, commands: Commands, tmp_path: Path, number: signal.Signals
-) -> None:
-    """An engine that someone else ends is named, with exit code 5; nothing before it is lost."""
-    real(sample)
-    run = sample.copy(tmp_path / "run", AFTER)
-    commands.start("resume", run)
-    engine_started(run, AFTER)
-    for pid in processes_in(run):
-        os.kill(pid, number)
-    assert commands.end() == 5
-    assert f"was ended by {number.name}" in commands.output.read_text()
-    assert RunFolder(run).stage_names() == ["preparation", FIRST, SECOND, JUMP]
-    assert not RunFolder(run).failure(JUMP)
-
-
-def test_absurd_time_step_is_not_credible(
-    sample: Sample, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Fifty Rayleigh times a step: nan, lost or flying grains end in a typed error, not in 0."""
-    real(sample)
-    monkeypatch.setattr(Scene, "time_step", 50 * sample.scene.rayleigh_time)
-    monkeypatch.setattr(Scene, "steps_per_cycle", 100)
-    with pytest.raises(TrackbedError) as caught:
-        run_scene(sample.file, tmp_path / "run", overrides=sample.overrides, progress=QUIET)
-    assert caught.value.exit_code in (5, 6, 7), caught.value
-    assert RunFolder(tmp_path / "run").outcomes() == []
-
-
-def test_missing_program(sample: Sample, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine without the engine: exit code 4, and how to get it."""
-    real(sample)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(engine_lammps, "lammps_program", lambda: None)
-    with pytest.raises(EngineMissing) as caught:
-        engine_named(sample.name).version()
-    assert "install" in str(caught.value)
-    words = ["run", str(sample.file), "--run-folder", str(tmp_path / "run")]
-    assert trackbed.main([*words, "--engine", sample.name]) == 4
-
-
-def test_full_disk(sample: Sample, tmp_path: Path) -> None:
-    """An engine that may write no more is named, exit code 5; with room again the run goes on.
-
-    A limit of 4 KiB on the size of files stands for the disk; it lies in the launcher.
-    """
-    real(sample)
-    full = tmp_path / "full"
-    # MPI's own large files go, so that the first to be too large is the engine's.
-    plain = "export PMIX_MCA_gds=hash OMPI_MCA_btl=self; ulimit -f 8"
-    script = f'if test -e {full}; then {plain}; fi; exec "$@"'
-    launcher = f'engine.launcher=["sh", "-c", """{script}""", "sh"]'
-    overrides = [word for o in (*sample.overrides, launcher) for word in ("--set", o)]
-    run = tmp_path / "run"
-    full.touch()
-    words = ["run", str(sample.file), "--run-folder", str(run), *overrides]
-    assert trackbed.main(words) == 5
-    assert RunFolder(run).stage_names() == []
-    full.unlink()
-    assert trackbed.main(words) == 0
     assert (run / "settlement.csv").read_bytes() == sample.table

@@ -20,6 +20,7 @@ from validation.chung_ooi import (
     Impact,
     Setting,
 )
+from validation.chung_ooi_curves import published_checks
 from validation.chung_ooi_impacts import pair_of, rebound_of, start_of
 from validation.chung_ooi_limits import (
     contact_time,
@@ -30,7 +31,12 @@ from validation.chung_ooi_limits import (
     sliding_spin,
     sliding_tangential_restitution,
 )
-from validation.chung_ooi_reference import friction_impulse, pull_factor
+from validation.chung_ooi_partial_slip import (
+    MODULUS,
+    partial_slip_impulse,
+    springs_sheared,
+)
+from validation.chung_ooi_reference import LAW_OF_ENGINE, Law, friction_impulse, pull_factor
 from validation.chung_ooi_runs import Motion, grains_data_started, law_text, restitution_given
 
 PUBLISHED = {
@@ -98,11 +104,11 @@ def test_reference_slides_and_sticks(rule: str, restitution: float) -> None:
 
     An infinitely stiff spring under large mu stops the contact point: impulse = slip/3.5.
     """
-    mu, limit = 0.3, 0.3 * (1 + restitution)
+    mu, limit, law = 0.3, 0.3 * (1 + restitution), Law(rule)
     slip = np.array([-60 * mu, 0.0, 60 * mu])
-    found = friction_impulse(slip, mu, restitution, 1.2, rule, steps=4000)
+    found = friction_impulse(slip, mu, restitution, 1.2, law, steps=4000)
     assert found == pytest.approx([-limit, 0.0, limit], rel=5e-3)
-    held = friction_impulse(np.array([0.01]), 1.0, restitution, 1.2, rule, steps=4000)
+    held = friction_impulse(np.array([0.01]), 1.0, restitution, 1.2, law, steps=4000)
     assert abs(held[0]) < 2 * 0.01 / 3.5  # no spring turns the slip round entirely
 
 
@@ -110,10 +116,81 @@ def test_reference_converges() -> None:
     """Half the step, half the distance, or less: the reference's own error is below 1e-3 mu."""
     slip = 0.3 * np.array([1.0, 3.0, 5.0])
     steps = (2_500, 5_000, 10_000, 20_000)
-    found = [friction_impulse(slip, 0.3, 0.5, 1.2, "rescaled", n) for n in steps]
+    found = [friction_impulse(slip, 0.3, 0.5, 1.2, Law("rescaled"), n) for n in steps]
     moves = [np.abs(b - a).max() for a, b in pairwise(found)]
     assert moves[2] < 0.6 * moves[0]
     assert moves[2] < 1e-3 * 0.3
+
+
+def test_pull_and_damping_alone() -> None:
+    """Sliding at e = 0.5: a pull adds 6.7 %, damping beyond Coulomb's limit more, within it none.
+
+    With e = 1 there is neither, and all laws of a rule are one.
+    """
+    slip, mu, e = np.array([8.0]), 0.4, 0.5
+
+    def excess(law: Law, restitution: float = e) -> float:
+        found = friction_impulse(slip, mu, restitution, 1.2, law, steps=4000)[0]
+        return float(found / (mu * (1 + restitution)) - 1)
+
+    pulled = excess(LAW_OF_ENGINE["lammps"])
+    assert pulled == pytest.approx(pull_factor(e) - 1, abs=1e-3)
+    assert excess(Law("rescaled", damping="within")) == pytest.approx(0, abs=1e-3)
+    assert excess(Law("secant", damping="beyond")) > 0.1
+    assert excess(LAW_OF_ENGINE["liggghts"]) > excess(Law("secant", damping="beyond"))
+    elastic = [excess(law, 1.0) for law in LAW_OF_ENGINE.values()]
+    assert elastic == pytest.approx([elastic[0]] * 3, abs=1e-3)
+
+
+def test_partial_slip_is_cattaneos() -> None:
+    """Sheared under a fixed overlap the springs give F_t = mu F_n (1 - (1 - s/s_max)^(3/2)).
+
+    s_max = mu E* delta/G; Cattaneo 1938, Mindlin 1949.  Unloaded half way they slip twice as far.
+    """
+    mu, delta, stiffness, springs = 0.3, 0.8, 0.7, 4000
+    dx = delta**0.5 / springs
+    grip = mu * MODULUS * (delta - ((np.arange(springs) + 0.5) * dx) ** 2)
+    greatest = mu * MODULUS * delta / stiffness
+
+    def force(stretch: np.ndarray) -> float:
+        return float(2 * stiffness * dx * stretch.sum())
+
+    def cattaneo(shift: float) -> float:
+        return mu * delta**1.5 * (1 - (1 - min(shift / greatest, 1.0)) ** 1.5)
+
+    stretch = np.zeros((1, springs))
+    for share in (0.2, 0.6, 1.0, 1.4):
+        stretch = springs_sheared(
+            stretch, np.array([[share * greatest]]) - stretch.max(), grip, stiffness
+        )
+        assert force(stretch) == pytest.approx(cattaneo(share * greatest), rel=1e-5)
+    turned = springs_sheared(stretch, np.array([[-0.5 * greatest]]), grip, stiffness)
+    back = mu * delta**1.5 - 2 * cattaneo(0.25 * greatest)
+    assert force(turned) == pytest.approx(back, rel=1e-5)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.6])
+def test_partial_slip_ends_in_the_limits(mu: float) -> None:
+    """Sliding all the time gives 2 mu; without friction there is no impulse; odd in the slip."""
+    slip = mu * np.array([-40.0, 0.0, 40.0])
+    assert partial_slip_impulse(slip, mu, 1.2, 1000, 100) == pytest.approx(
+        [-2 * mu, 0, 2 * mu], rel=1e-3
+    )
+    assert not partial_slip_impulse(slip, 0.0, 1.2, 1000, 100).any()
+
+
+def test_partial_slip_converges_and_keeps_energy() -> None:
+    """Half the step moves it half as far; no impact gains energy along the tangent."""
+    slip = 0.3 * np.array([0.3, 1.0, 2.0, 4.0])
+    found = [partial_slip_impulse(slip, 0.3, 1.2, n, 200) for n in (500, 1000, 2000)]
+    moves = [np.abs(b - a).max() for a, b in pairwise(found)]
+    assert moves[1] < 0.6 * moves[0]
+    assert np.all(np.abs(slip - 3.5 * found[-1]) < slip)
+
+
+def test_partial_slip_is_the_published_curve() -> None:
+    """Finite elements and experiment, as read off the figures: within 4 % of their greatest."""
+    assert [check.name for check in published_checks() if not check.holds] == []
 
 
 def test_pull_is_what_eq_7_adds() -> None:
@@ -186,7 +263,13 @@ def test_sliding_law_changes_what_it_says() -> None:
     assert "limitForce on" in law_text("liggghts", "sliding", pair)
     yade = '{"damping_tangential": 0.2, "friction": 1}'
     assert law_text("yade", "sliding", yade) == '{"damping_tangential": 0.0, "friction": 1}'
+    assert "limitForce" not in law_text("liggghts", "undamped", pair)
+    assert "tangential_damping" not in law_text("liggghts", "unpulled", pair)
+    assert "limit_damping" not in law_text("lammps", "undamped", lammps)
+    assert "force 2 0.9 0.5" in law_text("lammps", "unpulled", lammps)
+    assert law_text("yade", "unpulled", yade) == yade
     assert restitution_given("yade", "sliding", 0.5) == 0.5
+    assert restitution_given("lammps", "undamped", 0.5) == 0.5
     assert restitution_given("lammps", "scene", 0.5) == 0.5
     assert restitution_given("lammps", "sliding", 0.5) < 0.5
 

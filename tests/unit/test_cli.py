@@ -36,8 +36,8 @@ def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str])
         main(["--help"])
     assert stop.value.code == 0
     text = capsys.readouterr().out
-    shipped = {"doctor", "new", "run", "resume", "status", "report", "fit", "relax"}
-    assert shipped | {"qdem", "rigid", "validate", "cite"} == set(trackbed.VERBS)
+    shipped = {"doctor", "new", "run", "resume", "status", "report", "export", "fit", "relax"}
+    assert shipped | {"sweep", "qdem", "rigid", "validate", "cite"} == set(trackbed.VERBS)
     for verb in trackbed.VERBS:
         assert f"\n    {verb}" in text
     codes = {
@@ -69,6 +69,7 @@ def test_help_loads_nothing_heavy() -> None:
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
     heavy = {"numpy", "scipy", "numba", "pydantic", "matplotlib", "rich", "meshio", "pandas"}
+    heavy |= {"dask", "distributed", "pyarrow"}
     assert not heavy & set(run.stdout.split())
 
 
@@ -89,6 +90,8 @@ def test_version() -> None:
         (["new", "karech", "x"], "did you mean karrech?"),
         (["validate", "no-such-case"], "no validation case"),
         (["run", "no-such-scene.toml"], "no-such-scene.toml"),
+        (["sweep", "no-such-scene.toml", "--into", "x"], "no-such-scene.toml"),
+        (["sweep", "no-such-scene.toml"], "required: --into"),
         (["run", "no-such-scene.toml", "--launcher", "mpirun 'x"], "--launcher"),
         (["status", "no-such-run"], "no-such-run"),
         (["resume", "no-such-run"], "no-such-run"),
@@ -127,6 +130,7 @@ def test_malformed_scene(content: bytes, tmp_path: Path) -> None:
         (errors.EngineFailed("x"), 5),
         (errors.DumpError("x"), 6),
         (errors.NotConverged("x"), 7),
+        (errors.SweepIncomplete("x"), 8),
         (errors.Interrupted("x"), 130),
         (KeyboardInterrupt(), 130),
         (PermissionError(13, "Permission denied", "there"), 2),

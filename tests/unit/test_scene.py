@@ -12,9 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adapters.engine import engine_named
+from adapters.engine_names import ENGINES, REAL_ENGINES
 from adapters.errors import SceneError, TrackbedError, UsageError
 from adapters.load_series import load_series_read
-from adapters.scene import ENGINES, Engine, Loading, Scene
+from adapters.scene import Engine, Loading, Scene
 from adapters.scene_file import key_lines, scene_load
 from scenes import scene_names, scene_path, scene_template, scene_verb
 
@@ -63,7 +65,7 @@ def scene_or_refusal(path: Path) -> Scene | None:
 def test_shipped_scenes_load_without_doubts() -> None:
     """Every scene that ships is valid and free of warnings, on whichever engine there is."""
     names = [name for name in scene_names() if scene_verb(name) == "run"]
-    assert names == ["karrech", "karrech-coarse", "karrech-partial"]
+    assert names == ["cluster", "karrech", "karrech-coarse", "karrech-partial"]
     for name in names:
         scene = scene_load(Path(__file__).parents[2] / "scenes" / f"{name}.toml")
         assert scene.warnings == ()
@@ -133,9 +135,11 @@ def test_every_key_of_the_models_is_explained(tmp_path: Path) -> None:
 
 
 def test_engine_names_agree() -> None:
-    """ENGINES lists the names that the engine table accepts."""
+    """The engine table accepts every name, and every name has its file and class."""
     for name in ENGINES:
         assert Engine(name=name, rayleigh_share=0.2).name == name  # type: ignore[arg-type]
+    for name in (*REAL_ENGINES, "fake"):
+        assert engine_named(name).name == name
 
 
 @settings(max_examples=60, deadline=None)

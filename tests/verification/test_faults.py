@@ -572,7 +572,7 @@ def test_wrong_version(
     """A program of that name that is another, or too old: exit code 4 with its own words."""
     install(programs, banner)
     assert liggghts(scene) == 4
-    assert "not LIGGGHTS-PUBLIC 3.8 or later" in capsys.readouterr().err
+    assert "not LIGGGHTS 3.8 or later" in capsys.readouterr().err
 
 
 def test_launcher_missing(scene: Path, programs: Path, capsys: pytest.CaptureFixture[str]) -> None:

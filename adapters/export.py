@@ -1,0 +1,34 @@
+"""A run in the formats of other tools: VTU for ParaView, dumps for OVITO, STL of walls, CSV.
+
+A file holds what the scene names: without friction there is no tangential force, without load
+cycles no displacement and no piston.  Cycles inside a jump have no state, only its end has.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from adapters.errors import UsageError
+from adapters.export_instants import ExportedRun
+from adapters.export_meshes import stl_export, vtu_export
+from adapters.export_tables import csv_export, ovito_export
+from adapters.run_folder import disk_full_named
+
+FORMATS = {"vtu": vtu_export, "ovito": ovito_export, "stl": stl_export, "csv": csv_export}
+"""Name of a format -> function of the run, a folder and the cycles between two instants."""
+
+
+def export_run(run: ExportedRun, to: str, into: Path, every: int = 1) -> list[Path]:
+    """Write a run to the folder ``into`` in the format ``to``, one of `FORMATS`.
+
+    ``every``: cycles between two instants; the first and the last one are always among them.
+    Files of an earlier export are replaced; none is ever half-written.  Returns what to open
+    first, then the rest.  Raises `UsageError`, and `EngineFailed` on a full disk.
+    """
+    if to not in FORMATS:
+        raise UsageError(f"there is no format {to}", remedy=f"name one of {', '.join(FORMATS)}")
+    if every < 1:
+        raise UsageError(f"every {every} cycles is no step", remedy="give a whole number from 1 on")
+    with disk_full_named(into):
+        into.mkdir(parents=True, exist_ok=True)
+        return FORMATS[to](run, into, every)

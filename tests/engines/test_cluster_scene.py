@@ -1,0 +1,128 @@
+"""The scene of a million grains, small: same file, same decks, several processes."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters.engine import engine_named
+from adapters.errors import EngineMissing, SceneError
+from adapters.radii import grain_count_expected, radii_sample
+from adapters.sample import sample_start
+from adapters.scene import Scene
+from adapters.scene_file import scene_load
+from adapters.window import Window, window_read
+from scenes import scene_path
+from validation.engine_speed_windows import start_at_rest
+
+SMALL = (
+    "sample.count=60",
+    "sample.size_x=0.04",
+    "sample.size_y=0.02",
+    "material.grain.young=1e8",
+    "loading.piston_mass=0.02",
+    "loading.frequency=1000.0",
+)
+"""What the tests change: fewer and softer grains, and cycles of a hundred steps."""
+YIELDING = ("--oversubscribe", "--mca", "mpi_yield_when_idle", "1")
+"""Two processes on a machine with other work: who waits lets the other go on."""
+LAUNCHERS = {
+    "liggghts": ("mpirun", *YIELDING, "-np", "2"),
+    "lammps": ("mpiexec", "-n", "2"),
+}
+
+
+def launcher_of(engine: str) -> tuple[str, ...]:
+    """The words that start two processes of an engine; skips where one of the two is not here."""
+    try:
+        engine_named(engine).version()
+    except EngineMissing as error:
+        pytest.skip(str(error))
+    words = LAUNCHERS[engine]
+    here = str(Path(sys.executable).parent)
+    found = shutil.which(words[0], path=here if engine == "lammps" else None)
+    if found is None:
+        pytest.skip(f"{words[0]} is not here")
+    return (found, *words[1:])
+
+
+def computed(engine_name: str, launcher: tuple[str, ...], folder: Path) -> Window:
+    """A cycle of rain, then two load cycles, each stage a fresh run of the scene's decks."""
+    words = ", ".join(f'"{word}"' for word in launcher)
+    overrides = (*SMALL, f'engine.name="{engine_name}"', f"engine.launcher=[{words}]")
+    scene = scene_load(scene_path("cluster"), overrides)
+    radius = radii_sample(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    position, _ = sample_start(radius, scene.container, 0.15, scene.sample.seed)
+    start = start_at_rest(scene, position, radius, folder / "rain")
+    engine, window = engine_named(engine_name), folder / "window"
+    window.mkdir()
+    digests = engine.write_cycles(scene, start, 2, window)
+    engine.run(scene, "in.cycles", window, lambda: None, digests)
+    names = engine.wall_names(scene, piston=True)
+    return window_read(window, 0, names, start.piston_height)
+
+
+def grids(folder: Path) -> set[str]:
+    """How the processes of each stage share the box."""
+    screens = [(folder / stage / "screen.txt").read_text() for stage in ("rain", "window")]
+    return {grid for text in screens for grid in re.findall(r"(\d by \d by \d) MPI", text)}
+
+
+@pytest.mark.engine("liggghts")
+@pytest.mark.parametrize("engine", LAUNCHERS)
+def test_small_on_two_processes(engine: str, tmp_path: Path) -> None:
+    """Two processes share the bed as columns, and compute what one does."""
+    two = computed(engine, launcher_of(engine), tmp_path / "two")
+    one = computed(engine, (), tmp_path / "one")
+    assert grids(tmp_path / "two") == {"2 by 1 by 1"}
+    assert np.array_equal(two.identifier, one.identifier)
+    np.testing.assert_allclose(two.position, one.position, rtol=0, atol=1e-9)
+    assert np.abs(one.position[-1] - one.position[0]).max() > 1e-4  # something went on
+
+
+@pytest.mark.engine("liggghts")
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="mpirun is not installed")
+def test_srun_takes_the_number_of_processes_from_the_job(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The scene's own launcher: one word before the command; here a stand-in for SLURM's."""
+    srun = tmp_path / "srun"
+    words = " ".join(("mpirun", *YIELDING))
+    srun.write_text(f'#!/bin/sh\nexec {words} -np "$SLURM_NTASKS" "$@"\n')
+    srun.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("SLURM_NTASKS", "2")
+    launcher = scene_load(scene_path("cluster")).engine.launcher
+    assert launcher == ("srun",)
+    computed("liggghts", launcher, tmp_path)
+    assert grids(tmp_path) == {"2 by 1 by 1"}
+
+
+def test_yade_has_no_use_for_srun() -> None:
+    """It would run as often as the job has processes, in one folder."""
+    with pytest.raises(SceneError, match="one process"):
+        scene_load(scene_path("cluster"), ['engine.name="yade"'])
+
+
+def test_what_the_scene_says_of_itself() -> None:
+    """A million grains fill a third of a metre; piston mass and load an area are the paper's."""
+    cluster, paper = (scene_load(scene_path(name)) for name in ("cluster", "karrech"))
+    law = cluster.sample.grain_radius.law
+    assert grain_count_expected(law, cluster.container, 1 / 3) == pytest.approx(1e6, rel=0.02)
+
+    def mass_an_area(scene: Scene) -> float:
+        assert scene.loading is not None
+        return scene.loading.piston_mass / scene.container.area
+
+    assert mass_an_area(cluster) == pytest.approx(mass_an_area(paper), rel=0.03)
+    for table in ("material", "loading"):
+        one, other = (getattr(scene, table).model_dump() for scene in (cluster, paper))
+        one.pop("piston_mass", None)
+        other.pop("piston_mass", None)
+        assert one == other

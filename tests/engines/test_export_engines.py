@@ -1,0 +1,77 @@
+"""What an engine wrote opens in OVITO and meshio as it is; a run's export in all their tools."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+import adapters.meshio_dump  # noqa: F401  registers the format
+from adapters.export import export_run
+from adapters.export_instants import exported_run
+from adapters.state import state_load
+from tests.engine_sample import SECOND, Sample
+
+VECTORS = {"Particle Identifier", "Position", "Velocity", "Angular Velocity", "Radius", "Mass"}
+"""Properties of OVITO that it makes of the columns of ``states.dump``."""
+
+
+def engine_dump(sample: Sample) -> Path:
+    """``states.dump`` of the settled bed, as the engine left it."""
+    return sample.run / "preparation" / "states.dump"
+
+
+def test_dump_opens_in_meshio(sample: Sample) -> None:
+    """Every digit, and the walls' forces as vectors."""
+    mesh = meshio.read(engine_dump(sample))
+    state = state_load(sample.run / "preparation" / "state.npz")
+    assert np.array_equal(mesh.points, state.position)
+    assert np.array_equal(mesh.point_data["v"], state.velocity)
+    assert np.array_equal(mesh.point_data["omega"], state.spin)
+    assert np.array_equal(mesh.point_data["radius"], state.radius)
+    for name, force in state.wall_force.items():
+        assert np.array_equal(mesh.point_data[f"f_force_{name}"], force)
+
+
+def test_dumps_open_in_ovito(sample: Sample) -> None:
+    """Grains with the properties OVITO knows, the rain as a film, contacts as bonds."""
+    pytest.importorskip("ovito")
+    from ovito.io import import_file
+    from ovito.modifiers import LoadTrajectoryModifier
+
+    folder = sample.run / "preparation"
+    pipeline = import_file(str(folder / "states.dump"))
+    contacts = LoadTrajectoryModifier()
+    width = 12 if sample.scene.material.grain.friction else 6
+    columns = ["Particle Identifiers.1", "Particle Identifiers.2", *(f"c{i}" for i in range(3))]
+    columns += [f"d{i}" for i in range(width - 5)]
+    contacts.source.load(str(folder / "contacts.dump"), columns=columns)
+    pipeline.modifiers.append(contacts)
+    data = pipeline.compute(pipeline.source.num_frames - 1)
+    state = state_load(folder / "state.npz")
+    assert set(data.particles.keys()) >= VECTORS
+    # OVITO's reader of numbers is quick, and may be wrong in the last digit.
+    np.testing.assert_allclose(data.particles.positions[...], state.position, rtol=1e-15)
+    assert data.attributes["Timestep"] == state.time_step
+    assert (data.particles.bonds.count if data.particles.bonds else 0) == len(state.contacts)
+    rain = import_file(str(folder / "rain.dump"))
+    assert rain.compute(0).particles.count == 40
+    assert sample.name == "fake" or rain.source.num_frames > 10
+
+
+def test_export_opens(sample: Sample, tmp_path: Path) -> None:
+    """Forces of contacts and places of grains are the engine's own, in VTK's reader."""
+    pyvista = pytest.importorskip("pyvista")
+    export_run(exported_run(sample.run), "vtu", tmp_path, every=5)
+    state = sample.window(SECOND).state(-1)
+    grains = pyvista.read(tmp_path / "vtu" / f"grains_{state.cycle:06d}.vtu")
+    assert np.array_equal(grains.points, state.position)
+    lines = pyvista.read(tmp_path / "vtu" / f"contacts_{state.cycle:06d}.vtu")
+    assert lines.n_cells == len(state.contacts)
+    if sample.name != "fake":
+        push = np.linalg.norm(state.contacts.normal_force, axis=1)
+        assert np.abs(lines["normal_force"]) == pytest.approx(push, rel=1e-9)
+        assert np.mean(lines["normal_force"] > 0) > 0.8
+        assert np.array_equal(lines["tangential_force"], state.contacts.tangential_force)

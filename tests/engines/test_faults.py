@@ -1,0 +1,322 @@
+"""Faults on purpose, the same on every engine: the same error, the same exit code, nothing lost.
+
+What an engine wrote is replayed and damaged where no engine has to work for it; faults of a process
+are done to a real one.  After each the run goes on and ends in the table of the undisturbed run.
+"""
+
+from __future__ import annotations
+
+import resource
+import signal
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trackbed
+from adapters import engine_lammps
+from adapters.dump import Frame, dump_frames, dump_write
+from adapters.engine import engine_named
+from adapters.errors import EngineMissing, TrackbedError
+from adapters.procedure import run_scene
+from adapters.run_folder import RunFolder
+from adapters.scene import Scene
+from tests.engine_sample import (
+    AFTER,
+    FIRST,
+    JUMP,
+    QUIET,
+    SECOND,
+    Damage,
+    Sample,
+    fake_damaged,
+)
+
+PREPARATION = "preparation"
+LOST = {PREPARATION: (PREPARATION, "window_*", "jump_*"), SECOND: (SECOND, AFTER, "jump_*")}
+"""A stage that is to fail, and all that comes after it."""
+KEPT = {PREPARATION: [], SECOND: [PREPARATION, FIRST]}
+
+
+def real(sample: Sample) -> None:
+    """Go on only with an engine that has a program."""
+    if sample.name == "fake":
+        pytest.skip("the fake engine has no program")
+
+
+def check_failure(
+    sample: Sample, run: Path, code: int, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The run ends with an exit code and a sentence on what to do, and is no bug of ours."""
+    capsys.readouterr()
+    assert trackbed.main(sample.words(run)) == code
+    text = capsys.readouterr().err
+    assert said in text
+    assert "\n  -> " in text
+    assert "bug in trackbed" not in text
+
+
+def check_goes_on(sample: Sample, run: Path) -> None:
+    """Without the fault the run ends in the table of the undisturbed one."""
+    sample.replayed(run)
+    assert trackbed.main(sample.words(run)) == 0
+    assert (run / "settlement.csv").read_bytes() == sample.table
+
+
+# --- what an engine may leave, with exit code 0 ----------------------------------------------
+
+
+def last_frame(change: Callable[[Frame], Frame]) -> Damage:
+    """Change the last frame of ``states.dump``."""
+
+    def damage(folder: Path) -> None:
+        *before, last = dump_frames(folder / "states.dump")
+        dump_write(folder / "states.dump", [*before, change(last)])
+
+    return damage
+
+
+def with_value(column: str, value: float) -> Damage:
+    """Another value for grain 7."""
+
+    def change(frame: Frame) -> Frame:
+        values = frame.values.copy()
+        values[6, frame.columns.index(column)] = value
+        return replace(frame, values=values)
+
+    return last_frame(change)
+
+
+def without_grain(frame: Frame) -> Frame:
+    return replace(frame, values=np.delete(frame.values, 6, axis=0))
+
+
+def lost_from_the_start(folder: Path) -> None:
+    frames = list(dump_frames(folder / "states.dump"))
+    dump_write(folder / "states.dump", [without_grain(frame) for frame in frames])
+
+
+def cut(name: str, share: float) -> Damage:
+    """A file that ends early, as on a full disk."""
+
+    def damage(folder: Path) -> None:
+        content = (folder / name).read_bytes()
+        (folder / name).write_bytes(content[: int(share * len(content))])
+
+    return damage
+
+
+def piston_nan(folder: Path) -> None:
+    lines = (folder / "piston.txt").read_text().splitlines()
+    words = lines[-5].split()
+    lines[-5] = " ".join([*words[:2], "nan", *words[3:]])
+    (folder / "piston.txt").write_text("\n".join(lines) + "\n")
+
+
+def without_file(name: str) -> Damage:
+    return lambda folder: (folder / name).unlink()
+
+
+LEFT: dict[str, tuple[str, Damage, int, str]] = {
+    "nan": (SECOND, with_value("z", np.nan), 6, "column z of grain 7 is nan"),
+    "nan in the rain": (PREPARATION, with_value("vx", np.nan), 6, "column vx of grain 7 is nan"),
+    "nan of the piston": (SECOND, piston_nan, 6, "piston's record is not finite"),
+    "lost grain": (SECOND, last_frame(without_grain), 6, "lost grains: 7"),
+    "lost in the rain": (PREPARATION, lost_from_the_start, 6, "1 of 40 grains are lost"),
+    "flying grain": (SECOND, with_value("z", 1e3), 6, "mean move in one cycle"),
+    "states cut": (SECOND, cut("states.dump", 0.6), 6, "the file ends inside"),
+    "no piston": (SECOND, without_file("piston.txt"), 5, "left no piston.txt"),
+}
+"""Stage, damage to what the engine left there, exit code, words."""
+
+
+@pytest.mark.parametrize("fault", LEFT)
+def test_what_an_engine_leaves_is_judged(
+    sample: Sample,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    fault: str,
+) -> None:
+    """Nan, lost and flying grains, files cut short: named, though the engine ended well."""
+    stage, damage, code, said = LEFT[fault]
+    run = sample.copy(tmp_path / "run", *LOST[stage])
+    with monkeypatch.context() as patch:
+        fake_damaged(patch, damage, stage)
+        sample.replayed(run, damage, stage)
+        check_failure(sample, run, code, said, capsys)
+    assert RunFolder(run).stage_names() == KEPT[stage]
+    if fault in ("nan", "lost in the rain"):
+        check_goes_on(sample, run)
+
+
+def test_absurd_time_step_is_not_credible(
+    sample: Sample, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fifty Rayleigh times a step: whatever the engine makes of it ends in a typed error."""
+    real(sample)
+    monkeypatch.setattr(Scene, "time_step", 50 * sample.scene.rayleigh_time)
+    monkeypatch.setattr(Scene, "steps_per_cycle", 100)
+    with pytest.raises(TrackbedError) as caught:
+        run_scene(sample.file, tmp_path / "run", overrides=sample.overrides, progress=QUIET)
+    assert caught.value.exit_code in (5, 6, 7), caught.value
+    assert RunFolder(tmp_path / "run").outcomes() == []
+
+
+# --- faults of a process ----------------------------------------------------------------------
+
+STARTED = "while ! test -s screen.txt; do sleep 0.01; done; sleep 0.05"
+"""Wait until the engine has said something, and works."""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_engine_killed(
+    sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str], number: signal.Signals
+) -> None:
+    """An engine that someone else ends is named; nothing before it is lost, no jump is blamed."""
+    real(sample)
+    run = sample.copy(tmp_path / "run", AFTER)
+    sample.fault(run, f'"$@" & {STARTED}; kill -{number.value} $!; wait $!; exit $?')
+    check_failure(sample, run, 5, f"was ended by {number.name}", capsys)
+    assert RunFolder(run).stage_names() == [PREPARATION, FIRST, SECOND, JUMP]
+    assert not RunFolder(run).failure(JUMP)
+    check_goes_on(sample, run)
+
+
+def test_full_disk(sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An engine that may write no more; with room again the run goes on.
+
+    A limit of 4 KiB on the size of files stands for the disk.
+    """
+    run = sample.copy(tmp_path / "run", *LOST[SECOND])
+    # MPI's own large files go, so that the first to be too large is the engine's.
+    plain = "export PMIX_MCA_gds=hash OMPI_MCA_btl=self; ulimit -f 8"
+    sample.fault(run, f'{plain}; exec "$@"')
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    if sample.name == "fake":  # it writes from this process
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
+    try:
+        check_failure(sample, run, 5, "", capsys)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert RunFolder(run).stage_names() == KEPT[SECOND]
+    check_goes_on(sample, run)
+
+
+@pytest.mark.engine("yade")
+@pytest.mark.parametrize("sample", ["yade"], indirect=True)
+def test_disk_with_too_little_room_for_a_saved_scene(
+    sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """YADE would write on a full disk for ever: its script asks for the room before.
+
+    200 KiB are enough for each dump, and not for what is asked.
+    """
+    run = sample.copy(tmp_path / "run", *LOST[SECOND])
+    sample.fault(run, 'ulimit -f 400; exec "$@"')
+    check_failure(sample, run, 5, "File too large", capsys)
+    assert RunFolder(run).stage_names() == KEPT[SECOND]
+
+
+# --- no program, another one, no MPI ----------------------------------------------------------
+
+OLD = {
+    "liggghts": "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.1.0, compiled long ago)",
+    "lammps": "Large-scale Atomic/Molecular Massively Parallel Simulator - 29 Sep 2021 - Update 2",
+    "yade": "Yade version: 2021.01a",
+}
+"""What versions say of themselves that are too old."""
+
+
+def on_path(sample: Sample, folder: Path, monkeypatch: pytest.MonkeyPatch, says: str) -> None:
+    """Nothing on the PATH but a program of the engine's name that says this; "" for none."""
+    program = folder / sample.name
+    if says:
+        program.write_text(f"#!/bin/sh\necho '{says}'\n")
+        program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(folder))
+    words = [str(program)] if says else None
+    monkeypatch.setattr(engine_lammps, "lammps_program", lambda: words)
+
+
+@pytest.mark.parametrize("stage", [PREPARATION, SECOND])
+def test_missing_program(
+    sample: Sample,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    stage: str,
+) -> None:
+    """A machine without the engine, at the start or when a run goes on: how to get it."""
+    real(sample)
+    run = sample.copy(tmp_path / "run", *LOST[stage])
+    with monkeypatch.context() as patch:
+        on_path(sample, tmp_path, patch, "")
+        check_failure(sample, run, 4, "is not installed", capsys)
+        with pytest.raises(EngineMissing, match="install"):
+            engine_named(sample.name).version()
+    if stage == SECOND:
+        check_goes_on(sample, run)
+
+
+@pytest.mark.parametrize("says", ["old", "something else", " "])
+def test_wrong_version(
+    sample: Sample,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    says: str,
+) -> None:
+    """A program of that name that is too old, or another one, or mute: with its own words."""
+    real(sample)
+    run = sample.copy(tmp_path / "run", *LOST[SECOND])
+    answer = OLD[sample.name] if says == "old" else says
+    told = {"old": r"3\.1\.0|29 Sep 2021|2021\.01a", " ": "it says: nothing"}.get(says, says)
+    with monkeypatch.context() as patch:
+        on_path(sample, tmp_path, patch, answer)
+        check_failure(sample, run, 4, "or later; it says: ", capsys)
+        with pytest.raises(EngineMissing, match=told):
+            engine_named(sample.name).version()
+
+
+@pytest.mark.parametrize(
+    ("launcher", "code", "said"),
+    [
+        ("no-such-mpirun -np 2", 4, "can not start no-such-mpirun"),
+        ("sh -c 'echo not enough slots; exit 1' sh", 5, "not enough slots"),
+        ("sh -c 'exit 0' sh", 5, "no sentinel line"),
+    ],
+)
+def test_no_mpi(
+    sample: Sample,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    launcher: str,
+    code: int,
+    said: str,
+) -> None:
+    """A launcher that is missing, refuses, or starts nothing."""
+    real(sample)
+    words = ["run", str(sample.file), "--run-folder", str(tmp_path / "run")]
+    for override in sample.overrides:
+        if "launcher" not in override:
+            words += ["--set", override]
+    assert trackbed.main([*words, "--launcher", launcher]) == code
+    text = capsys.readouterr().err
+    assert said in text
+    assert "\n  -> " in text
+    assert RunFolder(tmp_path / "run").stage_names() == []
+
+
+def test_mpi_of_another_kind(
+    sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A launcher of another MPI starts two whole runs in one folder: ended as soon as seen."""
+    real(sample)
+    run = sample.copy(tmp_path / "run", *LOST[SECOND])
+    sample.fault(run, f"cat {sample.raw}/{SECOND}.said {sample.raw}/{SECOND}.said; sleep 60")
+    check_failure(sample, run, 5, "2 runs of the engine started", capsys)
+    assert RunFolder(run).stage_names() == KEPT[SECOND]
+    check_goes_on(sample, run)

@@ -1,0 +1,133 @@
+"""What the YADE scripts must do, case by case, where tests/engines/test_yade.py does not say it."""
+
+from __future__ import annotations
+
+import ast
+import json
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adapters import contact_law as law
+from tests.engines.test_yade import ALPHA, Bed
+from validation.few_grains import RADIUS, table_1
+from validation.few_grains_yade import track_run
+from validation.yade_scale import SEAM_MEAN, seam_force, seam_length
+
+SCRIPTS = [path for path in files("yade_scripts").iterdir() if path.name.endswith(".py")]
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
+def test_scripts_need_nothing_but_python_numpy_and_yade(script: Path) -> None:
+    """They run by hand where nothing of this project is installed."""
+    allowed = {*sys.stdlib_module_names, "numpy", "yade", "bed", "record"}
+    for node in ast.walk(ast.parse(script.read_text(encoding="utf-8"))):
+        names = []
+        if isinstance(node, ast.Import):
+            names = [each.name for each in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names = [node.module or ""]
+        assert {name.split(".")[0] for name in names} <= allowed
+
+
+def test_a_load_cycle_is_one_call_of_the_engine() -> None:
+    """Every ``O.run`` waits 40 ms: the loop over the cycles holds one, and no other loop does."""
+    tree = ast.parse((files("yade_scripts") / "cycles.py").read_text(encoding="utf-8"))
+    loops = [node for node in ast.walk(tree) if isinstance(node, ast.For | ast.While)]
+    calls = [
+        [c for c in ast.walk(loop) if isinstance(c, ast.Call) and ast.unparse(c.func) == "O.run"]
+        for loop in loops
+    ]
+    over_cycles = ["cycles" in ast.unparse(getattr(loop, "iter", loop)) for loop in loops]
+    assert [len(found) for found in calls] == [int(yes) for yes in over_cycles]
+    assert sum(over_cycles) == 1
+
+
+def test_nothing_damps_but_contacts() -> None:
+    """A grain that touches nothing keeps velocity and step: no numerical damping, a fixed step."""
+    scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
+    step, speed = 1e-6, 0.3
+    track = track_run(
+        scene,
+        np.array([[0.02, 0.02, 0.03]]),
+        np.array([[0.0, speed, 0.0]]),
+        ["fix motion all nve/sphere", "run 300"],
+        time_step=step,
+    )
+    assert np.all(track.velocity[:, 0] == [0.0, speed, 0.0])
+    moved = np.diff(track.position[:, 0, 1])
+    assert moved == pytest.approx(np.full(300, speed * step), rel=1e-7)
+
+
+def seam_floor(text: str) -> str:
+    """Parameters whose floor is two triangles that share the edge x = 0.02."""
+    content = json.loads(text)
+    far = 0.2
+    corners = [[0.02, -far, 0.0], [0.02, far, 0.0]]
+    place = next(i for i, wall in enumerate(content["walls"]) if wall["name"] == "floor")
+    floor = {"name": "floor", "material": "wall"}
+    sides = [floor | {"vertices": [*corners, [x, 0.0, 0.0]]} for x in (-far, far)]
+    content["walls"] = [sides[0], *content["walls"][:place], *content["walls"][place + 1 :]]
+    content["walls"].append(sides[1] | {"name": "other_half"})
+    return json.dumps(content)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.5])
+def test_two_triangles_push_as_derived(share: float) -> None:
+    """Within a contact radius of their seam both push: 1 + (1 - s^2/a^2)^(3/2) times a plane.
+
+    A grain held at an overlap of 1e-6 m, ``share`` contact radii a from the seam.  The second
+    triangle pushes along a line a/R = 0.025 off the normal, 3e-4 of the force: bar 1e-3.
+    """
+    scene = table_1("material.grain.restitution=1.0")
+    overlap = 1e-6
+    radius = np.sqrt(2 * RADIUS * overlap)
+    place = np.array([[0.02 + share * radius, 0.02, RADIUS - overlap]])
+    track = track_run(
+        scene, place, np.zeros((1, 3)), ["run 1"], time_step=1e-9, materials=seam_floor
+    )
+    flat = float(law.normal_force(overlap, scene.stiffness.wall, RADIUS))
+    expected = flat * float(seam_force(share * radius, radius))
+    assert track.force[0, 0, 2] == pytest.approx(expected, rel=1e-3)
+
+
+def test_mean_of_the_seam_force() -> None:
+    """Over the strip of a contact radius on either side the excess is 3 pi/16 on average."""
+    distance = np.linspace(-1, 1, 200_001)
+    assert np.mean(seam_force(distance, 1.0)) - 1 == pytest.approx(SEAM_MEAN, abs=1e-5)
+
+
+def test_seams_are_the_edges_of_two_triangles() -> None:
+    """A unit square of two triangles has its diagonal; half of it where only x > 0.5 counts."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    triangles = corners[[[0, 1, 2], [2, 3, 0]]]
+    assert seam_length(triangles, lambda p: p[:, 0] >= 0) == pytest.approx(np.sqrt(2))
+    half = seam_length(triangles, lambda p: p[:, 0] > 0.5)
+    assert half == pytest.approx(np.sqrt(0.5), rel=1e-3)
+
+
+def test_partial_piston_moves_by_its_forces(tmp_path: Path) -> None:
+    """M dv/dt = F_contact - F_target for a piston over 0.4 of the section, pushing none beyond.
+
+    The least load is not zero, so that it touches the bed at the cycle ends too.
+    """
+    bed = Bed(tmp_path, "loading.area_share=0.4", "loading.amplitude=5e3")
+    scene = bed.scene
+    assert scene.loading is not None
+    window = bed.computed(bed.after(), 1, "steps", track_steps=1)
+    track = window.piston
+    velocity = np.diff(track.height) / scene.time_step
+    force = (track.contact_force - track.target_force)[1:-1]
+    change = scene.loading.piston_mass * np.diff(velocity) / scene.time_step
+    noise = scene.loading.piston_mass * 4e-16 * track.height.max() / scene.time_step**2
+    assert change == pytest.approx(force, abs=4 * noise)
+    target = scene.stress_at(track.time_step / scene.steps_per_cycle) * scene.loaded_area
+    assert track.target_force == pytest.approx(target, abs=1e-9 * target.max())
+    pushed = window.wall_force["piston"].any(axis=2)
+    distance = np.hypot(window.position[..., 0], window.position[..., 1])
+    # On the edge a grain is touched from as far as its overlap lets it.
+    assert distance[pushed].max() < scene.piston_reach + 0.2 * window.radius.max()
+    assert np.mean(distance > scene.piston_reach + 0.2 * window.radius.max()) > 0.2

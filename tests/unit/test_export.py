@@ -1,0 +1,421 @@
+"""`trackbed export`: each file is opened by the Python reader of the tool it is for."""
+
+from __future__ import annotations
+
+import json
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import meshio
+import numpy as np
+import pytest
+
+import trackbed
+from adapters.container import Container, sides_needed
+from adapters.errors import EngineFailed
+from adapters.export import FORMATS, export_run
+from adapters.export_instants import ExportedRun, exported_run
+from adapters.export_walls import container_triangles, piston_triangles
+from adapters.procedure import run_scene
+from adapters.progress import Progress
+from adapters.report_record import record_read
+from adapters.scene_file import scene_load
+from adapters.state import Contacts, State
+from adapters.window import PistonTrack, Window
+from scenes import scene_template
+
+CYCLES = [0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
+"""Instants of the fixture's run, which jumps from 5 to 7."""
+TINY = (
+    'engine.name="fake"',
+    "sample.radius=0.018",
+    "sample.count=40",
+    "procedure.k_i=2",
+    "procedure.k=3",
+    "procedure.h=2",
+    "procedure.healing_cycles=1",
+    "procedure.total_cycles=11",
+)
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("scene") / "scene.toml"
+    path.write_text(scene_template("karrech-coarse"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(scene_file: Path) -> Path:
+    """A finished run of forty grains on the engine without mechanics."""
+    folder = scene_file.parent / "run"
+    run_scene(scene_file, folder, overrides=TINY, progress=Progress(quiet=True))
+    return folder
+
+
+def table(run: Path) -> dict[int, dict[str, float]]:
+    """Rows of ``settlement.csv`` by cycle."""
+    lines = (run / "settlement.csv").read_text().splitlines()
+    names = lines[0].split(",")
+    rows = [dict(zip(names, line.split(","), strict=True)) for line in lines[1:]]
+    wanted = ("settlement", "coordination_number", "piston_height")
+    return {int(row["cycle"]): {name: float(row[name]) for name in wanted} for row in rows}
+
+
+class Bed:
+    """Two pairs of grains over one cycle in place of a run: what a `Track` is asked for."""
+
+    DISTANCE = 1.9e-3
+    FORCE = 0.25
+    """How hard a pair pushes [N]."""
+
+    def __init__(self, friction: float, contacts: bool = True) -> None:
+        x = self.DISTANCE * np.array([[0, 0, 1], [1, 0, 1], [0, 3, 1], [0, 3, 2]], float)
+        push = np.array([[-self.FORCE, 0, 0], [0, 0, -self.FORCE]])
+        drag = np.array([[0, 0.1, 0], [0.03, 0.04, 0]]) * (friction > 0)
+        number, radius = np.array([3, 5, 6, 9]), np.full(4, 1e-3)
+        pair, count = np.array([[3, 5], [6, 9]]), 2 if contacts else 0
+        self.contacts = Contacts(
+            pair[:count], np.full(count, 1e-4), push[:count], drag[:count], drag[:count]
+        )
+        still = np.zeros((4, 3))
+        start = State(number, x, radius, 1e-5 + still[:, 0], still, still, self.contacts)
+        moved = np.array([x, x - [0, 0, 1e-5]])
+        self.window_made = Window(
+            0, np.array([0, 50]), number, radius, start.mass, moved, moved, moved, {},
+            (self.contacts, self.contacts), PistonTrack(np.array([25, 50]), *np.ones((5, 2))), 2.0,
+        )  # fmt: skip
+        self.start = lambda: start
+        self.windows = [("window_000000", SimpleNamespace(first_cycle=0, last_cycle=1))]
+
+    def window(self, name: str) -> Window:
+        return self.window_made
+
+
+def bed(scene_file: Path, friction: float, contacts: bool = True) -> ExportedRun:
+    scene = scene_load(scene_file, (*TINY, f"material.grain.friction={friction}"))
+    return ExportedRun(scene, Bed(friction, contacts))  # type: ignore[arg-type]
+
+
+# --- VTU ------------------------------------------------------------------------------------
+
+
+def test_paraview_series(run: Path, tmp_path: Path) -> None:
+    """VTK's reader: an instant a cycle, only the fields asked for, means those of the table."""
+    pyvista = pytest.importorskip("pyvista")
+    export_run(exported_run(run), "vtu", tmp_path)
+    series = pyvista.get_reader(str(tmp_path / "grains.pvd"))
+    assert series.time_values == CYCLES
+    start = None
+    for cycle in CYCLES:
+        series.set_active_time_value(cycle)
+        grains = series.read()[0]
+        assert grains.array_names == ["id", "radius", "displacement", "velocity", "coordination"]
+        assert grains.n_points == grains.n_cells == 40
+        start = grains.points if start is None else start
+        np.testing.assert_allclose(grains["displacement"], grains.points - start, atol=1e-16)
+        if cycle:
+            row = table(run)[cycle]
+            assert grains["coordination"].mean() == row["coordination_number"]
+            settled = -grains["displacement"][:, 2].mean()
+            assert settled == pytest.approx(row["settlement"], rel=1e-9)
+
+
+def test_meshio_reads_the_same(run: Path, tmp_path: Path) -> None:
+    """meshio's reader gives back every digit."""
+    every = {instant.cycle: instant for instant in exported_run(run).instants()}
+    export_run(exported_run(run), "vtu", tmp_path)
+    for cycle in CYCLES:
+        mesh = meshio.read(tmp_path / "vtu" / f"grains_{cycle:06d}.vtu")
+        assert np.array_equal(mesh.points, every[cycle].state.position)
+        assert np.array_equal(mesh.point_data["radius"], every[cycle].state.radius)
+        assert np.array_equal(mesh.point_data["displacement"], every[cycle].displacement)
+
+
+@pytest.mark.parametrize("friction", [0.5, 0.0])
+def test_contacts_are_lines(scene_file: Path, tmp_path: Path, friction: float) -> None:
+    """Lines join the centres; pushing is positive; without friction there is no such field."""
+    pyvista = pytest.importorskip("pyvista")
+    export_run(bed(scene_file, friction), "vtu", tmp_path)
+    lines = pyvista.read(tmp_path / "vtu" / "contacts_000001.vtu")
+    assert lines.n_cells == 2
+    sizes = lines.compute_cell_sizes()["Length"]
+    assert sizes == pytest.approx([Bed.DISTANCE, Bed.DISTANCE], rel=1e-12)
+    assert lines["normal_force"] == pytest.approx([Bed.FORCE, Bed.FORCE], rel=1e-12)
+    names = ["normal_force", "tangential_force"] if friction else ["normal_force"]
+    assert list(lines.cell_data.keys()) == names
+    assert meshio.read(tmp_path / "vtu" / "contacts_000001.vtu").cells_dict["line"].tolist() == [
+        [0, 1], [2, 3],
+    ]  # fmt: skip
+
+
+def test_bed_without_contacts(scene_file: Path, tmp_path: Path) -> None:
+    """A gas of grains has a file of contacts without lines, which VTK reads."""
+    pyvista = pytest.importorskip("pyvista")
+    export_run(bed(scene_file, 0.5, contacts=False), "vtu", tmp_path)
+    assert pyvista.read(tmp_path / "vtu" / "contacts_000001.vtu").n_cells == 0
+    for to in ("ovito", "csv"):
+        export_run(bed(scene_file, 0.5, contacts=False), to, tmp_path)
+    assert (tmp_path / "contacts.csv").read_text().splitlines() == [
+        "cycle,id1,id2,normal_force,tangential_force_x,tangential_force_y,tangential_force_z"
+    ]
+
+
+# --- STL ------------------------------------------------------------------------------------
+
+CONTAINERS = {
+    "quarter": Container("cylinder", ("x", "y"), radius=0.02),
+    "half": Container("cylinder", ("y",), radius=0.02),
+    "whole": Container("cylinder", radius=0.02),
+    "planes": Container("cylinder", ("x", "y"), radius=0.02, sides=40),
+    "box": Container("box", size_x=0.03, size_y=0.02),
+    "mirrored box": Container("box", ("x",), size_x=0.03, size_y=0.02),
+}
+GRAIN, HEIGHT = 3.2e-3, 0.05
+"""Mean radius of the grains and height of the walls [m]."""
+
+
+def areas(triangles: np.ndarray) -> np.ndarray:
+    """Twice the vector areas of triangles, shape (t, 3)."""
+    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+
+
+@pytest.mark.parametrize("name", CONTAINERS)
+def test_container_is_closed_but_for_mirrors_and_top(name: str) -> None:
+    """Every inner edge has two triangles; open edges lie in mirrors or at the top."""
+    container = CONTAINERS[name]
+    triangles = container_triangles(container, HEIGHT, GRAIN)
+    edges: dict[tuple, int] = {}
+    for triangle in triangles.round(12) + 0.0:
+        for a, b in ((0, 1), (1, 2), (2, 0)):
+            edge = tuple(sorted((tuple(triangle[a]), tuple(triangle[b]))))
+            edges[edge] = edges.get(edge, 0) + 1
+    assert set(edges.values()) <= {1, 2}
+    mirrors = ["xy".index(axis) for axis in container.symmetry]
+    for edge in (edge for edge, count in edges.items() if count == 1):
+        ends = np.array(edge)
+        open_ = [np.all(ends[:, 2] == HEIGHT)] + [np.all(ends[:, axis] == 0) for axis in mirrors]
+        assert any(open_), edge
+
+
+@pytest.mark.parametrize("name", CONTAINERS)
+def test_container_has_its_area_and_faces_the_grains(name: str) -> None:
+    """Floor and walls against closed forms; normals point at a grain in the middle.
+
+    Chords of N sides miss (2 pi / N)^2 / 6 of a circle's area and a quarter of that of its length.
+    """
+    container = CONTAINERS[name]
+    triangles = container_triangles(container, HEIGHT, GRAIN)
+    double = areas(triangles)
+    size = np.linalg.norm(double, axis=1) / 2
+    floor = np.abs(double[:, 2]) > 0
+    sides = container.sides or sides_needed(container.radius, GRAIN) if name[-3:] != "box" else 4
+    share = (2 * np.pi / sides) ** 2 / 6 if name[-3:] != "box" else 1e-12
+    assert size[floor].sum() == pytest.approx(container.area, rel=1.1 * share)
+    length = {"box": 2 * (0.03 + 0.02), "mirrored box": 2 * 0.03 + 0.02}.get(
+        name, 2 * np.pi * 0.02 / 2 ** len(container.symmetry)
+    )
+    assert size[~floor].sum() == pytest.approx(length * HEIGHT, rel=1.1 * share)
+    inside = np.array([0.011, 0.009, 0.02])
+    assert np.all(np.einsum("ta,ta->t", inside - triangles[:, 0], double) > 0)
+
+
+def test_planes_are_those_of_the_engine() -> None:
+    """Where planes stand for the cylinder, every side of the STL lies in one of them."""
+    container = CONTAINERS["planes"]
+    triangles = container_triangles(container, HEIGHT, GRAIN)
+    walls = container.walls()
+    upright = triangles[areas(triangles)[:, 2] == 0]
+    gap = np.einsum("tcpa,pa->tcp", upright[:, :, None] - walls.plane_point, walls.plane_normal)
+    assert np.abs(gap).max(axis=1).min(axis=1) == pytest.approx(0, abs=1e-15)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.8])
+def test_piston_faces_down(share: float) -> None:
+    """The whole section or the part under load, normals down."""
+    container = CONTAINERS["quarter"]
+    reach = np.inf if share == 1 else container.radius * np.sqrt(share)
+    double = areas(piston_triangles(container, reach, GRAIN))
+    assert np.all(double[:, 2] < 0)
+    sides = sides_needed(min(container.radius, reach), GRAIN)
+    area = -double[:, 2].sum() / 2
+    assert area == pytest.approx(share * container.area, rel=1.1 * (2 * np.pi / sides) ** 2 / 6)
+
+
+def test_stl_opens(run: Path, tmp_path: Path) -> None:
+    """VTK's and meshio's readers; the piston is where the table has it."""
+    pyvista = pytest.importorskip("pyvista")
+    export_run(exported_run(run), "stl", tmp_path)
+    assert pyvista.read(tmp_path / "container.stl").n_cells > 10
+    start = exported_run(run).track.window("window_000000").piston_start
+    for cycle in CYCLES:
+        path = tmp_path / "stl" / f"piston_{cycle:06d}.stl"
+        face = pyvista.read(path)
+        height = table(run)[cycle]["piston_height"] if cycle else start
+        assert face.points[:, 2] == pytest.approx(height, rel=1e-6)  # STL has single precision
+        assert len(meshio.read(path).cells_dict["triangle"]) == face.n_cells
+
+
+# --- OVITO and CSV --------------------------------------------------------------------------
+
+
+def test_ovito(run: Path, tmp_path: Path) -> None:
+    """OVITO's reader knows every column, and takes the cycle for the time step."""
+    pytest.importorskip("ovito")
+    from ovito.io import import_file
+
+    export_run(exported_run(run), "ovito", tmp_path)
+    pipeline = import_file(str(tmp_path / "grains.dump"))
+    assert pipeline.source.num_frames == len(CYCLES)
+    for frame, cycle in enumerate(CYCLES):
+        data = pipeline.compute(frame)
+        assert data.attributes["Timestep"] == cycle
+        names = set(data.particles.keys()) - {"Velocity Magnitude", "Displacement Magnitude"}
+        assert names == {
+            "Particle Identifier", "Position", "Radius", "Displacement", "Velocity", "Coordination",
+        }  # fmt: skip
+    assert np.mean(data.particles["Coordination"]) == table(run)[11]["coordination_number"]
+
+
+def test_ovito_bonds(scene_file: Path, tmp_path: Path) -> None:
+    """Contacts are bonds between the right grains, with the magnitudes of their forces."""
+    pytest.importorskip("ovito")
+    from ovito.io import import_file
+    from ovito.modifiers import LoadTrajectoryModifier
+
+    export_run(bed(scene_file, 0.5), "ovito", tmp_path)
+    pipeline = import_file(str(tmp_path / "grains.dump"))
+    contacts = LoadTrajectoryModifier()
+    columns = ["Particle Identifiers.1", "Particle Identifiers.2", "normal", "tangential"]
+    contacts.source.load(str(tmp_path / "contacts.dump"), columns=columns)
+    pipeline.modifiers.append(contacts)
+    assert " vx vy vz" in (tmp_path / "grains.dump").read_text().splitlines()[8]
+    data = pipeline.compute(1)
+    assert np.array_equal(data.particles["Velocity"], data.particles.positions)  # as made
+    bonds = data.particles.bonds
+    assert bonds.topology[...].tolist() == [[0, 1], [2, 3]]
+    assert bonds["normal"][...] == pytest.approx([Bed.FORCE, Bed.FORCE])
+    assert bonds["tangential"][...] == pytest.approx([0.1, 0.05])
+
+
+def test_csv_reads_back(run: Path, tmp_path: Path) -> None:
+    """Every number comes back bit for bit; the piston's samples are all there."""
+    exported = exported_run(run)
+    export_run(exported, "csv", tmp_path)
+    grains = np.genfromtxt(tmp_path / "grains.csv", delimiter=",", names=True)
+    instants = list(exported.instants())
+    assert np.array_equal(np.unique(grains["cycle"]), CYCLES)
+    for name, axis in (("x", 0), ("z", 2)):
+        expected = np.concatenate([instant.state.position[:, axis] for instant in instants])
+        assert np.array_equal(grains[name], expected)
+    moved = np.concatenate([instant.displacement[:, 2] for instant in instants])
+    assert np.array_equal(grains["displacement_z"], moved)
+    piston = np.genfromtxt(tmp_path / "piston.csv", delimiter=",", names=True)
+    assert piston.dtype.names == ("cycle", "target_force", "contact_force", "height")
+    ends = np.isin(piston["cycle"], CYCLES)
+    computed = [cycle for cycle in CYCLES[1:] if cycle != 7]
+    assert np.array_equal(piston["cycle"][ends], computed)
+    heights = [table(run)[cycle]["piston_height"] for cycle in computed]
+    assert np.array_equal(piston["height"][ends], heights)
+
+
+# --- the verb -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_verb(run: Path, tmp_path: Path, to: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Files and their size as JSON; again into the same folder gives the same bytes."""
+    words = ["export", str(run), "--to", to, "--into", str(tmp_path / "out"), "--json"]
+    assert trackbed.main(words) == 0
+    answer = json.loads(capsys.readouterr().out)
+    files = [Path(path) for path in answer["files"]]
+    assert set(files) == {path for path in (tmp_path / "out").rglob("*") if path.is_file()}
+    assert answer["bytes"] == sum(path.stat().st_size for path in files)
+    before = [path.read_bytes() for path in files]
+    assert trackbed.main(words) == 0
+    assert [path.read_bytes() for path in files] == before
+
+
+def test_every(run: Path, tmp_path: Path) -> None:
+    """Multiples of N, the first and the last; 7 is the end of a jump."""
+    words = ["export", str(run), "--to", "vtu", "--into", str(tmp_path), "--every", "3"]
+    assert trackbed.main(words) == 0
+    found = sorted(path.name[-7:-4] for path in (tmp_path / "vtu").glob("grains_*"))
+    assert found == ["000", "003", "009", "011"]
+
+
+def test_default_folder_is_no_run(scene_file: Path, tmp_path: Path) -> None:
+    """What is exported beside a run is not taken for one of its variants."""
+    run = tmp_path / "run"
+    overrides = (*TINY, "procedure.total_cycles=4")
+    run_scene(scene_file, run, overrides=overrides, progress=Progress(quiet=True), control=True)
+    assert trackbed.main(["export", str(run), "--to", "csv"]) == 0
+    assert trackbed.main(["export", str(run), "--to", "csv", "--variant", "control"]) == 0
+    one, other = run / "export" / "grains.csv", run / "control" / "export" / "grains.csv"
+    assert one.read_bytes() == other.read_bytes()  # nothing was jumped in four cycles
+    record = record_read(run)
+    assert record.control is not None
+    assert record.others == ()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--to", "vtu", "--every", "0"], "every 0 cycles"),
+        (["--to", "vtu", "--variant", "contrl"], "no run contrl"),
+    ],
+)
+def test_refusals(
+    run: Path, words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Wrong use is exit code 2 and a sentence."""
+    assert trackbed.main(["export", str(run), *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_nothing_to_export(tmp_path: Path, run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No run folder, and a run that is not prepared yet."""
+    assert trackbed.main(["export", str(tmp_path), "--to", "vtu"]) == 2
+    for name in ("manifest.json", "scene.toml"):
+        (tmp_path / name).write_bytes((run / name).read_bytes())
+    assert trackbed.main(["export", str(tmp_path), "--to", "vtu"]) == 2
+    assert "not prepared yet" in capsys.readouterr().err
+
+
+def test_unloaded_scene_has_no_piston(scene_file: Path, run: Path, tmp_path: Path) -> None:
+    """A run that is only prepared: one instant, no displacement, no piston."""
+    prepared = replace(exported_run(run), track=SimpleNamespace(
+        windows=[], start=exported_run(run).track.start
+    ))  # fmt: skip
+    for to in FORMATS:
+        export_run(prepared, to, tmp_path)
+    names = {path.name for path in tmp_path.rglob("*") if path.is_file()}
+    assert not {name for name in names if "piston" in name}
+    assert "displacement" not in (tmp_path / "grains.csv").read_text()
+    assert "displacement" not in (tmp_path / "vtu" / "grains_000000.vtu").read_text()
+
+
+@contextmanager
+def disk_of(size: int) -> Iterator[None]:
+    """No file may become larger than ``size`` bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_full_disk(run: Path, tmp_path: Path, to: str) -> None:
+    """Exit code 5's error, no part of a file, and what was there before stays."""
+    first = export_run(exported_run(run), to, tmp_path, every=100)
+    before = {path: path.read_bytes() for path in first}
+    with disk_of(512), pytest.raises(EngineFailed, match="disk is full"):
+        export_run(exported_run(run), to, tmp_path)
+    assert not list(tmp_path.rglob("*partial*"))
+    assert {path: path.read_bytes() for path in first} == before
