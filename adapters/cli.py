@@ -59,7 +59,7 @@ def doctor_command(arguments: argparse.Namespace) -> int:
     else:
         for one in found:
             version = one.version or ("missing" if one.remedy else "yes")
-            print(f"{one.kind:9}{one.name:16}{version:24}{one.where}".rstrip())
+            print(f"{one.kind:9}{one.name:16}{version:28}  {one.where}".rstrip())
             if one.remedy:
                 print(f"{'':9}-> {one.remedy}")
     if not engine_usable(found):

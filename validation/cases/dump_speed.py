@@ -152,9 +152,9 @@ def read_pandas_round_trip(path: str) -> Any:
 
 
 def read_ovito(path: str) -> Any:
-    from ovito.io import import_file  # type: ignore[import-not-found]
+    from ovito.io import import_file
 
-    pipeline = import_file(path, sort_particles=True)
+    pipeline: Any = import_file(path, sort_particles=True)
     frames = [pipeline.compute(frame) for frame in range(pipeline.source.num_frames)]
     return np.array(frames[-1].particles.positions[:, 0])
 
