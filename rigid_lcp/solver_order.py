@@ -21,6 +21,8 @@
                      They end after the effort that `FALLBACK_SHARE` names, or before they begin
                      where a linear programme proves that there is no solution.  Extrapolated
                      points again go on from the best
+                     Where friction is above 10, problems of less come first, each the start of the
+                     next
     islands          what is still not solved, each island apart, by all of this (large problems
                      of few islands at once)
 
@@ -74,6 +76,8 @@ times what was spent before them, or so many flops (some seconds) if that is mor
 DRIFT, DRIFT_FLOPS = 1500, 5e9
 """Factorisations of extrapolated points before the paths, and their cost in all (or so much as was
 spent before, if that is more)."""
+FRICTION_STEPS = (10.0, 30.0, 100.0, 300.0)
+"""Coefficients of friction at which greater ones stop on their way."""
 DRIFT_PATHS = (
     Path(rounding=0.3, compliance=1e-4),
     Path(rounding=1e-3, compliance=1e-4, lagged=True),
@@ -99,10 +103,11 @@ def attempts(
     accept: float = 0.0,
     *,
     paths: bool = True,
+    by_friction: bool = True,
 ) -> Trial:
     """All methods in this order until one reaches ``tolerance``, or ``accept`` where the problem is
     large; the trial holds the best point.  ``paths``: whether the dear ones at the end are tried
-    too."""
+    too; ``by_friction``: and great friction come to in steps."""
     trial = Trial(problem, start, tolerance)
     if trial.best.solved:
         trial.sharpen()
@@ -140,9 +145,32 @@ def attempts(
         return trial
     if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
         return trial
-    if paths:
+    if paths and not (by_friction and friction_steps(trial)):
         fallback_paths(trial, accept)
     return trial
+
+
+def friction_steps(trial: Trial) -> bool:
+    """Friction above 10 (contacts that all but can not slide, beside others that can) in steps,
+    each from the forces of the step before; whether the tolerance is reached.
+
+    The steeper a cone is, the less of its inside a path or a sweep sees; a little steeper one holds
+    most of the forces of the last.
+    """
+    problem, start = trial.problem, None
+    for most in FRICTION_STEPS:
+        if not problem.friction.max(initial=0.0) > most:
+            break
+        eased = replace(problem, friction=np.minimum(problem.friction, most))
+        found = attempts(eased, start, trial.tolerance, by_friction=False).best
+        if not found.solved:
+            return False
+        start = found.r
+    if start is not None:
+        trial.keep(
+            attempts(problem, start, trial.tolerance, paths=False).solution(), "friction in steps"
+        )
+    return trial.best.solved
 
 
 def fallback_paths(trial: Trial, accept: float) -> None:

@@ -20,6 +20,8 @@ from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.problem_files import read_problem
 from rigid_lcp.solver import solve_auto
 from rigid_lcp.solver_cold import CONVEX_STEPS
+from rigid_lcp.solver_order import friction_steps
+from rigid_lcp.solver_trial import Trial
 from validation.rigid_packings import packing
 
 FOLDER = Path(os.environ.get("TRACKBED_DATA", "")) / "friction_problems"
@@ -262,3 +264,15 @@ def test_real_problems(path):
     else:
         found = solve_auto(read_problem(path))
     assert found.residual <= 1e-12, found.message
+
+
+def test_friction_of_a_thousand_beside_none_is_come_to_in_steps(monkeypatch):
+    """A bed whose contacts have friction 0.5 but for a fifth with none and a tenth with 1,000."""
+    problem = packing(60, 2, seed=3, friction=0.5)
+    draw = np.random.default_rng(11).random(problem.contacts)
+    mixed = np.where(draw < 0.2, 0.0, np.where(draw > 0.9, 1000.0, 0.5))
+    hard = friction_problem(problem.bodies, problem.offset, mixed, 2)
+    trial = Trial(hard, None, 1e-12)
+    assert friction_steps(trial)
+    assert hard.residual(trial.best.r) <= 1e-12
+    assert not friction_steps(Trial(problem, None, 1e-12))  # nothing to come to
