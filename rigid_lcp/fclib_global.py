@@ -14,11 +14,14 @@ from scipy.sparse.linalg import splu
 
 from rigid_lcp.body_matrix import diagonal_blocks
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction_problem import (
+    BODY_SIZE,
+    BodySpace,
+    FrictionProblem,
+    friction_problem,
+)
 
 Floats = NDArray[np.float64]
-BODY_SIZE = {2: 3, 3: 6}
-"""Freedoms of a body by dimension."""
 
 
 def problem_by_masses(

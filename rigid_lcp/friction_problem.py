@@ -30,6 +30,8 @@ MOST_FRICTION = 1e6
 """Largest coefficient of friction [-]: the residual shows ``rho |u_N| / mu`` of an approach."""
 SHARE_LEFT = 0.1
 """Part of the error without forces that a solution may leave, where its forces are huge [-]."""
+BODY_SIZE = {2: 3, 3: 6}
+"""Freedoms of a body by dimension."""
 ROUND_OFF = 1e-15
 """Relative round-off of a force: what it leaves even where the residual is zero [-]."""
 

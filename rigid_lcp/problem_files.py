@@ -26,12 +26,15 @@ from numpy.typing import NDArray
 from rigid_lcp.damaged_files import DAMAGED, part_lacking, problem_named
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.fclib_files import fclib_forces, fclib_problem
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction_problem import (
+    BODY_SIZE,
+    BodySpace,
+    FrictionProblem,
+    friction_problem,
+)
 from rigid_lcp.siconos_files import siconos_problem
 
 Floats = NDArray[np.float64]
-BODY_SIZE = {2: 3, 3: 6}
-"""Freedoms of a body by dimension."""
 SAME = 1e-8
 """W and its factors, both stored, differ by less than this share of the largest entry of W."""
 

@@ -9,8 +9,8 @@ W is, by the number before it (``NumericsMatrix.h``),
         each, and then each block with its number before it, values by columns
     2   sparse: columns as CSparse prints them (``cs_print``); values have six digits
 
-Problems by masses (GFC3D), with rolling (RFC3D) and by contact-less parts have other layouts and
-are refused: their numbers do not add up to W, q and mu.
+Problems by masses (GFC3D) and with rolling (RFC3D) have other layouts and are refused: their first
+numbers are not those of a dim of 2 or 3 and of a W that fits.
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ class _Numbers:
 
 
 def siconos_problem(path: Path) -> FrictionProblem:
-    """The problem of a ``.dat`` file.  Raises `ProblemError`."""
+    """The problem of a ``.dat`` file, in the units that it has.  Raises `ProblemError`, which says
+    which part of the file is wrong."""
     try:
         text = path.read_text(encoding="utf-8")
         matrix, q, mu, dim = _parts(text)
@@ -138,7 +139,7 @@ def _blocks(numbers: _Numbers, size: int) -> sp.csr_array:
 def _sparse(text: str, size: int) -> tuple[sp.csr_array, _Numbers]:
     """W of columns as printed, and the numbers after it."""
     columns = list(COLUMN.finditer(text))
-    if [int(each[1]) for each in columns] != list(range(size)):
+    if len(columns) != size or any(int(each[1]) != k for k, each in enumerate(columns)):
         raise ValueError(f"it prints {len(columns)} columns of W, not 0 to {size - 1} in order")
     row, value = [], []
     for k, each in enumerate(columns):

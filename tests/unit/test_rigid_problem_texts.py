@@ -107,6 +107,11 @@ TEXT_DAMAGED: dict[str, tuple[str, Callable[[str], str], str]] = {
     "lists": ("blocks", lambda text: text.replace("\n3\n3\n2\t4\t6", "\n3\n3\n2\t4\t5"), "lists"),
     "negative": ("dense", lambda text: text.replace("3", "-3", 1), "not all whole numbers"),
     "column lost": ("sparse", lambda text: text.replace("col 1 ", "kol 1 "), "5 columns of W"),
+    "huge": (
+        "sparse",
+        lambda text: "2\n2000000000\n2\n4000000000\n4000000000\n2\n",
+        "0 columns of W",
+    ),
     "far row": ("sparse", lambda text: text.replace("\n      0 :", "\n      9 :", 1), "row 9 of 6"),
     "NaN": ("dense", lambda text: text[: text.rindex(" ")] + " nan\n", "not finite"),
     "friction": ("dense", lambda text: text[: text.rindex(" ")] + " -1.0\n", "negative"),
