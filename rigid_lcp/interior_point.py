@@ -44,6 +44,7 @@ from rigid_lcp.lorentz_cones import (
     cone_scaling_square,
     cone_step,
 )
+from rigid_lcp.newton import contact_rho
 
 Floats = NDArray[np.float64]
 
@@ -130,10 +131,7 @@ class PathStep:
         self.unit[:, 0] = 1.0
         self.tangent = np.where(slides[:, None], 1.0, self.unit)  # r_T = 0 without friction
         speed = float(np.sqrt(np.mean(problem.offset**2))) or 1.0
-        if size == 0.0:  # what contacts would bear as springs, soft enough to share the load
-            identity = np.broadcast_to(np.eye(dim), (contacts, dim, dim)).copy()
-            springs = linear.factor(identity * (path.compliance / problem.rho), identity)
-            size = float(np.sqrt(np.mean(springs(-problem.offset) ** 2)))
+        size = size or spring_size(problem, linear, path.compliance)
         self.x = self.unit * (size or problem.rho * speed)
         self.s = self.unit * speed
         self.stretch = np.ones((contacts, dim))
@@ -142,6 +140,10 @@ class PathStep:
     def force(self) -> Floats:
         """r of the point x."""
         return (self.x / self.stretch).ravel()
+
+    def sigma(self) -> float:
+        """The mean of ``x . s`` as the path of `rigid_lcp.smoothed_path` measures it [N^2]."""
+        return float(np.mean(contact_rho(self.problem))) * float(path_gap(self.x, self.s))
 
     def take(self) -> float:
         """One predictor-corrector step; returns its length.  Raises `SingularSystem`."""
@@ -177,6 +179,15 @@ class PathStep:
             raise SingularSystem
         self.x, self.s = x + length * dx, s + length * ds
         return length
+
+
+def spring_size(problem: FrictionProblem, linear: Factorisation, compliance: float) -> float:
+    """Size of what contacts would bear as springs, soft enough to share the load: the root of the
+    mean square of r [N or N s] in ``(W + compliance / rho) r = -q``.  Raises `SingularSystem`."""
+    contacts, dim = problem.contacts, problem.dim
+    identity = np.broadcast_to(np.eye(dim), (contacts, dim, dim)).copy()
+    springs = linear.factor(identity * (compliance / problem.rho), identity)
+    return float(np.sqrt(np.mean(springs(-problem.offset) ** 2)))
 
 
 @njit(cache=True)

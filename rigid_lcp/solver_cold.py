@@ -28,6 +28,9 @@ BENT_STEPS, BENT_ROUNDING, BENT_USEFUL = 25, 0.3, 3e-6
 """Where that is not enough: steps with the term |u_T|, from where the convex path was left, to
 `BENT_USEFUL`, and Newton; if that fails, on to `HAND_OVER`, and Newton again.  Coming from there
 the path folds back seldom."""
+WIDER = 10.0
+"""sigma with which the smoothed path goes on from there, over that of the point: where the interior
+point has jammed, some contacts are far from its own."""
 HEAVY_STEPS, HEAVY_PATIENCE = 12, 5
 HEAVY_PATH, HEAVY_NEWTON = 20, 10
 """Where light bodies bear heavy ones: steps of Newton from the forces of sticking, steps along a
@@ -99,7 +102,7 @@ def convex_path(trial: Trial) -> bool:
             break
         steps -= int(found.work["iterations"])
         trial.newton(found.r, CONVEX_STEPS + 1, found.method, NEWTON_PATIENCE)
-    trial.path_end = found.r
+    trial.path_end, trial.path_point = found.r, (path.force(), WIDER * path.sigma())
     return trial.best.solved
 
 
@@ -122,7 +125,7 @@ def heavy_path(trial: Trial, stuck: Floats, finer: float) -> bool:
         trial.newton(found.r, HEAVY_NEWTON, found.method)
         if trial.best.solved:
             break
-    trial.path_end = found.r
+    trial.path_end, trial.path_point = found.r, (path.force(), WIDER * path.sigma())
     return trial.best.solved
 
 

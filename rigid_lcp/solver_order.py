@@ -42,11 +42,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.frictionless import frictionless
 from rigid_lcp.gauss_seidel import gauss_seidel, sweeper_of
 from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
 from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
+from rigid_lcp.smoothed_path import smoothed_path
 from rigid_lcp.solver_cold import CONVEX_CONTACTS, convex_start
 from rigid_lcp.solver_trial import FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
 from rigid_lcp.solver_warm import deep, yielding
@@ -73,6 +75,11 @@ DEAR_SWEEPS = 6000
 FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
 """What the paths of the interior point may cost in all before no further one is begun: so many
 times what was spent before them, or so many flops (some seconds) if that is more."""
+SMOOTHED_PATHS, SMOOTHED_STEPS = (1e-2, 1e-3, 1e-1), 150
+"""Roundings of the smoothed paths, and factorisations along each."""
+FIRST_DRIFT, SMOOTHED_DRIFT = 80, 150
+"""Factorisations of extrapolated points from where a smoothed path ends, when it is followed first
+and when little else is left."""
 DRIFT, DRIFT_FLOPS = 1500, 5e9
 """Factorisations of extrapolated points before the paths, and their cost in all (or so much as was
 spent before, if that is more)."""
@@ -122,6 +129,10 @@ def attempts(
     if convex_start(trial) if cold else trial.stick_if_likely():
         return trial
     if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
+        return trial
+    if trial.path_point is not None and smoothed(
+        trial, SMOOTHED_PATHS[0], FIRST_DRIFT, trial.path_point
+    ):
         return trial
     moving = not small and start is not None
     if moving and tolerance < HAND_OVER and not trial.dear and deep(trial, start, accept):
@@ -181,7 +192,9 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         trial.best = replace(trial.best, status="no solution")
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
-    if drift_from_paths(trial, most) or trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort)):
+    if smoothed_paths(trial, most) or drift_from_paths(trial, most):
+        return
+    if trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort)):
         return
     for path, sweeps in PATHS:
         if trial.effort > most or not trial.affordable:
@@ -198,6 +211,31 @@ def fallback_paths(trial: Trial, accept: float) -> None:
             return
     if not trial.drift(LAST_DRIFT, LAST_DRIFT_FLOPS) and trial.effort <= most:
         trial.sweep(None, LAST_SWEEPS)
+
+
+def smoothed_paths(trial: Trial, most: float) -> bool:
+    """`smoothed` along one path after another; none is begun after an effort of ``most``."""
+    for rounding in SMOOTHED_PATHS:
+        if trial.effort > most or not trial.affordable:
+            break
+        if smoothed(trial, rounding, SMOOTHED_DRIFT):
+            return True
+    return False
+
+
+def smoothed(
+    trial: Trial, rounding: float, drift: int, begin: tuple[Floats, float] | None = None
+) -> bool:
+    """The smoothed path of a ``rounding``, from the forces and sigma of ``begin`` if given; from its
+    end extrapolated points, ``drift`` factorisations of them."""
+    trial.linear = trial.linear or factorisation(trial.problem)
+    found = smoothed_path(
+        trial.problem, trial.tolerance, begin, linear=trial.linear, rounding=rounding,
+        factorisations=min(SMOOTHED_STEPS, trial.affordable),
+    )  # fmt: skip
+    trial.keep(found)
+    trial.sharpen()
+    return trial.best.solved or trial.drift(drift, DRIFT_FLOPS, found)
 
 
 def drift_from_paths(trial: Trial, most: float) -> bool:

@@ -63,6 +63,7 @@ class Trial:
         self.linear: Factorisation | None = None
         self.sweeper: Sweeper | None = None
         self.path_end: Floats | None = None
+        self.path_point: tuple[Floats, float] | None = None
         if start is not None:
             self.keep(friction_solution(problem, start, tolerance, "start"))
 

@@ -5,7 +5,7 @@ call goes on behind the last line.  ``--fresh`` begins a record anew, for the ki
 
 ``speed``     the settled bed on each engine, CPU time of two lengths, so that no start-up counts
 ``adapter``   a window of load cycles, the engine alone beside all that `trackbed` does for it
-              (``adapter-paper``: at the paper's stiffness, LIGGGHTS and LAMMPS)
+              (``adapter-paper``: at the paper's stiffness)
 ``accuracy``  Chung and Ooi's tests at several steps
 ``ranks``     the settled bed on 1 and 2 processes of MPI
 
@@ -53,8 +53,6 @@ ADAPTER_YOUNG = 1e9
 """Young's modulus of the grains [Pa] in the windows through trackbed: a frame every 5,500 steps,
 where the paper's grains need 37,200, so that its cost shows seven times as much."""
 ADAPTER_CYCLES = {"liggghts": 2, "lammps": 2, "yade": 1}
-
-PAPER_REPEATS = 3
 
 RANKS = {(3, 3): 300, (10, 9): 40}
 """Tiles along x and y -> steps."""
@@ -135,7 +133,7 @@ def adapter_rows(
 
 def adapter_paper_rows(work: Path, done: Done) -> Iterator[Row]:
     """`adapter_rows` at the paper's stiffness, one cycle."""
-    return adapter_rows(work, done, PAPER_REPEATS, YOUNG, dict.fromkeys(LAUNCHERS, 1))
+    return adapter_rows(work, done, REPEATS, YOUNG, dict.fromkeys(ADAPTER_CYCLES, 1))
 
 
 def accuracy_rows(work: Path, done: Done) -> Iterator[Row]:
