@@ -23,7 +23,8 @@ contacts on the path.  Where redundant contacts stick, the matrix of a step has 
 ``sigma / |x|^2`` for every self-stress; a small shift of W in it, not in F, bounds them and leaves
 the point what it is.
 
-The path of a non-monotone law may still fold; then the best point is given back, from which
+The path of a non-monotone law may still fold.  Then another rounding is gone on with, whose path
+folds elsewhere; and when none leads on the best point is given back, from which
 `rigid_lcp.extrapolated_points` often ends.
 """
 
@@ -43,16 +44,17 @@ Floats = NDArray[np.float64]
 
 COMPLIANCE = 1e-4
 """The path begins at forces as large as those of springs, ``(W + compliance / rho) r = -q``."""
-ROUNDING = 1e-2
-"""eps over ``sqrt(sigma) / rho`` [-]."""
-SHRINK, LESS = 0.3, 0.55
-"""sigma of the next point over that of the last, and where that was not found."""
+ROUNDINGS, HOPS = (1e-2, 1e-1, 1e-3), 6
+"""eps over ``sqrt(sigma) / rho``, the velocity of a sticking contact on the path [-].  Every one is
+another path; where one folds the next in turn is gone on with, so often at most."""
+SHRINK, LESS, BACK = 0.3, 0.55, 3.0
+"""sigma of the next point over that of the last, where that was not found, and on another path."""
 SHIFT = 1e-8
 """Of W in the matrices, over mean(diag W)."""
 FOUND = 0.03
 """A point is found where |F| is so small a part of ``sqrt(sigma nc)``."""
-STEPS, FIRST_STEPS = 10, 30
-"""Newton steps in which a point has to be found, and the first one."""
+STEPS, FIRST_STEPS = 10, 20
+"""Newton steps in which a point has to be found, and the first one of a path."""
 DECREASE, LEAST_STEP = 1e-2, 2e-3
 """Part of a step by which |F| has to fall; a step shorter than the second is none."""
 NEAR, END_STEPS, END_PATIENCE = 3e-8, 5, 3
@@ -67,17 +69,14 @@ def smoothed_path(
     *,
     linear: Factorisation | None = None,
     factorisations: int = FACTORISATIONS,
-    rounding: float = ROUNDING,
 ) -> FrictionSolution:
     """Follow the path from a great sigma until the residual is at or below ``tolerance``.
 
     ``begin``: forces r (nc * dim,) and sigma [N^2] of a point near the path, as another method left
     them; else it begins at the forces of springs.  ``linear``: factorisations of this problem's W,
-    made if not given; at most ``factorisations`` are spent.  ``rounding``: eps over
-    ``sqrt(sigma) / rho``, the velocity of a sticking contact on the path [-]; another one is
-    another path.  Some 40 to 100 factorisations solve most settled beds; for what sticks or hardly
-    slides `rigid_lcp.interior_point` and Newton need a third of that.  ``work``: ``points`` and
-    ``factorisations``.
+    made if not given; at most ``factorisations`` are spent.  Some 40 to 100 solve most settled
+    beds; for what sticks or hardly slides `rigid_lcp.interior_point` and Newton need a third of
+    that.  ``work``: ``points`` and ``factorisations``.
     """
     linear = linear or factorisation(problem)
     best, least = np.zeros(problem.offset.shape), np.inf
@@ -87,11 +86,11 @@ def smoothed_path(
     except SingularSystem:
         return friction_solution(problem, best, tolerance, "smoothed path", status="singular")
     found_force, found_sigma, shrink = force, sigma, 1.0
+    hops, most = 0, FIRST_STEPS
     while least > tolerance and spent < factorisations:
-        most = STEPS if points else FIRST_STEPS
         force, found, steps = smoothed_point(
             problem, found_force, shrink * found_sigma, linear, min(most, factorisations - spent),
-            rounding,
+            ROUNDINGS[hops % len(ROUNDINGS)],
         )  # fmt: skip
         spent += steps
         residual = problem.residual(force)
@@ -99,7 +98,7 @@ def smoothed_path(
             best, least = force, residual
         if found:
             found_force, found_sigma, points = force, shrink * found_sigma, points + 1
-            shrink = SHRINK
+            shrink, most = SHRINK, STEPS
             if tolerance < residual < NEAR:
                 ended = newton(
                     problem, force, tolerance, linear=linear, iterations=END_STEPS,
@@ -110,6 +109,8 @@ def smoothed_path(
                     best, least = ended.r, ended.residual
         elif shrink == SHRINK:
             shrink = LESS
+        elif hops < HOPS:
+            hops, shrink, most = hops + 1, BACK, FIRST_STEPS
         else:
             break
     return friction_solution(
@@ -131,7 +132,7 @@ def path_begin(problem: FrictionProblem, linear: Factorisation) -> tuple[Floats,
 
 def smoothed_point(
     problem: FrictionProblem, force: Floats, sigma: float, linear: Factorisation, steps: int,
-    rounding: float = ROUNDING,
+    rounding: float = ROUNDINGS[0],
 ) -> tuple[Floats, bool, int]:  # fmt: skip
     """Forces of the path's point at ``sigma`` [N^2], from ``force``: whether they were found, and
     the factorisations it took."""

@@ -75,11 +75,9 @@ DEAR_SWEEPS = 6000
 FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
 """What the paths of the interior point may cost in all before no further one is begun: so many
 times what was spent before them, or so many flops (some seconds) if that is more."""
-SMOOTHED_PATHS, SMOOTHED_STEPS = (1e-2, 1e-3, 1e-1), 150
-"""Roundings of the smoothed paths, and factorisations along each."""
-FIRST_DRIFT, SMOOTHED_DRIFT = 80, 150
-"""Factorisations of extrapolated points from where a smoothed path ends, when it is followed first
-and when little else is left."""
+SMOOTHED_STEPS, SMOOTHED_DRIFT = (150, 300), (80, 200)
+"""Factorisations along the smoothed path, and of extrapolated points from where it ends: from the
+end of the convex path, and later from the beginning."""
 DRIFT, DRIFT_FLOPS = 1500, 5e9
 """Factorisations of extrapolated points before the paths, and their cost in all (or so much as was
 spent before, if that is more)."""
@@ -130,9 +128,7 @@ def attempts(
         return trial
     if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
         return trial
-    if trial.path_point is not None and smoothed(
-        trial, SMOOTHED_PATHS[0], FIRST_DRIFT, trial.path_point
-    ):
+    if trial.path_point is not None and smoothed(trial, trial.path_point):
         return trial
     moving = not small and start is not None
     if moving and tolerance < HAND_OVER and not trial.dear and deep(trial, start, accept):
@@ -192,7 +188,7 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         trial.best = replace(trial.best, status="no solution")
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
-    if smoothed_paths(trial, most) or drift_from_paths(trial, most):
+    if smoothed(trial) or drift_from_paths(trial, most):
         return
     if trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort)):
         return
@@ -213,29 +209,18 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         trial.sweep(None, LAST_SWEEPS)
 
 
-def smoothed_paths(trial: Trial, most: float) -> bool:
-    """`smoothed` along one path after another; none is begun after an effort of ``most``."""
-    for rounding in SMOOTHED_PATHS:
-        if trial.effort > most or not trial.affordable:
-            break
-        if smoothed(trial, rounding, SMOOTHED_DRIFT):
-            return True
-    return False
-
-
-def smoothed(
-    trial: Trial, rounding: float, drift: int, begin: tuple[Floats, float] | None = None
-) -> bool:
-    """The smoothed path of a ``rounding``, from the forces and sigma of ``begin`` if given; from its
-    end extrapolated points, ``drift`` factorisations of them."""
+def smoothed(trial: Trial, begin: tuple[Floats, float] | None = None) -> bool:
+    """The smoothed path from the forces and sigma of ``begin``, or from the beginning, and from its
+    end extrapolated points."""
     trial.linear = trial.linear or factorisation(trial.problem)
+    later = begin is None
     found = smoothed_path(
-        trial.problem, trial.tolerance, begin, linear=trial.linear, rounding=rounding,
-        factorisations=min(SMOOTHED_STEPS, trial.affordable),
+        trial.problem, trial.tolerance, begin, linear=trial.linear,
+        factorisations=min(SMOOTHED_STEPS[later], trial.affordable),
     )  # fmt: skip
     trial.keep(found)
     trial.sharpen()
-    return trial.best.solved or trial.drift(drift, DRIFT_FLOPS, found)
+    return trial.best.solved or trial.drift(SMOOTHED_DRIFT[later], DRIFT_FLOPS, found)
 
 
 def drift_from_paths(trial: Trial, most: float) -> bool:

@@ -1,0 +1,161 @@
+"""The smoothed path: its map against plain NumPy, its points, and beds that it solves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rigid_lcp import smoothed_path as smoothed
+from rigid_lcp.body_factorisation import factorisation
+from rigid_lcp.friction_problem import FrictionProblem, friction_problem
+from rigid_lcp.interior_point import Path, interior_point
+from rigid_lcp.newton import contact_rho
+from rigid_lcp.smoothed_path import path_begin, smoothed_map, smoothed_path, smoothed_point
+from validation.rigid_packings import packing, tower
+
+Floats = NDArray[np.float64]
+
+
+def jordan_root(vector: Floats) -> Floats:
+    """Square root of the Jordan algebra of the Lorentz cone: of the eigenvalues ``v_0 +- |v_T|``."""
+    across = np.linalg.norm(vector[1:])
+    direction = vector[1:] / across if across > 0.0 else vector[1:]
+    high, low = np.sqrt(vector[0] + across), np.sqrt(vector[0] - across)
+    return np.concatenate([[0.5 * (high + low)], 0.5 * (high - low) * direction])
+
+
+def jordan_square(vector: Floats) -> Floats:
+    return np.concatenate([[vector @ vector], 2.0 * vector[0] * vector[1:]])
+
+
+def scaled(
+    force: Floats, velocity: Floats, mu: float, rho: float, eps: float
+) -> tuple[Floats, Floats]:
+    """x and s of one contact."""
+    squares = velocity[1:] @ velocity[1:]
+    x = np.concatenate([[mu * force[0]], force[1:]])
+    normal = velocity[0] / mu + squares / np.sqrt(squares + eps**2)
+    return x, rho * np.concatenate([[normal], velocity[1:]])
+
+
+def plain_map(
+    force: Floats, velocity: Floats, mu: Floats, rho: Floats, sigma: float, eps: float
+) -> Floats:
+    """The twin: F contact by contact."""
+    found = np.zeros_like(force)
+    for c in range(len(mu)):
+        if mu[c] == 0.0:
+            normal, speed = force[c, 0], rho[c] * velocity[c, 0]
+            found[c] = force[c]
+            found[c, 0] = normal + speed - np.sqrt((normal - speed) ** 2 + 4.0 * sigma)
+            continue
+        x, s = scaled(force[c], velocity[c], mu[c], rho[c], eps)
+        inside = jordan_square(x - s)
+        inside[0] += 4.0 * sigma
+        found[c] = x + s - jordan_root(inside)
+    return found
+
+
+def hostile(dim: int, seed: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Forces and velocities of 40 contacts, some without friction, some at rest, some at nothing."""
+    generator = np.random.default_rng(seed)
+    force, velocity = generator.standard_normal((2, 40, dim))
+    force[:4, 1:] = velocity[:4, 1:] = 0.0
+    force[4], velocity[5] = 0.0, 0.0
+    mu = generator.uniform(0.01, 3.0, 40)
+    mu[::7] = 0.0
+    return force, velocity, mu, generator.uniform(0.1, 10.0, 40)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("sigma", [1.0, 1e-6])
+def test_the_map_is_its_numpy_twin_and_its_derivatives_are_differences(
+    dim: int, sigma: float
+) -> None:
+    force, velocity, mu, rho = hostile(dim, 3)
+    eps = 0.3
+    found, by_force, by_velocity = smoothed_map(force, velocity, mu, rho, sigma, eps)
+    plain = plain_map(force, velocity, mu, rho, sigma, eps)
+    assert np.abs(found - plain).max() < 1e-12 * np.abs(plain).max()
+    step = 1e-6  # central differences: error step^2 / sigma^(1/2)^2 of curvature, and 1e-16 / step
+    for k in range(dim):
+        ahead = np.zeros_like(force)
+        ahead[:, k] = step
+        across = [
+            plain_map(force + sign * ahead, velocity, mu, rho, sigma, eps) for sign in (1, -1)
+        ]
+        assert np.allclose(by_force[:, :, k], (across[0] - across[1]) / (2 * step), atol=1e-4)
+        across = [
+            plain_map(force, velocity + sign * ahead, mu, rho, sigma, eps) for sign in (1, -1)
+        ]
+        difference = (across[0] - across[1]) / (2 * step)
+        assert np.allclose(by_velocity[:, :, k], difference, atol=1e-4, rtol=1e-4)
+
+
+@pytest.fixture(scope="module")
+def kicked() -> FrictionProblem:
+    """A settled bed of 150 spheres, friction 0.1, whose bodies were hit."""
+    still = packing(150, 3, seed=3, friction=0.1)
+    assert still.bodies is not None
+    hit = np.random.default_rng(3).standard_normal(still.bodies.jacobian.shape[1])
+    push = still.bodies.jacobian @ hit
+    push *= 0.3 * np.linalg.norm(still.offset) / np.linalg.norm(push)
+    made: FrictionProblem = friction_problem(still.bodies, still.offset + push, still.friction, 3)
+    return made
+
+
+def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(
+    kicked: FrictionProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``x o s = sigma e``: the product is sigma, and what is beside the axis nothing."""
+    monkeypatch.setattr(smoothed, "FOUND", 1e-9)
+    linear = factorisation(kicked)
+    force, sigma = path_begin(kicked, linear)
+    force, found, _ = smoothed_point(kicked, force, sigma, linear, 60)
+    assert found
+    rho = contact_rho(kicked)
+    eps = smoothed.ROUNDINGS[0] * np.sqrt(sigma) / rho.mean()
+    r, u = force.reshape(-1, 3), kicked.velocity(force).reshape(-1, 3)
+    for c in range(kicked.contacts):
+        x, s = scaled(r[c], u[c], kicked.friction[c], rho[c], eps)
+        assert x[0] > np.linalg.norm(x[1:]) and s[0] > np.linalg.norm(s[1:])
+        assert x @ s == pytest.approx(sigma, rel=1e-6)
+        size = np.sqrt(sigma) * max(np.linalg.norm(x), np.linalg.norm(s))
+        assert np.linalg.norm(x[0] * s[1:] + s[0] * x[1:]) < 1e-6 * size
+
+
+def test_it_solves_a_bed_on_which_the_interior_point_stops(kicked: FrictionProblem) -> None:
+    """Without any other method but Newton's at its end; the residual is the judge."""
+    found = smoothed_path(kicked)
+    assert found.solved and kicked.residual(found.r) <= 1e-12
+    jammed = interior_point(kicked, None, 1e-10, Path(compliance=1e-4))
+    assert jammed.residual > 1e-9
+
+
+def test_units_change_nothing(kicked: FrictionProblem) -> None:
+    """Velocities in mm/s and masses in tonnes: the same steps, and forces in other units."""
+    assert kicked.bodies is not None
+    w = kicked.bodies.matrix
+    found = [
+        smoothed_path(friction_problem(a * w, b * kicked.offset, kicked.friction, 3))
+        for a, b in ((1.0, 1.0), (1024.0, 2.0**-20))  # powers of two: no round-off
+    ]
+    assert found[0].solved and found[0].work == found[1].work
+    assert found[1].r == pytest.approx(2.0**-30 * found[0].r, rel=1e-9)
+
+
+def test_a_tower_and_contacts_without_friction_are_solved() -> None:
+    boxes = tower(10, 3)
+    smooth = boxes.friction.copy()
+    smooth[::2] = 0.0
+    assert boxes.bodies is not None
+    for friction in (boxes.friction, smooth, np.zeros_like(smooth)):
+        problem = friction_problem(boxes.bodies, boxes.offset, friction, 3)
+        assert smoothed_path(problem).residual < 1e-10
+
+
+def test_what_has_no_solution_ends_and_says_so() -> None:
+    """One contact that nothing can keep from approaching."""
+    problem = friction_problem(np.zeros((3, 3)), [-1.0, 0.0, 0.0], 0.5, 3)
+    assert not smoothed_path(problem).solved
