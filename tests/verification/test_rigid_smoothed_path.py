@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 def jordan_root(vector: Floats) -> Floats:
-    """Square root of the Jordan algebra of the Lorentz cone: of the eigenvalues ``v_0 +- |v_T|``."""
+    """Square root in the Jordan algebra of the Lorentz cone, by eigenvalues ``v_0 +- |v_T|``."""
     across = np.linalg.norm(vector[1:])
     direction = vector[1:] / across if across > 0.0 else vector[1:]
     high, low = np.sqrt(vector[0] + across), np.sqrt(vector[0] - across)
@@ -58,7 +58,7 @@ def plain_map(
 
 
 def hostile(dim: int, seed: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Forces and velocities of 40 contacts, some without friction, some at rest, some at nothing."""
+    """Forces and velocities of 40 contacts, some without friction, some at rest, some loose."""
     generator = np.random.default_rng(seed)
     force, velocity = generator.standard_normal((2, 40, dim))
     force[:4, 1:] = velocity[:4, 1:] = 0.0
@@ -119,7 +119,8 @@ def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(
     r, u = force.reshape(-1, 3), kicked.velocity(force).reshape(-1, 3)
     for c in range(kicked.contacts):
         x, s = scaled(r[c], u[c], kicked.friction[c], rho[c], eps)
-        assert x[0] > np.linalg.norm(x[1:]) and s[0] > np.linalg.norm(s[1:])
+        assert x[0] > np.linalg.norm(x[1:])
+        assert s[0] > np.linalg.norm(s[1:])
         assert x @ s == pytest.approx(sigma, rel=1e-6)
         size = np.sqrt(sigma) * max(np.linalg.norm(x), np.linalg.norm(s))
         assert np.linalg.norm(x[0] * s[1:] + s[0] * x[1:]) < 1e-6 * size
@@ -128,7 +129,8 @@ def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(
 def test_it_solves_a_bed_on_which_the_interior_point_stops(kicked: FrictionProblem) -> None:
     """Without any other method but Newton's at its end; the residual is the judge."""
     found = smoothed_path(kicked)
-    assert found.solved and kicked.residual(found.r) <= 1e-12
+    assert found.solved
+    assert kicked.residual(found.r) <= 1e-12
     jammed = interior_point(kicked, None, 1e-10, Path(compliance=1e-4))
     assert jammed.residual > 1e-9
 
@@ -141,7 +143,8 @@ def test_units_change_nothing(kicked: FrictionProblem) -> None:
         smoothed_path(friction_problem(a * w, b * kicked.offset, kicked.friction, 3))
         for a, b in ((1.0, 1.0), (1024.0, 2.0**-20))  # powers of two: no round-off
     ]
-    assert found[0].solved and found[0].work == found[1].work
+    assert found[0].solved
+    assert found[0].work == found[1].work
     assert found[1].r == pytest.approx(2.0**-30 * found[0].r, rel=1e-9)
 
 
