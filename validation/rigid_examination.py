@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -42,7 +41,7 @@ BAR_S = 1.0
 CLOSE_S, REPEATS = (0.5, 2.0), 5
 """Costs so close to the bar that other programs could decide are measured again, so often."""
 QUIET_LOAD = 1.6
-"""Load average up to which they are: one program beside this one, on two cores."""
+"""Load average up to which they are, unless told otherwise: little beside this, on two cores."""
 WAIT_S = 5.0
 
 Wait = Callable[[], None]
@@ -115,7 +114,7 @@ def is_close(row: Row) -> bool:
 def examine(
     path: Path, posed: Sequence[tuple[Family, int, int]], origin: Row, *, rival: bool = False,
     failed_only: bool = False, close: bool = False, save: Path | None = None,
-    wait: Wait = lambda: None,
+    load: float = QUIET_LOAD, wait: Wait = lambda: None,
 ) -> list[Row]:  # fmt: skip
     """Make the lines that the record at ``path`` has not, as `main` says; all its rows."""
     rows = {key(row): row for row in rows_read(path)}
@@ -136,7 +135,7 @@ def examine(
             if rival and "rival_ok" not in row:
                 wait()
                 row = rivalled(worker, row)
-            if close and is_close(row):
+            if close and is_close(row) and os.getloadavg()[0] <= load:
                 wait()
                 row = repeated(worker, row)
             if row is not before:
@@ -159,13 +158,11 @@ def told(row: Row) -> str:
     )
 
 
-def holding(hold: Path | None, load: float | None) -> Wait:
-    """Wait while the file is there, or while the load average is above ``load``."""
+def holding(hold: Path | None) -> Wait:
+    """Wait while the file is there."""
 
     def wait() -> None:
-        while (hold is not None and hold.exists()) or (
-            load is not None and os.getloadavg()[0] > load
-        ):
+        while hold is not None and hold.exists():
             time.sleep(WAIT_S)
 
     return wait
@@ -186,6 +183,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--rival", action="store_true", help="Clarabel + Newton as well")
     parser.add_argument("--failed-only", action="store_true", help="what did not pass, again")
     parser.add_argument("--close", action="store_true", help="costs near the bar, five times more")
+    parser.add_argument(
+        "--load", type=float, default=QUIET_LOAD, help="load average up to which --close measures"
+    )
     parser.add_argument("--save-failed", type=Path, help="folder for problems that did not pass")
     parser.add_argument("--hold", type=Path, help="nothing is begun while this file exists")
     asked = parser.parse_args(arguments)
@@ -197,13 +197,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     record = asked.record or (
         RECORD if asked.seed == SEED else Path(f"rigid-examination-{asked.seed}.jsonl")
     )
-    words = sys.argv[1:] if arguments is None else arguments
-    command = ["python", "-m", "validation.rigid_examination", *map(str, words)]
+    command = ["python", "-m", "validation.rigid_examination", "--seed", str(asked.seed)]
     origin = {name: value for name, value in provenance(command).items() if name in ORIGIN}
     rows = examine(
         record, list(tasks(asked.seed, asked.families, asked.count)), origin, rival=asked.rival,
         failed_only=asked.failed_only, close=asked.close, save=asked.save_failed,
-        wait=holding(asked.hold, QUIET_LOAD if asked.close else None),
+        load=asked.load, wait=holding(asked.hold),
     )  # fmt: skip
     mine = [row for row in rows if row["seed"] == asked.seed]
     print(f"{record}: {sum(map(passed, mine))} of {len(mine)} solved within {BAR_S:g} s")

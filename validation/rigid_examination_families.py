@@ -1,4 +1,4 @@
-"""The families of the examination, named before any run: what the bars hold for, and what is beyond.
+"""The families of the examination, named before any run: what bars hold for, and what is beyond.
 
 The bars of `solve_friction` were set on stored problems: piles, stacks, walls, packings, mechanisms
 of other people's simulations, up to some 1,300 contacts, with a W and friction that a simulation
