@@ -22,14 +22,15 @@ from rigid_lcp.solver import solve_friction
 from validation.rigid_examination_beds import Posed
 from validation.rigid_examination_families import family_named
 from validation.rigid_examination_judge import residual_extended
-from validation.rigid_peers import clarabel_newton, death_words
+from validation.rigid_peers import batch_size, clarabel_newton, death_words
 from validation.rigid_problems import bodies_anew
 
 Row = dict[str, Any]
 MAKE_S, SOLVE_S = 300.0, 60.0
 """Processor seconds to make a problem, and to solve it, after which the process is ended."""
 SHORT_S = 2.0
-"""A solve of less is timed a second time: the first loads the compiled code that it needs."""
+"""A solve of less is timed again, the shortest as means over `batch_size` runs: the first one loads
+the compiled code that it needs, and the clock may tick every 4 ms."""
 RIVAL_S = 5.0
 """Processor seconds that Clarabel + Newton is given."""
 SHARE_LEFT = 0.1
@@ -128,7 +129,7 @@ def _solved(posed: Posed) -> tuple[FrictionSolution, float]:
 def _solve(posed: Posed) -> Row:
     found, cost = _solved(posed)
     if cost < SHORT_S:
-        found, cost = _solved(posed)
+        cost = float(np.mean([_solved(posed)[1] for _ in range(batch_size(cost))]))
     residual, left = residual_extended(posed.problem, found.r)
     return {
         "residual": residual, "left": left, "own_residual": found.residual,
@@ -146,9 +147,16 @@ def _repeat(posed: Posed, repeats: int) -> Row:
 def _rival(posed: Posed) -> Row:
     found = clarabel_newton(posed.problem, posed.bar, RIVAL_S)
     assert found.force is not None
+    cost = found.cost_s or 0.0
+    if cost < SHORT_S:
+        again = [
+            clarabel_newton(posed.problem, posed.bar, RIVAL_S).cost_s or 0.0
+            for _ in range(batch_size(cost))
+        ]
+        cost = float(np.mean(again))
     residual, left = residual_extended(posed.problem, found.force)
     return {
-        "rival_residual": residual, "rival_s": found.cost_s,
+        "rival_residual": residual, "rival_s": cost,
         "rival_ok": residual <= posed.bar and left <= SHARE_LEFT,
     }  # fmt: skip
 

@@ -203,7 +203,7 @@ def bed_problem(made: Bed, step: float, *, gaps: bool = False) -> FrictionProble
     apart = bed_gaps(made)
     radius, first, second = made.radius, made.pairs[:, 0], made.pairs[:, 1]
     frames = bed_frames(made)
-    other = np.where(second < 0, 0.0, radius[second])
+    other = np.where(second < 0, 0.0, radius[np.maximum(second, 0)])
     jacobian = contact_jacobian(
         made.pairs, frames[:, 0], -radius[first, None] * frames[:, 0], other[:, None]
         * frames[:, 0], len(radius), made.dim, frames,
