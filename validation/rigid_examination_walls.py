@@ -92,4 +92,4 @@ def wall_masses(count: int, kind: str, ratio: float, generator: np.random.Genera
 def _row(k: int, columns: int, length: float) -> Floats:
     """Middles of the bricks of row k; odd rows are half a brick in, and one brick shorter."""
     odd = k % 2 if columns > 1 else 0
-    return length * (np.arange(columns - odd) + odd / 2)
+    return np.asarray(length * (np.arange(columns - odd) + odd / 2), dtype=float)

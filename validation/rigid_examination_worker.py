@@ -10,12 +10,14 @@ import math
 import multiprocessing
 import resource
 import time
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numba.core.event import install_recorder
 
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution
 from rigid_lcp.solver import solve_friction
@@ -29,8 +31,8 @@ Row = dict[str, Any]
 MAKE_S, SOLVE_S = 300.0, 60.0
 """Processor seconds to make a problem, and to solve it, after which the process is ended."""
 SHORT_S = 2.0
-"""A solve of less is timed again, the shortest as means over `batch_size` runs: the first one loads
-the compiled code that it needs, and the clock may tick every 4 ms."""
+"""A solve of less, or one in which code was compiled, is timed again, the shortest as means over
+`batch_size` runs: the first one loads the code it needs, and the clock may tick every 4 ms."""
 RIVAL_S = 5.0
 """Processor seconds that Clarabel + Newton is given."""
 SHARE_LEFT = 0.1
@@ -82,7 +84,12 @@ def _serve(pipe: Connection) -> None:
     from validation.rigid_dantzig_runs import warm
 
     warm()
-    jobs = {"solve": _solve, "repeat": _repeat, "rival": _rival, "save": _save}
+    jobs: dict[str, Callable[..., Row]] = {
+        "solve": _solve,
+        "repeat": _repeat,
+        "rival": _rival,
+        "save": _save,
+    }
     known: tuple[Any, Posed | None] = (None, None)
     while True:
         job, task, more = pipe.recv()
@@ -127,8 +134,10 @@ def _solved(posed: Posed) -> tuple[FrictionSolution, float]:
 
 
 def _solve(posed: Posed) -> Row:
-    found, cost = _solved(posed)
-    if cost < SHORT_S:
+    with install_recorder("numba:compile") as compiled:
+        found, cost = _solved(posed)
+    if cost < SHORT_S or compiled.buffer:
+        _limit(SOLVE_S)
         cost = float(np.mean([_solved(posed)[1] for _ in range(batch_size(cost))]))
     residual, left = residual_extended(posed.problem, found.r)
     return {
@@ -169,7 +178,11 @@ def _save(posed: Posed, path: str) -> Row:
 def problem_write(path: Path, problem: FrictionProblem, start: Any = None) -> None:
     """A problem as `rigid_lcp.read_problem` reads it: ``NAME.npz`` and ``NAME_H.npz``, where the
     bodies are known by a diagonal M^-1, or ``NAME_W.npz``; the array start is for who solves it."""
-    arrays = {"q": problem.offset, "mu": problem.friction, "dim": np.array(problem.dim)}
+    arrays: dict[str, Any] = {
+        "q": problem.offset,
+        "mu": problem.friction,
+        "dim": np.array(problem.dim),
+    }
     if start is not None:
         arrays["start"] = start
     path.parent.mkdir(parents=True, exist_ok=True)
