@@ -45,16 +45,16 @@ SHARE_LEFT = 0.1
 class Worker:
     """The process that makes and solves, begun when it is needed and again when it has died."""
 
-    def __init__(self) -> None:
+    def __init__(self, begun_by: str = "spawn") -> None:
+        self._context: Any = multiprocessing.get_context(begun_by)
         self._process: Any = None
         self._pipe: Connection | None = None
 
     def ask(self, job: str, family: str, seed: int, index: int, *more: Any) -> Row:
         """Do a job on a problem: what the process said of it, and under ``status`` how it died."""
         if self._process is None or not self._process.is_alive():
-            context = multiprocessing.get_context("spawn")
-            self._pipe, other = context.Pipe()
-            self._process = context.Process(target=_serve, args=(other,), daemon=True)
+            self._pipe, other = self._context.Pipe()
+            self._process = self._context.Process(target=_serve, args=(other,), daemon=True)
             self._process.start()
             other.close()
         assert self._pipe is not None

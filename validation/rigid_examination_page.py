@@ -1,0 +1,103 @@
+"""The examination's part of the page on solvers: a table by family, and what was not solved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from validation.rigid_examination import BAR_S
+from validation.rigid_examination_families import BEYOND, FAMILIES, SAME
+from validation.rigid_page_studies import seconds
+
+Row = dict[str, Any]
+FINEST_S = 1e-3
+"""Costs below it count as this in ratios."""
+
+
+def examination_table(rows: Sequence[Row]) -> str:
+    """Family by family, and all of what bars hold for and of what is beyond; empty without rows."""
+    if not rows:
+        return ""
+    lines = [
+        "| family | problems | solved | over 1 s | median | greatest |"
+        " slower than Clarabel + Newton |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for belongs in (SAME, BEYOND):
+        mine = [row for row in rows if row["belongs"] == belongs]
+        for family in FAMILIES:
+            some = [row for row in mine if row["family"] == family.name]
+            if some:
+                lines.append(_line(family.name, some))
+        if mine:
+            lines.append(_line(f"**{belongs}, all**", mine))
+    return "\n".join(lines)
+
+
+def _line(name: str, rows: Sequence[Row]) -> str:
+    solved = [row["cpu_s"] for row in rows if row["ok"]]
+    costs = [seconds(float(np.median(solved))), seconds(max(solved))] if solved else ["", ""]
+    slow = sum(cost > BAR_S for cost in solved)
+    pairs = rivals(rows)
+    slower = sum(ours > theirs for ours, theirs in pairs)
+    cells = [name, len(rows), len(solved), slow or "", *costs, f"{slower} of {len(pairs)}"]
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def rivals(rows: Sequence[Row]) -> list[tuple[float, float]]:
+    """Our cost and that of Clarabel + Newton [s] on the problems that both solve."""
+    return [
+        (max(row["cpu_s"], FINEST_S), max(row["rival_s"], FINEST_S))
+        for row in rows
+        if row["ok"] and row.get("rival_ok")
+    ]
+
+
+def examination_words(rows: Sequence[Row]) -> str:
+    """How many, what the rival made of them, and whether an answer called solved was none."""
+    if not rows:
+        return "There is no record of it."
+    seeds = ", ".join(str(seed) for seed in sorted({row["seed"] for row in rows}))
+    wrong = sum(bool(row["claims"]) and not row["ok"] for row in rows)
+    given = [row for row in rows if "rival_ok" in row]
+    both = rivals(rows)
+    worst = max((ours / theirs for ours, theirs in both), default=0.0)
+    ratio = float(np.median([ours / theirs for ours, theirs in both])) if both else 0.0
+    commits = ", ".join(sorted({f"`{row['commit'][:10]}`" for row in rows}))
+    solved = sum(row["ok"] for row in rows)
+    words = (
+        f"{len(rows)} problems of seed {seeds} ({commits}), {solved} solved;"
+        f" answers called solved that are not: {wrong}."
+    )
+    if given:
+        words += (
+            f" Clarabel + Newton was given {len(given)} and solved"
+            f" {sum(row['rival_ok'] for row in given)}; on the {len(both)} that both solve the"
+            f" median of our cost over its is {ratio:.2g}, the greatest {worst:.2g}."
+        )
+    return words
+
+
+def examination_failures(rows: Sequence[Row]) -> str:
+    """What was not solved, and what took more than a second, a line each."""
+    failed = [row for row in rows if not row["ok"]]
+    slow = [row for row in rows if row["ok"] and row["cpu_s"] > BAR_S]
+    lines: list[str] = []
+    for title, some in (("Not solved:", failed), ("Solved, in more than a second:", slow)):
+        if some:
+            lines += ["", title, "", *(_told(row) for row in sorted(some, key=_order))]
+    return "\n".join(lines).strip()
+
+
+def _order(row: Row) -> tuple[int, int]:
+    return [family.name for family in FAMILIES].index(row["family"]), row["index"]
+
+
+def _told(row: Row) -> str:
+    words = f"- {row['family']} {row['index']} ({row['recipe']}; {row['contacts']:,} contacts): "
+    if row["residual"] is None:
+        return words + row["status"]
+    alone = ", median of five" if "repeats_s" in row else ""
+    return words + f"{row['residual']:.1e} after {seconds(row['cpu_s'])}{alone}, {row['status']}"
