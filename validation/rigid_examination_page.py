@@ -67,9 +67,12 @@ def examination_words(rows: Sequence[Row]) -> str:
     ratio = float(np.median([ours / theirs for ours, theirs in both])) if both else 0.0
     commits = ", ".join(sorted({f"`{row['commit'][:10]}`" for row in rows}))
     solved = sum(row["ok"] for row in rows)
+    loads, machines = [row["load"] for row in rows], sorted({row["machine"] for row in rows})
     words = (
         f"{len(rows)} problems of seed {seeds} ({commits}), {solved} solved;"
-        f" answers called solved that are not: {wrong}."
+        f" answers called solved that are not: {wrong}. Made on {', '.join(machines)} at load"
+        f" averages of {min(loads):.1f} to {max(loads):.1f}: above the number of cores, costs are"
+        " greater than alone."
     )
     if given:
         words += (

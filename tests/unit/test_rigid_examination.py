@@ -336,7 +336,7 @@ def row(family: Family, index: int, **more: Any) -> dict[str, Any]:
     return {
         "family": family.name, "belongs": family.belongs, "seed": 5, "index": index, "ok": True,
         "claims": True, "cpu_s": 0.5, "residual": 1e-15, "rival_ok": True, "rival_s": 0.25,
-        "commit": "abc", "recipe": "bricks", "contacts": 1200, "status": "solved",
+        "commit": "abc", "recipe": "bricks", "contacts": 1200, "status": "solved", "load": 2.0, "machine": "m",
     } | more  # fmt: skip
 
 
