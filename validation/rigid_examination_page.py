@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from validation.rigid_examination import BAR_S
-from validation.rigid_examination_families import BEYOND, FAMILIES, SAME
+from validation.rigid_examination_families import BEYOND, FAMILIES, SAME, family_named
+from validation.rigid_examination_worker import SHARE_LEFT
 from validation.rigid_page_studies import seconds
 
 Row = dict[str, Any]
@@ -74,6 +75,13 @@ def examination_words(rows: Sequence[Row]) -> str:
         f" averages of {min(loads):.1f} to {max(loads):.1f}: above the number of cores, costs are"
         " greater than alone."
     )
+    sure = [row for row in rows if family_named(row["family"]).soluble]
+    if sure:
+        names = ", ".join(dict.fromkeys(row["family"] for row in sure))
+        words += (
+            f" Of families whose every problem has a solution ({names})"
+            f" {sum(row['ok'] for row in sure)} of {len(sure)} are solved."
+        )
     if given:
         words += (
             f" Clarabel + Newton was given {len(given)} and solved"
@@ -103,4 +111,7 @@ def _told(row: Row) -> str:
     if row["residual"] is None:
         return words + row["status"]
     alone = ", median of five" if "repeats_s" in row else ""
-    return words + f"{row['residual']:.1e} after {seconds(row['cpu_s'])}{alone}, {row['status']}"
+    words += f"{row['residual']:.1e} after {seconds(row['cpu_s'])}{alone}, {row['status']}"
+    if row["left"] > SHARE_LEFT:  # forces that grow without bound make any residual small
+        words += f", with forces that leave {row['left']:.2g} of the error of none"
+    return words

@@ -71,7 +71,7 @@ def test_judge_of_a_sliding_block() -> None:
 
 def test_judge_without_forces() -> None:
     """What parts needs none: residual zero; what approaches shows its velocity, over its size."""
-    part, meet = (friction_problem(np.eye(2), np.array([v, 0.0]), 0.5, 2) for v in (1.0, -1.0))
+    part, meet = (friction_problem(np.eye(2), np.array([v, 0.0]), 0.5, 2) for v in (1.0, -2.0))
     assert residual_extended(part, np.zeros(2))[0] == 0.0
     assert residual_extended(meet, np.zeros(2))[0] == 1.0
 
@@ -136,6 +136,15 @@ def test_a_wall_stands_on_its_floor(dim: int, joined: bool) -> None:
     moved = (space.jacobian @ sideways.ravel()).reshape(-1, dim)
     assert moved[:floor, 0] == pytest.approx(float(dim))
     assert np.abs(moved[len(moved) - 1]).max() == 0.0
+
+
+def test_inertia_of_bricks() -> None:
+    """2 x 1 x 1 m and 3 kg: ``m (a^2 + b^2) / 12`` about each axis, y alone in the plane."""
+    about = 3.0 * np.array([2.0, 5.0, 5.0]) / 12.0
+    for dim, turning in ((2, about[1:2]), (3, about)):
+        space = wall_bodies(1, 1, dim, np.array([3.0]))
+        expected = 1.0 / np.array([3.0] * dim + [*turning])
+        assert space.inverse_mass.diagonal() == pytest.approx(expected, rel=1e-15)
 
 
 def test_a_wall_turns_as_a_rigid_body() -> None:
@@ -336,7 +345,8 @@ def row(family: Family, index: int, **more: Any) -> dict[str, Any]:
     return {
         "family": family.name, "belongs": family.belongs, "seed": 5, "index": index, "ok": True,
         "claims": True, "cpu_s": 0.5, "residual": 1e-15, "rival_ok": True, "rival_s": 0.25,
-        "commit": "abc", "recipe": "bricks", "contacts": 1200, "status": "solved", "load": 2.0, "machine": "m",
+        "commit": "abc", "recipe": "bricks", "contacts": 1200, "status": "solved",
+        "load": 2.0, "machine": "m", "left": 1e-14,
     } | more  # fmt: skip
 
 
@@ -345,7 +355,8 @@ def test_page_counts() -> None:
     near, far = family_named("towers"), family_named("random assemblies")
     rows = [
         row(near, 0), row(near, 1, cpu_s=1.5, rival_s=3.0),
-        row(near, 2, ok=False, claims=False, residual=1e-5, cpu_s=9.0, status="not converged"),
+        row(near, 2, ok=False, claims=False, residual=1e-5, cpu_s=9.0, status="not converged",
+            left=2.5),
         row(far, 0, ok=False, residual=None, cpu_s=None, status="out of time"),
     ]  # fmt: skip
     table = examination_table(rows)
@@ -353,9 +364,13 @@ def test_page_counts() -> None:
     assert "| **beyond them, all** | 1 | 0 |  |  |  | 0 of 0 |" in table
     words = examination_words(rows)
     assert "4 problems of seed 5 (`abc`), 2 solved; answers called solved that are not: 1." in words
+    assert "every problem has a solution (towers) 2 of 3 are solved" in words
     assert "the median of our cost over its is 1.2, the greatest 2." in words
     failures = examination_failures(rows)
-    assert "- towers 2 (bricks; 1,200 contacts): 1.0e-05 after 9 s, not converged" in failures
+    assert (
+        "- towers 2 (bricks; 1,200 contacts): 1.0e-05 after 9 s, not converged, with forces that"
+        " leave 2.5 of the error of none" in failures
+    )
     assert "- random assemblies 0 (bricks; 1,200 contacts): out of time" in failures
     assert failures.index("Solved, in more than") < failures.index("- towers 1 ")
 
