@@ -354,18 +354,18 @@ def test_page_counts() -> None:
     """Solved, slow, slower than the rival where both solve; what failed or was slow by name."""
     near, far = family_named("towers"), family_named("random assemblies")
     rows = [
-        row(near, 0), row(near, 1, cpu_s=1.5, rival_s=3.0),
+        row(near, 0), row(near, 1, cpu_s=1.5, rival_s=3.0), row(near, 3, rival_s=1.0),
         row(near, 2, ok=False, claims=False, residual=1e-5, cpu_s=9.0, status="not converged",
             left=2.5),
         row(far, 0, ok=False, residual=None, cpu_s=None, status="out of time"),
     ]  # fmt: skip
     table = examination_table(rows)
-    assert "| towers | 3 | 2 | 1 | 1 s | 1.5 s | 1 of 2 |" in table
+    assert "| towers | 4 | 3 | 1 | 0.5 s | 1.5 s | 1 of 3 |" in table
     assert "| **beyond them, all** | 1 | 0 |  |  |  | 0 of 0 |" in table
     words = examination_words(rows)
-    assert "4 problems of seed 5 (`abc`), 2 solved; answers called solved that are not: 1." in words
-    assert "every problem has a solution (towers) 2 of 3 are solved" in words
-    assert "the median of our cost over its is 1.2, the greatest 2." in words
+    assert "5 problems of seed 5 (`abc`), 3 solved; answers called solved that are not: 1." in words
+    assert "every problem has a solution (towers) 3 of 4 are solved" in words
+    assert "the median of our cost over its is 0.5, the greatest 2." in words
     failures = examination_failures(rows)
     assert (
         "- towers 2 (bricks; 1,200 contacts): 1.0e-05 after 9 s, not converged, with forces that"
