@@ -358,20 +358,22 @@ def test_page_counts() -> None:
         row(near, 2, ok=False, claims=False, residual=1e-5, cpu_s=9.0, status="not converged",
             left=2.5),
         row(far, 0, ok=False, residual=None, cpu_s=None, status="out of time"),
+        row(far, 1, ok=False, claims=False, residual=1e-14, cpu_s=4.0, left=3.0, rival_ok=False),
     ]  # fmt: skip
     table = examination_table(rows)
     assert "| towers | 4 | 3 | 1 | 0.5 s | 1.5 s | 1 of 3 |" in table
-    assert "| **beyond them, all** | 1 | 0 |  |  |  | 0 of 0 |" in table
+    assert "| **beyond them, all** | 2 | 0 |  |  |  | 0 of 0 |" in table
     words = examination_words(rows)
-    assert "5 problems of seed 5 (`abc`), 3 solved; answers called solved that are not: 1." in words
+    assert "6 problems of seed 5 (`abc`), 3 solved; answers called solved that are not: 1." in words
     assert "every problem has a solution (towers) 3 of 4 are solved" in words
-    assert "the median of our cost over its is 0.5, the greatest 2." in words
+    assert "the median of our cost over its is 0.5, the greatest 2; we are slower" in words
+    assert "take more than 0.01 s on 1. It solves what we do not: towers 2, random" in words
     failures = examination_failures(rows)
+    assert "- towers 2 (bricks; 1,200 contacts): 1.0e-05 in 9 s" in failures
     assert (
-        "- towers 2 (bricks; 1,200 contacts): 1.0e-05 after 9 s, not converged, with forces that"
-        " leave 2.5 of the error of none" in failures
+        "- random assemblies 0, 1: residuals of 1.0e-14 to 1.0e-14 in 4 s to 4 s; on 1" in failures
     )
-    assert "- random assemblies 0 (bricks; 1,200 contacts): out of time" in failures
+    assert "none; 1 ended after 60 s or otherwise" in failures
     assert failures.index("Solved, in more than") < failures.index("- towers 1 ")
 
 
