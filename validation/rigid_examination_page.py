@@ -132,13 +132,26 @@ def _summed(rows: Sequence[Row]) -> list[str]:
     ended = [row for row in rows if row["residual"] is not None]
     words = f"- {rows[0]['family']} {', '.join(str(row['index']) for row in rows)}"
     if ended:
-        errors, costs = ([row[name] for row in ended] for name in ("residual", "cpu_s"))
+        errors = _range([f"{row['residual']:.1e}" for row in sorted(ended, key=_residual)])
+        costs = _range([seconds(row["cpu_s"]) for row in sorted(ended, key=_cost)])
         endless = sum(row["left"] > SHARE_LEFT for row in ended)
-        words += f": residuals of {min(errors):.1e} to {max(errors):.1e}"
-        words += f" in {seconds(min(costs))} to {seconds(max(costs))}"
+        words += f": residual {errors} in {costs}"
         if endless:  # forces that grow without bound make any residual small
             words += f"; on {endless} forces leave more than a tenth of the error of none"
     proved = sum(row["status"] == "no solution" for row in rows)
     words += f"; {proved} proved to have none" * (proved > 0)
     other = len(rows) - len(ended)
     return [words + f"; {other} ended after 60 s or otherwise" * (other > 0)]
+
+
+def _residual(row: Row) -> float:
+    return float(row["residual"])
+
+
+def _cost(row: Row) -> float:
+    return float(row["cpu_s"])
+
+
+def _range(words: Sequence[str]) -> str:
+    """The first and the last, or the only one."""
+    return words[0] if words[0] == words[-1] else f"{words[0]} to {words[-1]}"
