@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.provenance import provenance
+from validation.rigid_cone_programs import library_missing
 from validation.rigid_examination_families import FAMILIES, Family
 from validation.rigid_examination_worker import Worker
 from validation.rigid_peers import ONE_THREAD
@@ -191,6 +192,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     asked = parser.parse_args(arguments)
     if any(os.environ.get(name) != "1" for name in ONE_THREAD):
         raise SystemExit(f"set {', '.join(ONE_THREAD)} to 1: costs are of one thread")
+    if asked.rival and library_missing("clarabel"):
+        raise SystemExit("--rival needs the Python package clarabel: pip install clarabel")
     for family in FAMILIES:
         if family.needs and not os.environ.get(family.needs):
             print(f"left out: {family.name}, as {family.needs} names no folder", flush=True)

@@ -340,6 +340,29 @@ def test_families_by_turns(monkeypatch: pytest.MonkeyPatch) -> None:
     assert some == [("towers", 0), ("walls", 0), ("towers", 1), ("walls", 1)]
 
 
+def test_command_says_what_it_lacks(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, told: Told
+) -> None:
+    """One thread, the rival's package, the folders of problems; then it runs what is left."""
+    words = ["--seed", "5", "--families", "towers", "--count", "2"]
+    words += ["--record", str(tmp_path / "record.jsonl")]
+    for name in examination.ONE_THREAD:
+        monkeypatch.setenv(name, "1")
+    monkeypatch.delenv("TRACKBED_SICONOS", raising=False)
+    examination.main(words)
+    said = capsys.readouterr().out
+    assert "left out: test suite, changed, as TRACKBED_SICONOS names no folder" in said
+    assert "1 of 2 solved within 1 s" in said
+    (line, _) = examination.rows_read(tmp_path / "record.jsonl")
+    assert line["command"] == "python -m validation.rigid_examination --seed 5"
+    monkeypatch.setattr(examination, "library_missing", lambda _: True)
+    with pytest.raises(SystemExit, match="pip install clarabel"):
+        examination.main([*words, "--rival"])
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    with pytest.raises(SystemExit, match="costs are of one thread"):
+        examination.main(words)
+
+
 def row(family: Family, index: int, **more: Any) -> dict[str, Any]:
     """A line of the record."""
     return {
