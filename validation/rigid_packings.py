@@ -110,19 +110,29 @@ def bed(
         return bed_read(folder / name)
     generator = np.random.default_rng(seed)
     radius = generator.uniform(*RADII, grains)
+    made = bed_of(radius, dim, generator, friction=friction, settle=settle)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        arrays: dict[str, Any] = vars(made)
+        np.savez_compressed(folder / name, **arrays)
+    return made
+
+
+def bed_of(
+    radius: Floats, dim: int, generator: np.random.Generator, *, friction: float, settle: int = 200
+) -> Bed:
+    """Pour grains of these radii (n,) [m] at random places and settle them, see `bed`."""
+    grains = len(radius)
     drop = generator.random((grains, 2))
     if dim == 2:
         drop[:, 1] = -1.0
     width = 2.0 * float(radius.mean()) * max(2.0, grains ** (1 / dim))
+    width = max(width, 2.5 * float(radius.max()))
     centre = bed_poured(radius, width, drop)
     made = Bed(centre, radius, width, dim, friction, np.zeros((0, 2), int), np.zeros((0, 3)), 1.0)
     for k in range(settle):
         step = SETTLE_STEPS[0] * (SETTLE_STEPS[1] / SETTLE_STEPS[0]) ** (k / settle)
         made = bed_settled(replace(made, friction=0.0 if 2 * k < settle else friction), step)
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        arrays: dict[str, Any] = vars(made)
-        np.savez_compressed(folder / name, **arrays)
     return made
 
 
@@ -193,7 +203,7 @@ def bed_problem(made: Bed, step: float, *, gaps: bool = False) -> FrictionProble
     apart = bed_gaps(made)
     radius, first, second = made.radius, made.pairs[:, 0], made.pairs[:, 1]
     frames = bed_frames(made)
-    other = np.where(second < 0, 0.0, radius[second])
+    other = np.where(second < 0, 0.0, radius[np.maximum(second, 0)])
     jacobian = contact_jacobian(
         made.pairs, frames[:, 0], -radius[first, None] * frames[:, 0], other[:, None]
         * frames[:, 0], len(radius), made.dim, frames,

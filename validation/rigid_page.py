@@ -3,8 +3,8 @@
     python -m validation.rigid_page             writes docs/rigid-solvers.md and its picture
     python -m validation.rigid_page --words     the page alone
 
-The words are in ``rigid_page.md`` beside this file; every figure in them is looked up in the
-record, and a test holds the page to it.
+The words are in ``rigid_page.md`` beside this file; every figure in them is looked up in that
+record or in that of `rigid_examination`, and a test holds the page to them.
 """
 
 from __future__ import annotations
@@ -18,6 +18,12 @@ import numpy as np
 
 from validation import rigid_report as report
 from validation.qdem_record import write_atomically
+from validation.rigid_examination import RECORD as EXAMINATION
+from validation.rigid_examination_page import (
+    examination_failures,
+    examination_table,
+    examination_words,
+)
 from validation.rigid_page_studies import (
     dantzig_table,
     ladder_table,
@@ -54,6 +60,7 @@ def page(rows: Sequence[Row]) -> str:
     """The whole page in Markdown."""
     races = report.races(rows)
     contacts = [each[0]["contacts"] for each in report.problems(races).values()]
+    examined = rows_read(EXAMINATION)
     parts = {
         "count": str(len(contacts)),
         "least": f"{min(contacts):,}",
@@ -68,6 +75,9 @@ def page(rows: Sequence[Row]) -> str:
         "scale": scale_table(rows),
         "motion": motion_table(rows),
         "dantzig": dantzig_table(rows),
+        "examination": examination_table(examined),
+        "examined": examination_words(examined),
+        "unsolved": examination_failures(examined),
         "lemke": f"{SICONOS_MOST['2D_LEMKE']:,}",
         "dense": f"{SICONOS_MOST['2D_NSGS']:,}",
         "wide": f"{SICONOS_SPARSE:,}",
