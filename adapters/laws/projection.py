@@ -26,7 +26,7 @@ CHUNK = 1_000_000
 """Numbers in one column array: bounds the memory."""
 STEPS = 60
 """Damped steps at most; a handful suffices but in flat valleys."""
-GAIN_SMALL = 1e-10
+GAIN_SMALL = 1e-8
 """A step that lowers the sum of squares by less than this share ends a search."""
 STEP_SMALL = 1e-10
 """A step of all shape parameters below this (in ln theta or theta) ends a search."""
@@ -210,7 +210,9 @@ def _search(
             inside = here[index] + 1e-7 <= high[index]
             probe[index] += np.where(inside, 1e-7, -1e-7)
             change = residual(probe, series) - missed
-            slopes.append(change / (probe[index] - here[index]))
+            slope = change / (probe[index] - here[index])
+            outward = np.where((slope * missed).sum(axis=0) > 0, low[index], high[index])
+            slopes.append(np.where(here[index] == outward, 0.0, slope))  # held by its bound
         step = _damped_step(np.stack(slopes), missed, damping[active])
         tried = np.clip(here + step, low, high)
         again = residual(tried, series)
@@ -226,15 +228,17 @@ def _search(
 
 
 def _damped_step(slopes: FloatArray, missed: FloatArray, damping: FloatArray) -> FloatArray:
-    """-(J'J + lambda diag J'J)^-1 J'r for one or two shape parameters, shape (m, n)."""
+    """-(J'J + lambda diag J'J)^-1 J'r for one or two shape parameters, shape (m, n).
+
+    A parameter without any slope stays where it is.
+    """
     gradient = (slopes * missed).sum(axis=1)
     square = (slopes * slopes).sum(axis=1)
-    tiny = np.finfo(float).tiny
-    diagonal = square * (1 + damping) + tiny
+    diagonal = np.where(square > 0, square, 1.0) * (1 + damping)
     if len(slopes) == 1:
         return -gradient / diagonal
     mixed = (slopes[0] * slopes[1]).sum(axis=0)
-    determinant = diagonal[0] * diagonal[1] - mixed * mixed + tiny
+    determinant = diagonal[0] * diagonal[1] - mixed * mixed
     return np.stack(
         [
             (mixed * gradient[1] - diagonal[1] * gradient[0]) / determinant,
