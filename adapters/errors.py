@@ -90,6 +90,17 @@ class JumpRefused(NotCredible):
         self.regime, self.parameters = regime, parameters or {}
         super().__init__(what, where=where, remedy=remedy)
 
+    def to_json(self, unit: str) -> dict[str, object]:
+        """The keys of ``trackbed fit --json``, without a prediction."""
+        return {
+            "law": "auto",
+            "parameters": self.parameters,
+            "prediction": None,
+            "band": None,
+            "unit": unit,
+            "regime": self.regime,
+        }
+
 
 class NotConverged(TrackbedError):
     """An iteration (preparation, relaxation, fit) did not reach its tolerance."""

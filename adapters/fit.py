@@ -13,6 +13,7 @@ from adapters.fit_auto import FEWEST, outlook
 from adapters.fit_candidates import thinned
 from adapters.fit_regime import WHY_NOT, regimes_of
 from adapters.laws.law import Law
+from adapters.laws.shaped_law import ShapedLaw
 from adapters.residual import cycles_for_error, error_term
 from adapters.settlement_series import Series, series_read
 from adapters.state import FloatArray
@@ -177,7 +178,8 @@ def fit_noise(
     freedom = effective - len(parameters)
     deviation = sqrt(square / count * effective / freedom)
 
-    members = int(np.clip(2e7 / count, 50, NOISE_SERIES))
+    effort = 4e5 if isinstance(law, ShapedLaw) else 2e7  # numbers that are fitted
+    members = int(np.clip(effort / count, 50, NOISE_SERIES))
     random = np.random.default_rng(0)
     noise = deviation * autoregression(random, correlation, (count, members))
     kept = correlation ** ((to_cycle - cycle[-1]) / (cycle[-1] - cycle[-2]))

@@ -11,6 +11,7 @@ from adapters.errors import NotConverged, UsageError
 from adapters.fit_candidates import Candidates, candidates_of, thinned
 from adapters.fit_regime import (
     EXPONENTS,
+    SHAKEDOWN,
     Regime,
     exponent_weights,
     independent,
@@ -43,8 +44,9 @@ def outlook(
 
     *Prediction*: the last value plus the median increment of the slow laws, each fitted to the
     last decade, the last two, and all data; one that missed the held-out block by more than three
-    times the median miss has no vote.  No law is right on ballast, and the median of several is
-    less often far off than the one that fits best.
+    times the median miss has no vote, nor, where the bed shakes down, a law without an end.  No
+    law is right on ballast, and the median of several is less often far off than the one that
+    fits best.
 
     *Band*, three independent parts added as squares, each side by itself:
 
@@ -67,16 +69,19 @@ def outlook(
             remedy=f"give at least {FEWEST} computed cycles, or name a law: --law log",
         )
     few, means = thinned(cycle, displacement)
-    last = displacement[-1]
-    if to_cycle == cycle[-1]:
-        candidates = candidates_of(few, means, to_cycle)
-        return Outlook(regimes_of(few, means), last, last, last, candidates)
+    last, regimes = displacement[-1], regimes_of(few, means)
+    bounded = np.array([regime.name == SHAKEDOWN for regime in regimes])
     with np.errstate(over="ignore", invalid="ignore"):  # judged below, in one place
         candidates = candidates_of(few, means, to_cycle)
-        moved = candidates.median()
+        if to_cycle == cycle[-1]:
+            return Outlook(regimes, last, last, last, candidates)
+        moved = candidates.median(bounded)
         reading = reading_error(cycle, displacement, few, means, probability)
-        distance = log(to_cycle / cycle[-1])
-        below, above = half_widths(candidates, moved, distance, reading, probability)
+        miss = held_out_error(candidates, log(to_cycle / cycle[-1]), probability)
+        further = np.hypot(miss, reading)
+        lowest, highest = candidates.spread(bounded, probability)
+        below = np.hypot(np.maximum(moved - lowest, 0.0), further)
+        above = np.hypot(np.maximum(highest - moved, 0.0), further)
         low, high = last + moved - below, last + moved + above
         low = np.where(moved > 0, np.maximum(low, last - reading), low)
         high = np.where(moved < 0, np.minimum(high, last + reading), high)
@@ -85,34 +90,21 @@ def outlook(
             f"the slow laws give no finite settlement at cycle {to_cycle:g}",
             remedy="predict less far, or use the law log",
         )
-    return Outlook(regimes_of(few, means), last + moved, low, high, candidates)
+    return Outlook(regimes, last + moved, low, high, candidates)
 
 
-def half_widths(
-    candidates: Candidates,
-    moved: FloatArray,
-    distance: float,
-    reading: FloatArray,
-    probability: float,
-) -> tuple[FloatArray, FloatArray]:
-    """How far the band reaches below and above the prediction, (n,) each; see `outlook`.
+def held_out_error(candidates: Candidates, distance: float, probability: float) -> FloatArray:
+    """Half-width from the median's own error on the held-out block, (n,); 0 without a block.
 
-    ``moved``: predicted increment, (n,); ``distance``: ln of the jump's end over its start;
-    ``reading``: half-width of `reading_error`, (n,).
+    The error grows in proportion to the distance in ln N, here ``distance``, and is taken as one
+    standard deviation of a normal one.
     """
     from scipy.special import ndtri
 
-    outer = (1 - probability) / 2, (1 + probability) / 2
-    lowest, highest = np.quantile(candidates.increment, outer, axis=0)
-    held_out = np.zeros_like(moved)
-    if candidates.distance:
-        miss = np.abs(candidates.combined_miss) * distance / candidates.distance
-        held_out = ndtri(outer[1]) * miss
-    further = np.hypot(held_out, reading)
-    return (
-        np.hypot(np.maximum(moved - lowest, 0.0), further),
-        np.hypot(np.maximum(highest - moved, 0.0), further),
-    )
+    if not candidates.distance:
+        return np.zeros_like(candidates.combined_miss)
+    miss = np.abs(candidates.combined_miss) * distance / candidates.distance
+    return np.asarray(ndtri((1 + probability) / 2) * miss)
 
 
 def reading_error(

@@ -8,13 +8,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters.fit_regime import tail_rows
 from adapters.laws import law_named
 from adapters.state import FloatArray
 
+BoolArray = NDArray[np.bool_]
+
 SLOW_LAWS = ("log", "power", "hyperbolic", "stretched-exponential", "inverse-log")
 """Laws whose rate falls: those with a term b N explode when they are extrapolated."""
+BOUNDED_LAWS = ("hyperbolic", "stretched-exponential", "inverse-log")
+"""Those of them whose total has an end."""
 WINDOW_DECADES = (1.0, 2.0, np.inf)
 """The tail alone knows best where the bed goes, all data best what noise is: neither is trusted."""
 ROWS_PER_DECADE = 24
@@ -40,17 +45,36 @@ class Candidates:
     combined_miss: FloatArray
     """Error of the candidates' median there, shape (n,)."""
 
-    def kept(self) -> FloatArray:
-        """True for candidates that have a vote, shape (c, n): half of them at least."""
-        tested = ~np.isnan(self.miss[:, 0])
-        if not tested.any():
-            return np.ones(self.miss.shape, bool)
-        bound = VETO * np.median(self.miss[tested], axis=0)
-        return ~tested[:, None] | (self.miss <= bound)
+    def votes(self, bounded: BoolArray) -> BoolArray:
+        """True for candidates that have a vote, shape (c, n); half of the admitted ones at least.
 
-    def median(self) -> FloatArray:
+        ``bounded``, shape (n,): series of which the regime says that their total stays bounded;
+        only laws that end are admitted there.
+        """
+        ends = np.array([law in BOUNDED_LAWS for law in self.law])
+        admitted = ends[:, None] | ~bounded
+        tested = admitted & ~np.isnan(self.miss)
+        if not tested.any():
+            return admitted
+        bound = VETO * np.nanmedian(np.where(tested, self.miss, np.nan), axis=0)
+        return admitted & ~(self.miss > bound)
+
+    def median(self, bounded: BoolArray) -> FloatArray:
         """Median increment of those that have a vote, shape (n,)."""
-        return np.asarray(np.nanmedian(np.where(self.kept(), self.increment, np.nan), axis=0))
+        votes = self.votes(bounded)
+        return np.asarray(np.nanmedian(np.where(votes, self.increment, np.nan), axis=0))
+
+    def spread(self, bounded: BoolArray, probability: float) -> tuple[FloatArray, FloatArray]:
+        """Increments between which the middle ``probability`` of the candidates lies, (n,) each.
+
+        All count, whatever they missed; but where the total stays bounded not the power law, which
+        never slows down to the logarithm.
+        """
+        slow = np.array([law != "power" for law in self.law])
+        kept = np.where(slow[:, None] | ~bounded, self.increment, np.nan)
+        outer = (1 - probability) / 2, (1 + probability) / 2
+        low, high = np.nanquantile(kept, outer, axis=0)
+        return low, high
 
 
 def thinned(cycle: FloatArray, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -65,7 +89,8 @@ def thinned(cycle: FloatArray, displacement: FloatArray) -> tuple[FloatArray, Fl
     if len(start) == len(cycle):
         return cycle, displacement
     mean_log = np.add.reduceat(np.log(cycle), start) / count
-    return np.exp(mean_log), np.add.reduceat(displacement, start, axis=0) / count[:, None]
+    few = np.append(np.exp(mean_log[:-1]), cycle[-1])
+    return few, np.add.reduceat(displacement, start, axis=0) / count[:, None]
 
 
 def increments(

@@ -20,8 +20,8 @@ TAIL_ROWS = 6
 EXPONENTS = np.linspace(-4.0, 6.0, 201)
 """Exponents beta that are weighed."""
 PRIOR = 0.5
-"""Deviation of beta before any data: mechanics' bounds, -1 (u ends as 1/N) and 1 (constant rate),
-lie at two deviations from the logarithm, 0."""
+"""Half-width of beta's distribution (Cauchy's) before any data: half of it between a rate that falls
+as N^-1.5 and as N^-0.5, about the logarithm; its long tails let an explosion be seen as one."""
 RESOLUTION = 1e-3
 """Readings are not trusted to less than this share of the tail's range."""
 CERTAIN = 0.9
@@ -94,7 +94,7 @@ def exponent_weights(cycle: FloatArray, displacement: FloatArray) -> FloatArray:
     residual = series - columns[:, best] * along[best, np.arange(series.shape[1])]
     counted = np.maximum(independent(residual), 4.0)
     fit = np.log(missed / missed.min(axis=0))
-    weight = np.exp(-(counted - 2) / 2 * fit - (EXPONENTS[:, None] / PRIOR) ** 2 / 2)
+    weight = np.exp(-(counted - 2) / 2 * fit) / (1 + (EXPONENTS[:, None] / PRIOR) ** 2)
     return np.asarray(weight / weight.sum(axis=0))
 
 

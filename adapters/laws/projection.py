@@ -169,7 +169,7 @@ def _grid_best(
 
 
 def _projected(values: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Amplitudes (p, n) and residuals (k, n) of centred series for columns (p, k, n) of their own."""
+    """Amplitudes (p, n) and residuals (k, n) of centred series with columns (p, k, n) each."""
     values = centred(values, 1)
     q, triangle = orthonormal(values)
     found, _ = amplitudes((q * target).sum(axis=1), triangle)
