@@ -45,29 +45,29 @@ class Candidates:
     combined_miss: FloatArray
     """Error of the candidates' median there, shape (n,)."""
 
-    def votes(self, bounded: BoolArray) -> BoolArray:
+    def votes(self, bounded: BoolArray, unbounded: BoolArray) -> BoolArray:
         """True for candidates that have a vote, shape (c, n); half of the admitted ones at least.
 
-        ``bounded``, shape (n,): series of which the regime says that their total stays bounded;
-        only laws that end are admitted there.
+        ``bounded`` and ``unbounded``, shape (n,): series whose total has an end, or has none, for
+        certain.  Only laws of the same kind are admitted there, and all where neither is certain.
         """
-        ends = np.array([law in BOUNDED_LAWS for law in self.law])
-        admitted = ends[:, None] | ~bounded
+        ends = np.array([law in BOUNDED_LAWS for law in self.law])[:, None]
+        admitted = np.where(ends, ~unbounded, ~bounded)
         tested = admitted & ~np.isnan(self.miss)
         if not tested.any():
             return admitted
         bound = VETO * np.nanmedian(np.where(tested, self.miss, np.nan), axis=0)
         return admitted & ~(self.miss > bound)
 
-    def median(self, bounded: BoolArray) -> FloatArray:
+    def median(self, bounded: BoolArray, unbounded: BoolArray) -> FloatArray:
         """Median increment of those that have a vote, shape (n,)."""
-        votes = self.votes(bounded)
+        votes = self.votes(bounded, unbounded)
         return np.asarray(np.nanmedian(np.where(votes, self.increment, np.nan), axis=0))
 
     def spread(self, bounded: BoolArray, probability: float) -> tuple[FloatArray, FloatArray]:
         """Increments between which the middle ``probability`` of the candidates lies, (n,) each.
 
-        All count, whatever they missed; but where the total stays bounded not the power law, which
+        All count, whatever they missed; but where the total has an end not the power law, which
         never slows down to the logarithm.
         """
         slow = np.array([law != "power" for law in self.law])

@@ -49,6 +49,8 @@ class Regime:
     """Mean of beta; the rate falls as N^(beta - 1)."""
     deviation: float
     """Standard deviation of beta."""
+    bounded: float
+    """Probability of beta < 0: that the total has an end."""
 
     @property
     def jump_allowed(self) -> bool:
@@ -133,7 +135,7 @@ def regimes_of(cycle: FloatArray, displacement: FloatArray) -> list[Regime]:
     """
     weight = exponent_weights(cycle, displacement)
     fast, growing = weight[EXPONENTS > 0.5].sum(axis=0), weight[EXPONENTS > 1].sum(axis=0)
-    bounded = weight[EXPONENTS < 0].sum(axis=0)
+    bounded = weight[EXPONENTS < -1e-9].sum(axis=0)
     mean = EXPONENTS @ weight
     deviation = np.sqrt(np.maximum((EXPONENTS**2) @ weight - mean**2, 0.0))
     still = np.ptp(displacement[tail_rows(cycle)], axis=0) == 0
@@ -143,6 +145,6 @@ def regimes_of(cycle: FloatArray, displacement: FloatArray) -> list[Regime]:
         np.where((bounded > CERTAIN) | still, SHAKEDOWN, STEADY),
     )
     return [
-        Regime(str(one), float(m), float(d))
-        for one, m, d in zip(name, mean, deviation, strict=True)
+        Regime(str(one), float(m), float(d), float(b))
+        for one, m, d, b in zip(name, mean, deviation, bounded, strict=True)
     ]
