@@ -20,7 +20,7 @@ TAIL_ROWS = 6
 EXPONENTS = np.linspace(-4.0, 6.0, 201)
 """Exponents beta that are weighed."""
 PRIOR = 0.5
-"""Half-width of beta's distribution (Cauchy's) before any data: half of it between a rate that falls
+"""Half-width of beta's distribution (Cauchy's) before any data: half of it between rates that fall
 as N^-1.5 and as N^-0.5, about the logarithm; its long tails let an explosion be seen as one."""
 RESOLUTION = 1e-3
 """Readings are not trusted to less than this share of the tail's range."""

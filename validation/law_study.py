@@ -122,10 +122,8 @@ def auto_summary(rows: Sequence[Row]) -> Row:
     """Errors and band where auto lets the jump go ahead, and what leaving a series out changes."""
     allowed = [row for row in rows if row["allowed"]]
     names = sorted({row["name"] for row in rows})
-    without = [
-        summary(row["error"] for row in allowed if row["name"] != name)["error_90"]
-        for name in names
-    ]
+    others = [[row["error"] for row in allowed if row["name"] != name] for name in names]
+    without = [summary(errors)["error_90"] for errors in others if errors]
     return {
         "method": "auto",
         **summary(row["error"] for row in allowed),
@@ -194,7 +192,21 @@ def study(members: int, folder: Path | None) -> list[Row]:
     fast = auto_rows(fast_cases(members))
     refused = sum(not row["allowed"] for row in fast)
     found.append({"source": "fast", "method": "auto", "cases": len(fast), "refused": refused})
-    return found
+    return found + [grains_row(name) for name in ("log", "hyperbolic", "stretched-exponential")]
+
+
+def grains_row(name: str, grains: int = 1000, cycles: int = 50) -> Row:
+    """CPU time of one fit to noisy logarithms of all axes of all grains, least of three."""
+    cycle = np.arange(1.0, cycles + 1)
+    noise = 0.05 * np.random.default_rng(0).standard_normal((cycles, grains, 3))
+    displacement = np.log(cycle)[:, None, None] + noise
+    law, seconds = law_named(name), []
+    for _ in range(3):
+        start = time.process_time()
+        law.fit(cycle, displacement)
+        seconds.append(time.process_time() - start)
+    setting = {"grains": grains, "cycles": cycles}
+    return {"source": "grains", "method": name, "setting": setting, "cost_s": min(seconds)}
 
 
 def record_read() -> list[Row]:

@@ -44,8 +44,9 @@ class Shape:
 
     def searched(self) -> FloatArray:
         """Grid in the variable that is searched, shape (count,)."""
-        ends = (np.log(self.low), np.log(self.high)) if self.logarithmic else (self.low, self.high)
-        return np.linspace(*ends, self.count)
+        if self.logarithmic:
+            return np.linspace(np.log(self.low), np.log(self.high), self.count)
+        return np.linspace(self.low, self.high, self.count)
 
 
 def time_shape(cycle: FloatArray) -> Shape:

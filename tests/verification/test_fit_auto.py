@@ -39,7 +39,7 @@ def noisy(settlement: FloatArray, seed: int) -> FloatArray:
 @pytest.mark.parametrize("name", SERIES)
 @pytest.mark.parametrize("seed", [None, 1, 2])
 def test_regimes_of_known_series(name: str, seed: int | None) -> None:
-    """Three series of each regime, exact and read with an error: none is refused or let pass wrongly.
+    """Three series of each regime, exact and read with an error: none is wrongly refused or let by.
 
     With noise shakedown needs 90 % certainty and may be called steady, collapse ratcheting: both
     pairs have the same consequence.
@@ -220,7 +220,7 @@ def test_tail_is_the_last_decade() -> None:
 
 
 def test_command_refuses_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """``fit --law auto``: exit code 6, the regime in JSON, a sentence on stderr; or a prediction."""
+    """``fit --law auto``: exit code 6, the regime in JSON, a sentence on stderr; or an answer."""
     path = tmp_path / "series.csv"
 
     def write(settlement: FloatArray) -> None:

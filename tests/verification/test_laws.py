@@ -314,7 +314,7 @@ def test_a_law_is_added_by_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_hundred_thousand_grains_take_less_than_a_second() -> None:
-    """Fit and increment of 1e5 grains, 3 axes, 100 cycles: under 1 s of one thread, every linear law."""
+    """Fit and increment of 1e5 grains, 3 axes, 100 cycles: under 1 s of one thread, linear laws."""
     cycle = np.arange(51.0, 151.0)
     displacement = np.random.default_rng(0).random((100, 100_000, 3))
     for law in [*LAWS, law_named("log-linear"), law_named("shenton")]:
