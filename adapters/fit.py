@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from adapters.errors import JumpRefused, NotConverged, UsageError
-from adapters.fit_auto import FEWEST, outlook
-from adapters.fit_candidates import thinned
+from adapters.fit_auto import outlook
+from adapters.fit_candidates import ROWS_FEWEST, thinned
 from adapters.fit_regime import WHY_NOT, regimes_of
 from adapters.laws.law import Law
 from adapters.laws.shaped_law import ShapedLaw
@@ -117,9 +117,9 @@ def fit_auto(series: Series, to_cycle: float, probability: float = 0.9) -> Predi
 
 
 def regime_of(series: Series) -> str | None:
-    """Regime of a series; None where it has fewer than `fit_auto.FEWEST` cycles after the start."""
+    """Regime of a series; None where it has fewer than four cycles after the start."""
     rows = series.cycle > 0
-    if rows.sum() < FEWEST:
+    if rows.sum() < ROWS_FEWEST:
         return None
     return regimes_of(*thinned(series.cycle[rows], series.settlement[rows, None]))[0].name
 

@@ -8,7 +8,7 @@ from math import log
 import numpy as np
 
 from adapters.errors import NotConverged, UsageError
-from adapters.fit_candidates import Candidates, candidates_of, thinned
+from adapters.fit_candidates import ROWS_FEWEST, Candidates, candidates_of, thinned
 from adapters.fit_regime import (
     CERTAIN,
     EXPONENTS,
@@ -24,9 +24,6 @@ from adapters.fit_regime import (
 from adapters.laws import law_named
 from adapters.laws.law import training_data
 from adapters.state import FloatArray
-
-FEWEST = 4
-"""Cycles that a regime can be told from."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +58,15 @@ def outlook(
     It never reaches back beyond the last value by more than the reading: a bed that settles does
     not rise.  The band does not hold in the regimes ratcheting and collapse.
 
-    Cycle 0 must be left out.  Raises `UsageError` for what no law can take, fewer than `FEWEST`
-    cycles included, and `NotConverged` when the prediction is not finite.
+    Cycle 0 must be left out.  Raises `UsageError` for what no law can take and for fewer than
+    `ROWS_FEWEST` cycles, `NotConverged` when the prediction is not finite.
     """
     cycle, displacement = training_data(law_named("log"), cycle, displacement)
-    if len(cycle) < FEWEST:
+    if len(cycle) < ROWS_FEWEST:
         raise UsageError(
             f"{len(cycle)} cycles are too few to tell a regime from",
             where="law auto",
-            remedy=f"give at least {FEWEST} computed cycles, or name a law: --law log",
+            remedy=f"give at least {ROWS_FEWEST} computed cycles, or name a law: --law log",
         )
     few, means = thinned(cycle, displacement)
     last, regimes = displacement[-1], regimes_of(few, means)

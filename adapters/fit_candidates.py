@@ -25,6 +25,8 @@ WINDOW_DECADES = (1.0, 2.0, np.inf)
 ROWS_PER_DECADE = 24
 """Cycles are averaged to so many a decade: each decade weighs the same, and a fit costs the same,
 whether a laboratory read 30 values or an engine computed every cycle."""
+ROWS_FEWEST = 4
+"""Rows that a regime can be told from."""
 VETO = 3.0
 """A candidate that missed the held-out block by so many times the median miss has no vote."""
 
@@ -80,13 +82,16 @@ class Candidates:
 def thinned(cycle: FloatArray, displacement: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Means over bins evenly spaced in ln N, `ROWS_PER_DECADE`; the last row stays as it is.
 
-    A bin's cycle is the geometric mean of its own, so the unit of N does not matter.
+    Less than a decade of data gets as many as a decade.  A bin's cycle is the geometric mean of its
+    own, so the unit of N does not matter.  What would leave fewer than `ROWS_FEWEST` rows is not
+    thinned.
     """
-    place = np.log10(cycle / cycle[-1]) * ROWS_PER_DECADE
+    span = np.log10(cycle[-1] / cycle[0])
+    place = np.log10(cycle / cycle[-1]) * ROWS_PER_DECADE / min(span, 1.0)
     number = np.floor(place + 1e-9)
     number[-1] = 1.0
     _, start, count = np.unique(number, return_index=True, return_counts=True)
-    if len(start) == len(cycle):
+    if len(start) == len(cycle) or len(start) < ROWS_FEWEST:
         return cycle, displacement
     mean_log = np.add.reduceat(np.log(cycle), start) / count
     few = np.append(np.exp(mean_log[:-1]), cycle[-1])

@@ -187,6 +187,19 @@ def test_one_bad_reading_does_not_rule_the_prediction() -> None:
     assert dirty == pytest.approx(clean, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    "cycle",
+    [1e6 + np.arange(21.0), np.arange(25.0, 51.0), np.array([1.0, 1.001, 1.002, 1.003, 1000.0])],
+    ids=["far", "a doubling", "uneven"],
+)
+def test_short_windows_are_no_obstacle(cycle: FloatArray) -> None:
+    """Twenty cycles after a million, one doubling, four readings at once: a prediction, a band."""
+    series = Series(cycle, np.log(cycle / cycle[0] + 0.5))
+    found = fit_auto(series, 1.1 * cycle[-1])
+    assert found.band[0] <= found.prediction <= found.band[1]
+    assert len(thinned(cycle, cycle[:, None])[0]) >= 4
+
+
 @pytest.mark.parametrize("level", [0.0, -2.0])
 def test_a_bed_at_rest_stays(level: float) -> None:
     """All zeros, or any constant: shakedown, and a band that is closed."""
