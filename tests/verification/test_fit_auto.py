@@ -69,15 +69,17 @@ def test_alike_residuals_count_for_fewer() -> None:
     assert independent(white.cumsum(axis=0))[0] < 30
 
 
-def test_a_bed_that_hardly_moves_by_chance_is_no_alarm() -> None:
-    """Twenty random walks over a logarithm, as an engine computes them: at most two are refused.
+def test_exponent_knows_how_little_a_computed_series_says() -> None:
+    """200 logarithms under random walks: beta = 0 lies within two deviations in 70 % or more.
 
-    Counted as independent, their residuals would tell an exponent to 0.01, and refuse many.
+    Nominal are 95 %; a walk is worse than the autoregression that is assumed.  Counted as
+    independent, residuals promise so much that 36 % do.  None is refused.
     """
     cycle = np.arange(1.0, 101.0)
-    walks = 0.02 * np.random.default_rng(4).standard_normal((100, 20)).cumsum(axis=0)
+    walks = 0.02 * np.random.default_rng(4).standard_normal((100, 200)).cumsum(axis=0)
     found = regimes_of(*thinned(cycle, np.log(cycle)[:, None] + walks))
-    assert sum(not regime.jump_allowed for regime in found) <= 2
+    assert sum(abs(regime.exponent) < 2 * regime.deviation for regime in found) >= 140
+    assert all(regime.jump_allowed for regime in found)
 
 
 @pytest.mark.parametrize("name", ["log", "hyperbolic", "stretched-exponential", "inverse-log"])
@@ -151,10 +153,15 @@ def test_band_grows_with_probability_and_holds_the_prediction() -> None:
 
 
 def test_settlement_does_not_turn_round() -> None:
-    """The band of a settling bed ends at its last reading, but for the reading's own error."""
-    read = noisy(READ / (20 + READ), 3)[:, None]
-    found = outlook(READ, read, 1e5)
-    assert found.low[0] > read[-1, 0] - 0.05
+    """The band of a settled bed ends at its last reading, but for the reading's own error.
+
+    Readings err by 0.02; Student's t for some five of them is 2 to 3, so 0.1 is enough.  What
+    the held-out block missed would reach below by 0.1 to 0.25.
+    """
+    for seed in range(4):
+        noise = 0.02 * np.random.default_rng(seed).standard_normal(len(READ))
+        read = (READ / (20 + READ) + noise)[:, None]
+        assert outlook(READ, read, 1e5).low[0] > read[-1, 0] - 0.1
 
 
 def test_every_decade_weighs_the_same() -> None:
@@ -168,12 +175,15 @@ def test_every_decade_weighs_the_same() -> None:
 
 
 def test_held_out_block_is_never_fitted() -> None:
-    """Changing the block changes what was missed, and nothing of what the past alone says."""
+    """Changing the block changes what was missed, by just as much, and nothing that is predicted.
+
+    Its first row is changed too, which a fit that reached one row too far would see.
+    """
     before = held_out_rows(READ)
     assert READ[before - 1] <= READ[-1] / 10**0.5 < READ[before]
     read = np.log(READ)[:, None]
     other = read.copy()
-    other[-1] += 0.5
+    other[[before, -1]] += 0.5
     one, two = (candidates_of(READ, rows, 1e4) for rows in (read, other))
     np.testing.assert_allclose(two.combined_miss - one.combined_miss, -0.5, atol=1e-9)
 
