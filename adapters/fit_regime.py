@@ -23,7 +23,8 @@ PRIOR = 0.5
 """Half-width of beta's distribution (Cauchy's) before any data: half of it between rates that fall
 as N^-1.5 and as N^-0.5, about the logarithm; its long tails let an explosion be seen as one."""
 RESOLUTION = 1e-3
-"""Readings are not trusted to less than this share of the tail's range."""
+"""Deviation of a reading at best, of the whole range: a digit of a curve of 300 is off by as much.
+A bed that has settled but for its last digit is at rest, whichever way that digit goes."""
 CERTAIN = 0.9
 """Probability from which a bed is said to shake down or to collapse."""
 
@@ -90,7 +91,7 @@ def exponent_weights(cycle: FloatArray, displacement: FloatArray) -> FloatArray:
     columns /= np.linalg.norm(columns, axis=0)
     along = columns.T @ series
     total = (series * series).sum(axis=0)
-    reading = len(ratio) * (RESOLUTION * np.ptp(series, axis=0)) ** 2
+    reading = len(ratio) * (RESOLUTION * np.ptp(displacement, axis=0)) ** 2
     missed = np.where(total > 0, np.maximum(total - along**2, 0.0) + reading, 1.0)
     best = missed.argmin(axis=0)
     residual = series - columns[:, best] * along[best, np.arange(series.shape[1])]

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from adapters.fit_regime import WHY_NOT
 from validation.law_study import LAWS, RIVALS, Row, record_read
 
 TEMPLATE = Path(__file__).with_name("law_page.md")
@@ -38,7 +39,8 @@ PARAMETERS = {
 NAMES = {
     "ballast": "real ballast",
     "families": "families",
-    "engine": "engine beds, N_c = 10 to 100",
+    "doublings": "engine beds, windows of 20 to 90 cycles, to 2 N_c",
+    "engine": "engine beds from cycle 1, N_c = 10 to 100",
 }
 
 
@@ -146,9 +148,22 @@ def worst_told(rows: Sequence[Row]) -> str:
     return f"- Largest errors on real ballast: {', '.join(said)}."
 
 
+def alarms_told(rows: Sequence[Row]) -> str:
+    """Tests that are refused when all of their readings are known."""
+    regimes = row_of(rows, "whole ballast")["regimes"]
+    refused = [
+        f"{name.removeprefix('p_').replace('_', ' ')} ({regime})"
+        for name, regime in regimes.items()
+        if regime in WHY_NOT
+    ]
+    count = len(regimes)
+    return f"Of the {count} tests, known to their ends, refused: {', '.join(refused) or 'none'}."
+
+
 def page(rows: Sequence[Row]) -> str:
     """The page, with every mark ``{{name}}`` of the template replaced."""
     ballast, engine = row_of(rows, "ballast"), row_of(rows, "engine")
+    doubling = row_of(rows, "doublings")
     inside, of = row_of(rows, "families")["coverage_by_name"]["bursts"]
     low, high = ballast["error_90_without_one"]
     hindsight = ballast["hindsight"]
@@ -168,6 +183,11 @@ def page(rows: Sequence[Row]) -> str:
             f"{per_cent(engine['error'], 0)} median error, and the band holds "
             f"{per_cent(engine['coverage'], 0)} of {engine['cases']}."
         ),
+        "doubling": (
+            f"{per_cent(doubling['error'])} median error, {per_cent(doubling['coverage'], 0)} of "
+            f"{doubling['cases']} inside the band"
+        ),
+        "alarms": alarms_told(rows),
         "bursts": f"{inside} of {of}",
     }
     text = TEMPLATE.read_text(encoding="utf-8")

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from adapters.state import FloatArray
+from validation.cases.series_without_engine import run_cases as window_cases
 
 REACH = 10.0
 """Predicted over last known cycle."""
@@ -28,6 +29,8 @@ READING = 0.002
 DIGIT = 1 / 300
 """...a digit, both of the range: a curve of 300 pixels, as published ones are."""
 SEED = 2026
+RUNS = ("paper_scale_a", "paper_scale_b", "coarse_bursty")
+"""Full runs: two of 1,085 grains, one of 150."""
 
 Curve = Callable[[FloatArray], FloatArray]
 
@@ -79,12 +82,21 @@ def ballast_cases(folder: Path) -> list[LawCase]:
 def run_cases(folder: Path) -> list[LawCase]:
     """Mean settlement of full runs at every cycle: 1,085 grains (two), 150 grains in bursts."""
     found = []
-    for name in ("paper_scale_a", "paper_scale_b", "coarse_bursty"):
+    for name in RUNS:
         with np.load(folder / "full_runs" / f"{name}.npz") as data:
             settlement = -1e-6 * data["displacement_um"][1:, :, 2].mean(axis=1, dtype=float)
         cycle = np.arange(1.0, len(settlement) + 1)
         found += list(cut_cases("engine", name, cycle, settlement, (10.0, 20.0, 30.0, 50.0, 100.0)))
     return found
+
+
+def doubling_cases(folder: Path) -> list[LawCase]:
+    """The same runs, windows of twenty cycles and more, and only one doubling ahead."""
+    return [
+        LawCase("doublings", name, float(known.cycle[-1]), known.cycle, known.settlement, to, truth)
+        for name in RUNS
+        for known, to, truth in window_cases(folder / "full_runs" / f"{name}.npz", 2.0)
+    ]
 
 
 def slow_families(random: np.random.Generator) -> dict[str, Curve]:

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from adapters.fit_auto import outlook
-from adapters.fit_regime import REGIMES
+from adapters.fit_candidates import thinned
+from adapters.fit_regime import REGIMES, regimes_of
 from adapters.laws import law_named
 from adapters.provenance import provenance
 from adapters.run_folder import write_atomically
@@ -26,6 +27,8 @@ from validation.cases.jump_without_engine import data_folder
 from validation.law_series import (
     LawCase,
     ballast_cases,
+    ballast_series,
+    doubling_cases,
     family_cases,
     fast_cases,
     run_cases,
@@ -176,8 +179,11 @@ def method_summary(
 
 def sources(members: int, folder: Path | None) -> dict[str, list[LawCase]]:
     """Cases by source; real ones only where their folder is there."""
-    real = {"ballast": ballast_cases(folder), "engine": run_cases(folder)} if folder else {}
-    return real | {"families": family_cases(members)}
+    made = {"families": family_cases(members)}
+    if folder is None:
+        return made
+    real = {"ballast": ballast_cases(folder), "doublings": doubling_cases(folder)}
+    return real | made | {"engine": run_cases(folder)}
 
 
 def study(members: int, folder: Path | None) -> list[Row]:
@@ -192,7 +198,18 @@ def study(members: int, folder: Path | None) -> list[Row]:
     fast = auto_rows(fast_cases(members))
     refused = sum(not row["allowed"] for row in fast)
     found.append({"source": "fast", "method": "auto", "cases": len(fast), "refused": refused})
+    if folder:
+        found.append(whole_row(folder))
     return found + [grains_row(name) for name in ("log", "hyperbolic", "stretched-exponential")]
+
+
+def whole_row(folder: Path) -> Row:
+    """Regime of every ballast test from all of its readings."""
+    regimes = {
+        name: regimes_of(*thinned(cycle, strain[:, None]))[0].name
+        for name, cycle, strain in ballast_series(folder)
+    }
+    return {"source": "whole ballast", "method": "auto", "regimes": regimes}
 
 
 def grains_row(name: str, grains: int = 1000, cycles: int = 50) -> Row:

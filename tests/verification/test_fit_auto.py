@@ -54,11 +54,16 @@ def test_regimes_of_known_series(name: str, seed: int | None) -> None:
 
 @pytest.mark.parametrize("exponent", [-0.8, -0.3, 0.2, 0.6, 1.0])
 def test_exponent_of_the_tail_is_measured(exponent: float) -> None:
-    """u = c + a N^beta read exactly: beta within 2 of its own deviations, which are small."""
+    """u = c + a N^beta: beta within 2 of its own deviations; small ones where the tail moves.
+
+    Readings are trusted to 1e-3 of the range.  For beta = -0.8 the last decade is 2 % of it, and a
+    reading 1/20 of that.
+    """
     settlement = 3 + READ**exponent / exponent
     (found,) = regimes_of(READ, settlement[:, None])
     assert abs(found.exponent - exponent) < max(2 * found.deviation, 0.05)
-    assert found.deviation < 0.15
+    assert found.deviation < (0.15 if exponent > 0 else 0.6)
+    assert (found.bounded > 0.5) == (exponent < 0)
 
 
 def test_alike_residuals_count_for_fewer() -> None:
