@@ -57,12 +57,12 @@ def test_exponent_of_the_tail_is_measured(exponent: float) -> None:
     """u = c + a N^beta: beta within 2 of its own deviations; small ones where the tail moves.
 
     Readings are trusted to 1e-3 of the range.  For beta = -0.8 the last decade is 2 % of it, and a
-    reading 1/20 of that.
+    reading 1/20 of that: it says little more than what was thought before.
     """
     settlement = 3 + READ**exponent / exponent
     (found,) = regimes_of(READ, settlement[:, None])
     assert abs(found.exponent - exponent) < max(2 * found.deviation, 0.05)
-    assert found.deviation < (0.15 if exponent > 0 else 0.6)
+    assert found.deviation < (0.15 if exponent > 0 else 0.8)
     assert (found.bounded > 0.5) == (exponent < 0)
 
 
