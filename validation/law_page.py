@@ -6,10 +6,11 @@ The page is ``law_page.md`` beside this file, with tables and numbers of the rec
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import isfinite
 from pathlib import Path
 
 from adapters.fit_regime import WHY_NOT
-from validation.law_study import LAWS, RIVALS, Row, record_read
+from validation.law_study import LAWS, REGIME_CUTS, RIVALS, Row, record_read
 
 TEMPLATE = Path(__file__).with_name("law_page.md")
 PAGE = Path(__file__).parents[1] / "docs" / "laws.md"
@@ -148,16 +149,17 @@ def worst_told(rows: Sequence[Row]) -> str:
     return f"- Largest errors on real ballast: {', '.join(said)}."
 
 
-def alarms_told(rows: Sequence[Row]) -> str:
-    """Tests that are refused when all of their readings are known."""
-    regimes = row_of(rows, "whole ballast")["regimes"]
-    refused = [
-        f"{name.removeprefix('p_').replace('_', ' ')} ({regime})"
-        for name, regime in regimes.items()
-        if regime in WHY_NOT
-    ]
-    count = len(regimes)
-    return f"Of the {count} tests, known to their ends, refused: {', '.join(refused) or 'none'}."
+def regimes_table(rows: Sequence[Row]) -> str:
+    """What each test was told to do when it was known so far; what is refused in bold."""
+
+    def cell(regime: str | None) -> str:
+        return "" if regime is None else f"**{regime}**" if regime in WHY_NOT else regime
+
+    regimes = row_of(rows, "ballast regimes")["regimes"]
+    names = {name: name.removeprefix("p_").replace("_q_", " / ") for name in regimes}
+    head = ["p / q, f", *(f"{cut:,.0f}" if isfinite(cut) else "its end" for cut in REGIME_CUTS)]
+    lines = [[names[name].replace("_f_", ", "), *map(cell, regimes[name])] for name in regimes]
+    return table(head, lines)
 
 
 def page(rows: Sequence[Row]) -> str:
@@ -187,7 +189,7 @@ def page(rows: Sequence[Row]) -> str:
             f"{per_cent(doubling['error'])} median error, {per_cent(doubling['coverage'], 0)} of "
             f"{doubling['cases']} inside the band"
         ),
-        "alarms": alarms_told(rows),
+        "regimes": regimes_table(rows),
         "bursts": f"{inside} of {of}",
     }
     text = TEMPLATE.read_text(encoding="utf-8")

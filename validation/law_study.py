@@ -41,6 +41,8 @@ LAWS = (
     "linear", "log", "log-linear", "power", "shenton", "hyperbolic", "stretched-exponential",
     "inverse-log", "sato", "hca", "karrech2007",
 )  # fmt: skip
+REGIME_CUTS = (100.0, 300.0, 1e3, 3e3, 1e4, 1e5, np.inf)
+"""Last known cycle; inf: the whole test."""
 RIVALS = ("polyfit", "curve_fit")
 Row = dict[str, Any]
 
@@ -199,17 +201,22 @@ def study(members: int, folder: Path | None) -> list[Row]:
     refused = sum(not row["allowed"] for row in fast)
     found.append({"source": "fast", "method": "auto", "cases": len(fast), "refused": refused})
     if folder:
-        found.append(whole_row(folder))
+        found.append(regimes_row(folder))
     return found + [grains_row(name) for name in ("log", "hyperbolic", "stretched-exponential")]
 
 
-def whole_row(folder: Path) -> Row:
-    """Regime of every ballast test from all of its readings."""
-    regimes = {
-        name: regimes_of(*thinned(cycle, strain[:, None]))[0].name
-        for name, cycle, strain in ballast_series(folder)
-    }
-    return {"source": "whole ballast", "method": "auto", "regimes": regimes}
+def regimes_row(folder: Path) -> Row:
+    """Regime of every ballast test from its readings up to `REGIME_CUTS`; None: too few."""
+    regimes: dict[str, list[str | None]] = {}
+    for name, cycle, strain in ballast_series(folder):
+        told: list[str | None] = []
+        for cut in REGIME_CUTS:
+            known = cycle <= cut * (1 + 1e-9)
+            enough = known.sum() >= 5 and (cycle[known][-1] >= cut / 2 or not np.isfinite(cut))
+            rows = thinned(cycle[known], strain[known, None]) if enough else None
+            told.append(regimes_of(*rows)[0].name if rows else None)
+        regimes[name] = told
+    return {"source": "ballast regimes", "method": "auto", "regimes": regimes}
 
 
 def grains_row(name: str, grains: int = 1000, cycles: int = 50) -> Row:
