@@ -39,6 +39,7 @@ PARAMETERS = {
 }  # fmt: skip
 NAMES = {
     "ballast": "real ballast",
+    "other cuts": "the same tests, N_c between these",
     "families": "families",
     "doublings": "engine beds, windows of 20 to 90 cycles, to 2 N_c",
     "engine": "engine beds from cycle 1, N_c = 10 to 100",

@@ -22,6 +22,8 @@ REACH = 10.0
 """Predicted over last known cycle."""
 CUTS = (300.0, 1e3, 3e3, 1e4)
 """N_c."""
+OTHER_CUTS = (200.0, 500.0, 700.0, 2e3, 5e3, 2e4, 5e4)
+"""N_c between these: what the choice of `CUTS` is worth."""
 LAST = 5e5
 """Cycles of a made series, as of the real ones."""
 READING = 0.002
@@ -70,12 +72,12 @@ def cut_cases(
             yield LawCase(source, name, cut, cycle[known], settlement[known], to_cycle, truth)
 
 
-def ballast_cases(folder: Path) -> list[LawCase]:
+def ballast_cases(folder: Path, cuts: tuple[float, ...] = CUTS) -> list[LawCase]:
     """All cases of the triaxial tests."""
     return [
         case
         for name, cycle, strain in ballast_series(folder)
-        for case in cut_cases("ballast", name, cycle, strain, CUTS)
+        for case in cut_cases("ballast", name, cycle, strain, cuts)
     ]
 
 

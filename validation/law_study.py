@@ -25,6 +25,7 @@ from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.cases.jump_without_engine import data_folder
 from validation.law_series import (
+    OTHER_CUTS,
     LawCase,
     ballast_cases,
     ballast_series,
@@ -184,7 +185,11 @@ def sources(members: int, folder: Path | None) -> dict[str, list[LawCase]]:
     made = {"families": family_cases(members)}
     if folder is None:
         return made
-    real = {"ballast": ballast_cases(folder), "doublings": doubling_cases(folder)}
+    real = {
+        "ballast": ballast_cases(folder),
+        "other cuts": ballast_cases(folder, OTHER_CUTS),
+        "doublings": doubling_cases(folder),
+    }
     return real | made | {"engine": run_cases(folder)}
 
 
