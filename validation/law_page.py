@@ -191,6 +191,11 @@ def page(rows: Sequence[Row]) -> str:
             f"{doubling['cases']} inside the band"
         ),
         "regimes": regimes_table(rows),
+        "other": ", ".join(
+            f"{name} {per_cent(row['error'], 0)} / {per_cent(row['error_90'], 0)}"
+            for name in ("hyperbolic", "log")
+            for row in [row_of(rows, "other cuts", name)]
+        ),
         "bursts": f"{inside} of {of}",
     }
     text = TEMPLATE.read_text(encoding="utf-8")
