@@ -5,8 +5,10 @@ TRACKBED_DATA names the folder; series made from twelve families of the literatu
 noise and as few digits as a published curve; five families that must be refused; and the mean
 settlement of full engine runs, one doubling and ten times ahead: measured, no bar.
 
-    trackbed validate laws            12 members of each family, a minute
-    trackbed validate laws --quick    3 members
+    trackbed validate laws            a minute
+    trackbed validate laws --quick    what has bars alone
+
+Both draw all members of the families: the 90th percentile of fewer is off by several per cent.
 """
 
 from __future__ import annotations
@@ -50,12 +52,13 @@ def source_checks(source: str, found: Row, total: int) -> list[Check]:
 
 
 def run(quick: bool) -> list[Check]:
-    """Checks on every source that is here; ``quick`` draws fewer members of the families."""
-    members, folder = (3 if quick else MEMBERS), data_folder()
+    """Checks on every source that is here; ``quick`` leaves out those that have no bars."""
+    folder = data_folder()
     checks = [] if folder else skipped()
-    for source, cases in sources(members, folder).items():
-        checks += source_checks(source, auto_summary(auto_rows(cases)), len(cases))
-    fast = auto_rows(fast_cases(members))
+    for source, cases in sources(MEMBERS, folder).items():
+        if source in JUDGED or not quick:
+            checks += source_checks(source, auto_summary(auto_rows(cases)), len(cases))
+    fast = auto_rows(fast_cases(MEMBERS))
     refused = sum(not row["allowed"] for row in fast) / len(fast)
     name = f"constant or growing rate ({len(fast)} series): share refused"
     return [*checks, Check(name, refused, f">= {ALARM_BAR}", refused >= ALARM_BAR)]
