@@ -233,7 +233,11 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
         "paths", nargs="+", metavar="RUN|DUMP...|CSV", type=Path,
         help="a run folder, dumps with a frame each cycle, or a CSV of cycle,settlement (m)",
     )  # fmt: skip
-    parser.add_argument("--law", default="log", metavar="NAME", help="default: log")
+    parser.add_argument(
+        "--law", default="log", metavar="NAME",
+        help="default: log; auto: the slow laws together, refused (exit code 6) where the series "
+        "ratchets or collapses",
+    )  # fmt: skip
     parser.add_argument(
         "--to-cycle", type=float, metavar="N", help="cycle to predict; default: the last one given"
     )
@@ -259,17 +263,32 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
 
 def fit_command(arguments: argparse.Namespace) -> int:
     """Fit a law to a series; print its parameters, a prediction and its band."""
-    from adapters.fit import cycles_needed, fit_series, series_read
+    from adapters.errors import JumpRefused
+    from adapters.fit import cycles_needed, fit_auto, fit_series, series_read
     from adapters.laws import law_named
 
     if (arguments.confidence is None) != (arguments.error is None):
         raise UsageError("--confidence and --error belong together", remedy="give both or none")
-    law = law_named(arguments.law)
+    auto = arguments.law == "auto"
+    if auto and arguments.error is not None:
+        raise UsageError(
+            "--law auto is no single law, so it has no error term of eq. 15",
+            remedy="name a law for --error, such as --law log",
+        )
+    law = law_named("log" if auto else arguments.law)
     series = series_read(arguments.paths, arguments.steps_per_cycle).since(arguments.from_cycle)
     to_cycle = arguments.to_cycle
     if to_cycle is None:
         to_cycle = series.cycle.max(initial=0.0)
-    fitted = fit_series(series, law, to_cycle, arguments.probability).to_json()
+    try:
+        if auto:
+            fitted = fit_auto(series, to_cycle, arguments.probability).to_json()
+        else:
+            fitted = fit_series(series, law, to_cycle, arguments.probability).to_json()
+    except JumpRefused as refusal:
+        if arguments.json:
+            json_print(refusal.to_json(series.unit))
+        raise
     if arguments.error is not None:
         fitted["cycles_needed"] = cycles_needed(series, law, arguments.error, arguments.confidence)
     if arguments.json:
@@ -279,6 +298,7 @@ def fit_command(arguments: argparse.Namespace) -> int:
     print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles")
     for name, value in fitted["parameters"].items():
         print(f"  {name} = {value:.6g}")
+    print(f"regime: {fitted['regime'] or 'not told from so few cycles'}")
     low, high = fitted["band"]
     print(f"settlement at cycle {to_cycle:g}: {fitted['prediction']:.6g} {unit}")
     print(f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}")

@@ -72,6 +72,36 @@ class DumpError(NotCredible):
         super().__init__(what, where=where, remedy=remedy)
 
 
+class JumpRefused(NotCredible):
+    """Nothing bounds what comes after a series: its rate does not fall, or grows.
+
+    ``regime`` is ``ratcheting`` or ``collapse``; ``parameters`` what it was told from.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: str = "",
+        remedy: str = "",
+        regime: str = "",
+        parameters: dict[str, float] | None = None,
+    ) -> None:
+        self.regime, self.parameters = regime, parameters or {}
+        super().__init__(what, where=where, remedy=remedy)
+
+    def to_json(self, unit: str) -> dict[str, object]:
+        """The keys of ``trackbed fit --json``, without a prediction."""
+        return {
+            "law": "auto",
+            "parameters": self.parameters,
+            "prediction": None,
+            "band": None,
+            "unit": unit,
+            "regime": self.regime,
+        }
+
+
 class NotConverged(TrackbedError):
     """An iteration (preparation, relaxation, fit) did not reach its tolerance."""
 

@@ -8,13 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from adapters.errors import NotConverged, UsageError
+from adapters.errors import JumpRefused, NotConverged, UsageError
+from adapters.fit_auto import outlook
+from adapters.fit_candidates import ROWS_FEWEST, thinned
+from adapters.fit_regime import WHY_NOT, regimes_of
 from adapters.laws.law import Law
+from adapters.laws.shaped_law import ShapedLaw
 from adapters.residual import cycles_for_error, error_term
 from adapters.settlement_series import Series, series_read
 from adapters.state import FloatArray
 
-__all__ = ["Prediction", "Series", "cycles_needed", "fit_series", "series_read"]
+__all__ = ["Prediction", "Series", "cycles_needed", "fit_auto", "fit_series", "series_read"]
 
 NOISE_SERIES = 400
 """Random residual series that a fit is repeated on: scatter to 3.5 %; fewer for long series."""
@@ -32,6 +36,8 @@ class Prediction:
     band: tuple[float, float]
     """Low and high end of the settlement at that cycle, in ``unit``; see `prediction_band`."""
     unit: str
+    regime: str | None = None
+    """One of `fit_regime.REGIMES`; None where the series is too short to tell."""
 
     def to_json(self) -> dict[str, Any]:
         """What ``trackbed fit --json`` prints."""
@@ -41,6 +47,7 @@ class Prediction:
             "prediction": self.prediction,
             "band": list(self.band),
             "unit": self.unit,
+            "regime": self.regime,
         }
 
 
@@ -54,15 +61,9 @@ def fit_series(series: Series, law: Law, to_cycle: float, probability: float = 0
     is too short (one row more than the law has parameters), `NotConverged` when the result is
     not finite.
     """
-    if not 0 < probability < 1:
-        raise UsageError(f"a probability lies between 0 and 1, not at {probability:g}")
     cycle, settlement = _training_rows(series, law)
     last = float(cycle[-1])
-    if not (isfinite(to_cycle) and to_cycle >= last):
-        raise UsageError(
-            f"cycle {to_cycle:g} does not lie behind the last one of the series, {last:g}",
-            remedy="ask for a later cycle: the earlier ones are known",
-        )
+    _check_target(last, to_cycle, probability)
     with np.errstate(over="ignore", invalid="ignore"):  # judged below, in one place
         parameters = law.fit(cycle, settlement)
         prediction = float(settlement[-1] + law.increment(parameters, last, to_cycle))
@@ -76,7 +77,51 @@ def fit_series(series: Series, law: Law, to_cycle: float, probability: float = 0
             remedy="predict less far, or use the law log",
         )
     named = dict(zip(law.parameter_names, map(float, parameters), strict=True))
-    return Prediction(law.name, named, prediction, band, series.unit)
+    return Prediction(law.name, named, prediction, band, series.unit, regime_of(series))
+
+
+def fit_auto(series: Series, to_cycle: float, probability: float = 0.9) -> Prediction:
+    """Predict the settlement at ``to_cycle`` from the slow laws together; see `fit_auto.outlook`.
+
+    ``parameters`` of the result: ``exponent`` beta of the tail with its deviation, which the
+    regime is told from, and under each law's name the settlement that it alone predicts (the
+    median of its windows), so that one sees which agree.
+
+    Raises `JumpRefused` where the series ratchets or collapses and ``to_cycle`` lies behind it:
+    no law says when that ends.  Otherwise as `fit_series`.
+    """
+    rows = series.cycle > 0
+    cycle, settlement = series.cycle[rows], series.settlement[rows]
+    if len(cycle):
+        _check_target(float(cycle[-1]), to_cycle, probability)
+    found = outlook(cycle, settlement[:, None], to_cycle, probability)
+    regime, candidates = found.regime[0], found.candidates
+    parameters = regime.parameters()
+    if not regime.jump_allowed and to_cycle > cycle[-1]:
+        raise JumpRefused(
+            f"up to cycle {cycle[-1]:g} {WHY_NOT[regime.name]}: it goes as N^(beta - 1) with "
+            f"beta = {regime.exponent:.2f} ± {regime.deviation:.2f}, and no law says when "
+            "that ends",
+            where="law auto",
+            remedy="compute or measure more cycles, or name a law yourself: --law log, linear ...",
+            regime=regime.name,
+            parameters=parameters,
+        )
+    for name in dict.fromkeys(candidates.law):
+        own = [row for row, law in enumerate(candidates.law) if law == name]
+        parameters[name] = float(settlement[-1] + np.median(candidates.increment[own, 0]))
+    band = (float(found.low[0]), float(found.high[0]))
+    return Prediction(
+        "auto", parameters, float(found.prediction[0]), band, series.unit, regime.name
+    )
+
+
+def regime_of(series: Series) -> str | None:
+    """Regime of a series; None where it has fewer than four cycles after the start."""
+    rows = series.cycle > 0
+    if rows.sum() < ROWS_FEWEST:
+        return None
+    return regimes_of(*thinned(series.cycle[rows], series.settlement[rows, None]))[0].name
 
 
 def prediction_band(
@@ -133,7 +178,8 @@ def fit_noise(
     freedom = effective - len(parameters)
     deviation = sqrt(square / count * effective / freedom)
 
-    members = int(np.clip(2e7 / count, 50, NOISE_SERIES))
+    effort = 4e5 if isinstance(law, ShapedLaw) else 2e7  # numbers that are fitted
+    members = int(np.clip(effort / count, 50, NOISE_SERIES))
     random = np.random.default_rng(0)
     noise = deviation * autoregression(random, correlation, (count, members))
     kept = correlation ** ((to_cycle - cycle[-1]) / (cycle[-1] - cycle[-2]))
@@ -166,6 +212,16 @@ def cycles_needed(series: Series, law: Law, error: float, confidence: float) -> 
     cycle, settlement = _training_rows(series, law)
     residual = error_term(law, cycle, settlement)
     return cycles_for_error(float(residual.min()), float(residual.max()), error, 1 - confidence)
+
+
+def _check_target(last: float, to_cycle: float, probability: float) -> None:
+    if not 0 < probability < 1:
+        raise UsageError(f"a probability lies between 0 and 1, not at {probability:g}")
+    if not (isfinite(to_cycle) and to_cycle >= last):
+        raise UsageError(
+            f"cycle {to_cycle:g} does not lie behind the last one of the series, {last:g}",
+            remedy="ask for a later cycle: the earlier ones are known",
+        )
 
 
 def _training_rows(series: Series, law: Law) -> tuple[FloatArray, FloatArray]:

@@ -6,17 +6,21 @@ import numpy as np
 
 from adapters.errors import UsageError
 from adapters.laws.law import log_ratio, outer, training_data
+from adapters.laws.projection import centred, orthonormal, two_term_fit
 from adapters.state import FloatArray
 
 
 class LogLinear:
     """u(N) = c + a ln N + b N by least squares; a jump adds a ln((N + h) / N) + b h.
 
+    a and b have one sign; where the free least squares gives them opposite ones, the better of
+    the two terms stays alone.
+
     Shenton's law as the paper uses it, with a constant and with its increment: then it does not
     depend on the unit of time (b takes the factor), as eq. 17 does.
 
     Do not use it to predict far from a short window: over one doubling ln N and N are nearly the
-    same curve, a and b become large with opposite signs, and the term b N explodes.
+    same curve, noise decides how the slope is shared, and the term b N explodes.
     """
 
     name = "log-linear"
@@ -28,22 +32,19 @@ class LogLinear:
     def fit(self, cycle: FloatArray, displacement: FloatArray) -> FloatArray:
         """Parameters c, a [m] and b [m/cycle], shape (3, ...); see `Law.fit`.
 
-        Both columns are centred and scaled before they are made orthogonal: at a million cycles
-        they differ by 1e-5 of themselves only.
+        Both columns are counted from the first cycle: at a million cycles they differ by 1e-5 of
+        themselves only.  Raises `UsageError` also where they can not be told apart.
         """
         cycle, displacement = training_data(self, cycle, displacement)
-        columns = np.stack([(cycle - cycle[0]) / cycle[0], log_ratio(cycle[0], cycle)], axis=1)
-        columns -= columns.mean(axis=0)
-        scale = np.linalg.norm(columns, axis=0)
-        orthogonal, triangle = np.linalg.qr(columns / scale)
-        if abs(triangle[1, 1]) <= len(cycle) * np.finfo(float).eps:
+        columns = np.stack([(cycle - cycle[0]) / cycle[0], log_ratio(cycle[0], cycle)])
+        _, triangle = orthonormal(centred(columns, 1))
+        if not triangle[2]:
             raise UsageError(
                 f"ln N and N are the same straight line over cycles {cycle[0]:g} to {cycle[-1]:g}",
                 where=f"law {self.name}",
                 remedy="use the law log",
             )
-        pseudo_inverse = np.linalg.solve(triangle, orthogonal.T) / scale[:, None]
-        b, a = np.tensordot(pseudo_inverse, displacement, 1)
+        b, a = two_term_fit(columns, displacement)
         b = b / cycle[0]
         c = displacement.mean(axis=0) - a * np.log(cycle).mean() - b * cycle.mean()
         return np.stack([c, a, b])

@@ -18,12 +18,14 @@ from adapters.fit import (
     fit_series,
     prediction_band,
 )
-from adapters.laws import Law, law_named, laws_known
+from adapters.laws import Law, law_named
 from adapters.residual import error_term
 from adapters.state import FloatArray
 
 LOG = law_named("log")
-every_law = pytest.mark.parametrize("law", [law_named(name) for name in laws_known()])
+every_law = pytest.mark.parametrize(
+    "law", [law_named(name) for name in ("karrech2007", "linear", "log", "log-linear")]
+)
 
 
 def correlated_noise(seed: int, count: int, correlation: float, many: int) -> FloatArray:
@@ -62,6 +64,7 @@ def test_series_that_follows_a_law_is_predicted(name: str, parameters: dict[str,
         "prediction": found.prediction,
         "band": list(found.band),
         "unit": "mm",
+        "regime": found.regime,
     }
 
 
