@@ -24,8 +24,8 @@ contacts on the path.  Where redundant contacts stick, the matrix of a step has 
 the point what it is.
 
 The path of a non-monotone law may still fold.  Then another rounding is gone on with, whose path
-folds elsewhere; and when none leads on the best point is given back, from which
-`rigid_lcp.extrapolated_points` often ends.
+folds elsewhere, from a sigma some times as great.  When none leads on the best point is given back,
+from which `rigid_lcp.extrapolated_points` often ends.
 """
 
 from __future__ import annotations
@@ -44,11 +44,16 @@ Floats = NDArray[np.float64]
 
 COMPLIANCE = 1e-4
 """The path begins at forces as large as those of springs, ``(W + compliance / rho) r = -q``."""
-ROUNDINGS, HOPS = (1e-2, 1e-1, 1e-3), 6
-"""eps over ``sqrt(sigma) / rho``, the velocity of a sticking contact on the path [-].  Every one is
-another path; where one folds the next in turn is gone on with, so often at most."""
-SHRINK, LESS, BACK = 0.3, 0.55, 3.0
-"""sigma of the next point over that of the last, where that was not found, and on another path."""
+ROUNDINGS = (1e-2, 1e-1, 1e-3, 1e-4)
+"""eps over ``sqrt(sigma) / rho``, the velocity of a sticking contact on the path [-]: every one is
+another path, and they are followed in turn."""
+SHRINK, LESS = 0.3, 0.55
+"""sigma of the next point over that of the last, and where that was not found."""
+BACK = (3.0, 10.0, 30.0, 100.0)
+"""sigma with which another path is begun where one folds, over that of its last point: greater ones
+when all paths have folded."""
+HOPS = 6
+"""So many other paths at most are gone on with."""
 SHIFT = 1e-8
 """Of W in the matrices, over mean(diag W)."""
 FOUND = 0.03
@@ -69,14 +74,16 @@ def smoothed_path(
     *,
     linear: Factorisation | None = None,
     factorisations: int = FACTORISATIONS,
+    hops: int = HOPS,
 ) -> FrictionSolution:
     """Follow the path from a great sigma until the residual is at or below ``tolerance``.
 
     ``begin``: forces r (nc * dim,) and sigma [N^2] of a point near the path, as another method left
     them; else it begins at the forces of springs.  ``linear``: factorisations of this problem's W,
-    made if not given; at most ``factorisations`` are spent.  Some 40 to 100 solve most settled
-    beds; for what sticks or hardly slides `rigid_lcp.interior_point` and Newton need a third of
-    that.  ``work``: ``points`` and ``factorisations``.
+    made if not given; at most ``factorisations`` are spent, and so many ``hops`` made to other
+    paths where one folds.  Some 40 to 100 factorisations solve most settled beds; for what sticks
+    or hardly slides `rigid_lcp.interior_point` and Newton need a third of that.  ``work``:
+    ``points`` and ``factorisations``.
     """
     linear = linear or factorisation(problem)
     best, least = np.zeros(problem.offset.shape), np.inf
@@ -86,11 +93,11 @@ def smoothed_path(
     except SingularSystem:
         return friction_solution(problem, best, tolerance, "smoothed path", status="singular")
     found_force, found_sigma, shrink = force, sigma, 1.0
-    hops, most = 0, FIRST_STEPS
+    most, rounding, hopped = FIRST_STEPS, ROUNDINGS[0], 0
     while least > tolerance and spent < factorisations:
         force, found, steps = smoothed_point(
             problem, found_force, shrink * found_sigma, linear, min(most, factorisations - spent),
-            ROUNDINGS[hops % len(ROUNDINGS)],
+            rounding,
         )  # fmt: skip
         spent += steps
         residual = problem.residual(force)
@@ -109,8 +116,10 @@ def smoothed_path(
                     best, least = ended.r, ended.residual
         elif shrink == SHRINK:
             shrink = LESS
-        elif hops < HOPS:
-            hops, shrink, most = hops + 1, BACK, FIRST_STEPS
+        elif hopped < hops:
+            hopped, most = hopped + 1, FIRST_STEPS
+            rounding = ROUNDINGS[hopped % len(ROUNDINGS)]
+            shrink = BACK[hopped // len(ROUNDINGS) % len(BACK)]
         else:
             break
     return friction_solution(

@@ -75,9 +75,12 @@ DEAR_SWEEPS = 6000
 FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
 """What the paths of the interior point may cost in all before no further one is begun: so many
 times what was spent before them, or so many flops (some seconds) if that is more."""
-SMOOTHED_STEPS, SMOOTHED_DRIFT = (150, 300), (80, 200)
-"""Factorisations along the smoothed path, and of extrapolated points from where it ends: from the
-end of the convex path, and later from the beginning."""
+SMOOTHED_STEPS, SMOOTHED_DRIFT = 150, 80
+"""Factorisations along the smoothed path that goes on from the convex one, and of extrapolated
+points from where it ends."""
+LAST_STEPS, LAST_HOPS, LAST_FLOPS, LAST_FEW = 3000, 100, 4e10, 300
+"""The same from the beginning and with many folds left behind, where little else is left: the cost
+in all, or so few factorisations if that is more."""
 DRIFT, DRIFT_FLOPS = 1500, 5e9
 """Factorisations of extrapolated points before the paths, and their cost in all (or so much as was
 spent before, if that is more)."""
@@ -128,7 +131,7 @@ def attempts(
         return trial
     if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
         return trial
-    if trial.path_point is not None and smoothed(trial, trial.path_point):
+    if trial.path_point is not None and smoothed_further(trial, trial.path_point):
         return trial
     moving = not small and start is not None
     if moving and tolerance < HAND_OVER and not trial.dear and deep(trial, start, accept):
@@ -188,7 +191,7 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         trial.best = replace(trial.best, status="no solution")
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
-    if smoothed(trial) or drift_from_paths(trial, most):
+    if drift_from_paths(trial, most) or smoothed(trial):
         return
     if trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort)):
         return
@@ -209,18 +212,30 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         trial.sweep(None, LAST_SWEEPS)
 
 
-def smoothed(trial: Trial, begin: tuple[Floats, float] | None = None) -> bool:
-    """The smoothed path from the forces and sigma of ``begin``, or from the beginning, and from its
-    end extrapolated points."""
-    trial.linear = trial.linear or factorisation(trial.problem)
-    later = begin is None
+def smoothed_further(trial: Trial, begin: tuple[Floats, float]) -> bool:
+    """The smoothed path from the forces and sigma where the convex one ended, and from its end
+    extrapolated points."""
     found = smoothed_path(
         trial.problem, trial.tolerance, begin, linear=trial.linear,
-        factorisations=min(SMOOTHED_STEPS[later], trial.affordable),
+        factorisations=min(SMOOTHED_STEPS, trial.affordable),
     )  # fmt: skip
     trial.keep(found)
     trial.sharpen()
-    return trial.best.solved or trial.drift(SMOOTHED_DRIFT[later], DRIFT_FLOPS, found)
+    return trial.best.solved or trial.drift(SMOOTHED_DRIFT, DRIFT_FLOPS, found)
+
+
+def smoothed(trial: Trial) -> bool:
+    """The smoothed path from its beginning, past many folds."""
+    trial.linear = trial.linear or factorisation(trial.problem)
+    count = min(LAST_STEPS, max(LAST_FEW, int(LAST_FLOPS / trial.linear.flops)))
+    trial.keep(
+        smoothed_path(
+            trial.problem, trial.tolerance, linear=trial.linear,
+            factorisations=min(count, trial.affordable), hops=LAST_HOPS,
+        )
+    )  # fmt: skip
+    trial.sharpen()
+    return trial.best.solved
 
 
 def drift_from_paths(trial: Trial, most: float) -> bool:
