@@ -165,6 +165,21 @@ def test_a_killed_job_is_replaced(tmp_path: Path) -> None:
     sweep.nothing_left()
 
 
+@pytest.mark.engine("liggghts")
+def test_a_stopped_sweep_leaves_no_job(tmp_path: Path) -> None:
+    """SIGTERM: exit code 130, jobs given back, no engine goes on; the same command would."""
+    launcher = json.dumps([str(tmp_path / "good")])
+    settings = [*TINY, 'engine.name="liggghts"', "procedure.total_cycles=200"]
+    sweep = JobSweep(tmp_path, settings, "--set", f"engine.launcher={launcher}")
+    child = sweep.start()
+    until(lambda: [*sweep.into.glob("members/*/window_000002")] or child.poll() is not None)
+    child.terminate()
+    _, said = child.communicate(timeout=PATIENCE_S)
+    assert child.returncode == 130, said
+    assert "the same command goes on with the sweep" in said
+    sweep.nothing_left()
+
+
 JOB = """\
 #!/bin/sh
 #SBATCH --job-name=bed --nodes=1 --ntasks=2 --time=00:10:00 --output=job.txt
