@@ -1,12 +1,13 @@
 #!/bin/sh
 # A SLURM of one node on this machine, all of it in one folder, for tests/engines/test_slurm.py:
 #
-#   apt-get install --no-install-recommends slurm-wlm munge        # Debian 12: SLURM 22.05
+#   apt-get install --no-install-recommends slurm-wlm munge libpmix-dev    # Debian 12: SLURM 22.05
 #   export SLURM_CONF=FOLDER/slurm.conf
 #   sh tests/engines/slurm_one_node.sh start FOLDER
 #   pytest tests/engines/test_slurm.py
 #   sh tests/engines/slurm_one_node.sh stop FOLDER
 #
+# (libpmix-dev holds the name under which SLURM looks for PMIx, which LIGGGHTS' MPI wants.)
 # Key, socket and ports are its own: a SLURM that is there already is not touched.  Jobs run as who
 # started it.  Two processors; no cgroups, which containers lack; ended jobs in FOLDER/jobs.txt.
 set -eu
