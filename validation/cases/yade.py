@@ -51,7 +51,7 @@ def paper_checks(figures: PaperScale) -> list[Check]:
                 1.0),
         Check("the same: piston's work in the last cycle", figures.work, "> 0", True, "J"),
         bounded("kinetic energy over that work, greatest", figures.kinetic_share, 1.0),
-        bounded("the same at the cycle's end", ends[-1] / figures.work, 0.1),
+        bounded("kinetic energy over that work, at the cycle's end", ends[-1] / figures.work, 0.1),
         Check("the same: settlement in all cycles", figures.settlement, "> 0",
               figures.settlement > 0, "m"),
         bounded("rms force error of the piston over the peak", figures.force_error, 0.25),
