@@ -45,6 +45,6 @@ def share_told(content: dict[str, Any]) -> str:
     told = "holds" if min(soft, stiff) >= 0.95 else "**is missed**"
     return (
         f"Frames and the piston's record take {added:.2f} s of a run of {engine:.1f} s, reading, "
-        f"checking and waiting {python:.2f} s beside it: {soft:.3f} of YADE's speed is left on the soft "
-        f"bed, {stiff:.3f} at the paper's stiffness; the bar of 0.95 {told}."
+        f"checking and waiting {python:.2f} s beside it: {soft:.3f} of YADE's speed is left on the "
+        f"soft bed, {stiff:.3f} at the paper's stiffness; the bar of 0.95 {told}."
     )
