@@ -22,7 +22,11 @@ stop() {
         test -s "$file" || continue
         read -r pid <"$file"
         kill "$pid" 2>/dev/null || true
-        for _ in $(seq 100); do kill -0 "$pid" 2>/dev/null && sleep 0.1; done
+        for _ in $(seq 100); do
+            kill -0 "$pid" 2>/dev/null || break
+            sleep 0.1
+        done
+        kill -9 "$pid" 2>/dev/null || true # one that a lost step holds up
         rm -f "$file"
     done
 }
