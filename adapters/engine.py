@@ -1,4 +1,4 @@
-"""The contract of an engine, and how one process of it is run.
+"""The contract of an engine; `adapters.engine_process` runs a process of one.
 
 An engine reads input files from a folder and leaves, in the same folder:
 
@@ -12,14 +12,10 @@ Its exit code proves nothing: `adapters.checks` judges what it left.
 
 from __future__ import annotations
 
-import ctypes
-import os
 import resource
 import signal
-import subprocess
 import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
@@ -36,10 +32,6 @@ ENGINE_REMEDY = (
     "see: trackbed doctor"
 )
 """What to do where no engine is installed."""
-
-POLL_S, POLL_MOST_S, POLL_SHARE = 0.05, 1.0, 1e-3
-"""Time between two looks at a running engine [s]; at a long run it grows to so great a part of its
-length, up to the second: a look costs 0.3 ms."""
 
 
 @dataclass(frozen=True)
@@ -130,56 +122,6 @@ class Engine(Protocol):
 
 CRASHES = (signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGBUS, signal.SIGILL)
 """Signals by which a program ends itself; all others come from outside."""
-
-
-def _die_with_parent() -> None:
-    """Have the kernel end this child when Python is killed, so that no orphan keeps computing."""
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # 1 = PR_SET_PDEATHSIG
-
-
-def process_run(
-    command: Sequence[str], folder: Path, watch: Callable[[], None]
-) -> tuple[int, float, float]:
-    """Run ``command`` in ``folder``, output to ``screen.txt``; exit status, CPU s, elapsed s.
-
-    On any exception, Ctrl-C included, the whole process group is ended first.
-    Raises `EngineMissing` when the program can not be started.
-    """
-    environment = os.environ | {
-        "OMPI_ALLOW_RUN_AS_ROOT": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    }
-    started = time.monotonic()
-    with (folder / "screen.txt").open("wb") as screen:
-        try:
-            child = subprocess.Popen(
-                command,
-                cwd=folder,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=screen,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                preexec_fn=_die_with_parent,
-            )
-        except OSError as error:
-            raise EngineMissing(
-                f"can not start {command[0]} ({error.strerror})",
-                remedy="install it, or mend the scene's engine.launcher; see: trackbed doctor",
-            ) from error
-        try:
-            pid = 0
-            while pid == 0:
-                length = time.monotonic() - started
-                time.sleep(min(max(POLL_S, POLL_SHARE * length), POLL_MOST_S))
-                watch()
-                pid, status, usage = os.wait4(child.pid, os.WNOHANG)
-        except BaseException:
-            os.killpg(child.pid, signal.SIGKILL)
-            child.wait()
-            raise
-    child.returncode = os.waitstatus_to_exitcode(status)
-    return child.returncode, usage.ru_utime + usage.ru_stime, time.monotonic() - started
 
 
 def python_cpu_s() -> float:

@@ -7,8 +7,9 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from adapters.engine import EngineRun, engine_failure, process_run, restart_check
+from adapters.engine import EngineRun, engine_failure, restart_check
 from adapters.engine_plan import SETTLE_TIMES
+from adapters.engine_process import process_run
 from adapters.errors import EngineFailed, NotConverged
 
 COMPLETE = re.compile(r"^COMPLETE step \d+", re.MULTILINE)

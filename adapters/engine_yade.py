@@ -10,14 +10,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from adapters.decks import PISTON_MARGIN, deck_copy
+from adapters.decks import deck_copy
 from adapters.engine import EngineRun, EngineStart, cycles_in_track
 from adapters.engine_deck import deck_run
 from adapters.engine_plan import EQUILIBRIUM_RATIO, seat_plan, settle_plan
 from adapters.engine_program import Program
 from adapters.scene import Scene
 from adapters.state import FloatArray
-from adapters.yade_parameters import piston_triangles, shared_parameters
+from adapters.yade_parameters import piston_face, shared_parameters
 
 SCRIPTS = {"in.prepare": "prepare.py", "in.cycles": "cycles.py"}
 """Script of each deck."""
@@ -76,13 +76,12 @@ class YadeEngine:
         """Write a window of load cycles; see `adapters.engine.Engine`."""
         assert scene.loading is not None
         shutil.copyfile(start.restart, folder / "start.restart")
-        margin = PISTON_MARGIN * scene.sample.grain_radius.greatest
         steps = scene.steps_per_cycle
         content = shared_parameters(scene, start.piston_height)
         content["piston"] = {
             "mass": scene.loading.piston_mass,
             "height": start.piston_height,
-            "triangles": piston_triangles(scene.container, scene.piston_reach, margin).tolist(),
+            **piston_face(scene.container, scene.piston_reach, scene.sample.grain_radius),
         }
         content["window"] = {
             "start": start.kind,

@@ -149,8 +149,8 @@ def _run(
         taken = set()
         try:
             for future in as_completed(futures):
-                taken.add(future)
                 take(future)
+                taken.add(future)  # behind it: a signal within is to lose no result
         except (KeyboardInterrupt, Exception):
             sweep.stop_file.touch()
             wait([*futures], timeout=STOP_S)

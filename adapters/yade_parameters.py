@@ -8,10 +8,10 @@ import numpy as np
 
 from adapters.contact_law import DAMPING_FACTOR, damping_of_rebound
 from adapters.container import Container
-from adapters.decks import MIRROR_YOUNG, box_bounds, convex_clip, section_bounds
+from adapters.decks import MIRROR_YOUNG, PISTON_MARGIN, box_bounds, convex_clip, section_bounds
 from adapters.engine_plan import frictional
 from adapters.sample import GRAVITY
-from adapters.scene import Scene
+from adapters.scene import GrainRadius, Scene
 from adapters.state import FloatArray
 
 VERLET_SHARE = 0.1
@@ -19,6 +19,10 @@ VERLET_SHARE = 0.1
 
 DISC_CORNERS = 96
 """Corners of the polygon that stands for a disc-shaped piston."""
+
+RIM_WIDTH = 0.2
+"""How far inside a piston's rim grains still meet the rim, in mean radii: further than one moves in
+a load cycle, or than a contact is wide."""
 
 NO_WEIGHT = 1.0
 """Density of walls [kg/m^3]: nothing depends on it, and YADE wants one."""
@@ -129,34 +133,34 @@ def side_triangle(container: Container, angle: float, height: float) -> FloatArr
     return np.column_stack([plane, corners[:, 1]])
 
 
-def piston_triangles(container: Container, reach: float, margin: float) -> FloatArray:
-    """Triangles of the piston's face, horizontal corners [m], shape (t, 3, 2), normal down.
+def piston_face(container: Container, reach: float, grain: GrainRadius) -> dict[str, Any]:
+    """The piston's face: ``triangles``, horizontal corners [m], shape (t, 3, 2), normal down.
 
-    A whole piston (``reach`` infinite) is one triangle over the section and ``margin`` [m] more;
-    a partial one a disc of radius ``reach`` [m], cut ``margin`` behind the mirror planes.
+    A whole piston (``reach`` infinite) is one triangle over the section and somewhat more.  A
+    partial one, a disc of radius ``reach`` [m], is a plane for grains whose centres are within
+    ``plane_reach`` [m] of the axis, and triangles for those further out.  ``grain``: radii.
     """
+    margin = PISTON_MARGIN * grain.greatest
     if np.isinf(reach):
         low, high = section_bounds(container)
         corner = np.array(low) - margin
         across = 2 * (np.array(high) + margin - corner)
         face = [corner, corner + np.array([0.0, across[1]]), corner + np.array([across[0], 0.0])]
-        return np.array([face])
+        return {"triangles": np.array([face]).tolist()}
     angle = -np.linspace(0.0, 2 * np.pi, DISC_CORNERS + 1)[:-1]
     circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
     floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
-    return convex_triangles(convex_clip(circle, floor))
+    return {
+        "triangles": rim_triangles(convex_clip(circle, floor)).tolist(),
+        "plane_reach": max(reach - RIM_WIDTH * grain.mean, 0.0),
+    }
 
 
-def convex_triangles(corners: FloatArray) -> FloatArray:
-    """Triangles (t, 3, 2) of a convex polygon (n, 2), with short seams between them.
+def rim_triangles(corners: FloatArray) -> FloatArray:
+    """Triangles (n, 3, 2) from the origin to the sides of a convex polygon (n, 2) around it.
 
-    Every other corner is cut off, again and again.  YADE pushes a grain on a seam of two
-    triangles from both: seams are to be short, and those of a fan are not.
+    YADE pushes a grain on a seam of two triangles from both.  These seams go straight to the
+    corners, so that near the rim, where alone grains meet them, there is as little as can be.
     """
-    triangles = []
-    left = list(corners)
-    while len(left) > 3:
-        count = len(left)
-        triangles += [[left[i], left[i + 1], left[(i + 2) % count]] for i in range(0, count - 1, 2)]
-        left = left[::2]
-    return np.array([*triangles, left] if len(left) == 3 else triangles)
+    after = np.roll(corners, -1, axis=0)
+    return np.stack([np.zeros_like(corners), corners, after], axis=1)

@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from adapters.dump import dump_frames
-from adapters.engine import Engine, engine_failure, engine_named, process_run
+from adapters.engine import Engine, engine_failure, engine_named
+from adapters.engine_process import process_run
 from adapters.engine_yade import PARAMETERS
 from adapters.errors import NotCredible
 from adapters.sample import GRAVITY

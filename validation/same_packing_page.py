@@ -5,7 +5,6 @@ python -m validation.same_packing_page
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
@@ -14,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from adapters.run_folder import write_atomically
-from validation.cases.yade import CYCLES as CYCLES_TIMED
 from validation.same_packing import CYCLES, SEEDS, WAYS, interval
 from validation.same_packing_reading import (
     ENGINES,
@@ -41,12 +39,12 @@ from validation.tangential_rules import (
     path,
     work,
 )
+from validation.yade_page import rows_yade, share_told, yade_read
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "engines.md"
 PLOT = ROOT / "docs" / "engines.png"
 TEXT = Path(__file__).parent / "same_packing_page.md"
-YADE = Path(__file__).parent / "results" / "yade.json"
 
 ON_THE_WAY = (1, 3, 5, 10, 20, 50)
 """Cycles at which the curves are compared."""
@@ -161,32 +159,6 @@ def table_rules(runs: dict[str, dict[int, Row]]) -> str:
     return table([*head, "less the paper's, µm", "the same, cycles 2 to 50"], rows)
 
 
-def table_yade(content: dict[str, Any]) -> str:
-    """The checks of ``trackbed validate yade``."""
-    rows = [
-        [check["name"], f"{check['value']:.4g} {check['unit']}".rstrip(), check["bar"]]
-        for check in content["checks"]
-    ]
-    return table(["what", "figure", "bar"], rows)
-
-
-def share_at_paper_scale(content: dict[str, Any]) -> str:
-    """Speed through the adapter where a cycle has the paper's steps, from the same overhead."""
-    figures = {check["name"].split(": ")[-1]: float(check["value"]) for check in content["checks"]}
-    bare, speed = (
-        figures[name]
-        for name in ("CPU time of YADE alone", "speed through the adapter over YADE alone")
-    )
-    overhead = bare * (1 / speed - 1) / CYCLES_TIMED
-    cycle = figures["CPU time of a load cycle"]
-    return (
-        f"What the adapter adds is {overhead:.2f} s a cycle, whatever its steps: of a stiff cycle "
-        f"of {cycle:.0f} s that leaves {1 - overhead / cycle:.3f} of YADE's speed. The soft bed's "
-        f"cycle is a tenth as long, and {'holds' if speed >= 0.95 else '**misses**'} the bar of "
-        "0.95."
-    )
-
-
 def failures(rows: Sequence[Row]) -> str:
     """Runs that failed, and how many of the plan are there."""
     bad = [
@@ -216,8 +188,8 @@ def page(rows: Sequence[Row], yade: dict[str, Any]) -> str:
         "TABLE_SETTINGS": table_settings(runs),
         "TABLE_ON_THE_WAY": table_on_the_way(runs),
         "TABLE_RULES": table_rules(runs),
-        "TABLE_YADE": table_yade(yade),
-        "SHARE": share_at_paper_scale(yade),
+        "TABLE_YADE": table(["what", "figure", "bar"], rows_yade(yade)),
+        "SHARE": share_told(yade),
         "READING_ENGINES": reading_engines(runs),
         "READING_NOISE": reading_noise(runs),
         "READING_SETTINGS": reading_settings(runs),
@@ -268,12 +240,6 @@ def draw(rows: Sequence[Row], target: Path) -> None:
     right.set(xlabel="difference in settlement [µm]", title="bed by bed, mean and 95 %")
     figure.savefig(target, dpi=130)
     plt.close(figure)
-
-
-def yade_read() -> dict[str, Any]:
-    """The record of ``trackbed validate yade``."""
-    content: dict[str, Any] = json.loads(YADE.read_text(encoding="utf-8"))
-    return content
 
 
 def main() -> None:

@@ -35,6 +35,9 @@ O = Omega()
 GRAIN_MASK, WALL_MASK, BALLAST_MASK = 1, 3, 4
 """Group masks: bodies meet when they share a bit; walls, of bit 2, never meet one another."""
 
+PLANE, RIM = 8, 16
+"""Bits of grains under a piston over a part of the bed: each meets its plane, or its rim."""
+
 STILL = 1e-100
 """Share of the time step with which forces are worked out anew: no spring stretches, and
 velocities, which the law divides by the step, keep their digits."""
@@ -78,7 +81,12 @@ def walls_add(parameters):
 
 
 class Piston:
-    """A flat face of triangles with a mass: a clump, driven by forces along z.
+    """A flat face with a mass: a clump, driven by forces along z.
+
+    Over the whole section the face is one triangle.  Over a part of it, it is a plane for the
+    grains within ``plane_reach`` of the axis, and a fan of triangles for those further out, which
+    ends where the piston does: a grain meets one of the two (`grains_share`), and is pushed twice
+    on a seam of two triangles only near the rim.
 
     Its members have no mass of their own, so that a contact damps with the mass of its grain.
     YADE makes no clump without a sphere; that sphere touches nothing, and at the face's height
@@ -89,25 +97,61 @@ class Piston:
         """Find the piston among the bodies, or make it where there is none yet."""
         piston = parameters["piston"]
         self.mass = piston["mass"]
-        first = parameters["grain_count"] + len(parameters["walls"])
-        self.faces = list(range(first, first + len(piston["triangles"])))
+        self.plane_reach = piston.get("plane_reach")
+        self.grains = parameters["grain_count"]
+        first = self.grains + len(parameters["walls"])
+        members = len(piston["triangles"]) + (self.plane_reach is not None)
+        self.faces = list(range(first, first + members))
         self.ballast = self.faces[-1] + 1
         self.clump = self.ballast + 1
         if len(O.bodies) == first:
             self._make(piston)
+        assert len(O.bodies) == self.clump + 1, "the saved bed has another piston"
+        self.grains_share()
 
     def _make(self, piston):
-        z = piston["height"]
+        z, parted = piston["height"], self.plane_reach is not None
         members = [
-            facet([Vector3(x, y, z) for x, y in triangle], material="wall", mask=WALL_MASK)
+            facet(
+                [Vector3(x, y, z) for x, y in triangle],
+                material="wall",
+                mask=RIM | WALL_MASK & ~GRAIN_MASK if parted else WALL_MASK,
+            )
             for triangle in piston["triangles"]
         ]
+        if parted:
+            mask = PLANE | WALL_MASK & ~GRAIN_MASK
+            members.append(wall((0, 0, z), 2, -1, material="wall", mask=mask))
         members.append(sphere((0, 0, z), 1e-3, material="wall", mask=BALLAST_MASK))
         made = O.bodies.appendClumped(members)
         assert made == (self.clump, [*self.faces, self.ballast]), made
         state = O.bodies[self.clump].state
         state.mass, state.inertia = self.mass, Vector3(1, 1, 1)
         state.blockedDOFs = "xyXYZ"
+
+    def grains_share(self):
+        """Have each grain meet the plane or the rim; True where one changed from one to the other.
+
+        Then engines are to be set anew: a collider looks at pairs whose bounds began to overlap.
+        The contact it had is made anew by the other face, without its tangential spring.
+        """
+        if self.plane_reach is None:
+            return False
+        changed = False
+        for number in range(self.grains):
+            body = O.bodies[number]
+            place = body.state.pos
+            inside = place[0] ** 2 + place[1] ** 2 < self.plane_reach**2
+            mask = GRAIN_MASK | (PLANE if inside else RIM)
+            if body.mask != mask:
+                body.mask = mask
+                changed = True
+                for face in self.faces:
+                    if O.interactions.has(number, face):
+                        O.interactions.erase(number, face)
+        if changed:  # erased ones only sleep while bounds overlap, whatever the masks say
+            O.interactions.eraseNonReal()
+        return changed
 
     @property
     def height(self):

@@ -38,6 +38,7 @@ def seat():
     O.run(press["steps"], True)
     piston.press(press["release_force"], gravity)
     O.run(press["release_steps"], True)
+    piston.grains_share()
 
 
 def move_grains(positions):
@@ -52,19 +53,29 @@ if window["start"] == "first":
     seat()
 elif window["start"] == "moved":
     move_grains(window["moved"])
+    piston.grains_share()
     piston.place(parameters["piston"]["height"])
 elif window["start"] == "perturbed":
     O.bodies[0].state.pos += Vector3(window["perturbation"], 0, 0)
 
 load = bed.load_engine(window["load"], piston)
 piston_record = record.PistonRecord(piston, gravity, window["track_steps"])
-bed.engines_set(parameters, [load], [piston_record.watch], [piston_record.watch_behind])
+
+
+def engines_set():
+    """Those of a load cycle."""
+    bed.engines_set(parameters, [load], [piston_record.watch], [piston_record.watch_behind])
+
+
+engines_set()
 piston.press(window["load"]["mean_force"], gravity)
 dumps = record.Dumps(parameters, piston)
 bed.forces_renew([load])
 dumps.frame()
 for _ in range(window["cycles"]):
     O.run(window["steps_per_cycle"], True)
+    if piston.grains_share():
+        engines_set()
     bed.forces_renew([load])
     dumps.frame()
 piston_record.last(record.grain_table(dumps.count))

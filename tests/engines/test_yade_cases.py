@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 from adapters import contact_law as law
+from adapters.yade_parameters import DISC_CORNERS
 from tests.engines.test_yade import ALPHA, Bed
 from validation.few_grains import RADIUS, table_1
+from validation.few_grains_piston import piston_forces, scene_partial
 from validation.few_grains_yade import track_run
-from validation.yade_scale import SEAM_MEAN, seam_force, seam_length
+from validation.yade_seams import SEAM_MEAN, seam_force, seam_length
 
 SCRIPTS = [path for path in files("yade_scripts").iterdir() if path.name.endswith(".py")]
 
@@ -92,6 +94,35 @@ def test_two_triangles_push_as_derived(share: float) -> None:
     flat = float(law.normal_force(overlap, scene.stiffness.wall, RADIUS))
     expected = flat * float(seam_force(share * radius, radius))
     assert track.force[0, 0, 2] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_partial_piston_pushes_once() -> None:
+    """Anywhere under it by eq. 5, and no more when a grain goes from its plane to its rim and back.
+
+    Grains at an overlap of 1e-7 m on the lines from the axis to the rim's corners, where triangles
+    meet; in the middle between two; beyond the rim by two contact radii.  Only the one that is on
+    such a line and near the rim is pushed by both triangles.
+    """
+    scene = scene_partial()
+    radius, reach = scene.sample.grain_radius.mean, scene.piston_reach
+    height, overlap = 0.05, 1e-7
+    near, beyond = reach - 0.1 * radius, reach + 2 * np.sqrt(2 * radius * overlap)
+
+    def at(distance: float, corner: float) -> list[float]:
+        angle = 2 * np.pi * corner / DISC_CORNERS
+        place = [distance * np.cos(angle), distance * np.sin(angle)]
+        return [*place, height - radius + overlap]
+
+    looks = [
+        np.array([at(0.5 * reach, 5), at(0.8 * reach, 14), at(near, 10), at(near, 19.5)]),
+        np.array([at(near, 5.5), at(0.8 * reach, 14), at(near, 10), at(beyond, 19.5)]),
+        np.array([at(0.5 * reach, 5), at(0.8 * reach, 14), at(0.6 * reach, 10), at(near, 19.5)]),
+    ]
+    force, changed = piston_forces(scene, looks, height)
+    flat = float(law.normal_force(overlap, scene.stiffness.wall, radius))
+    expected = np.array([[1, 1, 2, 1], [1, 1, 2, 0], [1, 1, 1, 1]])
+    assert -force[..., 2] / flat == pytest.approx(expected, abs=1e-6)
+    assert list(changed) == [0, 1, 1]
 
 
 def test_mean_of_the_seam_force() -> None:

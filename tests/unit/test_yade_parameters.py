@@ -14,16 +14,17 @@ from hypothesis import strategies as st
 import trackbed
 from adapters import contact_law as law
 from adapters.container import Container, sides_needed
+from adapters.decks import PISTON_MARGIN
 from adapters.engine import EngineStart
 from adapters.engine_yade import YadeEngine
 from adapters.errors import EngineFailed, EngineMissing, NotConverged, SceneError
-from adapters.scene import Scene
+from adapters.scene import GrainRadius, Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State
 from adapters.yade_parameters import (
-    convex_triangles,
     damping_ratio,
-    piston_triangles,
+    piston_face,
+    rim_triangles,
     shared_parameters,
     side_triangle,
 )
@@ -165,39 +166,40 @@ def test_mirrors_pass_through_corners() -> None:
 
 @given(st.integers(3, 60), st.floats(0.0, 6.0))
 def test_triangles_of_a_polygon_cover_it_once(corners: int, turn: float) -> None:
-    """Areas add up to the polygon's, none turns over, and no seam is longer than in a fan."""
+    """Areas add up to the polygon's and none turns over; every seam goes to the middle."""
     angle = turn + np.linspace(0, 2 * np.pi, corners + 1)[:-1]
     polygon = np.column_stack([np.cos(angle), np.sin(angle)])
-    triangles = convex_triangles(polygon)
-    assert len(triangles) == corners - 2
+    triangles = rim_triangles(polygon)
     area = areas(triangles)
     assert np.all(area > 0)
     assert area.sum() == pytest.approx(corners / 2 * np.sin(2 * np.pi / corners), rel=1e-9)
+    assert not triangles[:, 0].any()
 
 
-def test_seams_are_short() -> None:
-    """Of a disc of 96 corners: a quarter of the seams of a fan."""
-    disc = piston_triangles(Container("cylinder", (), 1.0), 1.0, 0.1)
-    edges = np.linalg.norm(disc - np.roll(disc, 1, axis=1), axis=2).sum()
-    seams = (edges - 96 * 2 * np.sin(np.pi / 96)) / 2
-    fan = sum(2 * np.sin(np.pi * k / 96) for k in range(2, 95))
-    assert seams < 0.25 * fan
+def test_grains_meet_the_rim_near_it() -> None:
+    """Closer to it than a fifth of a mean radius; a piston of a pebble's size is all rim."""
+    grain = GrainRadius(distribution="constant", mean=0.003)
+    container = Container("cylinder", ("x", "y"), 0.03)
+    assert piston_face(container, 0.02, grain)["plane_reach"] == pytest.approx(0.02 - 0.0006)
+    assert piston_face(container, 0.0005, grain)["plane_reach"] == 0
+    assert "plane_reach" not in piston_face(container, np.inf, grain)
 
 
 def test_pistons_cover_what_is_loaded() -> None:
     """A whole piston the section with room to spare; a partial one its disc behind the mirrors."""
     container = Container("cylinder", ("x", "y"), 0.03)
-    (whole,) = piston_triangles(container, np.inf, 0.004)
+    grain = GrainRadius(distribution="constant", mean=0.004 / PISTON_MARGIN)
+    (whole,) = np.array(piston_face(container, np.inf, grain)["triangles"])
     for point in [(-0.004, -0.004), (0.034, 0.034), (-0.003, 0.033), (0.033, -0.003)]:
         turns = cross(np.roll(whole, -1, axis=0) - whole, np.array(point) - whole)
         assert np.all(turns <= 1e-18)  # the normal points down
-    part = piston_triangles(container, 0.02, 0.004)
+    part = np.array(piston_face(container, 0.02, grain)["triangles"])
     assert np.all(areas(part) < 0)
     assert part.min() == pytest.approx(-0.004)
     assert np.linalg.norm(part, axis=2).max() == pytest.approx(0.02, rel=1e-2)
     box = Container("box", (), size_x=0.02, size_y=0.01)
-    (lid,) = piston_triangles(box, np.inf, 0.001)
-    assert lid.min() == pytest.approx(-0.001)
+    (lid,) = np.array(piston_face(box, np.inf, grain)["triangles"])
+    assert lid.min() == pytest.approx(-0.004)
 
 
 # --- a program that fails -------------------------------------------------------------------

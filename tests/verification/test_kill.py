@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 import trackbed
-from adapters.engine import process_run
+from adapters import engine_process
+from adapters.engine_process import process_run
 from adapters.run_folder import RunFolder
 from tests.forked_commands import Commands, alive, awaited, processes_in
 from tests.small_bed import small_bed
@@ -223,6 +224,32 @@ def test_engine_ends_with_its_run_when_python_lives_on(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         process_run(["sh", "-c", "sleep 600 & sleep 600"], tmp_path, interrupted)
+    deadline = time.monotonic() + 60
+    while processes_in(tmp_path) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert processes_in(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("launcher", "end_s"),
+    [
+        ("setsid sleep 600 & task=$!; trap 'kill $task; exit' TERM; : > started; wait", 60),
+        ("trap '' TERM; : > started; sleep 600", 0.2),
+    ],
+    ids=["tasks are another's", "deaf"],
+)
+def test_a_launcher_can_end_its_tasks(
+    launcher: str, end_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Tasks that belong to another process, as srun's do, end with their launcher; it is asked."""
+    monkeypatch.setattr(engine_process, "END_S", end_s)
+
+    def interrupted() -> None:
+        if (tmp_path / "started").exists():
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        process_run(["sh", "-c", launcher], tmp_path, interrupted)
     deadline = time.monotonic() + 60
     while processes_in(tmp_path) and time.monotonic() < deadline:
         time.sleep(0.01)

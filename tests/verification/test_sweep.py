@@ -18,8 +18,10 @@ import numpy as np
 import pytest
 
 import trackbed
-from adapters import sweep_member
+from adapters import sweep_member, sweep_run
 from adapters.run_folder import RunFolder
+from adapters.sweep import Member, Sweep
+from adapters.sweep_member import Ended
 from tests.forked_commands import processes_in
 from tests.small_bed import small_bed
 
@@ -283,6 +285,28 @@ def test_stopped_it_goes_on(
     assert code == 0
     assert "3 members, 1 finished" in said
     assert len(in_process) == 3
+
+
+def test_a_signal_loses_no_result(
+    scene: Path, tmp_path: Path, in_process: list[list[str]], capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """SIGTERM just when a member's end is looked at: it counts as finished all the same."""
+    into, look, sent = tmp_path / "sweep", sweep_run.result_of, []
+
+    def signalled(one: Sweep, member: Member, ended: Ended | None) -> sweep_run.Result:
+        if ended is not None and not sent:
+            sent.append(member.name)
+            os.kill(os.getpid(), signal.SIGTERM)
+        return look(one, member, ended)
+
+    monkeypatch.setattr(sweep_run, "result_of", signalled)
+    assert sweep(capsys, scene, "--seeds", 2, "--into", into)[0] == 130
+    states = {
+        one["member"]: one["state"]
+        for one in json.loads((into / "sweep.json").read_text())["members"]
+    }
+    assert states[sent[0]] == "finished"
 
 
 def test_killed_it_goes_on(

@@ -1,0 +1,79 @@
+"""Single grains under a partial piston in YADE: what its face does to a grain here or there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from adapters.engine_yade import PARAMETERS, YadeEngine
+from adapters.scene import Scene
+from adapters.scene_file import scene_load
+from adapters.state import FloatArray
+from adapters.yade_parameters import piston_face
+from scenes import scene_path
+
+SCRIPT = """\
+import os
+import sys
+
+import numpy as np
+from yade import Omega, Vector3
+
+sys.path.insert(0, os.getcwd())
+import bed
+
+O = Omega()
+parameters = bed.parameters_read()
+bed.materials_add(parameters)
+bed.grains_add(parameters)
+bed.walls_add(parameters)
+count = parameters["grain_count"]
+piston = bed.Piston(parameters)
+rows = []
+for places in parameters["few"]:
+    for number, place in enumerate(places):
+        O.bodies[number].state.pos = Vector3(*place)
+    changed = piston.grains_share()
+    bed.engines_set(parameters)
+    bed.forces_renew()
+    rows += [[*O.forces.f(number, True), changed] for number in range(count)]
+np.savetxt("force.txt", rows, fmt="%.17g")
+print("COMPLETE step 0", flush=True)
+open("end.restart", "w").write("none")
+"""
+
+
+def scene_partial(*settings: str) -> Scene:
+    """The shipped scene with a piston over a part of the bed, on YADE."""
+    return scene_load(scene_path("karrech-partial"), ['engine.name="yade"', *settings])
+
+
+def piston_forces(
+    scene: Scene, places: Sequence[FloatArray], height: float
+) -> tuple[FloatArray, FloatArray]:
+    """Forces on grains that the piston's face at a ``height`` [m] touches.
+
+    ``places`` [m]: an array (n, 3) for each look, all grains of the mean radius.  Gives forces [N],
+    shape (looks, n, 3), and whether any grain went over to another face before a look, (looks,).
+    """
+    engine, count = YadeEngine(), len(places[0])
+    radius = np.full(count, scene.sample.grain_radius.mean)
+    with TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        digests = engine.write_preparation(scene, places[0], radius, 2 * height, folder)
+        content = json.loads((folder / PARAMETERS).read_text())
+        content["grain_count"] = count
+        content["piston"] = {"mass": 1.0, "height": height}
+        content["piston"] |= piston_face(
+            scene.container, scene.piston_reach, scene.sample.grain_radius
+        )
+        content["few"] = [each.tolist() for each in places]
+        (folder / PARAMETERS).write_text(json.dumps(content))
+        (folder / "few.py").write_text(SCRIPT)
+        engine.run(scene, "few.py", folder, lambda: None, digests)
+        table = np.loadtxt(folder / "force.txt").reshape(len(places), count, 4)
+    return table[..., :3], table[:, 0, 3]
