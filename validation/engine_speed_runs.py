@@ -125,6 +125,7 @@ def adapter_rows(
                 "cost_s": cost.through,
                 "alone_s": cost.alone,
                 "python_s": cost.python,
+                "output_s": cost.output,
                 "work": len(radius) * scene.steps_per_cycle * cycles,
                 "work_unit": "grain-steps",
                 "steps_per_cycle": scene.steps_per_cycle,

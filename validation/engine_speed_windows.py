@@ -30,6 +30,10 @@ piston_mass = 0.1
 """
 """The paper's load."""
 
+LOOP = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
+OUTPUT = re.compile(r"^Outp(?:t time \(%\) =|ut\s+\|)\s*(\S+)", re.MULTILINE)
+"""Elapsed seconds of a run's steps and of their output, LIGGGHTS' and LAMMPS' words."""
+
 
 @dataclass(frozen=True)
 class WindowCost:
@@ -41,6 +45,8 @@ class WindowCost:
     """Of the engine under trackbed."""
     python: float
     """Of trackbed itself: input written, output read, checked and kept."""
+    output: float | None
+    """Of the engine under trackbed, what it tells itself that writing took; YADE does not."""
 
     @property
     def through(self) -> float:
@@ -96,4 +102,12 @@ def window_cost(scene: Scene, start: EngineStart, cycles: int, folder: Path) -> 
     window = window_read(through, 0, engine.wall_names(scene, piston=True), start.piston_height)
     check_window(scene, window, cycles)
     window_save(window, through / "states.npz")
-    return WindowCost(alone, done.cpu_s, python + python_cpu_s() - before)
+    python += python_cpu_s() - before
+    share = output_share("".join(path.read_text() for path in through.glob("log.*")))
+    return WindowCost(alone, done.cpu_s, python, None if share is None else share * done.cpu_s)
+
+
+def output_share(log: str) -> float | None:
+    """Part of the time of all steps that an engine wrote output, by the timers in its log."""
+    steps = [float(text) for text in LOOP.findall(log)]
+    return sum(float(text) for text in OUTPUT.findall(log)) / sum(steps) if steps else None

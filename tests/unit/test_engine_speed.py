@@ -16,6 +16,7 @@ from validation.engine_speed_accuracy import steps_of_scene
 from validation.engine_speed_bare import READ_AFTERWARDS, check_end, most_shared, timings
 from validation.engine_speed_bed import MIRROR, SIDE, bed_scene, mirrored
 from validation.engine_speed_page import medians, speeds
+from validation.engine_speed_windows import output_share
 
 
 def test_an_image_pushes_as_the_mirror_did() -> None:
@@ -116,3 +117,13 @@ def test_checks_can_fail() -> None:
     assert verdict["a: the engine alone over trackbed, the paper's cycle"] is False
     assert verdict["b: the engine alone over trackbed, the paper's cycle"] is True
     assert not verdict["100 grains: contacts per grain, greatest difference of two engines"]
+
+
+def test_output_share_reads_the_timers_of_both_engines() -> None:
+    """Two runs of LIGGGHTS: (0.1 + 0.3) s of (2 + 6) s; one of LAMMPS: 0.5 s of 10 s."""
+    liggghts = "Loop time of 2.0 on 1 procs\nPair  time (%) = 1 (50)\nOutpt time (%) = 0.1 (5)\n"
+    more = "Loop time of 6.0 on 1 procs\nOutpt time (%) = 0.3 (5)\n"
+    lammps = "Loop time of 10 on 1 procs\nOutput  | 0.5        | 0.5 | 0.5 |   0.0 |  5.00\n"
+    assert output_share(liggghts + more) == pytest.approx(0.05)
+    assert output_share(lammps) == pytest.approx(0.05)
+    assert output_share("YADE prints no timers") is None
