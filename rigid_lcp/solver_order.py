@@ -9,13 +9,16 @@
                      are swept a few times before, which ends what is loose or regular
     convex path      without a start: a part of it, and Newton; solves most static piles.  Where it
                      does not, the path is bent to Coulomb's law, and Newton again
+    smoothed path    from there on, as it needs not stay inside the cones
+                     (`rigid_lcp.smoothed_path`): kicked, tilted and slippery beds
     Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
                      Newton at its end: first few sweeps and factorisations, then many, as what is
                      hard for the one is often easy for the other
     extrapolated     proximal points that run ahead of their drift
                      (`rigid_lcp.extrapolated_points`): beds whose self-stress has to grow a long
                      way before a contact lets go.  Some from the end of each of three paths of the
-                     interior point, then from the best
+                     interior point, then from the best.  Between them the smoothed path from its
+                     beginning, past many folds
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
                      goes to Newton, and if that is not enough to Gauss-Seidel and Newton again.
                      They end after the effort that `FALLBACK_SHARE` names, or before they begin
