@@ -48,7 +48,9 @@ class Kind:
     window: int
     """Cycles of a window: what a killed run loses at most."""
     marks: tuple[int, ...]
-    """Cycles whose states are kept; multiples of ``window``."""
+    """Cycles whose states are kept."""
+    told: tuple[int, ...]
+    """Cycles at which the page tells figures."""
     engine: str = "liggghts"
 
     def scene(self, seed: int) -> Scene:
@@ -111,6 +113,7 @@ CONFINED = Kind(
     last=500,
     window=10,
     marks=(0, 50, 100, 200, 300, 500),
+    told=(10, 20, 50, 60, 75, 100, 150, 200, 300, 500),
 )
 PARTIAL = Kind(
     "partial",
@@ -123,6 +126,7 @@ PARTIAL = Kind(
     last=100,
     window=4,
     marks=(0, 20, 40, 60, 100),
+    told=(5, 10, 20, 30, 40, 60, 80, 100),
 )
 COARSE = Kind(
     "coarse",
@@ -135,6 +139,7 @@ COARSE = Kind(
     last=10_000,
     window=100,
     marks=(0, 100, 200, 500, 1000, 2000, 5000, 10_000),
+    told=(10, 100, 200, 500, 1000, 2000, 5000, 10_000),
 )
 KINDS = {kind.name: kind for kind in (CONFINED, PARTIAL, COARSE)}
 

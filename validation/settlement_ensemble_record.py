@@ -8,7 +8,7 @@ In ``validation/results/settlement-ensemble``, for a run such as ``confined-2-1`
 
 The table is the root: it names the checkpoint and the states with their SHA-256, and holds that of
 its own rows.  It is replaced last and at once, so a killed writer leaves the old table with the old
-checkpoint, or the new one with the new.  What no table names is removed with the next window.
+checkpoint, or the new one with the new.  What no table names is removed by the next call.
 """
 
 from __future__ import annotations
@@ -203,11 +203,12 @@ class EnsembleRecord:
         states = dict(kept.states)
         if positions:
             _, before = self.states(name)
-            arrays = {f"position_{cycle}": x for cycle, x in (before | dict(positions)).items()}
+            arrays: dict[str, Any] = {"radius": radius}
+            arrays |= {f"position_{cycle}": x for cycle, x in (before | dict(positions)).items()}
             path = self.path / f"{name}.states.npz"
             temporary = path.with_name(f".{path.name}.partial")
             with temporary.open("wb") as stream:
-                np.savez_compressed(stream, radius=radius, **arrays)
+                np.savez_compressed(stream, **arrays)
             temporary.replace(path)
             states |= {str(cycle): digest(x.tobytes()) for cycle, x in positions.items()}
         content = lzma.compress(restart, preset=9)
@@ -216,10 +217,22 @@ class EnsembleRecord:
         checkpoint = replace(kept.checkpoint, file=file, sha256=digest(content))
         kept = replace(kept, checkpoint=checkpoint, states=states)
         self.table_write(name, kept)
+        self._checkpoints_remove_but(name, file)
+        return kept
+
+    def tidy(self) -> None:
+        """Remove what a killed writer left: parts of files, checkpoints that no table names."""
+        for leftover in self.path.glob(".*.partial"):
+            leftover.unlink()
+        for path in self.path.glob("*.csv"):
+            kept = self.kept(path.stem)
+            assert kept is not None
+            self._checkpoints_remove_but(path.stem, kept.checkpoint.file)
+
+    def _checkpoints_remove_but(self, name: str, file: str) -> None:
         for other in self.path.glob(f"{name}.*.restart.xz"):
             if other.name != file:
                 other.unlink()
-        return kept
 
     def table_write(self, name: str, kept: Kept) -> None:
         """Replace a run's table at once."""

@@ -188,7 +188,8 @@ def _window(piece: Piece, run: Run, record: EnsembleRecord, kept: Kept | None, b
     outcome = _outcome(run, name)
     window = window_load(run.folder.path / name / "states.npz")
     columns = {column: [row[column] for row in outcome.rows] for column in outcome.rows[0]}
-    columns["piston_stiffness"] = piston_stiffness(window.piston, run.scene.steps_per_cycle)
+    stiffness = piston_stiffness(window.piston, run.scene.steps_per_cycle)
+    columns["piston_stiffness"] = stiffness.tolist()
     columns["cpu_s"] = [outcome.cost["engine"] / len(window)] * len(window)
     after = replace(
         own,
@@ -209,8 +210,7 @@ def go_on(
     began = time.monotonic()
     origin()
     with interruptible(), RunFolder(work).locked():
-        for leftover in record.path.glob(".*.partial"):  # of a killed writer
-            leftover.unlink()
+        record.tidy()
         while time.monotonic() - began < 60 * minutes:
             piece = next_piece(kinds, record)
             if piece is None:
