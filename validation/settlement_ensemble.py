@@ -121,7 +121,7 @@ PARTIAL = Kind(
     "karrech-partial",
     (),
     packings=3,
-    members=1,
+    members=2,
     k_i=20,
     last=100,
     window=4,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from adapters.run_folder import write_atomically
 from validation.same_packing_page import table
-from validation.settlement_ensemble import KINDS, STEP, Kind
+from validation.settlement_ensemble import KINDS, Kind
 from validation.settlement_ensemble_picture import draw
 from validation.settlement_ensemble_reading import (
     Cost,
@@ -105,13 +105,13 @@ def table_reached(record: EnsembleRecord) -> str:
                 continue
             settlement = record.table(piece.name)["settlement"]
             size = (record.path / kept.checkpoint.file).stat().st_size
-            moved = (
-                "" if piece.member is None else f", one grain {piece.member} · {STEP:.0e} m aside"
-            )
+            what = "packing" if piece.member is None else "member"
+            if piece.perturbation:
+                what += f", one grain {piece.perturbation:.0e} m aside"
             rows.append(
                 [
                     f"`{piece.name}`",
-                    "packing" if piece.member is None else f"member{moved if piece.member else ''}",
+                    what,
                     f"{kept.cycle:,} of {piece.last:,}",
                     number(1e6 * float(settlement[-1]), 1) if len(settlement) else "-",
                     f"{size / 1e3:.0f}",
@@ -182,9 +182,14 @@ def origin(kept: Sequence[Kept]) -> str:
     parts = [part for each in kept for part in each.parts]
     machines = "; ".join(dict.fromkeys(part["machine"] for part in parts))
     engines = ", ".join(dict.fromkeys(each.engine for each in kept))
-    commits = ", ".join(dict.fromkeys(part["commit"][:7] for part in parts))
-    decks = len(set(part["decks_sha256"] for part in parts))
-    return f"{machines}; {engines}; commits {commits}; {decks} sets of decks (rain, cycles)."
+    commits = ", ".join(dict.fromkeys(short(part["commit"]) for part in parts))
+    return f"{machines}; {engines}; commits {commits}."
+
+
+def short(commit: str) -> str:
+    """Seven digits of a commit, and whether files differed from it."""
+    digits, *modified = commit.split("-")
+    return "-".join([digits[:7], *modified])
 
 
 def page(record: EnsembleRecord) -> str:
