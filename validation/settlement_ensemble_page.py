@@ -142,7 +142,7 @@ def missing(record: EnsembleRecord) -> str:
 
 
 def table_figures(kind: Kind, record: EnsembleRecord) -> str:
-    """Figures of a kind at the cycles it names, as far as they have been computed."""
+    """Figures of a kind at the cycles it names; lines and columns that have any."""
     runs = curves(kind, record)
     found = {
         cycle: [at_cycle(kind, runs, figure, cycle) for _, figure, _ in LINES]
@@ -150,11 +150,13 @@ def table_figures(kind: Kind, record: EnsembleRecord) -> str:
     }
     reached = [cycle for cycle, figures in found.items() if any(figures)]
     if not reached:
-        return "Nothing computed yet."
+        return f"`{kind.name}`: nothing computed yet."
     rows = []
     for line, (words, _, told) in enumerate(LINES):
         cells = [found[cycle][line] for cycle in reached]
-        rows.append([words, *("-" if cell is None else told(cell) for cell in cells)])
+        texts = ["-" if cell is None else told(cell) for cell in cells]
+        if set(texts) != {"-"}:
+            rows.append([words, *texts])
     return table([f"{kind.name}, after cycle", *(f"{cycle:,}" for cycle in reached)], rows)
 
 

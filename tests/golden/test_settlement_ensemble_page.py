@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 import pytest
 
 from adapters.overlaps import neighbours
 from adapters.radii import radii_sample
-from validation.settlement_ensemble import KINDS, Piece
+from validation.settlement_ensemble import CONFINED, KINDS, Piece
 from validation.settlement_ensemble_page import PAGE, page
-from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_ensemble_record import COLUMNS, EnsembleRecord
 from validation.settlement_ensemble_runs import scene_digest
 
 RECORD = EnsembleRecord()
@@ -48,6 +50,24 @@ def test_run_can_go_on(piece: Piece) -> None:
     assert kept.parts or piece.member is not None
     for before, after in zip(kept.parts, kept.parts[1:], strict=False):
         assert before["cycles"][1] == after["cycles"][0]
+
+
+def test_first_window_is_that_of_an_earlier_record() -> None:
+    """The same scene and seed, run before by ``trackbed run --control``: the same ten cycles.
+
+    Both are one process from the same rain of grains; then the windows part.
+    """
+    with (RECORD.path.parent / "settlement-karrech.control.csv").open() as stream:
+        before = [
+            row for row, _ in zip(csv.DictReader(stream), range(CONFINED.window), strict=False)
+        ]
+    table = RECORD.table("confined-1")
+    for name in ("settlement", "piston_height", "coordination_number", "elastic_deflection"):
+        values = [float(row[name]) for row in before]
+        digits = int(COLUMNS[name][1])
+        np.testing.assert_allclose(
+            table[name][: CONFINED.window], values, rtol=10.0 ** (1 - digits)
+        )
 
 
 @pytest.mark.parametrize("piece", KEPT, ids=lambda piece: piece.name)
