@@ -17,13 +17,13 @@
     extrapolated     proximal points that run ahead of their drift
                      (`rigid_lcp.extrapolated_points`): beds whose self-stress has to grow a long
                      way before a contact lets go.  Some from the end of each of three paths of the
-                     interior point, then from the best.  Between them the smoothed path from its
-                     beginning, past many folds
+                     interior point, then from the best
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
                      goes to Newton, and if that is not enough to Gauss-Seidel and Newton again.
                      They end after the effort that `FALLBACK_SHARE` names, or before they begin
-                     where a linear programme proves that there is no solution.  Extrapolated
-                     points again go on from the best
+                     where a linear programme proves that there is no solution.  Then the
+                     smoothed path from its beginning, past many folds, and extrapolated points
+                     again from the best
                      Where friction is above 10, problems of less come first, each the start of the
                      next
     islands          what is still not solved, each island apart, by all of this (large problems
@@ -194,7 +194,7 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         trial.best = replace(trial.best, status="no solution")
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
-    if drift_from_paths(trial, most) or smoothed(trial):
+    if drift_from_paths(trial, most):
         return
     if trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort)):
         return
@@ -211,7 +211,9 @@ def fallback_paths(trial: Trial, accept: float) -> None:
             return
         if trial.best.residual <= accept and problem.contacts > FEW_CONTACTS:
             return
-    if not trial.drift(LAST_DRIFT, LAST_DRIFT_FLOPS) and trial.effort <= most:
+    if smoothed(trial) or trial.drift(LAST_DRIFT, LAST_DRIFT_FLOPS):
+        return
+    if trial.effort <= most:
         trial.sweep(None, LAST_SWEEPS)
 
 
