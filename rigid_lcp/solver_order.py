@@ -78,9 +78,9 @@ DEAR_SWEEPS = 6000
 FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
 """What the paths of the interior point may cost in all before no further one is begun: so many
 times what was spent before them, or so many flops (some seconds) if that is more."""
-SMOOTHED_STEPS, SMOOTHED_DRIFT = 150, 80
+SMOOTHED_STEPS, SMOOTHED_DRIFT, SMOOTHED_USEFUL = 150, 80, 1e-6
 """Factorisations along the smoothed path that goes on from the convex one, and of extrapolated
-points from where it ends."""
+points from where it ends, if that is no worse."""
 LAST_STEPS, LAST_HOPS, LAST_FLOPS, LAST_FEW = 3000, 100, 4e10, 300
 """The same from the beginning and with many folds left behind, where little else is left: the cost
 in all, or so few factorisations if that is more."""
@@ -226,7 +226,9 @@ def smoothed_further(trial: Trial, begin: tuple[Floats, float]) -> bool:
     )  # fmt: skip
     trial.keep(found)
     trial.sharpen()
-    return trial.best.solved or trial.drift(SMOOTHED_DRIFT, DRIFT_FLOPS, found)
+    if trial.best.solved or found.residual > SMOOTHED_USEFUL:
+        return trial.best.solved
+    return trial.drift(SMOOTHED_DRIFT, DRIFT_FLOPS, found)
 
 
 def smoothed(trial: Trial) -> bool:
