@@ -57,7 +57,8 @@ def draw_errors(axis: Any, rows: Sequence[Row]) -> None:
         cost = 1e3 * row["cost_s"]
         axis.plot([cost] * 2, [100 * row["error"], 100 * row["error_90"]], color=color, lw=0.8)
         axis.plot(cost, 100 * row["error"], marker, color=color, ms=10 if name == "auto" else 5)
-        axis.annotate(name, (cost, 100 * row["error"]), fontsize=7, xytext=(4, -3),
+        beside = (4, -3) if name in LAWS or name == "auto" else (-4, 6)  # a rival fits the same law
+        axis.annotate(name, (cost, 100 * row["error"]), fontsize=7, xytext=beside,
                       textcoords="offset points")  # fmt: skip
     axis.set(xscale="log", yscale="log", xlabel="CPU time of a prediction, ms")
     axis.set_ylabel("error at 10 N_c, %: median to 90th percentile")

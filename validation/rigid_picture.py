@@ -133,7 +133,7 @@ def _success(axes: Any, rows: Sequence[Row]) -> None:
         shares = [solved / orders for solved, orders in found.values()]
         axes.plot(list(found), shares, "o-", color=colour, label=method)
     axes.set(
-        title="the paper's modified Dantzig algorithm on a packing", xlabel="friction",
+        title="the paper's modified Dantzig\nalgorithm on a packing", xlabel="friction",
         ylabel="orders of contacts solved, share", ylim=(-0.03, 1.03),
     )  # fmt: skip
     axes.legend(fontsize=8)

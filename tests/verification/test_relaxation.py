@@ -445,7 +445,8 @@ def test_hard_cases_end_valid(bed: Bed, make: object, bare: bool) -> None:
     estimate = make(state)  # type: ignore[operator]
     if bare:
         found = relax_bare(state.moved(estimate), walls, STIFFNESS)
-        limit = equilibrium_overlap(state.moved(estimate), STIFFNESS, GRAVITY)
+        # overlaps come to within 1 % of the mean carried one, which is no more than the cap
+        limit = 1.01 * equilibrium_overlap(state.moved(estimate), STIFFNESS, GRAVITY)
     else:
         found = relax(estimate, state, walls, STIFFNESS)
         limit = 1.01 * found.before.max_penetration

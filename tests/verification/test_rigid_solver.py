@@ -222,7 +222,8 @@ def test_where_a_proof_is_at_hand_no_path_is_tried():
 
 def test_the_search_ends_after_the_effort_that_is_stated(monkeypatch):
     """With no floor of flops, paths end once they cost `FALLBACK_SHARE` of what went before, the
-    last one included: six paths and twice the factorisations otherwise."""
+    last one included: six paths and twice the factorisations otherwise.  The smoothed path past
+    many folds may then cost as much as all before."""
     problem = random_problem(40, 30, 0.5, 3)
     all_paths = solve_auto(problem).work
     monkeypatch.setattr("rigid_lcp.solver_order.FALLBACK_FLOPS", 0.0)
@@ -231,7 +232,7 @@ def test_the_search_ends_after_the_effort_that_is_stated(monkeypatch):
     assert "->" in found.message
     for work in ("factorisations", "interior-point iterations"):
         assert found.work[work] < 0.6 * all_paths[work]
-    assert found.work["factorisations"] < 800
+    assert found.work["factorisations"] < 2 * 800
 
 
 @pytest.mark.parametrize("method", ["newton", "interior-point", "gauss-seidel", "pivoting"])
