@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 
 from adapters.laws.law import training_data
@@ -9,7 +11,7 @@ from adapters.laws.projection import Shape, shaped_fit
 from adapters.state import FloatArray
 
 
-class ShapedLaw:
+class ShapedLaw(ABC):
     """u(N) = c + sum_j a_j phi_j(N; theta), a_j of one sign; see `projection` for the fit.
 
     A law says its names and units, `columns` and `shapes`; parameters are in the order c, a_j,
@@ -24,13 +26,13 @@ class ShapedLaw:
     amplitude_count = 1
     """p: how many a_j there are."""
 
+    @abstractmethod
     def columns(self, cycle: FloatArray, theta: FloatArray) -> FloatArray:
         """phi_j(N; theta), shape (p, ...), for theta of shape (m, ...); cycles broadcast."""
-        raise NotImplementedError
 
+    @abstractmethod
     def shapes(self, cycle: FloatArray) -> tuple[Shape, ...]:
         """Ranges of theta for data at these cycles."""
-        raise NotImplementedError
 
     def fit(self, cycle: FloatArray, displacement: FloatArray) -> FloatArray:
         """Parameters, shape (1 + p + m, ...); see `Law.fit`."""
