@@ -49,11 +49,17 @@ ROUNDINGS = (1e-2, 1e-1, 1e-3, 1e-4)
 another path, and they are followed in turn."""
 SHRINK, LESS = 0.3, 0.55
 """sigma of the next point over that of the last, and where that was not found."""
-BACK = (3.0, 10.0, 30.0, 100.0)
+BACK = (3.0, 10.0)
 """sigma with which another path is begun where one folds, over that of its last point: greater ones
 when all paths have folded."""
 HOPS = 6
-"""So many other paths at most are gone on with."""
+"""So many other paths at most are gone on with,"""
+FURTHER_ROUNDINGS, FURTHER_BACK = (-4.0, -0.5), (0.1, 1.5)
+"""or more, with roundings and sigmas spread evenly between these powers of ten: the same ones again
+would lead to the same folds again."""
+SPREAD = (0.7548776662466927, 0.5698402909980532)
+"""Steps of the evenest sequence of pairs in the unit square (Roberts 2018): 1/g and 1/g^2, where
+g^3 = g + 1."""
 SHIFT = 1e-8
 """Of W in the matrices, over mean(diag W)."""
 FOUND = 0.03
@@ -118,14 +124,26 @@ def smoothed_path(
             shrink = LESS
         elif hopped < hops:
             hopped, most = hopped + 1, FIRST_STEPS
-            rounding = ROUNDINGS[hopped % len(ROUNDINGS)]
-            shrink = BACK[hopped // len(ROUNDINGS) % len(BACK)]
+            rounding, shrink = other_path(hopped)
         else:
             break
     return friction_solution(
         problem, best, tolerance, "smoothed path",
         {"points": float(points), "factorisations": float(spent)},
     )  # fmt: skip
+
+
+def other_path(hop: int) -> tuple[float, float]:
+    """Rounding [-] and sigma (over that of the last point) of the path that is gone on with after
+    ``hop`` folds."""
+    if hop <= HOPS:
+        return ROUNDINGS[hop % len(ROUNDINGS)], BACK[hop // len(ROUNDINGS)]
+    powers = (
+        low + (high - low) * ((0.5 + hop * step) % 1.0)
+        for (low, high), step in zip((FURTHER_ROUNDINGS, FURTHER_BACK), SPREAD, strict=True)
+    )
+    rounding, back = (float(10.0**power) for power in powers)
+    return rounding, back
 
 
 def path_begin(problem: FrictionProblem, linear: Factorisation) -> tuple[Floats, float]:

@@ -81,9 +81,9 @@ times what was spent before them, or so many flops (some seconds) if that is mor
 SMOOTHED_STEPS, SMOOTHED_DRIFT, SMOOTHED_USEFUL = 150, 80, 1e-6
 """Factorisations along the smoothed path that goes on from the convex one, and of extrapolated
 points from where it ends, if that is no worse."""
-LAST_HOPS, LAST_FLOPS, LAST_FEW = 100, 4e10, 300
+LAST_HOPS, LAST_FLOPS, LAST_FEW, LAST_MANY = 300, 4e10, 300, 3000
 """Where little else is left, from the beginning and with so many folds left behind: at most as many
-factorisations as all before, and at such a cost; or so few, if that is more."""
+factorisations as all before or the last number, and at such a cost; or so few, if that is more."""
 DRIFT, DRIFT_FLOPS = 1500, 5e9
 """Factorisations of extrapolated points before the paths, and their cost in all (or so much as was
 spent before, if that is more)."""
@@ -235,7 +235,7 @@ def smoothed(trial: Trial) -> bool:
     """The smoothed path from its beginning, past many folds."""
     trial.linear = trial.linear or factorisation(trial.problem)
     before, dearest = trial.work.get("factorisations", 0.0), LAST_FLOPS / trial.linear.flops
-    count = max(LAST_FEW, int(min(before, dearest)))
+    count = max(LAST_FEW, int(min(max(before, LAST_MANY), dearest)))
     trial.keep(
         smoothed_path(
             trial.problem, trial.tolerance, linear=trial.linear,

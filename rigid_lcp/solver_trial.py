@@ -43,7 +43,7 @@ REFINEMENTS, REFINED_CONTACTS = 8, 300
 """Most such steps, where factorisations cost next to nothing; one where there are more contacts."""
 FEW_DRIFT = 50
 """Fewer factorisations than that extrapolated points are not begun with."""
-MOST_FLOPS, MOST_FACTORED = 4e11, 4e6
+MOST_FLOPS, MOST_FACTORED = 4e11, 1e7
 """An effort (some 20 s), and a number of factorisations times contacts (some 10 s), beyond which no
 factorisation is begun.  Only large problems come there: one of 10,400 contacts between spheres
 takes 1.5e10 flops, most of a second, and one of 10,000 between discs 20 ms."""

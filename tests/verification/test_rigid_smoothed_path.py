@@ -162,3 +162,20 @@ def test_what_has_no_solution_ends_and_says_so() -> None:
     """One contact that nothing can keep from approaching."""
     problem = friction_problem(np.zeros((3, 3)), [-1.0, 0.0, 0.0], 0.5, 3)
     assert not smoothed_path(problem).solved
+
+
+def test_further_paths_differ_and_fill_the_ranges_evenly() -> None:
+    """The first are those of `ROUNDINGS` in turn; of the first n of the others no two are as near
+    as a quarter of the spacing n^(-1/2) of a square grid, and every quarter of both ranges has a
+    fifth of them or more."""
+    first = [smoothed.other_path(hop) for hop in range(1, smoothed.HOPS + 1)]
+    assert len(set(first)) == smoothed.HOPS
+    assert {rounding for rounding, _ in first} == set(smoothed.ROUNDINGS)
+    count = 64
+    ranges = np.array([smoothed.FURTHER_ROUNDINGS, smoothed.FURTHER_BACK])
+    powers = np.log10([smoothed.other_path(smoothed.HOPS + 1 + hop) for hop in range(count)])
+    place = (powers - ranges[:, 0]) / (ranges[:, 1] - ranges[:, 0])
+    apart = np.linalg.norm(place[:, None] - place[None, :], axis=2) + np.eye(count)
+    assert apart.min() > 0.25 / np.sqrt(count)
+    for along in place.T:
+        assert np.histogram(along, 4, (0.0, 1.0))[0].min() >= count / 5
