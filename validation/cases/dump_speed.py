@@ -162,7 +162,8 @@ def read_ovito(path: str) -> Any:
 def read_ase(path: str) -> Any:
     from ase.io import read
 
-    return read(path, index=":", format="lammps-dump-text")[-1].positions[:, 0]
+    frames: Any = read(path, index=":", format="lammps-dump-text")
+    return frames[-1].positions[:, 0]
 
 
 READERS = {
