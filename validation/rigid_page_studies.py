@@ -115,8 +115,9 @@ def dantzig_table(rows: Sequence[Row]) -> str:
         _, _, contact, origin, target, *_ = shown["events"][-1]
         lines += [
             "",
-            f"The run in the picture ({shown['bed']}, friction {shown['setting']['friction']:g}, order "
-            f"{shown['seed']}) ends after {shown['work']} changes of lists with {still} of length "
+            f"The run in the picture ({shown['bed']}, friction "
+            f"{shown['setting']['friction']:g}, order {shown['seed']}) ends after "
+            f"{shown['work']} changes of lists with {still} of length "
             f"zero: contact {contact} goes from {target} to {origin} and back.",
         ]
     return "\n".join(lines)
