@@ -49,7 +49,9 @@ def chamfer_vertex(vertices: ArrayLike, vertex: int, area: float) -> Floats:
     """
     corners = np.asarray(vertices, dtype=float)
     if not (np.isfinite(area) and area >= 0):
-        raise ShapeError(f"the worn area is {area}", where=f"vertex {vertex}")
+        raise ShapeError(
+            f"the worn area is {area}", where=f"vertex {vertex}", remedy="give m^2, zero or more"
+        )
     here = corners[vertex % len(corners)]
     back = corners[(vertex - 1) % len(corners)] - here
     ahead = corners[(vertex + 1) % len(corners)] - here

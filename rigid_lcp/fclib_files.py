@@ -74,8 +74,9 @@ def fclib_forces(path: Path) -> Floats:
         forces = _numbers(file, "solution/r", path)
     if forces.size != q.size:
         raise ProblemError(
-            f"it has {forces.size} numbers where q has {q.size}", where=f"{path}: solution/r"
-        )
+            f"it has {forces.size} numbers where q has {q.size}", where=f"{path}: solution/r",
+            remedy="look whether the solution is that of this problem",
+        )  # fmt: skip
     return np.asarray(forces, dtype=float).reshape(1, -1)
 
 
@@ -111,9 +112,13 @@ def _numbers(group: Any, name: str, path: Path) -> NDArray[Any]:
     try:
         values = np.asarray(group[name])
     except (OSError, ValueError, TypeError) as error:
-        raise ProblemError(f"it can not be read: {error}", where=f"{path}: {name}") from error
+        raise ProblemError(
+            f"it can not be read: {error}", where=f"{path}: {name}", remedy="write the file anew"
+        ) from error
     if values.dtype.kind not in "iuf" or not values.size:
-        raise ProblemError("it is not made of numbers", where=f"{path}: {name}")
+        raise ProblemError(
+            "it is not made of numbers", where=f"{path}: {name}", remedy="write the file anew"
+        )
     return values
 
 

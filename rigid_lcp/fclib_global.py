@@ -36,11 +36,14 @@ def problem_by_masses(
     if mass.shape != (freedoms, freedoms) or force.shape != (freedoms,):
         raise ProblemError(
             f"M is {mass.shape[0]} x {mass.shape[1]} and f has {force.size} numbers for "
-            f"{freedoms} freedoms (rows of H)",
-            where="M, f",
+            f"{freedoms} freedoms (rows of H)", where="M, f",
+            remedy="give a row of M and a number of f for every row of H",
         )  # fmt: skip
     if velocity.shape != (rows,):
-        raise ProblemError(f"w has {velocity.size} numbers for {rows} columns of H", where="w")
+        raise ProblemError(
+            f"w has {velocity.size} numbers for {rows} columns of H", where="w",
+            remedy="give a number for every column of H",
+        )  # fmt: skip
     jacobian = sp.csr_array(directions.T)
     size = BODY_SIZE[dim] if dim in BODY_SIZE and in_blocks(mass, BODY_SIZE[dim]) else 0
     try:
@@ -52,7 +55,10 @@ def problem_by_masses(
             spread = sp.csr_array(factor.solve(directions.toarray()))
             matrix, moved = sp.csr_array(jacobian @ spread), factor.solve(force)
     except (RuntimeError, ValueError, np.linalg.LinAlgError) as error:
-        raise ProblemError(f"M can not be inverted: {error}", where="M") from error
+        raise ProblemError(
+            f"M can not be inverted: {error}", where="M",
+            remedy="look for a body without mass or moment of inertia",
+        ) from error  # fmt: skip
     made: FrictionProblem = friction_problem(matrix, velocity + jacobian @ moved, mu, dim)
     return made
 

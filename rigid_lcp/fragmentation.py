@@ -92,7 +92,10 @@ def polygon_split(
             remedy="give corners (n, 2), three at least, and a direction (2,)",
         )  # fmt: skip
     if length == 0:
-        raise ShapeError("the direction of the line is zero", where="split")
+        raise ShapeError(
+            "the direction of the line is zero", where="split",
+            remedy="give the direction in which it runs, of any length",
+        )  # fmt: skip
     normal = np.array([-along[1], along[0]]) / length
     height = (corners - origin) @ normal
     width = float(height.max() - height.min())
@@ -232,7 +235,11 @@ def _parts_3d(body: Body, point: ArrayLike, normal: ArrayLike) -> tuple[Body, Bo
 
 
 def _numbers(values: ArrayLike, what: str) -> Floats:
-    array = np.asarray(values, dtype=float)
+    remedy = "give metres"
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"{what} is {values!r}", where="split", remedy=remedy) from error
     if not np.isfinite(array).all():
-        raise ShapeError(f"{what} holds numbers that are not finite", where="split")
+        raise ShapeError(f"{what} holds numbers that are not finite", where="split", remedy=remedy)
     return array

@@ -255,7 +255,7 @@ def friction_problem(
             remedy="order it contact after contact: n, t" + ", t2" * (dim - 2),
         )  # fmt: skip
     contacts = len(q) // dim
-    mu = finite_numbers(friction, "mu")
+    mu = finite_numbers(friction, "mu", f"give 0 to {MOST_FRICTION:g}")
     if mu.ndim == 0:
         mu = np.full(contacts, float(mu))
     if mu.shape != (contacts,):

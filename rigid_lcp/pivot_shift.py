@@ -67,9 +67,9 @@ def shift_remove(problem: FrictionProblem, state: Pivots, tolerance: float, few:
         ended = offset_drive(state, change, 1.0, True, spent + few)
         taken = int(state.events[0]) - spent
         if ended != DONE:
+            state_restore(state, before, shift)
             if smaller == shift or pace < 0.1:
                 break
-            state_restore(state, before, shift)
             pace *= 0.5
             continue
         force = pivots_force(problem, state)

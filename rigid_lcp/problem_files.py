@@ -75,7 +75,9 @@ def _reader(
             remedy=f"give one of {', '.join(readers)}",
         )  # fmt: skip
     if not path.is_file():
-        raise ProblemError("there is no such file", where=str(path))
+        raise ProblemError(
+            "there is no such file", where=str(path), remedy="look at the path and the ending"
+        )
     return readers[path.suffix]
 
 
@@ -114,8 +116,9 @@ def _npz_forces(path: Path) -> Floats:
     forces = np.atleast_2d(parts["r"])
     if forces.shape[1] != length or forces.dtype.kind != "f":
         raise ProblemError(
-            f"it has shape {forces.shape} where q has {length} numbers", where=f"{path}: r"
-        )
+            f"it has shape {forces.shape} where q has {length} numbers", where=f"{path}: r",
+            remedy="give forces (nc * dim,), or several solutions (k, nc * dim)",
+        )  # fmt: skip
     return forces
 
 

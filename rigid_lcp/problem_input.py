@@ -21,10 +21,15 @@ COLUMNS = 256
 """Columns of an operator that are written out at a time."""
 
 
-def finite_numbers(values: ArrayLike, name: str) -> Floats:
+FROM_A_DIVISION = "look for a mass of zero or a division by zero where it was made"
+"""What to do about numbers that are not finite."""
+
+
+def finite_numbers(values: ArrayLike, name: str, remedy: str = FROM_A_DIVISION) -> Floats:
     """A copy of ``values`` as an array of floats; `ProblemError`, with ``name``, for all else.
 
-    Refused are text, complex numbers, masked ones, numbers that are not finite or out of range.
+    Refused are text, complex numbers, masked ones, numbers that are not finite, for which
+    ``remedy`` says what to do.
     """
     if np.ma.is_masked(values):
         raise ProblemError(
@@ -35,7 +40,9 @@ def finite_numbers(values: ArrayLike, name: str) -> Floats:
         given = np.asarray(values)
         array = given.astype(float) if given.dtype.kind in "biufO" else None
     except (TypeError, ValueError) as error:
-        raise ProblemError(f"{name} is not made of numbers ({error})", where=name) from error
+        raise ProblemError(
+            f"{name} is not made of numbers ({error})", where=name, remedy="give real numbers"
+        ) from error
     if array is None:
         raise ProblemError(
             f"{name} is not made of numbers (but of {given.dtype})", where=name,
@@ -45,7 +52,7 @@ def finite_numbers(values: ArrayLike, name: str) -> Floats:
     if len(bad):
         raise ProblemError(
             f"{len(bad)} of its numbers are not finite, first number {bad[0]}", where=name,
-            remedy="look for a mass of zero or a division by zero where it was made",
+            remedy=remedy,
         )  # fmt: skip
     return array
 
@@ -121,8 +128,7 @@ def check_factors(bodies: BodySpace) -> None:
             )  # fmt: skip
         if not np.isfinite(part.data).all():
             raise ProblemError(
-                f"{name} holds numbers that are not finite", where=where,
-                remedy="look for a mass of zero or a division by zero where it was made",
+                f"{name} holds numbers that are not finite", where=where, remedy=FROM_A_DIVISION,
             )  # fmt: skip
         in_range(part.data, f"{where}, {name}")
     freedoms = jacobian.shape[1]

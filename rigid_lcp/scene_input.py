@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, nan
 from numbers import Integral, Real
@@ -78,6 +78,21 @@ def body_given(number: Any, bodies: int) -> int:
             remedy=f"give a whole number, 0 to {bodies - 1}, as Scene.add returned it",
         )  # fmt: skip
     return int(number)
+
+
+def line_given(line: Any, dim: int) -> tuple[Floats, Floats]:
+    """A point (dim,) [m] and a direction (dim,) of greatest number 1 (zero stays), or `SceneError`.
+
+    In 2D they are of a line, in 3D of a plane and its normal.
+    """
+    if not isinstance(line, Sequence | np.ndarray) or len(line) != 2:
+        raise SceneError(
+            f"the line is {line!r}", where="fragment",
+            remedy="give (point, direction), in 3D (point, normal)",
+        )  # fmt: skip
+    point = vector_given(line[0], dim, "the point", "fragment")
+    along = vector_given(line[1], dim, "the direction" if dim == 2 else "the normal", "fragment")
+    return point, along / (float(np.abs(along).max()) or 1.0)
 
 
 def check_half_space(

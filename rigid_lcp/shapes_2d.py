@@ -204,7 +204,9 @@ def _given(values: ArrayLike, what: str, where: str) -> Floats:
             raise TypeError("complex ones")
         array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
-        raise ShapeError(f"the {what} holds what are not numbers ({error})", where=where) from error
+        raise ShapeError(
+            f"the {what} holds what are not numbers ({error})", where=where, remedy="give metres"
+        ) from error
     if not np.isfinite(array).all():
         raise ShapeError(f"the {what} is not finite", where=where, remedy="give metres")
     return array

@@ -6,7 +6,6 @@ level, section 9) for few bodies and high order.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import ceil, nan
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.breakage import Breakage, Broken, breaks, scene_broken
 from rigid_lcp.contacts import ContactForces
-from rigid_lcp.errors import NotConverged, Overlapping, SceneError
+from rigid_lcp.errors import NotConverged, Overlapping
 from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.motion import Motion
 from rigid_lcp.runge_kutta import Pace, runge_kutta_advance
@@ -23,6 +22,7 @@ from rigid_lcp.scene_input import (
     CheckedLoads,
     Loads,
     body_given,
+    line_given,
     residual_given,
     seconds_given,
 )
@@ -121,11 +121,7 @@ class Simulation:
         or a line that is none.
         """
         body = body_given(body, len(self.motion.position))
-        if not isinstance(line, Sequence | np.ndarray) or len(line) != 2:
-            raise SceneError(
-                f"the line is {line!r}", where="fragment",
-                remedy="give (point, direction), in 3D (point, normal)",
-            )  # fmt: skip
+        line = line_given(line, self.motion.dim)
         scene = broken_scene(self.world.scene, self.motion, body, *line)
         part = self._go_on_broken(scene, body)
         self.broken.append(Broken(self.time, body, part, nan, nan))
@@ -231,8 +227,10 @@ class Simulation:
         found = self.world.contacts(self.motion, 0.0)
         if len(found) and found.gap.min() < -OVERLAP_AT_START * self.world.length:
             worst = int(np.argmin(found.gap))
+            pair = int(found.body_a[worst]), int(found.body_b[worst])
+            names = (self.world.scene.bodies[k].name or f"body {k}" for k in pair)
             raise Overlapping(
                 f"they overlap by {-found.gap[worst]:.3g} m",
-                where=f"bodies {found.body_a[worst]} and {found.body_b[worst]} at the start",
+                where=f"{' and '.join(names)} at the start",
                 remedy="move them apart",
             )

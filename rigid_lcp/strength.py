@@ -53,7 +53,10 @@ def mean_stress(points: ArrayLike, forces: ArrayLike, centre: ArrayLike, volume:
     ``volume`` [m^3], in 2D area times thickness.  Raises `ShapeError` for no volume.
     """
     if not volume > 0:
-        raise ShapeError(f"the volume of the grain is {volume}", where="mean_stress")
+        raise ShapeError(
+            f"the volume of the grain is {volume}", where="mean_stress",
+            remedy="give m^3 above zero, in 2D area times thickness",
+        )  # fmt: skip
     arm = np.atleast_2d(np.asarray(points, float)) - np.asarray(centre, float)
     stress = np.atleast_2d(np.asarray(forces, float)).T @ arm / volume
     return np.asarray((stress + stress.T) / 2)

@@ -12,7 +12,11 @@ by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur
 93; Jean, CMAME 177 (1999) 235).  Without friction no step adds energy: the mean of ``J v`` and
 ``J v+`` is never positive where p_N is not zero (to the second order in h where J turns), and what
 spins freely keeps its energy (`rigid_lcp.gyroscopic.free_rotation`); with restitution 1 a bounce
-keeps it to round-off, of bodies that turn as well.  With friction a body that comes to rest within
+keeps it to round-off, of bodies that turn as well.  But only a contact that approaches at the start
+of a step bounces: one that is open, and that the impulse of another closes within the same step,
+ends it without restitution.  Five balls a tenth of a step's way apart, two of which hit the others,
+lose 5 % of their energy at restitution 1; a step shorter than the way between them takes, or the
+acceleration level, keeps it.  With friction a body that comes to rest within
 a step may gain up to ``m (h |f/m|)^2 / 8``.
 
 What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart

@@ -16,6 +16,7 @@ from rigid_lcp.equations import body_space, contact_offset
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction_problem import friction_problem
 from rigid_lcp.motion import Motion, motion_with_rates
+from rigid_lcp.problem_input import one_number
 from rigid_lcp.scene import World
 from rigid_lcp.time_stepping import contact_forces
 from rigid_lcp.wear import Wear, WearState, contact_stiffness_worn
@@ -35,8 +36,10 @@ def unique_forces(
     ``loads`` (n, 3) or (n, 6) [N, N m]; ``stiffness`` of all contacts, only its ratio to others
     matters; with ``wear`` and ``worn`` that of worn corners is smaller
     (`rigid_lcp.wear.contact_stiffness_worn`).  For grains at rest or in slow motion: impacts are
-    not in it.  Raises `NotConverged` where the limit is not found (many sliding contacts).
+    not in it.  Raises `NotConverged` where the limit is not found (many sliding contacts),
+    `UsageError` for a stiffness that is not above zero.
     """
+    stiffness = one_number(stiffness, "stiffness")
     contacts = world.contacts(motion, 0.5 * CLOSED * world.length)
     none = np.zeros((len(contacts), motion.dim))
     if len(contacts) == 0:
@@ -46,7 +49,7 @@ def unique_forces(
     problem = friction_problem(
         space, contact_offset(contacts, motion, free), contacts.friction, motion.dim
     )
-    k = np.full(len(contacts), float(stiffness))
+    k = np.full(len(contacts), stiffness)
     if wear is not None and worn is not None:
         k = contact_stiffness_worn(worn, wear, contacts, stiffness)
     found = elastic_limit(problem, k, tolerance=tolerance)

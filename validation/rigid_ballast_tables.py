@@ -97,7 +97,7 @@ def fabric_table(found: Sequence[Summary]) -> str:
 def energies_table(found: Sequence[Summary]) -> str:
     """Energy dissipated a cycle."""
     last = len(found[0].lost)
-    shown = [n for n in (1, 2, 5, last) if n <= last]
+    shown = sorted({n for n in (1, 2, 5, last) if n <= last})
     head = ("level", *(f"cycle {n} [J/m]" for n in shown))
     return table_of(head, [
         (f"{s.method}: {s.name}", *(f"{s.lost[n - 1]:.3g}" for n in shown)) for s in found

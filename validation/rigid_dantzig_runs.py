@@ -1,7 +1,7 @@
 """Where the paper's modified Dantzig algorithm works: its success by friction, and a cycle of it.
 
-The same settled packing of discs with other friction and its contacts in random order, as the
-seed drives them and with reversal.  Rows for the record of `rigid_runs`.
+Settled packings of discs with other friction and their contacts in random order, as the seed
+drives them and with reversal.  Rows for the record of `rigid_runs`.
 """
 
 from __future__ import annotations
@@ -13,12 +13,16 @@ import numpy as np
 
 from rigid_lcp.dantzig import Event, dantzig
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
+from rigid_lcp.problem_files import read_problem
 from validation.rigid_packings import packing, tower
+from validation.rigid_problems import data_folder
 
 Row = dict[str, Any]
-FRICTIONS = (0.0, 0.1, 0.2, 0.3, 0.5, 0.8)
+FRICTIONS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
 ORDERS = 10
 GRAINS = 60
+STORED = "discs_125"
+"""A packing of the stored problems, with friction of one's own."""
 SHOWN = 60
 """Events of a cycling run that are kept, its last ones."""
 
@@ -36,55 +40,67 @@ def warm() -> None:
                 solve_friction(w, small.offset, small.friction, dim, method=method)
 
 
-def bed(friction: float) -> FrictionProblem:
-    """The packing, settled with friction 0.5, with other friction."""
-    made = packing(GRAINS, 2, seed=1)
-    problem: FrictionProblem = friction_problem(made.bodies, made.offset, friction, 2)
+def beds(quick: bool) -> dict[str, FrictionProblem]:
+    """Packings by name: one settled here with friction 0.5, and the stored one where it is."""
+    found: dict[str, FrictionProblem] = {f"{GRAINS} discs": packing(GRAINS, 2, seed=1)}
+    folder = data_folder()
+    if folder is not None and not quick:
+        found[STORED] = read_problem(folder / f"{STORED}.npz")
+    return found
+
+
+def with_friction(bed: FrictionProblem, friction: float) -> FrictionProblem:
+    """A packing with other friction."""
+    problem: FrictionProblem = friction_problem(bed.bodies or bed.delassus, bed.offset, friction, 2)
     return problem
 
 
 def dantzig_rows(quick: bool) -> list[Row]:
-    """A row for every friction, order and drive; and one with the trace of a cycle."""
-    frictions = FRICTIONS[:4:3] if quick else FRICTIONS
+    """A row for every packing, friction, order and drive; and one with the trace of a cycle."""
+    frictions = FRICTIONS[:5:4] if quick else FRICTIONS
     orders = 2 if quick else ORDERS
     dantzig(tower(2, 2))  # compiled before it is timed
+    made = beds(quick)
     rows = [
-        _row(bed(friction), friction, order, reversal)
+        _row(name, with_friction(bed, friction), friction, order, reversal)
+        for name, bed in made.items()
         for friction in frictions
         for reversal in (False, True)
         for order in range(orders)
     ]
-    return [*rows, *_trace_rows(rows)]
+    return [*rows, *_trace_rows(rows, made)]
 
 
-def _row(problem: FrictionProblem, friction: float, seed: int, reversal: bool) -> Row:
+def _row(
+    bed: str, problem: FrictionProblem, friction: float, seed: int, reversal: bool
+) -> Row:  # fmt: skip
     order = np.random.default_rng(seed).permutation(problem.contacts)
     start = time.process_time()
     found = dantzig(problem, order=order, reversal=reversal)
     cost = time.process_time() - start
     method = "dantzig, reversal" if reversal else "dantzig"
     return {
-        "case": "rigid-dantzig", "method": method, "setting": {"friction": friction},
+        "case": "rigid-dantzig", "bed": bed, "method": method, "setting": {"friction": friction},
         "contacts": problem.contacts, "seed": seed, "error": found.residual,
         "error_kind": "natural residual", "cost_s": cost, "work": found.work.get("pivots"),
         "work_unit": "pivots", "ok": found.solved, "why": "" if found.solved else found.status,
     }  # fmt: skip
 
 
-def _trace_rows(rows: list[Row]) -> list[Row]:
+def _trace_rows(rows: list[Row], made: dict[str, FrictionProblem]) -> list[Row]:
     """The last events of the first run that cycled."""
     cycled = next((r for r in rows if r["why"] == "cycled" and r["method"] == "dantzig"), None)
     if cycled is None:
         return []
     events: list[Event] = []
-    problem = bed(cycled["setting"]["friction"])
+    problem = with_friction(made[cycled["bed"]], cycled["setting"]["friction"])
     order = np.random.default_rng(cycled["seed"]).permutation(problem.contacts)
     dantzig(problem, order=order, trace=events)
     kept = [
         [e.driven, e.force, e.contact, e.origin, e.target, e.step, e.travelled]
         for e in events[-SHOWN:]
     ]
-    same = {key: cycled[key] for key in ("method", "setting", "contacts", "seed")}
+    same = {key: cycled[key] for key in ("bed", "method", "setting", "contacts", "seed")}
     return [
         {"case": "rigid-dantzig-trace", **same, "error": cycled["error"],
          "error_kind": "natural residual", "cost_s": cycled["cost_s"], "work": len(events),

@@ -118,7 +118,7 @@ def page(lines: Sequence[Data]) -> str:
     parts.append("| case | answer | bar | engine | measured | CPU s | steps |\n|" + "---|" * 7)
     shown = [line for line in lines if not _absent(line)]
     parts += [_row(line, before) for line, before in zip(shown, [None, *shown], strict=False)]
-    if reasons := _reasons(lines):
+    if reasons := [*_reasons(lines), *_unasked(lines)]:
         parts += ["\n## What did not run\n", *reasons]
     failed = [line for line in mine if not line["ok"]]
     if failed:
@@ -207,6 +207,13 @@ def _reasons(lines: Sequence[Data]) -> list[str]:
         f"* {method}: {why} ({count} case{'s' if count > 1 else ''})"
         for (method, why), count in counts.items()
     ]
+
+
+def _unasked(lines: Sequence[Data]) -> list[str]:
+    """The cases that no peer was given."""
+    given = {line["case"] for line in lines if line["peer"]}
+    alone = dict.fromkeys(line["case"] for line in lines if line["case"] not in given)
+    return [f"* no peer was given: {'; '.join(alone)}"] if alone else []
 
 
 def measure(

@@ -87,18 +87,23 @@ def motion_table(rows: Sequence[Row]) -> str:
 
 
 def dantzig_table(rows: Sequence[Row]) -> str:
-    monotone, reversal = (
-        report.dantzig_success(rows, method) for method in ("dantzig", "dantzig, reversal")
-    )
-    if not monotone:
+    beds = report.dantzig_beds(rows)
+    if not beds:
         return ""
     lines = [
-        "| friction | as in the paper | with reversal of the driven force |",
-        "|---|---|---|",
+        "| packing | contacts | friction | as in the paper | with reversal of the driven force |",
+        "|---|---|---|---|---|",
     ]
-    for friction, (solved, orders) in monotone.items():
-        other = reversal.get(friction, (0, 0))
-        lines.append(f"| {friction:g} | {solved} of {orders} | {other[0]} of {other[1]} |")
+    for bed, contacts in beds.items():
+        monotone, reversal = (
+            report.dantzig_success(rows, method, bed) for method in ("dantzig", "dantzig, reversal")
+        )
+        for friction, (solved, orders) in monotone.items():
+            other = reversal.get(friction, (0, 0))
+            lines.append(
+                f"| {bed} | {contacts} | {friction:g} | {solved} of {orders} | "
+                f"{other[0]} of {other[1]} |"
+            )
     ends = report.dantzig_ends(rows)
     if ends:
         told = ", ".join(f"{method}: {end} ({n})" for (method, end), n in sorted(ends.items()))
@@ -110,8 +115,9 @@ def dantzig_table(rows: Sequence[Row]) -> str:
         _, _, contact, origin, target, *_ = shown["events"][-1]
         lines += [
             "",
-            f"The run in the picture (friction {shown['setting']['friction']:g}, order "
-            f"{shown['seed']}) ends after {shown['work']} changes of lists with {still} of length "
+            f"The run in the picture ({shown['bed']}, friction "
+            f"{shown['setting']['friction']:g}, order {shown['seed']}) ends after "
+            f"{shown['work']} changes of lists with {still} of length "
             f"zero: contact {contact} goes from {target} to {origin} and back.",
         ]
     return "\n".join(lines)

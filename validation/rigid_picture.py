@@ -128,12 +128,13 @@ def _profile(axes: Any, rows: Sequence[Row]) -> None:
 
 def _success(axes: Any, rows: Sequence[Row]) -> None:
     """Share of the orders of contacts that Dantzig's algorithm solved."""
-    for method, colour in (("dantzig", "#0b5394"), ("dantzig, reversal", "#cc7a00")):
-        found = report.dantzig_success(rows, method)
-        shares = [solved / orders for solved, orders in found.values()]
-        axes.plot(list(found), shares, "o-", color=colour, label=method)
+    for bed, line in zip(report.dantzig_beds(rows), ("o-", "s--"), strict=False):
+        for method, colour in (("dantzig", "#0b5394"), ("dantzig, reversal", "#cc7a00")):
+            found = report.dantzig_success(rows, method, bed)
+            shares = [solved / orders for solved, orders in found.values()]
+            axes.plot(list(found), shares, line, color=colour, label=f"{method}: {bed}")
     axes.set(
-        title="the paper's modified Dantzig\nalgorithm on a packing", xlabel="friction",
+        title="the paper's modified Dantzig\nalgorithm on packings", xlabel="friction",
         ylabel="orders of contacts solved, share", ylim=(-0.03, 1.03),
     )  # fmt: skip
     axes.legend(fontsize=8)

@@ -172,11 +172,18 @@ def profile(
 # --- Dantzig ----------------------------------------------------------------------------------
 
 
-def dantzig_success(rows: Iterable[Row], method: str) -> dict[float, tuple[int, int]]:
-    """Friction: number of solved orders, and of orders."""
+def dantzig_beds(rows: Iterable[Row]) -> dict[str, int]:
+    """Packings that Dantzig's algorithm was run on: name and number of contacts."""
+    return {row["bed"]: row["contacts"] for row in rows if row["case"] == "rigid-dantzig"}
+
+
+def dantzig_success(
+    rows: Iterable[Row], method: str, bed: str
+) -> dict[float, tuple[int, int]]:  # fmt: skip
+    """Of a packing, by friction: number of solved orders, and of orders."""
     found: dict[float, tuple[int, int]] = {}
     for row in rows:
-        if row["case"] == "rigid-dantzig" and row["method"] == method:
+        if row["case"] == "rigid-dantzig" and row["method"] == method and row["bed"] == bed:
             solved, all_of = found.get(row["setting"]["friction"], (0, 0))
             found[row["setting"]["friction"]] = (solved + bool(row["ok"]), all_of + 1)
     return found

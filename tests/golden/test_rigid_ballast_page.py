@@ -31,3 +31,11 @@ def test_both_methods_have_an_ensemble() -> None:
 def test_force_chains_of_both_methods_are_there() -> None:
     drawn = {row["name"] for row in ROWS if row["kind"] == "state"}
     assert drawn == {level.name for level in PICTURED}
+
+
+def test_no_table_has_a_column_twice() -> None:
+    """The last cycle may be one of those that are shown anyway."""
+    heads = [line for line in PAGE.read_text(encoding="utf-8").splitlines() if "cycle 1 [" in line]
+    assert len(heads) == 1
+    columns = [cell.strip() for cell in heads[0].strip("|").split("|")]
+    assert len(set(columns)) == len(columns)

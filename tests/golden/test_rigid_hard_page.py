@@ -157,3 +157,13 @@ def test_case_gives_checks_of_ours(monkeypatch: pytest.MonkeyPatch) -> None:
     assert good.holds
     assert not bad.holds
     assert "no solution" in bad.bar
+
+
+def test_cases_without_a_peer_are_told() -> None:
+    """A case that no peer ran on is either under a reason or among those that none was given."""
+    known = record_lines([row(), row(method="ODE", peer=True), row(case="alone")], ORIGIN)
+    assert "* no peer was given: alone\n" in page(known)
+    lines = record_read()
+    given = {line["case"] for line in lines if line["peer"]}
+    told = page(lines).split("* no peer was given: ")[1].splitlines()[0].split("; ")
+    assert set(told) == {line["case"] for line in lines} - given

@@ -58,5 +58,15 @@ def test_the_case_judges_the_record() -> None:
 @pytest.mark.parametrize("method", ["dantzig", "dantzig, reversal"])
 def test_without_friction_dantzig_always_solves(method: str) -> None:
     """The paper's algorithm at friction zero, all orders of contacts."""
-    solved, orders = report.dantzig_success(ROWS, method)[0.0]
-    assert solved == orders == 10
+    beds = report.dantzig_beds(ROWS)
+    assert len(beds) == 2
+    for bed in beds:
+        solved, orders = report.dantzig_success(ROWS, method, bed)[0.0]
+        assert solved == orders == 10
+
+
+def test_the_papers_algorithm_works_at_little_friction_only() -> None:
+    """On the stored packing in most orders at 0.1, on none at 0.3 and above."""
+    found = report.dantzig_success(ROWS, "dantzig", "discs_125")
+    assert found[0.1][0] >= 5
+    assert all(solved == 0 for friction, (solved, _) in found.items() if friction >= 0.3)

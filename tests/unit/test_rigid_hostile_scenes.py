@@ -8,8 +8,8 @@ import pickle
 import numpy as np
 import pytest
 
-from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
-from rigid_lcp.errors import RigidError, SceneError, ShapeError, UsageError
+from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, box
+from rigid_lcp.errors import Overlapping, RigidError, SceneError, ShapeError, UsageError
 
 BLOCK = Polygon.rectangle(0.2, 0.1)
 
@@ -198,6 +198,47 @@ def test_a_line_that_breaks_nothing_changes_nothing(line):
     with pytest.raises(RigidError):
         run.fragment(1, line)
     assert (len(run.positions), run.energy) == (2, before)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["ab", (("a", 0), (0, 1)), ((0, 0.05, 0), (0, 1)), ((0, 0.05), None), ((0, [1]), (0, 1)),
+     ((0, 0.05), (1j, 0)), (0, 0)],
+)  # fmt: skip
+def test_a_line_or_plane_of_another_kind_is_named(line):
+    """In space each of these was an error of numpy, in the plane the second."""
+    runs = [at_rest()]
+    scene = Scene(3)
+    scene.add(box(0.1, 0.1, 0.1), density=2700)
+    runs.append(Simulation(scene))
+    for run, body in zip(runs, (1, 0), strict=True):
+        with pytest.raises(SceneError, match="fragment"):
+            run.fragment(body, line)
+
+
+@pytest.mark.parametrize("length", [1e-200, 1.0, 1e200])
+def test_a_direction_of_any_length_is_a_line(length):
+    """With 1e200 both parts were the whole."""
+    run = at_rest()
+    part = run.fragment(1, ((0, 0.05), (0, length)))
+    masses = [body.mass for body in run.world.scene.bodies[1:]]
+    np.testing.assert_allclose(masses, 2 * [BLOCK.area * 2700 / 2], rtol=1e-14)
+    assert part == 2
+    run.advance(0.01)
+
+
+def test_bodies_that_overlap_at_the_start_are_told_by_name():
+    scene = Scene()
+    scene.add(HalfSpace([0, 1]))
+    scene.add(BLOCK, density=2700, position=(0, 0.01), name="sleeper")
+    with pytest.raises(Overlapping, match=r"^sleeper and body 0 at the start: they overlap"):
+        Simulation(scene)
+
+
+@pytest.mark.parametrize("stiffness", [0, -1, np.nan, "a", None])
+def test_a_stiffness_that_is_none_is_named(stiffness):
+    with pytest.raises(UsageError, match="stiffness"):
+        at_rest().unique_forces(stiffness)
 
 
 def test_a_scene_that_changes_later_does_not_change_its_runs():

@@ -33,6 +33,12 @@ def test_malformed_input_is_named(w, q, mu, dim, words):
         solve_friction(w, q, mu, dim)
 
 
+@pytest.mark.parametrize("mu", [np.inf, np.nan])
+def test_friction_without_bound_is_told_what_can_be_given(mu):
+    with pytest.raises(ProblemError, match=r"mu.*\n.*give 0 to 1e\+06"):
+        solve_friction(np.eye(2), [-1.0, 0.0], mu, 2)
+
+
 def test_a_bad_start_method_or_tolerance_is_named():
     with pytest.raises(ProblemError, match=r"start.*3 numbers"):
         solve_friction(W, Q, 0.5, 2, start=np.zeros(3))

@@ -272,3 +272,14 @@ def test_a_settled_packing() -> None:
         problem = stored("discs_125", mu)
         found = [dantzig(problem, order=o) for o in orders(problem.contacts, 5)]
         assert sum(s.solved for s in found) >= least
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.05])
+def test_a_shift_that_stays_leaves_exact_lists(mu: float) -> None:
+    """Where events without end keep the shift of the diagonal from coming out (one of these ten
+    orders without friction, four at mu = 0.05), the lists that the drives ended on are solved
+    without it."""
+    problem = stored("discs_125", mu)
+    for order in orders(problem.contacts, 10):
+        found = dantzig(problem, order=order)
+        assert found.solved, found.message
