@@ -28,7 +28,6 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ProblemError, UsageError
@@ -148,7 +147,7 @@ def collision_round(
     ``velocity`` (nc * dim,): of all contacts before it [m/s].
     """
     rows = (dim * taking[:, None] + np.arange(dim)).ravel()
-    part = BodySpace(sp.csr_array(bodies.jacobian[rows]), bodies.inverse_mass, bodies.body_size)
+    part = bodies.of_contacts(taking)
     v = velocity[rows]
     factor = 1.0
     while True:

@@ -77,6 +77,12 @@ class BodySpace:
         )  # fmt: skip
         return found
 
+    def of_contacts(self, taking: NDArray[np.int64]) -> BodySpace:
+        """The same bodies and these contacts alone, by their numbers."""
+        dim = 2 if self.body_size == 3 else 3
+        rows = (dim * taking[:, None] + np.arange(dim)).ravel()
+        return BodySpace(sp.csr_array(self.jacobian[rows]), self.inverse_mass, self.body_size)
+
     def product(self, force: Floats) -> Floats:
         """``W r``."""
         rows, mass = self.jacobian, self.inverse_mass

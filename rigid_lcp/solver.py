@@ -124,11 +124,13 @@ def solve_auto(
     ):  # fmt: skip
         return trial.solution()
     parts = parts or islands(problem)
-    if len(parts) > 1 and not split and trial.best.status != "no solution":
+    if len(parts) > 1 and not split:
         apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
         if _error(apart) < _error(trial.best):  # endless forces on one hide the errors of others
             trial.best = apart
     if not trial.best.solved and (trial.best.status == "no solution" or proved_insoluble(problem)):
+        if len(parts) <= 1:
+            trial.forget_endless()
         return trial.solution(
             "no solution",
             "no forces within the cones of friction keep all contacts from approaching (proved by"

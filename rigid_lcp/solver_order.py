@@ -53,7 +53,7 @@ from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
 from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
 from rigid_lcp.smoothed_path import smoothed_path
 from rigid_lcp.solver_cold import CONVEX_CONTACTS, convex_start
-from rigid_lcp.solver_trial import FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
+from rigid_lcp.solver_trial import ENDLESS, FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
 from rigid_lcp.solver_warm import deep, yielding
 
 Floats = NDArray[np.float64]
@@ -101,8 +101,6 @@ less than many of one."""
 LAST_DRIFT, LAST_DRIFT_FLOPS = 4000, 4e10
 """The same after the paths, when nothing else is left: large packings of little friction take some
 ten seconds of it."""
-ENDLESS = 1e6
-"""Forces over ``rho |q|`` that look endless: a proof is looked for before the paths."""
 PROOF_CONTACTS = 3000
 """Up to so many contacts a linear programme looks for the proof that there is no solution."""
 
@@ -190,7 +188,8 @@ def fallback_paths(trial: Trial, accept: float) -> None:
     """Extrapolated points, then the interior point along one path after another, within the effort
     of `FALLBACK_SHARE`, and extrapolated points again."""
     problem, tolerance = trial.problem, trial.tolerance
-    if trial.forces > ENDLESS and proved_insoluble(problem):
+    if trial.forces > ENDLESS and proved_insoluble(problem):  # a proof before the paths
+        trial.forget_endless()
         trial.best = replace(trial.best, status="no solution")
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)

@@ -47,6 +47,8 @@ MOST_FLOPS, MOST_FACTORED = 4e11, 1e7
 """An effort (some 20 s), and a number of factorisations times contacts (some 10 s), beyond which no
 factorisation is begun.  Only large problems come there: one of 10,400 contacts between spheres
 takes 1.5e10 flops, most of a second, and one of 10,000 between discs 20 ms."""
+ENDLESS = 1e6
+"""Forces over ``rho |q|`` that look endless."""
 GREAT_FORCES = 1e4
 """Forces over what lets go, ``rho |q|``, above which such a residual hides velocities."""
 
@@ -180,6 +182,11 @@ class Trial:
         """Size of the best forces over that of what makes the contacts approach, ``rho |q|``."""
         offered = self.problem.rho * length(self.problem.offset)
         return length(self.best.r) / offered if offered > 0.0 else 0.0
+
+    def forget_endless(self) -> None:
+        """No forces in place of endless ones, behind whose size any velocity hides."""
+        if self.forces > ENDLESS:
+            self.best = Trial(self.problem, None, self.tolerance).best
 
     def newton(
         self, start: Floats, steps: int, after: str, patience: int = PATIENCE

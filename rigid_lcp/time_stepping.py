@@ -12,12 +12,9 @@ by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur
 93; Jean, CMAME 177 (1999) 235).  Without friction no step adds energy: the mean of ``J v`` and
 ``J v+`` is never positive where p_N is not zero (to the second order in h where J turns), and what
 spins freely keeps its energy (`rigid_lcp.gyroscopic.free_rotation`); with restitution 1 a bounce
-keeps it to round-off, of bodies that turn as well.  But only a contact that approaches at the start
-of a step bounces: one that is open, and that the impulse of another closes within the same step,
-ends it without restitution.  Five balls a tenth of a step's way apart, two of which hit the others,
-lose 5 % of their energy at restitution 1; a step shorter than the way between them takes, or the
-acceleration level, keeps it.  With friction a body that comes to rest within
-a step may gain up to ``m (h |f/m|)^2 / 8``.
+keeps it to round-off, of bodies that turn as well, and so does a row of balls that pass it on
+within the step (`rigid_lcp.passed_collisions`).  With friction a body that comes to rest within a
+step may gain up to ``m (h |f/m|)^2 / 8``.
 
 What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart
 (`rigid_lcp.overlap_removal`).
@@ -39,6 +36,7 @@ from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction_problem import BodySpace, FrictionSolution
 from rigid_lcp.motion import Motion, motion_with_rates
 from rigid_lcp.overlap_removal import OVERLAP, bodies_parted
+from rigid_lcp.passed_collisions import bouncing, hit_by_others, impulses_in_turn
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
 
@@ -110,11 +108,30 @@ def moreau_step(
         error = forces_error(bodies, solution, slow, offset + shift)
     impulse = solution.r.reshape(-1, motion.dim)
     after = solution.u.reshape(-1, motion.dim) - shift
+    message = solution.message
+    bounce = bouncing(contacts.restitution, gap, before, offset[:, 0], slow, h)
+    if bounce.any():
+        touching = OVERLAP * world.length
+        apart = ~bounce & ((gap > touching) | (before > slow))
+        waiting = hit_by_others(
+            contacts.restitution, apart, impulse[:, 0], after[:, 0] - 2.0 * turning[:, 0],
+            bodies.diagonal[:: motion.dim], slow,
+        )  # fmt: skip
+        if waiting.any():
+
+            def solve(part: BodySpace, q: Floats, mu: Floats) -> tuple[FrictionSolution, float]:
+                found = impulses_found(part, q, mu, None, tolerance, accept)
+                return found, forces_error(part, found, slow, q)
+
+            impulse, after, error, message = impulses_in_turn(
+                bodies, solve, contacts.friction, contacts.restitution, gap, before, offset,
+                turning[:, 0], slow, h, touching,
+            )  # fmt: skip
     rates = free.rates
     rates[world.movable] += _velocities(bodies, impulse, world.size)
     end = world.drifted(motion_with_rates(middle, rates), 0.5 * h)
     end = bodies_parted(world, motion, end, pull, h)
-    return Step(end, contact_forces(contacts, impulse, after, h), error, solution.message)
+    return Step(end, contact_forces(contacts, impulse, after, h), error, message)
 
 
 def planes_at_corners(contacts: Contacts) -> Contacts:
@@ -189,7 +206,7 @@ def contact_shift(
     not be told from rest.  ``turning``: inertial part of ``u_N+`` that is left out where it would
     ask bodies to part that come to rest within the step.
     """
-    bounce = (gap + 0.5 * h * free <= 0) & (before < -slow) & (restitution > 0)
+    bounce = bouncing(restitution, gap, before, free, slow, h)
     return np.where(
         bounce, restitution * before, np.maximum(np.maximum(gap, 0.0) * 2 / h, -turning)
     )

@@ -99,7 +99,7 @@ def test_overlapping_start_refused() -> None:
     scene.add(BOX, density=1.0, position=(0.2, 0.9))
     with pytest.raises(Overlapping, match=r"overlap by 0\.1 m") as error:
         Simulation(scene)
-    assert "0 and 1" in error.value.where
+    assert error.value.where == "body 0 and body 1 at the start"
 
 
 def heap(seed: int, count: int = 40) -> tuple[list[object], np.ndarray, np.ndarray]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from validation import rigid_peers as peers
 from validation import rigid_report as report
 from validation import rigid_runs as runs
 from validation import rigid_scale_runs as scale_runs
+from validation.cases import rigid as case
 from validation.cases.rigid import jam_or_part, nonunique_checks, scale_checks
 from validation.rigid_packings import tower
 from validation.rigid_problems import NamedProblem, changed
@@ -218,3 +219,15 @@ def test_scale_row(monkeypatch: pytest.MonkeyPatch) -> None:
     assert made["start_error"] < 1.0
     (check,) = scale_checks([made])
     assert check.holds == (made["cost_s"] <= 1.0)
+
+
+def test_what_the_record_holds_is_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`trackbed validate rigid` pours no bed to see that it has its rows already."""
+
+    def refuse() -> NoReturn:
+        raise AssertionError("made")
+
+    named = [NamedProblem(name, "family", refuse) for name in ("here", "lacking")]
+    monkeypatch.setattr(case, "all_problems", lambda quick: named)
+    rows = [{"case": "rigid-solvers", "problem": "here", "method": report.OURS}]
+    assert case.problems_lacking(rows) == ["lacking"]

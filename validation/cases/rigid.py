@@ -1,7 +1,8 @@
 """Solvers of rigid contact with friction: real problems, speed against error, beside their peers.
 
-    trackbed validate rigid            judges the record, after the runs that it lacks (all: hours)
-    trackbed validate rigid --quick    small generated problems, no Siconos: under a minute
+    trackbed validate rigid            judges the record, after the problems that it lacks (all:
+                                       hours), and runs the hard cases: some ten minutes
+    trackbed validate rigid --quick    small generated problems, no Siconos, and short hard cases
 
 With ``TRACKBED_DATA`` set the stored problems are among them.  What comes out in words and
 pictures: ``docs/rigid-solvers.md``.
@@ -23,8 +24,9 @@ from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.problem_files import read_forces, read_problem
 from validation import rigid_report as report
 from validation.case import Check
+from validation.cases import rigid_hard_cases
 from validation.rigid_peers import ONE_THREAD
-from validation.rigid_problems import NONUNIQUE, data_folder
+from validation.rigid_problems import NONUNIQUE, all_problems, data_folder
 from validation.rigid_report import HYBRID, OSQP, OURS, Row
 from validation.rigid_runs import LADDER, LARGE, RECORD, rows_read
 
@@ -38,22 +40,30 @@ def run(quick: bool) -> list[Check]:
     """All checks; the quick form makes runs of its own."""
     checks = nonunique_checks()
     if not quick:
-        record_apart(RECORD, quick=False)
-        return checks + record_checks(rows_read(RECORD))
+        lacking = problems_lacking(rows_read(RECORD))
+        if lacking:
+            record_apart(RECORD, "--problems", ",".join(lacking))
+        return checks + record_checks(rows_read(RECORD)) + rigid_hard_cases.run(quick)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "rigid-solvers.jsonl"
-        record_apart(path, quick=True)
-        return checks + record_checks(rows_read(path))
+        record_apart(path, "--quick", "--budget", "1")
+        return checks + record_checks(rows_read(path)) + rigid_hard_cases.run(quick)
 
 
-def record_apart(path: Path, quick: bool) -> None:
-    """`rigid_runs` in a process whose libraries have one thread each."""
-    command = [sys.executable, "-m", "validation.rigid_runs", "--out", str(path)]
+def problems_lacking(rows: Sequence[Row]) -> list[str]:
+    """Names of the problems on which the record has no run of ours; none of them is made."""
+    there = {row.get("problem") for row in report.of(rows, OURS)}
+    return [named.name for named in all_problems(quick=False) if named.name not in there]
+
+
+def record_apart(path: Path, *flags: str) -> None:
+    """`rigid_runs` in a process whose libraries have one thread each; what it says goes to
+    stderr, a line a run."""
+    command = [sys.executable, "-m", "validation.rigid_runs", "--out", str(path), *flags]
     root = str(Path(__file__).resolve().parents[2])
     subprocess.run(
-        command + ["--quick", "--budget", "1"] * quick, check=True, stdout=subprocess.DEVNULL,
-        env=os.environ | ONE_THREAD | {"PYTHONPATH": root},
-    )  # fmt: skip
+        command, check=True, stdout=sys.stderr, env=os.environ | ONE_THREAD | {"PYTHONPATH": root}
+    )
 
 
 def record_checks(rows: Sequence[Row]) -> list[Check]:
