@@ -98,7 +98,7 @@ def mode_kind(nodes: FloatArray, shape: FloatArray) -> Kind:
     share: dict[Kind, float] = {"vertical": 0.0, "lateral": 0.0, "torsion": 0.0, "axial": 0.0}
     for one in range(SECTIONS):
         x, u = nodes[at == one], shape[at == one]
-        if not len(x):
+        if len(x) < 2:  # no section: it neither turns nor weighs much
             continue
         mean = u.mean(axis=0)
         y, z = (x - x.mean(axis=0)).T[1:]

@@ -11,6 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qdem_fem.errors import ConditionError, MeshError, NotConverged
+from qdem_fem.grain_form import GrainRecipe, grain_random
+from qdem_fem.grain_mesh import grain_tetrahedra
 from qdem_fem.load_record import LoadRecord, load_record_read, load_record_write
 from qdem_fem.load_train import (
     Track,
@@ -96,6 +98,17 @@ def test_twist_and_stretch_of_the_paper_s_block() -> None:
     }
     for kind, frequency in expected.items():
         assert modes.frequency[modes.kind.index(kind)] == pytest.approx(frequency, rel=0.008)
+
+
+def test_modes_of_a_grain_scale_with_its_size() -> None:
+    """A body that is no beam, with slices of a single node: f goes with 1/size, and E with f^2."""
+    form = grain_random(np.random.default_rng(0), GrainRecipe())
+    mesh = grain_tetrahedra(form.nodes, form.corner_faces)
+    small = TetMesh(0.01 * mesh.nodes, mesh.elements)
+    soft = Material(young=45e7, poisson=0.167, density=2350)
+    frequency = free_modes(mesh, CONCRETE, 4).frequency
+    np.testing.assert_allclose(free_modes(small, CONCRETE, 4).frequency, 100 * frequency, rtol=1e-9)
+    np.testing.assert_allclose(free_modes(mesh, soft, 4).frequency, frequency / 10, rtol=1e-9)
 
 
 def test_modes_of_two_blocks_are_refused() -> None:
