@@ -107,23 +107,26 @@ def _shape_values(parts: Data) -> Data:
 
 
 def _cost_values(rows: list[Data], scan: Data) -> Data:
-    first = {row["grain"]: row for row in rows if row["level"] == 0}
+    first = {row["grain"]: row for row in rows if row["mesh"] == "as made"}
     table, coarse = [], []
     for row in rows:
         size = [abs(error) for error in row["error"]]
         start = first[row["grain"]]
         cost = row["tetrahedra"] / row["step"] / (start["tetrahedra"] / start["step"])
-        if row["level"] == 0:
+        if row["mesh"] == "as made":
             coarse.append(max(size))
         table.append(
-            f"| {row['grain'] + 1} | {row['tetrahedra']:,} | {row['nodes']:,} | {max(size):.1%} | "
+            f"| {row['grain'] + 1} | {row['mesh']} | {row['tetrahedra']:,} | {row['nodes']:,} | "
+            f"{max(size):.1%} | "
             f"{sum(row['error']) / len(size):+.1%} | {1e6 * row['step']:.2f} µs | {cost:.0f} |"
         )
-    second = [row for row in rows if row["level"] == 1]
+    second = [row for row in rows if row["mesh"] == "halved"]
     factor = [8 * first[row["grain"]]["step"] / row["step"] for row in second]
+    others = [max(map(abs, row["error"])) for row in rows if row["mesh"].startswith("gmsh")]
     return {
         "stiffness": "\n".join(table), "reference": max(row["reference_error"] for row in rows),
         "coarse_error": f"{min(coarse):.0%} to {max(coarse):.0%}",
+        "gmsh_error": f"{min(others):.0%} to {max(others):.0%}",
         "cost_factor": sum(factor) / len(factor), "scan_triangles": scan["triangles"],
         "scan": "\n".join(
             f"| {row['triangles']} | {row['tetrahedra']:,} | {row['inertia_error']:.1%} | "

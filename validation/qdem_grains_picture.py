@@ -81,16 +81,18 @@ def _grading(axes: Any, part: Data) -> None:
 
 def _errors(axes: Any, rows: list[Data]) -> None:
     for grain, colour in enumerate(("#0b5394", "#6aa84f", "#cc7a00")):
-        own = [row for row in rows if row["grain"] == grain]
+        own = [row for row in rows if row["grain"] == grain and "gmsh" not in row["mesh"]]
         count = [row["tetrahedra"] for row in own]
         axes.loglog(count, [max(map(abs, row["error"])) for row in own], "o-", color=colour,
                     label=f"grain {grain + 1}")  # fmt: skip
+        other = next(row for row in rows if row["grain"] == grain and "gmsh" in row["mesh"])
+        axes.loglog(other["tetrahedra"], max(map(abs, other["error"])), "x", color=colour)
         for row in own:
             axes.annotate(f"{1e6 * row['step']:.2f} µs", xytext=(4, 3), fontsize=6,
                           xy=(row["tetrahedra"], max(map(abs, row["error"]))),
                           textcoords="offset points", color=colour)  # fmt: skip
     axes.set(xlabel="tetrahedra of a grain", ylabel="greatest error of four frequencies [-]",
-             title="Stiffness error against cost, with the critical step")  # fmt: skip
+             title="Stiffness error against cost, with the critical step (x: gmsh)")  # fmt: skip
     axes.legend(fontsize=8)
 
 
