@@ -24,8 +24,10 @@ from validation.qdem_grains_picture import grains_picture, train_picture
 WORDS = Path(__file__).with_suffix(".md")
 PAGE = ROOT / "docs" / "ballast-grains.md"
 Data = dict[str, Any]
+FILL = 0.6
+"""Solid share of a ballast layer that the words compare with."""
 EXACT = {
-    "sphere": ("1", "1", "between widths of an icosahedron"),
+    "sphere": ("1", "1", "not tested"),
     "cube": ("(pi/6)^(1/3) = 0.8060", "0", "2"),
     "tetrahedron": ("(pi/(6 sqrt 3))^(1/3) = 0.6711", "0", "2 sqrt 2/sqrt 2 = 2"),
 }
@@ -71,6 +73,7 @@ def _set_values(part: Data, steps: Data) -> Data:
             f"| {1e3 * size:g} mm | {asked:.1%} | {got:.1%} | {least:.0%} to {most:.0%} |"
             for size, asked, got, least, most in rows
         ),
+        "wanted_volume": 1e6 * FILL * PAPER_LAYER / part["grains"],
         "layer": PAPER_LAYER, "share": part["mean_volume"] * part["grains"] / PAPER_LAYER,
         "paper_volume": 1e6 * part["paper_size_volume"],
         "paper_share": part["paper_size_volume"] * part["grains"] / PAPER_LAYER,
@@ -98,12 +101,19 @@ def _shape_values(parts: Data) -> Data:
             max(abs(one[at] - row[name]) for one in got) if got else None
             for at, name in enumerate(("sphericity", "roundness"))
         ]
-        shown = ["" if error is None else f"{error:.0e}" for error in errors]
+        shown = [
+            "" if error is None else format(error, form)
+            for error, form in zip(errors, (".0e", ".3f"), strict=True)
+        ]
         control.append(
             f"| {row['sphericity']:.2f} | {row['roundness']:.2f} | {row['refused']} | "
             f"{' | '.join(shown)} |"
         )
-    return {"shapes": "\n".join(shapes), "levels": levels, "control": "\n".join(control)}
+    gap = parts["shapes"]["sieve_gap"]
+    return {
+        "shapes": "\n".join(shapes), "levels": levels, "control": "\n".join(control),
+        "sieve_gap": f"{gap[0]:.0e} (median) and {gap[2]:.1e} (greatest)",
+    }  # fmt: skip
 
 
 def _cost_values(rows: list[Data], scan: Data) -> Data:
@@ -152,6 +162,10 @@ def _sleeper_values(part: Data) -> Data:
             f"| {end:g} m | {joined(f, '.0f')} | {f[1] / f[0]:.2f} | {f[2] / f[0]:.2f} |"
             for end, f in part["wedges"]
         ),
+        "ratio_two": part["shapes"][0]["vertical"][1] / part["shapes"][0]["vertical"][0],
+        "ratio_three": part["shapes"][0]["vertical"][2] / part["shapes"][0]["vertical"][0],
+        "seated": joined(part["seated"]["nearest"], ".0f"),
+        "seated_heights": joined(part["seated"]["height"], ".3f"),
         "wanted_modes": joined(part["wanted"]["frequency"], ".0f"),
         "wanted": joined(part["wanted"]["height"], ".3f"),
         "meshes": "\n".join(

@@ -47,20 +47,20 @@ def grains_picture(path: Path, parts: Data) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11, 9.5), layout="constrained")
+    figure = Figure(figsize=(11, 9.8), layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(2, 2, height_ratios=[1.5, 1])
+    grid = figure.add_gridspec(2, 2, height_ratios=[1.4, 1])
     axes = figure.add_subplot(grid[0, :])
     for row, (words, recipe) in enumerate(KINDS):
         grains = grains_make(8, 5, recipe, PAPER_SIZE)
         for grain in range(8):
             nodes, corner_faces = grains.parts(grain)
-            grain_draw(axes, nodes, grain_faces(corner_faces), (85.0 * grain, -85.0 * row))
-        axes.text(-50, -85.0 * row + 43, words, fontsize=8, va="bottom")
-    axes.set(xlim=(-55, 650), ylim=(-310, 65), aspect="equal", title="Grains of 45 to 55 mm sieve "
+            grain_draw(axes, nodes, grain_faces(corner_faces), (105.0 * grain, -105.0 * row))
+        axes.text(-60, -105.0 * row + 48, words, fontsize=8, va="bottom")
+    axes.set(xlim=(-75, 800), ylim=(-380, 70), aspect="equal", title="Grains of 45 to 55 mm sieve "
              "size, about 100 tetrahedra each (faces as meshed)")  # fmt: skip
-    axes.plot([560, 610], [-298, -298], "k-", lw=2)
-    axes.text(615, -298, "50 mm", va="center", fontsize=8)
+    axes.plot([690, 740], [-372, -372], "k-", lw=2)
+    axes.text(745, -372, "50 mm", va="center", fontsize=8)
     axes.axis("off")
     _grading(figure.add_subplot(grid[1, 0]), parts["set"])
     _errors(figure.add_subplot(grid[1, 1]), parts["stiffness"]["rows"])
@@ -131,6 +131,15 @@ def train_picture(path: Path, parts: Data) -> None:
     )
     axes.plot(half, wanted["height"], "o-", color="#cc0000", label="a profile with: "
               + ", ".join(f"{f:.0f}" for f in wanted["frequency"]) + " Hz")  # fmt: skip
+    seated = parts["sleeper"]["seated"]
+    axes.plot(
+        seated["half"],
+        seated["height"],
+        "s--",
+        color="#cc7a00",
+        label="nearest with seats, "
+        "E free: " + ", ".join(f"{f:.0f}" for f in seated["nearest"]) + " Hz",
+    )
     axes.axvspan(0.501, 0.631, color="#c9ced6", zorder=0, label="rail seat")
     axes.set(xlabel="distance from the centre [m]", ylabel="height of the sleeper [m]",
              ylim=(0, 0.2), title="What 200, 400, 800 Hz would ask for")  # fmt: skip

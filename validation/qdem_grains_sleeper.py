@@ -67,23 +67,33 @@ def tapered(height: FloatArray, half: FloatArray, at: FloatArray) -> FloatArray:
     return beam_modes(at, h * (b + t) / 2, h**3 * (b**2 + 4 * b * t + t**2) / 36 / (b + t))
 
 
-def profile_wanted(at: FloatArray) -> dict[str, Any]:
-    """Heights, at most 0.174 m, at seven places from the centre to the end that have the paper's
-    three frequencies, and what is left of them."""
-    half = np.linspace(0, 1, 7)
+def profile_nearest(half: FloatArray, seats: bool, at: FloatArray) -> dict[str, Any]:
+    """The heights, at most 0.174 m, at places ``half`` from the centre to the end, whose three
+    frequencies come nearest to the paper's: least sum of squares of their logarithms.
+
+    With ``seats`` the places within a rail seat keep 0.174 m, none goes below 0.05 m, and
+    Young's modulus is free as well: only the ratios of the frequencies count.
+    """
+    shape = SleeperShape()
+    middle = shape.seat_distance / shape.length
+    held = seats & (np.abs(half - middle) <= shape.seat_length / shape.length * 1.001)
+    floor = 0.05 if seats else 0.0
 
     def heights(free: FloatArray) -> FloatArray:
-        return np.asarray(0.174 / (1 + np.exp(-free)))
+        found = floor + (shape.height - floor) / (1 + np.exp(-free))
+        return np.asarray(np.where(held, shape.height, found))
 
-    def misfit(free: FloatArray) -> float:
-        frequency = tapered(heights(free), half, at)
-        return float((np.log(frequency / PAPER_MODES) ** 2).sum())
+    def misfits(free: FloatArray) -> FloatArray:
+        away = np.log(tapered(heights(free), half, at) / PAPER_MODES)
+        return np.asarray(away - away.mean() if seats else away)
 
-    best = minimize(misfit, np.full(7, 2.0), method="Nelder-Mead",
-                    options={"maxiter": 2000, "xatol": 1e-3, "fatol": 1e-7})  # fmt: skip
+    best = minimize(lambda free: float((misfits(free) ** 2).sum()), np.full(len(half), 2.0),
+                    method="Nelder-Mead",
+                    options={"maxiter": 1500, "xatol": 1e-3, "fatol": 1e-7})  # fmt: skip
     return {
         "half": half.tolist(), "height": heights(best.x).tolist(),
         "frequency": tapered(heights(best.x), half, at).tolist(),
+        "nearest": (PAPER_MODES * np.exp(misfits(best.x))).tolist(),
     }  # fmt: skip
 
 
@@ -120,4 +130,10 @@ def sleeper_part(folder: Path) -> dict[str, Any]:
         (end, tapered(np.array([0.174, end]), np.array([0.0, 1.0]), at).tolist())
         for end in (0.174, 0.14, 0.10, 0.06, 0.03)
     ]
-    return {"shapes": shapes, "meshes": meshes, "wedges": wedges, "wanted": profile_wanted(at)}
+    seat = SleeperShape().stations[4:6] - 1.0
+    with_seats = np.array([0.0, seat[0] / 2, *seat, (1 + seat[1]) / 2, 1.0])
+    return {
+        "shapes": shapes, "meshes": meshes, "wedges": wedges,
+        "wanted": profile_nearest(np.linspace(0, 1, 7), False, at),
+        "seated": profile_nearest(with_seats, True, at),
+    }  # fmt: skip
