@@ -212,8 +212,8 @@ def test_a_curve_that_is_none_is_refused(sieves: list[float], passing: list[floa
 @settings(max_examples=12)
 @given(
     seed=st.integers(0, 10**6),
-    psi=st.floats(0.74, 0.86),
-    roundness=st.floats(0.66, 0.76),
+    psi=st.floats(0.78, 0.86),
+    roundness=st.floats(0.64, 0.7),
     dents=st.sampled_from([0.0, 0.0, 0.2]),
 )
 def test_a_grain_is_what_was_asked(seed: int, psi: float, roundness: float, dents: float) -> None:
