@@ -22,7 +22,7 @@ from qdem_fem.grain_form import (
     hull_faces,
 )
 from qdem_fem.grain_grading import BALLAST, EN_13450_A, Grading, passing_of, sizes_drawn
-from qdem_fem.grain_mesh import grain_faces, grain_tetrahedra, radius_ratios
+from qdem_fem.grain_mesh import CORNERS, DIAGONALS, grain_faces, grain_tetrahedra, radius_ratios
 from qdem_fem.grain_set import GrainSet, grains_load, grains_make, grains_save, main
 from qdem_fem.grain_sieve import sieve_size
 from qdem_fem.grain_surface import (
@@ -106,6 +106,15 @@ def test_sphere_has_roundness_and_sphericity_one_in_the_limit() -> None:
     np.testing.assert_allclose(orders, [2, 1], atol=0.1)
     assert lacks[-1][1] < 0.02
     assert node_areas(nodes, faces).sum() == pytest.approx(surface_area(nodes, faces), rel=1e-12)
+
+
+def test_areas_of_nodes_are_positive_with_obtuse_triangles() -> None:
+    """A flat double pyramid over a long rhombus: Voronoi regions alone would be negative."""
+    nodes = np.vstack([np.eye(3), -np.eye(3)]) * [4.0, 1.0, 0.1]
+    faces = hull_faces(nodes)
+    areas = node_areas(nodes, faces)
+    assert areas.min() > 0
+    assert areas.sum() == pytest.approx(surface_area(nodes, faces), rel=1e-12)
 
 
 @pytest.mark.parametrize("nodes", [CUBE, TETRAHEDRON], ids=["cube", "tetrahedron"])
@@ -260,6 +269,16 @@ def test_radius_ratio_closed_forms() -> None:
     nodes = np.vstack([TETRAHEDRON, np.zeros(3), np.eye(3)])
     ratios = radius_ratios(nodes, np.array([[0, 1, 2, 3], [4, 5, 6, 7]]))
     np.testing.assert_allclose(ratios, [1, (3 - sqrt(3)) / sqrt(3)], rtol=1e-12)
+
+
+def test_eight_parts_of_a_cone_fill_it_around_each_diagonal() -> None:
+    """Cone over an outward face with its apex inside: right-handed parts of an eighth each."""
+    face, apex = np.array([[0.0, 0, 0], [0, 1, 0], [1, 0, 0]]), np.array([[0.2, 0.3, 1.0]])
+    middles = (face + np.roll(face, -1, axis=0)) / 2
+    nodes = np.vstack([face, middles, (face + apex) / 2, apex])
+    for part in (CORNERS, *DIAGONALS):
+        _, volumes = element_gradients(nodes, part)
+        np.testing.assert_allclose(volumes, 1 / 48, rtol=1e-12)
 
 
 def test_out_of_reach_says_what_was_reached() -> None:
