@@ -164,6 +164,7 @@ def _sleeper_values(part: Data) -> Data:
         ),
         "ratio_two": part["shapes"][0]["vertical"][1] / part["shapes"][0]["vertical"][0],
         "ratio_three": part["shapes"][0]["vertical"][2] / part["shapes"][0]["vertical"][0],
+        "seated_own": joined(part["seated"]["frequency"], ".0f"),
         "seated": joined(part["seated"]["nearest"], ".0f"),
         "seated_heights": joined(part["seated"]["height"], ".3f"),
         "wanted_modes": joined(part["wanted"]["frequency"], ".0f"),

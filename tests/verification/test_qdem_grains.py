@@ -109,8 +109,8 @@ def test_sphere_has_roundness_and_sphericity_one_in_the_limit() -> None:
 
 
 def test_areas_of_nodes_are_positive_with_obtuse_triangles() -> None:
-    """A flat double pyramid over a long rhombus: Voronoi regions alone would be negative."""
-    nodes = np.vstack([np.eye(3), -np.eye(3)]) * [4.0, 1.0, 0.1]
+    """A stretched hull, for some of whose nodes Voronoi regions alone would be negative."""
+    nodes = corners_apart(np.random.default_rng(0), 20) * [6.0, 1.0, 1.0]
     faces = hull_faces(nodes)
     areas = node_areas(nodes, faces)
     assert areas.min() > 0
