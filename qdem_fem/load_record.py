@@ -68,17 +68,17 @@ class LoadRecord:
                                  remedy="use 1 or 2")  # fmt: skip
         return Series(self.time, self.pressure[:, number - 1])
 
-    def node_forces(self, number: int, area: float, nodes: int, down: ArrayLike) -> Series:
-        """The same force [N], (3,), on each of ``nodes`` of a seat, for `Simulation.load`.
+    def force(self, number: int, area: float, down: ArrayLike) -> Series:
+        """Force on seat 1 or 2 [N], (3,), for `Simulation.load` on the nodes of that seat.
 
-        Section 4: pressure times the ``area`` of the sensor [m^2], shared evenly by the nodes
-        in it; ``down`` (3,) is the unit vector it acts along.
+        Section 4: pressure times the ``area`` of the sensor [m^2], which `load` shares evenly by
+        the nodes; ``down`` (3,) is the unit vector it acts along.
         """
-        if not (area > 0 and nodes > 0):
-            raise ConditionError(f"an area of {area} m^2 with {nodes} nodes", where="rail seat",
-                                 remedy="use the node set of a seat and its area")  # fmt: skip
-        share = self.pressure[:, number - 1, None] * area / nodes
-        return Series(self.time, share * np.asarray(down, float))
+        if not area > 0:
+            raise ConditionError(f"an area of {area} m^2", where="rail seat",
+                                 remedy="give the area of the pressure sensor")  # fmt: skip
+        series = self.seat(number)
+        return Series(self.time, area * series.values[:, None] * np.asarray(down, float))
 
 
 def load_record_read(path: str | os.PathLike[str], rate: float | None = RATE) -> LoadRecord:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from qdem_fem import Body, Simulation
 from qdem_fem.errors import ConditionError, MeshError, NotConverged
 from qdem_fem.grain_form import GrainRecipe, grain_random
 from qdem_fem.grain_mesh import grain_tetrahedra
@@ -25,7 +26,7 @@ from qdem_fem.load_train import (
     train_spectrum,
 )
 from qdem_fem.material import Material
-from qdem_fem.mesh import TetMesh, element_gradients
+from qdem_fem.mesh import TetMesh, element_gradients, lumped_mass
 from qdem_fem.sleeper_mesh import SleeperShape, sleeper_mesh
 from qdem_fem.sleeper_modes import free_modes
 from qdem_fem.spectra import fourier_spectrum
@@ -243,11 +244,36 @@ def test_record_is_linear_between_samples(tmp_path: Path) -> None:
         chord = 0.75 * record.pressure[k, 1] + 0.25 * record.pressure[k + 1, 1]
         assert between == pytest.approx(chord, rel=1e-9)
     assert series(-1.0) == record.pressure[0, 1]
-    forces = record.node_forces(1, area=0.0221, nodes=7, down=[0, 0, -1])
+    force = record.force(1, area=0.0221, down=[0, 0, -1])
     middle = float(record.time[2000])
     np.testing.assert_allclose(
-        7 * forces(middle), [0, 0, -record.pressure[2000, 0] * 0.0221], rtol=1e-12
+        force(middle), [0, 0, -record.pressure[2000, 0] * 0.0221], rtol=1e-12
     )
+
+
+def test_a_free_sleeper_takes_up_the_impulse_of_the_record() -> None:
+    """Both seats loaded by a record in steps: momentum is the integral of the forces, its moment
+    about the centre that of their difference."""
+    record = LoadRecord(np.arange(5) * 1e-4, np.outer(np.arange(5.0), [2e5, 1e5]))
+    body = Body(sleeper_mesh(SleeperShape(), 12, 2, 1), CONCRETE)
+    simulation = Simulation([body])
+    for seat in (1, 2):
+        nodes = body.mesh.node_sets[f"seat-{seat}"]
+        simulation.load(body, nodes, record.force(seat, 0.0221, [0, 0, -1]))
+    duration = 3e-4
+    simulation.advance(duration)
+    time = simulation.time
+    _, volumes = element_gradients(body.nodes, body.elements)
+    mass = lumped_mass(body.elements, volumes, 2350.0, len(body.nodes))
+    momentum = mass @ body.velocity
+    # forces grow in proportion to time: integral q t^2/2, of a sum over steps to their length
+    slope = 0.0221 * 3e5 / 1e-4
+    lag = simulation.step / time
+    assert momentum[2] == pytest.approx(-slope * time**2 / 2, rel=2 * lag)
+    arm = body.nodes[:, 0] - 1.0
+    turning = (mass * arm) @ body.velocity[:, 2]
+    expected = 0.566 * slope / 3 * time**2 / 2
+    assert turning == pytest.approx(expected, rel=2 * lag)
 
 
 @pytest.mark.parametrize(
@@ -282,8 +308,8 @@ def test_no_file_other_rates_and_wrong_seats(tmp_path: Path) -> None:
     assert record.rate == pytest.approx(10)
     with pytest.raises(ConditionError, match="rail seat 3"):
         record.seat(3)
-    with pytest.raises(ConditionError, match="0 nodes"):
-        record.node_forces(1, 0.02, 0, [0, 0, -1])
+    with pytest.raises(ConditionError, match="area of 0"):
+        record.force(1, 0.0, [0, 0, -1])
     with pytest.raises(ConditionError, match="shape"):
         LoadRecord(np.arange(3.0), np.zeros((3, 3)))
 
