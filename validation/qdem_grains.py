@@ -46,6 +46,7 @@ ROOT = Path(__file__).parents[1]
 RECORD = ROOT / "validation" / "results" / "qdem-grains.jsonl"
 STONE = Material(young=30e9, poisson=0.2, density=2700)
 """Ballast, Table 1 of the paper, without its viscosity."""
+VISCOUS_STONE = Material(young=30e9, poisson=0.2, density=2700, shear_viscosity=1e4)
 PAPER_GRAINS, PAPER_TETRAHEDRA, PAPER_NODES = 5700, 622_591, 199_469
 PAPER_LAYER = (4.6 + 3.0) / 2 * 0.4 * 0.6
 """Volume of the paper's ballast layer [m^3] (section 4)."""
@@ -165,9 +166,9 @@ def tetrahedra_halved(mesh: TetMesh) -> TetMesh:
     return mesh_read((nodes, np.concatenate([np.stack(one, axis=1) for one in eight])))
 
 
-def critical_step(mesh: TetMesh) -> float:
-    """`qdem_fem`'s own critical step of a free grain of Table 1's stone [s]."""
-    return Simulation([Body(mesh, STONE)]).critical_step.value
+def critical_step(mesh: TetMesh, stone: Material = STONE) -> float:
+    """`qdem_fem`'s own critical step of a free grain [s]."""
+    return Simulation([Body(mesh, stone)]).critical_step.value
 
 
 def stiffness_part(folder: Path) -> Row:
@@ -230,9 +231,11 @@ def steps_part(folder: Path) -> Row:
     """Critical steps of random grains of the 5,700, by `qdem_fem` itself."""
     grains: GrainSet = grains_make(60, 1)
     steps = [critical_step(grains.mesh(grain)) for grain in range(len(grains))]
+    viscous = [critical_step(grains.mesh(grain), VISCOUS_STONE) for grain in range(len(grains))]
     scaled = np.array(steps) / grains.sizes
     return {
         "grains": len(steps), "step": np.percentile(steps, [0, 5, 50, 95]).tolist(),
+        "viscous": np.percentile(viscous, [0, 5, 50, 95]).tolist(),
         "step_at_5_cm": (0.05 * np.percentile(scaled, [0, 5, 50, 95])).tolist(),
     }  # fmt: skip
 

@@ -66,6 +66,7 @@ def _set_values(part: Data, steps: Data) -> Data:
         "bytes": part["bytes"] / 1e6, "ratios": joined(part["radius_ratio"], ".2f"),
         "step_grains": steps["grains"],
         "steps": joined((1e6 * s for s in steps["step"]), ".2f"),
+        "steps_viscous": joined((1e6 * s for s in steps["viscous"]), ".2f"),
         "steps_5": joined((1e6 * s for s in steps["step_at_5_cm"]), ".2f"),
         "mean_volume": 1e6 * part["mean_volume"], "mean_size": 1e3 * part["mean_size"],
         "mean_size_mass": 1e3 * part["mean_size_by_mass"], "between": part["between"],
