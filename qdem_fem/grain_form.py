@@ -140,9 +140,10 @@ def grain_random(generator: np.random.Generator, recipe: GrainRecipe) -> GrainFo
             return form
     got = f"roundness {min(reached):.2f} to {max(reached):.2f}" if reached else "less sphericity"
     raise MeshError(
-        f"{DRAWS_MOST} random grains of sphericity {psi:.3f} reached {got}, none {roundness:.3f}",
+        f"none of {DRAWS_MOST} random grains has sphericity {psi:.3f} and roundness "
+        f"{roundness:.3f} without a sliver; reached was {got}",
         where="grain recipe",
-        remedy="ask for a roundness within that range, or change sphericity or corners",
+        remedy="ask for a roundness well within that range, more sphericity, or other corners",
     )
 
 

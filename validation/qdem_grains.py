@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.integrate import trapezoid
 from scipy.spatial.transform import Rotation
 
 from adapters.provenance import provenance
@@ -145,7 +146,8 @@ def sieve_gaps(count: int) -> list[float]:
     """How far `sieve_size` of each of ``count`` grains is above the least of 12 turned copies, for
     which the search starts elsewhere."""
     gaps = []
-    turns = Rotation.random(12, rng=np.random.default_rng(0)).as_matrix()
+    quaternions = np.random.default_rng(0).standard_normal((12, 4))
+    turns = Rotation.from_quat(quaternions).as_matrix()
     for grain in range(count):
         nodes = grain_random(np.random.default_rng([3, grain]), GrainRecipe()).nodes
         gaps.append(sieve_size(nodes) / min(sieve_size(nodes @ turn) for turn in turns) - 1)
@@ -244,7 +246,7 @@ def load_part(folder: Path) -> Row:
     """The made-up train: shares, impulse, peaks of its spectrum."""
     train, track, area = Train(), Track(), 0.13 * 0.17
     record = train_record(train, track, area)
-    impulse = np.trapezoid(record.pressure[:, 0], record.time) * area
+    impulse = trapezoid(record.pressure[:, 0], record.time) * area
     exact = 4 * train.cars * train.first_share * train.axle_load * track.spacing / train.speed
     frequency = np.linspace(0, 60, 6001)
     size = np.abs(train_spectrum(frequency, train, track))

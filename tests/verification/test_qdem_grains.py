@@ -283,7 +283,7 @@ def test_eight_parts_of_a_cone_fill_it_around_each_diagonal() -> None:
 
 def test_out_of_reach_says_what_was_reached() -> None:
     recipe = GrainRecipe(roundness=0.98, roundness_scatter=0.0)
-    with pytest.raises(MeshError, match=r"reached roundness 0\.\d+ to 0\.\d+, none 0\.980"):
+    with pytest.raises(MeshError, match=r"roundness 0\.980 .*reached was roundness 0\."):
         grain_random(np.random.default_rng(0), recipe)
     assert LIFT_MOST > 1
 
