@@ -155,17 +155,24 @@ def sieve_gaps(count: int) -> list[float]:
 
 
 def tetrahedra_halved(mesh: TetMesh) -> TetMesh:
-    """Each tetrahedron cut into eight at the middles of its edges (Bey 1995); same polyhedron."""
+    """Each tetrahedron cut into eight at the middles of its edges, the octahedron that is left
+    along its shortest diagonal (Bey 1995); same polyhedron."""
     t = mesh.elements
     pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
     every = np.sort(np.concatenate([t[:, pair] for pair in pairs]), axis=1)
     edges, place = np.unique(every, axis=0, return_inverse=True)
     nodes = np.vstack([mesh.nodes, mesh.nodes[edges].mean(axis=1)])
-    ab, ac, ad, bc, bd, cd = len(mesh.nodes) + place.reshape(6, -1)
+    middles = len(mesh.nodes) + place.reshape(6, -1)
+    ab, ac, ad, bc, bd, cd = middles
     a, b, c, d = t.T
-    eight = [(a, ab, ac, ad), (ab, b, bc, bd), (ac, bc, c, cd), (ad, bd, cd, d),
-             (ab, cd, ac, ad), (ab, cd, ad, bd), (ab, cd, bd, bc), (ab, cd, bc, ac)]  # fmt: skip
-    return mesh_read((nodes, np.concatenate([np.stack(one, axis=1) for one in eight])))
+    corners = [(a, ab, ac, ad), (ab, b, bc, bd), (ac, bc, c, cd), (ad, bd, cd, d)]
+    # a diagonal, then the four middles around it
+    rings = [(ab, cd, ac, ad, bd, bc), (ac, bd, ab, ad, cd, bc), (ad, bc, ab, ac, cd, bd)]
+    length = [np.linalg.norm(nodes[one] - nodes[other], axis=1) for one, other, *_ in rings]
+    chosen = np.stack(rings)[np.argmin(length, axis=0), :, np.arange(len(t))].T
+    one, other, *ring = chosen
+    inner = [(one, other, ring[k], ring[(k + 1) % 4]) for k in range(4)]
+    return mesh_read((nodes, np.concatenate([np.stack(x, axis=1) for x in corners + inner])))
 
 
 def critical_step(mesh: TetMesh, stone: Material = STONE) -> float:
