@@ -62,7 +62,9 @@ EN_13450_A = GradingLimits(
     np.array([0.00, 0.01, 0.30, 0.70, 1.00]),
     np.array([0.03, 0.25, 0.65, 0.99, 1.00]),
 )
-"""Percentages passing by mass; besides, at least half the mass lies between 31.5 and 50 mm."""
+"""Shares passing by mass; besides, at least half the mass lies between 31.5 and 50 mm.
+
+Not compared with a printed copy of the standard."""
 BALLAST = Grading(EN_13450_A.sieves, np.array([0.0, 0.13, 0.475, 0.845, 1.0]))
 """Midway between the limits of `EN_13450_A`, with nothing below 22.4 mm: 71.5 % from 31.5 to 50."""
 
