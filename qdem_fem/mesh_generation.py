@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import permutations
 from typing import Any, Literal
 
@@ -143,11 +144,21 @@ def gmsh_box(size: Triple, h: float, holes: Sequence[Hole] = ()) -> TetMesh:
     """
     _positive("size and h", (*size, h))
     _positive("radius of the holes", [radius for _, _, radius in holes])
+    with gmsh_model("gmsh_box", h, "change h or the holes") as gmsh:
+        return _gmsh_mesh(gmsh, size, holes)
+
+
+@contextmanager
+def gmsh_model(where: str, h: float, remedy: str) -> Iterator[Any]:
+    """gmsh with a model of its own and element size ``h`` [m]; what was open stays as it was.
+
+    Raises `LibraryMissing` without gmsh; what gmsh raises becomes a `MeshError` with ``remedy``.
+    """
     try:
         gmsh: Any = importlib.import_module("gmsh")
     except (ImportError, OSError) as error:  # OSError: its shared libraries are missing
         raise LibraryMissing(
-            f"gmsh_box needs gmsh ({error})", where="gmsh_box", remedy="pip install gmsh"
+            f"{where} needs gmsh ({error})", where=where, remedy="pip install gmsh"
         ) from error
     ours = not gmsh.isInitialized()
     if ours:
@@ -166,17 +177,15 @@ def gmsh_box(size: Triple, h: float, holes: Sequence[Hole] = ()) -> TetMesh:
     try:
         for name, value in options.items():
             gmsh.option.setNumber(name, value)
-        gmsh.model.add("gmsh_box")
+        gmsh.model.add(where)
         try:
-            mesh = _gmsh_mesh(gmsh, size, holes)
+            yield gmsh
         finally:
             gmsh.model.remove()
     except Exception as error:  # gmsh raises nothing more specific
         if isinstance(error, MeshError):
             raise
-        raise MeshError(
-            f"gmsh failed: {error}", where="gmsh_box", remedy="change h or the holes"
-        ) from error
+        raise MeshError(f"gmsh failed: {error}", where=where, remedy=remedy) from error
     finally:
         for name, value in saved.items():
             gmsh.option.setNumber(name, value)
@@ -184,7 +193,15 @@ def gmsh_box(size: Triple, h: float, holes: Sequence[Hole] = ()) -> TetMesh:
             gmsh.finalize()
         else:
             gmsh.model.setCurrent(before)
-    return mesh
+
+
+def gmsh_tetrahedra(gmsh: Any, where: str) -> TetMesh:
+    """The tetrahedra of gmsh's present model, checked."""
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    _, corners = gmsh.model.mesh.getElementsByType(4)
+    name = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
+    name[tags] = np.arange(len(tags))
+    return mesh_read((coordinates.reshape(-1, 3), name[corners].reshape(-1, 4)), where=where)
 
 
 def _gmsh_mesh(gmsh: Any, size: Triple, holes: Sequence[Hole]) -> TetMesh:
@@ -201,11 +218,7 @@ def _gmsh_mesh(gmsh: Any, size: Triple, holes: Sequence[Hole]) -> TetMesh:
         solids.cut([(3, box)], drills)
     solids.synchronize()
     gmsh.model.mesh.generate(3)
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    _, corners = gmsh.model.mesh.getElementsByType(4)
-    name = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
-    name[tags] = np.arange(len(tags))
-    mesh = mesh_read((coordinates.reshape(-1, 3), name[corners].reshape(-1, 4)), where="gmsh_box")
+    mesh = gmsh_tetrahedra(gmsh, "gmsh_box")
 
     near = _NEAR * max(size)
     surface = np.unique(surface_faces(mesh.elements))

@@ -48,7 +48,7 @@ def mesh_parts(source: Any, where: str) -> MeshParts:
     Raises `MeshError` if the source is of no known kind, or holds no linear tetrahedra.
     """
     if isinstance(source, (str, os.PathLike)):
-        return _parts_of_meshio(_file_read(source, where), where)
+        return _parts_of_meshio(file_read(source, where), where)
     if isinstance(source, (tuple, list)):
         if len(source) != 2:
             raise MeshError(
@@ -175,7 +175,7 @@ def _sets_of_meshio(mesh: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     )
 
 
-def _file_read(path: str | os.PathLike[str], where: str) -> Any:
+def file_read(path: str | os.PathLike[str], where: str) -> Any:
     """The meshio.Mesh of a file; whatever meshio says or does on a bad one is in a `MeshError`."""
     if not Path(path).is_file():
         raise MeshError(

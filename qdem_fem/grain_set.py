@@ -1,0 +1,180 @@
+"""Many grains: made by seed on any number of processors, saved, loaded, meshed.
+
+python -m qdem_fem.grain_set --count 5700 --seed 1 --out grains.npz
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import zipfile
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from qdem_fem.errors import MeshError
+from qdem_fem.grain_form import GrainRecipe, grain_random
+from qdem_fem.grain_grading import BALLAST, Grading, sizes_drawn
+from qdem_fem.grain_mesh import grain_faces, grain_tetrahedra
+from qdem_fem.grain_sieve import sieve_size
+from qdem_fem.grain_surface import Solid, polyhedron_integrals
+from qdem_fem.mesh import TetMesh
+from qdem_fem.mesh_checks import FloatArray, IntArray
+
+FORMAT = 1
+BATCH = 50
+"""Grains a process makes at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class GrainSet:
+    """Grains one behind another; grain i has ``corners[i]`` = M corners."""
+
+    corners: IntArray
+    """M of each grain, (g,)."""
+    nodes: FloatArray
+    """Nodes of all grains [m], (sum of 5 M - 5, 3), the centroid of each at zero."""
+    corner_faces: IntArray
+    """Triangles of their corners, (sum of 2 M - 4, 3), by the numbers within the grain."""
+    sizes: FloatArray
+    """`qdem_fem.grain_sieve.sieve_size` [m], (g,)."""
+    sphericity: FloatArray
+    roundness: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def parts(self, grain: int) -> tuple[FloatArray, IntArray]:
+        """Nodes (5 M - 5, 3) [m] and corner faces (2 M - 4, 3) of a grain."""
+        before = self.corners[:grain]
+        node, face, own = 5 * (before - 1), 2 * (before - 2), self.corners[grain]
+        start, first = int(node.sum()), int(face.sum())
+        return (
+            self.nodes[start : start + 5 * (own - 1)],
+            self.corner_faces[first : first + 2 * (own - 2)],
+        )
+
+    def mesh(self, grain: int) -> TetMesh:
+        """Its tetrahedra, for `qdem_fem.Body`."""
+        return grain_tetrahedra(*self.parts(grain))
+
+    def solid(self, grain: int) -> Solid:
+        """Volume and inertia of its polyhedron, for unit density."""
+        nodes, corner_faces = self.parts(grain)
+        return polyhedron_integrals(nodes, grain_faces(corner_faces))
+
+    @property
+    def tetrahedra(self) -> IntArray:
+        """How many each grain has, (g,)."""
+        return np.asarray(8 * (2 * self.corners - 4))
+
+
+def grains_make(
+    count: int, seed: int, recipe: GrainRecipe | None = None, grading: Grading = BALLAST,
+    workers: int = 1,
+) -> GrainSet:  # fmt: skip
+    """``count`` random grains whose sieve sizes follow ``grading``.
+
+    Grain i depends on ``seed``, i and the recipe only; sizes on ``seed``, ``count`` and the
+    grading: the same set for any number of ``workers`` (processes).  Raises `MeshError` for a
+    recipe that random grains do not meet, or a count below one.
+    """
+    if count < 1 or workers < 1:
+        raise MeshError(
+            f"{count} grains on {workers} processors", where="grains_make", remedy="use 1 or more"
+        )
+    sizes = sizes_drawn(grading, count, np.random.default_rng([seed, count]))
+    make = partial(_batch_make, recipe=recipe or GrainRecipe(), seed=seed)
+    batches = [range(at, min(at + BATCH, count)) for at in range(0, count, BATCH)]
+    if workers == 1:
+        made = [make(batch) for batch in batches]
+    else:
+        with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+            made = list(pool.map(make, batches))
+    forms = [form for batch in made for form in batch]
+    scales = sizes / np.array([form[2] for form in forms])
+    return GrainSet(
+        corners=np.array([form[1].max() + 1 for form in forms]),
+        nodes=np.concatenate([s * form[0] for s, form in zip(scales, forms, strict=True)]),
+        corner_faces=np.concatenate([form[1] for form in forms]),
+        sizes=sizes,
+        sphericity=np.array([form[3] for form in forms]),
+        roundness=np.array([form[4] for form in forms]),
+    )
+
+
+def _batch_make(
+    grains: range, recipe: GrainRecipe, seed: int
+) -> list[tuple[FloatArray, IntArray, float, float, float]]:
+    """Nodes, corner faces, sieve size, sphericity and roundness of grains of no set size."""
+    made = []
+    for grain in grains:
+        form = grain_random(np.random.default_rng([seed, grain, FORMAT]), recipe)
+        size = sieve_size(form.nodes)
+        made.append((form.nodes, form.corner_faces, size, form.sphericity, form.roundness))
+    return made
+
+
+def grains_save(path: str | os.PathLike[str], grains: GrainSet) -> None:
+    """Write a set of grains, atomically, as .npz: 24 bytes a node, 3 bytes a face."""
+    target = Path(path)
+    temporary = target.with_name(target.name + ".partial")
+    with temporary.open("wb") as stream:
+        np.savez(
+            stream,
+            format=np.array(FORMAT),
+            corners=grains.corners.astype(np.uint8),
+            nodes=grains.nodes,
+            corner_faces=grains.corner_faces.astype(np.uint8),
+            shape=np.stack([grains.sizes, grains.sphericity, grains.roundness]),
+        )
+    temporary.replace(target)
+
+
+def grains_load(path: str | os.PathLike[str]) -> GrainSet:
+    """Read what `grains_save` wrote, to the last digit; raises `MeshError` for another file."""
+    where = f"grains {os.fspath(path)!r}"
+    remedy = "give a file that grains_save or python -m qdem_fem.grain_set wrote"
+    try:
+        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
+            number = int(file["format"])
+            corners = file["corners"].astype(np.int64)
+            nodes, faces, shape = file["nodes"], file["corner_faces"], file["shape"]
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise MeshError(f"not a set of grains ({error})", where=where, remedy=remedy) from error
+    wanted = ((5 * corners.sum() - 5 * len(corners), 3), (2 * corners.sum() - 4 * len(corners), 3))
+    if number != FORMAT or (nodes.shape, faces.shape) != wanted or shape.shape != (3, len(corners)):
+        raise MeshError(
+            f"format {number}, nodes {nodes.shape}, faces {faces.shape} for {len(corners)} grains",
+            where=where,
+            remedy=remedy,
+        )
+    return GrainSet(corners, nodes, faces.astype(np.int64), *shape)
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Make a set and save it."""
+    parser = argparse.ArgumentParser(description="Makes random ballast grains, EN 13450 31.5/50 A.")
+    parser.add_argument("--count", type=int, default=5700)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--sphericity", type=float, default=GrainRecipe.sphericity)
+    parser.add_argument("--roundness", type=float, default=GrainRecipe.roundness)
+    parser.add_argument("--concavity", type=float, default=GrainRecipe.concavity)
+    parser.add_argument("--workers", type=int, default=1, help="processes")
+    parser.add_argument("--out", type=Path, required=True, help="the .npz to write")
+    given = parser.parse_args(words)
+    recipe = GrainRecipe(
+        sphericity=given.sphericity, roundness=given.roundness, concavity=given.concavity
+    )
+    grains = grains_make(given.count, given.seed, recipe, workers=given.workers)
+    grains_save(given.out, grains)
+    print(f"{given.out}: {len(grains)} grains, {grains.tetrahedra.sum()} tetrahedra")
+
+
+if __name__ == "__main__":
+    main()

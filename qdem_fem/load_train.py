@@ -1,0 +1,227 @@
+"""Load of a passing train on the rail seats of one sleeper: a made-up record, not a measured one.
+
+The record of the paper's Fig. 5 is not published.  Axles move at constant speed over a rail that is
+an infinite beam on a Winkler foundation (Zimmermann 1888; Hetenyi, Beams on Elastic Foundation,
+1946, ch. 2), and a sleeper takes what the foundation carries over its share of the track.  That
+holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat`
+names.
+
+    python -m qdem_fem.load_train --out train.csv
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from math import isfinite, pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.errors import ConditionError
+from qdem_fem.load_record import RATE, LoadRecord, load_record_write
+from qdem_fem.mesh_checks import FloatArray
+
+QUIET = 12.0
+"""Distance from the sleeper, over the elastic length, within which an axle counts: e^-12."""
+
+
+@dataclass(frozen=True)
+class Train:
+    """Equal cars with two bogies of two axles each.
+
+    Five cars of 20 m at 32 m/s pass in steps of 0.625 s, as the front axles of the paper's cars do
+    (Fig. 7: 0.11, 0.73, 1.35, 1.98, 2.61 s); the other values are assumed.
+    """
+
+    cars: int = 5
+    car_length: float = 20.0
+    """From one car to the next [m]."""
+    bogie_distance: float = 13.8
+    """Between the middles of the bogies of a car [m]."""
+    axle_distance: float = 2.1
+    """Between the axles of a bogie [m]."""
+    axle_load: float = 100e3
+    """Of both wheels [N]."""
+    speed: float = 32.0
+    """[m/s]."""
+    first_share: float = 0.5
+    """Share of an axle load on the rail of seat 1; the paper's two rails differ [-]."""
+
+    def __post_init__(self) -> None:
+        _refuse_unless_positive(self, "train")
+        if not (self.axle_distance < self.bogie_distance < self.car_length):
+            raise ConditionError(
+                f"axles {self.axle_distance} m, bogies {self.bogie_distance} m and cars "
+                f"{self.car_length} m apart do not nest",
+                where="train",
+                remedy="give axle_distance < bogie_distance < car_length",
+            )
+        if self.cars != int(self.cars) or not self.first_share < 1:
+            raise ConditionError(
+                f"{self.cars} cars, share {self.first_share} of the load on one rail",
+                where="train",
+                remedy="give a whole number of cars and a share below 1",
+            )
+
+    @property
+    def axles(self) -> FloatArray:
+        """Distance of each axle behind the first [m], (4 cars,)."""
+        car = np.array([0.0, self.axle_distance])
+        car = np.concatenate([car, self.bogie_distance + car])
+        return (self.car_length * np.arange(self.cars)[:, None] + car).reshape(-1)
+
+
+@dataclass(frozen=True)
+class Track:
+    """A rail on its foundation, one of two; a 50N rail, the paper's 0.6 m a sleeper."""
+
+    rail_stiffness: float = 206e9 * 1.96e-5
+    """E I of one rail [N m^2]."""
+    modulus: float = 30e6
+    """Track modulus u: force a metre of one rail over its deflection [N/m^2]; assumed."""
+    spacing: float = 0.6
+    """From sleeper to sleeper [m]."""
+
+    def __post_init__(self) -> None:
+        _refuse_unless_positive(self, "track")
+
+    @property
+    def elastic_length(self) -> float:
+        """L = (4 E I/u)^(1/4) [m]."""
+        return float((4 * self.rail_stiffness / self.modulus) ** 0.25)
+
+
+@dataclass(frozen=True)
+class WheelFlat:
+    """A flat on both wheels of one axle: a half-sine of force at every turn of the wheel.
+
+    Peak and duration are given, not computed: they depend on speed and contact in ways that no
+    short formula holds.
+    """
+
+    axle: int
+    """Its number from 0, from the front."""
+    peak: float
+    """Of the added force of one wheel on the rail [N]."""
+    duration: float
+    """[s]."""
+    wheel_radius: float = 0.43
+    """[m]."""
+    place: float = 0.0
+    """Where on the rail one of the impacts begins, from the sleeper [m]; others follow at
+    multiples of 2 pi times the radius."""
+
+
+def _refuse_unless_positive(thing: Any, where: str) -> None:
+    for field in fields(thing):
+        value = getattr(thing, field.name)
+        if not (isfinite(value) and value > 0):
+            raise ConditionError(
+                f"{field.name} = {value}", where=where, remedy="give numbers above zero, in SI"
+            )
+
+
+def seat_share(distance: FloatArray, track: Track) -> FloatArray:
+    """Share of a wheel load that a rail seat takes from a wheel at ``distance`` x from it [m].
+
+    The foundation carries p = P/(2 L) e^-s (cos s + sin s) a metre, s = |x|/L; over the spacing a
+
+        share = (Q((x + a/2)/L) - Q((x - a/2)/L))/2,   Q(s) = sign(s) (1 - e^-|s| cos s).
+
+    The shares of all sleepers add up to 1 at any moment; beyond 3 pi/4 L a share is negative.
+    """
+    x, half = np.asarray(distance, float), track.spacing / 2
+
+    def carried(s: FloatArray) -> FloatArray:
+        size = np.abs(s)
+        return np.asarray(np.sign(s) * (1 - np.exp(-size) * np.cos(size)))
+
+    length = track.elastic_length
+    return (carried((x + half) / length) - carried((x - half) / length)) / 2
+
+
+def seat_forces(
+    time: FloatArray, train: Train, track: Track, flats: Sequence[WheelFlat] = ()
+) -> FloatArray:
+    """Force on seat 1 and 2 [N], (k, 2), the first axle being over the sleeper at ``time`` 0.
+
+    Added forces of flats act where their wheel is.  Raises `ConditionError` for a flat on an axle
+    that the train does not have, or of no size.
+    """
+    shares = np.array([train.first_share, 1 - train.first_share])
+    total = np.zeros((len(time), 2))
+    for axle in train.axles:
+        share = seat_share(train.speed * time - axle, track)
+        total += np.outer(share, train.axle_load * shares)
+    for flat in flats:
+        if not (0 <= flat.axle < 4 * train.cars and min(flat.duration, flat.wheel_radius) > 0):
+            raise ConditionError(
+                f"a flat of {flat.duration} s on axle {flat.axle}, radius {flat.wheel_radius} m",
+                where="train",
+                remedy=f"use an axle from 0 to {4 * train.cars - 1} and sizes above zero",
+            )
+        place = train.speed * time - train.axles[flat.axle]
+        turn = 2 * pi * flat.wheel_radius
+        since = np.mod(place - flat.place, turn) / train.speed
+        force = np.where(since < flat.duration, flat.peak * np.sin(pi * since / flat.duration), 0.0)
+        total += (force * seat_share(place, track))[:, None]
+    return total
+
+
+def train_spectrum(frequency: FloatArray, train: Train, track: Track) -> np.ndarray[Any, Any]:
+    """Fourier spectrum of the force on seat 1 without flats [N s], complex (k,).
+
+        X(f) = P a/v sinc(f a/v) 4/(4 + (2 pi f L/v)^4) sum over axles of e^(-2 pi i f x_j/v)
+
+    with sinc(x) = sin(pi x)/(pi x): the sum has its peaks at multiples of speed over car length,
+    weighed by 4 cos(pi f b/v) cos(pi f c/v) of bogie distance b and axle distance c (Milne, Le Pen,
+    Thompson, Powrie, J. Sound Vib. 397, 2017, 123-140).
+    """
+    per_metre = frequency / train.speed
+    axles = np.exp(-2j * pi * np.outer(per_metre, train.axles)).sum(axis=1)
+    load = train.first_share * train.axle_load * track.spacing / train.speed
+    beam = 4 / (4 + (2 * pi * per_metre * track.elastic_length) ** 4)
+    return np.asarray(load * np.sinc(per_metre * track.spacing) * beam * axles)
+
+
+def train_record(
+    train: Train, track: Track, area: float, flats: Sequence[WheelFlat] = (), rate: float = RATE
+) -> LoadRecord:
+    """The pressure on both seats of ``area`` [m^2] while the train passes, sampled at ``rate``.
+
+    It begins and ends with the nearest axle `QUIET` elastic lengths and half a spacing away; time
+    0 is the first sample.
+    """
+    if not (area > 0 and rate > 0):
+        raise ConditionError(f"area {area} m^2, rate {rate} Hz", where="train",
+                             remedy="give numbers above zero")  # fmt: skip
+    lead = (QUIET * track.elastic_length + track.spacing / 2) / train.speed
+    last = 2 * lead + train.axles[-1] / train.speed
+    time = np.arange(int(np.ceil(last * rate)) + 1) / rate
+    return LoadRecord(time, seat_forces(time - lead, train, track, flats) / area)
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Write the record of a train as a CSV file."""
+    parser = argparse.ArgumentParser(description="Writes the made-up record of a passing train.")
+    parser.add_argument("--cars", type=int, default=Train.cars)
+    parser.add_argument("--speed", type=float, default=Train.speed, help="m/s")
+    parser.add_argument("--axle-load", type=float, default=Train.axle_load, help="N")
+    parser.add_argument("--first-share", type=float, default=Train.first_share,
+                        help="of an axle load on rail seat 1")  # fmt: skip
+    parser.add_argument("--modulus", type=float, default=Track.modulus, help="N/m^2")
+    parser.add_argument("--area", type=float, default=0.13 * 0.17, help="of a rail seat, m^2")
+    parser.add_argument("--out", type=Path, required=True, help="the .csv to write")
+    given = parser.parse_args(words)
+    train = Train(cars=given.cars, speed=given.speed, axle_load=given.axle_load,
+                  first_share=given.first_share)  # fmt: skip
+    record = train_record(train, Track(modulus=given.modulus), given.area)
+    load_record_write(given.out, record)
+    print(f"{given.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,111 @@
+"""Natural modes of a free body, and what kind of motion of a beam each of them is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.sparse import csc_matrix, diags
+from scipy.sparse.linalg import eigsh
+
+from qdem_fem.errors import NotConverged
+from qdem_fem.material import Material
+from qdem_fem.mesh import TetMesh, element_gradients, lumped_mass
+from qdem_fem.mesh_checks import FloatArray
+
+Kind = Literal["vertical", "lateral", "torsion", "axial"]
+RIGID = 6
+"""Motions of a free body without strain."""
+SHIFT = -1.0
+"""Where K - sigma M is inverted, over (2 pi)^2 f^2 of a wave along the body."""
+GAP = 1e-4
+"""Rigid motions have less than this share of the first mode's frequency."""
+SECTIONS = 24
+"""Slices of a beam by which a mode is told."""
+
+
+@dataclass(frozen=True)
+class FreeModes:
+    """Lowest modes with strain of a body that nothing holds."""
+
+    frequency: FloatArray
+    """[Hz], (count,), ascending."""
+    shape: FloatArray
+    """Displacement of the nodes of the mesh, largest component 1, (count, n, 3)."""
+    kind: tuple[Kind, ...]
+
+
+def free_modes(
+    mesh: TetMesh, material: Material, count: int = 8, quadratic: bool = False
+) -> FreeModes:
+    """Modes of K phi = (2 pi f)^2 M phi, without those of a rigid body.
+
+    Linear tetrahedra with QDEM's lumped mass: the frequencies of QDEM on this mesh, for small
+    steps.  ``quadratic``: ten-node tetrahedra with their consistent mass on the same mesh, near
+    those of the shape.  x is the long axis, z up.  One material for the whole body.  K - sigma M
+    with sigma < 0 is factorised, by SuperLU: for up to about 20,000 nodes, of either kind.
+
+    Raises `NotConverged` if six motions without strain are not told apart from the others.
+    """
+    import skfem
+    from skfem.models.elasticity import linear_elasticity
+
+    grid = skfem.MeshTet(mesh.nodes.T.copy(), mesh.elements.T.copy())
+    element = skfem.ElementTetP2() if quadratic else skfem.ElementTetP1()
+    basis = skfem.Basis(grid, skfem.ElementVector(element), intorder=2 if quadratic else 0)
+    stiffness = linear_elasticity(material.lame_first, material.lame_second).assemble(basis)
+    dofs = basis.nodal_dofs
+    if quadratic:
+        from skfem.helpers import dot
+
+        exact = skfem.Basis(grid, skfem.ElementVector(element), intorder=4)
+        form = skfem.BilinearForm(lambda u, v, w: dot(u, v))
+        mass = material.density * form.assemble(exact)
+    else:
+        _, volumes = element_gradients(mesh.nodes, mesh.elements)
+        nodal = lumped_mass(mesh.elements, volumes, material.density, len(mesh.nodes))
+        own = np.empty(stiffness.shape[0])
+        own[dofs] = nodal
+        mass = diags(own)
+    wave = float(np.max(material.wave_speed)) / float(np.ptp(mesh.nodes[:, 0]))
+    value, vector = eigsh(
+        csc_matrix(stiffness), k=count + RIGID, M=csc_matrix(mass), sigma=SHIFT * wave**2
+    )
+    order = np.argsort(value)
+    value, vector = value[order], vector[:, order]
+    if not (abs(value[:RIGID]) < GAP**2 * value[RIGID]).all():
+        raise NotConverged(
+            f"squares of the first frequencies {value[: RIGID + 1].tolist()}: six rigid motions "
+            "do not stand out",
+            where="free_modes",
+            remedy="check that the mesh is one connected body",
+        )
+    shape = vector[:, RIGID:].T[:, dofs].transpose(0, 2, 1)
+    shape = shape / np.abs(shape).max(axis=(1, 2), keepdims=True)
+    frequency = np.sqrt(value[RIGID:]) / 2 / np.pi
+    return FreeModes(frequency, shape, tuple(mode_kind(mesh.nodes, one) for one in shape))
+
+
+def mode_kind(nodes: FloatArray, shape: FloatArray) -> Kind:
+    """The motion of the sections of a beam along x that has most of the mode's square.
+
+    ``nodes`` (n, 3) [m], ``shape`` (n, 3).  In every slice along x the mean of u_z, u_y, u_x over
+    its nodes, and the rotation about x through their middle times its radius of gyration.
+    """
+    edges = np.linspace(nodes[:, 0].min(), nodes[:, 0].max(), SECTIONS + 1)
+    at = np.clip(np.searchsorted(edges, nodes[:, 0], side="right") - 1, 0, SECTIONS - 1)
+    share: dict[Kind, float] = {"vertical": 0.0, "lateral": 0.0, "torsion": 0.0, "axial": 0.0}
+    for one in range(SECTIONS):
+        x, u = nodes[at == one], shape[at == one]
+        if len(x) < 2:  # no section: it neither turns nor weighs much
+            continue
+        mean = u.mean(axis=0)
+        y, z = (x - x.mean(axis=0)).T[1:]
+        gyration = (y**2 + z**2).sum()
+        turn = (y * u[:, 2] - z * u[:, 1]).sum() / gyration
+        share["axial"] += len(x) * mean[0] ** 2
+        share["lateral"] += len(x) * mean[1] ** 2
+        share["vertical"] += len(x) * mean[2] ** 2
+        share["torsion"] += turn**2 * gyration
+    return max(share, key=lambda kind: share[kind])

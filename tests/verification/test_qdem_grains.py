@@ -1,0 +1,363 @@
+"""Shape of closed surfaces, sieve sizes, gradings and random grains against closed forms."""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from qdem_fem.errors import MeshError
+from qdem_fem.grain_form import (
+    LIFT_MOST,
+    RATIO_LEAST,
+    ROUNDNESS_WITHIN,
+    GrainRecipe,
+    corners_apart,
+    grain_random,
+    hull_faces,
+)
+from qdem_fem.grain_grading import BALLAST, EN_13450_A, Grading, passing_of, sizes_drawn
+from qdem_fem.grain_mesh import CORNERS, DIAGONALS, grain_faces, grain_tetrahedra, radius_ratios
+from qdem_fem.grain_set import GrainSet, grains_load, grains_make, grains_save, main
+from qdem_fem.grain_sieve import sieve_size
+from qdem_fem.grain_surface import (
+    edge_angles,
+    faces_quartered,
+    inscribed_sphere,
+    node_areas,
+    polyhedron_integrals,
+    roundness_wadell,
+    sphericity_true,
+    surface_area,
+    surface_edges,
+)
+from qdem_fem.mesh import element_gradients
+from qdem_fem.mesh_checks import FloatArray, IntArray
+from qdem_fem.surface import surface_faces
+
+CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)]) - 0.5
+TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+GOLDEN = (1 + sqrt(5)) / 2
+ICOSAHEDRON = np.array([[0, i, j * GOLDEN] for i in (-1, 1) for j in (-1, 1)]) / sqrt(1 + GOLDEN**2)
+ICOSAHEDRON = np.vstack([np.roll(ICOSAHEDRON, shift, axis=1) for shift in range(3)])
+TURN = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
+
+
+def halved(nodes: FloatArray, faces: IntArray, sphere: bool) -> tuple[FloatArray, IntArray]:
+    """Every face cut into four; new nodes pushed onto the unit sphere where asked."""
+    edges = surface_edges(faces)
+    finer = np.vstack([nodes, nodes[edges.nodes].mean(axis=1)])
+    if sphere:
+        finer /= np.linalg.norm(finer, axis=1)[:, None]
+    return finer, faces_quartered(faces, edges)
+
+
+def sphericity(nodes: FloatArray, faces: IntArray) -> float:
+    return sphericity_true(polyhedron_integrals(nodes, faces).volume, surface_area(nodes, faces))
+
+
+# --- surfaces -----------------------------------------------------------------------------------
+
+
+def test_box_volume_and_inertia_are_exact_wherever_it_lies() -> None:
+    """V = abc; inertia V/12 (b^2 + c^2) along a, turned with the box."""
+    size = np.array([3.0, 2.0, 0.5])
+    nodes = (CUBE * size) @ TURN.T + [10.0, -4.0, 2.0]
+    solid = polyhedron_integrals(nodes, hull_faces(CUBE))
+    expected = size.prod() / 12 * ((size**2).sum() - size**2)
+    assert solid.volume == pytest.approx(size.prod(), rel=1e-13)
+    np.testing.assert_allclose(solid.centroid, [10, -4, 2], rtol=1e-13)
+    np.testing.assert_allclose(TURN.T @ solid.inertia @ TURN, np.diag(expected), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "psi", "inscribed"),
+    [
+        (CUBE, (pi / 6) ** (1 / 3), 0.5),
+        (TETRAHEDRON, (pi / (6 * sqrt(3))) ** (1 / 3), 1 / sqrt(3)),
+    ],
+)  # fmt: skip
+def test_sphericity_and_inscribed_sphere(nodes: FloatArray, psi: float, inscribed: float) -> None:
+    """Closed forms, at any place, size and orientation."""
+    faces = hull_faces(nodes)
+    for size, shift in ((1.0, 0.0), (1e-3, 1.0), (1e3, -5e3)):
+        moved = size * nodes @ TURN.T + shift
+        # relative round-off of coordinates: shift/size in units of 1e-16
+        assert sphericity(moved, faces) == pytest.approx(psi, rel=1e-12)
+        assert inscribed_sphere(moved, faces)[1] == pytest.approx(size * inscribed, rel=1e-11)
+
+
+def test_sphere_has_roundness_and_sphericity_one_in_the_limit() -> None:
+    """Sphericity of an inscribed polyhedron is 1 - O(h^2); its roundness 1 - O(h).
+
+    H^2 - K, zero on a sphere, is O(h^2) here, and the root of it enters the curvature.
+    """
+    nodes, faces = ICOSAHEDRON, hull_faces(ICOSAHEDRON)
+    lacks = []
+    for _ in range(5):
+        lacks.append((1 - sphericity(nodes, faces), 1 - roundness_wadell(nodes, faces)))
+        nodes, faces = halved(nodes, faces, sphere=True)
+    orders = np.log2(np.array(lacks[-2]) / lacks[-1])
+    np.testing.assert_allclose(orders, [2, 1], atol=0.1)
+    assert lacks[-1][1] < 0.02
+    assert node_areas(nodes, faces).sum() == pytest.approx(surface_area(nodes, faces), rel=1e-12)
+
+
+def test_areas_of_nodes_are_positive_with_obtuse_triangles() -> None:
+    """A stretched hull, for some of whose nodes Voronoi regions alone would be negative."""
+    nodes = corners_apart(np.random.default_rng(0), 20) * [6.0, 1.0, 1.0]
+    faces = hull_faces(nodes)
+    areas = node_areas(nodes, faces)
+    assert areas.min() > 0
+    assert areas.sum() == pytest.approx(surface_area(nodes, faces), rel=1e-12)
+
+
+@pytest.mark.parametrize("nodes", [CUBE, TETRAHEDRON], ids=["cube", "tetrahedron"])
+def test_roundness_of_sharp_edges_falls_with_the_mesh_size(nodes: FloatArray) -> None:
+    """Edges are sharp: only the mesh size keeps the radius above zero, in proportion."""
+    faces, rounds = hull_faces(nodes), []
+    for _ in range(5):
+        nodes, faces = halved(nodes, faces, sphere=False)
+        rounds.append(roundness_wadell(nodes, faces))
+    assert rounds[-1] / rounds[-2] == pytest.approx(0.5, abs=0.05)
+    assert rounds[-1] < 0.08
+
+
+def test_rounded_cube_has_the_roundness_of_its_edges() -> None:
+    """A cube of half-width 1 - q with a ball of radius q rolled around it: roundness q.
+
+    Its surface is that of a finely cut cube, each node moved to the nearest point of the rounded
+    one; corners and ridges come within the 10 % that the mesh size leaves.
+    """
+    nodes, faces = 2 * CUBE, hull_faces(CUBE)
+    for _ in range(5):
+        nodes, faces = halved(nodes, faces, sphere=False)
+    for q in (0.6, 0.8):
+        core = np.clip(nodes, -(1 - q), 1 - q)
+        away = nodes - core
+        rounded = core + q * away / np.linalg.norm(away, axis=1)[:, None]
+        assert inscribed_sphere(rounded, faces)[1] == pytest.approx(1, rel=1e-3)
+        assert roundness_wadell(rounded, faces) == pytest.approx(q, rel=0.1)
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 10**6), count=st.integers(6, 30))
+def test_inscribed_sphere_touches_four_planes_and_cuts_none(seed: int, count: int) -> None:
+    """The optimum of the linear programme, by its own conditions."""
+    nodes = corners_apart(np.random.default_rng(seed), count) * [1.5, 1.0, 0.6]
+    faces = hull_faces(nodes)
+    centre, radius = inscribed_sphere(nodes, faces)
+    a, b, c = nodes[faces].transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    distance = np.einsum("fi,fi->f", a - centre, normal) / np.linalg.norm(normal, axis=1)
+    assert distance.min() == pytest.approx(radius, rel=1e-9)
+    assert (distance < radius * (1 + 1e-9)).sum() >= 4
+
+
+# --- sieves and gradings ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("nodes", "size"),
+    [
+        (CUBE, 1.0),
+        (TETRAHEDRON, 2.0),  # edge 2 sqrt(2), over sqrt(2)
+        (CUBE * [3, 2, 1], 2.0),
+        (CUBE * [3, 2, 0.5], 2.5 / sqrt(2)),  # a flat one passes along the diagonal
+        (CUBE * [2, 1.5, 0.2], 1.7 / sqrt(2)),
+    ],
+)
+def test_sieve_size_closed_forms(nodes: FloatArray, size: float) -> None:
+    """To 5e-5, about twice the last random turn of the search."""
+    assert sieve_size(nodes @ TURN.T + 3.0) == pytest.approx(size, rel=5e-5)
+
+
+def test_sieve_size_of_a_sphere_and_scaling() -> None:
+    """A polyhedron with corners on a sphere passes 2 r at most; lengths scale."""
+    nodes = corners_apart(np.random.default_rng(1), 300)
+    size = sieve_size(nodes)
+    assert 1.9 < size <= 2
+    assert sieve_size(0.01 * nodes) == pytest.approx(0.01 * size, rel=1e-6)
+
+
+def test_default_curve_is_within_the_standard() -> None:
+    assert EN_13450_A.kept_by(BALLAST.passing)
+    between = np.diff(BALLAST.passing_at([0.0315, 0.050]))
+    assert between[0] >= 0.5
+
+
+@settings(max_examples=20)
+@given(seed=st.integers(0, 10**6), count=st.integers(300, 3000))
+def test_drawn_sizes_meet_the_curve(seed: int, count: int) -> None:
+    """Of n slices one size each: the mass below a sieve is off by two grains at most.
+
+    The heaviest grain is (63/22.4)^3 = 22 times the lightest; one slice is cut by a sieve, and
+    sizes move within slices.
+    """
+    sizes = sizes_drawn(BALLAST, count, np.random.default_rng(seed))
+    mass = sizes**3
+    got = passing_of(sizes, mass, BALLAST.sieves)
+    assert np.abs(got - BALLAST.passing).max() < 3 * mass.max() / mass.sum()
+
+
+@pytest.mark.parametrize(
+    ("sieves", "passing"),
+    [([0.02], [0.0]), ([0.02, 0.01], [0, 1]), ([0.01, 0.02], [0.1, 1]), ([0.01, 0.02], [0, 0.9]),
+     ([0.01, 0.02, 0.03], [0, 1]), ([0.0, 0.02], [0, 1]), ([0.01, np.nan], [0, 1])],
+)  # fmt: skip
+def test_a_curve_that_is_none_is_refused(sieves: list[float], passing: list[float]) -> None:
+    with pytest.raises(MeshError, match="no grading curve"):
+        Grading(np.array(sieves), np.array(passing))
+
+
+# --- random grains ------------------------------------------------------------------------------
+
+
+@settings(max_examples=12)
+@given(
+    seed=st.integers(0, 10**6),
+    psi=st.floats(0.78, 0.86),
+    roundness=st.floats(0.64, 0.7),
+    dents=st.sampled_from([0.0, 0.0, 0.2]),
+)
+def test_a_grain_is_what_was_asked(seed: int, psi: float, roundness: float, dents: float) -> None:
+    """Sphericity to the last digits, roundness to its tolerance; convex unless dented; no sliver;
+    tetrahedra fill the polyhedron and share its surface."""
+    recipe = GrainRecipe(psi, 0.0, roundness, 0.0, dents)
+    form = grain_random(np.random.default_rng(seed), recipe)
+    corners = int(form.corner_faces.max()) + 1
+    faces = grain_faces(form.corner_faces)
+    surface = form.nodes[: 4 * corners - 6]
+    assert sphericity(surface, faces) == pytest.approx(psi, rel=1e-9)
+    assert roundness_wadell(surface, faces) == pytest.approx(roundness, abs=ROUNDNESS_WITHIN)
+    _, angle = edge_angles(surface, faces, surface_edges(faces))
+    if dents == 0:
+        assert angle.min() > -1e-6
+    assert angle.min() > -0.6  # mild: below 35 degrees
+    mesh = grain_tetrahedra(form.nodes, form.corner_faces)
+    assert len(mesh.elements) == 8 * (2 * corners - 4)
+    assert radius_ratios(mesh.nodes, mesh.elements).min() >= RATIO_LEAST
+    _, volumes = element_gradients(mesh.nodes, mesh.elements)
+    solid = polyhedron_integrals(surface, faces)
+    assert volumes.sum() == pytest.approx(solid.volume, rel=1e-12)
+    np.testing.assert_allclose(solid.centroid, 0, atol=1e-12)
+    outer = {tuple(np.roll(f, -f.argmin())) for f in surface_faces(mesh.elements)}
+    assert outer == {tuple(np.roll(f, -f.argmin())) for f in faces}
+
+
+def test_inertia_of_the_tetrahedra_is_that_of_the_polyhedron() -> None:
+    """integral x x^T = V/20 (sum x_a sum x_a^T + sum x_a x_a^T) for a tetrahedron."""
+    form = grain_random(np.random.default_rng(5), GrainRecipe(concavity=0.2))
+    mesh = grain_tetrahedra(form.nodes, form.corner_faces)
+    _, volumes = element_gradients(mesh.nodes, mesh.elements)
+    x = mesh.nodes[mesh.elements]
+    total = x.sum(axis=1)
+    second = np.einsum("m,mi,mj->ij", volumes, total, total) / 20
+    second += np.einsum("m,mai,maj->ij", volumes, x, x) / 20
+    inertia = np.trace(second) * np.eye(3) - second
+    solid = polyhedron_integrals(form.nodes, grain_faces(form.corner_faces))
+    np.testing.assert_allclose(inertia, solid.inertia, rtol=1e-11, atol=1e-13)
+
+
+def test_radius_ratio_closed_forms() -> None:
+    """1 for a regular tetrahedron; corner of a cube: 3 r/R = 3 (3 - sqrt 3)/6 / (sqrt 3/2)."""
+    nodes = np.vstack([TETRAHEDRON, np.zeros(3), np.eye(3)])
+    ratios = radius_ratios(nodes, np.array([[0, 1, 2, 3], [4, 5, 6, 7]]))
+    np.testing.assert_allclose(ratios, [1, (3 - sqrt(3)) / sqrt(3)], rtol=1e-12)
+
+
+def test_eight_parts_of_a_cone_fill_it_around_each_diagonal() -> None:
+    """Cone over an outward face with its apex inside: right-handed parts of an eighth each."""
+    face, apex = np.array([[0.0, 0, 0], [0, 1, 0], [1, 0, 0]]), np.array([[0.2, 0.3, 1.0]])
+    middles = (face + np.roll(face, -1, axis=0)) / 2
+    nodes = np.vstack([face, middles, (face + apex) / 2, apex])
+    for part in (CORNERS, *DIAGONALS):
+        _, volumes = element_gradients(nodes, part)
+        np.testing.assert_allclose(volumes, 1 / 48, rtol=1e-12)
+
+
+def test_out_of_reach_says_what_was_reached() -> None:
+    recipe = GrainRecipe(roundness=0.98, roundness_scatter=0.0)
+    with pytest.raises(MeshError, match=r"roundness 0\.980 .*reached was roundness 0\."):
+        grain_random(np.random.default_rng(0), recipe)
+    assert LIFT_MOST > 1
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"sphericity": 1.2}, {"roundness": -1.0}, {"concavity": 0.9}, {"corners": (5, 4)},
+     {"sphericity_scatter": -0.1}, {"sphericity": float("nan")}],
+)  # fmt: skip
+def test_a_recipe_of_no_grain_is_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(MeshError, match="no grain has"):
+        GrainRecipe(**wrong)  # type: ignore[arg-type]
+
+
+# --- sets ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def some() -> GrainSet:
+    return grains_make(40, 3)
+
+
+def same(one: GrainSet, other: GrainSet) -> bool:
+    names = ("corners", "nodes", "corner_faces", "sizes", "sphericity", "roundness")
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
+
+
+def test_a_set_is_the_same_for_any_number_of_workers(
+    some: GrainSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Batches of other lengths made in other processes hold the same grains."""
+    monkeypatch.setattr("qdem_fem.grain_set.BATCH", 7)
+    from concurrent.futures import ThreadPoolExecutor
+
+    monkeypatch.setattr(
+        "qdem_fem.grain_set.ProcessPoolExecutor", lambda workers, _: ThreadPoolExecutor(workers)
+    )
+    assert same(grains_make(40, 3, workers=3), some)
+    assert not np.array_equal(grains_make(2, 4).nodes, grains_make(2, 3).nodes)
+
+
+def test_grains_have_the_sizes_that_were_drawn(some: GrainSet) -> None:
+    for grain in (0, 17, 39):
+        nodes, _ = some.parts(grain)
+        assert sieve_size(nodes) == pytest.approx(some.sizes[grain], rel=1e-9)
+        assert len(some.mesh(grain).elements) == some.tetrahedra[grain]
+        assert some.solid(grain).volume > 0
+
+
+def test_saved_and_loaded_to_the_last_digit(some: GrainSet, tmp_path: Path) -> None:
+    path = tmp_path / "grains.npz"
+    grains_save(path, some)
+    assert same(grains_load(path), some)
+    assert path.stat().st_size < 1200 * len(some) + 5000
+
+
+def test_files_that_hold_no_grains_are_refused(some: GrainSet, tmp_path: Path) -> None:
+    path = tmp_path / "grains.npz"
+    grains_save(path, some)
+    whole = path.read_bytes()
+    for content in (whole[: len(whole) // 2], b"", b"solid stone"):
+        path.write_bytes(content)
+        with pytest.raises(MeshError, match="not a set of grains"):
+            grains_load(path)
+    with pytest.raises(MeshError, match="not a set of grains"):
+        grains_load(tmp_path / "none.npz")
+    with path.open("wb") as stream:
+        np.savez(stream, format=1, corners=[8], nodes=np.zeros((3, 3)), corner_faces=np.zeros(3),
+                 shape=np.zeros((3, 1)))  # fmt: skip
+    with pytest.raises(MeshError, match="nodes"):
+        grains_load(path)
+
+
+def test_command_makes_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["--count", "3", "--seed", "3", "--out", str(tmp_path / "g.npz")])
+    assert "3 grains" in capsys.readouterr().out
+    assert len(grains_load(tmp_path / "g.npz")) == 3
