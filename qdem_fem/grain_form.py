@@ -40,6 +40,8 @@ ROUNDNESS_WITHIN = 0.01
 HALVINGS_MOST = 8
 BENT_INWARD = 1e-9
 """Angle between normals below which an edge of a convex grain may not be bent inward [rad]."""
+BENT_MOST = 0.6
+"""Most that an edge of a dented grain may be bent inward [rad]; others are drawn anew."""
 LOWERED = 0.9
 """Factor on the lift of a node whose neighbour's edge is bent inward."""
 DRAWS_MOST = 60
@@ -141,7 +143,7 @@ def grain_random(generator: np.random.Generator, recipe: GrainRecipe) -> GrainFo
     got = f"roundness {min(reached):.2f} to {max(reached):.2f}" if reached else "less sphericity"
     raise MeshError(
         f"none of {DRAWS_MOST} random grains has sphericity {psi:.3f} and roundness "
-        f"{roundness:.3f} without a sliver; reached was {got}",
+        f"{roundness:.3f} without a sliver or a deep dent; reached was {got}",
         where="grain recipe",
         remedy="ask for a roundness well within that range, more sphericity, or other corners",
     )
@@ -240,7 +242,10 @@ class _Drawn:
         return None
 
     def _form(self, surface: FloatArray, psi: float, roundness: float) -> GrainForm | None:
-        """The grain of a solved surface, None where its mesh has a sliver."""
+        """The grain of a solved surface, None where a dent is deep or its mesh has a sliver."""
+        _, angle = edge_angles(surface, self.faces, self.edges)
+        if angle.min() < -BENT_MOST:
+            return None
         turned = surface @ self.turn.T
         inner = apex_and_spokes(turned, self.faces, self.count)
         nodes = np.vstack([turned, inner]) - inner[0]
