@@ -62,10 +62,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--record", type=Path, default=RECORD)
     given = parser.parse_args(arguments)
     done = {(row["run"], tuple(row["jump"]), row["move"]) for row in record_read(given.record)}
-    parts = {"offline": lambda: rows_offline(done), "engine": lambda: rows_engine(given.work, done)}
-    chosen = [given.only] if given.only else list(parts)
+    parts = []
+    if given.only != "engine":
+        parts.append(rows_offline(done))
+    if given.only != "offline":
+        parts.append(rows_engine(given.work, done))
     with interruptible():
-        record_append(chain.from_iterable(parts[name]() for name in chosen), given.record)
+        record_append(chain.from_iterable(parts), given.record)
 
 
 if __name__ == "__main__":

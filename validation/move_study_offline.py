@@ -1,8 +1,8 @@
 """What a jump moves, judged on full runs without an engine: one jump, the same run's own future.
 
 The environment variable TRACKBED_DATA names a folder with ``full_runs/*.npz``, of which
-`jump_without_engine` says what they hold.  Beds are chaotic, so single grains of another run are no truth; the run
-itself is, over one jump, and another member tells how far apart two runs' moves are.
+`jump_without_engine` says what they hold.  Beds are chaotic, so single grains of another run are no
+truth; the run itself is, over one jump, and another member tells how far apart two runs' moves are.
 """
 
 from __future__ import annotations

@@ -56,12 +56,12 @@ def displacement(
 
 
 def upper_fence(length: FloatArray) -> float:
-    """Tukey's upper fence of the logarithms of ``length`` (n,), as a length; 0 if all are 0."""
+    """Tukey's upper fence of the logarithms of ``length`` (n,), at most the longest one."""
     positive = length[length > 0]
     if not len(positive):
         return 0.0
     low, high = np.quantile(np.log(positive), (0.25, 0.75))
-    return float(np.exp(min(high + FENCE * (high - low), np.log(positive.max()))))
+    return float(min(np.exp(high + FENCE * (high - low)), positive.max()))
 
 
 MOVE = Move("robust", displacement)

@@ -85,12 +85,17 @@ def shrinkage(deviation: FloatArray) -> FloatArray:
 
     ``deviation`` [m], shape (b, n, 3), b >= 2: by each part of the window.  s_i^2 is the variance
     within the grain (`moves.move.within_variance`), tau^2 that between grains, by moments: the
-    mean of |mean deviation|^2 / 3 - s_i^2 over the grains, each by 1 / (s_i^2 + median s^2), none
-    below 0.
+    mean over the grains of |mean deviation|^2 / 3 - s_i^2, none below 0.  A grain counts by
+    1 / (e_i + median e) with e_i the mean square of its parts, so that a few loose ones do not
+    rule.  Noise alone of any spread gives 0 in the mean: it knows no direction, and among parts of
+    a given e_i products of different ones cancel.
     """
     variance = within_variance(deviation)
     square = (deviation.mean(axis=0) ** 2).sum(axis=1) / 3
-    between = max(float(np.average(square - variance, weights=grain_weights(deviation))), 0.0)
+    size = (deviation**2).mean(axis=(0, 2))
+    weight = size + np.median(size)
+    weight = np.divide(1.0, weight, out=np.ones_like(weight), where=weight > 0)
+    between = max(float(np.average(square - variance, weights=weight)), 0.0)
     total = between + variance
     return np.divide(between, total, out=np.zeros_like(total), where=total > 0)
 

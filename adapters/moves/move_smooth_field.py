@@ -54,16 +54,18 @@ def displacement(
 def elements(container: Container, place: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Shape functions at ``place`` (n, 3) [m], shape (n, N); nodes (N, 3) [m]; stiffness [m].
 
-    The stiffness (N, N) is that of the integral of |grad u|^2.  As many elements along each axis, so that
-    one has about `GRAINS_PER_ELEMENT` grains.
+    The stiffness (N, N) is that of the integral of |grad u|^2.  As many elements along each axis,
+    so that one has about `GRAINS_PER_ELEMENT` grains.
     """
     from skfem import Basis, BilinearForm, ElementHex1, MeshHex
     from skfem.helpers import dot, grad
 
     low, high = np.minimum(place.min(axis=0), 0.0), place.max(axis=0)
     for axis, length in enumerate((container.size_x, container.size_y)):
-        end = length if container.shape == "box" else container.radius
-        high[axis] = max(end, high[axis])
+        box = container.shape == "box"
+        high[axis] = max(length if box else container.radius, high[axis])
+        if not (box or "xy"[axis] in container.symmetry):
+            low[axis] = min(-container.radius, low[axis])
     high[2] = max(high[2], np.finfo(float).tiny)
     count = max(1, round((len(place) / GRAINS_PER_ELEMENT) ** (1 / 3)))
     ticks = [np.linspace(a, b, count + 1) for a, b in zip(low, high, strict=True)]
