@@ -28,7 +28,7 @@ from validation.settlement_ensemble import COARSE, STEP, piston_stiffness
 Row = dict[str, Any]
 K_I, K, H, AFTER = 60, 40, 40, 10
 """First cycles, fitted cycles, jumped cycles, cycles behind the jump."""
-BEDS = (1, 2, 3, 4, 5, 6)
+BEDS = (1, 2, 3, 4, 5, 6, 7, 8)
 """Seeds of the rain of grains."""
 FULL, TWIN = "every cycle", "every cycle, twin"
 MEASURES = (
@@ -80,7 +80,7 @@ def way_row(work: Path, seed: int, way: str) -> Row:
     scene = scene_moved(seed, way if jumps else "still")
     run = run_in(base.folder.path / way.replace(" ", "-").replace(",", ""), scene)
     run.folder.share_start(base.folder, K_I + K)
-    row: Row = {"part": "engine", "run": f"coarse-{seed}", "jump": [K_I, K, H], "move": way}
+    row: Row = {"run": f"coarse-{seed}", "jump": [K_I, K, H], "move": way}
     row["before"] = cycles_of(run, bed.window, slice(-AFTER, None))
     if jumps:
         moved = jump(run, bed, H, 1)

@@ -151,7 +151,6 @@ def jump_row(
     truth = position[last] - position[first]
     touching = neighbours(position[last], radius, scene.container.walls(after.piston_height))
     return {
-        "part": "offline",
         "run": run.name,
         "jump": list(jump),
         "move": way,
