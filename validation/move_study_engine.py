@@ -1,35 +1,32 @@
-"""What a jump moves, judged by LIGGGHTS: ten cycles after one jump, beside those before it.
+"""What a jump moves, judged by LIGGGHTS: cycles after one jump, beside those before it.
 
-Beds of the kind `coarse` of the settlement ensemble, from the rain on.  Each is computed through a
-window, and from its end on by every cycle (`FULL`), by every cycle with one grain moved by 1e-10 m
-(`TWIN`, chaos' own scatter), and by one jump each way with ten cycles behind it.  A stage that is
-through is kept in the work folder, a way that is through in the record.
+Beds are those of the settlement ensemble.  Each is computed through a window, and from its end on
+by every cycle (`FULL`), by every cycle with one grain moved by 1e-10 m (`TWIN`: chaos' own
+scatter), and by one jump each way with some cycles behind it.  A stage that is through is kept in
+the work folder, a way that is through in the record.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from adapters.engine import engine_named
+from adapters.engine import EngineStart, engine_named
 from adapters.moves import moves_known
 from adapters.progress import Progress
-from adapters.run_folder import RunFolder
+from adapters.run_folder import Outcome, RunFolder
 from adapters.scene import Scene
 from adapters.stages import Bed, Run, Variant, compute, jump, prepare
 from adapters.state import state_load
 from adapters.window import window_load
-from validation.settlement_ensemble import COARSE, STEP, piston_stiffness
+from validation.settlement_ensemble import COARSE, CONFINED, STEP, Kind, Piece, piston_stiffness
+from validation.settlement_ensemble_record import EnsembleRecord
 
 Row = dict[str, Any]
-K_I, K, H, AFTER = 60, 40, 40, 10
-"""First cycles, fitted cycles, jumped cycles, cycles behind the jump."""
-BEDS = (1, 2, 3, 4, 5, 6, 7, 8)
-"""Seeds of the rain of grains."""
 FULL, TWIN = "every cycle", "every cycle, twin"
 MEASURES = (
     "settlement", "coordination_number", "elastic_deflection", "piston_stiffness",
@@ -38,12 +35,41 @@ MEASURES = (
 """What is recorded of each cycle: m, -, m, N/m, m, share of the peak force."""
 
 
-def scene_moved(seed: int, way: str) -> Scene:
-    """The coarse scene of a seed, whose jumps move grains the given way."""
-    scene = COARSE.scene(seed)
-    assert scene.procedure is not None
-    change = {"k_i": K_I, "k": K, "h": (H,), "move": way}
-    return scene.model_copy(update={"procedure": scene.procedure.model_copy(update=change)})
+@dataclass(frozen=True)
+class Judged:
+    """One jump on some beds of a kind of the ensemble."""
+
+    kind: Kind
+    seeds: tuple[int, ...]
+    """Of the rain of grains."""
+    k_i: int
+    k: int
+    h: int
+    after: int
+    """Cycles behind the jump, and before it, that are compared."""
+    ways: tuple[str, ...]
+    stored: bool = False
+    """Whether the bed begins at the ensemble's checkpoint, or with the rain."""
+
+    @property
+    def jump(self) -> tuple[int, int, int]:
+        """k_i, k and h."""
+        return self.k_i, self.k, self.h
+
+    def scene(self, seed: int, way: str) -> Scene:
+        """The scene of a bed, whose jumps move grains the given way."""
+        scene = self.kind.scene(seed)
+        assert scene.procedure is not None
+        change = {"k_i": self.k_i, "k": self.k, "h": (self.h,), "move": way}
+        procedure = scene.procedure.model_copy(update=change)
+        return scene.model_copy(update={"procedure": procedure})
+
+
+SMALL = Judged(COARSE, tuple(range(1, 9)), 60, 40, 40, 10, (FULL, *moves_known(), TWIN))
+PAPER = Judged(
+    CONFINED, (1,), 50, 20, 20, 5, ("still", "smoothed", "shrunk", "per-grain", FULL), stored=True
+)
+JUDGED = (PAPER, SMALL)
 
 
 def run_in(folder: Path, scene: Scene) -> Run:
@@ -51,6 +77,24 @@ def run_in(folder: Path, scene: Scene) -> Run:
     folder.mkdir(parents=True, exist_ok=True)
     engine = engine_named(scene.engine.name)
     return Run(scene, RunFolder(folder), engine, Variant(), Progress(quiet=True))
+
+
+def bed_begun(run: Run, judged: Judged, seed: int) -> Bed:
+    """The bed after k_i cycles: computed, or from the ensemble's checkpoint."""
+    if not judged.stored:
+        return compute(run, prepare(run), judged.k_i)
+    record = EnsembleRecord()
+    kept = record.kept(Piece(judged.kind, seed).name)
+    assert kept is not None
+    assert kept.cycle == judged.k_i
+    if run.folder.outcome("preparation") is None:
+        heights = {"mean_height": kept.mean_height, "density_height": kept.density_height}
+        stage = run.folder.begin("preparation")  # of which a window asks these two heights
+        run.folder.finish(stage, Outcome("preparation", 0, 0, [], {}, notes=heights))
+    restart = run.folder.path / "checkpoint.restart"
+    restart.write_bytes(record.restart(kept))
+    start = EngineStart(restart, kept.checkpoint.time_step, 0, kept.checkpoint.piston_height)
+    return Bed(judged.k_i, start)
 
 
 def cycles_of(run: Run, name: str, rows: slice) -> dict[str, list[float]]:
@@ -66,34 +110,29 @@ def cycles_of(run: Run, name: str, rows: slice) -> dict[str, list[float]]:
     return {measure: [float(row[measure]) for row in table[rows]] for measure in MEASURES}
 
 
-def bed_window(work: Path, seed: int) -> tuple[Run, Bed]:
-    """The run and its state at the window's end, cycle K_I + K."""
-    run = run_in(work / f"bed-{seed}", scene_moved(seed, "still"))
-    bed = compute(run, compute(run, prepare(run), K_I), K)
-    return run, bed
-
-
-def way_row(work: Path, seed: int, way: str) -> Row:
-    """One way from a bed's window on: the ten cycles before, the state at the target, ten after."""
-    base, bed = bed_window(work, seed)
+def way_row(work: Path, judged: Judged, seed: int, way: str) -> Row:
+    """One way from a bed's window on: cycles before, the state at the target, cycles after."""
+    name = f"{judged.kind.name}-{seed}"
+    base = run_in(work / name, judged.scene(seed, "still"))
+    bed = compute(base, bed_begun(base, judged, seed), judged.k)
     jumps = way in moves_known()
-    scene = scene_moved(seed, way if jumps else "still")
+    scene = judged.scene(seed, way if jumps else "still")
     run = run_in(base.folder.path / way.replace(" ", "-").replace(",", ""), scene)
-    run.folder.share_start(base.folder, K_I + K)
-    row: Row = {"run": f"coarse-{seed}", "jump": [K_I, K, H], "move": way}
-    row["before"] = cycles_of(run, bed.window, slice(-AFTER, None))
+    run.folder.share_start(base.folder, bed.cycle)
+    row: Row = {"run": name, "jump": list(judged.jump), "move": way}
+    row["before"] = cycles_of(run, bed.window, slice(-judged.after, None))
     if jumps:
-        moved = jump(run, bed, H, 1)
-        done = compute(run, moved, AFTER, AFTER)
+        moved = jump(run, bed, judged.h, 1)
+        done = compute(run, moved, judged.after, judged.after)
         row["after"] = cycles_of(run, done.window, slice(None))
-        row |= jump_figures(run, f"jump_{K_I + K:06d}_1")
-        cost = stage_cost(run, f"jump_{K_I + K:06d}_1")
-        row["jump_cost_s"] = cost
+        stage = f"jump_{bed.cycle:06d}_1"
+        row |= jump_figures(run, bed.window, stage)
+        cost = row["jump_cost_s"] = stage_cost(run, stage)
     else:
         shift = STEP if way == TWIN else 0.0
         start = replace(bed, start=replace(bed.start, perturbation=shift))
-        done = compute(run, start, H + AFTER)
-        after = cycles_of(run, done.window, slice(H - 1, None))
+        done = compute(run, start, judged.h + judged.after)
+        after = cycles_of(run, done.window, slice(judged.h - 1, None))
         row["start"] = {name: values.pop(0) for name, values in after.items()}
         row["after"] = after
         cost = {}
@@ -102,13 +141,13 @@ def way_row(work: Path, seed: int, way: str) -> Row:
     return row
 
 
-def jump_figures(run: Run, stage: str) -> Row:
+def jump_figures(run: Run, window: str, stage: str) -> Row:
     """State after a jump, bed before and after relaxation, lengths of the grains' moves [m]."""
     outcome = run.folder.outcome(stage)
     assert outcome is not None
     after, relaxation = outcome.rows[0], outcome.notes["relaxation"]
     folder = run.folder.path
-    before = window_load(folder / f"window_{K_I:06d}" / "states.npz").position[-1]
+    before = window_load(folder / window / "states.npz").position[-1]
     move = np.linalg.norm(state_load(folder / stage / "estimated.npz").position - before, axis=1)
     return {
         "start": {name: after[name] for name in MEASURES if name in after},
@@ -127,7 +166,8 @@ def stage_cost(run: Run, stage: str) -> dict[str, float]:
 
 def rows_engine(work: Path, done: set[tuple[Any, ...]]) -> Iterator[Row]:
     """All rows that are not ``done`` (run, jump, way), bed by bed."""
-    for seed in BEDS:
-        for way in (FULL, *moves_known(), TWIN):
-            if (f"coarse-{seed}", (K_I, K, H), way) not in done:
-                yield way_row(work, seed, way)
+    for judged in JUDGED:
+        for seed in judged.seeds:
+            for way in judged.ways:
+                if (f"{judged.kind.name}-{seed}", judged.jump, way) not in done:
+                    yield way_row(work, judged, seed, way)

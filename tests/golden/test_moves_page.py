@@ -1,0 +1,78 @@
+"""docs/moves.md is what its record says, and its sentences hold in the record."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adapters.moves import moves_known
+from validation.move_study import Row, record_read
+from validation.move_study_engine import FULL, JUDGED, PAPER, SMALL, TWIN
+from validation.move_study_page import PAGE, page
+from validation.move_study_reading import (
+    SCALES,
+    beds,
+    cycles,
+    mean_of,
+    offline_rows,
+    rows_of_kind,
+)
+
+
+@pytest.fixture(scope="module")
+def offline() -> list[Row]:
+    return record_read("offline")
+
+
+@pytest.fixture(scope="module")
+def engine() -> list[Row]:
+    return record_read("engine")
+
+
+def test_page_is_made_from_the_record(offline: list[Row], engine: list[Row]) -> None:
+    """Made again, the page is the one that ships; every way is on it."""
+    text = PAGE.read_text(encoding="utf-8")
+    assert page(offline, engine) == text
+    assert "{{" not in text
+    assert all(f"| `{way}` |" in text for way in moves_known())
+
+
+def test_every_way_is_judged_on_the_same_jumps(offline: list[Row], engine: list[Row]) -> None:
+    """The same windows for all; at least four beds a way on the engine; each row once."""
+    keys = [(row["run"], *row["jump"], row["move"]) for row in [*offline, *engine]]
+    assert len(keys) == len(set(keys))
+    for scale in SCALES:
+        windows = {
+            frozenset((row["run"], *row["jump"]) for row in offline_rows(offline, scale, way))
+            for way in moves_known()
+        }
+        assert len(windows) == 1
+    small = rows_of_kind(engine, SMALL.kind.name)
+    counts = {way: len(beds(small, way)) for way in (*moves_known(), FULL, TWIN)}
+    assert len(set(counts.values())) == 1
+    assert min(counts.values()) >= 4
+    assert {row["run"].rpartition("-")[0] for row in engine} == {j.kind.name for j in JUDGED}
+    assert len(rows_of_kind(engine, PAPER.kind.name)) >= 4
+
+
+def test_sentences_about_fields(offline: list[Row]) -> None:
+    """What the page says of the offline part in words."""
+    for scale in SCALES:
+        error = {
+            way: mean_of(offline_rows(offline, scale, way), "field") for way in moves_known()
+        }
+        assert min(error, key=error.__getitem__) == "shrunk"
+        assert error["per-grain"] > 1.3
+        assert 0.9 < error["modes"] / error["per-grain"] < 1
+        for way in moves_known():
+            for row in offline_rows(offline, scale, way):
+                before, after = row["coordination_before"], row["coordination_relaxed"]
+                assert after == pytest.approx(before, rel=0.06)
+
+
+def test_sentences_about_the_first_cycle(engine: list[Row]) -> None:
+    """On the coarse bed the first cycle after a jump settles more than the later ones, any way."""
+    small = rows_of_kind(engine, SMALL.kind.name)
+    for way in moves_known():
+        path = np.mean([cycles(row, "after", "rate") for row in beds(small, way)], axis=0)
+        assert path[0] > 2 * abs(path[1:].mean())
