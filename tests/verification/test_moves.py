@@ -19,7 +19,7 @@ from adapters.moves.move import Move, block_moves, grain_weights, law_moves, wit
 from adapters.moves.move_modes import modal_moves
 from adapters.moves.move_robust import upper_fence
 from adapters.moves.move_shrunk import shrinkage
-from adapters.moves.move_smooth_field import admissible, affine_free, elements
+from adapters.moves.move_smooth_field import admissible, affine_free, elements, smooth_fit
 from adapters.procedure import run_scene, scene_record
 from adapters.progress import Progress
 from adapters.scene_file import scene_load
@@ -258,6 +258,26 @@ def test_stiffness_is_that_of_the_gradient() -> None:
     size = np.ptp(node, axis=0)
     assert node[:, 0] @ stiffness @ node[:, 0] == pytest.approx(float(size.prod()))
     np.testing.assert_allclose(stiffness.sum(axis=1), 0, atol=1e-12 * np.abs(stiffness).max())
+
+
+def test_penalty_is_chosen_by_what_it_predicts() -> None:
+    """Noise over an affine field is smoothed to it; a field that bends is followed.
+
+    2,000 grains on 4 x 4 x 4 elements: the affine fit has 4 freedoms, so noise of 1 leaves an error
+    of (4 / 2000)^(1/2) = .045, all 125 nodes one of .25; the bend's own error comes from elements.
+    """
+    random = np.random.default_rng(3)
+    place = random.uniform(0, 0.03, (2000, 3))
+    place[:, :2] -= 0.015
+    value, node, stiffness = elements(Container("cylinder", radius=0.015), place)
+    free, affine = admissible(Container("cylinder", radius=0.015), node, 0)
+    cost = affine_free(stiffness[np.ix_(free, free)], affine)
+    slope, bend = place @ [40.0, -20.0, 10.0], 2 * np.sin(200 * place[:, 2])
+    noise = random.standard_normal(2000)
+    for truth, bound in ((slope, 0.1), (slope + bend, 0.35)):
+        found = smooth_fit(value[:, free], np.ones(2000), truth + noise, cost, np.arange(2000) % 5)
+        assert np.sqrt(((found - truth) ** 2).mean()) < bound
+    assert np.sqrt((bend**2).mean()) > 1  # what an affine field would miss
 
 
 @pytest.mark.parametrize(
