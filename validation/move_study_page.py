@@ -76,6 +76,36 @@ def offline_table(rows: Sequence[Row]) -> str:
     return table(head, lines)
 
 
+def jumps_table(rows: Sequence[Row]) -> str:
+    """Error of the law's mean and of three fields by length of window and jump."""
+    shown = ("per-grain", "smoothed", "shrunk")
+    head = [
+        "bed", "k", "h", "windows", "settlement in the jump, µm", "error of it: mean", "rms",
+        *(f"`{way}`, relaxed" for way in shown),
+    ]  # fmt: skip
+    lines = []
+    for scale in SCALES:
+        for k, h in sorted({(row["jump"][1], row["jump"][2]) for row in rows}):
+            of_way = {
+                way: [r for r in offline_rows(rows, scale, way) if r["jump"][1:] == [k, h]]
+                for way in shown
+            }
+            law = of_way["shrunk"]
+            if not law:
+                continue
+            errors = np.array([row["mean_error"] for row in law])
+            lines.append(
+                [
+                    scale, str(k), str(h), str(len(law)),
+                    f"{np.mean([row['settlement_um'] for row in law]):.0f}",
+                    f"{100 * errors.mean():+.0f} %",
+                    f"{100 * np.sqrt((errors**2).mean()):.0f} %",
+                    *(f"{mean_of(of_way[way], 'field_relaxed'):.2f}" for way in shown),
+                ]
+            )  # fmt: skip
+    return table(head, lines)
+
+
 def mean_missed(rows: Sequence[Row], scale: str) -> str:
     """Root mean square error of the mean settlement of a jump, any way that keeps the law's."""
     errors = [row["mean_error"] for row in offline_rows(rows, scale, "shrunk")]
@@ -184,6 +214,7 @@ def page(offline: Sequence[Row], engine: Sequence[Row]) -> str:
     parts = {
         "WINDOWS": str(len({(row["run"], *row["jump"]) for row in offline})),
         "OFFLINE": offline_table(offline),
+        "JUMPS": jumps_table(offline),
         "OTHER": OTHER_MEMBER.capitalize(),
         "MEAN_PAPER": mean_missed(offline, "paper scale"),
         "MEAN_SMALL": mean_missed(offline, "small bed"),

@@ -12,6 +12,8 @@ from adapters.state import FloatArray
 
 GRAINS_PER_ELEMENT = 30
 """About so many: their mean has a fifth of the scatter of one grain."""
+ELEMENTS_MOST = 4
+"""Along each axis: more would follow single bursts, and cost."""
 FOLDS = 5
 """Parts of the grains, each predicted from the others, that the penalty is chosen by."""
 PENALTIES = tuple(10.0**exponent for exponent in range(-4, 5))
@@ -55,7 +57,7 @@ def elements(container: Container, place: FloatArray) -> tuple[FloatArray, Float
     """Shape functions at ``place`` (n, 3) [m], shape (n, N); nodes (N, 3) [m]; stiffness [m].
 
     The stiffness (N, N) is that of the integral of |grad u|^2.  As many elements along each axis,
-    so that one has about `GRAINS_PER_ELEMENT` grains.
+    so that one has about `GRAINS_PER_ELEMENT` grains, at most `ELEMENTS_MOST`.
     """
     from skfem import Basis, BilinearForm, ElementHex1, MeshHex
     from skfem.helpers import dot, grad
@@ -67,7 +69,8 @@ def elements(container: Container, place: FloatArray) -> tuple[FloatArray, Float
         if not (box or "xy"[axis] in container.symmetry):
             low[axis] = min(-container.radius, low[axis])
     high[2] = max(high[2], np.finfo(float).tiny)
-    count = max(1, round((len(place) / GRAINS_PER_ELEMENT) ** (1 / 3)))
+    count = round((len(place) / GRAINS_PER_ELEMENT) ** (1 / 3))
+    count = min(max(count, 1), ELEMENTS_MOST)
     ticks = [np.linspace(a, b, count + 1) for a, b in zip(low, high, strict=True)]
     mesh = MeshHex.init_tensor(*ticks)
     basis = Basis(mesh, ElementHex1())
@@ -112,25 +115,28 @@ def smooth_fit(
     ``value`` (n, f), ``weight`` (n,), ``move`` (n,) [m], ``cost`` (f, f); ``fold`` (n,) numbers
     the part each grain is in.
     """
-    scale = np.trace(value.T @ (weight[:, None] * value)) / max(float(np.trace(cost)), 1e-300)
+    parts = [np.flatnonzero(fold == number) for number in np.unique(fold)]
+    weighted = weight[:, None] * value
+    normal = np.stack([value[rows].T @ weighted[rows] for rows in parts])
+    right = np.stack([weighted[rows].T @ move[rows] for rows in parts])
+    scale = np.trace(normal.sum(axis=0)) / max(float(np.trace(cost)), np.finfo(float).tiny)
 
-    def fitted(rows: np.ndarray, penalty: float) -> FloatArray:
-        weighted = weight[rows, None] * value[rows]
-        normal = value[rows].T @ weighted + penalty * scale * cost
-        # minimum norm where an element holds no grain; else the plain solution
-        return np.asarray(
-            value @ (np.linalg.pinv(normal, hermitian=True) @ (weighted.T @ move[rows]))
-        )
+    def nodes(out: int | None, penalty: float) -> FloatArray:
+        """Nodal values from all parts but one; of minimum norm where an element has no grain."""
+        left = normal.sum(axis=0), right.sum(axis=0)
+        matrix, side = left if out is None else (left[0] - normal[out], left[1] - right[out])
+        return np.asarray(np.linalg.pinv(matrix + penalty * scale * cost, hermitian=True) @ side)
 
     def missed(penalty: float) -> float:
-        total = 0.0
-        for part in np.unique(fold):
-            out = fold == part
-            if not out.all():
-                total += float(weight[out] @ (move - fitted(~out, penalty))[out] ** 2)
-        return total
+        """Weighted squares of the parts' errors, each predicted by the others, less a constant."""
+        found = [nodes(out, penalty) for out in range(len(parts))]
+        return sum(
+            float(c @ matrix @ c - 2 * c @ side)
+            for c, matrix, side in zip(found, normal, right, strict=True)
+        )
 
-    return fitted(np.ones(len(move), bool), min(PENALTIES, key=missed))
+    choices = PENALTIES if len(parts) > 1 else PENALTIES[-1:]
+    return np.asarray(value @ nodes(None, min(choices, key=missed)))
 
 
 MOVE = Move("smooth-field", displacement)
