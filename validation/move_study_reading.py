@@ -9,12 +9,18 @@ import numpy as np
 from adapters.state import FloatArray
 from validation.move_study import Row
 from validation.move_study_engine import FULL, TWIN
+from validation.move_study_offline import OTHER_MEMBER
 
 SCALES = {
     "paper scale": ("paper_scale_a", "paper_scale_b"),
     "small bed": ("coarse_bursty",),
 }
 """Runs of the offline part by what they are."""
+ORDER = (
+    "still", "per-grain", "robust", "smoothed", "shrunk", "modes", "smooth-field", "profile",
+    OTHER_MEMBER, FULL, TWIN,
+)  # fmt: skip
+"""Ways as the page lists them, then runs of every cycle."""
 CONTINUES = ("rate", "coordination_number", "elastic_deflection", "piston_stiffness")
 """What is to go on after a jump as it was before."""
 SPREADS = 2.0
@@ -22,11 +28,9 @@ SPREADS = 2.0
 
 
 def ways_of(rows: Iterable[Row]) -> list[str]:
-    """Ways in the order of the record, runs of every cycle last."""
-    found = list(dict.fromkeys(row["move"] for row in rows))
-    return [way for way in found if way not in (FULL, TWIN)] + [
-        way for way in (FULL, TWIN) if way in found
-    ]
+    """Ways of the record in the order of the page."""
+    found = {row["move"] for row in rows}
+    return [way for way in ORDER if way in found]
 
 
 def offline_rows(rows: Sequence[Row], scale: str, way: str) -> list[Row]:

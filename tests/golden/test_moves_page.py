@@ -8,8 +8,10 @@ import pytest
 from adapters.moves import moves_known
 from validation.move_study import Row, record_read
 from validation.move_study_engine import FULL, JUDGED, PAPER, SMALL, TWIN
+from validation.move_study_offline import OTHER_MEMBER
 from validation.move_study_page import PAGE, page
 from validation.move_study_reading import (
+    ORDER,
     SCALES,
     beds,
     cycles,
@@ -35,6 +37,7 @@ def test_page_is_made_from_the_record(offline: list[Row], engine: list[Row]) -> 
     assert page(offline, engine) == text
     assert "{{" not in text
     assert all(f"| `{way}` |" in text for way in moves_known())
+    assert set(ORDER) == {*moves_known(), OTHER_MEMBER, FULL, TWIN}
 
 
 def test_every_way_is_judged_on_the_same_jumps(offline: list[Row], engine: list[Row]) -> None:
