@@ -149,6 +149,7 @@ def jump_row(
     except RelaxationNotConverged as error:
         result = error.best
     truth = position[last] - position[first]
+    relaxed = field_errors(result.position - before.position, truth)
     touching = neighbours(position[last], radius, scene.container.walls(after.piston_height))
     return {
         "run": run.name,
@@ -160,7 +161,8 @@ def jump_row(
         **bed_row(result.estimated, "estimated"),
         **bed_row(result.relaxed, "relaxed"),
         **bed_row(bed_measure(position[last], touching), "true"),
-        "field_relaxed": field_errors(result.position - before.position, truth)["field"],
+        "field_relaxed": relaxed["field"],
+        "median_relaxed": relaxed["median"],
         "relaxed": result.converged,
         "pushed_median": result.median_move,
         "pushed_most": result.largest_move,

@@ -9,7 +9,7 @@ from typing import Any
 from adapters.moves import DEFAULT
 from validation.move_study import Row
 from validation.move_study_offline import OTHER_MEMBER
-from validation.move_study_reading import SCALES, cost_of, mean_of, offline_rows, ways_of
+from validation.move_study_reading import SCALES, cost_of, median_of, offline_rows, ways_of
 
 
 def draw(rows: Sequence[Row], target: Path) -> None:
@@ -35,12 +35,14 @@ def draw_scale(axis: Any, rows: Sequence[Row], scale: str) -> None:
         if not mine or way == OTHER_MEMBER:
             continue
         color = {DEFAULT: "#1b6ca8", "shrunk": "#c8553d"}.get(way, "0.35")
-        cost, before = 1e3 * cost_of(mine), 1e3 * mean_of(mine, "move_s")
-        error, relaxed = mean_of(mine, "field"), mean_of(mine, "field_relaxed")
+        cost, before = 1e3 * cost_of(mine), 1e3 * median_of(mine, "move_s")
+        error, relaxed = median_of(mine, "field"), median_of(mine, "field_relaxed")
         axis.plot([max(before, 0.1), cost], [error, relaxed], "-", color=color, lw=0.8)
         axis.plot(max(before, 0.1), error, "o", mfc="none", color=color, ms=5)
         axis.plot(cost, relaxed, "o", color=color, ms=6)
-        axis.annotate(way, (cost, relaxed), fontsize=7, xytext=(5, 2), textcoords="offset points")
+        axis.annotate(
+            way, (max(before, 0.1), error), fontsize=7, xytext=(-3, 5), textcoords="offset points"
+        )
     axis.axhline(1, color="0.6", lw=0.7, ls=":")
     count = len({(row["run"], *row["jump"]) for row in rows if row["run"] in SCALES[scale]})
     axis.set(xscale="log", xlabel="CPU time of a jump, ms: estimate (hollow), with relaxation")
