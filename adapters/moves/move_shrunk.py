@@ -57,7 +57,7 @@ def displacement(
 
     def taken_apart(move: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         near, even = local @ move, np.zeros_like(move)
-        even[:, 2] = share * (weight * share) @ near[:, 2] / ((weight * share) @ share)
+        even[:, 2] = share * ((weight * share) @ near[:, 2] / ((weight * share) @ share))
         return even, near - even, move - near
 
     even, *deviations = taken_apart(own)

@@ -62,9 +62,8 @@ def test_every_way_is_judged_on_the_same_jumps(offline: list[Row], engine: list[
 def test_sentences_about_fields(offline: list[Row]) -> None:
     """What the page says of the offline part in words."""
     for scale in SCALES:
-        error = {
-            way: median_of(offline_rows(offline, scale, way), "field") for way in moves_known()
-        }
+        rows = {way: offline_rows(offline, scale, way) for way in moves_known()}
+        error = {way: median_of(mine, "field") for way, mine in rows.items()}
         assert min(error, key=error.__getitem__) == "shrunk"
         assert error["per-grain"] > 1.1
         assert 0.9 < error["modes"] / error["per-grain"] < 1
