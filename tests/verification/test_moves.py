@@ -227,7 +227,7 @@ def test_pure_noise_moves_nothing_and_pure_signal_everything() -> None:
 def test_strain_under_noise_is_kept_as_a_strain() -> None:
     """Walks of 1 um a cycle over a compaction of 0.3 um: what is left is the strain, not a shift.
 
-    The line through the moves over height vanishes at the lowest grain, to a tenth of the mean move.
+    The line through moves over height vanishes at the lowest grain, to a tenth of the mean move.
     """
     random = np.random.default_rng(4)
     place = random.uniform(0.002, 0.03, (3000, 3))
