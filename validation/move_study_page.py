@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from adapters.moves import moves_known
 from adapters.run_folder import write_atomically
 from validation.law_page import table
 from validation.move_study import Row, record_read
@@ -198,6 +199,17 @@ def origin(rows: Sequence[Row]) -> str:
     return f"{'; '.join(machines)}; {'; '.join(engines)}; commits {', '.join(commits)}."
 
 
+def first_cycle(rows: Sequence[Row], ways: Sequence[str]) -> str:
+    """Settlement in the first cycle behind the jump [µm]: mean over beds, range over ways."""
+    found = sorted(
+        1e6 * float(np.mean([cycles(row, "after", "rate")[0] for row in mine]))
+        for mine in (beds(rows, way) for way in ways)
+        if mine
+    )
+    low, high = f"{found[0]:.1f}", f"{found[-1]:.1f}"
+    return low if low == high else f"{low} to {high}"
+
+
 def jump_told(judged: Judged) -> str:
     """Window, jump, and cycles behind it."""
     return (
@@ -235,6 +247,9 @@ def page(offline: Sequence[Row], engine: Sequence[Row]) -> str:
         "HEALING_SMALL": healing_table(small),
         "HEALING_PAPER": healing_table(paper),
         "CONTINUES": continues_table(small),
+        "STILL_FIRST": first_cycle(small, ["still"]),
+        "PAPER_STILL": first_cycle(paper, ["still"]),
+        "PAPER_FIRST": first_cycle(paper, [w for w in moves_known() if w != "still"]),
         "ORIGIN": origin([*offline, *engine]),
     }
     text = TEMPLATE.read_text(encoding="utf-8")

@@ -17,7 +17,9 @@ from validation.move_study_reading import (
     cycles,
     median_of,
     offline_rows,
+    over_beds,
     rows_of_kind,
+    way_to_end,
     wins,
 )
 
@@ -80,3 +82,21 @@ def test_sentences_about_the_first_cycle(engine: list[Row]) -> None:
     for way in moves_known():
         path = np.mean([cycles(row, "after", "rate") for row in beds(small, way)], axis=0)
         assert path[0] > 2 * abs(path[1:].mean())
+
+
+def test_sentences_about_ways_that_can_not_be_told_apart(engine: list[Row]) -> None:
+    """On the coarse bed what moves ends within two errors of every other; twins differ by as much.
+
+    At paper scale the rate from the second cycle on is within a half of that before.
+    """
+    small = rows_of_kind(engine, SMALL.kind.name)
+    ends = [over_beds(beds(small, way), way_to_end) for way in moves_known() if way != "still"]
+    for mean, error in ends:
+        for other, its in ends:
+            assert abs(mean - other) < 2 * np.hypot(error, its)
+    for row in rows_of_kind(engine, PAPER.kind.name):
+        before, after = (
+            cycles(row, "before", "rate").mean(),
+            cycles(row, "after", "rate")[1:].mean(),
+        )
+        assert after == pytest.approx(before, rel=0.5)
