@@ -121,6 +121,7 @@ def way_row(work: Path, judged: Judged, seed: int, way: str) -> Row:
     run.folder.share_start(base.folder, bed.cycle)
     row: Row = {"run": name, "jump": list(judged.jump), "move": way}
     row["before"] = cycles_of(run, bed.window, slice(-judged.after, None))
+    row["rise"] = mean_rise(run, bed.window, judged.after)
     if jumps:
         moved = jump(run, bed, judged.h, 1)
         done = compute(run, moved, judged.after, judged.after)
@@ -139,6 +140,12 @@ def way_row(work: Path, judged: Judged, seed: int, way: str) -> Row:
     row["cpu_s"] = sum(cost.values()) + sum(stage_cost(run, done.window).values())
     row["engine"] = run.engine.version()
     return row
+
+
+def mean_rise(run: Run, name: str, cycles: int) -> float:
+    """Mean upward velocity [m/s] of the grains at the ends of the last cycles of a window."""
+    window = window_load(run.folder.path / name / "states.npz")
+    return float(window.velocity[-cycles:, :, 2].mean())
 
 
 def jump_figures(run: Run, window: str, stage: str) -> Row:

@@ -247,6 +247,8 @@ def page(offline: Sequence[Row], engine: Sequence[Row]) -> str:
         "HEALING_SMALL": healing_table(small),
         "HEALING_PAPER": healing_table(paper),
         "CONTINUES": continues_table(small),
+        "SMALL_RISE": f"{1e3 * float(np.mean([row['rise'] for row in small])):.0f}",
+        "PAPER_RISE": f"{1e3 * float(np.mean([row['rise'] for row in paper])):.1f}",
         "STILL_FIRST": first_cycle(small, ["still"]),
         "PAPER_STILL": first_cycle(paper, ["still"]),
         "PAPER_FIRST": first_cycle(paper, [w for w in moves_known() if w != "still"]),
