@@ -191,6 +191,13 @@ def continues_table(rows: Sequence[Row]) -> str:
     return table(["way", *names], lines)
 
 
+def held_share(rows: Sequence[Row], way: str) -> str:
+    """In how many beds all four go on as before."""
+    mine = beds(rows, way)
+    held = sum(all(goes_on(row, name) for name in CONTINUES) for row in mine)
+    return f"{held} of {len(mine)}"
+
+
 def origin(rows: Sequence[Row]) -> str:
     """Machines, engine and commits of the record."""
     machines = sorted({row["machine"] for row in rows})
@@ -247,6 +254,8 @@ def page(offline: Sequence[Row], engine: Sequence[Row]) -> str:
         "HEALING_SMALL": healing_table(small),
         "HEALING_PAPER": healing_table(paper),
         "CONTINUES": continues_table(small),
+        "FULL_HELD": held_share(small, FULL),
+        "TWIN_HELD": held_share(small, TWIN),
         "SMALL_RISE": f"{1e3 * float(np.mean([row['rise'] for row in small])):.0f}",
         "PAPER_RISE": f"{1e3 * float(np.mean([row['rise'] for row in paper])):.1f}",
         "STILL_FIRST": first_cycle(small, ["still"]),
