@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from adapters.errors import UsageError
 from adapters.laws.law import Law
-from adapters.state import FloatArray
+from adapters.state import FloatArray, IntArray
 
 
 def jump_field(
@@ -42,19 +42,43 @@ def jump_field(
     Raises `UsageError` for arguments out of range and positions that are not finite.
     """
     cycle, position = np.asarray(cycle, float), np.asarray(position, float)
-    _check_arguments(position, radius, h, smoothing_radii, clip_quantile)
+    jump_arguments_check(position, radius, h)
+    if not (np.isfinite(smoothing_radii) and smoothing_radii >= 0 and 0 < clip_quantile <= 1):
+        raise UsageError(
+            f"smoothing_radii {smoothing_radii:g} must be >= 0, clip_quantile {clip_quantile:g} "
+            "in (0, 1]"
+        )
     rows = slice(law.first_state, None)
     path = position[rows] - position[0]
     start, end = float(cycle[-1]), float(cycle[-1]) + h
     move = law.increment(law.fit(cycle[rows], path), start, end)
-    mean_path = path[:, :, 2].mean(axis=1)
-    mean_drop = float(law.increment(law.fit(cycle[rows], mean_path), start, end))
     move = clipped(move, clip_quantile)
     if smoothing_radii > 0:
         move = smoothed(position[-1], move, smoothing_radii * np.asarray(radius, float))
-    height = position[-1, :, 2] - position[-1, :, 2].min()
-    share = height / height.mean() if height.any() else np.ones_like(height)
-    move[:, 2] += (mean_drop - move[:, 2].mean()) * share
+    return mean_restored(position[-1], move, mean_drop(cycle, position, law, h))
+
+
+def mean_drop(cycle: FloatArray, position: FloatArray, law: Law, h: float) -> float:
+    """Mean vertical move [m] over ``h`` cycles by the law of the mean path; as `jump_field`."""
+    rows = slice(law.first_state, None)
+    path = (position[rows, :, 2] - position[0, :, 2]).mean(axis=1)
+    start = float(cycle[-1])
+    return float(law.increment(law.fit(cycle[rows], path), start, start + h))
+
+
+def height_share(place: FloatArray) -> FloatArray:
+    """Vertical move of each grain under a uniform strain of mean move 1, shape (n,).
+
+    Heights above the lowest grain of ``place`` (n, 3) [m] over their mean; 1 in a flat layer.
+    """
+    height = place[:, 2] - place[:, 2].min()
+    return np.asarray(height / height.mean() if height.any() else np.ones_like(height))
+
+
+def mean_restored(place: FloatArray, move: FloatArray, drop: float) -> FloatArray:
+    """``move`` (n, 3) [m] with the uniform vertical strain that makes its mean height ``drop``."""
+    move = move.copy()
+    move[:, 2] += (drop - move[:, 2].mean()) * height_share(place)
     return move
 
 
@@ -72,6 +96,18 @@ def smoothed(position: FloatArray, move: FloatArray, reach: FloatArray) -> Float
     Weights 1 - (d / reach)^2 with distances d between ``position`` [m], shape (n, 3); ``reach``
     is each grain's own, shape (n,).
     """
+    grain, neighbour, weight = kernel_pairs(position, reach)
+    total = np.bincount(grain, weight)
+    return np.stack(
+        [np.bincount(grain, weight * move[neighbour, axis]) / total for axis in range(3)], axis=1
+    )
+
+
+def kernel_pairs(position: FloatArray, reach: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Grain, neighbour and weight 1 - (d / reach)^2 of all pairs nearer than the grain's reach.
+
+    ``position`` (n, 3) and ``reach`` (n,) [m]; every grain is a neighbour of itself.
+    """
     reach = np.maximum(reach, np.finfo(float).tiny)  # a reach that underflows is one of no reach
     tree = cKDTree(position)
     near = tree.query_ball_point(position, reach)
@@ -79,20 +115,11 @@ def smoothed(position: FloatArray, move: FloatArray, reach: FloatArray) -> Float
     grain = np.repeat(np.arange(len(near)), count)
     neighbour = np.concatenate(near).astype(int)
     distance = np.linalg.norm(position[grain] - position[neighbour], axis=1)
-    weight = np.maximum(1 - (distance / reach[grain]) ** 2, 0.0)
-    total = np.bincount(grain, weight)
-    return np.stack(
-        [np.bincount(grain, weight * move[neighbour, axis]) / total for axis in range(3)], axis=1
-    )
+    return grain, neighbour, np.maximum(1 - (distance / reach[grain]) ** 2, 0.0)
 
 
-def _check_arguments(
-    position: FloatArray,
-    radius: FloatArray,
-    h: float,
-    smoothing_radii: float,
-    clip_quantile: float,
-) -> None:
+def jump_arguments_check(position: FloatArray, radius: FloatArray, h: float) -> None:
+    """Raise `UsageError` unless these are the states (k+1, n, 3) of n grains and a jump h >= 0."""
     if position.ndim != 3 or position.shape[2] != 3 or np.shape(radius) != position.shape[1:2]:
         raise UsageError(
             f"positions of shape {position.shape} and radii of shape {np.shape(radius)} are not "
@@ -102,8 +129,3 @@ def _check_arguments(
         raise UsageError("there are no grains to move")
     if not (np.isfinite(h) and h >= 0):
         raise UsageError(f"a jump of {h:g} cycles is none", remedy="give h >= 0")
-    if not (np.isfinite(smoothing_radii) and smoothing_radii >= 0 and 0 < clip_quantile <= 1):
-        raise UsageError(
-            f"smoothing_radii {smoothing_radii:g} must be >= 0, clip_quantile {clip_quantile:g} "
-            "in (0, 1]"
-        )

@@ -98,6 +98,6 @@ def _jumps(scene: Scene) -> Iterator[str]:
         return
     yield (
         "The dynamics of jumped cycles: positions follow the law "
-        f"'{scene.procedure.law}', grains restart at rest, and contacts that a jump opens lose "
-        "their tangential springs."
+        f"'{scene.procedure.law}', moved '{scene.procedure.move}', grains restart at rest, and "
+        "contacts that a jump opens lose their tangential springs."
     )

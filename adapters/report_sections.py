@@ -318,7 +318,8 @@ def _fairness(record: Record, numbers: Numbers) -> str:
     procedure = record.scene.procedure
     if procedure is not None and isfinite(numbers.settlement):
         items.append(
-            f"The law “{escape(procedure.law)}”, <i>k</i><sub>i</sub> = {procedure.k_i}, "
+            f"The law “{escape(procedure.law)}”, grains moved “{escape(procedure.move)}”, "
+            f"<i>k</i><sub>i</sub> = {procedure.k_i}, "
             f"<i>k</i> = {procedure.k} and <i>h</i> = {', '.join(map(str, procedure.h))} are one "
             "setting; other settings of the procedure are other points of the plot."
         )

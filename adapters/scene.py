@@ -11,13 +11,22 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from adapters import contact_law
 from adapters.container import Container, sides_needed
 from adapters.engine_names import EngineName
 from adapters.load_series import LoadSeries, load_series_read
+from adapters.moves import DEFAULT as MOVE_DEFAULT
 from adapters.radii import RadiusDistribution, grain_count_expected
 from adapters.scene_checks import COUNT_GREATEST, scene_problems, scene_warnings
 from adapters.state import FloatArray
@@ -193,9 +202,19 @@ class Procedure(Table):
     """Cycles computed after a jump and kept out of the fit."""
     law: str = "log"
     """Law of the residual displacement."""
+    move: str = MOVE_DEFAULT
+    """What a jump moves: a way of `adapters.moves`."""
     relaxation: Literal["smallest-move", "karrech2007", "proximal", "none"] = "smallest-move"
     total_cycles: Count
     """Cycles computed and jumped at the end."""
+
+    @model_serializer(mode="wrap")
+    def _without_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Stored runs are older than the key ``move``: at its default it is left out."""
+        record: dict[str, Any] = whole(self)
+        return {
+            key: value for key, value in record.items() if (key, value) != ("move", MOVE_DEFAULT)
+        }
 
     def jump_cycles(self, jump: int) -> int:
         """Cycles of jump number ``jump`` = 0, 1, ..."""

@@ -217,6 +217,14 @@ def _law(scene: _Values) -> Iterator[Problem]:
         yield Problem("procedure.law", f"unknown law {law!r}{did_you_mean(law, known)}")
 
 
+def _move(scene: _Values) -> Iterator[Problem]:
+    from adapters.moves import moves_known
+
+    move, known = scene.need("procedure.move"), moves_known()
+    if move not in known:
+        yield Problem("procedure.move", f"unknown way {move!r}{did_you_mean(move, known)}")
+
+
 def _rayleigh_time(scene: _Values) -> float:
     grain = "material.grain."
     radii = _radii(scene)
@@ -267,6 +275,7 @@ CHECKS: tuple[Check, ...] = (
     _procedure,
     _launcher,
     _law,
+    _move,
     _time_step,
 )
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from adapters import checks
 from adapters.engine import Engine, EngineRun, EngineStart
-from adapters.jump_field import jump_field
 from adapters.laws import law_named
+from adapters.moves import move_named
 from adapters.overlaps import neighbours
 from adapters.progress import Progress
 from adapters.radii import radii_sample
@@ -217,22 +217,24 @@ def jump(run: Run, bed: Bed, h: int, attempt: int) -> Bed:
 def estimate(run: Run, bed: Bed, h: int) -> tuple[State, FloatArray, float]:
     """State before a jump, estimated positions after it (n, 3) and the piston's height, in metres.
 
-    The piston follows the law of its own heights, so that a loose grain can not lift it; it is
-    never placed above where it is.
+    The grains move as ``procedure.move`` says.  The piston follows the law of its own heights, so
+    that a loose grain can not lift it; it is never placed above where it is.
     """
     procedure = run.scene.procedure
     assert procedure is not None
     with run.clock.part("parse"):
         window = window_load(run.folder.path / bed.window / "states.npz")
     with run.clock.part("fit"):
-        law = law_named(procedure.law)
+        law, move = law_named(procedure.law), move_named(procedure.move)
         cycle = window.cycle[bed.healing :].astype(float)
-        field_ = jump_field(cycle, window.position[bed.healing :], window.radius, law, h)
+        position = window.position[bed.healing :]
+        field_ = move.displacement(cycle, position, window.radius, law, h, run.scene.container)
         heights = window.piston_heights()[bed.healing :]
         parameters = law.fit(cycle[law.first_state :], heights[law.first_state :])
-        drop = float(law.increment(parameters, cycle[-1], cycle[-1] + h)) if h else 0.0
+        drop = float(law.increment(parameters, cycle[-1], cycle[-1] + h))
+        drop = min(drop, 0.0) if h and move.moves_piston else 0.0
     before = window.state(-1)
-    return before, before.position + field_, before.piston_height + min(drop, 0.0)
+    return before, before.position + field_, before.piston_height + drop
 
 
 def relaxed(

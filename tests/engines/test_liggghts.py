@@ -274,15 +274,15 @@ def test_a_lifted_loose_grain_does_not_raise_the_piston(
     before = window_of(folder, SECOND).state(-1)
     loose = np.setdiff1d(before.identifier, before.contacts.pair) - 1
     top = int(loose[np.argmax((before.position[:, 2] + before.radius)[loose])])
-    real = stages.jump_field
+    real = stages.move_named("smoothed")
 
     def thrown(*arguments: object) -> FloatArray:
-        move = real(*arguments)  # type: ignore[arg-type]
+        move = real.displacement(*arguments)  # type: ignore[arg-type]
         above = before.piston_height + lift * before.radius[top]
         move[top, 2] = above - before.radius[top] - before.position[top, 2]
         return move
 
-    monkeypatch.setattr(stages, "jump_field", thrown)
+    monkeypatch.setattr(stages, "move_named", lambda name: replace(real, displacement=thrown))
     bed = stages.jump(going, bed, 4, 1)
     relaxed = bed.start.moved
     assert relaxed is not None

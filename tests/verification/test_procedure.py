@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -83,13 +84,13 @@ def test_healing_cycles_stay_out_of_the_fit(
 ) -> None:
     """The fit after a jump sees k + 1 states, and none of the healing ones."""
     seen: list[np.ndarray] = []
-    real = stages.jump_field
+    real = stages.move_named("smoothed")
 
     def spy(cycle: np.ndarray, *rest: object) -> np.ndarray:
         seen.append(cycle)
-        return real(cycle, *rest)  # type: ignore[arg-type]
+        return real.displacement(cycle, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(stages, "jump_field", spy)
+    monkeypatch.setattr(stages, "move_named", lambda name: replace(real, displacement=spy))
     settle(tmp_path / "run", "procedure.h=10", "procedure.total_cycles=120")
     first, second = seen[:2]
     assert first.tolist() == list(range(20, 41))

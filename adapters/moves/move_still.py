@@ -1,0 +1,30 @@
+"""Nothing moves: the null hypothesis beside which every other way is shown."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.container import Container
+from adapters.jump_field import jump_arguments_check
+from adapters.laws.law import Law
+from adapters.moves.move import Move
+from adapters.state import FloatArray
+
+
+def displacement(
+    cycle: FloatArray,
+    position: FloatArray,
+    radius: FloatArray,
+    law: Law,
+    h: float,
+    container: Container,
+) -> FloatArray:
+    """Zeros [m], shape (n, 3); arguments and errors as `moves.move.Displacement`.
+
+    The cycles are counted as jumped and the bed has not felt them: not for predictions.
+    """
+    jump_arguments_check(position, radius, h)
+    return np.zeros_like(position[-1])
+
+
+MOVE = Move("still", displacement, moves_piston=False)
