@@ -191,8 +191,8 @@ def _fire(way: _Way, x: FloatArray, bound: float) -> FloatArray:
     class Spheres(calculator.Calculator):  # type: ignore[misc]
         implemented_properties = ["energy", "forces"]  # noqa: RUF012  (as ASE asks for it)
 
-        def calculate(self, *words: Any, **more: Any) -> None:
-            super().calculate(*words, **({"system_changes": calculator.all_changes} | more))
+        def calculate(self, *words: Any) -> None:
+            super().calculate(*words)
             energy, gradient = way(self.atoms.positions.ravel())
             self.results = {"energy": energy, "forces": -gradient.reshape(-1, 3)}
 
