@@ -27,7 +27,7 @@ from validation.relaxation_reading import (
     values,
 )
 from validation.relaxation_runs import Row, record_read
-from validation.relaxation_ways import AFTER
+from validation.relaxation_beds import AFTER
 from validation.same_packing import interval
 from validation.same_packing_page import table
 
