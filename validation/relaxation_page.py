@@ -12,6 +12,7 @@ import numpy as np
 
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
+from validation.relaxation_beds import AFTER
 from validation.relaxation_picture import draw
 from validation.relaxation_reading import (
     BED_TITLES,
@@ -27,7 +28,6 @@ from validation.relaxation_reading import (
     values,
 )
 from validation.relaxation_runs import Row, record_read
-from validation.relaxation_beds import AFTER
 from validation.same_packing import interval
 from validation.same_packing_page import table
 
