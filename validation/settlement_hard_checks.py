@@ -22,7 +22,7 @@ from adapters.state import FloatArray
 from adapters.window import Window, window_load
 from validation.case import Check
 
-CLOSEST = np.pi / np.sqrt(18)
+CLOSEST = float(np.pi / np.sqrt(18))
 """Relative density of the closest packing of equal grains, 0.7405."""
 ISOSTATIC, ISOSTATIC_FRICTION = 3.0, 2.0
 """Contacts over grains, each contact counted once, where forces are just as many as equations of

@@ -77,7 +77,10 @@ def judged(case: HardCase, row: Row, ended: Ended | None) -> Row:
             "settlement": [float(f"{value:.5g}") for value in ended.settlement],
             "cycle": [row["cycle"] for row in ended.rows],
         }
-    told = [asdict(check) | {"value": float(f"{check.value:.5g}")} for check in checks]
+    told = [
+        asdict(check) | {"value": float(f"{check.value:.5g}"), "ok": check.holds}
+        for check in checks
+    ]
     return {"figures": figures, "checks": told}
 
 
