@@ -107,14 +107,16 @@ def test_sentences_at_paper_scale(paper: Ways) -> None:
 def test_sentences_about_live_beds(beds: Ways) -> None:
     """First cycles beside the full run's, forces of deep overlaps, and history."""
     assert 2 * len(refused(beds, "estimate")) > len(beds["estimate"])
-    met = gained_met(beds, 0, 1)
-    for way in ("smallest-move", "hertz gradient, carried"):
+    met, first = gained_met(beds, 0, 1), gained(beds, "smallest-move", 0, 1)
+    mean, half = interval(first - met)
+    assert abs(mean) < half
+    for way in ("hertz gradient, carried", "hertz fire, carried"):
         mean, half = interval(gained(beds, way, 0, 1) - met)
-        assert abs(mean) < half
-        assert not refused(beds, way)
-    for way in ("hertz lbfgs", "hertz lbfgs, carried", "hertz fire"):
-        mean, half = interval(gained(beds, way, 0, 1) - met)
+        assert first.mean() < gained(beds, way, 0, 1).mean() < 2 * first.mean()
         assert mean > half
+    for way in ("hertz lbfgs", "hertz lbfgs, carried", "hertz fire"):
+        assert gained(beds, way, 0, 1).mean() > 2 * first.mean()
+    assert not refused(beds, "smallest-move")
     for way in ("karrech2007", "eq29 gradient", "liggghts drag, 1000", "liggghts drag, 10000"):
         assert of_answers(beds, way, "peak_force", 0).mean() > 1.2
         assert gained(beds, way, 0, 1).mean() < -1e-4
