@@ -103,7 +103,7 @@ CASES = (
             "procedure.k_i=4",
             "procedure.k=4",
             "procedure.h=6",
-            "procedure.total_cycles=20",
+            "procedure.total_cycles=22",
         ),
         checks=("settles",),
     ),
