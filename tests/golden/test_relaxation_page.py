@@ -108,14 +108,20 @@ def test_sentences_about_live_beds(beds: Ways) -> None:
     """First cycles beside the full run's, forces of deep overlaps, and history."""
     assert 2 * len(refused(beds, "estimate")) > len(beds["estimate"])
     met, first = gained_met(beds, 0, 1), gained(beds, "smallest-move", 0, 1)
-    mean, half = interval(first - met)
-    assert abs(mean) < half
+    assert np.abs(met).max() < 2e-5
+    greatest = 0.0
     for way in ("hertz gradient, carried", "hertz fire, carried"):
         mean, half = interval(gained(beds, way, 0, 1) - met)
-        assert first.mean() < gained(beds, way, 0, 1).mean() < 2 * first.mean()
         assert mean > half
+        assert np.abs(gained(beds, way, 0, 1)).max() < 5e-5
+        assert np.median(first) < np.median(gained(beds, way, 0, 1))
+        greatest = max(greatest, gained(beds, way, 0, 1).max())
+    assert first.max() > 2 * greatest
+    rival = gained(beds, "hertz gradient, carried", 0, 1).mean()
     for way in ("hertz lbfgs", "hertz lbfgs, carried", "hertz fire"):
-        assert gained(beds, way, 0, 1).mean() > 2 * first.mean()
+        assert gained(beds, way, 0, 1).mean() > 1.5 * rival
+    extra = np.mean([row["coordination_error"] for row in beds["hertz gradient, carried"].values()])
+    assert 0.2 < extra < 0.4
     assert not refused(beds, "smallest-move")
     for way in ("karrech2007", "eq29 gradient", "liggghts drag, 1000", "liggghts drag, 10000"):
         assert of_answers(beds, way, "peak_force", 0).mean() > 1.2
