@@ -28,13 +28,13 @@ def test_page_is_made_from_the_record(rows: list[Row]) -> None:
 
 
 def test_every_case_ends_right_or_is_refused(rows: list[Row]) -> None:
-    """All checks hold, but for the cases that the page calls not right; twenty CPU s at most."""
+    """All checks hold, but for the cases that the page calls not right; codes are README's."""
     failing = {row["name"] for row in rows if not all(check["ok"] for check in row["checks"])}
     assert failing == NOT_RIGHT
     for row in rows:
         case = case_named(row["name"])
         assert row["code"] == case.code
-        assert row["code"] in (0, 3, 5, 6, 7)  # README's table
+        assert row["code"] in (0, 3, 5, 6, 7)
         assert case.says in row["says"]
 
 
