@@ -6,15 +6,13 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
+from adapters.contact_law import OVERLAP_BOUND
 from adapters.errors import EngineFailed, NotCredible
 from adapters.overlaps import neighbours
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
 from adapters.state import State
 from adapters.window import Window
-
-OVERLAP_BOUND = 0.05
-"""Greatest overlap over the smallest radius: Hertz contact is a law of small overlaps."""
 
 FORCE_ERROR_BOUND = 0.25
 """Greatest rms of piston force minus target, over the peak target, from the fourth cycle on."""

@@ -37,6 +37,9 @@ from adapters.state import FloatArray
 DAMPING_FACTOR = sqrt(5 / 6)
 """LIGGGHTS' damping over 2 alpha sqrt(m* S_n), dimensionless."""
 
+OVERLAP_BOUND = 0.05
+"""Greatest overlap over the smallest radius: Hertz contact is a law of small overlaps."""
+
 CONTACT_TIME_FACTOR = 2.943275
 """Contact time of an undamped Hertz collision times speed over greatest overlap, dimensionless."""
 

@@ -28,6 +28,10 @@ stiffness and the damping of the mirrored pair exactly; a finite one is softer."
 PISTON_MARGIN = 1.0
 """By how much the piston's mesh is wider than the container, in greatest radii."""
 
+PISTON_EDGE = 0.02
+"""Least edge of a partial piston's mesh where a mirror cuts it, in its reach: LIGGGHTS refuses a
+triangle with an angle below 0.0045 rad, half the edge in a fan about a corner."""
+
 PARTS_PREPARE = ("in.prepare", "settings.in", "bed.in")
 PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
 
@@ -224,7 +228,8 @@ def piston_stl_write(path: Path, container: Container, reach: float, margin: flo
         angle = np.linspace(0.0, 2 * np.pi, 97)[:-1]
         circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
         floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
-        corners = [tuple(point) for point in convex_clip(circle, floor)]
+        cut = corners_apart(convex_clip(circle, floor), floor, PISTON_EDGE * reach)
+        corners = [tuple(point) for point in cut]
     fan = [[0, i + 1, i] for i in range(1, len(corners) - 1)]
     points = np.column_stack([np.array(corners), np.zeros(len(corners))])
     meshio.Mesh(points, [("triangle", np.array(fan))]).write(path, file_format="stl", binary=False)
@@ -244,3 +249,15 @@ def convex_clip(polygon: FloatArray, floor: list[float]) -> FloatArray:
                 kept.append(a + share * (b - a))
         polygon = np.array(kept)
     return polygon
+
+
+def corners_apart(polygon: FloatArray, floor: list[float], least: float) -> FloatArray:
+    """Corners of a clipped polygon, shape (n, 2) [m], without those near to where it was cut.
+
+    A corner of the polygon itself that is nearer than ``least`` [m] to one on ``floor`` goes.
+    """
+    on_floor = np.any(polygon == np.array(floor), axis=1)
+    if not on_floor.any():
+        return polygon
+    distance = np.linalg.norm(polygon[:, None] - polygon[on_floor], axis=2).min(axis=1)
+    return polygon[on_floor | (distance >= least)]

@@ -215,6 +215,15 @@ def screen_tail(folder: Path, lines: int = 3) -> str:
     return errors[-1] if errors else " | ".join(line.strip() for line in text[-lines:])
 
 
+SAID = {
+    "Lost atoms": "grains left the box, thrown out: a smaller load, a shorter time step, or a "
+    "piston that is not so light (loading.piston_mass)",
+    "Mesh elements have been lost": "the piston left the box, thrown off by the bed: a heavier "
+    "piston (loading.piston_mass), or a smaller load",
+}
+"""What an engine says when the physics of a scene ended it, and what that means."""
+
+
 def engine_failure(status: int, folder: Path) -> EngineFailed:
     """The error for a process that ended badly, with the engine's own words.
 
@@ -226,10 +235,12 @@ def engine_failure(status: int, folder: Path) -> EngineFailed:
         how = f"was ended by {signal.Signals(number).name}"
     else:
         how = f"ended with exit code {status} and no sentinel line"
+    tail = screen_tail(folder)
+    meant = (meaning for words, meaning in SAID.items() if words in tail)
     error = EngineFailed(
-        f"the engine {how}: {screen_tail(folder)}",
+        f"the engine {how}: {tail}",
         where=str(folder),
-        remedy="mend the cause and go on with: trackbed resume RUN",
+        remedy=next(meant, "mend the cause and go on with: trackbed resume RUN"),
     )
     error.from_outside = number in signal.valid_signals() and number not in CRASHES
     return error

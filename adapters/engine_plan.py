@@ -22,6 +22,10 @@ SEAT_SPEED = 0.1
 SEAT_SHARE = 1.0
 """Force that seats the piston, over the peak of the load."""
 
+SEAT_DRAG_SHARE = 0.5
+"""Greatest drag of the seating times the time step over the piston's mass: an explicit step turns
+a drag above 2 into growing oscillations, and one above 1 into oscillations."""
+
 
 @dataclass(frozen=True)
 class SettlePlan:
@@ -71,13 +75,19 @@ def settle_plan(scene: Scene, height: float) -> SettlePlan:
 
 
 def seat_plan(scene: Scene) -> SeatPlan:
-    """Plan of the seating of the piston, in whole cycles."""
+    """Plan of the seating of the piston, in whole cycles.
+
+    A piston that is light for its load is pressed by less than the peak, so that its drag, force
+    over speed, is one that the time step can follow.
+    """
+    assert scene.loading is not None
     steps = scene.steps_per_cycle
     peak = float(scene.stress_at(np.linspace(0, 1, 1001)).max()) * scene.loaded_area
+    followed = SEAT_DRAG_SHARE * scene.loading.piston_mass * SEAT_SPEED / scene.time_step
     press_s = 2 * scene.sample.grain_radius.greatest / SEAT_SPEED
     cycles = ceil(press_s / (steps * scene.time_step))
     return SeatPlan(
-        SEAT_SHARE * peak,
+        min(SEAT_SHARE * peak, followed),
         SEAT_SPEED,
         cycles * steps,
         float(scene.stress_at(0.0)) * scene.loaded_area,

@@ -38,7 +38,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from adapters.contact_law import HertzStiffness, normal_force, overlap_under_force
+from adapters.contact_law import HertzStiffness, overlap_under_force
 from adapters.container import Walls
 from adapters.errors import NotConverged, UsageError
 from adapters.overlaps import (
@@ -47,14 +47,13 @@ from adapters.overlaps import (
     bed_check,
     bed_measure,
     behind_discs,
-    neighbours,
-    rows_at,
     wall_names,
     wall_rows,
 )
 from adapters.relaxation_kernel import BoolArray
 from adapters.relaxation_printed import Energy, energy_minimise
 from adapters.relaxation_smallest import smallest_move
+from adapters.relaxation_surroundings import Surroundings
 from adapters.state import FloatArray, IntArray, State
 
 Method = Literal["smallest-move", "karrech2007", "proximal"]
@@ -119,43 +118,6 @@ class RelaxationNotConverged(NotConverged):
     best: Relaxation
 
 
-@dataclass(frozen=True)
-class _Scene:
-    """What does not change while grains move."""
-
-    radius: FloatArray
-    walls: Walls
-    behind: BoolArray
-    stiffness: HertzStiffness
-
-    def rows(self, position: FloatArray, first: IntArray, second: IntArray) -> Neighbours:
-        return rows_at(position, self.radius, first, second, self.walls, self.behind)
-
-    def search(self, position: FloatArray, gap: float) -> Neighbours:
-        return neighbours(position, self.radius, self.walls, gap, self.behind)
-
-    def taken(self, order: IntArray) -> _Scene:
-        """The same with the grains in another order."""
-        return _Scene(self.radius[order], self.walls, self.behind[order], self.stiffness)
-
-    def row_stiffness(self, rows: Neighbours) -> FloatArray:
-        """lambda = 4/3 E* sqrt(R*) of each row [N/m^1.5]."""
-        modulus_of_wall = np.array(
-            [
-                self.stiffness.mirror if mirror else self.stiffness.wall
-                for mirror in self.walls.plane_frictionless
-            ]
-            + [self.stiffness.wall]
-        )
-        pair = rows.second >= 0
-        other = np.where(pair, self.radius[np.where(pair, rows.second, 0)], np.inf)
-        modulus = np.where(
-            pair, self.stiffness.grain, modulus_of_wall[np.where(pair, 0, -1 - rows.second)]
-        )
-        radius = 1 / (1 / self.radius[rows.first] + 1 / other)
-        return np.asarray(normal_force(1.0, 1.0, radius) * modulus)
-
-
 def relax(
     position: FloatArray,
     before: State,
@@ -204,8 +166,8 @@ def relax(
     if not (len(radius) and gravity > 0 and tolerance > 0):
         raise UsageError("a relaxation wants grains, gravity above 0 and a tolerance above 0")
     behind = behind_discs(before.position, walls)
-    scene_before = _Scene(radius, walls, behind, stiffness)
-    scene = _Scene(radius, after, behind, stiffness)
+    scene_before = Surroundings(radius, walls, behind, stiffness)
+    scene = Surroundings(radius, after, behind, stiffness)
     carried = scene_before.search(before.position, 0.0)
     weight = gravity * before.mass
     if method == "smallest-move":
@@ -310,8 +272,8 @@ def equilibrium_overlap(
 
 
 def _relax_by_move(
-    before: _Scene,
-    after: _Scene,
+    before: Surroundings,
+    after: Surroundings,
     position_before: FloatArray,
     estimate: FloatArray,
     scale: float,
@@ -357,7 +319,7 @@ def _frontier(
 
 
 def _overlap_scale(
-    scene: _Scene, carried: Neighbours, overlap_cap: float, mean_weight: float
+    scene: Surroundings, carried: Neighbours, overlap_cap: float, mean_weight: float
 ) -> float:
     """Mean carried overlap [m]; without any, that of one grain's weight on another."""
     overlap = carried.overlap[carried.overlap <= overlap_cap]
@@ -378,7 +340,7 @@ def _chosen(rows: Neighbours, which: BoolArray, overlap: float | None = None) ->
     return Neighbours(rows.first[which], rows.second[which], rows.normal[which], kept)
 
 
-def _inside(scene: _Scene, position: FloatArray) -> FloatArray:
+def _inside(scene: Surroundings, position: FloatArray) -> FloatArray:
     """Positions [m] where grains with their centre beyond a wall are brought to touch it."""
     start = position.copy()
     for wall in range(len(wall_names(scene.walls))):
@@ -389,14 +351,16 @@ def _inside(scene: _Scene, position: FloatArray) -> FloatArray:
 
 
 def _energy(
-    scene: _Scene, position: FloatArray, touching: Neighbours, state: State, gravity: float
+    scene: Surroundings, position: FloatArray, touching: Neighbours, state: State, gravity: float
 ) -> float:
     """Hertz energy 2/5 lambda delta^(5/2) plus m g z [J]."""
     hertz = 0.4 * scene.row_stiffness(touching) @ touching.overlap**2.5
     return float(hertz + gravity * state.mass @ position[:, 2])
 
 
-def _residual_force(scene: _Scene, touching: Neighbours, state: State, gravity: float) -> float:
+def _residual_force(
+    scene: Surroundings, touching: Neighbours, state: State, gravity: float
+) -> float:
     """Root mean square of the unbalanced force over the grains [N]."""
     force = np.zeros((len(scene.radius), 3))
     force[:, 2] = -gravity * state.mass

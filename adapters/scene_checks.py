@@ -12,7 +12,12 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from adapters.contact_law import rayleigh_time
+from adapters.contact_law import (
+    OVERLAP_BOUND,
+    equivalent_modulus,
+    overlap_under_force,
+    rayleigh_time,
+)
 from adapters.container import Container
 from adapters.errors import SceneError
 from adapters.load_series import load_series_read
@@ -37,6 +42,10 @@ WIDTH_DOUBTFUL = 8
 """Least width of a container, in mean grain diameters, that is free of doubt."""
 STEPS_DOUBTFUL = 100
 """Least number of time steps a cycle that is free of doubt."""
+CHAIN_FACTOR = 10.0
+"""Greatest contact force over the mean one in a bed under load, as in `adapters.relaxation`."""
+JUMP_DOUBTFUL = 10
+"""Cycles of a jump for each cycle fitted, above which noise is extrapolated and not a law."""
 
 
 @dataclass(frozen=True)
@@ -261,6 +270,41 @@ def _fill_height(scene: _Values) -> Iterator[Problem]:
         yield Problem("sample.fill_height", f"{height:g} m would take {count:.3g} grains")
 
 
+def _overlap_share(scene: _Values) -> tuple[str, float, float]:
+    """Key of the load, its greatest stress [Pa], mean overlap under it over the smallest radius.
+
+    A grain of a layer carries the stress on the square that it fills, (2 r)^2.
+    """
+    if scene.need("loading.waveform") == "sine":
+        key = "loading.amplitude"
+        stress = scene.need("loading.mean") + scene.need(key) / 2
+    else:
+        key = "loading.series"
+        try:
+            series = load_series_read(Path(scene.need(key)))
+        except SceneError as error:
+            raise _NotValid from error
+        stress = float(series.stress.max())
+    radii, grain = _radii(scene), "material.grain."
+    if radii.smallest <= 0:
+        raise _NotValid
+    young, poisson = scene.need(grain + "young"), scene.need(grain + "poisson")
+    modulus = equivalent_modulus(young, poisson, young, poisson)
+    overlap = overlap_under_force(stress * (2 * radii.mean) ** 2, modulus, radii.mean / 2)
+    return key, stress, float(overlap) / radii.smallest
+
+
+def _great_load(scene: _Values) -> Iterator[Problem]:
+    key, stress, share = _overlap_share(scene)
+    if share > OVERLAP_BOUND:
+        yield Problem(
+            key,
+            f"a stress of {stress:.3g} Pa presses grains {share:.2g} of the smallest radius into "
+            f"one another; Hertz contact is a law up to {OVERLAP_BOUND:g}: "
+            "a smaller load, or stiffer grains",
+        )
+
+
 CHECKS: tuple[Check, ...] = (
     _alternatives,
     _container,
@@ -277,6 +321,7 @@ CHECKS: tuple[Check, ...] = (
     _law,
     _move,
     _time_step,
+    _great_load,
 )
 
 
@@ -314,7 +359,28 @@ def _few_steps(scene: _Values) -> Iterator[Problem]:
         yield Problem("loading.frequency", f"a cycle is only {steps:.3g} time steps long")
 
 
-DOUBTS: tuple[Check, ...] = (_long_time_step, _narrow, _few_steps)
+def _deep_chains(scene: _Values) -> Iterator[Problem]:
+    key, stress, share = _overlap_share(scene)
+    deepest = CHAIN_FACTOR ** (2 / 3) * share
+    if deepest > OVERLAP_BOUND:
+        yield Problem(
+            key,
+            f"under {stress:.3g} Pa overlaps reach about {deepest:.2g} of the smallest radius in "
+            f"force chains; above {OVERLAP_BOUND:g} a run is refused",
+        )
+
+
+def _far_jump(scene: _Values) -> Iterator[Problem]:
+    h, k = max(scene.need("procedure.h")), scene.need("procedure.k")
+    if h > JUMP_DOUBTFUL * k:
+        yield Problem(
+            "procedure.h",
+            f"a jump of {h} cycles is fitted to {k}: above {JUMP_DOUBTFUL} times as many it "
+            "extrapolates their noise, and the bed may even rise",
+        )
+
+
+DOUBTS: tuple[Check, ...] = (_long_time_step, _narrow, _few_steps, _deep_chains, _far_jump)
 
 
 def scene_problems(values: Mapping[str, Any], invalid: Iterable[str] = ()) -> list[Problem]:

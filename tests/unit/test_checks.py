@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from adapters.checks import (
     FORCE_ERROR_BOUND,
     FORCE_START_CYCLES,
-    OVERLAP_BOUND,
     WindowFigures,
     check_bounds,
     check_complete,
@@ -21,6 +20,7 @@ from adapters.checks import (
     check_window,
     figures_of_window,
 )
+from adapters.contact_law import OVERLAP_BOUND
 from adapters.errors import EngineFailed, NotCredible
 from adapters.sample import GRAVITY
 from adapters.scene import Scene

@@ -246,6 +246,8 @@ def test_scene_built_in_python_is_checked() -> None:
         ("engine.time_step=1.5e-6", "0.56 of the Rayleigh time"),
         ("sample.radius=0.02", "mean grain diameters wide"),
         ("loading.frequency=50000.0", "time steps long"),
+        ("procedure.h=1000", "a jump of 1000 cycles is fitted to 20"),
+        ("material.grain.young=1e8", "in force chains; above 0.05 a run is refused"),
     ],
 )
 def test_doubts_are_warnings(tmp_path: Path, override: str, words: str) -> None:
@@ -285,6 +287,7 @@ REFUSED = [
     ("material.wall.young", "", "missing"),
     ("loading.waveform", 'waveform = "series"', "does not use it"),
     ("loading.amplitude", "", "needs it"),
+    ("loading.mean", "mean = 1e9", "of the smallest radius into one another"),
     ("loading.mean", "mean = 7000.0", "a piston can not pull"),
     ("loading.area_share", "area_share = 1.2", "at most 1"),
     ("loading.piston_mass", "piston_mass = 0", "at least"),

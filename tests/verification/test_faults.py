@@ -653,3 +653,20 @@ def test_library_use_in_a_thread(scene: Path) -> None:
     thread.start()
     thread.join()
     assert failures == []
+
+
+@pytest.mark.parametrize(
+    ("words", "meaning"),
+    [
+        ("ERROR: Lost atoms: original 76 current 76 (./src/thermo.cpp:445)", "grains left the box"),
+        ("ERROR: Mesh (id piston_0): Mesh elements have been lost / left", "the piston left the"),
+        ("ERROR: Cannot open file nothing.in", "trackbed resume"),
+    ],
+)
+def test_what_an_engine_says_is_explained(tmp_path: Path, words: str, meaning: str) -> None:
+    """Where the physics of a scene ended an engine, the remedy is one of physics."""
+    (tmp_path / "screen.txt").write_text(f"Step\n{words}\n")
+    error = engine_failure(1, tmp_path)
+    assert words in str(error)
+    assert meaning in error.remedy
+    assert error.exit_code == 5
