@@ -34,6 +34,7 @@ from adapters.report_html import (
 from adapters.report_numbers import Numbers, variant_name
 from adapters.report_record import Record
 from adapters.report_verdict import FITTED, FULL, NOTHING, PROCEDURE
+from adapters.scene import Procedure
 
 
 def body(record: Record, numbers: Numbers, figures: Figures) -> Iterator[str]:
@@ -298,6 +299,13 @@ def _shown(value: object) -> str:
     return text if len(text) < 80 else text[:77] + "..."
 
 
+def _setting(procedure: Procedure) -> str:
+    """What rules the jumps, in words."""
+    if procedure.h is None:
+        return f"a tolerance of {per_cent(procedure.tolerance or 0.0)} a jump"
+    return f"<i>k</i> = {procedure.k} and <i>h</i> = {', '.join(map(str, procedure.h))}"
+
+
 def _fairness(record: Record, numbers: Numbers) -> str:
     """What the comparison can not show."""
     items = [
@@ -319,7 +327,7 @@ def _fairness(record: Record, numbers: Numbers) -> str:
     if procedure is not None and isfinite(numbers.settlement):
         items.append(
             f"The law “{escape(procedure.law)}”, <i>k</i><sub>i</sub> = {procedure.k_i}, "
-            f"<i>k</i> = {procedure.k} and <i>h</i> = {', '.join(map(str, procedure.h))} are one "
+            f"{_setting(procedure)} are one "
             "setting; other settings of the procedure are other points of the plot."
         )
     return section("Known limits of fairness", bullets(items))

@@ -1,0 +1,237 @@
+"""What computed cycles say of the settlement rate, and how noisy they are.
+
+Increments of neighbouring cycles are alike (a burst lasts), so k cycles count for fewer: what
+counts is the long-run variance S = sum over all lags of the autocovariance, and the mean of k
+increments has the variance S / k.  Lengths in metres, rates in metres a cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, sqrt
+
+import numpy as np
+
+from adapters.residual import cycles_for_error
+from adapters.state import FloatArray
+
+BLOCKS = 4
+"""Parts of a stretch whose mean rates are fitted: enough to see a trend inside of it."""
+LAW_ERROR = 0.02
+"""Share of a block's gain by which no law is better known: forms of laws are made by people."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Cycles computed one after another, healing cycles left out; k of them."""
+
+    first_cycle: int
+    """Cycles done before."""
+    gain: FloatArray
+    """Settlement gained in each cycle [m], shape (k,)."""
+    coordination: FloatArray
+    """Contacts with other grains a grain, at each cycle's end, shape (k,)."""
+    deflection: FloatArray
+    """Rise of the piston on unloading [m], shape (k,)."""
+
+    @property
+    def last_cycle(self) -> int:
+        """Cycles done at its end."""
+        return self.first_cycle + len(self.gain)
+
+    @property
+    def rate(self) -> float:
+        """Mean settlement a cycle [m]."""
+        return float(self.gain.mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """Gains of b blocks of cycles with their variances, each of shape (b,)."""
+
+    start: FloatArray
+    """Cycles done before each block."""
+    end: FloatArray
+    """Cycles done after it."""
+    gain: FloatArray
+    """Settlement gained in it [m]."""
+    variance: FloatArray
+    """Of the gain [m^2]."""
+    freedom: float
+    """Degrees of freedom that the variances are known with."""
+
+    @property
+    def last_cycle(self) -> float:
+        """Cycle that predictions start from."""
+        return float(self.end[-1])
+
+
+def long_run_variance(series: FloatArray) -> float:
+    """S = gamma_0 + 2 sum_l (1 - l / L) gamma_l of a series (k,), its straight trend taken out.
+
+    Bartlett's weights up to L = sqrt(k), which keep S >= 0 (Newey and West 1987); divided by k - 2
+    for the two parameters of the trend.  0 for fewer than 4 values.  Too small by the share of the
+    correlation that reaches further than L.
+    """
+    k = len(series)
+    if k < 4:
+        return 0.0
+    place = np.arange(k) - (k - 1) / 2
+    residual = series - series.mean() - place * (place @ series) / (place @ place)
+    lags = ceil(sqrt(k))
+    total = float(residual @ residual)
+    for lag in range(1, lags):
+        total += 2 * (1 - lag / lags) * float(residual[lag:] @ residual[:-lag])
+    return max(total, 0.0) / (k - 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Noise of the gains of s stretches."""
+
+    variance: FloatArray
+    """Long-run variance S [m^2 a cycle] of each, shape (s,)."""
+    freedom: float
+    """Degrees of freedom that it is known with."""
+
+
+def noise_of(stretches: Sequence[Stretch]) -> Noise:
+    """Long-run variance of the gains about their smooth rate, from all stretches together.
+
+    Alone, a window between two bursts sees none, would look quiet, and be believed too much.  The
+    noise is in proportion to the rate or the same everywhere, whichever makes the gains likelier.
+    Its correlation is that of an autoregression of first order, with what a fitted trend takes out
+    of it put back, (2 + 4 rho) / k; scatter of whole stretches about the trend, where there are four
+    or more, is pooled in by its degrees of freedom.
+    """
+    count = np.array([len(one.gain) for one in stretches])
+    total, ends = int(count.sum()), np.cumsum(count)
+    place = smooth_line(stretches)
+    cycles = np.concatenate([one.first_cycle + 0.5 + np.arange(len(one.gain)) for one in stretches])
+    rate = place.rate(cycles)
+    residual = np.concatenate([one.gain for one in stretches]) - rate
+    if total < 4 or not residual.any():
+        return Noise(np.zeros(len(stretches)), 1.0)
+    scale, standard = np.ones(total), residual
+    if (rate > 0).all():
+        relative = residual / rate
+        gained = np.log(residual @ residual) - np.log(relative @ relative)
+        if gained * total / 2 > np.log(rate).sum():
+            scale, standard = rate, relative
+    variance = float(standard @ standard) / max(total - 2, 1)
+    pairs = standard[1:] * standard[:-1]
+    inside = np.ones(total - 1, bool)
+    inside[ends[:-1] - 1] = False
+    seen = max(float(pairs[inside].mean()) / variance if inside.any() else 0.0, 0.0)
+    correlation = min(seen + (2 + 4 * seen) / total, 0.9)
+    grown = (1 + correlation) / (1 - correlation)
+    freedom = max(total / grown - 2, 1.0)
+    pooled = variance * grown
+    if len(stretches) >= 4:
+        sums = np.add.reduceat(standard, np.append(0, ends[:-1]))
+        between = float((sums**2 / count).sum()) / (len(stretches) - 2)
+        further = len(stretches) - 2
+        pooled = (freedom * pooled + further * between) / (freedom + further)
+    return Noise(pooled * scale[ends - count // 2 - 1] ** 2, freedom)
+
+
+@dataclass(frozen=True)
+class SmoothLine:
+    """w = N du/dN as a straight line in ln N."""
+
+    place: float
+    """Mean ln N."""
+    level: float
+    """w there [m]."""
+    slope: float
+    """Its change a unit of ln N [m]."""
+
+    def rate(self, cycle: FloatArray) -> FloatArray:
+        """du/dN [m a cycle]."""
+        return np.asarray((self.level + self.slope * (np.log(cycle) - self.place)) / cycle)
+
+
+def smooth_line(stretches: Sequence[Stretch]) -> SmoothLine:
+    """Least squares of the stretches' w, weighed by their cycles alone.
+
+    Never by what they gained: a fit that believes quiet blocks more comes out too slow.
+    """
+    count = np.array([len(one.gain) for one in stretches], float)
+    middle = np.array([one.first_cycle + len(one.gain) / 2 for one in stretches])
+    place = np.log(middle)
+    w = np.array([one.rate for one in stretches]) * middle
+    mean = float(count @ place / count.sum())
+    square = float(count @ (place - mean) ** 2)
+    slope = float((count * (place - mean)) @ w) / square if square > 0 else 0.0
+    return SmoothLine(mean, float(count @ w / count.sum()), slope)
+
+
+def rates_of(stretches: Sequence[Stretch]) -> Rates:
+    """Blocks of all stretches: `BLOCKS` each, of two cycles at least."""
+    start, end, gain, variance = [], [], [], []
+    noise, line = noise_of(stretches), smooth_line(stretches)
+    for one, own in zip(stretches, noise.variance, strict=True):
+        edges = np.linspace(0, len(one.gain), min(BLOCKS, max(1, len(one.gain) // 2)) + 1)
+        edges = np.round(edges).astype(int)
+        count = np.diff(edges)
+        start.append(one.first_cycle + edges[:-1])
+        end.append(one.first_cycle + edges[1:])
+        gain.append(np.add.reduceat(one.gain, edges[:-1]))
+        smooth = line.rate(one.first_cycle + 0.5 * (edges[1:] + edges[:-1])) * count
+        variance.append(own * count + (LAW_ERROR * smooth) ** 2)
+    joined = [np.concatenate(part).astype(float) for part in (start, end, gain, variance)]
+    return Rates(*joined, freedom=max(noise.freedom, 3.0))
+
+
+def slope_trend(rates: Rates, blocks: int = 3 * BLOCKS) -> tuple[float, float]:
+    """Trend g = dw / d ln N of w = N du/dN over the last blocks, and its standard error [m].
+
+    The logarithm has w constant, so g is the slope change of Cojocaru and Karlsson (2006) by which
+    a jump errs; a weighted straight line instead of three single slopes.  (0, 0) where one block,
+    or a bed without motion, has no trend.
+    """
+    last = slice(-blocks, None)
+    start, end = rates.start[last], rates.end[last]
+    span = np.log(end / start)
+    if len(span) < 2:
+        return 0.0, 0.0
+    place, w = 0.5 * np.log(start * end), rates.gain[last] / span
+    weight = span**2 / np.maximum(rates.variance[last], np.finfo(float).tiny)
+    weight = weight / weight.max()
+    mean = weight @ place / weight.sum()
+    square = weight @ (place - mean) ** 2
+    slope = float(weight @ ((place - mean) * w) / square)
+    variances = rates.variance[last] / span**2
+    return slope, sqrt(float((weight * (place - mean)) ** 2 @ variances)) / float(square)
+
+
+def state_trend(stretches: Sequence[Stretch], name: str) -> tuple[float, float, float]:
+    """Mean of ``coordination`` or ``deflection``, its trend a unit of ln N, the standard error."""
+    values = [getattr(one, name) for one in stretches]
+    known = np.isfinite(np.concatenate(values))
+    every = np.concatenate(values)[known]
+    if len(every) < 4:
+        return 0.0, 0.0, 0.0
+    cycles = np.concatenate([one.first_cycle + 1 + np.arange(len(one.gain)) for one in stretches])
+    place = np.log(cycles[known])
+    place = place - place.mean()
+    square = float(place @ place)
+    slope = float(place @ every) / square
+    noise = long_run_variance(every - slope * place)
+    return float(every.mean()), slope, sqrt(noise / square)
+
+
+def cycles_bound(stretch: Stretch, error: float, probability: float) -> int | None:
+    """Cycles k of the paper's bound (eq. 15) that keep the mean increment within ``error`` [m].
+
+    For independent increments in the range seen; None where ``error`` is not positive or the bound
+    gives no number.  The controller does not use it: it is told beside k.
+    """
+    from adapters.errors import UsageError
+
+    try:
+        low, high = float(stretch.gain.min()), float(stretch.gain.max())
+        return cycles_for_error(low, high, error, 1 - probability)
+    except UsageError:
+        return None
