@@ -16,13 +16,14 @@ jumps add up is told by `adapters.jump_band`.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp, hypot, inf, log, sqrt
+from math import exp, inf
 
 import numpy as np
 from scipy.special import stdtrit
 
+from adapters.fit_candidates import BoolArray
 from adapters.fit_regime import WHY_NOT
-from adapters.jump_forecast import Forecast, forecast_of, gain_between, laws_gain
+from adapters.jump_forecast import Forecast, forecast_of, laws_gain
 from adapters.jump_rates import (
     Stretch,
     cycles_bound,
@@ -46,14 +47,10 @@ STATE_CHANGE = 0.05
 """Greatest change of coordination number or elastic deflection that a jump may pass over."""
 SAFETY = 0.9
 """Share of the tolerance that is aimed at."""
-ROLL_BACK = 2.0
-"""Realised error over the tolerance from which a jump is taken back."""
-CHANGED = 3.5
-"""Standard errors between a rate and its forecast from which the past is forgotten."""
 MEMORY = 10.0
 """Stretches that ended before N / 10 are forgotten: what a law of one exponent can span."""
-LEAST_ERROR = 0.01
-"""Realised error over the tolerance below which it counts as this much."""
+STATES = ("coordination", "deflection")
+"""Columns of a `Stretch` that a jump leaves as they are, and that are compared behind it."""
 ATTEMPTS = 4
 """Jumps tried from one state; then cycles are computed before the next."""
 
@@ -127,35 +124,6 @@ class Decision:
     why: str = ""
 
 
-@dataclass(frozen=True)
-class Check:
-    """A jump compared with the cycles computed behind it; in metres unless said otherwise."""
-
-    accepted: bool
-    gained: float
-    """Settlement of the bed from the jump's start to the end of its healing cycles."""
-    expected: float
-    """The same by the rates computed on both sides: the corrected gain."""
-    noise: float
-    """Standard error of ``expected`` from the noise of the rates."""
-    form: float
-    """Standard deviation of ``expected`` from the unknown exponent."""
-    error: float
-    """``gained`` less ``expected``, over the total settlement."""
-    rate_expected: float
-    """Rate forecast for the window [m a cycle]."""
-    rate_observed: float
-    deviation: float
-    """Their difference in standard errors."""
-    noise_rate: float
-    """Long-run variance of the gains [m^2 a cycle]."""
-    changed: bool
-    """The rate is another than forecast, beyond noise."""
-    state_misses: tuple[tuple[str, float, float], ...] = ()
-    """Coordination number and elastic deflection: relative change against the forecast, and its
-    standard error."""
-
-
 def begin(cycle: int, settlement: float) -> Control:
     """The state after the first k_i cycles, which are not fitted."""
     return Control(cycle, settlement)
@@ -166,8 +134,8 @@ def observe(control: Control, stretch: Stretch, settlement: float) -> Control:
 
     Errors observed count less the longer ago they are: their limit doubles with every window.
     """
-    known = _joined(control.stretches, stretch)
-    cycles, curve = _curve(stretch, settlement)
+    known = joined(control.stretches, stretch)
+    cycles, curve = curve_of(stretch, settlement)
     return replace(
         control,
         cycle=stretch.last_cycle,
@@ -181,7 +149,7 @@ def observe(control: Control, stretch: Stretch, settlement: float) -> Control:
     )
 
 
-def _joined(stretches: tuple[Stretch, ...], new: Stretch) -> tuple[Stretch, ...]:
+def joined(stretches: tuple[Stretch, ...], new: Stretch) -> tuple[Stretch, ...]:
     """Memory with a new stretch; windows that follow one another become one stretch."""
     if stretches and stretches[-1].last_cycle == new.first_cycle:
         last = stretches[-1]
@@ -194,13 +162,10 @@ def _joined(stretches: tuple[Stretch, ...], new: Stretch) -> tuple[Stretch, ...]
     return (*kept, new)
 
 
-def _curve(stretch: Stretch, settlement: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def curve_of(stretch: Stretch, settlement: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     cycles = stretch.first_cycle + 1.0 + np.arange(len(stretch.gain))
     values = settlement - stretch.gain.sum() + np.cumsum(stretch.gain)
     return tuple(cycles.tolist()), tuple(values.tolist())
-
-
-# --- the decision ---------------------------------------------------------------------------
 
 
 def decide(control: Control, settings: Settings) -> Decision:
@@ -279,7 +244,8 @@ def limits_of(
       counts: a noisy slope is no curvature.
     - *noise*, *laws*: half-width of the gain from the noise of the rates, and from the exponent
       and the slow laws' spread; both together within the tolerance.  The limit is told under the
-      name of the greater part.
+      name of the greater part.  And a rate that noise hides, so that its sign is not known, is not
+      extrapolated, for many such jumps would add up; unless all cycles left come to too little.
     - *state*: coordination number and elastic deflection change by their trend, beyond its
       standard error, no more than `STATE_CHANGE`.
     - *observed*: by the errors of the jumps before, see `accept` and `reject`.
@@ -294,21 +260,22 @@ def limits_of(
     missed = 0.5 * curvature * np.log1p(grid / here) ** 2
     noise, law = widths
     both = np.hypot(noise, law)
-    last = _longest(grid, both <= allowed)
+    idle = noise[-1] <= allowed[-1]
+    last = _longest(grid, (both <= allowed) & ((noise <= gains) | idle))
     place = min(int(np.searchsorted(grid, max(last, 1.0))), len(grid) - 1)
     name = "noise" if noise[place] >= law[place] else "laws"
     first = control.last_jump == 0
     return {
         "slope": _longest(grid, missed <= allowed),
         name: last,
-        "state": min(_state_limit(control, name) for name in ("coordination", "deflection")),
+        "state": min(_state_limit(control, name) for name in STATES),
         "observed": control.longest,
         "growth": float(control.window) if first else GROWTH * control.last_jump,
         "reach": here * (REACH - 1),
     }
 
 
-def _longest(grid: FloatArray, held: FloatArray) -> float:
+def _longest(grid: FloatArray, held: BoolArray) -> float:
     """Last of the ``grid`` up to which all are ``held``; infinite where all are, 0 where none."""
     if held.all():
         return inf
@@ -366,121 +333,3 @@ def window_of(
         return min(2 * control.window, LONGEST_WINDOW)
     gained = np.where(pays, 1 + np.minimum(jumps, 1e9) / (sizes + settings.healing), 0.0)
     return int(sizes[int(np.argmax(gained))])
-
-
-# --- the check ------------------------------------------------------------------------------
-
-
-def judge(
-    control: Control, decision: Decision, settings: Settings, stretch: Stretch, settlement: float
-) -> Check:
-    """Compare a jump with the window behind it.
-
-    ``stretch``: the window's cycles behind the healing ones; ``settlement`` [m] at its end.  The
-    gain that is expected is that of all rates on both sides; where the window's rate is another
-    than the forecast, beyond noise, that of a power law through the two rates.
-    """
-    before = forecast_of(rates_of(control.stretches))
-    start, end = float(control.cycle), float(stretch.first_cycle)
-    joined = (*control.stretches, stretch)
-    noise_rate = float(noise_of(joined).variance[-1])
-    k = len(stretch.gain)
-    rate_expected = float(before.gain(end, float(stretch.last_cycle))) / k
-    known = np.array(before.half_widths(end, float(stretch.last_cycle), PROBABILITY)) / k
-    student = float(stdtrit(before.freedom, (1 + PROBABILITY) / 2))
-    error = sqrt(noise_rate / k + float((known / student) @ (known / student)))
-    difference = stretch.rate - rate_expected
-    deviation = difference / error if error > 0 else (inf if difference else 0.0)
-    changed = abs(deviation) > CHANGED
-    both = forecast_of(rates_of(joined))
-    widths = both.half_widths(start, end, PROBABILITY)
-    student = float(stdtrit(both.freedom, (1 + PROBABILITY) / 2))
-    noise, form = (float(width) / student for width in widths)
-    expected = float(both.gain(start, end))
-    if changed:
-        rate = float(before.rate @ before.weight)
-        expected = gain_between(rate, stretch.rate, start, end)
-        sides = float(before.weight @ before.error**2), noise_rate / k
-        noise = 0.5 * log(end / start) * sqrt(sides[0] * start**2 + sides[1] * end**2)
-        form = abs(expected - 0.5 * (end - start) * (rate + stretch.rate)) / 2
-    gained = settlement - float(stretch.gain.sum()) - control.settlement
-    total = abs(control.settlement + gained)
-    error = gained - expected
-    relative = error / total if total > 0 else (inf if error else 0.0)
-    return Check(
-        accepted=abs(relative) <= ROLL_BACK * settings.tolerance,
-        gained=gained,
-        expected=expected,
-        noise=noise,
-        form=form,
-        error=relative,
-        rate_expected=rate_expected,
-        rate_observed=stretch.rate,
-        deviation=deviation,
-        noise_rate=noise_rate,
-        changed=changed,
-        state_misses=tuple(_state_miss(control, stretch, name) for name in STATES),
-    )
-
-
-STATES = ("coordination", "deflection")
-"""Columns of a `Stretch` that a jump leaves as they are, and that are compared behind it."""
-
-
-def _state_miss(control: Control, stretch: Stretch, name: str) -> tuple[str, float, float]:
-    mean, slope, error = state_trend(control.stretches, name)
-    values = getattr(stretch, name)
-    if mean == 0 or not np.isfinite(values).all():
-        return name, 0.0, 0.0
-    cycles = [one.first_cycle + 1 + np.arange(len(one.gain)) for one in control.stretches]
-    centre = float(np.log(np.concatenate(cycles)).mean())
-    ahead = log(stretch.first_cycle + len(values) / 2) - centre
-    expected = mean + slope * ahead
-    return name, (float(values.mean()) - expected) / abs(mean), error * abs(ahead) / abs(mean)
-
-
-def accept(
-    control: Control,
-    decision: Decision,
-    check: Check,
-    settings: Settings,
-    stretch: Stretch,
-    settlement: float,
-) -> Control:
-    """The state after a jump that stands.
-
-    The next one may be longer by a step-size controller's factor (proportional and integral),
-    0.9 (tol / e)^(0.7/2) (e_last / tol)^(0.4/2), between 1/5 and `GROWTH`, where e is what the
-    realised error exceeds its own standard error by.  Where the rate changed, the past is forgotten.
-    """
-    total = abs(control.settlement + check.gained)
-    certain = abs(check.error) * total - hypot(check.noise, check.form) if total else 0.0
-    error = max(certain / (settings.tolerance * total) if total else 0.0, LEAST_ERROR)
-    factor = SAFETY * error**-0.35 * control.last_error**0.2
-    cycles, curve = _curve(stretch, settlement)
-    before = () if check.changed else control.stretches
-    past = ((), ()) if check.changed else (control.curve_cycle, control.curve_settlement)
-    return replace(
-        control,
-        cycle=stretch.last_cycle,
-        settlement=settlement,
-        stretches=_joined(before, stretch),
-        curve_cycle=past[0] + cycles,
-        curve_settlement=past[1] + curve,
-        last_jump=decision.jump,
-        longest=decision.jump * min(max(factor, 0.2), GROWTH),
-        last_error=error,
-        attempts=0,
-        window=len(stretch.gain),
-    )
-
-
-def reject(control: Control, decision: Decision, error: float, settings: Settings) -> Control:
-    """The state before a jump that was taken back: the next one is shorter.
-
-    By 0.9 (tol / e)^(1/2), between 1/10 and 1/2; ``error`` is the realised one, not a number where
-    the jump failed otherwise.
-    """
-    ratio = settings.tolerance / abs(error) if np.isfinite(error) and error else 0.0
-    factor = min(max(SAFETY * sqrt(ratio), 0.1), 0.5) if ratio else 0.5
-    return replace(control, longest=decision.jump * factor, attempts=control.attempts + 1)

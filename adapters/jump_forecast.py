@@ -8,9 +8,8 @@ not enter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log
+from math import log, sqrt
 
 import numpy as np
 from scipy.special import stdtrit
@@ -26,7 +25,7 @@ from adapters.fit_regime import (
     STEADY,
     Regime,
 )
-from adapters.jump_rates import Rates
+from adapters.jump_rates import Rates, spans
 from adapters.state import FloatArray
 
 
@@ -43,11 +42,20 @@ class Forecast:
     weight: FloatArray
     freedom: float
     """Degrees of freedom of the errors."""
+    influence: FloatArray
+    """Derivative of A by the gain of each block, shape (b, g)."""
 
     def gain(self, start: float, end: float | FloatArray) -> FloatArray:
-        """Mean gain from cycle ``start`` to ``end`` [m]; never negative, as a bed settles."""
+        """Mean gain from cycle ``start`` to ``end`` [m].
+
+        Negative where the bed rose: cut at zero, noise would settle a bed that is at rest.
+        """
+        return np.asarray(spans(self.last_cycle, start, end) @ (self.weight * self.rate))
+
+    def shares(self, start: float, end: float) -> FloatArray:
+        """Derivative of that gain by the gain of each block it was fitted to, shape (b,)."""
         span = spans(self.last_cycle, start, end)
-        return np.maximum(span @ (self.weight * self.rate), 0.0)
+        return np.asarray(self.influence @ (self.weight * span))
 
     def half_widths(
         self, start: float, end: float | FloatArray, probability: float
@@ -72,7 +80,7 @@ class Forecast:
         growing = float(self.weight[EXPONENTS > 1].sum())
         bounded = float(self.weight[EXPONENTS < -1e-9].sum())
         mean = float(self.weight @ EXPONENTS)
-        deviation = float(np.sqrt(max(self.weight @ EXPONENTS**2 - mean**2, 0.0)))
+        deviation = sqrt(max(float(self.weight @ EXPONENTS**2) - mean**2, 0.0))
         still = not self.rate.any()
         if growing > CERTAIN and not still:
             name = COLLAPSE
@@ -81,15 +89,6 @@ class Forecast:
         else:
             name = SHAKEDOWN if bounded > CERTAIN or still else STEADY
         return Regime(name, mean, deviation, bounded)
-
-
-def spans(scale: float, start: float | FloatArray, end: float | FloatArray) -> FloatArray:
-    """phi_beta = integral of (N / scale)^(beta - 1) dN, shape (..., g); ``start`` above 0."""
-    low = np.log(np.asarray(start, float) / scale)[..., None]
-    high = np.log(np.asarray(end, float) / scale)[..., None]
-    safe = np.where(np.abs(EXPONENTS) < 1e-9, 1.0, EXPONENTS)
-    power = np.exp(safe * low) * np.expm1(safe * (high - low)) / safe
-    return np.asarray(scale * np.where(np.abs(EXPONENTS) < 1e-9, high - low, power))
 
 
 def forecast_of(rates: Rates, from_cycle: float | None = None) -> Forecast:
@@ -103,18 +102,21 @@ def forecast_of(rates: Rates, from_cycle: float | None = None) -> Forecast:
     prior = 1 / (1 + (EXPONENTS / PRIOR) ** 2)
     if not rates.gain.any() and not rates.variance.any():
         still = np.zeros_like(EXPONENTS)
-        return Forecast(last, still, still, prior / prior.sum(), rates.freedom)
+        none = np.zeros((len(rates.gain), len(EXPONENTS)))
+        return Forecast(last, still, still, prior / prior.sum(), rates.freedom, none)
     weight = 1 / np.maximum(rates.variance, np.finfo(float).eps * rates.variance.max())[:, None]
     information = (span**2 * weight).sum(axis=0)
     rate = (span * rates.gain[:, None] * weight).sum(axis=0) / information
     missed = ((rates.gain[:, None] - span * rate) ** 2 * weight).sum(axis=0)
     missed = missed - missed.min()
     likely = (1 + missed / rates.freedom) ** (-(rates.freedom + 1) / 2) * prior
-    return Forecast(last, rate, information**-0.5, likely / likely.sum(), rates.freedom)
+    influence = span * weight / information
+    weights = likely / likely.sum()
+    return Forecast(last, rate, information**-0.5, weights, rates.freedom, influence)
 
 
 def laws_gain(
-    cycle: FloatArray, settlement: FloatArray, ends: Sequence[float], probability: float
+    cycle: FloatArray, settlement: FloatArray, ends: FloatArray, probability: float
 ) -> tuple[FloatArray, FloatArray]:
     """Lowest and highest gain that the slow laws give to each of e ``ends``, shape (e,) [m].
 
@@ -126,7 +128,7 @@ def laws_gain(
         return -wide, wide
     few, means = thinned(cycle, settlement[:, None])
     with np.errstate(over="ignore", invalid="ignore"):
-        found = increments(few, means, np.asarray(ends, float))
+        found = increments(few, means, ends)
     every = np.stack([gains[:, 0] for gains in found.values()])
     outer = (1 - probability) / 2, (1 + probability) / 2
     low, high = np.nanquantile(np.where(np.isfinite(every), every, np.nan), outer, axis=0)

@@ -13,6 +13,8 @@ from math import ceil, sqrt
 
 import numpy as np
 
+from adapters.errors import UsageError
+from adapters.fit_regime import EXPONENTS
 from adapters.residual import cycles_for_error
 from adapters.state import FloatArray
 
@@ -102,14 +104,14 @@ def noise_of(stretches: Sequence[Stretch]) -> Noise:
     Alone, a window between two bursts sees none, would look quiet, and be believed too much.  The
     noise is in proportion to the rate or the same everywhere, whichever makes the gains likelier.
     Its correlation is that of an autoregression of first order, with what a fitted trend takes out
-    of it put back, (2 + 4 rho) / k; scatter of whole stretches about the trend, where there are four
-    or more, is pooled in by its degrees of freedom.
+    of it put back, (2 + 4 rho) / k; scatter of whole stretches about the trend, where there are
+    four or more, is pooled in by its degrees of freedom.
     """
     count = np.array([len(one.gain) for one in stretches])
     total, ends = int(count.sum()), np.cumsum(count)
-    place = smooth_line(stretches)
+    smooth = smooth_rate(stretches)
     cycles = np.concatenate([one.first_cycle + 0.5 + np.arange(len(one.gain)) for one in stretches])
-    rate = place.rate(cycles)
+    rate = smooth.at(cycles)
     residual = np.concatenate([one.gain for one in stretches]) - rate
     if total < 4 or not residual.any():
         return Noise(np.zeros(len(stretches)), 1.0)
@@ -123,8 +125,8 @@ def noise_of(stretches: Sequence[Stretch]) -> Noise:
     pairs = standard[1:] * standard[:-1]
     inside = np.ones(total - 1, bool)
     inside[ends[:-1] - 1] = False
-    seen = max(float(pairs[inside].mean()) / variance if inside.any() else 0.0, 0.0)
-    correlation = min(seen + (2 + 4 * seen) / total, 0.9)
+    seen = float(pairs[inside].mean()) / variance if inside.any() else 0.0
+    correlation = float(np.clip(seen + (2 + 4 * seen) / total, -0.5, 0.9))
     grown = (1 + correlation) / (1 - correlation)
     freedom = max(total / grown - 2, 1.0)
     pooled = variance * grown
@@ -136,52 +138,77 @@ def noise_of(stretches: Sequence[Stretch]) -> Noise:
     return Noise(pooled * scale[ends - count // 2 - 1] ** 2, freedom)
 
 
+def spans(scale: float, start: float | FloatArray, end: float | FloatArray) -> FloatArray:
+    """phi_beta = integral of (N / scale)^(beta - 1) dN, shape (..., g); ``start`` above 0."""
+    low = np.log(np.asarray(start, float) / scale)[..., None]
+    high = np.log(np.asarray(end, float) / scale)[..., None]
+    flat = np.abs(EXPONENTS) < 1e-9
+    safe = np.where(flat, 1.0, EXPONENTS)
+    power = np.exp(safe * low) * np.expm1(safe * (high - low)) / safe
+    return np.asarray(scale * np.where(flat, high - low, power))
+
+
 @dataclass(frozen=True)
-class SmoothLine:
-    """w = N du/dN as a straight line in ln N."""
+class SmoothRate:
+    """du/dN = A (N / scale)^(beta - 1)."""
 
-    place: float
-    """Mean ln N."""
-    level: float
-    """w there [m]."""
-    slope: float
-    """Its change a unit of ln N [m]."""
+    scale: float
+    rate: float
+    """A [m a cycle]."""
+    exponent: float
 
-    def rate(self, cycle: FloatArray) -> FloatArray:
-        """du/dN [m a cycle]."""
-        return np.asarray((self.level + self.slope * (np.log(cycle) - self.place)) / cycle)
+    def at(self, cycle: FloatArray) -> FloatArray:
+        """Rate at a cycle [m a cycle]."""
+        return np.asarray(self.rate * (np.asarray(cycle) / self.scale) ** (self.exponent - 1))
 
 
-def smooth_line(stretches: Sequence[Stretch]) -> SmoothLine:
-    """Least squares of the stretches' w, weighed by their cycles alone.
+def smooth_rate(stretches: Sequence[Stretch]) -> SmoothRate:
+    """The power of N next to the gains of the stretches, by least squares.
 
-    Never by what they gained: a fit that believes quiet blocks more comes out too slow.
+    A gain weighs N^2 / k, as if noise were in proportion to the logarithm's rate, and never by what
+    was gained: a fit that believes quiet windows more comes out too slow.
     """
+    start = np.array([one.first_cycle for one in stretches], float)
     count = np.array([len(one.gain) for one in stretches], float)
-    middle = np.array([one.first_cycle + len(one.gain) / 2 for one in stretches])
-    place = np.log(middle)
-    w = np.array([one.rate for one in stretches]) * middle
-    mean = float(count @ place / count.sum())
-    square = float(count @ (place - mean) ** 2)
-    slope = float((count * (place - mean)) @ w) / square if square > 0 else 0.0
-    return SmoothLine(mean, float(count @ w / count.sum()), slope)
+    gain = np.array([one.gain.sum() for one in stretches])
+    scale = float(start[-1] + count[-1])
+    span = spans(scale, start, start + count)
+    weight = ((start + count / 2) ** 2 / count)[:, None]
+    rate = (span * gain[:, None] * weight).sum(axis=0) / (span**2 * weight).sum(axis=0)
+    missed = ((gain[:, None] - span * rate) ** 2 * weight).sum(axis=0)
+    missed += missed.max() * 1e-9 * EXPONENTS**2  # of one stretch alone every power is as good
+    best = int(missed.argmin())
+    return SmoothRate(scale, float(rate[best]), float(EXPONENTS[best]))
+
+
+def block_count(stretch: Stretch) -> int:
+    """Blocks of a stretch: `BLOCKS`, of two cycles at least."""
+    return min(BLOCKS, max(1, len(stretch.gain) // 2))
 
 
 def rates_of(stretches: Sequence[Stretch]) -> Rates:
-    """Blocks of all stretches: `BLOCKS` each, of two cycles at least."""
-    start, end, gain, variance = [], [], [], []
-    noise, line = noise_of(stretches), smooth_line(stretches)
+    """Blocks of all stretches, with the noise of all."""
+    start: list[FloatArray] = []
+    end: list[FloatArray] = []
+    gain: list[FloatArray] = []
+    variance: list[FloatArray] = []
+    noise, trend = noise_of(stretches), smooth_rate(stretches)
     for one, own in zip(stretches, noise.variance, strict=True):
-        edges = np.linspace(0, len(one.gain), min(BLOCKS, max(1, len(one.gain) // 2)) + 1)
-        edges = np.round(edges).astype(int)
+        edges = np.linspace(0, len(one.gain), block_count(one) + 1)
+        edges = np.asarray(np.round(edges), np.int64)
         count = np.diff(edges)
         start.append(one.first_cycle + edges[:-1])
         end.append(one.first_cycle + edges[1:])
         gain.append(np.add.reduceat(one.gain, edges[:-1]))
-        smooth = line.rate(one.first_cycle + 0.5 * (edges[1:] + edges[:-1])) * count
+        smooth = trend.at(one.first_cycle + 0.5 * (edges[1:] + edges[:-1])) * count
         variance.append(own * count + (LAW_ERROR * smooth) ** 2)
-    joined = [np.concatenate(part).astype(float) for part in (start, end, gain, variance)]
-    return Rates(*joined, freedom=max(noise.freedom, 3.0))
+    return Rates(
+        np.concatenate(start).astype(float),
+        np.concatenate(end).astype(float),
+        np.concatenate(gain),
+        np.concatenate(variance),
+        max(noise.freedom, 3.0),
+    )
 
 
 def slope_trend(rates: Rates, blocks: int = 3 * BLOCKS) -> tuple[float, float]:
@@ -228,8 +255,6 @@ def cycles_bound(stretch: Stretch, error: float, probability: float) -> int | No
     For independent increments in the range seen; None where ``error`` is not positive or the bound
     gives no number.  The controller does not use it: it is told beside k.
     """
-    from adapters.errors import UsageError
-
     try:
         low, high = float(stretch.gain.min()), float(stretch.gain.max())
         return cycles_for_error(low, high, error, 1 - probability)

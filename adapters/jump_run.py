@@ -15,18 +15,8 @@ import numpy as np
 
 from adapters import stages
 from adapters.errors import EngineFailed, JumpRefused, NotConverged, NotCredible
-from adapters.jump_control import (
-    Check,
-    Control,
-    Decision,
-    Settings,
-    accept,
-    begin,
-    decide,
-    judge,
-    observe,
-    reject,
-)
+from adapters.jump_check import Check, accept, judge, reject
+from adapters.jump_control import Control, Decision, Settings, begin, decide, observe
 from adapters.jump_rates import Stretch
 from adapters.report_history import cost_total
 from adapters.run_folder import disk_full_named

@@ -3,70 +3,128 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
-from adapters.jump_control import (
-    Check, Control, Decision, Settings, accept, begin, decide, judge, observe, reject,
-)  # fmt: skip
+from adapters.engine_fake import FakeBed
+from adapters.jump_check import accept, judge, reject
+from adapters.jump_control import Decision, Settings, begin, decide, observe
 from adapters.jump_rates import Stretch
 from adapters.state import FloatArray
+
+Law = Callable[[FloatArray], FloatArray]
+
+MICRO = 1e-6
+
+
+def _load_step(cycle: FloatArray) -> FloatArray:
+    after = np.maximum(cycle - 600, 0.0)
+    return 100 * MICRO * np.log1p(cycle) + 100 * MICRO * np.log1p(after / 60)
+
+
+CURVES: dict[str, Law] = {
+    "log": lambda n: 100 * MICRO * np.log1p(n),
+    "power": lambda n: 60 * MICRO * n**0.2,
+    "stretched": lambda n: 600 * MICRO * -np.expm1(-((n / 300) ** 0.4)),
+    "hyperbolic": lambda n: 500 * MICRO * n / (150 + n),
+    "sato": lambda n: 300 * MICRO * -np.expm1(-n / 60) + 0.01 * MICRO * n,
+    "load step": _load_step,
+    "ratcheting": lambda n: 1 * MICRO * n,
+    "collapse": lambda n: 0.02 * MICRO * n**2.5,
+    "rest": lambda n: np.zeros_like(n),
+}
+"""u(N) [m] of the mean of many beds."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A law with the noise of one run."""
+
+    law: Law
+    bursts: float = 0.0
+    """Share of the settlement that comes in bursts (`engine_fake.bursts`)."""
+    seed: int = 1
+    jitter: float = 0.0
+    """Deviation of each reading [m]."""
+
+    @property
+    def bed(self) -> FakeBed:
+        """The fake engine's bed of that curve."""
+        return FakeBed(self.law, self.bursts, self.seed, self.jitter)
+
+    def mean(self, first: int, last: int) -> float:
+        """What many beds gain on the mean [m]."""
+        return float(np.diff(self.law(np.array([first, last], float)))[0])
 
 
 @dataclass
 class Play:
-    decisions: list = field(default_factory=list)
-    jumps: list = field(default_factory=list)  # (decision, check, N, true gain)
-    rejected: list = field(default_factory=list)
+    """What a controlled run did."""
+
+    decisions: list[Decision] = field(default_factory=list)
+    checks: list[dict[str, Any]] = field(default_factory=list)
+    """Of jumps that stand, as `jump_band.band_of` takes them."""
+    taken_back: list[dict[str, Any]] = field(default_factory=list)
+    true_errors: list[float] = field(default_factory=list)
+    """Gain of each jump that stands less that of the mean law, over the total."""
     computed: int = 0
-    wasted: int = 0
-    final: float = 0.0
+    """Cycles, those of jumps taken back included."""
+    settlement: float = 0.0
+    truth: float = 0.0
+    """What the mean bed would have from the same state after k_i cycles [m]."""
     refused: bool = False
 
+    @property
+    def errors(self) -> FloatArray:
+        """Absolute true errors of the jumps that stand."""
+        return np.abs(self.true_errors)
 
-def play(mean: Callable, gains: FloatArray, k_i: int, settings: Settings) -> Play:
-    out = Play()
-    total = settings.total_cycles
-    u = float(gains[:k_i].sum())
+
+def play(curve: Curve, k_i: int, settings: Settings, first: Play | None = None) -> Play:
+    """Let the controller run on a curve from the state after ``k_i`` cycles."""
+    out, bed = first or Play(), curve.bed
+    start = float(bed.settlement(0, k_i)[-1])
+    control = begin(k_i, start)
     out.computed = k_i
-    c = begin(k_i, u)
 
-    def stretch(first, k):
-        z = np.full(k, np.nan)
-        return Stretch(first, gains[first : first + k], z, z)
+    def computed(first: int, cycles: int) -> Stretch:
+        unknown = np.full(cycles, np.nan)
+        return Stretch(first, np.diff(bed.settlement(first, cycles)), unknown, unknown)
 
     while True:
-        d = decide(c, settings)
-        out.decisions.append(d)
-        if d.action == "end":
+        decision = decide(control, settings)
+        out.decisions.append(decision)
+        if decision.action in ("end", "refuse"):
+            out.refused = decision.action == "refuse"
             break
-        if d.action == "refuse":
-            out.refused = True
-            break
-        if d.action == "compute":
-            s = stretch(c.cycle, d.window)
-            out.computed += d.window
-            c = observe(c, s, c.settlement + float(s.gain.sum()))
+        if decision.action == "compute":
+            window = computed(control.cycle, decision.window)
+            out.computed += decision.window
+            control = observe(control, window, control.settlement + float(window.gain.sum()))
             continue
-        m = settings.healing
-        first = c.cycle + d.jump + m
-        s = stretch(first, d.window)
-        out.computed += d.window + m
-        u = (
-            c.settlement
-            + d.gain
-            + float(gains[c.cycle + d.jump : first].sum())
-            + float(s.gain.sum())
-        )
-        check = judge(c, d, settings, s, u)
-        true = mean(c.cycle + d.jump) - mean(c.cycle)
+        landed = control.cycle + decision.jump
+        healed = computed(landed, settings.healing)
+        window = computed(landed + settings.healing, decision.window)
+        out.computed += settings.healing + decision.window
+        gained = decision.gain + float(healed.gain.sum())
+        settlement = control.settlement + gained + float(window.gain.sum())
+        check = judge(control, decision, settings, window, settlement)
+        told = asdict(check) | {
+            "jump": decision.jump,
+            "window": settings.healing + decision.window,
+            "cycle": control.cycle,
+        }
         if check.accepted:
-            out.jumps.append((d, check, c.cycle, true, c.settlement + d.gain))
-            c = accept(c, d, check, settings, s, u)
+            error = decision.gain - curve.mean(control.cycle, landed)
+            total = abs(control.settlement + decision.gain)
+            out.true_errors.append(error / total if total else 0.0)
+            out.checks.append(told)
+            control = accept(control, decision, check, settings, window, settlement)
         else:
-            out.wasted += d.window + m
-            out.rejected.append((d, check, c.cycle, true))
-            c = reject(c, d, check.error, settings)
-    out.final = c.settlement
+            out.taken_back.append(told)
+            control = reject(control, decision, check.error, settings)
+    out.settlement = control.settlement
+    out.truth = start + curve.mean(k_i, control.cycle)
     return out
