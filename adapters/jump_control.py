@@ -296,13 +296,16 @@ def widths_of(
 ) -> tuple[FloatArray, FloatArray]:
     """Half-widths of the gain over jumps of ``lengths`` cycles [m]: noise, laws; shape (h,) each.
 
-    *laws* is the greater of the exponents' and of the slow laws' own, fitted to the run's curve.
+    *laws* is the greater of the exponents' and of how far the slow laws, fitted to the run's own
+    curve, lie from the forecast.
     """
     here = float(control.cycle)
     noise, form = forecast.half_widths(here, here + lengths, PROBABILITY)
     curve = np.array(control.curve_cycle), np.array(control.curve_settlement)
     low, high = laws_gain(*curve, here + lengths, PROBABILITY)
-    return noise, np.maximum(form, np.where(np.isfinite(high - low), (high - low) / 2, 0.0))
+    gain = forecast.gain(here, here + lengths)
+    apart = np.maximum(high - gain, gain - low)
+    return noise, np.maximum(form, np.where(np.isfinite(apart), apart, 0.0))
 
 
 def window_of(
