@@ -15,7 +15,7 @@ import numpy as np
 
 from adapters import stages
 from adapters.errors import EngineFailed, JumpRefused, NotConverged, NotCredible
-from adapters.jump_check import Check, accept, judge, reject
+from adapters.jump_check import accept, judge, reject
 from adapters.jump_control import Control, Decision, Settings, begin, decide, observe
 from adapters.jump_rates import Stretch
 from adapters.report_history import cost_total
@@ -82,7 +82,8 @@ def jump_and_check(
     healed = rows[healing - 1] if healing else _jump_row(run, name)
     stretch = stretch_of(rows[healing:], float(healed["settlement"]))
     check = judge(control, decision, settings, stretch, settlement)
-    journal.write(CHECK, decision.cycle, decision.attempt, _told(decision, check))
+    told = {"jump": decision.jump, "window": healing + decision.window, **asdict(check)}
+    journal.write(CHECK, decision.cycle, decision.attempt, told)
     if check.accepted:
         return after, accept(control, decision, check, settings, stretch, settlement)
     why = (
@@ -149,10 +150,6 @@ class Journal:
             if kind not in self._silent:
                 self._run.progress.say(f"cycle {cycle}: {why}; computing on")
             self._silent.add(kind)
-
-
-def _told(decision: Decision, check: Check) -> dict[str, Any]:
-    return {"jump": decision.jump, "window": decision.window, **asdict(check)}
 
 
 def _finite(value: Any) -> Any:

@@ -15,6 +15,7 @@ from adapters.report_bed import (
     sample,
     structure,
 )
+from adapters.report_control import control
 from adapters.report_error import Comparison
 from adapters.report_history import AVERAGED
 from adapters.report_html import (
@@ -45,6 +46,7 @@ def body(record: Record, numbers: Numbers, figures: Figures) -> Iterator[str]:
         yield _settlement(numbers, figures)
         yield _error(record, numbers, figures)
         yield structure(figures)
+        yield control(record)
         yield penetration(record, numbers, figures)
         yield sample(figures)
     yield preparation(record, numbers, figures)

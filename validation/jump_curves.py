@@ -31,6 +31,9 @@ CURVES: dict[str, Law] = {
     "hyperbolic": lambda n: 500 * MICRO * n / (150 + n),
     "sato": lambda n: 300 * MICRO * -np.expm1(-n / 60) + 0.01 * MICRO * n,
     "load step": _load_step,
+    "early load step": lambda n: (
+        20 * MICRO * np.log1p(n) + 1 * MICRO * np.maximum(n - 110, 0.0) ** 0.8
+    ),
     "ratcheting": lambda n: 1 * MICRO * n,
     "collapse": lambda n: 0.02 * MICRO * n**2.5,
     "rest": lambda n: np.zeros_like(n),
