@@ -315,8 +315,8 @@ def window_of(
 
     With k more cycles of long-run variance S the rate is known to s^-2 = s_0^-2 + k / S, and the
     noise alone allows h(k) = N (exp(tolerance u / (t s N)) - 1), Student's t.  Where the other
-    rules allow more than that, k grows; without noise the shortest window does.  Where no k makes
-    a jump pay, twice the last window.
+    rules allow more than that, k grows; without noise the shortest window does.  A rate whose sign
+    the noise would hide allows none.  Where no k makes a jump pay, twice the last window.
     """
     here = float(control.cycle)
     sizes = np.unique(np.geomspace(SHORTEST_WINDOW, LONGEST_WINDOW, 20).round())
@@ -328,7 +328,8 @@ def window_of(
         error = 1 / np.sqrt(known + sizes / variance)
         allowed = SAFETY * settings.tolerance * abs(control.settlement)
         reach = np.minimum(allowed / np.maximum(student * error * here, 1e-300), 50.0)
-        jumps = np.minimum(here * np.expm1(reach), GROWTH * others)
+        told = student * error <= abs(float(forecast.rate @ forecast.weight))
+        jumps = np.where(told, np.minimum(here * np.expm1(reach), GROWTH * others), 0.0)
     else:
         jumps = np.full_like(sizes, others)
     pays = jumps >= settings.shortest_jump

@@ -16,7 +16,7 @@ import numpy as np
 from adapters.errors import UsageError
 from adapters.fit_regime import EXPONENTS
 from adapters.residual import cycles_for_error
-from adapters.state import FloatArray
+from adapters.state import FloatArray, IntArray
 
 BLOCKS = 4
 """Parts of a stretch whose mean rates are fitted: enough to see a trend inside of it."""
@@ -163,20 +163,25 @@ class SmoothRate:
 
 
 def smooth_rate(stretches: Sequence[Stretch]) -> SmoothRate:
-    """The power of N next to the gains of the stretches, by least squares.
+    """The power of N next to the gains of all blocks, by least squares.
 
     A gain weighs N^2 / k, as if noise were in proportion to the logarithm's rate, and never by what
     was gained: a fit that believes quiet windows more comes out too slow.
     """
-    start = np.array([one.first_cycle for one in stretches], float)
-    count = np.array([len(one.gain) for one in stretches], float)
-    gain = np.array([one.gain.sum() for one in stretches])
+    edges = [block_edges(one) for one in stretches]
+    start = np.concatenate(
+        [one.first_cycle + e[:-1] for one, e in zip(stretches, edges, strict=True)]
+    )
+    count = np.concatenate([np.diff(e) for e in edges])
+    gain = np.concatenate(
+        [np.add.reduceat(one.gain, e[:-1]) for one, e in zip(stretches, edges, strict=True)]
+    )
     scale = float(start[-1] + count[-1])
     span = spans(scale, start, start + count)
     weight = ((start + count / 2) ** 2 / count)[:, None]
     rate = (span * gain[:, None] * weight).sum(axis=0) / (span**2 * weight).sum(axis=0)
     missed = ((gain[:, None] - span * rate) ** 2 * weight).sum(axis=0)
-    missed += missed.max() * 1e-9 * EXPONENTS**2  # of one stretch alone every power is as good
+    missed += missed.max() * 1e-9 * EXPONENTS**2  # of one block alone every power is as good
     best = int(missed.argmin())
     return SmoothRate(scale, float(rate[best]), float(EXPONENTS[best]))
 
@@ -184,6 +189,12 @@ def smooth_rate(stretches: Sequence[Stretch]) -> SmoothRate:
 def block_count(stretch: Stretch) -> int:
     """Blocks of a stretch: `BLOCKS`, of two cycles at least."""
     return min(BLOCKS, max(1, len(stretch.gain) // 2))
+
+
+def block_edges(stretch: Stretch) -> IntArray:
+    """Cycles from a stretch's start to the ends of its blocks, 0 first, shape (b + 1,)."""
+    edges = np.linspace(0, len(stretch.gain), block_count(stretch) + 1)
+    return np.asarray(np.round(edges), np.int64)
 
 
 def rates_of(stretches: Sequence[Stretch]) -> Rates:
@@ -194,8 +205,7 @@ def rates_of(stretches: Sequence[Stretch]) -> Rates:
     variance: list[FloatArray] = []
     noise, trend = noise_of(stretches), smooth_rate(stretches)
     for one, own in zip(stretches, noise.variance, strict=True):
-        edges = np.linspace(0, len(one.gain), block_count(one) + 1)
-        edges = np.asarray(np.round(edges), np.int64)
+        edges = block_edges(one)
         count = np.diff(edges)
         start.append(one.first_cycle + edges[:-1])
         end.append(one.first_cycle + edges[1:])

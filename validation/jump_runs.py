@@ -79,6 +79,12 @@ def run(way: Way, seed: int, work: Path) -> dict[str, Any]:
             here = run_variant(home, scene_of(way, seed), way.variant, Progress(), True)
         except JumpRefused as error:
             here, refused = home, str(error)
+    costs = [outcome.cost for outcome in here.outcomes() if outcome.stage != "preparation"]
+    lost = [
+        {"lost_s": 0.0, "lost_cycles": 0, "why": here.failure(name)} | here.failure_details(name)
+        for name in here.stage_names()
+        if here.failure(name)
+    ]
     return {
         "way": way.name,
         "seed": seed,
@@ -86,12 +92,9 @@ def run(way: Way, seed: int, work: Path) -> dict[str, Any]:
         "computed": sum(
             o.last_cycle - o.first_cycle for o in here.outcomes() if o.stage == "window"
         ),
-        "lost": [
-            here.failure_details(name) | {"why": here.failure(name)}
-            for name in here.stage_names()
-            if here.failure(name)
-        ],
-        "cpu_s": sum(cost_total(o.cost) for o in here.outcomes() if o.stage != "preparation"),
+        "lost": lost,
+        "cpu_s": sum(cost_total(cost) for cost in costs) + sum(one["lost_s"] for one in lost),
+        "engine_s": sum(cost["engine"] for cost in costs),
         "rows": [
             [row["cycle"], row["kind"][0], *(_short(row.get(name)) for name in COLUMNS)]
             for outcome in here.outcomes()

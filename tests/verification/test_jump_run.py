@@ -115,14 +115,14 @@ def test_collapse_is_refused_with_its_code(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 6 and what to do; ``resume --cycle-by-cycle`` goes on to the end, for good."""
-    monkeypatch.setattr(engine_fake, "BED", FakeBed(CURVES["collapse"]))
-    scene = small(tmp_path, 100)
+    monkeypatch.setattr(engine_fake, "BED", FakeBed(lambda n: 0.005 * CURVES["collapse"](n)))
+    scene = small(tmp_path, 200)
     assert trackbed.main(["run", str(scene)]) == JumpRefused.exit_code == 6
     assert "trackbed resume RUN --cycle-by-cycle" in capsys.readouterr().err
     assert trackbed.main(["resume", str(tmp_path / "run")]) == 6
     assert trackbed.main(["resume", str(tmp_path / "run"), "--cycle-by-cycle"]) == 0
     assert trackbed.main(["resume", str(tmp_path / "run")]) == 0
-    assert status(tmp_path / "run").cycles_computed == 100
+    assert status(tmp_path / "run").cycles_computed == 200
 
 
 def test_no_jump_pays_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -172,7 +172,7 @@ def commands(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commands]:
 
 
 def test_killed_at_file_operations(commands: Commands, tmp_path: Path) -> None:
-    """Killed in place of every fifth change of a file and resumed: the same table and decisions.
+    """Killed at the 17th change of a file, again and again: the same table and decisions.
 
     The run has jumps that stand and one taken back, so kills fall before, within and behind each.
     """
@@ -184,7 +184,7 @@ def test_killed_at_file_operations(commands: Commands, tmp_path: Path) -> None:
     kills = 0
     while True:
         words = ("resume", run_folder) if (run_folder / "manifest.json").exists() else first
-        ended = commands.run(*words, root=str(run_folder), crash=23, bed=STEP)
+        ended = commands.run(*words, root=str(run_folder), crash=17, bed=STEP)
         if ended != -signal.SIGKILL:
             break
         kills += 1
