@@ -207,14 +207,14 @@ def rates_of(stretches: Sequence[Stretch]) -> Rates:
     for one, own in zip(stretches, noise.variance, strict=True):
         edges = block_edges(one)
         count = np.diff(edges)
-        start.append(one.first_cycle + edges[:-1])
-        end.append(one.first_cycle + edges[1:])
+        start.append(one.first_cycle + edges[:-1].astype(float))
+        end.append(one.first_cycle + edges[1:].astype(float))
         gain.append(np.add.reduceat(one.gain, edges[:-1]))
-        smooth = trend.at(one.first_cycle + 0.5 * (edges[1:] + edges[:-1])) * count
+        smooth = trend.at(0.5 * (start[-1] + end[-1])) * count
         variance.append(own * count + (LAW_ERROR * smooth) ** 2)
     return Rates(
-        np.concatenate(start).astype(float),
-        np.concatenate(end).astype(float),
+        np.concatenate(start),
+        np.concatenate(end),
         np.concatenate(gain),
         np.concatenate(variance),
         max(noise.freedom, 3.0),

@@ -85,16 +85,18 @@ class Play:
         return np.abs(self.true_errors)
 
 
-def play(curve: Curve, k_i: int, settings: Settings, first: Play | None = None) -> Play:
+def stretch_of(bed: FakeBed, first: int, cycles: int) -> Stretch:
+    """Cycles of a bed as the controller sees them."""
+    unknown = np.full(cycles, np.nan)
+    return Stretch(first, np.diff(bed.settlement(first, cycles)), unknown, unknown)
+
+
+def play(curve: Curve, k_i: int, settings: Settings) -> Play:
     """Let the controller run on a curve from the state after ``k_i`` cycles."""
-    out, bed = first or Play(), curve.bed
+    out, bed = Play(), curve.bed
     start = float(bed.settlement(0, k_i)[-1])
     control = begin(k_i, start)
     out.computed = k_i
-
-    def computed(first: int, cycles: int) -> Stretch:
-        unknown = np.full(cycles, np.nan)
-        return Stretch(first, np.diff(bed.settlement(first, cycles)), unknown, unknown)
 
     while True:
         decision = decide(control, settings)
@@ -103,13 +105,13 @@ def play(curve: Curve, k_i: int, settings: Settings, first: Play | None = None) 
             out.refused = decision.action == "refuse"
             break
         if decision.action == "compute":
-            window = computed(control.cycle, decision.window)
+            window = stretch_of(bed, control.cycle, decision.window)
             out.computed += decision.window
             control = observe(control, window, control.settlement + float(window.gain.sum()))
             continue
         landed = control.cycle + decision.jump
-        healed = computed(landed, settings.healing)
-        window = computed(landed + settings.healing, decision.window)
+        healed = stretch_of(bed, landed, settings.healing)
+        window = stretch_of(bed, landed + settings.healing, decision.window)
         out.computed += settings.healing + decision.window
         gained = decision.gain + float(healed.gain.sum())
         settlement = control.settlement + gained + float(window.gain.sum())

@@ -80,7 +80,7 @@ def run(way: Way, seed: int, work: Path) -> dict[str, Any]:
         except JumpRefused as error:
             here, refused = home, str(error)
     costs = [outcome.cost for outcome in here.outcomes() if outcome.stage != "preparation"]
-    lost = [
+    lost: list[dict[str, Any]] = [
         {"lost_s": 0.0, "lost_cycles": 0, "why": here.failure(name)} | here.failure_details(name)
         for name in here.stage_names()
         if here.failure(name)
@@ -93,7 +93,8 @@ def run(way: Way, seed: int, work: Path) -> dict[str, Any]:
             o.last_cycle - o.first_cycle for o in here.outcomes() if o.stage == "window"
         ),
         "lost": lost,
-        "cpu_s": sum(cost_total(cost) for cost in costs) + sum(one["lost_s"] for one in lost),
+        "cpu_s": sum(cost_total(cost) for cost in costs)
+        + sum(float(one["lost_s"]) for one in lost),
         "engine_s": sum(cost["engine"] for cost in costs),
         "rows": [
             [row["cycle"], row["kind"][0], *(_short(row.get(name)) for name in COLUMNS)]
