@@ -62,6 +62,27 @@ class Curve:
         return float(np.diff(self.law(np.array([first, last], float)))[0])
 
 
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """The mean curve of a full run; what it gained is the truth, its own noise included."""
+
+    path: FloatArray
+    """Settlement after 0, 1, 2, ... cycles [m]."""
+
+    @property
+    def bed(self) -> Measured:
+        """Itself."""
+        return self
+
+    def settlement(self, first: int, cycles: int) -> FloatArray:
+        """u [m] at the ends of ``cycles`` cycles from ``first`` on, less u before them."""
+        return np.asarray(self.path[first : first + cycles + 1] - self.path[first])
+
+    def mean(self, first: int, last: int) -> float:
+        """What the run gained [m]."""
+        return float(self.path[last] - self.path[first])
+
+
 @dataclass
 class Play:
     """What a controlled run did."""
@@ -85,13 +106,13 @@ class Play:
         return np.abs(self.true_errors)
 
 
-def stretch_of(bed: FakeBed, first: int, cycles: int) -> Stretch:
+def stretch_of(bed: FakeBed | Measured, first: int, cycles: int) -> Stretch:
     """Cycles of a bed as the controller sees them."""
     unknown = np.full(cycles, np.nan)
     return Stretch(first, np.diff(bed.settlement(first, cycles)), unknown, unknown)
 
 
-def play(curve: Curve, k_i: int, settings: Settings) -> Play:
+def play(curve: Curve | Measured, k_i: int, settings: Settings) -> Play:
     """Let the controller run on a curve from the state after ``k_i`` cycles."""
     out, bed = Play(), curve.bed
     start = float(bed.settlement(0, k_i)[-1])
