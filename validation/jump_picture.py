@@ -53,6 +53,10 @@ def _curves(axis: Any, rows: Rows) -> None:
         ylabel="error at cycle 2,000, rms [%]",
     )  # fmt: skip
     axis.set_title(f"five laws, {jump_study.SEEDS} seeds, bursts as the paper's bed", fontsize=9)
+    ticks = (200, 500, 1000, 2000)
+    axis.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
+    axis.set_yticks((3, 4, 5, 6), ("3", "4", "5", "6"))
+    axis.minorticks_off()
     axis.legend(frameon=False, fontsize=8)
 
 

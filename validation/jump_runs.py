@@ -20,7 +20,6 @@ from adapters.jump_run import CHECK, DECISION
 from adapters.procedure import CONTROL, run_variant
 from adapters.progress import Progress
 from adapters.provenance import commit, machine
-from adapters.report_history import cost_total
 from adapters.run_folder import RunFolder
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
@@ -93,8 +92,6 @@ def run(way: Way, seed: int, work: Path) -> dict[str, Any]:
             o.last_cycle - o.first_cycle for o in here.outcomes() if o.stage == "window"
         ),
         "lost": lost,
-        "cpu_s": sum(cost_total(cost) for cost in costs)
-        + sum(float(one["lost_s"]) for one in lost),
         "engine_s": sum(cost["engine"] for cost in costs),
         "rows": [
             [row["cycle"], row["kind"][0], *(_short(row.get(name)) for name in COLUMNS)]
@@ -144,7 +141,9 @@ def main(words: Sequence[str] | None = None) -> None:
             made = run(way, seed, arguments.work)
             with arguments.record.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps(made, separators=(",", ":")) + "\n")
-            print(f"{way.name}, seed {seed}: {made['computed']} cycles, {made['cpu_s']:.0f} CPU s")
+            print(
+                f"{way.name}, seed {seed}: {made['computed']} cycles, {made['engine_s']:.0f} CPU s"
+            )
 
 
 if __name__ == "__main__":
