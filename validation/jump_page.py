@@ -242,10 +242,12 @@ def liggghts_told(runs: Rows) -> str:
     for way in dict.fromkeys(run["way"] for run in runs if run["way"] != "full"):
         these = [run for run in runs if run["way"] == way]
         errors = [e for run in these if (e := liggghts_error(run, runs)) is not None]
-        cycles = np.mean([run["computed"] for run in these])
+        lost = [sum(one["lost_cycles"] for one in run["lost"]) for run in these]
+        cycles = np.mean([run["computed"] for run in these]) + np.mean(lost)
         spread = f", error {100 * np.mean(errors):+.1f} % on the mean" if errors else ""
         if len(errors) > 1:
-            spread += f", {100 * np.std(errors, ddof=1):.1f} % its scatter"
+            spread += f", {100 * np.std(errors, ddof=1):.1f} % its scatter, "
+            spread += f"{100 * np.mean(np.abs(errors)):.1f} % without signs"
         said.append(f"{way}: {cycles:.0f} cycles computed{spread} ({len(these)} seeds)")
     wanted = {(way.name, seed) for way in jump_runs.WAYS for seed in range(1, jump_runs.SEEDS + 1)}
     missing = sorted(wanted - {(run["way"], run["seed"]) for run in runs})
