@@ -205,6 +205,18 @@ def test_noise_shortens_the_jump_and_the_half_width_holds_it() -> None:
     assert lengths[1] < lengths[0] / 2
 
 
+def test_slope_rule() -> None:
+    """The longest jump by the slope is where g x^2 / 2 reaches 0.9 of the tolerance's error."""
+    beds = [of_law(n, 20, 0.4) for n in (50, 80, 120)]
+    control = known(*beds)
+    trend, error = slope_trend(rates_of(beds))
+    longest = dict(decide(control, SETTINGS).limits)["slope"]
+    missed = 0.5 * (trend - error) * log(1 + longest / 140) ** 2
+    gain = float(of_law(140, int(longest), 0.4).gain.sum())
+    # lengths are tried in steps of about a tenth, so x^2 in steps of about a fifth
+    assert 0.75 < missed / (0.9 * 0.02 * (4e-4 + gain)) <= 1.02
+
+
 @pytest.mark.parametrize(
     ("beta", "regime"),
     [(1.0, "ratcheting"), (2.5, "collapse"), (0.0, "steady"), (-1.5, "shakedown")],
