@@ -11,6 +11,9 @@ from typing import Any
 
 from adapters.errors import EngineMissing, UsageError
 
+JUMP_KEYS = ("procedure.k", "procedure.h")
+"""Keys that ``--tolerance`` stands for."""
+
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``verb`` to its parser."""
@@ -132,9 +135,43 @@ def run_register(parser: argparse.ArgumentParser) -> None:
         help="change a key of the scene, such as procedure.h=10; may be repeated",
     )  # fmt: skip
     parser.add_argument(
+        "--tolerance", type=float, metavar="T",
+        help="jumps choose themselves: error of the settlement gained in a jump over the total "
+        "settlement, such as 0.02; short for --set procedure.tolerance=T, instead of k and h",
+    )  # fmt: skip
+    parser.add_argument(
+        "--cycles", type=int, metavar="N", help="short for --set procedure.total_cycles=N"
+    )
+    cycle_by_cycle_flag(parser)
+    parser.add_argument(
         "--dry-run", action="store_true", help="write the decks and print the engine's command"
     )
     parser.set_defaults(command=run_command)
+
+
+def cycle_by_cycle_flag(parser: argparse.ArgumentParser) -> None:
+    """Add ``--cycle-by-cycle``."""
+    parser.add_argument(
+        "--cycle-by-cycle", action="store_true",
+        help="with a tolerance: where the bed ratchets or collapses, so that no jump is allowed, "
+        "compute every cycle instead of stopping with exit code 6",
+    )  # fmt: skip
+
+
+def jump_overrides(arguments: argparse.Namespace) -> list[str]:
+    """KEY=VALUE of ``--tolerance`` and ``--cycles``; `UsageError` beside a k or h by hand."""
+    overrides = []
+    if arguments.tolerance is not None:
+        by_hand = [one for one in arguments.overrides if one.split("=")[0].strip() in JUMP_KEYS]
+        if by_hand:
+            raise UsageError(
+                f"--tolerance chooses k and h, and --set {by_hand[0]} gives one by hand",
+                remedy="leave one of the two out",
+            )
+        overrides.append(f"procedure.tolerance={arguments.tolerance!r}")
+    if arguments.cycles is not None:
+        overrides.append(f"procedure.total_cycles={arguments.cycles}")
+    return overrides
 
 
 def overrides_of(arguments: argparse.Namespace) -> list[str]:
@@ -159,8 +196,9 @@ def run_command(arguments: argparse.Namespace) -> int:
         arguments.scene,
         arguments.run_folder or arguments.scene.parent / "run",
         control=arguments.control,
-        overrides=overrides_of(arguments),
+        overrides=overrides_of(arguments) + jump_overrides(arguments),
         dry_run=arguments.dry_run,
+        cycle_by_cycle=arguments.cycle_by_cycle,
     )
     return 0
 
@@ -173,6 +211,7 @@ def run_argument(parser: argparse.ArgumentParser) -> None:
 def resume_register(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``resume``."""
     run_argument(parser)
+    cycle_by_cycle_flag(parser)
     parser.set_defaults(command=resume_command)
 
 
@@ -180,7 +219,7 @@ def resume_command(arguments: argparse.Namespace) -> int:
     """Go on with a run from its last window that passes the checks."""
     from adapters import procedure
 
-    procedure.resume(arguments.run_folder)
+    procedure.resume(arguments.run_folder, cycle_by_cycle=arguments.cycle_by_cycle)
     return 0
 
 

@@ -1,8 +1,8 @@
 """An engine without mechanics: analytic residual displacements, the files of a real one.
 
 It exists so that the whole procedure, its dumps and its checks included, runs in milliseconds.
-Every grain settles by ``-a_beta ln(1 + N)`` in cycle N, grains in contact keep their overlap.
-Never use it for a result.
+Every grain settles by ``-a_beta ln(1 + N)`` in cycle N, or as `BED` says, with bursts; grains in
+contact keep their overlap.  Never use it for a result.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,73 @@ SPACING = 0.9999
 
 TRACK_SAMPLES = 20
 """Samples of the piston's record in a cycle."""
+
+
+def logarithm(cycle: FloatArray) -> FloatArray:
+    """u = a ln(1 + N) [m]."""
+    return np.asarray(SETTLEMENT * np.log1p(cycle))
+
+
+@dataclass(frozen=True)
+class FakeBed:
+    """How the mean grain settles."""
+
+    law: Callable[[FloatArray], FloatArray] = logarithm
+    """u(N) [m] of the mean of many beds."""
+    bursts: float = 0.0
+    """Share of the settlement that comes in bursts; 0: without noise."""
+    seed: int = 1
+    """Of the bursts; a cycle's is the same in every run."""
+    jitter: float = 0.0
+    """Deviation of each reading [m], independent from cycle to cycle."""
+    transient: float = 0.0
+    """What the bed settles further in the first cycles behind a jump [m]."""
+
+    def settlement(self, first: int, cycles: int) -> FloatArray:
+        """u [m] at the ends of ``cycles`` cycles from ``first`` on, less u before them."""
+        count = np.arange(first, first + cycles + 1)
+        gain = np.diff(self.law(count.astype(float)))
+        if self.bursts:
+            share = bursts(self.seed, _rounded_up(first + cycles))[first : first + cycles]
+            gain = gain * (1 - self.bursts + self.bursts * share)
+        path = np.concatenate([[0.0], np.cumsum(gain)])
+        if self.jitter:
+            reading = jitter(self.seed, _rounded_up(first + cycles + 1))
+            path += self.jitter * (reading[count] - reading[first])
+        return path
+
+
+BED = FakeBed()
+"""The bed of every run; tests put another in its place."""
+
+BURST_CHANCE, BURST_CYCLES = 0.2, 2.0
+"""Chance of a burst in a cycle, and cycles in which it dies away by e."""
+
+
+@cache
+def bursts(seed: int, count: int) -> FloatArray:
+    """Gains of ``count`` cycles over their mean: bursts of exponential size that die away slowly.
+
+    Mean 1, standard deviation 1.5, correlation exp(-1/2) from one cycle to the next.  The first
+    cycles of a longer series are those of a shorter one.
+    """
+    from scipy.signal import lfilter
+
+    came = np.random.default_rng([seed, 0]).random(count) < BURST_CHANCE
+    size = np.random.default_rng([seed, 1]).exponential(size=count) * came / BURST_CHANCE
+    kept = np.exp(-1 / BURST_CYCLES)
+    return np.asarray(lfilter([1 - kept], [1, -kept], size))
+
+
+@cache
+def jitter(seed: int, count: int) -> FloatArray:
+    """Standard normal numbers, one a cycle."""
+    return np.random.default_rng([seed, 2]).standard_normal(count)
+
+
+def _rounded_up(count: int) -> int:
+    """The next power of two, so that few series are made."""
+    return 1 << max(count, 2).bit_length()
 
 
 class FakeEngine:
@@ -72,6 +141,7 @@ class FakeEngine:
                 cycles=cycles,
                 first_step=start.time_step,
                 first_cycle=data["cycle"] if start.moved is None else start.moved.cycle,
+                moved=start.moved is not None,
                 piston_height=start.piston_height,
             )
         return {}
@@ -111,16 +181,18 @@ class FakeEngine:
         cycles, first = int(values["cycles"]), int(values["first_cycle"])
         radius, start = values["radius"], values["position"]
         steps = int(values["first_step"]) + scene.steps_per_cycle * np.arange(cycles + 1)
-        law = np.log((1.0 + first + np.arange(cycles + 1)) / (1.0 + first))
+        settled = BED.settlement(first, cycles)
+        if values["moved"]:
+            settled += BED.transient * -np.expm1(-np.arange(cycles + 1) / 1.5)
         # Grains higher up settle more, as in a bed that compacts evenly.
         share = start[:, 2] / start[:, 2].mean()
         position = np.repeat(start[None], cycles + 1, axis=0)
-        position[:, :, 2] -= SETTLEMENT * law[:, None] * share
+        position[:, :, 2] -= settled[:, None] * share
         _dumps_write(folder, radius, position, steps.tolist())
         _restart_write(folder, radius, position[-1], first + cycles)
         phase = np.arange(1, cycles * TRACK_SAMPLES + 1) / TRACK_SAMPLES
         force = scene.stress_at(phase) * scene.loaded_area
-        height = values["piston_height"] - SETTLEMENT * np.log((1 + first + phase) / (1 + first))
+        height = values["piston_height"] - np.interp(phase, np.arange(cycles + 1), settled)
         track = np.column_stack(
             [
                 steps[0] + np.round(phase * scene.steps_per_cycle),

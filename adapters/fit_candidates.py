@@ -99,9 +99,12 @@ def thinned(cycle: FloatArray, displacement: FloatArray) -> tuple[FloatArray, Fl
 
 
 def increments(
-    cycle: FloatArray, displacement: FloatArray, to_cycle: float
+    cycle: FloatArray, displacement: FloatArray, to_cycle: float | FloatArray
 ) -> dict[tuple[str, float], FloatArray]:
-    """Increment to ``to_cycle``, shape (n,), of every law on every window that determines it."""
+    """Increment to ``to_cycle``, shape (n,), of every law on every window that determines it.
+
+    To m cycles at once: shape (m, n).
+    """
     found = {}
     last, used = float(cycle[-1]), set()
     for decades in WINDOW_DECADES:

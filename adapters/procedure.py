@@ -20,6 +20,7 @@ from adapters.errors import (
     SceneError,
     UsageError,
 )
+from adapters.jump_run import settle_controlled
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder, disk_full_named, write_atomically
 from adapters.scene import Scene, flat_keys
@@ -48,15 +49,18 @@ def settle(run: Run) -> Bed:
     bed = stages.prepare(run)
     bed = stages.compute(run, bed, p.k_i)
     bed = replace(bed, start=replace(bed.start, perturbation=run.variant.perturbation))
-    bed = stages.compute(run, bed, min(p.k, p.total_cycles - bed.cycle))
+    if p.tolerance is not None and run.variant.jumps and not run.variant.still:
+        return settle_controlled(run, bed)
+    k = p.window_cycles
+    bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
     for number in range(p.total_cycles):
-        longest = p.total_cycles - bed.cycle - p.healing_cycles - p.k
+        longest = p.total_cycles - bed.cycle - p.healing_cycles - k
         h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
-        if not run.variant.jumps or longest < min(p.h):
+        if not run.variant.jumps or longest < min(p.h or (0,)):
             break
         bed = jump_and_heal(run, bed, h)
     while bed.cycle < p.total_cycles:
-        bed = stages.compute(run, bed, min(p.k, p.total_cycles - bed.cycle))
+        bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
     return bed
 
 
@@ -75,7 +79,8 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
             try:
                 with disk_full_named(run.folder.path):
                     moved = stages.jump(run, bed, h, attempt)
-                    return stages.compute(run, moved, p.healing_cycles + p.k, p.healing_cycles)
+                    cycles = p.healing_cycles + p.window_cycles
+                    return stages.compute(run, moved, cycles, p.healing_cycles)
             except (EngineFailed, NotCredible, NotConverged) as error:
                 if isinstance(error, EngineFailed) and error.from_outside:
                     raise
@@ -97,12 +102,14 @@ def run_scene(
     control: bool = False,
     overrides: Sequence[str] = (),
     dry_run: bool = False,
+    cycle_by_cycle: bool = False,
     progress: Progress | None = None,
 ) -> None:
     """Run a scene in the folder ``run_path``; with ``control``, every cycle beside it too.
 
     A folder that holds the same scene is resumed; one that holds another is refused with the
     differences.  ``dry_run`` writes the first decks and prints the engine's command line.
+    ``cycle_by_cycle``: where a controlled run may not jump, compute instead of `JumpRefused`.
     """
     scene = scene_load(scene_path, overrides)
     progress = progress or Progress()
@@ -124,23 +131,28 @@ def run_scene(
     folder = RunFolder(run_path)
     with interruptible(), disk_full_named(run_path), folder.locked():
         manifest_settle(folder, scene, scene_path, overrides, control)
-        _run_all(folder, scene, control, progress)
+        _run_all(folder, scene, control, folder.asked_on(cycle_by_cycle), progress)
 
 
-def resume(run_path: Path, *, progress: Progress | None = None) -> None:
-    """Go on with the run in ``run_path`` from its last whole stage."""
+def resume(
+    run_path: Path, *, cycle_by_cycle: bool = False, progress: Progress | None = None
+) -> None:
+    """Go on with the run in ``run_path`` from its last whole stage; see `run_scene`."""
     folder = RunFolder(run_path)
     manifest = folder.manifest()
     scene = scene_load(run_path / "scene.toml", manifest["overrides"])
     with interruptible(), disk_full_named(run_path), folder.locked():
         refuse_differences(manifest["scene"], scene_record(scene), run_path)
         folder.event("resumed")
-        _run_all(folder, scene, manifest["control"], progress or Progress())
+        asked = folder.asked_on(cycle_by_cycle)
+        _run_all(folder, scene, manifest["control"], asked, progress or Progress())
 
 
-def _run_all(folder: RunFolder, scene: Scene, control: bool, progress: Progress) -> None:
+def _run_all(
+    folder: RunFolder, scene: Scene, control: bool, cycle_by_cycle: bool, progress: Progress
+) -> None:
     try:
-        run_variant(folder, scene, Variant(), progress)
+        run_variant(folder, scene, Variant(), progress, cycle_by_cycle)
         if control:
             run_variant(folder, scene, CONTROL, progress)
     except BaseException as error:
@@ -149,7 +161,13 @@ def _run_all(folder: RunFolder, scene: Scene, control: bool, progress: Progress)
         raise
 
 
-def run_variant(folder: RunFolder, scene: Scene, variant: Variant, progress: Progress) -> RunFolder:
+def run_variant(
+    folder: RunFolder,
+    scene: Scene,
+    variant: Variant,
+    progress: Progress,
+    cycle_by_cycle: bool = False,
+) -> RunFolder:
     """Run one variant of a scene: the procedure in ``folder`` itself, others in a folder inside.
 
     The control shares the stages before the first jump: the same work would give the same bits.
@@ -162,10 +180,11 @@ def run_variant(folder: RunFolder, scene: Scene, variant: Variant, progress: Pro
         here = RunFolder(folder.path / variant.name)
         here.path.mkdir(exist_ok=True)
         assert scene.procedure is not None
-        shared = scene.procedure.k_i + (0 if variant.perturbation else scene.procedure.k)
+        first = 0 if variant.perturbation else scene.procedure.window_cycles
+        shared = scene.procedure.k_i + first
         here.share_start(folder, shared)
         progress.say(variant.name.replace("_", " "))
-    run = Run(scene, here, engine, variant, progress)
+    run = Run(scene, here, engine, variant, progress, cycle_by_cycle)
     if variant.name == "procedure":
         run.clock = Clock(0.0)  # it bears the start-up of Python; the others come in its wake
     progress.start()

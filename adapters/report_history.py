@@ -134,12 +134,16 @@ def failed_jumps(folder: RunFolder) -> tuple[FailedJump, ...]:
     """The jumps of a run that were given up, in order."""
     events = folder.events()
     return tuple(
-        FailedJump(
-            stage, stage_place(stage)[0], why, lost_time(stage, folder.outcome(stage), events)
-        )
+        FailedJump(stage, stage_place(stage)[0], why, _lost_s(folder, stage, events))
         for stage in folder.stage_names()
         if (why := folder.failure(stage))
     )
+
+
+def _lost_s(folder: RunFolder, stage: str, events: Sequence[dict[str, Any]]) -> float:
+    """What a failed jump lost [s]: as it was noted where the jump was taken back."""
+    noted = folder.failure_details(stage).get("lost_s")
+    return lost_time(stage, folder.outcome(stage), events) if noted is None else float(noted)
 
 
 def lost_time(stage: str, outcome: Outcome | None, events: Sequence[dict[str, Any]]) -> float:

@@ -94,7 +94,11 @@ def _load(scene: Scene) -> Iterator[str]:
 
 
 def _jumps(scene: Scene) -> Iterator[str]:
-    if scene.procedure is None or scene.loading is None or not any(scene.procedure.h):
+    if (
+        scene.procedure is None
+        or scene.loading is None
+        or not (scene.procedure.tolerance or any(scene.procedure.h or ()))
+    ):
         return
     yield (
         "The dynamics of jumped cycles: positions follow the law "

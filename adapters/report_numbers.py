@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from adapters.jump_band import Band
+from adapters.jump_record import band_of_run
 from adapters.laws import law_named
 from adapters.procedure import CONTROL_STILL
 from adapters.report_error import (
@@ -64,6 +66,8 @@ class Numbers:
     cycles_computed: int
     settlement: float
     """At ``cycle`` [m]."""
+    band: Band | None
+    """Settlement of a run with a tolerance and how far it can be off."""
     speed_up_of_cycles: float
     """Cycles done over cycles computed: what the speed-up is without a control to measure it."""
     compared_at: int
@@ -141,6 +145,7 @@ def numbers_of(record: Record) -> Numbers:
         total_cycles=total,
         cycles_computed=computed,
         settlement=float(history.settlement[-1]) if cycle else nan,
+        band=band_of_run(run),
         speed_up_of_cycles=cycle / computed if computed else nan,
         compared_at=compared_at,
         error_rows=rows,

@@ -15,6 +15,7 @@ from adapters.report_bed import (
     sample,
     structure,
 )
+from adapters.report_control import control
 from adapters.report_error import Comparison
 from adapters.report_history import AVERAGED
 from adapters.report_html import (
@@ -34,6 +35,7 @@ from adapters.report_html import (
 from adapters.report_numbers import Numbers, variant_name
 from adapters.report_record import Record
 from adapters.report_verdict import FITTED, FULL, NOTHING, PROCEDURE
+from adapters.scene import Procedure
 
 
 def body(record: Record, numbers: Numbers, figures: Figures) -> Iterator[str]:
@@ -44,6 +46,7 @@ def body(record: Record, numbers: Numbers, figures: Figures) -> Iterator[str]:
         yield _settlement(numbers, figures)
         yield _error(record, numbers, figures)
         yield structure(figures)
+        yield control(record)
         yield penetration(record, numbers, figures)
         yield sample(figures)
     yield preparation(record, numbers, figures)
@@ -298,6 +301,13 @@ def _shown(value: object) -> str:
     return text if len(text) < 80 else text[:77] + "..."
 
 
+def _setting(procedure: Procedure) -> str:
+    """What rules the jumps, in words."""
+    if procedure.h is None:
+        return f"a tolerance of {per_cent(procedure.tolerance or 0.0)} a jump"
+    return f"<i>k</i> = {procedure.k} and <i>h</i> = {', '.join(map(str, procedure.h))}"
+
+
 def _fairness(record: Record, numbers: Numbers) -> str:
     """What the comparison can not show."""
     items = [
@@ -319,8 +329,7 @@ def _fairness(record: Record, numbers: Numbers) -> str:
     if procedure is not None and isfinite(numbers.settlement):
         items.append(
             f"The law “{escape(procedure.law)}”, grains moved “{escape(procedure.move)}”, "
-            f"<i>k</i><sub>i</sub> = {procedure.k_i}, "
-            f"<i>k</i> = {procedure.k} and <i>h</i> = {', '.join(map(str, procedure.h))} are one "
+            f"<i>k</i><sub>i</sub> = {procedure.k_i}, {_setting(procedure)} are one "
             "setting; other settings of the procedure are other points of the plot."
         )
     return section("Known limits of fairness", bullets(items))

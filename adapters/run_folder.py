@@ -67,6 +67,9 @@ FREE_LEAST = 2**20
 MANIFEST = ("scene", "overrides", "control")
 """What a manifest must hold for its run to be resumed."""
 
+ASKED_ON = "asked to go on cycle by cycle"
+"""Event of a run whose user wants every cycle computed where no jump is allowed."""
+
 STAGES = ("preparation", "jump", "window")
 """Kinds of stages; at one cycle in this order: a jump of h = 0 comes before its window."""
 
@@ -127,6 +130,12 @@ class RunFolder:
         with (self.path / "events.jsonl").open("a", encoding="utf-8") as stream:
             stream.write(json.dumps(line) + "\n")
 
+    def asked_on(self, now: bool) -> bool:
+        """Whether this run was asked to compute where it may not jump, ``now`` or ever before."""
+        if now and not any(event["event"] == ASKED_ON for event in self.events()):
+            self.event(ASKED_ON)
+        return now or any(event["event"] == ASKED_ON for event in self.events())
+
     def events(self) -> list[dict[str, Any]]:
         """All events; a last line cut short by a crash is left out."""
         path = self.path / "events.jsonl"
@@ -171,11 +180,22 @@ class RunFolder:
         except (ValueError, TypeError, KeyError):
             return "the record of its failure is damaged"
 
-    def give_up(self, name: str, why: str) -> None:
-        """Mark a jump as failed, for good: its attempt is not made again on resume."""
+    def failure_details(self, name: str) -> dict[str, Any]:
+        """What `give_up` was told of a failed jump besides the reason; empty when that is all."""
+        try:
+            text = (self.path / name / "failed.json").read_text(encoding="utf-8")
+            return {key: value for key, value in json.loads(text).items() if key != "why"}
+        except (OSError, ValueError, AttributeError):
+            return {}
+
+    def give_up(self, name: str, why: str, **details: object) -> None:
+        """Mark a jump as failed, for good: its attempt is not made again on resume.
+
+        ``details`` are kept with the reason; see `failure_details`.
+        """
         folder = self.path / name
         folder.mkdir(exist_ok=True)
-        write_atomically(folder / "failed.json", json.dumps({"why": why}) + "\n")
+        write_atomically(folder / "failed.json", json.dumps({"why": why, **details}) + "\n")
         self.event("jump failed", stage=name, why=why)
         self.settlement_write()
 

@@ -31,6 +31,9 @@ from adapters.radii import RadiusDistribution, grain_count_expected
 from adapters.scene_checks import COUNT_GREATEST, scene_problems, scene_warnings
 from adapters.state import FloatArray
 
+FIRST_WINDOW = 20
+"""Cycles that are fitted first where no k is given: the paper finds k > 20 enough."""
+
 TRACK_SAMPLES = 100
 """Least number of samples of the piston's record in a cycle."""
 
@@ -190,14 +193,19 @@ class Procedure(Table):
 
     k_i: Annotated[int, Field(ge=1)]
     """First cycles, computed before anything is fitted."""
-    k: Annotated[int, Field(ge=2)]
+    k: Annotated[int, Field(ge=2)] | None = None
     """Cycles computed and fitted before each jump."""
-    h: Annotated[
-        tuple[Annotated[int, Field(ge=0)], ...],
-        BeforeValidator(_as_schedule),
-        Field(strict=False, min_length=1),
-    ]
+    h: (
+        Annotated[
+            tuple[Annotated[int, Field(ge=0)], ...],
+            BeforeValidator(_as_schedule),
+            Field(strict=False, min_length=1),
+        ]
+        | None
+    ) = None
     """Cycles of the first, second, ... jump; the last repeats; 0 resubmits without a jump."""
+    tolerance: Annotated[float, Field(ge=1e-9, le=0.5, allow_inf_nan=False)] | None = None
+    """Error of the settlement gained in a jump over the total settlement, instead of k and h."""
     healing_cycles: Annotated[int, Field(ge=0)] = 5
     """Cycles computed after a jump and kept out of the fit."""
     law: str = "log"
@@ -210,15 +218,22 @@ class Procedure(Table):
 
     @model_serializer(mode="wrap")
     def _without_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Stored runs are older than the key ``move``: at its default it is left out."""
+        """Stored runs are older than the keys ``move`` and ``tolerance``: at their defaults they
+        are left out."""
+        newer = {"move": MOVE_DEFAULT, "tolerance": None}
         record: dict[str, Any] = whole(self)
         return {
-            key: value for key, value in record.items() if (key, value) != ("move", MOVE_DEFAULT)
+            key: value for key, value in record.items() if key not in newer or value != newer[key]
         }
 
     def jump_cycles(self, jump: int) -> int:
-        """Cycles of jump number ``jump`` = 0, 1, ..."""
-        return self.h[min(jump, len(self.h) - 1)]
+        """Cycles of jump number ``jump`` = 0, 1, ...; 0 where the jumps choose themselves."""
+        return self.h[min(jump, len(self.h) - 1)] if self.h else 0
+
+    @property
+    def window_cycles(self) -> int:
+        """Cycles of the first window that is fitted."""
+        return FIRST_WINDOW if self.k is None else self.k
 
 
 class Engine(Table):

@@ -30,6 +30,9 @@ ALTERNATIVES = (
 )
 """Pairs of keys of which a scene gives exactly one."""
 
+JUMP_KEYS, TOLERANCE_KEY = ("procedure.k", "procedure.h"), "procedure.tolerance"
+"""Cycles computed and jumped by hand, and what stands instead."""
+
 COUNT_GREATEST = 10**8
 """Most grains a scene may have."""
 
@@ -210,6 +213,21 @@ def _procedure(scene: _Values) -> Iterator[Problem]:
         yield Problem("procedure.total_cycles", f"must exceed k_i = {first}, is {total}")
 
 
+def _jumps(scene: _Values) -> Iterator[Problem]:
+    """Either k and h, or a tolerance by which they choose themselves."""
+    if not scene.has_table("procedure"):
+        return
+    given = [key for key in JUMP_KEYS if _present(scene, key)]
+    if _present(scene, TOLERANCE_KEY):
+        for key in given:
+            name = key.rpartition(".")[2]
+            yield Problem(key, f"with a tolerance {name} chooses itself: give one of the two")
+    else:
+        for key in JUMP_KEYS:
+            if key not in given:
+                yield Problem(key, "missing: give k and h, or a tolerance instead of both")
+
+
 def _launcher(scene: _Values) -> Iterator[Problem]:
     words = [Path(word).name for word in scene.get("engine.launcher") or ()]
     if scene.need("engine.name") == "yade" and set(words) & MPI_STARTERS:
@@ -317,6 +335,7 @@ CHECKS: tuple[Check, ...] = (
     _series,
     _partial_piston,
     _procedure,
+    _jumps,
     _launcher,
     _law,
     _move,

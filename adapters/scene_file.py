@@ -13,7 +13,14 @@ from pydantic_core import ErrorDetails
 
 from adapters.errors import SceneError, UsageError
 from adapters.scene import Scene, flat_keys
-from adapters.scene_checks import ALTERNATIVES, Problem, did_you_mean, scene_problems
+from adapters.scene_checks import (
+    ALTERNATIVES,
+    JUMP_KEYS,
+    TOLERANCE_KEY,
+    Problem,
+    did_you_mean,
+    scene_problems,
+)
 
 REMEDY = "correct these keys; scenes/karrech.toml (trackbed new karrech DIR) explains every key"
 
@@ -30,8 +37,9 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     """Read and check a scene file.
 
     ``overrides`` such as ``procedure.k=10`` replace or add keys, their values in TOML (a bare word
-    is a string); an override of one of two alternative keys removes the other.  A relative path of
-    a load series counts from the scene file's folder.
+    is a string); an override of one of two alternative keys removes the other, and one of
+    procedure.tolerance removes k and h.  A relative path of a load series counts from the scene
+    file's folder.
 
     Raises `UsageError` when the file or an override can not be read, `SceneError` with all that is
     wrong: file, line, dotted key and sentence of each.
@@ -148,6 +156,9 @@ def _override(data: dict[str, Any], override: str) -> str:
     for pair in ALTERNATIVES:
         if key in pair:
             table.pop(next(other for other in pair if other != key).rpartition(".")[2], None)
+    if key == TOLERANCE_KEY:
+        for other in JUMP_KEYS:
+            table.pop(other.rpartition(".")[2], None)
     return key
 
 

@@ -84,6 +84,8 @@ class Run:
     engine: Engine
     variant: Variant
     progress: Progress
+    cycle_by_cycle: bool = False
+    """Where no jump is allowed: True computes every cycle, False refuses."""
     clock: Clock = field(default_factory=Clock)
     computed_here: int = 0
 
@@ -179,13 +181,18 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
     return Bed(outcome.last_cycle, start, name, healing)
 
 
-def jump(run: Run, bed: Bed, h: int, attempt: int) -> Bed:
-    """Estimate the bed ``h`` cycles on (eqs 16, 17), relax it (eq. 29), hand it back at rest."""
+def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) -> Bed:
+    """Estimate the bed ``h`` cycles on (eqs 16, 17), relax it (eq. 29), hand it back at rest.
+
+    ``gain``: settlement of the mean grain [m] where that is not to be the scene's law's.
+    """
     name = f"jump_{bed.cycle:06d}_{attempt}"
     folder = run.folder.path / name
     if run.folder.outcome(name) is None:
         folder = _begin(run, name)
         before, target, piston_height = estimate(run, bed, h)
+        if gain is not None:
+            target, piston_height = settled_by(gain, before, target, piston_height)
         with run.clock.part("relax"):
             position, record = relaxed(run, before, target, piston_height)
         after = before.moved(
@@ -235,6 +242,24 @@ def estimate(run: Run, bed: Bed, h: int) -> tuple[State, FloatArray, float]:
         drop = min(drop, 0.0) if h and move.moves_piston else 0.0
     before = window.state(-1)
     return before, before.position + field_, before.piston_height + drop
+
+
+def settled_by(
+    gain: float, before: State, target: FloatArray, piston_height: float
+) -> tuple[FloatArray, float]:
+    """Estimated positions (n, 3) and piston height whose mean grain has settled by ``gain``, in m.
+
+    What lacks is a uniform vertical strain, zero at the lowest grain; the piston is never placed
+    above where it is.
+    """
+    lacking = before.position[:, 2].mean() - target[:, 2].mean() - gain
+    height = before.position[:, 2] - before.position[:, 2].min()
+    mean = float(height.mean()) or 1.0
+    target = target.copy()
+    target[:, 2] += lacking * height / mean if height.any() else lacking
+    above = before.piston_height - float(before.position[:, 2].min())
+    piston_height += float(lacking) * above / mean
+    return target, min(piston_height, before.piston_height)
 
 
 def relaxed(
@@ -350,5 +375,8 @@ def cycles_to_compute(run: Run, cycle: int) -> int:
     left = procedure.total_cycles - cycle
     if not run.variant.jumps:
         return left
-    block = procedure.k + procedure.healing_cycles
+    block = procedure.window_cycles + procedure.healing_cycles
+    if procedure.h is None:
+        jumps = [o.last_cycle - o.first_cycle for o in run.folder.outcomes() if o.stage == "jump"]
+        return round(left * block / (block + (jumps[-1] if jumps else 0)))
     return round(left * block / (block + procedure.h[-1]))

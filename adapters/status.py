@@ -11,6 +11,7 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
+from adapters.jump_record import band_of_run
 from adapters.report_history import cost_total
 from adapters.report_record import Record, Track, record_read
 
@@ -37,6 +38,8 @@ class Status:
     """Cycles done over cycles computed; the report gives the ratio of CPU times."""
     cpu_s: float
     """CPU time of all finished stages, preparation included [s]."""
+    band_m: tuple[float, float] | None
+    """Of a run with a tolerance: a full run would be between them with probability 0.9."""
     control_cycle: int | None
     """Cycles the full run beside it has done; None without one."""
     next: str
@@ -57,6 +60,7 @@ def status(run_folder: Path) -> Status:
     if state == "stopped" and _is_finished(record):
         state = "finished"
     ratio = cycle / computed if computed else nan
+    band = band_of_run(record.run)
     procedure = record.scene.procedure if record.scene.loading is not None else None
     verb = {"running": "status", "stopped": "resume", "finished": "report"}[state]
     last = record.run.events[-1] if record.run.events else {}
@@ -73,6 +77,7 @@ def status(run_folder: Path) -> Status:
         settlement_m=float(history.settlement[-1]) if cycle else None,
         speed_up_so_far=ratio if isfinite(ratio) else None,
         cpu_s=sum(cost_total(outcome.cost) for outcome in record.run.outcomes),
+        band_m=None if band is None else (band.low, band.high),
         control_cycle=_cycle(record.control) if record.control is not None else None,
         next=f"trackbed {verb} {shlex.quote(str(run_folder))}",
     )

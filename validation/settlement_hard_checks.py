@@ -133,7 +133,7 @@ def stands_still(run: Ended) -> Check:
     """
     procedure = run.scene.procedure
     assert procedure is not None
-    first, k = procedure.k_i, procedure.k
+    first, k = procedure.k_i, procedure.window_cycles
     drift = abs(float(run.settlement[-k:].mean() - run.settlement[first : first + k].mean()))
     bar = 0.01 * run.scene.sample.grain_radius.mean
     return Check("drift of the settlement behind k_i", drift, f"< {bar:.2g}", drift < bar, "m")

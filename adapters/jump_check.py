@@ -1,0 +1,192 @@
+"""Whether a jump stands: what it gained beside the rates computed behind it, and what follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import hypot, inf, log, sqrt
+
+import numpy as np
+from scipy.special import stdtrit
+
+from adapters.jump_control import (
+    GROWTH,
+    PROBABILITY,
+    SAFETY,
+    STATES,
+    Control,
+    Decision,
+    Settings,
+    curve_of,
+    joined,
+)
+from adapters.jump_forecast import forecast_of, gain_between
+from adapters.jump_rates import Stretch, block_count, noise_of, rates_of, state_trend
+from adapters.state import FloatArray
+
+ROLL_BACK = 2.0
+"""Realised error over the tolerance from which a jump is taken back."""
+CHANGED = 3.5
+"""Standard errors between a rate and its forecast from which the past is forgotten."""
+LEAST_ERROR = 0.01
+"""Realised error over the tolerance below which it counts as this much."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """A jump compared with the cycles computed behind it; in metres unless said otherwise."""
+
+    accepted: bool
+    gained: float
+    """Settlement of the bed from the jump's start to the end of its healing cycles."""
+    expected: float
+    """The same by the rates computed on both sides: the corrected gain."""
+    noise: float
+    """Standard error of ``expected`` from the noise of the rates."""
+    form: float
+    """Standard deviation of ``expected`` from the unknown exponent."""
+    error: float
+    """``gained`` less ``expected``, over the total settlement."""
+    rate_expected: float
+    """Rate forecast for the window [m a cycle]."""
+    rate_observed: float
+    deviation: float
+    """Their difference in standard errors."""
+    changed: bool
+    """The rate is another than forecast, beyond noise."""
+    sources: tuple[tuple[int, int, float, float], ...] = ()
+    """Of each stretch that ``expected`` rests on, the new one last: cycles done before it, its
+    cycles, their long-run variance [m^2 a cycle], derivative of ``expected`` by its gain."""
+    state_misses: tuple[tuple[str, float, float], ...] = ()
+    """Coordination number and elastic deflection: relative change against the forecast, and its
+    standard error."""
+
+
+def judge(
+    control: Control, decision: Decision, settings: Settings, stretch: Stretch, settlement: float
+) -> Check:
+    """Compare a jump with the window behind it.
+
+    ``stretch``: the window's cycles behind the healing ones; ``settlement`` [m] at its end.  The
+    gain that is expected is that of all rates on both sides; where the window's rate is another
+    than the forecast, beyond noise, that of a power law through the two rates.
+    """
+    past = noise_of(control.stretches)
+    before = forecast_of(rates_of(control.stretches))
+    start, end = float(control.cycle), float(stretch.first_cycle)
+    every = (*control.stretches, stretch)
+    noises = noise_of(every).variance
+    k = len(stretch.gain)
+    rate_expected = float(before.gain(end, float(stretch.last_cycle))) / k
+    known = np.array(before.half_widths(end, float(stretch.last_cycle), PROBABILITY)) / k
+    student = float(stdtrit(before.freedom, (1 + PROBABILITY) / 2))
+    error = sqrt(float(past.variance[-1]) / k + float((known / student) @ (known / student)))
+    difference = stretch.rate - rate_expected
+    deviation = difference / error if error > 0 else (inf if difference else 0.0)
+    changed = abs(deviation) > CHANGED
+    both = forecast_of(rates_of(every))
+    widths = both.half_widths(start, end, PROBABILITY)
+    student = float(stdtrit(both.freedom, (1 + PROBABILITY) / 2))
+    noise, form = (float(width) / student for width in widths)
+    expected, shares = float(both.gain(start, end)), both.shares(start, end)
+    if changed:
+        rate = float(before.rate @ before.weight)
+        expected = gain_between(rate, stretch.rate, start, end)
+        sides = float(before.weight @ before.error**2), float(noises[-1]) / k
+        noise = 0.5 * log(end / start) * sqrt(sides[0] * start**2 + sides[1] * end**2)
+        form = abs(expected - 0.5 * (end - start) * (rate + stretch.rate)) / 2
+        x = 0.5 * log(end / start)
+        blocks = len(both.influence) - len(before.influence)
+        shares = np.concatenate(
+            [x * start * (before.influence @ before.weight), np.full(blocks, x * end / k)]
+        )
+    gained = settlement - float(stretch.gain.sum()) - control.settlement
+    total = abs(control.settlement + gained)
+    error = gained - expected
+    relative = error / total if total > 0 else (inf if error else 0.0)
+    return Check(
+        accepted=abs(relative) <= ROLL_BACK * settings.tolerance,
+        gained=gained,
+        expected=expected,
+        noise=noise,
+        form=form,
+        error=relative,
+        rate_expected=rate_expected,
+        rate_observed=stretch.rate,
+        deviation=deviation,
+        changed=changed,
+        sources=sources_of(every, noises, shares),
+        state_misses=tuple(_state_miss(control, stretch, name) for name in STATES),
+    )
+
+
+def sources_of(
+    stretches: Sequence[Stretch], noises: FloatArray, shares: FloatArray
+) -> tuple[tuple[int, int, float, float], ...]:
+    """`Check.sources` from the derivatives by each block's gain, shape (b,)."""
+    blocks = [block_count(one) for one in stretches]
+    parts = np.split(shares, np.cumsum(blocks)[:-1])
+    return tuple(
+        (one.first_cycle, len(one.gain), float(noise), float(part.mean()))
+        for one, noise, part in zip(stretches, noises, parts, strict=True)
+    )
+
+
+def _state_miss(control: Control, stretch: Stretch, name: str) -> tuple[str, float, float]:
+    mean, slope, error = state_trend(control.stretches, name)
+    values = getattr(stretch, name)
+    if mean == 0 or not np.isfinite(values).all():
+        return name, 0.0, 0.0
+    cycles = [one.first_cycle + 1 + np.arange(len(one.gain)) for one in control.stretches]
+    centre = float(np.log(np.concatenate(cycles)).mean())
+    ahead = log(stretch.first_cycle + len(values) / 2) - centre
+    expected = mean + slope * ahead
+    return name, (float(values.mean()) - expected) / abs(mean), error * abs(ahead) / abs(mean)
+
+
+def accept(
+    control: Control,
+    decision: Decision,
+    check: Check,
+    settings: Settings,
+    stretch: Stretch,
+    settlement: float,
+) -> Control:
+    """The state after a jump that stands.
+
+    The next one may be longer by a step-size controller's factor (proportional and integral),
+    0.9 (tol / e)^(0.7/2) (e_last / tol)^(0.4/2), between 1/5 and `GROWTH`, where e is what the
+    realised error exceeds its own standard error by.  Where the rate changed, the past is
+    forgotten.
+    """
+    total = abs(control.settlement + check.gained)
+    certain = abs(check.error) * total - hypot(check.noise, check.form) if total else 0.0
+    error = max(certain / (settings.tolerance * total) if total else 0.0, LEAST_ERROR)
+    factor = SAFETY * error**-0.35 * control.last_error**0.2
+    cycles, curve = curve_of(stretch, settlement)
+    before = () if check.changed else control.stretches
+    past = ((), ()) if check.changed else (control.curve_cycle, control.curve_settlement)
+    return replace(
+        control,
+        cycle=stretch.last_cycle,
+        settlement=settlement,
+        stretches=joined(before, stretch),
+        curve_cycle=past[0] + cycles,
+        curve_settlement=past[1] + curve,
+        last_jump=decision.jump,
+        longest=decision.jump * min(max(factor, 0.2), GROWTH),
+        last_error=error,
+        attempts=0,
+        window=len(stretch.gain),
+    )
+
+
+def reject(control: Control, decision: Decision, error: float, settings: Settings) -> Control:
+    """The state before a jump that was taken back: the next one is shorter.
+
+    By 0.9 (tol / e)^(1/2), between 1/10 and 1/2; ``error`` is the realised one, not a number where
+    the jump failed otherwise.
+    """
+    ratio = settings.tolerance / abs(error) if np.isfinite(error) and error else 0.0
+    factor = min(max(SAFETY * sqrt(ratio), 0.1), 0.5) if ratio else 0.5
+    return replace(control, longest=decision.jump * factor, attempts=control.attempts + 1)

@@ -1,0 +1,171 @@
+"""A run whose jumps choose themselves: carries out what `adapters.jump_control` decides.
+
+Nothing is kept between two stages but the run folder: a run that is resumed goes through the same
+decisions on the finished stages, and finds there what it would do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from math import isfinite, nan
+from typing import Any
+
+import numpy as np
+
+from adapters import stages
+from adapters.errors import EngineFailed, JumpRefused, NotConverged, NotCredible
+from adapters.jump_check import accept, judge, reject
+from adapters.jump_control import Control, Decision, Settings, begin, decide, observe
+from adapters.jump_rates import Stretch
+from adapters.report_history import cost_total
+from adapters.run_folder import disk_full_named
+from adapters.stages import Bed, Run
+
+DECISION, CHECK = "decision", "jump checked"
+"""Events of a controlled run: what was decided and why; a jump beside what was computed behind."""
+
+
+def settle_controlled(run: Run, bed: Bed) -> Bed:
+    """From the bed after k_i cycles to the end: windows and jumps as the controller decides.
+
+    Raises `JumpRefused` where the bed ratchets or collapses, unless the run was asked to go on.
+    """
+    procedure = run.scene.procedure
+    assert procedure is not None
+    assert procedure.tolerance is not None
+    settings = Settings(
+        procedure.tolerance, procedure.healing_cycles, procedure.total_cycles, run.cycle_by_cycle
+    )
+    journal = Journal(run)
+    rows = _rows(run, bed)
+    control = begin(bed.cycle, float(rows[-1]["settlement"]))
+    while (decision := decide(control, settings)).action != "end":
+        journal.write(DECISION, decision.cycle, decision.attempt, asdict(decision))
+        if decision.action == "refuse":
+            raise refused(run, decision)
+        if decision.action == "compute":
+            bed = stages.compute(run, bed, decision.window)
+            rows = _rows(run, bed)
+            stretch = stretch_of(rows, control.settlement)
+            control = observe(control, stretch, float(rows[-1]["settlement"]))
+        else:
+            bed, control = jump_and_check(run, bed, control, decision, settings, journal)
+    return bed
+
+
+def jump_and_check(
+    run: Run, bed: Bed, control: Control, decision: Decision, settings: Settings, journal: Journal
+) -> tuple[Bed, Control]:
+    """The jump, the window behind it, and the verdict; a jump taken back leaves the bed before it.
+
+    The bed before a jump is a finished stage and stays; the window behind a jump that does not
+    stand goes to ``discarded/``, what it cost to the jump's record.
+    """
+    name = f"jump_{bed.cycle:06d}_{decision.attempt}"
+    if run.folder.failure(name):
+        error = run.folder.failure_details(name).get("error", nan)
+        return bed, reject(control, decision, float(error), settings)
+    healing = settings.healing
+    try:
+        with disk_full_named(run.folder.path):
+            moved = stages.jump(run, bed, decision.jump, decision.attempt, decision.gain)
+            after = stages.compute(run, moved, healing + decision.window, healing)
+    except (EngineFailed, NotCredible, NotConverged) as error:
+        if isinstance(error, EngineFailed) and error.from_outside:
+            raise
+        run.folder.give_up(name, str(error))
+        run.progress.say(f"the jump of {decision.jump} cycles from {bed.cycle} failed: {error}")
+        return bed, reject(control, decision, nan, settings)
+    rows = _rows(run, after)
+    settlement = float(rows[-1]["settlement"])
+    healed = rows[healing - 1] if healing else _jump_row(run, name)
+    stretch = stretch_of(rows[healing:], float(healed["settlement"]))
+    check = judge(control, decision, settings, stretch, settlement)
+    told = {"jump": decision.jump, "window": healing + decision.window, **asdict(check)}
+    journal.write(CHECK, decision.cycle, decision.attempt, told)
+    if check.accepted:
+        return after, accept(control, decision, check, settings, stretch, settlement)
+    why = (
+        f"taken back: the bed gained {1e6 * check.gained:.3g} um, and the rates on both sides give "
+        f"{1e6 * check.expected:.3g} um: an error of {100 * check.error:+.3g} % of the total"
+    )
+    outcomes = [run.folder.outcome(stage) for stage in (name, after.window)]
+    lost_s = sum(cost_total(outcome.cost) for outcome in outcomes if outcome is not None)
+    lost = {"lost_s": lost_s, "lost_cycles": healing + decision.window}
+    run.folder.give_up(name, why, error=check.error, **lost)
+    run.folder.discard(run.folder.path / after.window)
+    run.folder.settlement_write()
+    run.progress.say(f"the jump of {decision.jump} cycles from {bed.cycle} was {why}")
+    return bed, reject(control, decision, check.error, settings)
+
+
+def stretch_of(rows: list[dict[str, Any]], before: float) -> Stretch:
+    """Cycles of a table's ``rows``; ``before``: settlement at the end of the cycle before [m]."""
+    settlement = np.array([before, *(row["settlement"] for row in rows)], float)
+    return Stretch(
+        int(rows[0]["cycle"]) - 1,
+        np.diff(settlement),
+        np.array([row["coordination_number"] for row in rows], float),
+        np.array([row["elastic_deflection"] for row in rows], float),
+    )
+
+
+def refused(run: Run, decision: Decision) -> JumpRefused:
+    """The error of a run that may not jump."""
+    return JumpRefused(
+        f"up to cycle {decision.cycle} {decision.why}: it goes as N^(beta - 1) with beta = "
+        f"{decision.exponent:.2f}, and no law says when that ends",
+        where=str(run.folder.path),
+        remedy="every cycle so far is kept; to compute the others one by one: "
+        "trackbed resume RUN --cycle-by-cycle",
+        regime=decision.regime,
+        parameters={"exponent": decision.exponent},
+    )
+
+
+class Journal:
+    """Events of a controlled run, each once, however often the run was resumed."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._known = {
+            (event["event"], event["cycle"], event["attempt"], event.get("action"))
+            for event in run.folder.events()
+            if event["event"] in (DECISION, CHECK)
+        }
+        self._silent: set[str] = set()
+
+    def write(self, what: str, cycle: int, attempt: int, content: Mapping[str, Any]) -> None:
+        """One event, unless it is there; a run that can not jump says so on the screen, once."""
+        key = (what, cycle, attempt, content.get("action"))
+        if key in self._known:
+            return
+        self._known.add(key)
+        details = {name: _finite(value) for name, value in content.items()}
+        self._run.folder.event(what, **(details | {"cycle": cycle, "attempt": attempt}))
+        why = str(content.get("why", ""))
+        if what == DECISION and content["action"] == "compute" and content["binding"]:
+            kind = why.partition(":")[0]
+            if kind not in self._silent:
+                self._run.progress.say(f"cycle {cycle}: {why}; computing on")
+            self._silent.add(kind)
+
+
+def _finite(value: Any) -> Any:
+    """The same with None for numbers that are not finite, which JSON does not have."""
+    if isinstance(value, list | tuple):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _rows(run: Run, bed: Bed) -> list[dict[str, Any]]:
+    outcome = run.folder.outcome(bed.window)
+    assert outcome is not None
+    return outcome.rows
+
+
+def _jump_row(run: Run, name: str) -> dict[str, Any]:
+    outcome = run.folder.outcome(name)
+    assert outcome is not None
+    return outcome.rows[-1]

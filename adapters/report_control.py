@@ -1,0 +1,84 @@
+"""The section of a report on jump control: every decision, why this length, what came of it."""
+
+from __future__ import annotations
+
+from html import escape
+from math import inf
+
+from adapters.jump_band import PROBABILITY
+from adapters.jump_record import band_of_run, checks_of, decisions_of
+from adapters.report_html import micrometres, paragraph, per_cent, plain, section, table
+from adapters.report_record import Record
+
+
+def control(record: Record) -> str:
+    """Decisions and checks of a controlled run; empty for another."""
+    procedure, track = record.scene.procedure, record.run
+    band = band_of_run(track)
+    if procedure is None or procedure.tolerance is None or band is None:
+        return ""
+    checks = checks_of(track.events)
+    rows = []
+    for decision in decisions_of(track.events):
+        check = checks.get((decision["cycle"], decision["attempt"]), {})
+        check = check if decision["action"] == "jump" else {}
+        limits = [(name, inf if value is None else value) for name, value in decision["limits"]]
+        others = ", ".join(f"{name} {value:.0f}" for name, value in limits if value < 1e6)
+        bound = "" if decision["bound"] is None else plain(decision["bound"], "d")
+        rows.append(
+            (
+                plain(decision["cycle"], "d"),
+                escape(decision["action"]),
+                plain(decision["jump"], "d") if decision["jump"] else "",
+                plain(decision["window"], "d"),
+                bound,
+                micrometres(decision["gain"]) if decision["jump"] else "",
+                micrometres(decision["half_width"]) if decision["jump"] else "",
+                per_cent(check["error"], "+.2f") if check else "",
+                plain(check["deviation"], "+.1f") if check else "",
+                ("stands" if check["accepted"] else "taken back") if check else "",
+                escape(decision["why"]) + (f" ({escape(others)})" if others else ""),
+            )
+        )
+    definition = paragraph(
+        f"Tolerance: {per_cent(procedure.tolerance)}, on the error of the settlement gained from "
+        "the start of a jump to the end of its healing cycles, over the total settlement since "
+        "the preparation. The realised error compares that gain with the rates computed on both "
+        "sides of the jump; above twice the tolerance the jump is taken back. Jumps taken back: "
+        f"{sum(not check['accepted'] for check in checks.values())}."
+    )
+    ends = f"{micrometres(band.low)} to {micrometres(band.high)} µm"
+    mean = f"{micrometres(band.mean_low)} to {micrometres(band.mean_high)} µm"
+    return section(
+        "Jump control",
+        definition,
+        paragraph(
+            f"At cycle {band.cycle} the bed has settled by {micrometres(band.settlement)} µm; with "
+            f"the errors observed behind its jumps taken out, {micrometres(band.corrected)} µm. "
+            f"With probability {PROBABILITY:g} a full run from the same state ends within {ends}, "
+            f"the mean of many within {mean}. Standard deviations: "
+            f"{micrometres(band.jumps)} µm from the noise of the computed rates, "
+            f"{micrometres(band.laws)} µm from the form of the law, {micrometres(band.scatter)} µm "
+            "from the bursts of the other run."
+        ),
+        table(
+            "Every decision. <i>k</i>: cycles computed next; beside it the paper's lower bound for "
+            "independent increments (eq. 15). The last column names the rule that set <i>h</i>, "
+            "and the longest jump by each.",
+            (
+                "cycle",
+                "",
+                "<i>h</i>",
+                "<i>k</i>",
+                "eq. 15",
+                "gain expected (µm)",
+                "half-width (µm)",
+                "realised error",
+                "rate off by (standard errors)",
+                "",
+                "why",
+            ),
+            rows,
+            words=frozenset({10}),
+        ),
+    )

@@ -1,0 +1,402 @@
+"""The controller of jumps on curves with known laws: noise, limits, verdicts, hard cases."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, log, nan
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from adapters.jump_band import band_of
+from adapters.jump_check import accept, judge, reject
+from adapters.jump_control import (
+    GROWTH,
+    LONGEST_WINDOW,
+    Control,
+    Decision,
+    Settings,
+    begin,
+    decide,
+    observe,
+)
+from adapters.jump_forecast import forecast_of, gain_between, laws_gain
+from adapters.jump_rates import (
+    Stretch,
+    cycles_bound,
+    long_run_variance,
+    noise_of,
+    rates_of,
+    slope_trend,
+)
+from adapters.state import FloatArray
+from validation.jump_curves import CURVES, Curve, play
+
+SETTINGS = Settings(tolerance=0.02, healing=5, total_cycles=2000)
+BURSTY = 0.35
+
+
+def stretch(first: int, gain: FloatArray) -> Stretch:
+    unknown = np.full(len(gain), nan)
+    return Stretch(first, gain, unknown, unknown)
+
+
+def of_law(first: int, k: int, beta: float, rate: float = 1e-6, scale: float = 100.0) -> Stretch:
+    """Gains of du/dN = rate (N / scale)^(beta - 1), exactly."""
+    cycle = first + np.arange(k + 1.0)
+    u = np.log(cycle) if beta == 0 else cycle**beta / beta
+    return stretch(first, np.diff(u) * rate * scale ** (1 - beta))
+
+
+# --- rates and their noise ------------------------------------------------------------------
+
+
+def test_long_run_variance_of_an_autoregression() -> None:
+    """S = sigma^2 / (1 - rho)^2 of x_t = rho x_(t-1) + sigma e_t; Bartlett takes a little less."""
+    random, rho = np.random.default_rng(1), 0.5
+    series = lfilter([1.0], [1.0, -rho], random.standard_normal((400, 400)), axis=0)
+    found = np.mean([long_run_variance(series[:, i]) for i in range(400)])
+    # Bartlett's weights, L = 20, miss 2 sum_l (l / L) gamma_l; a trend of two parameters takes
+    # 2 S / k from each of the L covariances that are added.
+    missed = 2 / (1 - rho**2) * rho / (20 * (1 - rho) ** 2)
+    expected = (1 / (1 - rho) ** 2 - missed) * (1 - 2 * 20 / 400)
+    assert found == pytest.approx(expected, rel=0.05)
+
+
+def test_a_straight_trend_is_no_noise() -> None:
+    """Gains that fall in a straight line have no long-run variance but round-off."""
+    assert long_run_variance(np.linspace(2.0, 1.0, 30)) < 1e-25
+
+
+def test_quiet_windows_are_not_believed_more() -> None:
+    """Of a bed with rare bursts the rate is not biased, though most windows see none.
+
+    40 beds of 8 windows: the mean of the forecast rates is the true one within two standard errors.
+    Weights by each window's own scatter would make it 25 % too slow.
+    """
+    random = np.random.default_rng(4)
+    found = []
+    for _ in range(40):
+        gains = [random.exponential(5.0, 10) * (random.random(10) < 0.2) for _ in range(8)]
+        beds = [
+            stretch(n, 1e-3 / (n + 5) * gain)
+            for n, gain in zip(range(1000, 1160, 20), gains, strict=True)
+        ]
+        forecast = forecast_of(rates_of(beds))
+        found.append(float(forecast.rate @ forecast.weight))
+    error = float(np.std(found)) / 40**0.5
+    assert np.mean(found) == pytest.approx(1e-3 / 1150, abs=2 * error)
+
+
+def test_noise_in_proportion_to_the_rate_is_told_from_constant_noise() -> None:
+    """Ten times slower, ten times quieter, or as loud as before: the last S says which."""
+    random = np.random.default_rng(2)
+    for power in (1, 0):
+        beds = [
+            stretch(n, 1e-4 / n * (1 + 0.0 * n) + 1e-6 * (100 / n) ** power * noise)
+            for n in (100, 200, 400, 1000)
+            for noise in [random.standard_normal(30)]
+        ]
+        noise = noise_of(beds).variance
+        ratio = (100 / 1000) ** (2 * power)
+        assert noise[-1] / noise[0] == pytest.approx(ratio, rel=0.35)
+
+
+def test_a_noisy_slope_is_no_curvature() -> None:
+    """w constant with noise: the trend stays within its error; a power law's beyond it."""
+    random = np.random.default_rng(3)
+    noisy = [
+        stretch(n, 1e-4 / (n + np.arange(20.0)) * (1 + 0.3 * random.standard_normal(20)))
+        for n in (100, 150, 220)
+    ]
+    slope, error = slope_trend(rates_of(noisy))
+    assert abs(slope) < 2 * error
+    slope, error = slope_trend(rates_of([of_law(n, 20, 0.5) for n in (100, 150, 220)]))
+    assert slope > 5 * error
+
+
+@pytest.mark.parametrize("beta", [-1.0, 0.0, 0.5, 1.0])
+def test_forecast_of_a_power_law(beta: float) -> None:
+    """Four windows over a doubling of N, without noise, give the gain of the next half doubling."""
+    beds = [of_law(n, 20, beta) for n in (100, 130, 160, 200)]
+    forecast = forecast_of(rates_of(beds))
+    truth = float(of_law(220, 110, beta).gain.sum())
+    noise, form = forecast.half_widths(220, 330.0, 0.9)
+    # laws are known to 2 % of a block (LAW_ERROR), so beta only to some tenths
+    assert float(forecast.gain(220, 330.0)) == pytest.approx(truth, rel=0.02)
+    assert abs(float(forecast.gain(220, 330.0)) - truth) < float(np.hypot(noise, form))
+
+
+def test_units_do_not_matter() -> None:
+    """Millimetres instead of metres, ten times the cycles: the same gain and the same weights."""
+    beds = [of_law(n, 20, 0.3) for n in (100, 200)]
+    scaled = [stretch(one.first_cycle, 1e3 * one.gain) for one in beds]
+    one, other = (forecast_of(rates_of(of)) for of in (beds, scaled))
+    np.testing.assert_allclose(other.weight, one.weight, rtol=1e-9)
+    assert float(other.gain(220, 300.0)) == pytest.approx(1e3 * float(one.gain(220, 300.0)))
+
+
+def test_gain_between_is_exact_for_powers() -> None:
+    """Rates at both ends of a power law give its integral; of opposite signs, the trapezoid."""
+    for beta in (-1.5, -0.4, 0.7, 1.0):
+        truth = (300**beta - 100**beta) / beta
+        found = gain_between(100 ** (beta - 1), 300 ** (beta - 1), 100, 300)
+        assert found == pytest.approx(truth, rel=1e-9)
+    assert gain_between(1 / 100, 1 / 300, 100, 300) == pytest.approx(log(3))
+    assert gain_between(-1 / 100, 1 / 300, 100, 300) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_slow_laws_of_a_curve() -> None:
+    """On a noise-free logarithm all laws that hold it agree within a few per cent of the gain."""
+    cycle = np.arange(20.0, 101)
+    low, high = laws_gain(cycle, np.log(cycle), np.array([150.0]), 0.9)
+    assert low[0] < log(1.5) < high[0]
+    assert high[0] - low[0] < 0.2 * log(1.5)
+    low, high = laws_gain(cycle[:5], cycle[:5], np.array([10.0]), 0.9)
+    assert (low[0], high[0]) == (-inf, inf)
+
+
+def test_paper_bound_is_told() -> None:
+    """(b - a)^2 / (2 eps^2) ln(2 / p): range 2, eps 1, p 0.1 is 5.99, so 6; none for eps 0."""
+    gains = stretch(100, np.array([1.0, -1.0, 1.0, -1.0]))
+    assert cycles_bound(gains, 1.0, 0.9) == 6
+    assert cycles_bound(gains, 0.0, 0.9) is None
+
+
+# --- decisions ------------------------------------------------------------------------------
+
+
+def known(*stretches: Stretch, settlement: float = 4e-4) -> Control:
+    """A state with these stretches computed."""
+    control = begin(stretches[0].first_cycle, settlement)
+    for one in stretches:
+        control = observe(replace(control, cycle=one.first_cycle), one, settlement)
+    return control
+
+
+def test_first_jump_is_no_longer_than_its_window() -> None:
+    """Twenty cycles of a logarithm: the first jump skips twenty at most, the next twice that."""
+    decision = decide(known(of_law(50, 20, 0.0)), SETTINGS)
+    assert decision.action == "jump"
+    assert decision.jump <= 20
+    assert decision.gain == pytest.approx(1e-4 * log((70 + decision.jump) / 70), rel=0.02)
+    limits = dict(decision.limits)
+    assert limits["growth"] == 20
+    assert limits[decision.binding] == min(limits.values())
+
+
+def test_decision_is_a_function_of_what_was_seen() -> None:
+    """The same observations give the same decision, to the last bit."""
+    control = known(of_law(50, 20, 0.0), of_law(90, 20, 0.1))
+    assert decide(control, SETTINGS) == decide(control, SETTINGS)
+
+
+def test_noise_shortens_the_jump_and_the_half_width_holds_it() -> None:
+    """Ten times the noise, a shorter jump; the half-width is within the tolerance in both."""
+    random, lengths = np.random.default_rng(6), []
+    burst = random.standard_normal(40)
+    for noise in (0.1, 1.0):
+        gain = 1e-4 / (100 + np.arange(40.0)) * (1 + noise * burst)
+        control = replace(known(stretch(100, gain)), last_jump=10_000)
+        decision = decide(control, replace(SETTINGS, total_cycles=10_000))
+        lengths.append(decision.jump)
+        assert decision.half_width <= 0.02 * (4e-4 + decision.gain)
+    assert lengths[1] < lengths[0] / 2
+
+
+def test_slope_rule() -> None:
+    """The longest jump by the slope is where g x^2 / 2 reaches 0.9 of the tolerance's error."""
+    beds = [of_law(n, 20, 0.4) for n in (50, 80, 120)]
+    control = known(*beds)
+    trend, error = slope_trend(rates_of(beds))
+    longest = dict(decide(control, SETTINGS).limits)["slope"]
+    missed = 0.5 * (trend - error) * log(1 + longest / 140) ** 2
+    gain = float(of_law(140, int(longest), 0.4).gain.sum())
+    # lengths are tried in steps of about a tenth, so x^2 in steps of about a fifth
+    assert 0.75 < missed / (0.9 * 0.02 * (4e-4 + gain)) <= 1.02
+
+
+@pytest.mark.parametrize(
+    ("beta", "regime"),
+    [(1.0, "ratcheting"), (2.5, "collapse"), (0.0, "steady"), (-1.5, "shakedown")],
+)
+def test_regimes(beta: float, regime: str) -> None:
+    """Constant and growing rates refuse, or compute on when asked; slow ones jump."""
+    control = known(*(of_law(n, 20, beta) for n in (50, 80, 120, 180, 270)))
+    decision = decide(control, SETTINGS)
+    assert decision.regime == regime
+    refuses = regime in ("ratcheting", "collapse")
+    assert decision.action == ("refuse" if refuses else "jump")
+    asked = decide(control, replace(SETTINGS, cycle_by_cycle=True))
+    assert asked.action == ("compute" if refuses else "jump")
+
+
+def test_no_jump_pays_at_a_tolerance_of_1e_minus_6() -> None:
+    """It says so, and windows grow to the longest."""
+    decision = decide(known(of_law(50, 20, 0.2)), replace(SETTINGS, tolerance=1e-6))
+    assert (decision.action, decision.window) == ("compute", 40)
+    assert decision.why.startswith("no jump pays: ")
+    run = play(Curve(CURVES["power"]), 1, replace(SETTINGS, tolerance=1e-6, total_cycles=600))
+    assert run.computed == 600
+    assert max(one.window for one in run.decisions) == LONGEST_WINDOW
+
+
+def test_a_state_that_drifts_limits_the_jump() -> None:
+    """Coordination number up 10 % a unit of ln N: half a unit is allowed, (e^0.5 - 1) N."""
+    cycle = 100 + 1 + np.arange(40.0)
+    gain = 1e-4 / cycle
+    bed = Stretch(100, gain, 4 * (1 + 0.1 * np.log(cycle / 120)), np.full(40, 1e-5))
+    limits = dict(decide(replace(known(bed), last_jump=10_000), SETTINGS).limits)
+    assert limits["state"] == pytest.approx(140 * (np.exp(0.5) - 1), rel=0.02)
+
+
+# --- verdicts -------------------------------------------------------------------------------
+
+
+def jumped(control: Control, decision: Decision, after: Stretch) -> float:
+    """Settlement behind a jump whose healing cycles gain as the law says."""
+    healing = after.first_cycle - control.cycle - decision.jump
+    return control.settlement + decision.gain + healing * after.rate + float(after.gain.sum())
+
+
+def test_a_jump_that_went_as_forecast_stands() -> None:
+    """Log before and behind: no error but the law's, and the next jump may be longer."""
+    control = known(of_law(50, 20, 0.0))
+    decision = decide(control, SETTINGS)
+    after = of_law(70 + decision.jump + 5, 20, 0.0)
+    settlement = jumped(control, decision, after)
+    check = judge(control, decision, SETTINGS, after, settlement)
+    assert check.accepted
+    assert not check.changed
+    assert abs(check.error) < 0.1 * SETTINGS.tolerance
+    grown = accept(control, decision, check, SETTINGS, after, settlement)
+    assert (grown.cycle, grown.settlement) == (after.last_cycle, settlement)
+    assert decision.jump < grown.longest <= GROWTH * decision.jump
+    assert len(grown.stretches) == 2
+
+
+def test_a_rate_that_changed_is_seen_and_the_past_forgotten() -> None:
+    """Ten times the rate behind the jump: 0.5 h dv off, taken back where that exceeds 2 tol."""
+    control = known(of_law(50, 20, 0.0))
+    decision = decide(control, SETTINGS)
+    after = of_law(70 + decision.jump + 5, 20, 0.0, rate=1e-5)
+    settlement = jumped(control, decision, of_law(after.first_cycle, 20, 0.0))
+    settlement += float(after.gain.sum()) * 0.9
+    check = judge(control, decision, SETTINGS, after, settlement)
+    assert check.changed
+    assert not check.accepted
+    before, behind = 1e-4 / 70, after.rate
+    expected = gain_between(before, behind, 70, after.first_cycle)
+    assert check.expected == pytest.approx(expected, rel=0.05)
+    shorter = reject(control, decision, check.error, SETTINGS)
+    assert shorter.cycle == control.cycle
+    assert 0.1 * decision.jump <= shorter.longest <= 0.5 * decision.jump
+    assert decide(shorter, SETTINGS).attempt == 2
+    forgotten = accept(control, decision, check, SETTINGS, after, settlement)
+    assert forgotten.stretches == (after,)
+
+
+def test_a_shock_behind_the_jump_counts_as_its_error() -> None:
+    """The bed drops by 5 % of its total in the healing cycles: the realised error is that."""
+    control = known(of_law(50, 20, 0.0))
+    decision = decide(control, SETTINGS)
+    after = of_law(70 + decision.jump + 5, 20, 0.0)
+    settlement = jumped(control, decision, after) + 0.05 * control.settlement
+    check = judge(control, decision, SETTINGS, after, settlement)
+    total = settlement - float(after.gain.sum())
+    assert check.error == pytest.approx(0.05 * control.settlement / total, rel=0.1)
+    assert not check.accepted
+
+
+def test_failed_jumps_halve_and_end_in_computing() -> None:
+    """Four failures from one state, then cycles are computed."""
+    control = known(of_law(50, 20, 0.0))
+    lengths = []
+    for _ in range(4):
+        decision = decide(control, replace(SETTINGS, healing=0))
+        lengths.append(decision.jump)
+        control = reject(control, decision, nan, SETTINGS)
+    assert lengths == sorted(lengths, reverse=True)
+    assert decide(control, SETTINGS).action == "compute"
+
+
+# --- whole runs on curves -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["log", "hyperbolic"])
+def test_realised_errors_within_the_tolerance(name: str) -> None:
+    """Five seeds to 1,000 cycles: at least 90 % of the jumps, and no end off by more than 10 %.
+
+    Against the mean law, which no run can know; bursts of 1.5 times the rate are a third of it.
+    """
+    settings = replace(SETTINGS, total_cycles=1000)
+    runs = [play(Curve(CURVES[name], BURSTY, seed), 50, settings) for seed in range(5)]
+    errors = np.concatenate([run.errors for run in runs])
+    assert len(errors) > 40
+    assert np.mean(errors <= SETTINGS.tolerance) >= 0.9
+    inside = 0
+    for run in runs:
+        band = band_of(1000, run.settlement, run.checks)
+        inside += band.mean_low <= run.truth <= band.mean_high
+        assert run.computed < 600
+        assert abs(run.settlement / run.truth - 1) < 0.1
+    assert inside >= 4  # a band of 90 %
+
+
+def test_load_step_in_mid_run() -> None:
+    """From cycle 600 on the bed settles anew, ten times as fast: it is seen and computed."""
+    run = play(Curve(CURVES["load step"], 0.2, 3), 50, SETTINGS)
+    assert run.taken_back or any(check["changed"] for check in run.checks)
+    near = [one.cycle for one in run.decisions if 550 < one.cycle < 1000]
+    assert len(near) >= 4
+    assert abs(run.settlement / run.truth - 1) < 0.1
+
+
+def test_collapse_is_refused() -> None:
+    """A rate that grows as N^1.5 ends the run; asked, it is computed to its end."""
+    curve = Curve(CURVES["collapse"], 0.2, 1)
+    assert play(curve, 50, SETTINGS).refused
+    asked = play(curve, 50, replace(SETTINGS, cycle_by_cycle=True, total_cycles=500))
+    assert not asked.refused
+    assert asked.computed >= 450
+
+
+def test_noise_greater_than_the_slope() -> None:
+    """Readings off by twenty times a cycle's gain: jumps are few or none, and errors are held."""
+    run = play(Curve(CURVES["log"], 0.0, 2, jitter=2e-5), 100, replace(SETTINGS, total_cycles=1500))
+    assert run.settlement == pytest.approx(run.truth, rel=0.1)
+    if len(run.errors):
+        assert np.mean(run.errors <= SETTINGS.tolerance) >= 0.8
+
+
+def test_zero_settlement_jumps_to_the_end() -> None:
+    """A bed at rest is at rest: no error, the longest jumps, and no division by zero."""
+    run = play(Curve(CURVES["rest"]), 50, SETTINGS)
+    assert run.settlement == 0
+    assert run.computed < 400
+    assert not run.taken_back
+
+
+def test_a_jump_a_hundred_times_its_window() -> None:
+    """Late in a bed that shakes down, h / k comes to 100."""
+    settings = replace(SETTINGS, total_cycles=20_000)
+    run = play(Curve(CURVES["hyperbolic"]), 50, settings)
+    assert max(one.jump / one.window for one in run.decisions if one.jump) >= 100
+    assert run.settlement == pytest.approx(run.truth, rel=0.1)
+
+
+def test_band_of_two_jumps() -> None:
+    """By hand: 1 um off each, laws 2 each; three stretches of 4 cycles, S = 1, healing of 1.
+
+    Derivatives by the stretches, their own gains included: 1 + 1/2, 1 + 1/2 + 1/4, 1 + 1/4.
+    """
+    known = {"gained": 1.0, "expected": 2.0, "form": 2.0, "jump": 10, "window": 5}
+    first = known | {"sources": [(10, 4, 1.0, 0.5), (25, 4, 1.0, 0.5)]}
+    second = known | {"sources": [(25, 4, 1.0, 0.25), (40, 4, 1.0, 0.25)]}
+    band = band_of(44, 50.0, [first, second])
+    assert band.corrected == 52
+    assert band.jumps**2 == pytest.approx(2 + 4 * (1.5**2 + 1.75**2 + 1.25**2))
+    half = 1.6448536
+    assert band.mean_high - 52 == pytest.approx(half * (band.jumps**2 + 4**2) ** 0.5)
+    assert band.high - 52 == pytest.approx(half * (band.jumps**2 + 4**2 + 30) ** 0.5)

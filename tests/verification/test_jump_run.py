@@ -1,0 +1,220 @@
+"""Whole controlled runs on the fake engine: to the end, taken back, refused, killed, reported."""
+
+from __future__ import annotations
+
+import csv
+import json
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trackbed
+from adapters import engine_fake, procedure, stages
+from adapters.engine_fake import FakeBed
+from adapters.errors import JumpRefused, SceneError
+from adapters.jump_record import checks_of, decisions_of
+from adapters.progress import Progress
+from adapters.report import report_write
+from adapters.report_control import control
+from adapters.report_record import record_read
+from adapters.run_folder import RunFolder
+from adapters.scene_file import scene_load
+from adapters.status import status
+from scenes import scene_path
+from tests.forked_commands import Commands
+from tests.small_bed import small_bed
+from validation.jump_curves import CURVES
+
+QUIET = Progress(quiet=True)
+
+
+def small(folder: Path, total: int = 300, tolerance: float = 0.02) -> Path:
+    """The scene of a small bed with a tolerance."""
+    text = small_bed(k=2, h=2, total_cycles=total)
+    text = text.replace("k = 2\nh = 2\n", f"tolerance = {tolerance}\n").replace(
+        "k_i = 2", "k_i = 20"
+    )
+    (folder / "scene.toml").write_text(text)
+    return folder / "scene.toml"
+
+
+def run(folder: Path, total: int = 300, **options: bool) -> list[dict[str, str]]:
+    """Run it; the rows of settlement.csv."""
+    procedure.run_scene(small(folder, total), folder / "run", progress=QUIET, **options)
+    with (folder / "run" / "settlement.csv").open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_to_the_end_with_its_control(tmp_path: Path) -> None:
+    """The logarithm to cycle 200: it is met within the tolerance, from half of the cycles.
+
+    The band holds the closed form; the control shares the window before the first jump.
+    """
+    rows = run(tmp_path, 200, control=True)
+    truth = engine_fake.SETTLEMENT * np.log(201)
+    assert int(rows[-1]["cycle"]) == 200
+    assert float(rows[-1]["settlement"]) == pytest.approx(truth, rel=0.02)
+    assert sum(row["kind"] != "jumped" for row in rows) < 100
+    shared = Path("window_000020") / "states.npz"
+    assert (tmp_path / "run" / "control" / shared).samefile(tmp_path / "run" / shared)
+    low, high = status(tmp_path / "run").band_m or (0, 0)
+    assert low < truth < high
+    report_write(tmp_path / "run")
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "Jump control" in page
+    decisions = decisions_of(RunFolder(tmp_path / "run").events())
+    assert page.count("<td>jump</td>") == sum(one["action"] == "jump" for one in decisions)
+    written = json.loads((tmp_path / "run" / "report.json").read_text())
+    assert written["band"]["low"] == pytest.approx(low)
+    events = len(RunFolder(tmp_path / "run").events())
+    procedure.resume(tmp_path / "run", progress=QUIET)  # finished: the same decisions, none told
+    assert decisions_of(RunFolder(tmp_path / "run").events()) == decisions
+    assert len(RunFolder(tmp_path / "run").events()) == events + 3  # resumed, two engines
+
+
+def test_the_mean_grain_moves_by_what_was_decided(tmp_path: Path) -> None:
+    """Before relaxation the mean drop of each jump is the decision's gain, to round-off."""
+    run(tmp_path, 120)
+    folder = RunFolder(tmp_path / "run")
+    held = checks_of(folder.events())
+    for decision in decisions_of(folder.events()):
+        if (decision["cycle"], 1) in held and decision["action"] == "jump":
+            jump = folder.path / f"jump_{decision['cycle']:06d}_1"
+            moved = np.load(jump / "estimated.npz")["position"][:, 2].mean()
+            window = next(
+                name for name in folder.stage_names()
+                if (o := folder.outcome(name)) and o.stage == "window"
+                and o.last_cycle == decision["cycle"]
+            )  # fmt: skip
+            before = np.load(folder.path / window / "states.npz")["position"][-1, :, 2].mean()
+            assert before - moved == pytest.approx(decision["gain"], rel=1e-6)
+
+
+def test_load_step_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A jump into a load step is rolled back to the stored state; its window is in discarded/."""
+    step = FakeBed(CURVES["early load step"])
+    monkeypatch.setattr(engine_fake, "BED", step)
+    rows = run(tmp_path, 200, cycle_by_cycle=True)
+    folder = RunFolder(tmp_path / "run")
+    back = [event for event in folder.events() if event["event"] == "jump failed"]
+    assert back
+    assert "taken back: the bed gained" in back[0]["why"]
+    details = folder.failure_details(back[0]["stage"])
+    assert abs(details["error"]) > 0.04
+    assert details["lost_cycles"] > 0
+    assert any((tmp_path / "run" / "discarded").iterdir())
+    cycles = [int(row["cycle"]) for row in rows]
+    assert cycles == sorted(set(cycles))
+    assert float(rows[-1]["settlement"]) == pytest.approx(float(step.law(np.array(200.0))), rel=0.1)
+    assert "taken back" in control(record_read(tmp_path / "run"))
+
+
+def test_collapse_is_refused_with_its_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 6 and what to do; ``resume --cycle-by-cycle`` goes on to the end, for good."""
+    monkeypatch.setattr(engine_fake, "BED", FakeBed(lambda n: 0.005 * CURVES["collapse"](n)))
+    scene = small(tmp_path, 200)
+    assert trackbed.main(["run", str(scene)]) == JumpRefused.exit_code == 6
+    assert "trackbed resume RUN --cycle-by-cycle" in capsys.readouterr().err
+    assert trackbed.main(["resume", str(tmp_path / "run")]) == 6
+    assert trackbed.main(["resume", str(tmp_path / "run"), "--cycle-by-cycle"]) == 0
+    assert trackbed.main(["resume", str(tmp_path / "run")]) == 0
+    assert status(tmp_path / "run").cycles_computed == 200
+
+
+def test_no_jump_pays_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Tolerance 1e-6: every cycle is computed, and the reason is on the screen once."""
+    scene = small(tmp_path, 120)
+    words = ["--tolerance", "1e-6", "--cycles", "110", "--run-folder", str(tmp_path / "run")]
+    assert trackbed.main(["run", str(scene), *words]) == 0
+    assert capsys.readouterr().err.count("no jump pays") == 1
+    assert status(tmp_path / "run").cycles_computed == 110
+
+
+def test_scene_keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A tolerance stands instead of k and h; both, or none, is an error with a sentence."""
+    scene = scene_path("karrech-coarse")
+    loaded = scene_load(scene, ["procedure.tolerance=0.02"]).procedure
+    assert loaded is not None
+    assert (loaded.tolerance, loaded.k, loaded.h) == (0.02, None, None)
+    with pytest.raises(SceneError, match="with a tolerance h chooses itself"):
+        scene_load(scene, ["procedure.tolerance=0.02", "procedure.h=3"])
+    text = scene.read_text().replace("\nk = 20", "").replace("\nh = 35", "")
+    (tmp_path / "none.toml").write_text(text)
+    with pytest.raises(SceneError, match="give k and h, or a tolerance") as caught:
+        scene_load(tmp_path / "none.toml")
+    assert "2 problems" in str(caught.value)
+    for value in ("0", "1", '"much"'):
+        with pytest.raises(SceneError, match=r"procedure\.tolerance"):
+            scene_load(scene, [f"procedure.tolerance={value}"])
+    words = ["run", str(scene), "--tolerance", "0.02", "--set", "procedure.h=3"]
+    assert trackbed.main(words) == 2
+    assert "--tolerance chooses k and h" in capsys.readouterr().err
+
+
+# --- killed ---------------------------------------------------------------------------------
+
+STEP = "early load step"
+
+
+@pytest.fixture(scope="module")
+def commands(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Commands]:
+    """A server whose beds have a load step, and an uninterrupted run in ``whole``."""
+    folder = tmp_path_factory.mktemp("jump_kill")
+    server = Commands(folder)
+    words = ("run", small(folder, 170), "--cycle-by-cycle", "--run-folder", folder / "whole")
+    server.run(*words, here=True, bed=STEP)
+    yield server
+    server.close()
+
+
+def test_killed_at_file_operations(commands: Commands, tmp_path: Path) -> None:
+    """Killed at the 17th change of a file, again and again: the same table and decisions.
+
+    The run has jumps that stand and one taken back, so kills fall before, within and behind each.
+    """
+    whole = commands.folder / "whole"
+    assert any("taken back" in str(e.get("why")) for e in RunFolder(whole).events())
+    table = (whole / "settlement.csv").read_bytes()
+    run_folder = tmp_path / "run"
+    first = ("run", commands.folder / "scene.toml", "--cycle-by-cycle", "--run-folder", run_folder)
+    kills = 0
+    while True:
+        words = ("resume", run_folder) if (run_folder / "manifest.json").exists() else first
+        ended = commands.run(*words, root=str(run_folder), crash=17, bed=STEP)
+        if ended != -signal.SIGKILL:
+            break
+        kills += 1
+    assert ended == 0, commands.output.read_text()
+    assert kills >= 5
+    assert (run_folder / "settlement.csv").read_bytes() == table
+    names = [RunFolder(path).stage_names() for path in (whole, run_folder)]
+    assert names[0] == names[1]
+
+    def told(path: Path) -> list[dict[str, object]]:
+        return [{**e, "time": ""} for e in decisions_of(RunFolder(path).events())]
+
+    assert told(run_folder) == told(whole)
+
+
+def test_jump_that_fails_is_halved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A relaxation that fails twice: shorter jumps from the same state, then the run goes on."""
+    from adapters.errors import NotConverged
+
+    lengths: list[int] = []
+    real = stages.jump
+
+    def fail_twice(*arguments: object) -> stages.Bed:
+        lengths.append(arguments[2])  # type: ignore[arg-type]
+        if len(lengths) <= 2:
+            raise NotConverged("made to fail")
+        return real(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(stages, "jump", fail_twice)
+    rows = run(tmp_path, 120)
+    assert lengths[1] == lengths[0] // 2
+    assert int(rows[-1]["cycle"]) == 120

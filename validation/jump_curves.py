@@ -1,0 +1,156 @@
+"""Settlement curves with known laws and noise, and the controller played on them, no engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from adapters.engine_fake import FakeBed
+from adapters.jump_check import accept, judge, reject
+from adapters.jump_control import Decision, Settings, begin, decide, observe
+from adapters.jump_rates import Stretch
+from adapters.state import FloatArray
+
+Law = Callable[[FloatArray], FloatArray]
+
+MICRO = 1e-6
+
+
+def _load_step(cycle: FloatArray) -> FloatArray:
+    after = np.maximum(cycle - 600, 0.0)
+    return 100 * MICRO * np.log1p(cycle) + 100 * MICRO * np.log1p(after / 60)
+
+
+CURVES: dict[str, Law] = {
+    "log": lambda n: 100 * MICRO * np.log1p(n),
+    "power": lambda n: 60 * MICRO * n**0.2,
+    "stretched": lambda n: 600 * MICRO * -np.expm1(-((n / 300) ** 0.4)),
+    "hyperbolic": lambda n: 500 * MICRO * n / (150 + n),
+    "sato": lambda n: 300 * MICRO * -np.expm1(-n / 60) + 0.01 * MICRO * n,
+    "load step": _load_step,
+    "early load step": lambda n: (
+        20 * MICRO * np.log1p(n) + 1 * MICRO * np.maximum(n - 110, 0.0) ** 0.8
+    ),
+    "ratcheting": lambda n: 1 * MICRO * n,
+    "collapse": lambda n: 0.02 * MICRO * n**2.5,
+    "rest": lambda n: np.zeros_like(n),
+}
+"""u(N) [m] of the mean of many beds."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A law with the noise of one run."""
+
+    law: Law
+    bursts: float = 0.0
+    """Share of the settlement that comes in bursts (`engine_fake.bursts`)."""
+    seed: int = 1
+    jitter: float = 0.0
+    """Deviation of each reading [m]."""
+
+    @property
+    def bed(self) -> FakeBed:
+        """The fake engine's bed of that curve."""
+        return FakeBed(self.law, self.bursts, self.seed, self.jitter)
+
+    def mean(self, first: int, last: int) -> float:
+        """What many beds gain on the mean [m]."""
+        return float(np.diff(self.law(np.array([first, last], float)))[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """The mean curve of a full run; what it gained is the truth, its own noise included."""
+
+    path: FloatArray
+    """Settlement after 0, 1, 2, ... cycles [m]."""
+
+    @property
+    def bed(self) -> Measured:
+        """Itself."""
+        return self
+
+    def settlement(self, first: int, cycles: int) -> FloatArray:
+        """u [m] at the ends of ``cycles`` cycles from ``first`` on, less u before them."""
+        return np.asarray(self.path[first : first + cycles + 1] - self.path[first])
+
+    def mean(self, first: int, last: int) -> float:
+        """What the run gained [m]."""
+        return float(self.path[last] - self.path[first])
+
+
+@dataclass
+class Play:
+    """What a controlled run did."""
+
+    decisions: list[Decision] = field(default_factory=list)
+    checks: list[dict[str, Any]] = field(default_factory=list)
+    """Of jumps that stand, as `jump_band.band_of` takes them."""
+    taken_back: list[dict[str, Any]] = field(default_factory=list)
+    true_errors: list[float] = field(default_factory=list)
+    """Gain of each jump that stands less that of the mean law, over the total."""
+    computed: int = 0
+    """Cycles, those of jumps taken back included."""
+    settlement: float = 0.0
+    truth: float = 0.0
+    """What the mean bed would have from the same state after k_i cycles [m]."""
+    refused: bool = False
+
+    @property
+    def errors(self) -> FloatArray:
+        """Absolute true errors of the jumps that stand."""
+        return np.abs(self.true_errors)
+
+
+def stretch_of(bed: FakeBed | Measured, first: int, cycles: int) -> Stretch:
+    """Cycles of a bed as the controller sees them."""
+    unknown = np.full(cycles, np.nan)
+    return Stretch(first, np.diff(bed.settlement(first, cycles)), unknown, unknown)
+
+
+def play(curve: Curve | Measured, k_i: int, settings: Settings) -> Play:
+    """Let the controller run on a curve from the state after ``k_i`` cycles."""
+    out, bed = Play(), curve.bed
+    start = float(bed.settlement(0, k_i)[-1])
+    control = begin(k_i, start)
+    out.computed = k_i
+
+    while True:
+        decision = decide(control, settings)
+        out.decisions.append(decision)
+        if decision.action in ("end", "refuse"):
+            out.refused = decision.action == "refuse"
+            break
+        if decision.action == "compute":
+            window = stretch_of(bed, control.cycle, decision.window)
+            out.computed += decision.window
+            control = observe(control, window, control.settlement + float(window.gain.sum()))
+            continue
+        landed = control.cycle + decision.jump
+        healed = stretch_of(bed, landed, settings.healing)
+        window = stretch_of(bed, landed + settings.healing, decision.window)
+        out.computed += settings.healing + decision.window
+        gained = decision.gain + float(healed.gain.sum())
+        settlement = control.settlement + gained + float(window.gain.sum())
+        check = judge(control, decision, settings, window, settlement)
+        told = asdict(check) | {
+            "jump": decision.jump,
+            "window": settings.healing + decision.window,
+            "cycle": control.cycle,
+        }
+        if check.accepted:
+            error = decision.gain - curve.mean(control.cycle, landed)
+            total = abs(control.settlement + decision.gain)
+            out.true_errors.append(error / total if total else 0.0)
+            out.checks.append(told)
+            control = accept(control, decision, check, settings, window, settlement)
+        else:
+            out.taken_back.append(told)
+            control = reject(control, decision, check.error, settings)
+    out.settlement = control.settlement
+    out.truth = start + curve.mean(k_i, control.cycle)
+    return out
