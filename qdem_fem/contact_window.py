@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from numba import njit
+from numba.core import types
+from numba.extending import overload
 
 from qdem_fem import kernel
 from qdem_fem.contact_kernel import GO_ON, advance_one, advance_threads
@@ -21,12 +23,16 @@ WINDOW_ONE: Any = kernel.window_kernel(1)
 WINDOW_THREADS: Any = kernel.window_kernel(2)
 
 
-@njit
-def gravity_from(gravity: Any, k: int) -> Any:  # pragma: no cover
+def gravity_from(gravity: Any, k: int) -> Any:
     """Accelerations from step k on; None without gravity."""
-    if gravity is None:
-        return None
-    return gravity[4 * k :]
+    return None if gravity is None else gravity[4 * k :]
+
+
+@overload(gravity_from, strict=False)
+def _gravity_from(gravity: Any, k: int) -> Any:
+    if isinstance(gravity, types.NoneType):
+        return lambda gravity, k: None
+    return lambda gravity, k: gravity[4 * k :]
 
 
 def contact_window_build(made_from: str) -> Any:
