@@ -15,7 +15,7 @@ from numba import njit, prange
 
 from qdem_fem.contact_search import Pairs
 
-BLOCK = 512
+BLOCK = 2048
 """Spheres that one thread takes at a time."""
 GO_ON, LOOK_ANEW, TOO_DEEP = 0, 1, 2
 """What a step says: go on; a vertex has left the skin; two spheres are too deep in each other."""
@@ -74,8 +74,6 @@ class Contact(NamedTuple):
     """(c, 3) positions when pairs were last looked for [m]"""
     position: Any
     """(c, 3) [m]"""
-    way: Any
-    """(c, 3) of the last step [m]"""
     force: Any
     """(c, 3) [N]"""
     slid: Any
@@ -132,65 +130,56 @@ def row_put(a: Any, i: int, values: Any) -> None:  # pragma: no cover
 
 
 @exact
-def spheres_move(
-    c: Any, low: int, high: int, displacement: Any, velocity: Any, step: float
-) -> float:  # pragma: no cover
-    """Positions and ways of the spheres ``low`` to ``high``; greatest square way [m^2]."""
+def spheres_move(c: Any, low: int, high: int, displacement: Any) -> float:  # pragma: no cover
+    """Positions of the spheres ``low`` to ``high``; their greatest square way [m^2]."""
     far = 0.0
     for i in range(low, high):
         at, moved = c.spheres.place[i], 0.0
         for k in range(3):
             c.position[i, k] = c.spheres.reference[i, k] + displacement[at + k]
-            c.way[i, k] = step * velocity[at + k]
             moved += (c.position[i, k] - c.start[i, k]) ** 2
         far = max(far, moved)
     return far
 
 
 @exact
-def pair_forces(c: Any, i: int) -> float:  # pragma: no cover
-    """Forces of the pairs of sphere i, summed into its force; greatest overlap over radius."""
-    pairs, sphere = c.pairs, c.spheres
-    fx, fy, fz = 0.0, 0.0, 0.0
+def pairs_forces(
+    c: Any, low: int, high: int, velocity: Any, step: float
+) -> float:  # pragma: no cover
+    """Forces of the pairs of acting spheres on the first; deepest overlap over radius."""
     deepest = 0.0
-    for p in range(pairs.first[i], pairs.first[i + 1]):
-        j = pairs.second[p]
-        dx, dy, dz = minus(c.position, i, c.position, j)
-        square = dx * dx + dy * dy + dz * dz
-        reach = sphere.radius[i] + sphere.radius[j]
-        if square >= reach * reach:
-            if pairs.touching[p]:  # they part: the spring that is left was force times way
-                s, w = row(pairs.spring, p), minus(c.way, i, c.way, j)
-                k_t = series(sphere.tangential[i], sphere.tangential[j])
-                n = normal_of(dx, dy, dz, np.sqrt(square))
-                c.slid[i] += slider(s, n, w, k_t, 0.0)[1]
-                pairs.touching[p] = 0
-                row_put(pairs.spring, p, (0.0, 0.0, 0.0))
-                row_put(pairs.pull, p, (0.0, 0.0, 0.0))
-            continue
-        apart = np.sqrt(square)
-        overlap = reach - apart
-        deepest = max(deepest, overlap / min(sphere.radius[i], sphere.radius[j]))
-        n = normal_of(dx, dy, dz, apart)
-        push = series(sphere.normal[i], sphere.normal[j]) * overlap
-        k_t = series(sphere.tangential[i], sphere.tangential[j])
-        way = minus(c.way, i, c.way, j)
-        s, loss = slider(row(pairs.spring, p), n, way, k_t, c.friction * push)
-        f = (push * n[0] - k_t * s[0], push * n[1] - k_t * s[1], push * n[2] - k_t * s[2])
-        c.slid[i] += loss
-        pairs.touching[p] = 1
-        row_put(pairs.spring, p, s)
-        row_put(pairs.pull, p, f)
-        fx, fy, fz = fx + f[0], fy + f[1], fz + f[2]
-    row_put(c.force, i, (fx, fy, fz))
+    pairs, sphere = c.pairs, c.spheres
+    for i in pairs.acting[low:high]:
+        fx, fy, fz = 0.0, 0.0, 0.0
+        for p in range(pairs.first[i], pairs.first[i + 1]):
+            j = pairs.second[p]
+            d = minus(c.position, i, c.position, j)
+            square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+            reach = sphere.radius[i] + sphere.radius[j]
+            open_now = square >= reach * reach
+            if open_now and not pairs.touching[p]:
+                continue
+            apart = np.sqrt(square)
+            overlap = max(reach - apart, 0.0)
+            deepest = max(deepest, overlap / min(sphere.radius[i], sphere.radius[j]))
+            inverse = 1.0 / apart if apart > 0.0 else 0.0  # no distance is too deep in any case
+            n = d[0] * inverse, d[1] * inverse, d[2] * inverse
+            push = series(sphere.normal[i], sphere.normal[j]) * overlap
+            k_t = series(sphere.tangential[i], sphere.tangential[j])
+            v, at, there = velocity, sphere.place[i], sphere.place[j]
+            way = (
+                step * (v[at] - v[there]), step * (v[at + 1] - v[there + 1]),
+                step * (v[at + 2] - v[there + 2]),
+            )  # fmt: skip
+            s, loss = slider(row(pairs.spring, p), n, way, k_t, c.friction * push)
+            f = push * n[0] - k_t * s[0], push * n[1] - k_t * s[1], push * n[2] - k_t * s[2]
+            c.slid[i] += loss
+            pairs.touching[p] = not open_now  # where spheres part, nothing is left of the spring
+            row_put(pairs.spring, p, s)
+            row_put(pairs.pull, p, f)
+            fx, fy, fz = fx + f[0], fy + f[1], fz + f[2]
+        row_put(c.force, i, (fx, fy, fz))
     return deepest
-
-
-@inlined
-def normal_of(dx: float, dy: float, dz: float, apart: float) -> Any:  # pragma: no cover
-    """Unit vector; zero for no distance, which is too deep in any case."""
-    inverse = 1.0 / apart if apart > 0.0 else 0.0
-    return dx * inverse, dy * inverse, dz * inverse
 
 
 @inlined
@@ -200,35 +189,38 @@ def series(one: float, other: float) -> float:  # pragma: no cover
 
 
 @exact
-def plane_forces(c: Any, i: int) -> float:  # pragma: no cover
-    """Add the forces of the walls on sphere i; greatest overlap over radius."""
-    planes, radius = c.planes, c.spheres.radius[i]
-    deepest = 0.0
+def planes_forces(
+    c: Any, low: int, high: int, velocity: Any, step: float
+) -> float:  # pragma: no cover
+    """Add the forces of the walls on spheres ``low`` to ``high``; greatest overlap over radius."""
+    planes, deepest = c.planes, 0.0
     for w in range(planes.point.shape[0]):
-        n, d = row(planes.normal, w), minus(c.position, i, planes.point, w)
-        overlap = radius - (d[0] * n[0] + d[1] * n[1] + d[2] * n[2])
-        push = 2.0 * c.spheres.normal[i] * max(overlap, 0.0)
-        before = row(planes.force[w], i)
-        if push == 0.0 and before[0] == 0.0 and before[1] == 0.0 and before[2] == 0.0:
-            continue
-        deepest = max(deepest, overlap / radius)
-        k_t = 2.0 * c.spheres.tangential[i]
-        limit = planes.friction[w] * push
-        s, loss = slider(row(planes.spring[w], i), n, row(c.way, i), k_t, limit)
-        f = (push * n[0] - k_t * s[0], push * n[1] - k_t * s[1], push * n[2] - k_t * s[2])
-        c.slid[i] += loss
-        row_put(planes.spring[w], i, s)
-        row_put(planes.force[w], i, f)
-        for k in range(3):
-            c.force[i, k] += f[k]
+        n, spring, force = row(planes.normal, w), planes.spring[w], planes.force[w]
+        for i in range(low, high):
+            d, radius = minus(c.position, i, planes.point, w), c.spheres.radius[i]
+            overlap = radius - (d[0] * n[0] + d[1] * n[1] + d[2] * n[2])
+            if overlap <= 0.0 and force[i, 0] == 0.0 and force[i, 1] == 0.0 and force[i, 2] == 0.0:
+                continue
+            deepest = max(deepest, overlap / radius)
+            push = 2.0 * c.spheres.normal[i] * max(overlap, 0.0)
+            k_t = 2.0 * c.spheres.tangential[i]
+            at = c.spheres.place[i]
+            way = step * velocity[at], step * velocity[at + 1], step * velocity[at + 2]
+            s, loss = slider(row(spring, i), n, way, k_t, planes.friction[w] * push)
+            f = push * n[0] - k_t * s[0], push * n[1] - k_t * s[1], push * n[2] - k_t * s[2]
+            c.slid[i] += loss
+            row_put(spring, i, s)
+            row_put(force, i, f)
+            for k in range(3):
+                c.force[i, k] += f[k]
     return deepest
 
 
 @exact
 def reactions_add(c: Any, low: int, high: int) -> None:  # pragma: no cover
-    """Take from each sphere what its pairs did to the first one of them."""
+    """Take from each acting sphere what its pairs did to the first one of them."""
     pairs = c.pairs
-    for j in range(low, high):
+    for j in pairs.acting[low:high]:
         for q in range(pairs.back_first[j], pairs.back_first[j + 1]):
             p = pairs.back_pair[q]
             if pairs.touching[p]:
@@ -243,23 +235,25 @@ def advance(c: Any, displacement: Any, velocity: Any, step: float) -> int:  # pr
     state that no step led to.  Returns `GO_ON`, `LOOK_ANEW` or `TOO_DEEP`.
     """
     # a parallel loop of numba takes arrays only: tuples are taken apart, and made anew within
-    (a0, a1, a2, a3, a4, a5, a6), (p0, p1, p2, p3, p4, p5, p6), (w0, w1, w2, w3, w4) = c[:3]
-    friction, half_skin, start, position, way, force, slid = c[3:]
+    (a0, a1, a2, a3, a4, a5, a6), (p0, p1, p2, p3, p4, p5, p6, p7), (w0, w1, w2, w3, w4) = c[:3]
+    friction, half_skin, start, position, force, slid = c[3:]
     count = position.shape[0]
     blocks = (count + BLOCK - 1) // BLOCK
     far, deep = np.zeros(blocks), np.zeros(blocks)
     for stage in range(3):  # all spheres pass one stage before any begins the next
         for b in prange(blocks):
             own = Contact(
-                Spheres(a0, a1, a2, a3, a4, a5, a6), Pairs(p0, p1, p2, p3, p4, p5, p6),
-                Planes(w0, w1, w2, w3, w4), friction, half_skin, start, position, way, force, slid,
+                Spheres(a0, a1, a2, a3, a4, a5, a6), Pairs(p0, p1, p2, p3, p4, p5, p6, p7),
+                Planes(w0, w1, w2, w3, w4), friction, half_skin, start, position, force, slid,
             )  # fmt: skip
             low, high = b * BLOCK, min(count, (b + 1) * BLOCK)
             if stage == 0:
-                far[b] = spheres_move(own, low, high, displacement, velocity, step)
+                far[b] = spheres_move(own, low, high, displacement)
             elif stage == 1:
-                for i in range(low, high):
-                    deep[b] = max(deep[b], pair_forces(own, i), plane_forces(own, i))
+                deep[b] = max(
+                    pairs_forces(own, low, high, velocity, step),
+                    planes_forces(own, low, high, velocity, step),
+                )
             else:
                 reactions_add(own, low, high)
     deepest, farthest = 0.0, 0.0

@@ -35,6 +35,8 @@ class Pairs(NamedTuple):
     """(p, 3) tangential spring s, of i against j [m]."""
     pull: Any
     """(p, 3) force on i [N]."""
+    acting: Any
+    """(a,) the spheres to look at: those in a pair, or all where there are walls."""
 
 
 @njit(cache=True)
@@ -135,27 +137,27 @@ def history_carry(old: Any, new: Any) -> None:  # pragma: no cover
                 new.pull[q] = old.pull[p]
 
 
-def pairs_of(first: Integers, second: Integers) -> Pairs:
-    """Pairs without a history, from their rows."""
-    count = len(second)
-    back_first = np.zeros(len(first), np.int64)
-    np.cumsum(np.bincount(second, minlength=len(first) - 1), out=back_first[1:])
+def pairs_of(first: Integers, second: Integers, walls: bool) -> Pairs:
+    """Pairs without a history, from their rows; ``walls``: whether there are any."""
+    count, size = len(second), len(first) - 1
+    back = np.bincount(second, minlength=size)
     return Pairs(
         first,
         second,
-        back_first,
+        np.concatenate([[0], np.cumsum(back)]),
         np.argsort(second, kind="stable"),
         np.zeros(count, np.uint8),
         np.zeros((count, 3)),
         np.zeros((count, 3)),
+        np.flatnonzero((np.diff(first) > 0) | (back > 0) | walls),
     )
 
 
 def pairs_renew(
-    old: Pairs | None, position: Floats, radius: Floats, body: Integers, skin: float
+    old: Pairs | None, position: Floats, radius: Floats, body: Integers, skin: float, walls: bool
 ) -> Pairs:
     """The list for spheres at ``position`` (c, 3) [m], with the history of the ``old`` one."""
-    new = pairs_of(*pairs_near(position, radius, body, skin))
+    new = pairs_of(*pairs_near(position, radius, body, skin), walls)
     if old is not None:
         history_carry(old, new)
     return new

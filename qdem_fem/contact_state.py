@@ -93,7 +93,7 @@ class Contacts:
                 normal,
                 tangential_stiffness(normal, poisson),
             ),
-            pairs_of(np.zeros(size + 1, np.int64), np.zeros(0, np.int64)),
+            pairs_of(np.zeros(size + 1, np.int64), np.zeros(0, np.int64), bool(walls)),
             Planes(
                 np.array([p.point for p in asked.planes], dtype=float).reshape(-1, 3),
                 across / np.linalg.norm(across, axis=1, keepdims=True),
@@ -104,7 +104,6 @@ class Contacts:
             float(asked.friction),
             self.skin / 2,
             np.full((size, 3), np.inf),
-            np.zeros((size, 3)),
             np.zeros((size, 3)),
             np.zeros((size, 3)),
             np.zeros(size),
@@ -147,7 +146,8 @@ class Contacts:
         if not np.isfinite(position).all():
             return  # what made it so is told by the march
         spheres = self.kernel.spheres
-        pairs = pairs_renew(self.pairs, position, spheres.radius, spheres.body, self.skin)
+        walls = bool(self.asked.planes)
+        pairs = pairs_renew(self.pairs, position, spheres.radius, spheres.body, self.skin, walls)
         self.kernel = self.kernel._replace(pairs=pairs)
         self.kernel.start[:] = position
         self.renewals += 1
@@ -309,7 +309,7 @@ class Contacts:
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take what `stored` gave."""
         given = {name: arrays[f"contact_{name}"] for name in PAIR_ARRAYS}
-        pairs = pairs_of(given["first"].copy(), given["second"].copy())
+        pairs = pairs_of(given["first"].copy(), given["second"].copy(), bool(self.asked.planes))
         for name in ("touching", "spring", "pull"):
             getattr(pairs, name)[:] = given[name]
         self.kernel = self.kernel._replace(pairs=pairs)

@@ -52,7 +52,7 @@ def contact_window_build(made_from: str) -> Any:
         forces = state.forces
         force_at, pull = contact.spheres.force_at, contact.force
         for k in range(steps):
-            for i in range(force_at.size):
+            for i in contact.pairs.acting:
                 for c in range(3):
                     forces[force_at[i] + c] += pull[i, c]
             ahead = kernel.Probes(probes.node_at, probes.record, probes.stride, probes.first - k)

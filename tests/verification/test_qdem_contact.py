@@ -109,13 +109,13 @@ def cloud(seed: int, count: int, walls: bool, skin: float = 0.2) -> Contact:
             reference, 4 * np.arange(count), 4 * np.arange(count), body, radius, normal,
             tangential_stiffness(normal, 0.2),
         ),
-        pairs_renew(None, reference, radius, body, skin),
+        pairs_renew(None, reference, radius, body, skin, walls),
         Planes(
             ((reference @ across.T).min(axis=0) - 0.25)[:, None] * across, across,
             np.array([0.2, 0.7])[: 2 * walls],
             np.zeros((2 * walls, count, 3)), np.zeros((2 * walls, count, 3)),
         ),
-        0.4, skin / 2, reference.copy(), size.copy(), size.copy(), size.copy(), np.zeros(count),
+        0.4, skin / 2, reference.copy(), size.copy(), size.copy(), np.zeros(count),
     )  # fmt: skip
 
 
@@ -146,7 +146,7 @@ def test_kernel_is_its_twin(walls: bool) -> None:
         slipped, held = slipped + (stretched > 0.1).sum(), held + (stretched > 0).sum()
         if said == LOOK_ANEW:
             position = c.spheres.reference + at
-            pairs = pairs_renew(c.pairs, position, c.spheres.radius, c.spheres.body, 0.2)
+            pairs = pairs_renew(c.pairs, position, c.spheres.radius, c.spheres.body, 0.2, walls)
             c = c._replace(pairs=pairs)
             c.start[:] = position
             renewed += 1
@@ -210,7 +210,7 @@ def test_what_a_step_says() -> None:
     c.spheres.radius[:] = 0.5
     c.spheres.reference[:] = [[0, 0, 0], [2.0, 0, 0]]
     c = c._replace(
-        pairs=pairs_renew(None, c.spheres.reference, c.spheres.radius, np.arange(2), 9.0)
+        pairs=pairs_renew(None, c.spheres.reference, c.spheres.radius, np.arange(2), 9.0, False)
     )
     c.start[:] = c.spheres.reference
     still = np.zeros(8)
