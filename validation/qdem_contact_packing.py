@@ -28,8 +28,6 @@ SHELL, CORE = 26, 9
 """Vertices on the surface of a grain and within it: 35, as in the paper on average."""
 GRAIN = 0.0125
 """Radius of the mesh of a grain [m]: then edges are 10 mm long on average."""
-NEAR = 0.93
-"""Distance of neighbours over twice the radius of grain and sphere: five pairs a grain touch."""
 
 
 def grain_mesh(seed: int) -> tuple[Floats, NDArray[np.int64]]:
@@ -48,15 +46,15 @@ def grain_mesh(seed: int) -> tuple[Floats, NDArray[np.int64]]:
     return nodes, Delaunay(nodes).simplices.astype(np.int64)
 
 
-def lattice(side: int) -> list[q.Body]:
-    """``side**3`` grains, so near that every one touches its neighbours along each axis."""
+def lattice(side: int, near: float) -> list[q.Body]:
+    """``side**3`` grains; ``near``: distance over twice the radius of grain and sphere."""
     meshes = {}
     for i, place in enumerate(np.ndindex(side, side, side)):
         meshes[place] = grain_mesh(i)
     bodies = []
     span = 2 * (GRAIN + RADIUS)
     for place, (nodes, elements) in meshes.items():
-        centre = span * NEAR * np.array(place)
+        centre = span * near * np.array(place)
         bodies.append(q.Body((nodes + centre, elements), BALLAST, name="grain"))
     return bodies
 
@@ -94,13 +92,15 @@ def seconds_a_step(run: q.Simulation, steps: int, rounds: int) -> float:
     return float(least)
 
 
-def packing_cost(side: int = 6, steps: int = 60, rounds: int = 5) -> PackingCost:
+def packing_cost(
+    side: int = 6, near: float = 0.95, steps: int = 60, rounds: int = 5
+) -> PackingCost:
     """Measure a packing of ``side**3`` grains with contact and without."""
     step = 1e-8  # far below the critical one: what overlaps at the start does not fly apart
     found = {}
     touch = q.SphereContact(RADIUS, STIFFNESS, FRICTION)
     for contact in (None, touch):
-        bodies = lattice(side)
+        bodies = lattice(side, near)
         run = q.Simulation(bodies, threads=1, step=step, contact=contact)
         found[contact is None] = run, seconds_a_step(run, steps, rounds)
     run, with_contact = found[False]

@@ -1,0 +1,216 @@
+"""Trials of contact between bodies: faces on faces, slopes, a collision, a heap; each a few checks.
+
+Stone as in Table 1 of Nishiura et al. (30 GPa, 0.2, 2700 kg/m^3), bodies of 3 cm.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import qdem_fem as q
+from qdem_fem.mesh_generation import box_mesh
+from validation.case import Check
+from validation.qdem_contact_packing import packing_cost
+
+Floats = NDArray[np.float64]
+SIDE = 0.03
+STONE = q.Material(30e9, 0.2, 2700.0)
+GRAVITY = 9.81
+
+
+def cube(
+    cells: int, place: Any = (0, 0, 0), material: q.Material = STONE, name: str = "cube"
+) -> q.Body:
+    """A cube of ``cells**3 * 5`` tetrahedra with its least corner at ``place`` [m]."""
+    return q.Body(box_mesh((SIDE,) * 3, (cells,) * 3, "five", tuple(place)), material, name=name)
+
+
+# --- two cubes face to face ----------------------------------------------------------------------
+
+PRESSURE = 1e6
+
+
+def faces_stress(below: int, above: int, radius: float, stiffness: float) -> tuple[Floats, float]:
+    """Stress of all elements over the pressure, (m,), and the force carried over the load.
+
+    The upper cube lies on the lower one and is pressed at 1 MPa until both rest; the exact answer
+    is one everywhere.
+    """
+    damped = q.Material(30e9, 0.2, 2700.0, shear_viscosity=3e4, bulk_viscosity=3e4)
+    bodies = [cube(below, material=damped), cube(above, (0, 0, SIDE + 2 * radius), damped)]
+    contact = q.SphereContact(radius, stiffness, 0.5)
+    run = q.Simulation(bodies, threads=1, contact=contact)
+    run.fix(bodies[0], bodies[0].nodes[:, 2] == 0, "z")
+    run.fix(bodies[0], 0)
+    top = bodies[1].nodes[:, 2] > 2 * SIDE + 2 * radius - 1e-9
+    run.pressure(bodies[1], top, q.ramp(3e-4, PRESSURE))
+    run.advance(1.5e-3)
+    stress = np.concatenate([body.stress()[:, 2, 2] for body in bodies]) / -PRESSURE
+    assert run.contacts is not None
+    carried = -run.contacts.touching().force[:, 2].sum() / (PRESSURE * SIDE**2)
+    return stress, float(carried)
+
+
+def faces_checks(quick: bool) -> list[Check]:
+    """Vertices on vertices, and between them, on two sizes of mesh."""
+    checks = []
+    for below, above, radius in ((2, 2, 0.006), (4, 4, 0.006), (3, 4, 0.012))[: 2 if quick else 3]:
+        stress, carried = faces_stress(below, above, radius, 1.613e9)
+        name = f"faces, {below} on {above} cells, spheres of {2000 * radius:.0f} mm"
+        worst = float(np.abs(stress - 1).max())
+        checks.append(Check(f"{name}: force carried less load", abs(carried - 1), "<= 0.001",
+                            abs(carried - 1) <= 1e-3))  # fmt: skip
+        checks.append(Check(f"{name}: stress, greatest error", worst, "reported", True))
+    return checks
+
+
+# --- a block on a slope --------------------------------------------------------------------------
+
+
+def slope_gain(share: float) -> tuple[float, float, float]:
+    """A cube on a wall, ``tan(alpha) = 1/2``, friction that share of it.
+
+    Gravity turns to the slope in 13 ms from an equilibrium.  Acceleration along the slope in the
+    last 13 of 39 ms [m/s^2], that of a rigid block, and the way in that time [m].
+    """
+    alpha, stiffness, ramp, radius = np.arctan(0.5), 1e5, 13e-3, 0.006
+    body = q.Body(box_mesh((SIDE,) * 3, (2, 2, 2)), STONE)
+    overlap = SIDE**3 * 2700 * GRAVITY * np.cos(alpha) / (9 * 2 * stiffness)
+    body = q.Body(box_mesh((SIDE,) * 3, (2, 2, 2), "kuhn", (0, 0, radius - overlap)), STONE)
+    times = np.linspace(0, ramp, 200)
+    along = GRAVITY * np.sin(alpha) * 0.5 * (1 - np.cos(np.pi * times / ramp))
+    across = np.full(200, -GRAVITY * np.cos(alpha))
+    wall = q.ContactPlane((0, 0, 0), (0, 0, 1))
+    run = q.Simulation(
+        [body],
+        threads=1,
+        gravity=q.Series(times, np.column_stack([along, 0 * along, across])),
+        contact=q.SphereContact(radius, stiffness, share / 2, planes=[wall]),
+    )
+    run.advance(2 * ramp)
+    speed, place = body.velocity.mean(axis=0)[0], body.displacement.mean(axis=0)[0]
+    run.advance(ramp)
+    gain = (body.velocity.mean(axis=0)[0] - speed) / ramp
+    rigid = GRAVITY * (np.sin(alpha) - share / 2 * np.cos(alpha))
+    return float(gain), float(rigid), float(body.displacement.mean(axis=0)[0] - place)
+
+
+def slope_checks() -> list[Check]:
+    """One per cent below and above the angle of friction, and at it."""
+    gain, rigid, _ = slope_gain(0.99)
+    rest, creep = (slope_gain(share)[2] for share in (1.01, 1.0))
+    slid = 0.5 * rigid * 13e-3**2
+    return [
+        Check("slope, mu 1 % below tan alpha: acceleration to the rigid block's",
+              abs(gain / rigid - 1), "<= 0.1", abs(gain / rigid - 1) <= 0.1),
+        Check("slope, mu 1 % above tan alpha: way in 13 ms", abs(rest), "<= 1e-07",
+              abs(rest) <= 1e-7, "m"),
+        Check("slope, mu at tan alpha: way in 13 ms", abs(creep), "reported", True, "m"),
+        Check("slope, mu 1 % below: way in 13 ms of a rigid block from rest", slid,
+              "reported", True, "m"),
+    ]  # fmt: skip
+
+
+def slab_threshold(radius: float, cells: int) -> float:
+    """``tan(alpha)`` at which a cube leaves a held slab of the same mesh, over the friction.
+
+    Vertices begin on vertices' hollows: the block is moved by half a cell both ways.
+    """
+    friction, stiffness, pitch = 0.2, 1e6, SIDE / cells
+    across = np.sqrt((2 * radius) ** 2 - pitch**2 / 2)
+    slab = q.Body(box_mesh((2 * SIDE, SIDE + pitch, pitch), (2 * cells, cells + 1, 1)), STONE)
+    overlap = SIDE**3 * 2700 * GRAVITY / (4 * (cells + 1) ** 2 * stiffness)
+    place = (pitch / 2, pitch / 2, pitch + across - overlap)
+    body = q.Body(box_mesh((SIDE,) * 3, (cells,) * 3, "kuhn", place), STONE)
+    duration = 0.05
+
+    def turned(t: float) -> Floats:
+        """Gravity that leans over by 45 degrees in 50 ms."""
+        alpha = np.pi / 4 * t / duration
+        return GRAVITY * np.array([np.sin(alpha), 0, -np.cos(alpha)])
+
+    run = q.Simulation(
+        [slab, body],
+        threads=1,
+        gravity=turned,
+        contact=q.SphereContact(radius, stiffness, friction),
+    )
+    run.fix(slab, slab.nodes[:, 2] < np.inf)
+    for k in range(100):
+        run.advance(duration / 100)
+        if body.displacement.mean(axis=0)[0] > pitch / 100:
+            return float(np.tan(np.pi / 4 * (k + 1) / 100) / friction)
+    return np.inf
+
+
+def slab_checks() -> list[Check]:
+    """Vertices 15 mm apart with spheres of 12 mm, and 10 mm apart with the paper's 24 mm."""
+    return [
+        Check(f"slope, on a slab of vertices {pitch} mm apart, spheres of {2000 * radius:.0f} mm: "
+              "tan alpha where it slides, over mu", slab_threshold(radius, cells), "reported", True)
+        for pitch, radius, cells in ((15, 0.006 * 1.5, 2), (10, 0.012, 3))
+    ]  # fmt: skip
+
+
+# --- many bodies ---------------------------------------------------------------------------------
+
+
+def heap_checks(quick: bool) -> list[Check]:
+    """Cubes turned at random fall into a box of walls: the account of energies at all times."""
+    side, radius = (2 if quick else 3), 0.006
+    random, bodies = np.random.default_rng(1), []
+    span = 0.065
+    for place in np.ndindex(side, side, side):
+        mesh = box_mesh((SIDE,) * 3, (2, 2, 2))
+        arm = Rotation.random(random_state=random).apply(mesh.nodes - SIDE / 2)
+        bodies.append(q.Body((arm + span * np.array(place), mesh.elements), STONE, name="cube"))
+    low, high = -0.033, span * (side - 1) + 0.033
+    walls = [q.ContactPlane((0, 0, low), (0, 0, 1))]
+    for axis in (0, 1):
+        for at, way in ((low, 1.0), (high, -1.0)):
+            walls.append(q.ContactPlane(tuple(at * np.eye(3)[axis]), tuple(way * np.eye(3)[axis])))
+    contact = q.SphereContact(radius, 1e7, 0.577, planes=walls)
+    run = q.Simulation(bodies, threads=1, gravity=(0, 0, -GRAVITY), contact=contact)
+    for body in bodies:
+        spin = 30 * random.normal(size=3)
+        arm = body.nodes - body.nodes.mean(axis=0)
+        body.velocity = np.cross(spin, arm) + np.array([0, 0, -1.0]) + random.normal(size=3)
+    start = run.energy().kinetic
+    worst, greatest, lost = 0.0, start, 0.0
+    for _ in range(10 if quick else 40):
+        run.advance(1e-3)
+        e = run.energy()
+        stored = e.kinetic + e.elastic + e.contact
+        worst = max(worst, abs(stored + e.friction - e.external - start))
+        greatest, lost = max(greatest, stored), e.friction
+    assert run.contacts is not None
+    words = f"heap of {side**3} cubes"
+    return [
+        Check(f"{words}: energies do not close, over the greatest", worst / greatest, "<= 0.001",
+              worst / greatest <= 1e-3),
+        Check(f"{words}: work of friction, over the energy at the start", lost / start,
+              "reported", True),
+        Check(f"{words}: looks for pairs", float(run.contacts.renewals), "reported", True),
+        Check(f"{words}: time steps", float(run.steps_done), "reported", True),
+    ]  # fmt: skip
+
+
+def cost_checks(quick: bool) -> list[Check]:
+    """A packing of 216 grains of the paper's size: share of contact in a step, one thread."""
+    checks = []
+    for near in (0.95,) if quick else (0.99, 0.95, 0.93):
+        cost = packing_cost(4 if quick else 6, near=near)
+        words = f"packing of {cost.bodies} grains, {cost.touching / cost.bodies:.1f} pairs a grain"
+        bar = near == 0.95
+        checks += [
+            Check(f"{words}: share of contact in a step", cost.share, "<= 0.3" if bar else
+                  "reported", cost.share <= 0.3 or not bar),
+            Check(f"{words}: step", cost.step_with, "reported", True, "s"),
+            Check(f"{words}: one look for pairs, over a step", cost.search / cost.step_with,
+                  "reported", True),
+        ]  # fmt: skip
+    return checks
