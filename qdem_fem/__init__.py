@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from qdem_fem.body import Body
     from qdem_fem.contact_spheres import ContactPlane, SphereContact
+    from qdem_fem.contact_surface import SurfaceContact
     from qdem_fem.critical_step import CriticalStep
     from qdem_fem.dynamic_relaxation import StaticAnswer
     from qdem_fem.errors import QdemError, StepWarning
@@ -29,6 +30,7 @@ _HOMES = {
     "Series": "series",
     "Simulation": "simulation",
     "SphereContact": "contact_spheres",
+    "SurfaceContact": "contact_surface",
     "StaticAnswer": "dynamic_relaxation",
     "StepWarning": "errors",
     "ramp": "series",
@@ -46,6 +48,7 @@ __all__ = [
     "SphereContact",
     "StaticAnswer",
     "StepWarning",
+    "SurfaceContact",
     "ramp",
 ]
 

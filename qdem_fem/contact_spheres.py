@@ -88,34 +88,44 @@ class SphereContact:
         for name in ("radius", "normal_stiffness"):
             value = getattr(self, name)
             for each in value.values() if isinstance(value, Mapping) else [value]:
-                _number_check(each, name, above=True)
+                contact_number_check(each, name, above=True)
         if self.skin is not None:
-            _number_check(self.skin, "skin", above=True)
-        _number_check(self.friction, "friction", above=False)
+            contact_number_check(self.skin, "skin", above=True)
+        contact_number_check(self.friction, "friction", above=False)
         if not (is_real(self.contacts) and self.contacts >= 1):
             raise ConditionError(f"{self.contacts!r} contacts of a vertex", where="contact")
-        for number, plane in enumerate(self.planes):
-            _plane_check(plane, f"plane.{number}")
+        contact_planes_check(self.planes)
 
     def of_body(self, name: str, quantity: str) -> float:
         """``radius`` or ``normal_stiffness`` of a body; `ConditionError` where it has none."""
-        value = getattr(self, quantity)
-        if not isinstance(value, Mapping):
-            return float(value)
-        if name not in value:
-            raise ConditionError(
-                f"body {name} has none, only {', '.join(value) or 'nobody'} has",
-                where=f"contact, {quantity}",
-                remedy="give one number for all bodies, or one for each by its name",
-            )
-        return float(value[name])
+        return value_of_body(getattr(self, quantity), name, quantity)
 
 
-def _number_check(value: Any, name: str, *, above: bool) -> None:
+def value_of_body(value: float | Mapping[str, float], name: str, quantity: str) -> float:
+    """A number of a body: one for all, or by its name; `ConditionError` where it has none."""
+    if not isinstance(value, Mapping):
+        return float(value)
+    if name not in value:
+        raise ConditionError(
+            f"body {name} has none, only {', '.join(value) or 'nobody'} has",
+            where=f"contact, {quantity}",
+            remedy="give one number for all bodies, or one for each by its name",
+        )
+    return float(value[name])
+
+
+def contact_number_check(value: Any, name: str, *, above: bool) -> None:
+    """Raise `ConditionError` for what is no number above zero, or at least zero."""
     if not (is_real(value) and np.isfinite(value) and (value > 0 if above else value >= 0)):
         raise ConditionError(
             f"{value!r} is not {'above' if above else 'at least'} zero", where=f"contact, {name}"
         )
+
+
+def contact_planes_check(planes: Sequence[ContactPlane]) -> None:
+    """Raise `ConditionError` for a wall without a place, a direction or a friction."""
+    for number, plane in enumerate(planes):
+        _plane_check(plane, f"plane.{number}")
 
 
 def _plane_check(plane: ContactPlane, name: str) -> None:
@@ -132,22 +142,4 @@ def _plane_check(plane: ContactPlane, name: str) -> None:
         if quantity == "normal" and not vector.any():
             raise ConditionError("it has no direction", where=f"contact, {name}.normal")
     if plane.friction is not None:
-        _number_check(plane.friction, f"{name}.friction", above=False)
-
-
-def contact_options_check(contact: Any, precision: str, device: str) -> None:
-    """Raise `ConditionError` for a contact that this simulation can not have."""
-    if contact is None:
-        return
-    if not isinstance(contact, SphereContact):
-        raise ConditionError(
-            f"a {type(contact).__name__} is no contact",
-            where="simulation, contact",
-            remedy="give SphereContact(radius, normal_stiffness, friction)",
-        )
-    if precision != "float64" or device != "cpu":
-        raise ConditionError(
-            "contact is computed in double precision on the processor",
-            where="simulation, contact",
-            remedy='take precision="float64" and device="cpu"',
-        )
+        contact_number_check(plane.friction, f"{name}.friction", above=False)

@@ -16,9 +16,10 @@ from numba.core import types
 from numba.extending import overload
 
 from qdem_fem import kernel
-from qdem_fem.contact_kernel import GO_ON, advance_one, advance_threads
+from qdem_fem.contact_kernel import GO_ON, Contact, advance_one, advance_threads
+from qdem_fem.contact_surface_kernel import surface_step
 
-SOURCES = ("kernel.py", "stress.py", "lanes.py", "contact_kernel.py")
+SOURCES = ("kernel.py", "stress.py", "lanes.py", "contact_kernel.py", "contact_surface_kernel.py")
 WINDOW_ONE: Any = kernel.window_kernel(1)
 WINDOW_THREADS: Any = kernel.window_kernel(2)
 
@@ -33,6 +34,43 @@ def _gravity_from(gravity: Any, k: int) -> Any:
     if isinstance(gravity, types.NoneType):
         return lambda gravity, k: None
     return lambda gravity, k: gravity[4 * k :]
+
+
+def places_of(contact: Any) -> Any:
+    """The vertices that contact may act on, their places in the forces, and the forces on all."""
+    if isinstance(contact, Contact):
+        return contact.pairs.acting, contact.spheres.force_at, contact.force
+    return contact.acting, contact.surface.force_at, contact.force
+
+
+@overload(places_of, strict=False)
+def _places_of(contact: Any) -> Any:
+    if contact.instance_class is Contact:
+        return lambda contact: (contact.pairs.acting, contact.spheres.force_at, contact.force)
+    return lambda contact: (contact.acting, contact.surface.force_at, contact.force)
+
+
+def advance_of(contact: Any, threads: Any, displacement: Any, velocity: Any, step: float) -> int:
+    """One step of contact, by the type of ``contact``; ``threads``: True, or None for one."""
+    if not isinstance(contact, Contact):
+        return int(surface_step(contact, displacement, velocity, step))
+    advance = advance_one if threads is None else advance_threads
+    return int(advance(contact, displacement, velocity, step))
+
+
+@overload(advance_of, strict=False)
+def _advance_of(contact: Any, threads: Any, displacement: Any, velocity: Any, step: float) -> Any:
+    if contact.instance_class is not Contact:
+        return lambda contact, threads, displacement, velocity, step: surface_step(
+            contact, displacement, velocity, step
+        )
+    if isinstance(threads, types.NoneType):
+        return lambda contact, threads, displacement, velocity, step: advance_one(
+            contact, displacement, velocity, step
+        )
+    return lambda contact, threads, displacement, velocity, step: advance_threads(
+        contact, displacement, velocity, step
+    )
 
 
 def contact_window_build(made_from: str) -> Any:
@@ -50,9 +88,9 @@ def contact_window_build(made_from: str) -> Any:
         """
         stamp = made_from  # noqa: F841  (makes it a part of the key)
         forces = state.forces
-        force_at, pull = contact.spheres.force_at, contact.force
+        acting, force_at, pull = places_of(contact)
         for k in range(steps):
-            for i in contact.pairs.acting:
+            for i in acting:
                 for c in range(3):
                     forces[force_at[i] + c] += pull[i, c]
             ahead = kernel.Probes(probes.node_at, probes.record, probes.stride, probes.first - k)
@@ -61,12 +99,12 @@ def contact_window_build(made_from: str) -> Any:
                 _, bad = WINDOW_ONE(
                     law, viscous, layout, state, loads, held, ahead, row, fall, work, step, 1
                 )
-                said = advance_one(contact, state.displacement, state.velocity, step)
+                said = advance_of(contact, None, state.displacement, state.velocity, step)
             else:
                 _, bad = WINDOW_THREADS(
                     law, viscous, layout, state, loads, held, ahead, row, fall, work, step, 1
                 )
-                said = advance_threads(contact, state.displacement, state.velocity, step)
+                said = advance_of(contact, True, state.displacement, state.velocity, step)
             if bad > 0.0 or said != GO_ON:
                 return k + 1, bad, said
         return steps, 0.0, GO_ON

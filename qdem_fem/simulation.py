@@ -17,7 +17,7 @@ from qdem_fem.body import Body
 from qdem_fem.checkpoint import checkpoint_read, checkpoint_write
 from qdem_fem.conditioned_bodies import ConditionedBodies
 from qdem_fem.conditions import Held, Roller
-from qdem_fem.contact_spheres import SphereContact, contact_options_check
+from qdem_fem.contact_options import Contact, contact_options_check, contacts_of
 from qdem_fem.critical_step import CriticalStep, critical_step_find
 from qdem_fem.dynamic_relaxation import StaticAnswer, relax
 from qdem_fem.errors import ConditionError
@@ -98,7 +98,7 @@ class Simulation(ConditionedBodies):
     default, the result does not depend on it; ``mass_scaling`` [s]: raise the density of
     elements whose own critical step is shorter than this; ``device``: ``"cpu"``, or ``"cuda"``
     for a GPU (`qdem_fem.cuda_assembly`), whose results repeat to round-off only; ``contact``:
-    how bodies touch (`qdem_fem.contact_spheres.SphereContact`), not at all by default.
+    how bodies touch, a `qdem_fem.SphereContact` or `SurfaceContact`; not at all by default.
 
     Bodies of one name are numbered, as messages name them.  In single precision a free body has
     a frame of its own (`qdem_fem.body_frames`), renewed when an advance begins: bits then depend
@@ -121,7 +121,7 @@ class Simulation(ConditionedBodies):
         threads: int | None = None,
         mass_scaling: float | None = None,
         device: Literal["cpu", "cuda"] = "cpu",
-        contact: SphereContact | None = None,
+        contact: Contact | None = None,
     ) -> None:
         super().__init__(bodies)
         words_check(strain=strain, precision=precision, device=device)
@@ -307,9 +307,7 @@ class Simulation(ConditionedBodies):
     def contacts(self) -> Contacts | None:
         """The contacts of the bodies; None where they have none."""
         if self.contact is not None and self._contacts is None:
-            from qdem_fem.contact_state import Contacts
-
-            self._contacts = Contacts(self, self.contact)
+            self._contacts = contacts_of(self, self.contact)
         return self._contacts
 
     # --- for the march and the files -----------------------------------------------------------
