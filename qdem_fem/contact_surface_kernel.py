@@ -396,8 +396,8 @@ def edges_forces(c: Any, velocity: Any, step: float) -> None:  # pragma: no cove
             flat = edge_flatness(surface, x, a, n, -1.0) * edge_flatness(surface, x, b, n, 1.0)
             fade = 16.0 * s * (1.0 - s) * t * (1.0 - t) * (1.0 - flat**FLAT)
             near.edge_weight[at] = fade * min(surface.edge_area[a], surface.edge_area[b])
-            # where it does not begin by approach it begins without a force
-            near.edge_start[at] = 0.0 if g + dot(way, n) <= 0.0 else g
+            # what slides onto an edge begins without a force
+            near.edge_start[at] = 0.0 if step == 0.0 or g + dot(way, n) <= 0.0 else g
         body, other = surface.edge_body[a], surface.edge_body[b]
         k_n = near.edge_weight[at] * series(surface.modulus[body], surface.modulus[other])
         k_t = near.edge_weight[at] * series(surface.shear[body], surface.shear[other])
