@@ -7,7 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from qdem_fem.contact_spheres import CONTACTS, ContactPlane, SphereContact
+from qdem_fem.contact_options import Contact
+from qdem_fem.contact_spheres import ContactPlane, SphereContact
+from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.scene_types import Name, NonNegative, Positive, Table, Vector, number_or_table
 
 NumberByBody = Annotated[
@@ -30,33 +32,41 @@ class PlaneTable(Table):
 class ContactTable(Table):
     """Contact between all bodies; left out of the kernel when not given."""
 
-    model: Literal["spheres"]
-    """At the vertices of the surface, as in the paper."""
-    radius: NumberByBody
-    """[m]: a number, or by body."""
-    normal_stiffness: NumberByBody
-    """Of a pair of the body's material [N/m]: a number, or by body."""
+    model: Literal["spheres", "surface"]
+    """Spheres at the vertices of the surface, as in the paper, or the surfaces themselves."""
     friction: NonNegative
     """Coulomb's coefficient."""
-    skin: Positive | None = None
-    """Of the neighbour list [m]."""
-    contacts: Annotated[int, Field(ge=1, le=1000)] = CONTACTS
+    contacts: Annotated[int, Field(ge=1, le=1000)] | None = None
     """Contacts of a vertex at once that the time step allows for."""
     plane: Annotated[tuple[PlaneTable, ...], Field(strict=False)] = ()
+    radius: NumberByBody | None = None
+    """Of spheres [m]: a number, or by body."""
+    normal_stiffness: NumberByBody | None = None
+    """Of a pair of spheres of the body's material [N/m]: a number, or by body."""
+    skin: Positive | None = None
+    """Of the neighbour list of spheres [m]."""
+    modulus: NumberByBody | None = None
+    """Of two surfaces of the body's material [Pa/m]: a number, or by body."""
+    points: Annotated[int, Field(ge=1, le=20)] | None = None
+    """A face of a surface has that many points squared."""
+    depth: Positive | None = None
+    """Greatest depth of a surface in another [m]."""
 
 
-def contact_of(table: ContactTable | None) -> SphereContact | None:
+NEEDED = {"spheres": ("radius", "normal_stiffness"), "surface": ("modulus",)}
+"""Keys of each model that have no default."""
+OPTIONS = {"spheres": ("skin", "contacts"), "surface": ("points", "depth", "contacts")}
+
+
+def contact_of(table: ContactTable | None) -> Contact | None:
     """The contact that a scene asks for."""
     if table is None:
         return None
-    return SphereContact(
-        radius=table.radius,
-        normal_stiffness=table.normal_stiffness,
-        friction=table.friction,
-        planes=tuple(ContactPlane(p.point, p.normal, p.friction) for p in table.plane),
-        skin=table.skin,
-        contacts=table.contacts,
-    )
+    names = [*NEEDED[table.model], *OPTIONS[table.model]]
+    given = {name: getattr(table, name) for name in names if getattr(table, name) is not None}
+    planes = tuple(ContactPlane(p.point, p.normal, p.friction) for p in table.plane)
+    made = SphereContact if table.model == "spheres" else SurfaceContact
+    return made(friction=table.friction, planes=planes, **given)
 
 
 def contact_faults(
@@ -67,8 +77,14 @@ def contact_faults(
     ``simulation``: its `SimulationTable`, or None where that has a fault of its own; ``names`` of
     all bodies.
     """
-    for quantity in ("radius", "normal_stiffness"):
+    known = {*NEEDED[table.model], *OPTIONS[table.model]}
+    for key in sorted({key for keys in (*NEEDED.values(), *OPTIONS.values()) for key in keys}):
+        if getattr(table, key) is not None and key not in known:
+            yield f"contact.{key}", f"the model {table.model!r} does not use it"
+    for quantity in NEEDED[table.model]:
         given = getattr(table, quantity)
+        if given is None:
+            yield f"contact.{quantity}", f"missing: the model {table.model!r} needs it"
         if isinstance(given, Mapping):
             for name in given:
                 if name not in names:

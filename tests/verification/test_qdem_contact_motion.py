@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -389,6 +390,14 @@ def test_a_scene_names_its_contact(tmp_path: Path) -> None:
     assert run.contact.of_body("above", "radius") == 0.005
     assert run.contact.planes[0].friction == 0.2
     assert not [text for text in prepared.scene.left_out() if "contact" in text]
+    surface = scene_of(
+        tmp_path,
+        lambda text: re.sub("radius.*|normal_stiff.*", "", text).replace(
+            '"spheres"', '"surface"\nmodulus = { below = 1e12, above = 2e12 }\npoints = 3'
+        ),
+    )
+    contact = simulation_of(surface)[0].contact
+    assert (contact.of_body("above", "modulus"), contact.points) == (2e12, 3)
     without = scene_of(tmp_path, lambda text: text[: text.index("[contact]")])
     assert simulation_of(without)[0].contact is None
     assert [text for text in without.scene.left_out() if "contact" in text]
@@ -399,6 +408,12 @@ def test_a_scene_names_its_contact(tmp_path: Path) -> None:
     [
         ("above = 0.005", "abov = 0.005", "contact.radius.abov: there is no body 'abov'"),
         (", above = 0.005", "", "contact.radius: body 'above' has none"),
+        (
+            "radius = {",
+            "modulus = 1e12\nradius = {",
+            "contact.modulus: the model 'spheres' does not",
+        ),
+        ('"spheres"', '"surface"', "contact.modulus: missing: the model 'surface' needs it"),
         ("1e8", "0", "contact.normal_stiffness: must be above 0"),
         ('"spheres"', '"cubes"', "contact.model: must be 'spheres'"),
         ("normal = [0, 0, 1]", "normal = [0, 0, 0]", "contact.plane.0.normal: has no direction"),
