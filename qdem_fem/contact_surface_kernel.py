@@ -82,12 +82,16 @@ class Near(NamedTuple):
     """(n + 1,) its first entry in ``face``"""
     face: Any
     """faces of that body near to it"""
+    free: Any
+    """(n,) way of all vertices from ``start`` up to which the point can not get in [m]"""
     weight: Any
     """(n,) area as the contact sees it, kept while it lasts [m^2]; negative: does not touch"""
     spring: Any
     """(n, 3) [m]"""
     edges: Any
     """(m, 2) pairs of edges"""
+    edge_free: Any
+    """(m,) as ``free``"""
     edge_weight: Any
     """(m,) [m^2]"""
     edge_start: Any
@@ -317,17 +321,24 @@ def series(one: float, other: float) -> float:  # pragma: no cover
 
 
 @exact
-def points_forces(c: Any, velocity: Any, step: float) -> float:  # pragma: no cover
-    """Forces of points in other bodies; greatest depth."""
+def points_forces(c: Any, velocity: Any, step: float, moved: float) -> float:  # pragma: no cover
+    """Forces of points in other bodies; greatest depth.
+
+    ``moved`` [m]: greatest way of a vertex from ``start``.  A point outside by ``g`` is not in
+    before it and a face have moved by ``g`` in all, each by ``moved`` then and now at most.
+    """
     surface, near, x = c.surface, c.near, c.position
     deepest = 0.0
     for at in range(near.point.size):
+        if moved < near.free[at]:
+            continue
         q = near.point[at]
         nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
         share = row(surface.point_share, q)
         p = blend(x, nodes, share)
         faces = near.face[near.first[at] : near.first[at + 1]]
         g, n, f, below = depth_of(p, x, surface.face, faces)
+        near.free[at] = -0.5 * g - moved if g > -np.inf else -1.0
         if g <= 0.0 and near.weight[at] < 0.0:
             continue
         if g > 0.0 and near.weight[at] < 0.0:
@@ -354,10 +365,12 @@ def points_forces(c: Any, velocity: Any, step: float) -> float:  # pragma: no co
 
 
 @exact
-def edges_forces(c: Any, velocity: Any, step: float) -> None:  # pragma: no cover
-    """Forces of sharp edges across sharp edges of other bodies."""
+def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # pragma: no cover
+    """Forces of sharp edges across sharp edges of other bodies; ``moved`` as `points_forces`."""
     surface, near, x = c.surface, c.near, c.position
     for at in range(near.edges.shape[0]):
+        if moved < near.edge_free[at]:
+            continue
         a, b = near.edges[at, 0], near.edges[at, 1]
         i, j, k, m = surface.edge[a, 0], surface.edge[a, 1], surface.edge[b, 0], surface.edge[b, 1]
         u, v, w = minus(x, j, x, i), minus(x, m, x, k), minus(x, i, x, k)
@@ -452,8 +465,9 @@ def surface_advance(
             moved += (c.position[i, k] - c.start[i, k]) ** 2
         far = max(far, moved)
     c.account[0] = 0.0
-    deepest = max(points_forces(c, velocity, step), walls_forces(c, velocity, step))
-    edges_forces(c, velocity, step)
+    moved = np.sqrt(far)
+    deepest = max(points_forces(c, velocity, step, moved), walls_forces(c, velocity, step))
+    edges_forces(c, velocity, step, moved)
     if deepest > c.depth:
         return TOO_DEEP
     return LOOK_ANEW if far > c.half_skin**2 else GO_ON

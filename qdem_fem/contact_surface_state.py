@@ -89,7 +89,9 @@ class SurfaceContacts(Contacts):
                 np.concatenate(opposite), np.concatenate(edge_areas), body_of[3],
                 modulus, tangential_stiffness(modulus, poisson),
             ),
-            near_of(nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2)),
+            near_of(
+                nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2), np.zeros(0)
+            ),
             Walls(
                 *planes_arrays(asked.planes, asked.friction), np.full((walls, count), -1.0),
                 np.zeros((walls, count, 3)), np.zeros((walls, 3)),
@@ -110,6 +112,7 @@ class SurfaceContacts(Contacts):
 
     def forget(self) -> None:
         """Let go of all springs."""
+        self.near.free[:] = -1.0
         for weight in (self.near.weight, self.near.edge_weight, self.kernel.walls.weight):
             weight[:] = -1.0
         for spring in (self.near.spring, self.near.edge_spring, self.kernel.walls.spring):

@@ -17,6 +17,8 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
+from qdem_fem.contact_sphere_state import SphereContacts
+from qdem_fem.contact_surface_state import SurfaceContacts
 
 Floats = NDArray[np.float64]
 BALLAST = q.Material(30e9, 0.2, 2700.0, shear_viscosity=1e4)
@@ -46,15 +48,14 @@ def grain_mesh(seed: int) -> tuple[Floats, NDArray[np.int64]]:
     return nodes, Delaunay(nodes).simplices.astype(np.int64)
 
 
-def lattice(side: int, near: float) -> list[q.Body]:
-    """``side**3`` grains; ``near``: distance over twice the radius of grain and sphere."""
+def lattice(side: int, distance: float) -> list[q.Body]:
+    """``side**3`` grains on a cubic lattice, neighbours ``distance`` apart [m]."""
     meshes = {}
     for i, place in enumerate(np.ndindex(side, side, side)):
         meshes[place] = grain_mesh(i)
     bodies = []
-    span = 2 * (GRAIN + RADIUS)
     for place, (nodes, elements) in meshes.items():
-        centre = span * near * np.array(place)
+        centre = distance * np.array(place)
         bodies.append(q.Body((nodes + centre, elements), BALLAST, name="grain"))
     return bodies
 
@@ -81,46 +82,61 @@ class PackingCost:
         return 1 - self.step_without / self.step_with
 
 
-def seconds_a_step(run: q.Simulation, steps: int, rounds: int) -> float:
-    """Least CPU time of a step in some rounds [s]."""
-    run.advance(2 * run.step)
-    least = np.inf
+def seconds_a_step(runs: list[q.Simulation], steps: int, rounds: int) -> list[float]:
+    """Least CPU time of a step of each in some rounds, one after the other in each [s]."""
+    least = [np.inf] * len(runs)
+    for run in runs:
+        run.advance(2 * run.step)
     for _ in range(rounds):
-        started = time.process_time()
-        run.advance(steps * run.step)
-        least = min(least, (time.process_time() - started) / steps)
-    return float(least)
+        for k, run in enumerate(runs):
+            started = time.process_time()
+            run.advance(steps * run.step)
+            least[k] = min(least[k], (time.process_time() - started) / steps)
+    return least
 
 
 def packing_cost(
-    side: int = 6, near: float = 0.95, steps: int = 60, rounds: int = 5
+    model: str = "spheres", side: int = 6, near: float = 0.95, steps: int = 300, rounds: int = 5
 ) -> PackingCost:
-    """Measure a packing of ``side**3`` grains with contact and without."""
-    step = 1e-8  # far below the critical one: what overlaps at the start does not fly apart
-    found = {}
-    touch = q.SphereContact(RADIUS, STIFFNESS, FRICTION)
-    for contact in (None, touch):
-        bodies = lattice(side, near)
-        run = q.Simulation(bodies, threads=1, step=step, contact=contact)
-        found[contact is None] = run, seconds_a_step(run, steps, rounds)
-    run, with_contact = found[False]
+    """Measure a packing of ``side**3`` grains with contact and without.
+
+    ``near``: distance of neighbours over the diameter of a grain, which spheres make larger.
+    """
+    step = 1e-8
+    touch: q.SphereContact | q.SurfaceContact
+    if model == "spheres":
+        touch, size = q.SphereContact(RADIUS, STIFFNESS, FRICTION), GRAIN + RADIUS
+    else:
+        touch, size = q.SurfaceContact(STIFFNESS, FRICTION), GRAIN
+    runs = [
+        q.Simulation(lattice(side, 2 * near * size), threads=1, step=step, contact=contact)
+        for contact in (None, touch)
+    ]
+    without, with_contact = seconds_a_step(runs, steps, rounds)
+    run = runs[1]
     contacts = run.contacts
     assert contacts is not None
     started = time.process_time()
     contacts.pairs_find()
     search = time.process_time() - started
+    if isinstance(contacts, SphereContacts):
+        candidates, touching = len(contacts.pairs.second), contacts.pairs.touching.sum()
+    else:
+        assert isinstance(contacts, SurfaceContacts)
+        candidates, touching = len(contacts.near.point), (contacts.near.weight > 0).sum()
     return PackingCost(
         bodies=len(run.bodies),
         elements=len(run.assembly.elements),
         spheres=len(contacts.nodes),
-        candidates=len(contacts.pairs.second),
-        touching=int(contacts.pairs.touching.sum()),
-        step_without=found[True][1],
+        candidates=candidates,
+        touching=int(touching),
+        step_without=without,
         step_with=with_contact,
         search=search,
     )
 
 
 if __name__ == "__main__":
-    cost = packing_cost()
-    print(cost, f"share {100 * cost.share:.1f} %")
+    for name, distance in (("spheres", 0.95), ("surface", 0.97)):
+        cost = packing_cost(name, near=distance)
+        print(name, cost, f"share {100 * cost.share:.1f} %")
