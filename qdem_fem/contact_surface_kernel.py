@@ -90,8 +90,6 @@ class Near(NamedTuple):
     """(n, 3) [m]"""
     edges: Any
     """(m, 2) pairs of edges"""
-    edge_free: Any
-    """(m,) as ``free``"""
     edge_weight: Any
     """(m,) [m^2]"""
     edge_start: Any
@@ -365,12 +363,10 @@ def points_forces(c: Any, velocity: Any, step: float, moved: float) -> float:  #
 
 
 @exact
-def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # pragma: no cover
-    """Forces of sharp edges across sharp edges of other bodies; ``moved`` as `points_forces`."""
+def edges_forces(c: Any, velocity: Any, step: float) -> None:  # pragma: no cover
+    """Forces of sharp edges across sharp edges of other bodies."""
     surface, near, x = c.surface, c.near, c.position
     for at in range(near.edges.shape[0]):
-        if moved < near.edge_free[at]:
-            continue
         a, b = near.edges[at, 0], near.edges[at, 1]
         i, j, k, m = surface.edge[a, 0], surface.edge[a, 1], surface.edge[b, 0], surface.edge[b, 1]
         u, v, w = minus(x, j, x, i), minus(x, m, x, k), minus(x, i, x, k)
@@ -467,7 +463,7 @@ def surface_advance(
     c.account[0] = 0.0
     moved = np.sqrt(far)
     deepest = max(points_forces(c, velocity, step, moved), walls_forces(c, velocity, step))
-    edges_forces(c, velocity, step, moved)
+    edges_forces(c, velocity, step)
     if deepest > c.depth:
         return TOO_DEEP
     return LOOK_ANEW if far > c.half_skin**2 else GO_ON

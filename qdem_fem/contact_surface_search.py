@@ -116,27 +116,18 @@ def edges_near(
     return found[:count].copy()
 
 
-def edges_apart(surface: Surface, position: Any, edges: Integers) -> Any:
-    """Distance that pairs of edges (m, 2) have at least, of their boxes, [m], (m,)."""
-    ends = position[surface.edge[edges]]  # (m, 2 edges, 2 ends, 3)
-    low, high = ends.min(axis=2), ends.max(axis=2)
-    gap = np.maximum(low[:, 0] - high[:, 1], low[:, 1] - high[:, 0])
-    return np.linalg.norm(np.maximum(gap, 0.0), axis=1)
-
-
 def near_of(
     point: Integers,
     body: Integers,
     first: Integers,
     face: Integers,
     edges: Integers,
-    edge_free: Any,
 ) -> Near:
     """Lists without a history."""
     count, pairs = len(point), len(edges)
     return Near(
         point, body, first, face, np.full(count, -1.0), np.full(count, -1.0), np.zeros((count, 3)),
-        edges, edge_free, np.full(pairs, -1.0), np.zeros(pairs), np.zeros((pairs, 3)),
+        edges, np.full(pairs, -1.0), np.zeros(pairs), np.zeros((pairs, 3)),
     )  # fmt: skip
 
 
@@ -168,7 +159,7 @@ def near_renew(
     high = np.maximum.reduceat(position, node[:-1])
     found = points_near(surface, position, (low, high), point, face, reach)
     edges = edges_near(surface, position, (low, high), edge, reach)
-    new = near_of(*found, edges, edges_apart(surface, position, edges) / 2)
+    new = near_of(*found, edges)
     if old is not None:
         history_carry(old, new, len(low))
     return new

@@ -90,7 +90,7 @@ class SurfaceContacts(Contacts):
                 modulus, tangential_stiffness(modulus, poisson),
             ),
             near_of(
-                nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2), np.zeros(0)
+                nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2)
             ),
             Walls(
                 *planes_arrays(asked.planes, asked.friction), np.full((walls, count), -1.0),
