@@ -221,6 +221,30 @@ def test_what_a_step_says() -> None:
     assert said == [GO_ON, LOOK_ANEW, LOOK_ANEW, TOO_DEEP]
 
 
+def test_spheres_that_turn_as_one_strain_their_spring() -> None:
+    """What the paper's vertices without a spin imply: ``|s| = |d| theta`` at the scale of a step.
+
+    The chord of 1e-3 differs from its arc by theta^2/24, the old spring's turn by theta^2/2.
+    """
+    c = cloud(7, 2, False)
+    c.spheres.body[:] = 0, 1
+    c.spheres.radius[:] = 0.5
+    c.spheres.reference[:] = [[-0.48, 0, 0], [0.48, 0, 0]]
+    c = c._replace(
+        friction=np.inf,
+        pairs=pairs_renew(None, c.spheres.reference, c.spheres.radius, c.spheres.body, 1.0, False),
+    )
+    at = c.spheres.reference
+    for k in range(10):
+        angle = 1e-3 * (k + 1)
+        turned = 0.48 * np.array([[-np.cos(angle), -np.sin(angle), 0]])
+        now = np.concatenate([turned, -turned])
+        way = now - at
+        advance_one(c, packed(now - c.spheres.reference), packed(way), 1.0)
+        at = now
+    assert np.linalg.norm(c.pairs.spring[0]) == pytest.approx(0.96 * 1e-2, rel=1e-4)
+
+
 # --- the list ------------------------------------------------------------------------------------
 
 
