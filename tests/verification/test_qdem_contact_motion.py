@@ -18,6 +18,7 @@ from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, Sce
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
+from validation.qdem_contact_trials import slope_gain
 
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
@@ -138,47 +139,19 @@ def test_soft_head_on_collision_is_half_a_period_of_one_spring() -> None:
 # --- friction ------------------------------------------------------------------------------------
 
 
-def on_a_slope(share: float) -> tuple[float, float, float]:
-    """A cube on a wall at ``tan(alpha) = 1/2``, with ``mu`` that share of it.
-
-    Gravity turns to the slope within ten periods of the contact's springs, from an equilibrium.
-    Returns acceleration down the slope [m/s^2] in the last third, the expected one, and the way.
-    """
-    alpha, stiffness, ramp = np.arctan(0.5), 1e5, 13e-3
-    overlap = SIDE**3 * 2700 * 9.81 * np.cos(alpha) / (9 * 2 * stiffness)
-    times = np.linspace(0, ramp, 200)
-    along = 9.81 * np.sin(alpha) * 0.5 * (1 - np.cos(np.pi * times / ramp))
-    across = np.full(200, -9.81 * np.cos(alpha))
-    cube = block(origin=(0, 0, RADIUS - overlap))
-    run = q.Simulation(
-        [cube], threads=1,
-        gravity=q.Series(times, np.column_stack([along, 0 * along, across])),
-        contact=q.SphereContact(
-            RADIUS, stiffness, share / 2, planes=[q.ContactPlane((0, 0, 0), (0, 0, 2))]
-        ),
-    )  # fmt: skip
-    run.advance(2 * ramp)
-    before, place = cube.velocity.mean(axis=0)[0], cube.displacement.mean(axis=0)[0]
-    run.advance(ramp)
-    gain = (cube.velocity.mean(axis=0)[0] - before) / ramp
-    expected = 9.81 * (np.sin(alpha) - share / 2 * np.cos(alpha))
-    return gain, expected, cube.displacement.mean(axis=0)[0] - place
-
-
 def test_block_on_a_slope_slides_above_the_angle_of_friction() -> None:
-    """One per cent above: it gains ``g (sin alpha - mu cos alpha)``; the cube's elastic rocking
+    """mu 1 % below ``tan(alpha) = 1/2``: it gains ``g (sin alpha - mu cos alpha)``.
 
-    changes the pressure by some per mille, a tenth of that per cent.
+    The cube's elastic rocking changes the pressure by some per mille, a tenth of that per cent.
     """
-    gain, expected, way = on_a_slope(0.99)
-    assert gain == pytest.approx(expected, rel=0.1)
+    gain, rigid, way = slope_gain(0.99)
+    assert gain == pytest.approx(rigid, rel=0.1)
     assert way > 1e-5
 
 
 def test_block_on_a_slope_rests_below_the_angle_of_friction() -> None:
-    """One per cent below: it stays within a hundredth of the way that it would slide above."""
-    _, _, way = on_a_slope(1.01)
-    assert abs(way) < 1e-7
+    """mu 1 % above: it stays within a hundredth of the way that it would slide below."""
+    assert abs(slope_gain(1.01)[2]) < 1e-7
 
 
 # --- invariance and history ----------------------------------------------------------------------
@@ -221,7 +194,7 @@ def test_units_change_no_bit() -> None:
 def grinding(skin: float | None = None, threads: int = 1) -> q.Simulation:
     """Two cubes pressed on each other and on a wall, the upper one sliding fast."""
     run = two(
-        gap=-2e-6, shift=(0.004, 0.002), stiffness=1e6, step=1.2e-6, gravity=(0.0, 0.0, -9.81),
+        gap=-2e-6, shift=(0.004, 0.002), stiffness=1e6, step=1.2e-6,
         contact={"planes": [q.ContactPlane((0, 0, -0.00599), (0, 0, 1), 0.2)], "skin": skin},
     )  # fmt: skip
     run.threads = threads
@@ -285,7 +258,7 @@ def test_bodies_that_do_not_touch_move_as_without_contact() -> None:
     fields = []
     for contact in (None, q.SphereContact(RADIUS, 1e8, 0.5)):
         bodies = [block("below"), block("above", (0, 0, 0.1))]
-        run = q.Simulation(bodies, threads=1, step=1.2e-6, contact=contact, gravity=(0, 0, -9.81))
+        run = q.Simulation(bodies, threads=1, step=1.2e-6, contact=contact)
         run.fix(bodies[0], bodies[0].nodes[:, 2] == 0)
         run.load(bodies[0], bodies[0].nodes[:, 2] == SIDE, lambda t: np.array([t, 0, 1.0]))
         thrown(run, (0.1, 0.0, 0.2))

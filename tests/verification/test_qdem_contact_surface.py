@@ -17,6 +17,7 @@ from qdem_fem.contact_surface import face_points, sharp_edges
 from qdem_fem.contact_window import advance_of
 from qdem_fem.errors import ConditionError, ContactTooDeep
 from qdem_fem.mesh_generation import box_mesh
+from validation.qdem_contact_trials import slope_gain
 
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
@@ -189,8 +190,6 @@ def test_collision_keeps_momentum_moment_and_energy() -> None:
 @pytest.mark.parametrize("share", [0.99, 1.01])
 def test_block_on_a_slope(share: float) -> None:
     """``tan(alpha) = 1/2``, mu one per cent below: it slides as a rigid block; above: it rests."""
-    from validation.qdem_contact_trials import slope_gain
-
     gain, rigid, way = slope_gain(share, "surface")
     if share < 1:
         assert gain == pytest.approx(rigid, rel=0.1)
