@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from qdem_fem.body import Body
+    from qdem_fem.contact_spheres import ContactPlane, SphereContact
+    from qdem_fem.contact_surface import SurfaceContact
     from qdem_fem.critical_step import CriticalStep
     from qdem_fem.dynamic_relaxation import StaticAnswer
     from qdem_fem.errors import QdemError, StepWarning
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Body": "body",
+    "ContactPlane": "contact_spheres",
     "CriticalStep": "critical_step",
     "Energy": "simulation",
     "History": "simulation",
@@ -26,12 +29,15 @@ _HOMES = {
     "QdemError": "errors",
     "Series": "series",
     "Simulation": "simulation",
+    "SphereContact": "contact_spheres",
+    "SurfaceContact": "contact_surface",
     "StaticAnswer": "dynamic_relaxation",
     "StepWarning": "errors",
     "ramp": "series",
 }
 __all__ = [
     "Body",
+    "ContactPlane",
     "CriticalStep",
     "Energy",
     "History",
@@ -39,8 +45,10 @@ __all__ = [
     "QdemError",
     "Series",
     "Simulation",
+    "SphereContact",
     "StaticAnswer",
     "StepWarning",
+    "SurfaceContact",
     "ramp",
 ]
 

@@ -230,6 +230,14 @@ class Assembly:
         frames.advance(done, step, journey)
         return done, bad
 
+    def gravity_packed(self, gravity: Floats | None) -> Any:
+        """Gravity (k, 3) [m/s^2] as the kernel reads it, four numbers a step; None without."""
+        if gravity is None:
+            return None
+        accelerations = aligned_zeros(4 * len(gravity), self.dtype)
+        accelerations.reshape(-1, 4)[:, :3] = gravity
+        return accelerations
+
     def kernel_run(
         self,
         state: kernel.State,
@@ -243,10 +251,7 @@ class Assembly:
         work: Floats,
     ) -> tuple[int, float]:
         """Run the kernel on a state as it is, in the frames of the bodies."""
-        accelerations = None
-        if gravity is not None:
-            accelerations = aligned_zeros(4 * len(gravity), self.dtype)
-            accelerations.reshape(-1, 4)[:, :3] = gravity
+        accelerations = self.gravity_packed(gravity)
         before = numba.get_num_threads()
         numba.set_num_threads(self.threads)
         try:

@@ -38,7 +38,7 @@ FUNCTION = "a function, not compared"
 def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
     """Write the state of ``simulation`` to ``path``; a kill leaves the old file or the new one."""
     assembly, (_, held) = simulation.assembly, simulation.packed_lists()
-    critical = simulation.critical_step
+    critical = simulation.elements_critical_step
     head = {
         "format": FORMAT,
         "fingerprint": fingerprint(simulation),
@@ -56,6 +56,8 @@ def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
         "critical_mode": critical.mode,
     }
     arrays |= assembly.stored()
+    if simulation.contacts is not None:
+        arrays |= simulation.contacts.stored()
     stream = io.BytesIO()
     np.savez(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes them for its flags
     write_whole(Path(path), _sealed(stream.getvalue()))
@@ -81,6 +83,8 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
         critical = CriticalStep(**head["critical_step"], mode=arrays["critical_mode"])
         previous = arrays["previous"]
         assembly.restore(arrays)
+        if simulation.contacts is not None:
+            simulation.contacts.restore(arrays)
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"a part of the state is not there ({error})", where=where) from error
     held.previous[:] = previous
@@ -124,6 +128,8 @@ def fingerprint(simulation: Simulation) -> dict[str, str]:
         ),
         "periodic pairs": _mark(simulation.master),
     }
+    if simulation.contact is not None:
+        marks["contact"] = repr(simulation.contact)
     for number, body in enumerate(simulation.bodies):
         marks[f"mesh of body {number}"] = _mark(body.nodes, body.elements)
         material = [np.asarray(getattr(body.material, f.name)) for f in fields(body.material)]

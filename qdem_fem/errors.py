@@ -75,6 +75,12 @@ class ElementInverted(QdemError):
         super().__init__(what, where=where, remedy=remedy)
 
 
+class ContactTooDeep(QdemError):
+    """Two bodies are so deep in each other that the contact no longer knows its direction."""
+
+    exit_code = 6
+
+
 class CheckpointError(QdemError):
     """A saved state is damaged or belongs to another simulation."""
 

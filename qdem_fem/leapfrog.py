@@ -92,9 +92,10 @@ def accelerations_free(run: Simulation, displacement: Floats, velocity: Floats) 
     """What the forces would make of all nodes now if none were held [m/s^2], (n, 3)."""
     loads, _ = run.packed_lists()
     now = np.full(2, run.time)
-    return run.assembly.accelerations(
+    free = run.assembly.accelerations(
         displacement, velocity, loads, run.conditions.table(now), run.gravity_at(now)
     )
+    return free if run.contacts is None else free + run.contacts.accelerations()
 
 
 def _accelerations(run: Simulation, displacement: Floats, velocity: Floats) -> Floats:

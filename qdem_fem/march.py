@@ -45,6 +45,8 @@ def march(
     if motion.displacement_set:
         state_admit(run)
         motion.displacement_set = False
+    if run.contacts is not None:
+        run.contacts.refresh()
     if isnan(motion.put_in):
         motion.put_in = energy_set(run)
     step_check(run)
@@ -57,6 +59,7 @@ def march(
     if run.gravity is not None and run.gravity.varying is not None:
         most = GRAVITY_STEPS
     end = motion.steps_done + steps
+    window = assembly.window if run.contacts is None else run.contacts.window
     while motion.steps_done < end:
         assembly.frames_renew()
         count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
@@ -64,7 +67,7 @@ def march(
         probes = samples.probes(4 * assembly.place[nodes], motion.steps_done)
         gravity = run.gravity_at(times)
         before = moment(run) if gravity is not None else None
-        done, bad = assembly.window(
+        done, bad = window(
             count, run.step, loads, held, probes, run.conditions.table(times), gravity, motion.work
         )
         motion.steps_done += done
@@ -72,6 +75,8 @@ def march(
             after = moment(run)
             motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
         motion_check(run, bad)
+        if run.contacts is not None:
+            run.contacts.step_check()
         if progress is not None:
             progress(run.time)
     return samples
@@ -119,10 +124,11 @@ def step_check(run: Simulation) -> None:
 
 def energy_set(run: Simulation) -> float:
     """Energy of the state that the march begins with [J]."""
-    if not any(run.assembly.field(name).any() for name in ("displacement", "velocity")):
+    still = not any(run.assembly.field(name).any() for name in ("displacement", "velocity"))
+    if still and run.contacts is None:
         return 0.0
     energy = run.energy()
-    return energy.kinetic + abs(energy.elastic)
+    return energy.kinetic + abs(energy.elastic) + energy.contact
 
 
 def moment(run: Simulation) -> tuple[Floats, Floats]:

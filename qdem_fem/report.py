@@ -198,7 +198,7 @@ def _energy(summary: dict[str, Any]) -> Iterator[str]:
     yield _table(("energy", "J"), rows)
 
 
-NAMED = ("kinetic", "elastic", "external")
+NAMED = ("kinetic", "elastic", "contact", "friction", "external")
 
 
 def _left_out(summary: dict[str, Any]) -> Iterator[str]:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from qdem_fem.contact_scene import ContactTable
 from qdem_fem.scene_types import (
     Cells,
     Interval,
@@ -258,6 +259,8 @@ class Scene(Table):
     load: Annotated[tuple[Load, ...], Field(strict=False)] = ()
     pressure: Annotated[tuple[Pressure, ...], Field(strict=False)] = ()
     periodic: Annotated[tuple[Periodic, ...], Field(strict=False)] = ()
+    contact: ContactTable | None = None
+    """Bodies touch; left out of the kernel when not given."""
     output: Output = Output()
 
     def left_out(self) -> list[str]:
@@ -279,7 +282,7 @@ class Scene(Table):
                 "finite rotations: the strain is the small one",
             ),
             (self.simulation.method == "static", "inertia: the answer is static"),
-            (True, "contact and friction between bodies"),
+            (self.contact is None, "contact and friction between bodies"),
             (True, "plasticity, damage and fracture"),
         ]
         return [text for absent, text in missing if absent]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from qdem_fem.contact_scene import contact_of
 from qdem_fem.errors import ConditionError, QdemError
 from qdem_fem.scene import BodyTable, Mesh
 from qdem_fem.scene_file import Problem, error_told
@@ -74,6 +75,7 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         threads=table.threads,
         device=table.device,
         mass_scaling=table.mass_scaling,
+        contact=contact_of(scene.contact),
     )
     problems = []
     for step in prepared.conditions:

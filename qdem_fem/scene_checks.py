@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
+from qdem_fem.contact_scene import ContactTable, contact_faults
 from qdem_fem.errors import MeshError
 from qdem_fem.scene import (
     BodyTable,
@@ -99,6 +100,9 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
         found = list(_probes(output, names, meshes, probes))
         problems += found
     problems += _times(text)
+    for _, contact in _tables(text, ContactTable):
+        faults = contact_faults(contact, text.tables.get("simulation"), names)
+        problems += [Problem(*fault) for fault in faults]
     text.refuse(problems)
     scene = Scene.model_validate(text.data)
     return Prepared(scene, text, meshes, conditions, probes, dict(_files(text, folder)))

@@ -127,7 +127,7 @@ def _tables_check(scene: SceneText) -> None:
                 scene.problems.append(Problem(name, f"must be a text, not {_shown(data[name])}"))
             continue
         value = data[name]
-        if name in ("simulation", "output"):
+        if name in ("simulation", "contact", "output"):
             _table_check(scene, name, model, value)
         elif not isinstance(value, list) or (not value and definition.is_required()):
             scene.problems.append(Problem(name, f"write [[{name}]] tables, not {_shown(value)}"))

@@ -25,6 +25,7 @@ CHUNK_WORK = 50_000_000
 ENERGY = 100
 """Least steps between rows of energies, unless asked otherwise: a row costs as much as twenty."""
 ENERGIES = ("kinetic", "elastic", "external")
+CONTACT_ENERGIES = ("contact", "friction")
 COST = "cost.json"
 
 
@@ -115,7 +116,7 @@ def run_dynamic(
         run.restore(folder.checkpoint)
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
     plan = plan_of(prepared, float(run.step))
-    rows, energies = _tables(folder.path, probes)
+    rows, energies = _tables(folder.path, probes, energy_names(run))
     record = _Record(run, list(bodies.values()), plan, folder.path, rows, energies)
     if goes_on:
         record.go_on()
@@ -153,7 +154,7 @@ def run_static(prepared: Prepared, run: Any, bodies: dict[str, Any], folder: Run
         "wall_s": time.perf_counter() - started,
     }
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
-    rows, energies = _tables(folder.path, probes)
+    rows, energies = _tables(folder.path, probes, energy_names(run))
     for table in (rows, energies):
         table.begin()
     rows.append(np.array([[0.0, *_probed(probes)]]))
@@ -241,10 +242,15 @@ def _cost_read(path: Path) -> dict[str, float]:
         return {"cpu_s": 0.0, "wall_s": 0.0}
 
 
-def _tables(path: Path, probes: dict[str, Any]) -> tuple[Table, Table]:
+def energy_names(run: Any) -> tuple[str, ...]:
+    """Columns of energy.csv beside the time; of contact where there is any."""
+    return ENERGIES if run.contact is None else ENERGIES + CONTACT_ENERGIES
+
+
+def _tables(path: Path, probes: dict[str, Any], energies: tuple[str, ...]) -> tuple[Table, Table]:
     names = [f"{name}_{axis}" for name in probes for axis in "xyz"]
     rows = Table(path / "probes.csv", ["time", *names])
-    return rows, Table(path / "energy.csv", ["time", *ENERGIES])
+    return rows, Table(path / "energy.csv", ["time", *energies])
 
 
 def _probed(probes: dict[str, Any]) -> list[float]:
@@ -254,7 +260,7 @@ def _probed(probes: dict[str, Any]) -> list[float]:
 
 def _energy_row(run: Any, when: float) -> Any:
     energy = run.energy()
-    return np.array([[when, *(float(getattr(energy, name)) for name in ENERGIES)]])
+    return np.array([[when, *(float(getattr(energy, name)) for name in energy_names(run))]])
 
 
 class Stop:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, isfinite, nan
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from qdem_fem.body import Body
 from qdem_fem.checkpoint import checkpoint_read, checkpoint_write
 from qdem_fem.conditioned_bodies import ConditionedBodies
 from qdem_fem.conditions import Held, Roller
+from qdem_fem.contact_options import Contact, contact_options_check, contacts_of
 from qdem_fem.critical_step import CriticalStep, critical_step_find
 from qdem_fem.dynamic_relaxation import StaticAnswer, relax
 from qdem_fem.errors import ConditionError
@@ -36,6 +37,9 @@ from qdem_fem.simulation_options import (
     numbers_check,
     words_check,
 )
+
+if TYPE_CHECKING:
+    from qdem_fem.contact_state import Contacts
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -57,6 +61,10 @@ class Energy:
     """Work of loads, gravity and prescribed motion since the start.
 
     What it takes to hold a node that a user's state had moved away is not counted."""
+    contact: float = 0.0
+    """In the springs of contacts."""
+    friction: float = 0.0
+    """Work that sliders of contacts took since the start."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,8 @@ class Simulation(ConditionedBodies):
     step; ``gravity`` [m/s^2], three components, constant or a series; ``threads``: all by
     default, the result does not depend on it; ``mass_scaling`` [s]: raise the density of
     elements whose own critical step is shorter than this; ``device``: ``"cpu"``, or ``"cuda"``
-    for a GPU (`qdem_fem.cuda_assembly`), whose results repeat to round-off only.
+    for a GPU (`qdem_fem.cuda_assembly`), whose results repeat to round-off only; ``contact``:
+    how bodies touch, a `qdem_fem.SphereContact` or `SurfaceContact`; not at all by default.
 
     Bodies of one name are numbered, as messages name them.  In single precision a free body has
     a frame of its own (`qdem_fem.body_frames`), renewed when an advance begins: bits then depend
@@ -112,12 +121,16 @@ class Simulation(ConditionedBodies):
         threads: int | None = None,
         mass_scaling: float | None = None,
         device: Literal["cpu", "cuda"] = "cpu",
+        contact: Contact | None = None,
     ) -> None:
         super().__init__(bodies)
         words_check(strain=strain, precision=precision, device=device)
         numbers_check(step=step, safety=safety, threads=threads, mass_scaling=mass_scaling)
         bounds_check(safety=safety, threads=threads)
+        contact_options_check(contact, precision, device)
         self._assembly_class = assembly_class(device)
+        self.contact = contact
+        self._contacts: Contacts | None = None
         self.strain, self.precision, self.safety = strain, precision, safety
         self.threads, self.mass_scaling = threads, mass_scaling
         self.gravity = None if gravity is None else Driver(gravity, 3, "gravity")
@@ -178,6 +191,12 @@ class Simulation(ConditionedBodies):
     @property
     def critical_step(self) -> CriticalStep:
         """The largest stable step, for small motions about the reference configuration."""
+        elements = self.elements_critical_step
+        return elements if self.contacts is None else self.contacts.critical_step(elements)
+
+    @property
+    def elements_critical_step(self) -> CriticalStep:
+        """The critical step of bodies that touch nothing."""
         if self._critical is None:
             self._critical = critical_step_find(self)
         return self._critical
@@ -225,6 +244,12 @@ class Simulation(ConditionedBodies):
         Until the residual is below ``tolerance`` of the loads; time stands still, and `advance`
         goes on from there.  See `qdem_fem.dynamic_relaxation.relax` for what is raised.
         """
+        if self.contact is not None:
+            raise ConditionError(
+                "bodies in contact have no static answer here",
+                where="relax",
+                remedy="march, with viscosity, until they rest",
+            )
         return relax(self, tolerance, max_steps)
 
     def reaction(self, condition: Held | Roller) -> Floats:
@@ -246,7 +271,9 @@ class Simulation(ConditionedBodies):
         external = float(self.motion.work.sum()) + self.motion.gravity_work
         if self.motion.behind:
             external += float(half_work(self, self.assembly.field("velocity"), velocity).sum())
-        return Energy(kinetic, float(elastic), external)
+        if self.contacts is None:
+            return Energy(kinetic, float(elastic), external)
+        return Energy(kinetic, float(elastic), external, *self.contacts.energy())
 
     def save(self, path: str | Path) -> None:
         """Write the state to a file (`qdem_fem.checkpoint.checkpoint_write`)."""
@@ -275,6 +302,13 @@ class Simulation(ConditionedBodies):
                 self._assembly.field_set(name, np.concatenate(fields))
             self.motion.displacement_set = any(body._displacement.any() for body in self.bodies)
         return self._assembly
+
+    @property
+    def contacts(self) -> Contacts | None:
+        """The contacts of the bodies; None where they have none."""
+        if self.contact is not None and self._contacts is None:
+            self._contacts = contacts_of(self, self.contact)
+        return self._contacts
 
     # --- for the march and the files -----------------------------------------------------------
 
@@ -314,3 +348,5 @@ class Simulation(ConditionedBodies):
         self.assembly.field_set(name, field)
         self.motion.displacement_set |= name == "displacement"
         self.motion.put_in = nan
+        if self._contacts is not None and name == "displacement":
+            self._contacts.stale = True

@@ -95,12 +95,15 @@ def body_facts(body: Any) -> dict[str, Any]:
 
 
 def energy_facts(energy: dict[str, FloatArray]) -> dict[str, float]:
-    """Energies at the end [J], and the greatest of external - kinetic - elastic on the way."""
-    stored = energy["kinetic"] + energy["elastic"]
+    """Energies at the end [J], and the greatest of external less all others on the way."""
+    names = [name for name in ("kinetic", "elastic", "contact", "friction") if name in energy]
+    stored = np.sum([energy[name] for name in names], axis=0)
+    if "contact" in energy:  # overlap that the scene begins with is no work of its loads
+        stored = stored - energy["contact"][0]
     missing = energy["external"] - stored
     greatest = float(max(np.abs(energy["external"]).max(), stored.max()))
     return {
-        **{name: float(energy[name][-1]) for name in ("kinetic", "elastic", "external")},
+        **{name: float(energy[name][-1]) for name in [*names, "external"]},
         "greatest_imbalance": float(np.abs(missing).max()),
         "relative_imbalance": float(np.abs(missing).max()) / greatest if greatest > 0 else 0.0,
     }

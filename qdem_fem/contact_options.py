@@ -1,0 +1,44 @@
+"""Which contact a simulation may have, and what computes it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from qdem_fem.contact_spheres import SphereContact
+from qdem_fem.contact_surface import SurfaceContact
+from qdem_fem.errors import ConditionError
+
+if TYPE_CHECKING:
+    from qdem_fem.contact_state import Contacts
+    from qdem_fem.simulation import Simulation
+
+Contact = SphereContact | SurfaceContact
+
+
+def contact_options_check(contact: Any, precision: str, device: str) -> None:
+    """Raise `ConditionError` for a contact that this simulation can not have."""
+    if contact is None:
+        return
+    if not isinstance(contact, Contact):
+        raise ConditionError(
+            f"a {type(contact).__name__} is no contact",
+            where="simulation, contact",
+            remedy="give a SphereContact or a SurfaceContact",
+        )
+    if precision != "float64" or device != "cpu":
+        raise ConditionError(
+            "contact is computed in double precision on the processor",
+            where="simulation, contact",
+            remedy='take precision="float64" and device="cpu"',
+        )
+
+
+def contacts_of(run: Simulation, contact: Contact) -> Contacts:
+    """What computes a contact; its kernels are loaded when a simulation first needs them."""
+    if isinstance(contact, SphereContact):
+        from qdem_fem.contact_sphere_state import SphereContacts
+
+        return SphereContacts(run, contact)
+    from qdem_fem.contact_surface_state import SurfaceContacts
+
+    return SurfaceContacts(run, contact)

@@ -1,0 +1,163 @@
+"""Which spheres may touch: a cell list, and the tangential history carried from list to list.
+
+A list holds all pairs of different bodies nearer than the sum of radii plus a skin; it is good
+until a vertex has moved half the skin.  Cells are hashed, so that memory goes with the number of
+spheres and not with the room they are in.  Pairs stand in the order of their two numbers: where
+the cells lie changes nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Pairs(NamedTuple):
+    """Pairs i < j by row i, and what each remembers."""
+
+    first: Any
+    """First pair of every sphere, and the end, (c + 1,)."""
+    second: Any
+    """(p,) sphere j of the pair."""
+    back_first: Any
+    """First entry in ``back_pair`` of every sphere, and the end, (c + 1,)."""
+    back_pair: Any
+    """(p,) the pairs in which a sphere is the second."""
+    touching: Any
+    """(p,) uint8, whether the spheres touched when they were last looked at."""
+    spring: Any
+    """(p, 3) tangential spring s, of i against j [m]."""
+    pull: Any
+    """(p, 3) force on i [N]."""
+    acting: Any
+    """(a,) the spheres to look at: those in a pair, or all where there are walls."""
+
+
+@njit(cache=True)
+def cells_fill(position: Any, size: float) -> tuple[Any, Any, Any]:  # pragma: no cover
+    """Cells (c, 3) of side ``size`` [m], first entry of every bucket, and spheres by bucket."""
+    count = position.shape[0]
+    buckets = 16
+    while buckets < 2 * count:
+        buckets *= 2
+    cell = np.empty((count, 3), np.int64)
+    start = np.zeros(buckets + 1, np.int64)
+    bucket = np.empty(count, np.int64)
+    for i in range(count):
+        for c in range(3):
+            cell[i, c] = np.int64(np.floor(position[i, c] / size))
+        bucket[i] = cell_bucket(cell[i, 0], cell[i, 1], cell[i, 2], buckets)
+        start[bucket[i] + 1] += 1
+    for b in range(buckets):
+        start[b + 1] += start[b]
+    at = start[:-1].copy()
+    order = np.empty(count, np.int64)
+    for i in range(count):
+        order[at[bucket[i]]] = i
+        at[bucket[i]] += 1
+    return cell, start, order
+
+
+@njit(cache=True)
+def cell_bucket(x: int, y: int, z: int, buckets: int) -> int:  # pragma: no cover
+    """Bucket of a cell; ``buckets`` is a power of two."""
+    mixed = x * 73856093 ^ y * 19349663 ^ z * 83492791
+    return (mixed ^ (mixed >> 17)) & (buckets - 1)
+
+
+@njit(cache=True)
+def pairs_near(
+    position: Any, radius: Any, body: Any, skin: float
+) -> tuple[Any, Any]:  # pragma: no cover
+    """Rows ``first`` (c + 1,) and ``second`` (p,) of all pairs nearer than their reach.
+
+    ``position`` (c, 3) [m], ``radius`` (c,) [m], ``body`` (c,); a pair is of two bodies.
+    """
+    count = position.shape[0]
+    first = np.zeros(count + 1, np.int64)
+    second = np.empty(max(16, 4 * count), np.int64)
+    if count == 0:
+        return first, second[:0]
+    size = 2 * radius.max() + skin
+    cell, start, order = cells_fill(position, size)
+    buckets = start.size - 1
+    found = 0
+    for i in range(count):
+        row = found
+        for step in range(27):
+            x = cell[i, 0] + step // 9 - 1
+            y = cell[i, 1] + step // 3 % 3 - 1
+            z = cell[i, 2] + step % 3 - 1
+            b = cell_bucket(x, y, z, buckets)
+            for q in range(start[b], start[b + 1]):
+                j = order[q]
+                if j <= i or body[j] == body[i]:
+                    continue
+                if cell[j, 0] != x or cell[j, 1] != y or cell[j, 2] != z:
+                    continue  # another cell of the same bucket
+                reach = radius[i] + radius[j] + skin
+                apart = 0.0
+                for c in range(3):
+                    apart += (position[i, c] - position[j, c]) ** 2
+                if apart > reach * reach:
+                    continue
+                if found == second.size:
+                    longer = np.empty(2 * found, np.int64)
+                    longer[:found] = second
+                    second = longer
+                at = found  # rows are short: sort by insertion
+                while at > row and second[at - 1] > j:
+                    second[at] = second[at - 1]
+                    at -= 1
+                second[at] = j
+                found += 1
+        first[i + 1] = found
+    return first, second[:found].copy()
+
+
+@njit(cache=True)
+def history_carry(old: Any, new: Any) -> None:  # pragma: no cover
+    """Take what the pairs of ``old`` remember over to the same pairs of ``new``."""
+    for i in range(old.first.size - 1):
+        q = new.first[i]
+        for p in range(old.first[i], old.first[i + 1]):
+            if not old.touching[p]:
+                continue
+            while q < new.first[i + 1] and new.second[q] < old.second[p]:
+                q += 1
+            if q < new.first[i + 1] and new.second[q] == old.second[p]:
+                new.touching[q] = old.touching[p]
+                new.spring[q] = old.spring[p]
+                new.pull[q] = old.pull[p]
+
+
+def pairs_of(first: Integers, second: Integers, walls: bool) -> Pairs:
+    """Pairs without a history, from their rows; ``walls``: whether there are any."""
+    count, size = len(second), len(first) - 1
+    back = np.bincount(second, minlength=size)
+    return Pairs(
+        first,
+        second,
+        np.concatenate([[0], np.cumsum(back)]),
+        np.argsort(second, kind="stable"),
+        np.zeros(count, np.uint8),
+        np.zeros((count, 3)),
+        np.zeros((count, 3)),
+        np.flatnonzero((np.diff(first) > 0) | (back > 0) | walls),
+    )
+
+
+def pairs_renew(
+    old: Pairs | None, position: Floats, radius: Floats, body: Integers, skin: float, walls: bool
+) -> Pairs:
+    """The list for spheres at ``position`` (c, 3) [m], with the history of the ``old`` one."""
+    new = pairs_of(*pairs_near(position, radius, body, skin), walls)
+    if old is not None:
+        history_carry(old, new)
+    return new

@@ -1,0 +1,169 @@
+"""The contacts of spheres at surface vertices: their arrays, bounds, energies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.contact_kernel import Contact, Planes, Spheres
+from qdem_fem.contact_search import Pairs, pairs_of, pairs_renew
+from qdem_fem.contact_spheres import SKIN, SphereContact, pair_stiffness, tangential_stiffness
+from qdem_fem.contact_state import Contacts, ContactTouching, Floats, Integers, planes_arrays
+from qdem_fem.contact_step import allowed_bound, network_bound
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+PAIR_ARRAYS = ("first", "second", "touching", "spring", "pull")
+CONTACT_ARRAYS = ("start", "position", "force", "slid")
+PLANE_ARRAYS = ("spring", "force")
+
+
+class SphereContacts(Contacts):
+    """Spheres at the surface vertices of all bodies of a simulation, and what they remember."""
+
+    kernel: Contact
+
+    def __init__(self, run: Simulation, asked: SphereContact) -> None:
+        super().__init__(run, asked.contacts)
+        self.asked = asked
+        counts = [len(nodes) for nodes in self.local]
+
+        def by_body(values: list[float]) -> Floats:
+            return np.repeat(np.array(values, dtype=float), counts)
+
+        normal = by_body([asked.of_body(b.name, "normal_stiffness") for b in run.bodies])
+        radius = by_body([asked.of_body(b.name, "radius") for b in run.bodies])
+        poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
+        self.skin = float(SKIN * radius.min() if asked.skin is None else asked.skin)
+        size, walls = len(self.nodes), len(asked.planes)
+        zero = np.zeros((size, 3))
+        self.kernel = Contact(
+            Spheres(
+                self.reference, 4 * self.place, self.force_at,
+                np.repeat(np.arange(len(counts)), counts), radius, normal,
+                tangential_stiffness(normal, poisson),
+            ),
+            pairs_of(np.zeros(size + 1, np.int64), np.zeros(0, np.int64), bool(walls)),
+            Planes(
+                *planes_arrays(asked.planes, asked.friction),
+                np.zeros((walls, size, 3)), np.zeros((walls, size, 3)),
+            ),
+            float(asked.friction), self.skin / 2, zero + np.inf, zero.copy(), zero.copy(),
+            np.zeros(size),
+        )  # fmt: skip
+
+    @property
+    def pairs(self) -> Pairs:
+        """The present list of pairs."""
+        found: Pairs = self.kernel.pairs
+        return found
+
+    def forget(self) -> None:
+        """Let go of all springs."""
+        self.pairs.touching[:] = 0
+        self.kernel.planes.spring[:] = 0.0
+        self.kernel.planes.force[:] = 0.0
+
+    def lists_renew(self, position: Floats) -> None:
+        """Look for pairs around vertices at (c, 3) [m]."""
+        spheres, walls = self.kernel.spheres, bool(self.asked.planes)
+        pairs = pairs_renew(self.pairs, position, spheres.radius, spheres.body, self.skin, walls)
+        self.kernel = self.kernel._replace(pairs=pairs)
+
+    def deepest_words(self) -> tuple[str, str]:
+        """The pair that overlaps most, and what to do."""
+        touching, radius = self.touching(), self.kernel.spheres.radius
+        worst = "a vertex is in a wall by more than its radius"
+        if len(touching.overlap):
+            at = int(np.argmax(touching.overlap))
+            one, other = (self.node_named(int(n[at])) for n in (touching.first, touching.second))
+            if touching.overlap[at] >= radius.min():
+                worst = f"{one} and {other} overlap by {touching.overlap[at]:.3g} m"
+        return (
+            f"{worst}; spheres of radius {radius.min():.3g} m no longer tell inside from outside",
+            "begin with bodies apart by two radii, load more slowly, or take a greater "
+            "normal_stiffness",
+        )
+
+    @cached_property
+    def allowed(self) -> float:  # type: ignore[override]
+        """`allowed_bound` of as many contacts as were asked for [1/s^2]."""
+        normal = self.kernel.spheres.normal
+        greatest = pair_stiffness(normal, normal.max(initial=0.0))
+        return allowed_bound(greatest, self.inverse_mass, self.asked.contacts)
+
+    def stiffness_now(self) -> float:
+        """`network_bound` of the contacts there are now [1/s^2]."""
+        ends = self._ends()
+        normal = self.kernel.spheres.normal
+        stiffness = pair_stiffness(normal[ends[:, 0]], normal[ends[:, 1]])
+        walls = (self.kernel.planes.force != 0).any(axis=2).sum(axis=0)
+        return network_bound(ends, stiffness, 2 * normal * walls, self.inverse_mass)
+
+    def _ends(self) -> Integers:
+        touching = np.flatnonzero(self.pairs.touching)
+        row = np.repeat(np.arange(len(self.nodes)), np.diff(self.pairs.first))
+        return np.column_stack([row[touching], self.pairs.second[touching]])
+
+    def touching(self) -> ContactTouching:
+        """Pairs that touch now, by their nodes."""
+        ends, held = self._ends(), self.pairs.touching.astype(bool)
+        apart = self.kernel.position[ends[:, 0]] - self.kernel.position[ends[:, 1]]
+        overlap = self.kernel.spheres.radius[ends].sum(axis=1) - np.linalg.norm(apart, axis=1)
+        return ContactTouching(
+            self.nodes[ends[:, 0]],
+            self.nodes[ends[:, 1]],
+            self.pairs.pull[held],
+            self.pairs.spring[held],
+            overlap,
+        )
+
+    def energy(self) -> tuple[float, float]:
+        """Energy in the springs, and work that the sliders took since the start [J]."""
+        self.refresh()
+        spheres, planes = self.kernel.spheres, self.kernel.planes
+        ends, touching = self._ends(), self.touching()
+        normal, tangential = (
+            pair_stiffness(k[ends[:, 0]], k[ends[:, 1]])
+            for k in (spheres.normal, spheres.tangential)
+        )
+        twice = (normal * touching.overlap**2).sum()
+        twice += (tangential * (touching.spring**2).sum(axis=1)).sum()
+        for w, n in enumerate(planes.normal):
+            overlap = (planes.force[w] @ n) / (2 * spheres.normal)
+            twice += (2 * spheres.normal * overlap**2).sum()
+            twice += (2 * spheres.tangential * (planes.spring[w] ** 2).sum(axis=1)).sum()
+        return 0.5 * float(twice), float(self.kernel.slid.sum())
+
+    def plane_force(self, number: int) -> Floats:
+        """Force of the bodies on a wall [N], (3,)."""
+        self.refresh()
+        return -np.asarray(self.kernel.planes.force[number].sum(axis=0))
+
+    def stored(self) -> dict[str, NDArray[Any]]:
+        """Everything that the next step reads, to the bit."""
+        self.refresh()
+        arrays = {f"contact_{name}": getattr(self.pairs, name) for name in PAIR_ARRAYS}
+        arrays |= {f"contact_{name}": getattr(self.kernel, name) for name in CONTACT_ARRAYS}
+        return arrays | {
+            f"contact_plane_{name}": getattr(self.kernel.planes, name) for name in PLANE_ARRAYS
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take what `stored` gave."""
+        given = {name: arrays[f"contact_{name}"] for name in PAIR_ARRAYS}
+        walls = bool(self.asked.planes)
+        pairs = pairs_of(given["first"].copy(), given["second"].copy(), walls)
+        for name in ("touching", "spring", "pull"):
+            getattr(pairs, name)[:] = given[name]
+        self.kernel = self.kernel._replace(pairs=pairs)
+        for name in CONTACT_ARRAYS:
+            getattr(self.kernel, name)[:] = arrays[f"contact_{name}"]
+        for name in PLANE_ARRAYS:
+            getattr(self.kernel.planes, name)[:] = arrays[f"contact_plane_{name}"]
+        self.stale = False

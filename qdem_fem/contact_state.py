@@ -1,0 +1,219 @@
+"""The contacts of a simulation, whatever their model: their place in a march."""
+
+from __future__ import annotations
+
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem import kernel
+from qdem_fem.contact_kernel import TOO_DEEP
+from qdem_fem.contact_spheres import ContactPlane
+from qdem_fem.contact_step import step_with_contact
+from qdem_fem.contact_window import advance_of, contact_window
+from qdem_fem.errors import ContactTooDeep, StepWarning
+
+if TYPE_CHECKING:
+    from qdem_fem.critical_step import CriticalStep
+    from qdem_fem.simulation import Simulation
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+SHORTER = 1 / 3
+"""Share of the elements' critical step below which contact is remarked on."""
+
+
+@dataclass(frozen=True)
+class ContactTouching:
+    """Pairs of spheres that touch now."""
+
+    first: Integers
+    """(t,) node of one, in the numbers of all bodies"""
+    second: Integers
+    """(t,) node of the other"""
+    force: Floats
+    """(t, 3) on the first [N]"""
+    spring: Floats
+    """(t, 3) tangential spring [m]"""
+    overlap: Floats
+    """(t,) [m]"""
+
+
+class Contacts(ABC):
+    """Contact at the surface vertices of all bodies of a simulation, and what it remembers.
+
+    A model sets ``kernel``, the arrays that a step of it reads and writes, and ``skin`` [m].
+    """
+
+    kernel: Any
+    skin: float
+    allowed: float
+    """Bound on omega^2 of the contacts that the time step allows for [1/s^2]."""
+
+    def __init__(self, run: Simulation, contacts: float) -> None:
+        self.run, self.contacts = run, contacts
+        self.local = [np.unique(body.surface) for body in run.bodies]
+        starts = run.first_node[:-1]
+        self.nodes = np.concatenate([n + s for n, s in zip(self.local, starts, strict=True)])
+        """(c,) surface vertices, in the numbers of all bodies"""
+        own = zip(self.local, run.bodies, strict=True)
+        self.reference = np.concatenate([body.nodes[nodes] for nodes, body in own])
+        self.place = run.assembly.place[self.nodes]
+        self.force_at = 4 * self.place + run.assembly.packed.node_window[self.place]
+        inverse = np.asarray(run.assembly.state.inverse_mass, dtype=float)
+        self.inverse_mass: Floats = inverse[self.place]
+        """(c,) [1/kg]"""
+        self.renewals = 0
+        """Times that pairs were looked for."""
+        self.warned = 0.0
+        self.stale = True
+        """Whether the user moved a body since the contacts were found."""
+
+    # --- what a model is -----------------------------------------------------------------------
+
+    @abstractmethod
+    def forget(self) -> None:
+        """Let go of all springs."""
+
+    @abstractmethod
+    def lists_renew(self, position: Floats) -> None:
+        """Look for what may touch around vertices at (c, 3) [m]; what touches keeps its springs."""
+
+    @abstractmethod
+    def stiffness_now(self) -> float:
+        """Bound on omega^2 of the contacts there are now [1/s^2]."""
+
+    @abstractmethod
+    def deepest_words(self) -> tuple[str, str]:
+        """What is too deep, and what to do, in words."""
+
+    @abstractmethod
+    def energy(self) -> tuple[float, float]:
+        """Energy in the springs, and work that the sliders took since the start [J]."""
+
+    @abstractmethod
+    def plane_force(self, number: int) -> Floats:
+        """Force of the bodies on a wall [N], (3,)."""
+
+    @abstractmethod
+    def stored(self) -> dict[str, NDArray[Any]]:
+        """Everything that the next step reads, to the bit."""
+
+    @abstractmethod
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take what `stored` gave."""
+
+    # --- in a march ----------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Find the contacts of a displacement that the user set: springs begin anew there."""
+        if not self.stale:
+            return
+        self.forget()
+        self.pairs_find()
+        state = self.run.assembly.state
+        said = advance_of(self.kernel, None, state.displacement, state.velocity, 0.0)
+        self.stale = False
+        self.deep_check(said)
+
+    def pairs_find(self) -> None:
+        """Look for pairs anew; those that touch keep their springs."""
+        displacement = np.asarray(self.run.assembly.state.displacement)
+        position = self.reference + displacement[4 * self.place[:, None] + np.arange(3)]
+        if not np.isfinite(position).all():
+            return  # what made it so is told by the march
+        self.lists_renew(position)
+        self.kernel.start[:] = position
+        self.renewals += 1
+
+    def window(
+        self, steps: int, step: float, loads: kernel.Loads, held: kernel.Constraints,
+        probes: kernel.Probes, table: Floats, gravity: Floats | None, work: Floats,
+    ) -> tuple[int, float]:  # fmt: skip
+        """`Assembly.window` with contact; comes back early where pairs have to be looked for."""
+        assembly = self.run.assembly
+        accelerations = assembly.gravity_packed(gravity)
+        before = numba.get_num_threads()
+        numba.set_num_threads(assembly.threads)
+        try:
+            done, bad, said = contact_window(
+                True if assembly.threads > 1 else None, assembly.law, assembly.viscous,
+                assembly.packed.layout, assembly.state, loads, held, probes, table,
+                accelerations, work, assembly.dtype.type(step), steps, self.kernel,
+            )  # fmt: skip
+        finally:
+            numba.set_num_threads(before)
+        if said == TOO_DEEP and not bad:
+            self.run.motion.steps_done += int(done)
+            self.deep_check(said)
+        if said:
+            self.pairs_find()
+        return int(done), float(bad)
+
+    def deep_check(self, said: int) -> None:
+        """Raise `ContactTooDeep` with the deepest contact where a step said so."""
+        if said == TOO_DEEP:
+            what, remedy = self.deepest_words()
+            where = f"t = {self.run.time:.6g} s, step {self.run.steps_done}"
+            raise ContactTooDeep(what, where=where, remedy=remedy)
+
+    def node_named(self, node: int) -> str:
+        """A node of all bodies by its number in its own."""
+        body = int(np.searchsorted(self.run.first_node, node, side="right")) - 1
+        return f"node {node - self.run.first_node[body]} of {self.run.bodies[body].name}"
+
+    def step_check(self) -> None:
+        """Warn where the contacts there are now make the step too long."""
+        bound = self.stiffness_now()
+        if bound <= max(self.allowed, self.warned):
+            return
+        elements = self.run.elements_critical_step.value
+        own = step_with_contact(elements, bound, viscous=self.run.viscous)
+        if self.run.step > own:
+            self.warned = bound
+            warnings.warn(
+                f"t = {self.run.time:.6g} s: a vertex has more contacts than the step allows for; "
+                f"it is {self.run.step:.4g} s, and only {own:.4g} s is sure to be stable; name "
+                f"more contacts than {self.contacts:g}",
+                StepWarning,
+                stacklevel=5,
+            )
+
+    def critical_step(self, elements: CriticalStep) -> CriticalStep:
+        """The critical step of the elements, made shorter by the contacts it allows for."""
+        value = step_with_contact(elements.value, self.allowed, viscous=self.run.viscous)
+        remark = elements.remark
+        if value < elements.value * SHORTER:
+            remark = (
+                f"{self.contacts:g} contacts of a vertex make the critical step "
+                f"{value / elements.value:.2g} times what the elements alone allow; a softer "
+                "contact or a mesh with heavier vertices makes it longer"
+            )
+        return replace(elements, value=value, remark=remark)
+
+    def accelerations(self) -> Floats:
+        """What the contact forces of now make of the nodes [m/s^2], (n, 3)."""
+        self.refresh()
+        assembly = self.run.assembly
+        flat = np.zeros((assembly.n_nodes, 4))
+        np.add.at(flat[:, :3], self.place, self.kernel.force)
+        flat *= np.asarray(assembly.state.inverse_mass, dtype=float)[:, None]
+        return flat[assembly.place, :3]
+
+
+def planes_arrays(planes: Sequence[ContactPlane], friction: float) -> tuple[Floats, Floats, Floats]:
+    """Points (w, 3) [m], unit normals (w, 3) and frictions (w,) of walls."""
+    across = np.array([plane.normal for plane in planes], dtype=float).reshape(-1, 3)
+    own = [friction if plane.friction is None else plane.friction for plane in planes]
+    return (
+        np.array([plane.point for plane in planes], dtype=float).reshape(-1, 3),
+        across / np.linalg.norm(across, axis=1, keepdims=True),
+        np.array(own, dtype=float),
+    )

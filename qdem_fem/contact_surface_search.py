@@ -1,0 +1,165 @@
+"""Which points may be in which faces, and which edges across which: boxes of bodies, then of parts.
+
+The lists are good until a vertex has moved half the skin.  They stand in the order of bodies,
+points and faces, whatever moved before.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from qdem_fem.contact_kernel import row
+from qdem_fem.contact_surface_kernel import Near, Surface, blend
+
+Integers = NDArray[np.int64]
+
+
+@njit(cache=True)
+def grown(values: Any, count: int) -> Any:  # pragma: no cover
+    """Room for twice as many."""
+    longer = np.empty((2 * count, *values.shape[1:]), values.dtype)
+    longer[:count] = values[:count]
+    return longer
+
+
+@njit(cache=True)
+def boxes_of(position: Any, parts: Any) -> tuple[Any, Any]:  # pragma: no cover
+    """Least and greatest corners (k, 3) of parts (k, n) of vertices."""
+    low, high = np.empty((len(parts), 3)), np.empty((len(parts), 3))
+    for k in range(len(parts)):
+        for c in range(3):
+            low[k, c] = high[k, c] = position[parts[k, 0], c]
+            for i in parts[k, 1:]:
+                low[k, c], high[k, c] = (
+                    min(low[k, c], position[i, c]),
+                    max(high[k, c], position[i, c]),
+                )
+    return low, high
+
+
+@njit(cache=True)
+def boxes_near(
+    low: Any, high: Any, i: int, low_other: Any, high_other: Any, j: int, reach: float
+) -> bool:  # pragma: no cover
+    """Whether two boxes are nearer than ``reach`` along every axis."""
+    for c in range(3):
+        if low[i, c] - reach > high_other[j, c] or low_other[j, c] - reach > high[i, c]:
+            return False
+    return True
+
+
+@njit(cache=True)
+def points_near(
+    surface: Any, position: Any, box: Any, first_point: Any, first_face: Any, reach: float
+) -> tuple[Any, Any, Any, Any]:  # pragma: no cover
+    """``point``, ``body``, ``first`` and ``face`` of `Near`; ``box`` of bodies."""
+    low, high = box
+    points = np.empty((len(surface.point_area), 3))
+    for q in range(len(points)):
+        nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
+        points[q, 0], points[q, 1], points[q, 2] = blend(
+            position, nodes, row(surface.point_share, q)
+        )
+    face_low, face_high = boxes_of(position, surface.face)
+    found = np.empty((64, 3), np.int64)  # point, body, first face
+    faces = np.empty(256, np.int64)
+    count, total = 0, 0
+    for a in range(len(low)):
+        for b in range(len(low)):
+            if a == b or not boxes_near(low, high, a, low, high, b, reach):
+                continue
+            for q in range(first_point[a], first_point[a + 1]):
+                if not boxes_near(points, points, q, low, high, b, reach):
+                    continue
+                begin = total
+                for f in range(first_face[b], first_face[b + 1]):
+                    if boxes_near(points, points, q, face_low, face_high, f, reach):
+                        if total == len(faces):
+                            faces = grown(faces, total)
+                        faces[total] = f
+                        total += 1
+                if total > begin:
+                    if count == len(found):
+                        found = grown(found, count)
+                    found[count, 0], found[count, 1], found[count, 2] = q, b, begin
+                    count += 1
+    first = np.empty(count + 1, np.int64)
+    first[:count], first[count] = found[:count, 2], total
+    return found[:count, 0].copy(), found[:count, 1].copy(), first, faces[:total].copy()
+
+
+@njit(cache=True)
+def edges_near(
+    surface: Any, position: Any, box: Any, first_edge: Any, reach: float
+) -> Any:  # pragma: no cover
+    """Pairs (m, 2) of sharp edges of two bodies, of the first body's first."""
+    low, high = box
+    edge_low, edge_high = boxes_of(position, surface.edge)
+    found, count = np.empty((64, 2), np.int64), 0
+    for a in range(len(low)):
+        for b in range(a + 1, len(low)):
+            if not boxes_near(low, high, a, low, high, b, reach):
+                continue
+            for i in range(first_edge[a], first_edge[a + 1]):
+                if not boxes_near(edge_low, edge_high, i, low, high, b, reach):
+                    continue
+                for j in range(first_edge[b], first_edge[b + 1]):
+                    if boxes_near(edge_low, edge_high, i, edge_low, edge_high, j, reach):
+                        if count == len(found):
+                            found = grown(found, count)
+                        found[count, 0], found[count, 1] = i, j
+                        count += 1
+    return found[:count].copy()
+
+
+def near_of(
+    point: Integers,
+    body: Integers,
+    first: Integers,
+    face: Integers,
+    edges: Integers,
+) -> Near:
+    """Lists without a history."""
+    count, pairs = len(point), len(edges)
+    return Near(
+        point, body, first, face, np.full(count, -1.0), np.full(count, -1.0), np.zeros((count, 3)),
+        edges, np.full(pairs, -1.0), np.zeros(pairs), np.zeros((pairs, 3)),
+    )  # fmt: skip
+
+
+def history_carry(old: Near, new: Near, bodies: int) -> None:
+    """Take what the pairs of ``old`` remember over to the same pairs of ``new``."""
+    here, there = same_keys(*(near.point * bodies + near.body for near in (old, new)))
+    new.weight[there], new.spring[there] = old.weight[here], old.spring[here]
+    most = 1 + max(int(near.edges.max(initial=0)) for near in (old, new))
+    here, there = same_keys(*(near.edges[:, 0] * most + near.edges[:, 1] for near in (old, new)))
+    for name in ("edge_weight", "edge_start", "edge_spring"):
+        getattr(new, name)[there] = getattr(old, name)[here]
+
+
+def same_keys(old: Integers, new: Integers) -> tuple[Integers, Integers]:
+    """Places of the keys that are in both, in each."""
+    _, here, there = np.intersect1d(old, new, assume_unique=True, return_indices=True)
+    return here, there
+
+
+def near_renew(
+    old: Near | None, surface: Surface, position: Any, firsts: tuple[Integers, ...], reach: float
+) -> Near:
+    """The lists for vertices at ``position`` (c, 3) [m], with the history of the ``old`` ones.
+
+    ``firsts``: first vertex, face, point and edge of every body, and the ends.
+    """
+    node, face, point, edge = firsts
+    low = np.minimum.reduceat(position, node[:-1])
+    high = np.maximum.reduceat(position, node[:-1])
+    found = points_near(surface, position, (low, high), point, face, reach)
+    edges = edges_near(surface, position, (low, high), edge, reach)
+    new = near_of(*found, edges)
+    if old is not None:
+        history_carry(old, new, len(low))
+    return new

@@ -1,0 +1,186 @@
+"""The contacts of surfaces: their arrays, bounds, energies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.contact_spheres import pair_stiffness, tangential_stiffness
+from qdem_fem.contact_state import Contacts, Floats, planes_arrays
+from qdem_fem.contact_surface import DEPTH, SurfaceContact, face_points, sharp_edges
+from qdem_fem.contact_surface_kernel import Near, Surface, SurfaceTouch, Walls
+from qdem_fem.contact_surface_search import near_of, near_renew
+from qdem_fem.surface import face_area_vectors
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+TOUCH_ARRAYS = ("start", "position", "force", "account")
+WALL_ARRAYS = ("weight", "spring", "force")
+
+
+class SurfaceContacts(Contacts):
+    """Points and sharp edges of the surfaces of all bodies, and what they remember."""
+
+    kernel: SurfaceTouch
+
+    def __init__(self, run: Simulation, asked: SurfaceContact) -> None:
+        super().__init__(run, asked.contacts)
+        self.asked = asked
+        counts = np.array([len(nodes) for nodes in self.local])
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        share = face_points(int(asked.points))
+        parts: list[list[Any]] = [[] for _ in range(7)]
+        faces, areas, edges, opposite, edge_areas, points, shares = parts
+        for body, nodes, start in zip(run.bodies, self.local, starts, strict=False):
+            own = np.searchsorted(nodes, body.surface)
+            area = np.linalg.norm(face_area_vectors(body.nodes, body.surface), axis=1)
+            sharp, across = sharp_edges(body.nodes[nodes], own)
+            by_edge = np.zeros(len(sharp))
+            for k in range(2):  # a third of each of its two faces
+                three = np.column_stack([sharp, across[:, k]])
+                by_edge += np.linalg.norm(face_area_vectors(body.nodes[nodes], three), axis=1) / 3
+            for kept, new in (
+                (faces, own + start), (areas, area), (edges, sharp + start),
+                (opposite, across + start), (edge_areas, by_edge),
+                (points, np.concatenate([
+                    np.repeat(own + start, len(share), axis=0),
+                    np.repeat(np.arange(len(nodes))[:, None] + start, 3, axis=1),
+                ])),
+                (shares, np.concatenate([
+                    np.tile(share, (len(own), 1)), np.tile([1.0, 0, 0], (len(nodes), 1)),
+                ])),
+            ):  # fmt: skip
+                kept.append(new)
+        self.firsts = tuple(
+            np.concatenate([[0], np.cumsum(number)])
+            for number in (
+                counts, [len(f) for f in faces], [len(p) for p in points], [len(e) for e in edges],
+            )
+        )  # fmt: skip
+        """First vertex, face, point and edge of every body, and the ends."""
+        face, area = np.concatenate(faces), np.concatenate(areas)
+        body_of = [np.repeat(np.arange(len(counts)), np.diff(first)) for first in self.firsts]
+        modulus = np.array([asked.of_body(body.name, "modulus") for body in run.bodies])
+        poisson = np.array([float(np.mean(body.material.poisson)) for body in run.bodies])
+        length = np.linalg.norm(self.reference[face[:, 1]] - self.reference[face[:, 0]], axis=1)
+        self.depth = float(DEPTH * np.median(length) if asked.depth is None else asked.depth)
+        self.skin = self.depth
+        size, count, walls = len(self.nodes), int(self.firsts[2][-1]), len(asked.planes)
+        point_face = np.concatenate([
+            np.concatenate([np.repeat(np.arange(begin, end), len(share)), np.full(vertices, -1)])
+            for begin, end, vertices in zip(
+                self.firsts[1][:-1], self.firsts[1][1:], counts, strict=True
+            )
+        ])  # fmt: skip
+        fan = np.argsort(face.ravel(), kind="stable")
+        nothing = np.zeros(0, np.int64)
+        zero = np.zeros((size, 3))
+        self.kernel = SurfaceTouch(
+            Surface(
+                self.reference, 4 * self.place, self.force_at, face,
+                area, np.searchsorted(face.ravel()[fan], np.arange(size + 1)), fan // 3,
+                np.concatenate(points), np.concatenate(shares), point_face,
+                np.where(point_face >= 0, area[point_face] / len(share), 0.0), body_of[2],
+                np.concatenate(edges),
+                np.concatenate(opposite), np.concatenate(edge_areas), body_of[3],
+                modulus, tangential_stiffness(modulus, poisson),
+            ),
+            near_of(
+                nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2)
+            ),
+            Walls(
+                *planes_arrays(asked.planes, asked.friction), np.full((walls, count), -1.0),
+                np.zeros((walls, count, 3)), np.zeros((walls, 3)),
+            ),
+            float(asked.friction), self.skin / 2, self.depth, zero + np.inf, zero.copy(),
+            zero.copy(), np.zeros(2), np.arange(size),
+        )  # fmt: skip
+        covering = np.zeros(size)
+        np.add.at(covering, face, np.repeat(area[:, None] / 3, 3, axis=1))
+        greatest = pair_stiffness(modulus, modulus.max())[body_of[0]]
+        self.allowed = 2 * asked.contacts * float((greatest * covering * self.inverse_mass).max())
+
+    @property
+    def near(self) -> Near:
+        """The present lists."""
+        found: Near = self.kernel.near
+        return found
+
+    def forget(self) -> None:
+        """Let go of all springs."""
+        self.near.free[:] = -1.0
+        for weight in (self.near.weight, self.near.edge_weight, self.kernel.walls.weight):
+            weight[:] = -1.0
+        for spring in (self.near.spring, self.near.edge_spring, self.kernel.walls.spring):
+            spring[:] = 0.0
+
+    def lists_renew(self, position: Floats) -> None:
+        """Look for what is near around vertices at (c, 3) [m]."""
+        reach = self.depth + self.skin
+        near = near_renew(self.near, self.kernel.surface, position, self.firsts, reach)
+        self.kernel = self.kernel._replace(near=near)
+
+    def deepest_words(self) -> tuple[str, str]:
+        """That a point is too deep, and what to do."""
+        return (
+            f"a point of a surface is more than {self.depth:.3g} m inside another body",
+            "begin with bodies that do not overlap, load more slowly, or take a greater modulus "
+            "or depth",
+        )
+
+    def stiffness_now(self) -> float:
+        """Row sums of the points and edges that touch now, over the masses [1/s^2]."""
+        surface, near, walls = self.kernel.surface, self.near, self.kernel.walls
+        total = np.zeros(len(self.nodes))
+        at = np.flatnonzero(near.weight > 0)
+        point, other = near.point[at], near.body[at]
+        modulus = pair_stiffness(surface.modulus[surface.point_body[point]], surface.modulus[other])
+        stiffness = 0.5 * near.weight[at] * modulus
+        face = surface.point_node[point]
+        np.add.at(total, face, 2 * stiffness[:, None] * surface.point_share[point])
+        if len(at):  # what lies on a face is borne by its nodes, by no more than all of it each
+            below = surface.face[near.face[near.first[at]]]
+            np.add.at(total, below, 2 * stiffness[:, None] / 3)
+        at = np.flatnonzero(near.edge_weight > 0)
+        for k in range(2):
+            edge = near.edges[at, k]
+            modulus = surface.modulus[surface.edge_body[edge]]
+            np.add.at(total, surface.edge[edge], (2 * near.edge_weight[at] * modulus)[:, None])
+        held = np.maximum(walls.weight, 0).sum(axis=0)
+        stiffness = 2 * held * surface.modulus[surface.point_body]
+        face = surface.point_node
+        np.add.at(total, face, stiffness[:, None] * surface.point_share)
+        return float((total * self.inverse_mass).max(initial=0.0))
+
+    def energy(self) -> tuple[float, float]:
+        """Energy in the springs, and work that the sliders took since the start [J]."""
+        self.refresh()
+        return float(self.kernel.account[0]), float(self.kernel.account[1])
+
+    def plane_force(self, number: int) -> Floats:
+        """Force of the bodies on a wall [N], (3,)."""
+        self.refresh()
+        return np.array(self.kernel.walls.force[number])
+
+    def stored(self) -> dict[str, NDArray[Any]]:
+        """Everything that the next step reads, to the bit."""
+        self.refresh()
+        arrays = {f"contact_near_{name}": getattr(self.near, name) for name in Near._fields}
+        arrays |= {f"contact_{name}": getattr(self.kernel, name) for name in TOUCH_ARRAYS}
+        return arrays | {
+            f"contact_wall_{name}": getattr(self.kernel.walls, name) for name in WALL_ARRAYS
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take what `stored` gave."""
+        near = Near(*(arrays[f"contact_near_{name}"].copy() for name in Near._fields))
+        self.kernel = self.kernel._replace(near=near)
+        for name in TOUCH_ARRAYS:
+            getattr(self.kernel, name)[:] = arrays[f"contact_{name}"]
+        for name in WALL_ARRAYS:
+            getattr(self.kernel.walls, name)[:] = arrays[f"contact_wall_{name}"]
+        self.stale = False

@@ -1,0 +1,122 @@
+"""The compiled loop over time steps with contact: the step of the elements, then the contact.
+
+The step itself is `qdem_fem.kernel.window_build`'s, of one step, as it is without contact: what a
+scene without contact runs is not touched.  Contact forces of a displacement are found when that
+displacement is, and wait for the next step; so the springs and the fields are of one time.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+from numba.core import types
+from numba.extending import overload
+
+from qdem_fem import kernel
+from qdem_fem.contact_kernel import GO_ON, Contact, advance_one, advance_threads
+from qdem_fem.contact_surface_kernel import surface_step
+
+SOURCES = ("kernel.py", "stress.py", "lanes.py", "contact_kernel.py", "contact_surface_kernel.py")
+WINDOW_ONE: Any = kernel.window_kernel(1)
+WINDOW_THREADS: Any = kernel.window_kernel(2)
+
+
+def gravity_from(gravity: Any, k: int) -> Any:
+    """Accelerations from step k on; None without gravity."""
+    return None if gravity is None else gravity[4 * k :]
+
+
+@overload(gravity_from, strict=False)
+def _gravity_from(gravity: Any, k: int) -> Any:
+    if isinstance(gravity, types.NoneType):
+        return lambda gravity, k: None
+    return lambda gravity, k: gravity[4 * k :]
+
+
+def places_of(contact: Any) -> Any:
+    """The vertices that contact may act on, their places in the forces, and the forces on all."""
+    if isinstance(contact, Contact):
+        return contact.pairs.acting, contact.spheres.force_at, contact.force
+    return contact.acting, contact.surface.force_at, contact.force
+
+
+@overload(places_of, strict=False)
+def _places_of(contact: Any) -> Any:
+    if contact.instance_class is Contact:
+        return lambda contact: (contact.pairs.acting, contact.spheres.force_at, contact.force)
+    return lambda contact: (contact.acting, contact.surface.force_at, contact.force)
+
+
+def advance_of(contact: Any, threads: Any, displacement: Any, velocity: Any, step: float) -> int:
+    """One step of contact, by the type of ``contact``; ``threads``: True, or None for one."""
+    if not isinstance(contact, Contact):
+        return int(surface_step(contact, displacement, velocity, step))
+    advance = advance_one if threads is None else advance_threads
+    return int(advance(contact, displacement, velocity, step))
+
+
+@overload(advance_of, strict=False)
+def _advance_of(contact: Any, threads: Any, displacement: Any, velocity: Any, step: float) -> Any:
+    if contact.instance_class is not Contact:
+        return lambda contact, threads, displacement, velocity, step: surface_step(
+            contact, displacement, velocity, step
+        )
+    if isinstance(threads, types.NoneType):
+        return lambda contact, threads, displacement, velocity, step: advance_one(
+            contact, displacement, velocity, step
+        )
+    return lambda contact, threads, displacement, velocity, step: advance_threads(
+        contact, displacement, velocity, step
+    )
+
+
+def contact_window_build(made_from: str) -> Any:
+    """The loop; ``made_from`` makes the sources it calls a part of its key on disk."""
+
+    @njit(cache=True, error_model="numpy")
+    def contact_window(
+        threads: Any, law: Any, viscous: Any, layout: Any, state: Any, loads: Any, held: Any,
+        probes: Any, table: Any, gravity: Any, work: Any, step: Any, steps: int, contact: Any,
+    ) -> tuple[int, float, int]:  # fmt: skip  # pragma: no cover
+        """As `window` of `qdem_fem.kernel`, with a `Contact`; ``threads``: True, or None for one.
+
+        Returns steps done, bad elements, and what the last step of contact said.  Comes back
+        where that is not `GO_ON`.
+        """
+        stamp = made_from  # noqa: F841  (makes it a part of the key)
+        forces = state.forces
+        acting, force_at, pull = places_of(contact)
+        for k in range(steps):
+            for i in acting:
+                for c in range(3):
+                    forces[force_at[i] + c] += pull[i, c]
+            ahead = kernel.Probes(probes.node_at, probes.record, probes.stride, probes.first - k)
+            row, fall = table[k : k + 2], gravity_from(gravity, k)
+            if threads is None:
+                _, bad = WINDOW_ONE(
+                    law, viscous, layout, state, loads, held, ahead, row, fall, work, step, 1
+                )
+                said = advance_of(contact, None, state.displacement, state.velocity, step)
+            else:
+                _, bad = WINDOW_THREADS(
+                    law, viscous, layout, state, loads, held, ahead, row, fall, work, step, 1
+                )
+                said = advance_of(contact, True, state.displacement, state.velocity, step)
+            if bad > 0.0 or said != GO_ON:
+                return k + 1, bad, said
+        return steps, 0.0, GO_ON
+
+    return contact_window
+
+
+def _sources_digest() -> str:
+    digest = hashlib.sha256()
+    for name in SOURCES:
+        digest.update(Path(__file__).with_name(name).read_bytes())
+    return digest.hexdigest()
+
+
+contact_window: Any = contact_window_build(_sources_digest())
