@@ -11,7 +11,7 @@ from adapters.errors import EngineFailed, NotCredible
 from adapters.overlaps import neighbours
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
-from adapters.state import State
+from adapters.state import FloatArray, State
 from adapters.window import Window
 
 FORCE_ERROR_BOUND = 0.25
@@ -145,6 +145,27 @@ def check_bounds(scene: Scene, figures: WindowFigures) -> None:
     for what, value, bound in bounds:
         if value > bound:  # nan, which stands for "not judged", passes
             raise NotCredible(f"{what} is {value:.3g}, above {bound:g}", remedy=remedy)
+
+
+RISE_FLOOR = 1e-3
+"""A rise below this share of the mean radius hurts nothing, whatever the window told."""
+
+
+def check_rise(scene: Scene, mean_height: FloatArray, rise: float) -> None:
+    """A jump does not lift a loaded bed by more than it moved in all of the jump's window.
+
+    ``mean_height`` (k+1,) [m] of the grains at the ends of the window's cycles, ``rise`` [m] of it
+    in the jump.  A law that is fitted to the noise of a few cycles may say so.  Raises
+    `NotCredible`.
+    """
+    moved = float(np.ptp(mean_height))
+    if rise > max(moved, RISE_FLOOR * scene.sample.grain_radius.mean):
+        raise NotCredible(
+            f"the law lifts the bed by {rise * 1e6:.4g} um in the jump, where it moved by"
+            f" {moved * 1e6:.4g} um in all of the {len(mean_height) - 1} cycles fitted",
+            remedy="fit more cycles (procedure.k), jump less far (procedure.h), or let jumps"
+            " choose themselves (procedure.tolerance)",
+        )
 
 
 def check_window(scene: Scene, window: Window, cycles: int) -> dict[str, float]:

@@ -191,7 +191,10 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
     if run.folder.outcome(name) is None:
         folder = _begin(run, name)
         before, target, piston_height = estimate(run, bed, h)
-        if gain is not None:
+        if gain is None:
+            heights = _fitted(run, bed).position[bed.healing :, :, 2].mean(axis=1)
+            checks.check_rise(run.scene, heights, float((target - before.position)[:, 2].mean()))
+        else:
             target, piston_height = settled_by(gain, before, target, piston_height)
         with run.clock.part("relax"):
             position, record = relaxed(run, before, target, piston_height)
@@ -230,7 +233,7 @@ def estimate(run: Run, bed: Bed, h: int) -> tuple[State, FloatArray, float]:
     procedure = run.scene.procedure
     assert procedure is not None
     with run.clock.part("parse"):
-        window = window_load(run.folder.path / bed.window / "states.npz")
+        window = _fitted(run, bed)
     with run.clock.part("fit"):
         law, move = law_named(procedure.law), move_named(procedure.move)
         cycle = window.cycle[bed.healing :].astype(float)
@@ -242,6 +245,11 @@ def estimate(run: Run, bed: Bed, h: int) -> tuple[State, FloatArray, float]:
         drop = min(drop, 0.0) if h and move.moves_piston else 0.0
     before = window.state(-1)
     return before, before.position + field_, before.piston_height + drop
+
+
+def _fitted(run: Run, bed: Bed) -> Window:
+    """The window that a jump from ``bed`` is fitted to."""
+    return window_load(run.folder.path / bed.window / "states.npz")
 
 
 def settled_by(

@@ -132,7 +132,8 @@ CASES = (
         "far-jump",
         "h/k = 100: 400 cycles from 4",
         ("procedure.k_i=20", "procedure.k=4", "procedure.h=400", "procedure.total_cycles=432"),
-        checks=("settles",),
+        code=6,
+        says="the law lifts the bed",
     ),
 )
 """All cases; those without words of a refusal have to end."""

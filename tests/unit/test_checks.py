@@ -16,6 +16,7 @@ from adapters.checks import (
     WindowFigures,
     check_bounds,
     check_complete,
+    check_rise,
     check_state,
     check_window,
     figures_of_window,
@@ -265,3 +266,15 @@ def test_settled_bed(fault: str) -> None:
     with pytest.raises(NotCredible) as caught:
         check_state(SCENE, state)
     assert caught.value.where == "preparation"
+
+
+def test_a_rise_is_judged_by_what_the_window_moved() -> None:
+    """The greater of the window's own travel and a thousandth of the mean radius may be risen."""
+    radius = SCENE.sample.grain_radius.mean
+    path = 0.05 - np.array([0.0, 2e-3, 1e-3]) * radius
+    check_rise(SCENE, path, 1.9e-3 * radius)
+    check_rise(SCENE, np.full(3, 0.05), 0.9e-3 * radius)
+    check_rise(SCENE, path, -radius)
+    for heights, rise in ((path, 2.1e-3 * radius), (np.full(3, 0.05), 1.1e-3 * radius)):
+        with pytest.raises(NotCredible, match="lifts the bed"):
+            check_rise(SCENE, heights, rise)

@@ -15,6 +15,7 @@ from adapters.engine_fake import SETTLEMENT
 from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder
+from adapters.state import FloatArray, State
 from adapters.window import window_load
 from scenes import scene_path
 
@@ -139,6 +140,27 @@ def test_failed_jump_is_tried_again_half_as_long(
         "jump_000040_1",
         "jump_000040_2",
     ]
+
+
+def test_a_jump_that_lifts_the_bed_is_no_jump(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A law that says so, by more than the bed moved in its window: shorter jumps, then exit code
+    6; a rise of less is let be."""
+    real = stages.estimate
+    metres_a_cycle = 1e-3
+
+    def lifted(run: stages.Run, bed: stages.Bed, h: int) -> tuple[State, FloatArray, float]:
+        before, _, height = real(run, bed, h)
+        return before, before.position + np.array([0.0, 0.0, metres_a_cycle * h]), height
+
+    monkeypatch.setattr(stages, "estimate", lifted)
+    with pytest.raises(NotCredible, match="the law lifts the bed by 2000 um"):
+        settle(tmp_path / "run")
+    failed = [e for e in RunFolder(tmp_path / "run").events() if e["event"] == "jump failed"]
+    assert len(failed) == 4
+    metres_a_cycle = 1e-9
+    settle(tmp_path / "little")
 
 
 def test_jump_that_keeps_failing_ends_the_run(
