@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from adapters.jump_band import Band, band_of
-from adapters.jump_run import CHECK, DECISION
 from adapters.report_record import Track
 
 Event = dict[str, Any]
+
+DECISION, CHECK = "decision", "jump checked"
+"""Events of a controlled run: what was decided and why; a jump beside what was computed behind."""
 
 
 def decisions_of(events: Sequence[Event]) -> list[Event]:

@@ -18,12 +18,10 @@ from adapters.errors import EngineFailed, JumpRefused, NotConverged, NotCredible
 from adapters.jump_check import accept, judge, reject
 from adapters.jump_control import Control, Decision, Settings, begin, decide, observe
 from adapters.jump_rates import Stretch
+from adapters.jump_record import CHECK, DECISION
 from adapters.report_history import cost_total
 from adapters.run_folder import disk_full_named
 from adapters.stages import Bed, Run
-
-DECISION, CHECK = "decision", "jump checked"
-"""Events of a controlled run: what was decided and why; a jump beside what was computed behind."""
 
 
 def settle_controlled(run: Run, bed: Bed) -> Bed:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.errors import JumpRefused
-from adapters.jump_run import CHECK, DECISION
+from adapters.jump_record import CHECK, DECISION
 from adapters.procedure import CONTROL, run_variant
 from adapters.progress import Progress
 from adapters.provenance import commit, machine
