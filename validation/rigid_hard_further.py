@@ -96,10 +96,20 @@ def ratio_trials(quick: bool) -> list[Trial]:
     for ratio in (1e8, 1e10):
         trials.append(Trial(
             f"light on heavy on light, 1 : {ratio:.0e} : 1", RESTS,
-            partial(scenes.light_on_heavy, ratio), seconds, "greatest move", greatest, 1e-9,
-            methods=OURS,
+            partial(scenes.light_on_heavy, ratio), seconds, "greatest move", greatest,
+            max(1e-9, 3.0 * round_off_walk(ratio, 1e-3, seconds)), methods=OURS,
         ))  # fmt: skip
     return trials
+
+
+def round_off_walk(ratio: float, step: float, seconds: float) -> float:
+    """How far a light body walks [m] under one ``ratio`` times as heavy, by round-off alone.
+
+    A step's impulse of the heavy body is right to eps, which gives the light one a velocity of
+    ``eps ratio g h`` and a way of h times that, to either side: a random walk of ``seconds / h``
+    steps.
+    """
+    return float(np.finfo(float).eps * ratio * 9.81 * step**2 * np.sqrt(seconds / step))
 
 
 def in_metres(moved: Floats) -> float:
