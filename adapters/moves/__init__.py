@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
-from importlib import import_module
-from pkgutil import iter_modules
 from typing import TYPE_CHECKING
 
-from adapters.errors import UsageError
+from adapters.named_files import file_named, names_known
 
 if TYPE_CHECKING:  # a scene asks for names only; the ways themselves load scipy
     from adapters.moves.move import Move
@@ -20,22 +17,10 @@ DEFAULT = "smoothed"
 
 def moves_known() -> tuple[str, ...]:
     """Names of all ways to move grains in a jump, sorted: the files ``move_*.py`` here."""
-    files = (module.name for module in iter_modules(__path__))
-    return tuple(
-        sorted(
-            name.removeprefix("move_").replace("_", "-") for name in files if name[:5] == "move_"
-        )
-    )
+    return names_known(__path__, "move")
 
 
 def move_named(name: str) -> Move:
     """The way of this name; raises `UsageError` with the nearest name when there is none."""
-    known = moves_known()
-    if name not in known:
-        near = get_close_matches(name.lower().replace("_", "-"), known, n=1)
-        raise UsageError(
-            f"no jump moves grains by '{name}'" + (f"; did you mean '{near[0]}'?" if near else ""),
-            remedy="the ways are: " + ", ".join(known),
-        )
-    move: Move = import_module(f"{__name__}.move_{name.replace('-', '_')}").MOVE
+    move: Move = file_named(__name__, __path__, "move", name, "no jump moves grains by").MOVE
     return move
