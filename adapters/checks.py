@@ -151,18 +151,19 @@ RISE_FLOOR = 1e-3
 """A rise below this share of the mean radius hurts nothing, whatever the window told."""
 
 
-def check_rise(scene: Scene, mean_height: FloatArray, rise: float) -> None:
+def check_rise(scene: Scene, height: FloatArray, rise: FloatArray) -> None:
     """A jump does not lift a loaded bed by more than it moved in all of the jump's window.
 
-    ``mean_height`` (k+1,) [m] of the grains at the ends of the window's cycles, ``rise`` [m] of it
-    in the jump.  A law that is fitted to the noise of a few cycles may say so.  Raises
-    `NotCredible`.
+    ``height`` (k+1, n) [m] of the grains at the ends of the window's cycles, ``rise`` (n,) [m] of
+    each in the jump; medians are compared, as a loose grain may be thrown up.  A law that is fitted
+    to the noise of a few cycles may lift the bed.  Raises `NotCredible`.
     """
-    moved = float(np.ptp(mean_height))
-    if rise > max(moved, RISE_FLOOR * scene.sample.grain_radius.mean):
+    moved = float(np.ptp(np.median(height - height[0], axis=1)))
+    lift = float(np.median(rise))
+    if lift > max(moved, RISE_FLOOR * scene.sample.grain_radius.mean):
         raise NotCredible(
-            f"the law lifts the bed by {rise * 1e6:.4g} um in the jump, where it moved by"
-            f" {moved * 1e6:.4g} um in all of the {len(mean_height) - 1} cycles fitted",
+            f"the law lifts the bed by {lift * 1e6:.4g} um in the jump, where it moved by"
+            f" {moved * 1e6:.4g} um in all of the {len(height) - 1} cycles fitted",
             remedy="fit more cycles (procedure.k), jump less far (procedure.h), or let jumps"
             " choose themselves (procedure.tolerance)",
         )

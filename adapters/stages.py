@@ -192,8 +192,8 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
         folder = _begin(run, name)
         before, target, piston_height = estimate(run, bed, h)
         if gain is None:
-            heights = _fitted(run, bed).position[bed.healing :, :, 2].mean(axis=1)
-            checks.check_rise(run.scene, heights, float((target - before.position)[:, 2].mean()))
+            height = _fitted(run, bed).position[bed.healing :, :, 2]
+            checks.check_rise(run.scene, height, (target - before.position)[:, 2])
         else:
             target, piston_height = settled_by(gain, before, target, piston_height)
         with run.clock.part("relax"):

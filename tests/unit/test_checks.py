@@ -269,12 +269,17 @@ def test_settled_bed(fault: str) -> None:
 
 
 def test_a_rise_is_judged_by_what_the_window_moved() -> None:
-    """The greater of the window's own travel and a thousandth of the mean radius may be risen."""
+    """The greater of the window's own travel and a thousandth of the mean radius may be risen; one
+    grain that is thrown up is no bed that rises."""
     radius = SCENE.sample.grain_radius.mean
-    path = 0.05 - np.array([0.0, 2e-3, 1e-3]) * radius
-    check_rise(SCENE, path, 1.9e-3 * radius)
-    check_rise(SCENE, np.full(3, 0.05), 0.9e-3 * radius)
-    check_rise(SCENE, path, -radius)
-    for heights, rise in ((path, 2.1e-3 * radius), (np.full(3, 0.05), 1.1e-3 * radius)):
+    grain = np.linspace(0.01, 0.05, 9)
+    moving = grain - np.array([0.0, 2e-3, 1e-3])[:, None] * radius
+    still = np.tile(grain, (3, 1))
+    thrown = np.where(np.arange(9) == 8, radius, 0.0)
+    check_rise(SCENE, moving, np.full(9, 1.9e-3 * radius))
+    check_rise(SCENE, still, np.full(9, 0.9e-3 * radius))
+    check_rise(SCENE, moving, np.full(9, -radius))
+    check_rise(SCENE, still, thrown)
+    for heights, rise in ((moving, 2.1e-3 * radius), (still, 1.1e-3 * radius)):
         with pytest.raises(NotCredible, match="lifts the bed"):
-            check_rise(SCENE, heights, rise)
+            check_rise(SCENE, heights, thrown + rise)
