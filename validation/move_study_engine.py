@@ -15,16 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import EngineStart, engine_named
+from adapters.engine import engine_named
 from adapters.moves import moves_known
 from adapters.progress import Progress
-from adapters.run_folder import Outcome, RunFolder
+from adapters.run_folder import RunFolder
 from adapters.scene import Scene
 from adapters.stages import Bed, Run, Variant, compute, jump, prepare
 from adapters.state import state_load
 from adapters.window import window_load
 from validation.settlement_ensemble import COARSE, CONFINED, STEP, Kind, Piece, piston_stiffness
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_ensemble_start import packing_lay
 
 Row = dict[str, Any]
 FULL, TWIN = "every cycle", "every cycle, twin"
@@ -81,20 +82,9 @@ def run_in(folder: Path, scene: Scene) -> Run:
 
 def bed_begun(run: Run, judged: Judged, seed: int) -> Bed:
     """The bed after k_i cycles: computed, or from the ensemble's checkpoint."""
-    if not judged.stored:
-        return compute(run, prepare(run), judged.k_i)
-    record = EnsembleRecord()
-    kept = record.kept(Piece(judged.kind, seed).name)
-    assert kept is not None
-    assert kept.cycle == judged.k_i
-    if run.folder.outcome("preparation") is None:
-        heights = {"mean_height": kept.mean_height, "density_height": kept.density_height}
-        stage = run.folder.begin("preparation")  # of which a window asks these two heights
-        run.folder.finish(stage, Outcome("preparation", 0, 0, [], {}, notes=heights))
-    restart = run.folder.path / "checkpoint.restart"
-    restart.write_bytes(record.restart(kept))
-    start = EngineStart(restart, kept.checkpoint.time_step, 0, kept.checkpoint.piston_height)
-    return Bed(judged.k_i, start)
+    if judged.stored:
+        packing_lay(run, Piece(judged.kind, seed), EnsembleRecord())
+    return compute(run, prepare(run), judged.k_i)
 
 
 def cycles_of(run: Run, name: str, rows: slice) -> dict[str, list[float]]:

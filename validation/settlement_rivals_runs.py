@@ -1,0 +1,107 @@
+"""Run the rivals of the settlement procedure on the coarse bed, and its error budget.
+
+    python -m validation.settlement_rivals_runs --work FOLDER [--minutes M] [--last N]
+        [--only rivals|budget|reference] [--methods NAME ...]
+    python -m validation.settlement_rivals_page      docs/settlement-rivals.md and its picture
+
+Writes a line to ``validation/results/settlement-rivals.jsonl`` as each run ends and goes on where
+that ends; after M minutes it begins no further run.  ``reference`` reads the coarse ensemble, from
+another folder by ``--ensemble``, and needs no engine.  FOLDER may be thrown away.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from adapters.engine import interruptible
+from adapters.provenance import commit, machine
+from adapters.run_folder import RunFolder
+from validation.move_study import rounded
+from validation.settlement_ensemble import COARSE
+from validation.settlement_ensemble_record import RECORD as ENSEMBLE
+from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals import METHODS, Row, method_run
+
+RECORD = Path(__file__).with_name("results") / "settlement-rivals.jsonl"
+LAST = 500
+"""Cycle at which methods are compared: one whose state the ensemble keeps."""
+SEEDS = range(1, COARSE.packings + 1)
+
+Key = tuple[str, str, int, int, int]
+Planned = tuple[Row, Callable[[], Row]]
+"""What a run is, and what fills its row."""
+
+
+def record_read(path: Path = RECORD) -> list[Row]:
+    """Rows of the record; a line cut off by a kill is left out."""
+    if not path.exists():
+        return []
+    lines = path.read_text(encoding="utf-8").split("\n")
+    return [json.loads(line) for line in lines[:-1] if line]
+
+
+def key(row: Row) -> Key:
+    """What makes a row the same run as another."""
+    return row["part"], row["method"], row["seed"], row["member"], row["last"]
+
+
+def plan_rivals(work: Path, record: EnsembleRecord, last: int) -> Iterator[Planned]:
+    """Every method on every packing."""
+    for method in METHODS:
+        for seed in SEEDS:
+            head = {"part": "rivals", "method": method.name, "seed": seed, "member": 0}
+            folder = work / f"{method.name.replace(' ', '-').replace('/', '-')}-{seed}"
+
+            def fill(method=method, seed=seed, folder=folder) -> Row:  # type: ignore[no-untyped-def]
+                row = method_run(method, seed, last, record, folder)
+                shutil.rmtree(folder, ignore_errors=True)
+                return row
+
+            yield head | {"last": last}, fill
+
+
+def go_on(
+    plan: Iterator[Planned], path: Path, minutes: float, methods: Sequence[str] | None = None
+) -> None:
+    """Every run that the record lacks, a line each as it ends, until ``minutes`` are over."""
+    began = time.monotonic()
+    known = record_read(path)
+    path.write_text("".join(json.dumps(row) + "\n" for row in known), encoding="utf-8")
+    done = {key(row) for row in known}
+    origin = {"commit": commit(), "machine": machine()}
+    for head, fill in plan:
+        if key(head) in done or (methods and head["method"] not in methods):
+            continue
+        if time.monotonic() - began > 60 * minutes:
+            return
+        row = head | rounded(fill()) | origin
+        with path.open("a", encoding="utf-8") as stream:
+            stream.write(json.dumps(row, separators=(",", ":")) + "\n")
+        print(*key(head), row.get("refused", ""), f"{row.get('cpu_s', 0):.0f} CPU s", flush=True)
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Read the command line and go on."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--work", type=Path, required=True, help="folder for the engine's files")
+    parser.add_argument("--minutes", type=float, default=np.inf, help="begin no run after these")
+    parser.add_argument("--last", type=int, default=LAST, help="cycle to compare at")
+    parser.add_argument("--methods", nargs="+", help="only these")
+    parser.add_argument("--record", type=Path, default=RECORD)
+    parser.add_argument("--ensemble", type=Path, default=ENSEMBLE, help="the ensemble's record")
+    given = parser.parse_args(words)
+    record = EnsembleRecord(given.ensemble)
+    with interruptible(), RunFolder(given.work).locked():
+        plan = plan_rivals(given.work, record, given.last)
+        go_on(plan, given.record, given.minutes, given.methods)
+
+
+if __name__ == "__main__":
+    main()
