@@ -7,6 +7,7 @@ written into the decks of the windows (`Changed`).
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -47,31 +48,39 @@ class Changed(LiggghtsEngine):
     """LIGGGHTS going on from a state that was saved with another time step, or other masses.
 
     A saved step count that is no whole number of the scene's cycles is set to zero: the load's
-    phase is the step's.  ``heavier`` s: grains and piston get the scene's masses, which are s times
-    the saved ones, and gravity is `GRAVITY` / s, so that weights stay.  Velocities stay too.
+    phase is the step's.  ``lines`` are put behind a line of each window's deck.
     """
 
-    def __init__(self, heavier: float = 1.0) -> None:
-        self.heavier = heavier
+    def __init__(self, lines: Mapping[str, Sequence[str]] | None = None) -> None:
+        self.lines = lines or {}
 
     def write_cycles(
         self, scene: Scene, start: EngineStart, cycles: int, folder: Path
     ) -> dict[str, str]:
-        """As the engine's, then the changes in the folder's own copy of the deck."""
+        """As the engine's, then the lines in the folder's own copy of the deck."""
         digests = super().write_cycles(scene, start, cycles, folder)
         if start.time_step % scene.steps_per_cycle:
             deck_extend(folder / "in.cycles", "include ${start_part}", "reset_timestep 0")
-        if self.heavier != 1:
-            assert scene.loading is not None
-            deck_extend(
-                folder / "in.cycles",
-                "include piston.in",
-                f"set group grains density {scene.material.grain.density!r}",
-                f"set atom ${{piston_atom}} mass {scene.loading.piston_mass!r}",
-                "unfix gravity",
-                f"fix gravity grains gravity {GRAVITY / self.heavier!r} vector 0.0 0.0 -1.0",
-            )
+        for line, more in self.lines.items():
+            deck_extend(folder / "in.cycles", line, *more)
         return digests
+
+
+def masses_scaled(scene: Scene, ratio: float) -> dict[str, tuple[str, ...]]:
+    """Lines of `Changed` that give saved grains and piston the scene's masses.
+
+    Gravity is `GRAVITY` over the ``ratio`` of these to the saved ones, so that weights stay.
+    Velocities stay too, and so kinetic energies do not.
+    """
+    assert scene.loading is not None
+    return {
+        "include piston.in": (
+            f"set group grains density {scene.material.grain.density!r}",
+            f"set atom ${{piston_atom}} mass {scene.loading.piston_mass!r}",
+            "unfix gravity",
+            f"fix gravity grains gravity {GRAVITY / ratio!r} vector 0.0 0.0 -1.0",
+        )
+    }
 
 
 def deck_extend(path: Path, line: str, *more: str) -> None:
@@ -169,6 +178,14 @@ METHODS = (
 """In the order in which they are run."""
 
 
+def run_in(
+    folder: Path, scene: Scene, variant: Variant, lines: Mapping[str, Sequence[str]] | None = None
+) -> Run:
+    """A run in ``folder`` on `Changed` that says nothing, and computes where it may not jump."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return Run(scene, RunFolder(folder), Changed(lines), variant, Progress(quiet=True), True)
+
+
 def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, folder: Path) -> Row:
     """A method on a packing to cycle ``last`` in ``folder``: what is kept of it.
 
@@ -178,11 +195,8 @@ def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, fol
         scene = method.kind(last).scene(seed)
     except SceneError as error:
         return {"refused": " ".join(str(error).split()), "computed": 0, "cpu_s": 0.0}
-    folder.mkdir(parents=True, exist_ok=True)
-    run = Run(
-        scene, RunFolder(folder), Changed(method.heavier), method.variant,
-        Progress(quiet=True), cycle_by_cycle=True,
-    )  # fmt: skip
+    lines = {} if method.heavier == 1 else masses_scaled(scene, method.heavier)
+    run = run_in(folder, scene, method.variant, lines)
     if not method.own_rain:
         packing_lay(run, Piece(COARSE, seed), record)
     refused = ""
@@ -199,50 +213,84 @@ def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, fol
 def reached(run: Run) -> Row:
     """Figures of a run as far as it has come, and what they cost behind cycle k_i.
 
-    ``settlement`` [m] since the cycles up to k_i by the last cycle of each `BLOCK` that was
-    computed whole, ``state`` the `STATE` of the last, ``profile`` relative density of the layers at
-    the end, ``computed`` cycles, ``cost`` CPU time [s] by purpose, ``lost`` stages given up.
+    ``settlement``, ``state`` and ``profile`` as `figures_of`; ``computed`` cycles, ``cost`` CPU
+    time [s] by purpose, ``lost`` why stages were given up.
     """
     first = run.folder.outcome("window_000000")
     assert first is not None
-    before = np.mean([line["settlement"] for line in first.rows[-BLOCK:]])
+    found = {row["cycle"]: row for row in first.rows}
     names = [name for name in run.folder.stage_names() if name.startswith("window")]
-    found: dict[int, dict[str, float]] = {}
     for name in names[1:]:
-        outcome = run.folder.outcome(name)
-        if outcome is None:
-            continue
-        columns = cycles_of(run, name, slice(None))
-        for at, line in enumerate(outcome.rows):
-            found[line["cycle"]] = {column: values[at] for column, values in columns.items()}
-    outcomes = [o for o in run.folder.outcomes() if o.last_cycle > K_I or o.first_cycle >= K_I]
+        columns, window = cycles_of(run, name, slice(None)), run.folder.outcome(name)
+        assert window is not None
+        for cycle, values in enumerate(zip(*columns.values(), strict=True), window.first_cycle + 1):
+            found[cycle] = dict(zip(columns, values, strict=True))
     cost: dict[str, float] = {}
-    for outcome in outcomes:
-        for purpose, seconds in outcome.cost.items():
-            cost[purpose] = cost.get(purpose, 0.0) + seconds
-    lost = [run.folder.failure(n) for n in run.folder.stage_names() if run.folder.failure(n)]
-    row: Row = {"computed": len(found), "cost": cost, "cpu_s": cost_total(cost), "lost": lost}
-    if found:
-        row["settlement"] = {
-            str(end): mean_of(found, end, "settlement") - float(before)
-            for end in range(K_I + BLOCK, max(found) + 1, BLOCK)
+    for outcome in run.folder.outcomes():
+        if outcome.first_cycle >= K_I:
+            for purpose, seconds in outcome.cost.items():
+                cost[purpose] = cost.get(purpose, 0.0) + seconds
+    row = {
+        "computed": len(found) - K_I,
+        "cost": cost,
+        "cpu_s": cost_total(cost),
+        "lost": [why for name in run.folder.stage_names() if (why := run.folder.failure(name))],
+    }
+    if len(names) == 1:
+        return row
+    last = window_load(run.folder.path / names[-1] / "states.npz")
+    preparation = run.folder.outcome("preparation")
+    assert preparation is not None
+    height = preparation.notes["density_height"]
+    layers = profile(run.scene, height, last.position[-1], last.radius)
+    return row | figures_of(found) | {"profile": layers}
+
+
+def reference_row(seed: int, member: int, last: int, record: EnsembleRecord) -> Row:
+    """The same figures of a member of the ensemble, whose state at ``last`` it keeps; no Python."""
+    piece = Piece(COARSE, seed, member)
+    assert piece.packing is not None
+    kept, packing = record.kept(piece.name), record.table(piece.packing.name)
+    assert kept is not None
+    table = record.table(piece.name)
+    found = {
+        int(row[0]): dict(zip(packing, row, strict=True))
+        for columns in (packing, table)
+        for row in zip(*columns.values(), strict=True)
+        if row[0] <= last
+    }
+    engine_s = float(sum(found[cycle]["cpu_s"] for cycle in range(K_I + 1, last + 1)))
+    radius, position = record.states(piece.name)
+    layers = profile(COARSE.scene(seed), kept.density_height, position[last], radius)
+    row = {"computed": last - K_I, "cost": {"engine": engine_s}, "cpu_s": engine_s}
+    return row | figures_of(found) | {"profile": layers, "engine": kept.engine}
+
+
+def figures_of(found: Mapping[int, Mapping[str, float]]) -> Row:
+    """Figures from the columns of computed cycles.
+
+    ``settlement`` [m] since the `BLOCK` up to k_i by the last cycle of each block that was computed
+    whole, means of blocks both; ``state``: means of `STATE` over the last block.
+    """
+    ends = range(K_I + BLOCK, max(found) + 1, BLOCK)
+    before = mean_of(found, K_I, "settlement")
+    return {
+        "settlement": {
+            str(end): mean_of(found, end, "settlement") - before
+            for end in ends
             if all(cycle in found for cycle in range(end - BLOCK + 1, end + 1))
-        }
-        row["state"] = {column: mean_of(found, max(found), column) for column in STATE}
-        window = window_load(run.folder.path / names[-1] / "states.npz")
-        row["profile"] = profile(run, window.position[-1], window.radius)
-    return row
+        },
+        "state": {column: mean_of(found, max(found), column) for column in STATE},
+    }
 
 
-def mean_of(found: dict[int, dict[str, float]], end: int, column: str) -> float:
+def mean_of(found: Mapping[int, Mapping[str, float]], end: int, column: str) -> float:
     """Mean of a column over the cycles of the block up to ``end`` that were computed."""
     cycles = range(end - BLOCK + 1, end + 1)
     return float(np.mean([found[cycle][column] for cycle in cycles if cycle in found]))
 
 
-def profile(run: Run, position: FloatArray, radius: FloatArray) -> list[float]:
-    """Relative density of `LAYERS` layers of centres (n, 3) and radii (n,) [m]."""
-    preparation = run.folder.outcome("preparation")
-    assert preparation is not None
-    edges = np.linspace(0, preparation.notes["density_height"], LAYERS + 1)
-    return relative_density_profile(position, radius, run.scene.container, edges).tolist()
+def profile(scene: Scene, height: float, position: FloatArray, radius: FloatArray) -> list[float]:
+    """Relative density of `LAYERS` up to ``height``, of centres (n, 3) and radii (n,) [m]."""
+    edges = np.linspace(0, height, LAYERS + 1)
+    return relative_density_profile(position, radius, scene.container, edges).tolist()

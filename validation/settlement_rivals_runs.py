@@ -16,6 +16,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,14 +25,17 @@ from adapters.engine import interruptible
 from adapters.provenance import commit, machine
 from adapters.run_folder import RunFolder
 from validation.move_study import rounded
-from validation.settlement_ensemble import COARSE
+from validation.settlement_ensemble import COARSE, Piece
 from validation.settlement_ensemble_record import RECORD as ENSEMBLE
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import METHODS, Row, method_run
+from validation.settlement_rivals import METHODS, Method, Row, method_run, reference_row
+from validation.settlement_rivals_budget import EVERY, PARTS, PLACE, part_run
 
 RECORD = Path(__file__).with_name("results") / "settlement-rivals.jsonl"
 LAST = 500
 """Cycle at which methods are compared: one whose state the ensemble keeps."""
+PARTS_OF_STUDY = ("reference", "rivals", "budget")
+MEMBERS = range(COARSE.members)
 SEEDS = range(1, COARSE.packings + 1)
 
 Key = tuple[str, str, int, int, int]
@@ -52,6 +56,13 @@ def key(row: Row) -> Key:
     return row["part"], row["method"], row["seed"], row["member"], row["last"]
 
 
+def rival_row(method: Method, seed: int, last: int, record: EnsembleRecord, folder: Path) -> Row:
+    """What is kept of a method on a packing; its ``folder`` is not."""
+    row = method_run(method, seed, last, record, folder)
+    shutil.rmtree(folder, ignore_errors=True)
+    return row
+
+
 def plan_rivals(work: Path, record: EnsembleRecord, last: int) -> Iterator[Planned]:
     """Every method on every packing."""
     for method in METHODS:
@@ -59,12 +70,29 @@ def plan_rivals(work: Path, record: EnsembleRecord, last: int) -> Iterator[Plann
             head = {"part": "rivals", "method": method.name, "seed": seed, "member": 0}
             folder = work / f"{method.name.replace(' ', '-').replace('/', '-')}-{seed}"
 
-            def fill(method=method, seed=seed, folder=folder) -> Row:  # type: ignore[no-untyped-def]
-                row = method_run(method, seed, last, record, folder)
-                shutil.rmtree(folder, ignore_errors=True)
-                return row
+            yield head | {"last": last}, partial(rival_row, method, seed, last, record, folder)
 
-            yield head | {"last": last}, fill
+
+def plan_budget(work: Path, record: EnsembleRecord) -> Iterator[Planned]:
+    """Every part of a jump at every place."""
+    for part in PARTS:
+        for seed in SEEDS:
+            for member in MEMBERS:
+                head = {"part": "budget", "method": part.name, "seed": seed, "member": member}
+                yield (
+                    head | {"last": PLACE},
+                    partial(part_run, part, seed, member, record, work / "budget"),
+                )
+
+
+def plan_reference(record: EnsembleRecord, last: int) -> Iterator[Planned]:
+    """Every member of the ensemble that has reached ``last``."""
+    for seed in SEEDS:
+        for member in MEMBERS:
+            kept = record.kept(Piece(COARSE, seed, member).name)
+            if kept is not None and kept.cycle >= last:
+                head = {"part": "reference", "method": EVERY, "seed": seed, "member": member}
+                yield head | {"last": last}, partial(reference_row, seed, member, last, record)
 
 
 def go_on(
@@ -93,14 +121,20 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--work", type=Path, required=True, help="folder for the engine's files")
     parser.add_argument("--minutes", type=float, default=np.inf, help="begin no run after these")
     parser.add_argument("--last", type=int, default=LAST, help="cycle to compare at")
+    parser.add_argument("--only", nargs="+", choices=PARTS_OF_STUDY, default=PARTS_OF_STUDY)
     parser.add_argument("--methods", nargs="+", help="only these")
     parser.add_argument("--record", type=Path, default=RECORD)
     parser.add_argument("--ensemble", type=Path, default=ENSEMBLE, help="the ensemble's record")
     given = parser.parse_args(words)
     record = EnsembleRecord(given.ensemble)
     with interruptible(), RunFolder(given.work).locked():
-        plan = plan_rivals(given.work, record, given.last)
-        go_on(plan, given.record, given.minutes, given.methods)
+        plans = {
+            "reference": plan_reference(record, given.last),
+            "rivals": plan_rivals(given.work, record, given.last),
+            "budget": plan_budget(given.work, record),
+        }
+        for part in given.only:
+            go_on(plans[part], given.record, given.minutes, given.methods)
 
 
 if __name__ == "__main__":
