@@ -169,11 +169,10 @@ def heavier(factor: int) -> Method:
 FEWER = Method("75 grains", "fewer grains", ("sample.count=75",), own_rain=True)
 RESUBMITTED = Method("h = 0", "h = 0", (), Variant("h = 0", still=True))
 METHODS = (
-    *jumping(5), *jumping(2), softer(10), softer(30), softer(100),
-    longer(0.4), longer(0.6), longer(0.8), longer(1.0),
-    faster(2), faster(4), heavier(10), heavier(100), FEWER,
+    *jumping(5), *jumping(2), softer(10), longer(0.8), faster(4), heavier(10), longer(0.4),
+    softer(30), softer(100), heavier(100), longer(1.0), longer(0.6), faster(2), FEWER,
     Method("tolerance 0.1", "tolerance", ("procedure.tolerance=0.1",), JUMPING),
-    longer(0.3), *jumping(10), RESUBMITTED,
+    *jumping(10), longer(0.3), RESUBMITTED,
 )  # fmt: skip
 """In the order in which they are run."""
 
@@ -244,26 +243,6 @@ def reached(run: Run) -> Row:
     height = preparation.notes["density_height"]
     layers = profile(run.scene, height, last.position[-1], last.radius)
     return row | figures_of(found) | {"profile": layers}
-
-
-def reference_row(seed: int, member: int, last: int, record: EnsembleRecord) -> Row:
-    """The same figures of a member of the ensemble, whose state at ``last`` it keeps; no Python."""
-    piece = Piece(COARSE, seed, member)
-    assert piece.packing is not None
-    kept, packing = record.kept(piece.name), record.table(piece.packing.name)
-    assert kept is not None
-    table = record.table(piece.name)
-    found = {
-        int(row[0]): dict(zip(packing, row, strict=True))
-        for columns in (packing, table)
-        for row in zip(*columns.values(), strict=True)
-        if row[0] <= last
-    }
-    engine_s = float(sum(found[cycle]["cpu_s"] for cycle in range(K_I + 1, last + 1)))
-    radius, position = record.states(piece.name)
-    layers = profile(COARSE.scene(seed), kept.density_height, position[last], radius)
-    row = {"computed": last - K_I, "cost": {"engine": engine_s}, "cpu_s": engine_s}
-    return row | figures_of(found) | {"profile": layers, "engine": kept.engine}
 
 
 def figures_of(found: Mapping[int, Mapping[str, float]]) -> Row:

@@ -28,8 +28,9 @@ from validation.move_study import rounded
 from validation.settlement_ensemble import COARSE, Piece
 from validation.settlement_ensemble_record import RECORD as ENSEMBLE
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import METHODS, Method, Row, method_run, reference_row
+from validation.settlement_rivals import METHODS, Method, Row, method_run
 from validation.settlement_rivals_budget import EVERY, PARTS, PLACE, part_run
+from validation.settlement_rivals_reference import LAWS, law_row, reference_row
 
 RECORD = Path(__file__).with_name("results") / "settlement-rivals.jsonl"
 LAST = 500
@@ -86,13 +87,20 @@ def plan_budget(work: Path, record: EnsembleRecord) -> Iterator[Planned]:
 
 
 def plan_reference(record: EnsembleRecord, last: int) -> Iterator[Planned]:
-    """Every member of the ensemble that has reached ``last``."""
+    """Every member of the ensemble that has reached ``last``, and laws fitted to its curve."""
     for seed in SEEDS:
         for member in MEMBERS:
             kept = record.kept(Piece(COARSE, seed, member).name)
-            if kept is not None and kept.cycle >= last:
-                head = {"part": "reference", "method": EVERY, "seed": seed, "member": member}
-                yield head | {"last": last}, partial(reference_row, seed, member, last, record)
+            if kept is None or kept.cycle < last:
+                continue
+            head = {"part": "reference", "method": EVERY, "seed": seed, "member": member}
+            yield head | {"last": last}, partial(reference_row, seed, member, last, record)
+            for law, cycles in LAWS:
+                head = {"part": "law", "method": f"law {law}, {cycles} cycles", "seed": seed}
+                yield (
+                    head | {"member": member, "last": last},
+                    partial(law_row, law, cycles, seed, member, last, record),
+                )
 
 
 def go_on(

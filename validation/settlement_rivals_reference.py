@@ -1,0 +1,73 @@
+"""What the rivals are compared with: members of the coarse ensemble, and laws fitted to them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.fit_auto import outlook
+from adapters.laws import law_named
+from validation.settlement_ensemble import COARSE, Piece
+from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals import BLOCK, FIRST_WINDOW, K_I, Row, figures_of, mean_of, profile
+
+LAWS = tuple(
+    (law, cycles) for law in ("log", "auto") for cycles in (FIRST_WINDOW, 5 * FIRST_WINDOW)
+)
+"""A law, and cycles behind k_i that are computed before it stands for the rest."""
+
+
+def columns_by_cycle(piece: Piece, record: EnsembleRecord) -> dict[int, dict[str, float]]:
+    """Columns of the packing's cycles and the member's, by cycle."""
+    assert piece.packing is not None
+    return {
+        int(row[0]): dict(zip(table, row, strict=True))
+        for table in (record.table(piece.packing.name), record.table(piece.name))
+        for row in zip(*table.values(), strict=True)
+    }
+
+
+def engine_s(found: dict[int, dict[str, float]], last: int) -> float:
+    """CPU time of the engine from k_i to ``last`` [s]."""
+    return float(sum(found[cycle]["cpu_s"] for cycle in range(K_I + 1, last + 1)))
+
+
+def reference_row(seed: int, member: int, last: int, record: EnsembleRecord) -> Row:
+    """The figures of a member, whose state at ``last`` the ensemble keeps; time without Python."""
+    piece = Piece(COARSE, seed, member)
+    kept = record.kept(piece.name)
+    assert kept is not None
+    found = columns_by_cycle(piece, record)
+    found = {cycle: columns for cycle, columns in found.items() if cycle <= last}
+    cpu_s = engine_s(found, last)
+    radius, position = record.states(piece.name)
+    layers = profile(COARSE.scene(seed), kept.density_height, position[last], radius)
+    row = {"computed": last - K_I, "cost": {"engine": cpu_s}, "cpu_s": cpu_s}
+    return row | figures_of(found) | {"profile": layers, "engine": kept.engine}
+
+
+def law_row(
+    law: str, cycles: int, seed: int, member: int, last: int, record: EnsembleRecord
+) -> Row:
+    """Settlement at ``last`` by a law fitted to the curve of a member: no bed is left.
+
+    ``auto``: the prediction of `adapters.fit_auto` from all cycles since the rain; another: that
+    law's value, fitted to the ``cycles`` behind k_i.
+    """
+    found = columns_by_cycle(Piece(COARSE, seed, member), record)
+    first, end = (1 if law == "auto" else K_I + 1), K_I + cycles
+    cycle = np.arange(first, end + 1, dtype=float)
+    path = np.array([found[int(c)]["settlement"] for c in cycle])
+    if law == "auto":
+        predicted = float(outlook(cycle, path[:, None], last).prediction[0])
+    else:
+        chosen = law_named(law)
+        at_end = chosen.value(chosen.fit(cycle, path), np.arange(last - BLOCK + 1.0, last + 1))
+        predicted = float(np.mean(at_end))
+    settlement = predicted - mean_of(found, K_I, "settlement")
+    cpu_s = engine_s(found, end)
+    return {
+        "computed": cycles,
+        "cost": {"engine": cpu_s},
+        "cpu_s": cpu_s,
+        "settlement": {str(last): settlement},
+    }
