@@ -33,7 +33,7 @@ AFTER = 20
 JUMPED = 20
 """Cycles of the jump, behind which `FEW` are computed; the run without it goes as far."""
 FEW = 10
-EVERY = "every cycle"
+EVERY, TWIN = "every cycle", "one grain 1e-10 m aside"
 AT_REST = "velocity grains set 0.0 0.0 0.0 units box"
 NO_SPIN = "set group grains omegax 0.0 omegay 0.0 omegaz 0.0"
 PISTON_AT_REST = "velocity piston set 0.0 0.0 0.0 units box"
@@ -103,7 +103,7 @@ class Part:
 UNRELAXED = 'procedure.relaxation="none"'
 PARTS = (
     Part(EVERY, cycles=AFTER + FEW),
-    Part("one grain 1e-10 m aside", perturbation=STEP),
+    Part(TWIN, perturbation=STEP),
     Part("half the time step", ("engine.rayleigh_share=0.1",)),
     Part("grains at rest", lines=(AT_REST, NO_SPIN)),
     Part("a new piston, at rest", lines=(PISTON_AT_REST,), new_piston=True),

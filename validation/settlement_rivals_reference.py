@@ -16,6 +16,11 @@ LAWS = tuple(
 """A law, and cycles behind k_i that are computed before it stands for the rest."""
 
 
+def law_name(law: str, cycles: int) -> str:
+    """A fitted law among the methods, such as ``law log, 20 cycles``."""
+    return f"law {law}, {cycles} cycles"
+
+
 def columns_by_cycle(piece: Piece, record: EnsembleRecord) -> dict[int, dict[str, float]]:
     """Columns of the packing's cycles and the member's, by cycle."""
     assert piece.packing is not None

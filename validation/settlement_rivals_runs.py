@@ -30,7 +30,7 @@ from validation.settlement_ensemble_record import RECORD as ENSEMBLE
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import METHODS, Method, Row, method_run
 from validation.settlement_rivals_budget import EVERY, PARTS, PLACE, part_run
-from validation.settlement_rivals_reference import LAWS, law_row, reference_row
+from validation.settlement_rivals_reference import LAWS, law_name, law_row, reference_row
 
 RECORD = Path(__file__).with_name("results") / "settlement-rivals.jsonl"
 LAST = 500
@@ -96,7 +96,7 @@ def plan_reference(record: EnsembleRecord, last: int) -> Iterator[Planned]:
             head = {"part": "reference", "method": EVERY, "seed": seed, "member": member}
             yield head | {"last": last}, partial(reference_row, seed, member, last, record)
             for law, cycles in LAWS:
-                head = {"part": "law", "method": f"law {law}, {cycles} cycles", "seed": seed}
+                head = {"part": "law", "method": law_name(law, cycles), "seed": seed}
                 yield (
                     head | {"member": member, "last": last},
                     partial(law_row, law, cycles, seed, member, last, record),

@@ -1,0 +1,199 @@
+"""Rivals of the settlement procedure: schedules, what their figures mean, the study's sums."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from validation.settlement_ensemble import COARSE
+from validation.settlement_rivals import (
+    BLOCK,
+    FIRST_WINDOW,
+    HEALING,
+    K_I,
+    METHODS,
+    STATE,
+    Row,
+    deck_extend,
+    figures_of,
+    jump_length,
+    masses_scaled,
+)
+from validation.settlement_rivals_budget import EVERY, PLACE, TWIN
+from validation.settlement_rivals_reading import (
+    FIGURES,
+    chaos,
+    effect,
+    judged,
+    law_alone,
+    nearer,
+    profile_chaos,
+    profile_error,
+)
+
+LAST = 500
+
+
+@pytest.mark.parametrize("jumps", [1, 2, 5, 10])
+def test_equal_jumps_end_at_the_last_cycle(jumps: int) -> None:
+    h = jump_length(jumps, LAST)
+    assert K_I + FIRST_WINDOW + jumps * (h + HEALING + FIRST_WINDOW) == LAST
+
+
+def test_jumps_that_miss_the_last_cycle_are_refused() -> None:
+    for jumps in (3, 19):  # 380 / 3 is no number of cycles; 380 / 19 leaves none to jump
+        with pytest.raises(ValueError, match="miss cycle 500"):
+            jump_length(jumps, LAST)
+
+
+def test_methods_are_scenes_of_their_own() -> None:
+    """Every method but E/100 is a scene, of the reference's bed but for what its name says."""
+    reference = COARSE.scene(1)
+    assert len({method.name for method in METHODS}) == len(METHODS)
+    for method in METHODS:
+        if method.name == "E/100":
+            continue
+        scene = method.kind(LAST).scene(1)
+        assert scene.procedure is not None
+        assert scene.procedure.total_cycles == LAST
+        changed = scene.model_dump()["material"] != reference.model_dump()["material"]
+        assert changed == (method.family in ("softer", "density"))
+        steps = scene.steps_per_cycle / reference.steps_per_cycle
+        shorter = method.family in ("softer", "density", "longer step", "frequency")
+        assert (steps < 0.75) == shorter
+
+
+def test_scaled_masses_keep_weights() -> None:
+    """Gravity falls as the density rises."""
+    method = next(method for method in METHODS if method.name == "density x 10")
+    scene = method.kind(LAST).scene(1)
+    (lines,) = masses_scaled(scene, method.heavier).values()
+    density = float(lines[0].rpartition(" ")[2])
+    gravity = float(lines[-1].split()[4])
+    assert density * gravity == pytest.approx(COARSE.scene(1).material.grain.density * 9.81)
+
+
+def test_lines_come_behind_their_line(tmp_path: Path) -> None:
+    deck = tmp_path / "in.cycles"
+    deck.write_text("one\ntwo\n")
+    deck_extend(deck, "one", "and", "more")
+    assert deck.read_text() == "one\nand\nmore\ntwo\n"
+    with pytest.raises(ValueError, match="three"):
+        deck_extend(deck, "three", "more")
+
+
+def test_figures_leave_out_blocks_that_a_jump_skipped() -> None:
+    """Settlement is that of a block's mean less the mean of the block up to k_i."""
+    cycles = [*range(K_I - BLOCK + 1, K_I + 2 * BLOCK + 1), *range(K_I + 3 * BLOCK + 4, 151)]
+    found = {c: {"settlement": 1e-6 * c} | dict.fromkeys(STATE, float(c)) for c in cycles}
+    figures = figures_of(found)
+    assert figures["settlement"] == pytest.approx(
+        {"110": 1e-5, "120": 2e-5, "150": 5e-5}, rel=1e-12
+    )
+    assert figures["state"] == pytest.approx(dict.fromkeys(STATE, 145.5))
+
+
+# --- sums of the study, on made-up runs --------------------------------------------------------
+
+
+def made_up(part: str, method: str, seed: int, member: int, value: float) -> Row:
+    """A row whose every figure is ``value``."""
+    return {
+        "part": part, "method": method, "seed": seed, "member": member, "last": LAST,
+        "settlement": {str(LAST): value}, "profile": [value, 1.0], "cpu_s": 1.0, "refused": "",
+        "state": dict.fromkeys(STATE, value),
+    }  # fmt: skip
+
+
+def ensemble(generator: np.random.Generator, within: float, profile: float = 0.0) -> list[Row]:
+    """Five packings, two members each, scatter between packings 0.3 about 1."""
+    rows = []
+    for seed in range(1, 6):
+        own = 1 + 0.3 * generator.standard_normal()
+        for member in range(2):
+            row = made_up(
+                "reference", EVERY, seed, member, own + within * generator.standard_normal()
+            )
+            row["profile"] = list(1 + profile * generator.standard_normal(400))
+            rows.append(row)
+    return rows
+
+
+def test_band_of_chaos_holds_full_runs() -> None:
+    """A third run of each packing lies within the band in 95 % of ensembles.
+
+    Of 400 ensembles the share has a standard error of at most 1.1 %; the bar is three of them.
+    """
+    generator = np.random.default_rng(1)
+    inside = []
+    for _ in range(400):
+        own = 10 + generator.standard_normal(5)
+        members = own[:, None] + generator.standard_normal((5, 2))
+        rows = [
+            made_up("reference", EVERY, seed + 1, member, members[seed, member])
+            for seed in range(5)
+            for member in range(2)
+        ]
+        band = chaos(rows, LAST, "settlement")
+        for _ in range(2):
+            third = own + generator.standard_normal(5)
+            rows[10:] = [made_up("rivals", "full", s + 1, 0, third[s]) for s in range(5)]
+            found = judged(rows, "full", LAST, "settlement")
+            assert found is not None
+            inside.append(abs(found.mean) <= band)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.033)
+
+
+def test_band_of_profiles_is_that_of_a_third_run() -> None:
+    """Layers of independent errors, 400 of them: both tell s sqrt(3/2), within 5 %."""
+    rows = ensemble(np.random.default_rng(2), 0.0, profile=0.01)
+    third = ensemble(np.random.default_rng(3), 0.0, profile=0.01)
+    rows += [row | {"part": "rivals", "method": "full"} for row in third if row["member"] == 0]
+    expected = 0.01 * np.sqrt(1.5)
+    assert profile_chaos(rows, LAST) == pytest.approx(expected, rel=0.05)
+    assert profile_error(rows, "full", LAST).mean() == pytest.approx(expected, rel=0.05)
+
+
+def test_nearer_is_told_from_sizes_of_errors() -> None:
+    """Moving that is off by 0.1 to the other side is nearer than nothing moved, off by 0.3."""
+    rows = [made_up("reference", EVERY, s, m, 1.0) for s in (1, 2) for m in (0, 1)]
+    rows += [made_up("rivals", "moved", s, 0, 1.1) for s in (1, 2)]
+    rows += [made_up("rivals", "still", 2, 0, 0.7)]
+    assert nearer(rows, "moved", "still", LAST) == pytest.approx([0.2])
+    assert not len(nearer(rows, "moved", "unknown", LAST))
+
+
+def test_fewer_grains_are_scaled_to_the_bed() -> None:
+    """Half as many grains stand half as high: lengths count twice, stiffness half."""
+    row = made_up("rivals", "75 grains", 1, 0, 1.0)
+    values = {key: figure.value(row) for key, figure in FIGURES.items()}
+    assert values == {"settlement": 2.0, "coordination": 1.0, "deflection": 2.0, "stiffness": 0.5}
+
+
+def place(method: str, member: int, settlement: list[float], **more: Any) -> Row:
+    """A row of the budget."""
+    window = [1e-4 * np.log(PLACE - 19 + n) for n in range(20)]
+    head = {"part": "budget", "method": method, "seed": 1, "member": member, "last": PLACE}
+    cycles = [PLACE, PLACE + len(settlement)]
+    return head | {"window": window, "settlement": settlement, "cycles": cycles} | more
+
+
+def test_effects_are_paired_at_the_same_cycles() -> None:
+    """A run that ends ten cycles before the other is compared where both are."""
+    path = [1e-4 * np.log(PLACE + 1 + n) for n in range(30)]
+    rows = [place(EVERY, member, path) for member in (0, 1)]
+    rows += [place(TWIN, 0, [u + 2e-6 for u in path[:20]]), place(TWIN, 1, path[:20])]
+    ends = effect(rows, TWIN, lambda row: row["settlement"][-1])
+    assert ends == pytest.approx([1e-6], rel=1e-9)
+
+
+def test_a_law_that_holds_misses_nothing() -> None:
+    """Window and cycles behind on one log curve: what the law adds is what came."""
+    path = [1e-4 * np.log(PLACE + 1 + n) for n in range(30)]
+    steeper = [path[0] + 2 * (u - path[0]) for u in path]
+    missed = [law_alone([place(EVERY, 0, settlement)])[0] for settlement in (path, steeper)]
+    assert missed[0] == pytest.approx(0, abs=1e-12)
+    assert missed[1] < -1e-6

@@ -1,0 +1,223 @@
+"""Make docs/settlement-rivals.md and its picture: ``python -m validation.settlement_rivals_page``.
+
+The page is ``settlement_rivals_page.md`` beside this file with tables and numbers put in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from adapters.run_folder import write_atomically
+from adapters.state import FloatArray
+from validation.law_page import table
+from validation.same_packing import interval
+from validation.settlement_ensemble import COARSE
+from validation.settlement_ensemble_page import short
+from validation.settlement_ensemble_reading import nested
+from validation.settlement_rivals import K_I, METHODS, Row
+from validation.settlement_rivals_budget import AFTER, EVERY, PARTS, TWIN
+from validation.settlement_rivals_picture import draw, shown
+from validation.settlement_rivals_reading import (
+    FIGURES,
+    chaos,
+    cost,
+    effect,
+    finished,
+    judged,
+    law_alone,
+    nearer,
+    of_place,
+    over_same,
+    profile_chaos,
+    profile_error,
+    reference,
+    rms,
+    rows_of,
+    settled,
+)
+from validation.settlement_rivals_runs import LAST, SEEDS, record_read
+
+TEMPLATE = Path(__file__).with_suffix(".md")
+PAGE = Path(__file__).parents[1] / "docs" / "settlement-rivals.md"
+STEPS = COARSE.scene(1).steps_per_cycle
+SCHEDULES = tuple(m.jumps for m in METHODS if m.family == "procedure")
+
+
+def pm(values: FloatArray, factor: float, digits: int, unit: str = "", bold: bool = False) -> str:
+    """Mean and half of Student's interval over packings; bold where it leaves out zero."""
+    if not len(values):
+        return "-"
+    mean, half = interval(values * factor)
+    if half != half:
+        return f"{mean:+.{digits}f}{unit}"
+    text = f"{mean:+.{digits}f} ± {half:.{digits}f}{unit}"
+    return f"**{text}**" if bold and abs(mean) > half else text
+
+
+def table_methods(rows: Sequence[Row], last: int) -> str:
+    """A line for each method: cost and errors, bold where the packings agree that it is off."""
+    truth = reference(rows, last)
+    whole, full = cost(truth), last - K_I
+    head = [
+        "way to the last cycle", "packings", "cycles computed", "steps, %", "CPU s", "cheaper by",
+        "settlement", "coordination number", "density profile", "elastic deflection",
+        "piston stiffness",
+    ]  # fmt: skip
+    lines = [
+        ["every cycle (the reference)", f"{len(SEEDS)} x 2", str(full), "100", f"{whole:.0f}", "1",
+         *(f"± {100 * chaos(rows, last, key):.0f} %" for key in ("settlement", "coordination")),
+         f"{100 * profile_chaos(rows, last):.1f} %",
+         *(f"± {100 * chaos(rows, last, key):.0f} %" for key in ("deflection", "stiffness"))]
+    ]  # fmt: skip
+    for name, _ in shown():
+        mine = finished(rows, name, last)
+        if not mine:
+            continue
+        computed = float(np.mean([row["computed"] for row in mine]))
+        steps = 100 * computed * mine[0].get("steps_per_cycle", STEPS) / (full * STEPS)
+        cells = {}
+        for key in FIGURES:
+            found = judged(rows, name, last, key)
+            cells[key] = "-" if found is None else pm(found.error, 100, 0, " %", bold=True)
+        profile = profile_error(rows, name, last)
+        lines.append(
+            [name, str(len({row["seed"] for row in mine})), f"{computed:.0f}", f"{steps:.0f}",
+             f"{cost(mine):.0f}", f"{whole / cost(mine):.1f}",
+             cells["settlement"], cells["coordination"],
+             f"{100 * float(profile.mean()):.1f} %" if len(profile) else "-",
+             cells["deflection"], cells["stiffness"]]
+        )  # fmt: skip
+    return table(head, lines)
+
+
+def table_refused(rows: Sequence[Row], last: int) -> str:
+    """Which methods did not come to the end, and what was said."""
+    lines = []
+    for method in METHODS:
+        mine = [row for row in rows_of(rows, "rivals", method.name, last) if row["refused"]]
+        for why in dict.fromkeys(said(row["refused"]) for row in mine):
+            count = sum(said(row["refused"]) == why for row in mine)
+            reached = max(row["computed"] for row in mine if said(row["refused"]) == why)
+            of = len(rows_of(rows, "rivals", method.name, last))
+            lines.append([method.name, f"{count} of {of}", str(K_I + reached), why])
+    return table(["way", "packings", "at the latest after cycle", "what was said"], lines)
+
+
+def said(refused: str) -> str:
+    """The reason without its numbers, which differ from packing to packing, and without paths."""
+    why = refused.partition("problem ")[2] or refused
+    words = [word for word in why.split() if "/" not in word or word == "radius/"]
+    return " ".join(words).partition(" is 0.")[0].partition(" -> ")[0]
+
+
+def table_null(rows: Sequence[Row], last: int) -> str:
+    """Moving beside not moving, the same jumps, packing by packing."""
+    lines, whole = [], []
+    for jumps in SCHEDULES:
+        pair = (f"{jumps} jumps", f"{jumps} jumps, nothing moved")
+        one, other = (judged(rows, name, last, "settlement") for name in pair)
+        if one is None or other is None:
+            continue
+        gained = nearer(rows, *pair, last)
+        whole.append(gained)
+        lines.append(
+            [str(jumps), str(len(gained)), pm(one.error, 100, 0, " %"),
+             pm(other.error, 100, 0, " %"),
+             *(f"{100 * float(np.abs(found.error).mean()):.0f} %" for found in (one, other)),
+             pm(gained, 100, 0, " %"), f"{int((gained > 0).sum())} of {len(gained)}"]
+        )  # fmt: skip
+    if len(whole) > 1 and len({len(gained) for gained in whole}) == 1:
+        gained = np.mean(whole, axis=0)
+        counted = f"{int((gained > 0).sum())} of {len(gained)}"
+        lines.append(
+            ["mean of these", str(len(gained)), *["-"] * 4, pm(gained, 100, 0, " %"), counted]
+        )
+    head = [
+        "jumps", "packings", "error, moved", "error, nothing moved", "mean size, moved",
+        "nothing moved", "moved is nearer by", "nearer in",
+    ]  # fmt: skip
+    return table(head, lines)
+
+
+BUDGET: tuple[tuple[str, Callable[[Row], float], float, int], ...] = (
+    ("settlement of the first cycle, µm", lambda row: row["settlement"][0], 1e6, 1),
+    ("settlement after 20 cycles, µm", settled, 1e6, 1),
+    ("coordination number", lambda row: row["state"]["coordination_number"], 1, 3),
+    ("force error, first cycle, %", lambda row: row["first"]["force_error"], 100, 2),
+    ("force error, %", lambda row: row["state"]["force_error"], 100, 2),
+    ("elastic deflection, µm", lambda row: row["state"]["elastic_deflection"], 1e6, 1),
+)
+"""Columns of the budget: words, value of a row, factor, decimals."""
+
+
+def table_budget(rows: Sequence[Row]) -> str:
+    """A line for each part of a jump: its effect beside the run of every cycle."""
+    lines = []
+    for part in PARTS[1:]:
+        if rows_of(rows, "budget", part.name):
+            cells = [
+                "-" if part.jump and "first" in words else pm(found, factor, digits, bold=True)
+                for words, value, factor, digits in BUDGET
+                for found in [effect(rows, part.name, value)]
+            ]
+            lines.append([part.name, *cells])
+    alone = pm(law_alone(rows), 1e6, 1, bold=True)
+    lines.append(["the law alone (log), no bed", "-", alone, *["-"] * (len(BUDGET) - 2)])
+    return table(["what is done", *(words for words, *_ in BUDGET)], lines)
+
+
+def scatter(rows: Sequence[Row]) -> dict[str, str]:
+    """What a place settles in 20 cycles without a jump, and how far twins part [µm]: rms."""
+    every, twin = of_place(rows, EVERY), of_place(rows, TWIN)
+    gains = [settled(over_same(row, AFTER)) for row in every.values()]
+    apart = [settled(row) - settled(over_same(every[place], AFTER)) for place, row in twin.items()]
+    return {
+        "GAIN": f"{1e6 * float(np.mean(gains)):.0f}" if gains else "-",
+        "APART": f"{1e6 * rms(np.array(apart)):.0f}" if apart else "-",
+    }
+
+
+def page(rows: Sequence[Row], last: int = LAST) -> str:
+    """The page of a record."""
+    text = TEMPLATE.read_text(encoding="utf-8")
+    truth = reference(rows, last)
+    figure = FIGURES["settlement"]
+    values = {
+        seed: np.array([figure.value(row) for row in truth if row["seed"] == seed])
+        for seed in SEEDS
+    }
+    found = nested(values)
+    engines = ", ".join(dict.fromkeys(row["engine"] for row in rows if row.get("engine")))
+    commits = ", ".join(dict.fromkeys(short(row["commit"]) for row in rows))
+    parts = {
+        "LAST": str(last),
+        "MEAN": f"{1e6 * found.mean:.0f}",
+        "BETWEEN": f"{1e6 * found.between:.0f}",
+        "WITHIN": f"{1e6 * found.within:.0f}",
+        "GIVEN": f"{1e6 * found.half_given:.0f}",
+        "CHAOS": f"{100 * chaos(rows, last, 'settlement'):.0f}",
+        "METHODS": table_methods(rows, last),
+        "REFUSED": table_refused(rows, last),
+        "NULL": table_null(rows, last),
+        "BUDGET": table_budget(rows),
+        "MINUTES": f"{sum(r['cpu_s'] for r in rows if r['part'] in ('rivals', 'budget')) / 60:.0f}",
+        **scatter(rows),
+        "ORIGIN": f"{rows[0]['machine']}; {engines}; commits {commits}.",
+    }
+    for name, part in parts.items():
+        text = text.replace(f"<{name}>", part)
+    return text
+
+
+def main() -> None:
+    """Write page and picture."""
+    rows = record_read()
+    write_atomically(PAGE, page(rows))
+    draw(rows, LAST, PAGE.with_suffix(".png"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,229 @@
+"""What the record of the rivals says: errors, what chaos alone makes of them, paired tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from adapters.laws import law_named
+from adapters.state import FloatArray
+from validation.same_packing import interval
+from validation.settlement_ensemble_reading import nested, student
+from validation.settlement_rivals import FEWER, GRAINS, Row
+from validation.settlement_rivals_budget import EVERY, JUMPED
+
+HALF = 10
+"""Cycle ends over which the settlement of the budget is averaged, the last of `AFTER`."""
+
+
+def lengths(row: Row) -> float:
+    """By what lengths along the load are multiplied: a bed of half the grains is half as high."""
+    return GRAINS / 75 if row["method"] == FEWER.name else 1.0
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a row at the cycle of comparison."""
+
+    words: str
+    value: Callable[[Row], float]
+
+
+FIGURES = {
+    "settlement": Figure(
+        "settlement", lambda row: row["settlement"][str(row["last"])] * lengths(row)
+    ),
+    "coordination": Figure(
+        "coordination number", lambda row: float(row["state"]["coordination_number"])
+    ),
+    "deflection": Figure(
+        "elastic deflection", lambda row: row["state"]["elastic_deflection"] * lengths(row)
+    ),
+    "stiffness": Figure(
+        "piston stiffness", lambda row: row["state"]["piston_stiffness"] / lengths(row)
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Errors of a method over the packings that it finished."""
+
+    seeds: tuple[int, ...]
+    error: FloatArray
+    """Method less reference, one a packing, over the reference's mean of all packings."""
+
+    @property
+    def mean(self) -> float:
+        """Mean over the packings."""
+        return float(self.error.mean())
+
+    @property
+    def half(self) -> float:
+        """Half of Student's 95 % interval of the mean; nan for one packing."""
+        return interval(self.error)[1] if len(self.error) > 1 else float("nan")
+
+
+def rows_of(rows: Sequence[Row], part: str, method: str, last: int | None = None) -> list[Row]:
+    """Rows of a method, at cycle ``last`` where that is told."""
+    return [
+        row
+        for row in rows
+        if row["part"] == part and row["method"] == method and last in (None, row["last"])
+    ]
+
+
+def finished(rows: Sequence[Row], method: str, last: int) -> list[Row]:
+    """Rows of a method that came to ``last``, of rivals and of laws."""
+    found = rows_of(rows, "rivals", method, last) + rows_of(rows, "law", method, last)
+    return [row for row in found if str(last) in row.get("settlement", {})]
+
+
+def means_by_seed(rows: Sequence[Row], figure: Figure) -> dict[int, float]:
+    """Mean over the members of each packing."""
+    seeds = sorted({row["seed"] for row in rows})
+    return {
+        seed: float(np.mean([figure.value(row) for row in rows if row["seed"] == seed]))
+        for seed in seeds
+    }
+
+
+def reference(rows: Sequence[Row], last: int) -> list[Row]:
+    """Members of the ensemble that reached ``last``."""
+    return rows_of(rows, "reference", EVERY, last)
+
+
+def judged(rows: Sequence[Row], method: str, last: int, key: str) -> Judged | None:
+    """Errors of a method in a figure; None where it finished on no packing."""
+    mine, figure = finished(rows, method, last), FIGURES[key]
+    if not mine or (key != "settlement" and "state" not in mine[0]):
+        return None
+    truth, found = means_by_seed(reference(rows, last), figure), means_by_seed(mine, figure)
+    scale = float(np.mean(list(truth.values())))
+    error = np.array([found[seed] - truth[seed] for seed in found]) / scale
+    return Judged(tuple(found), error)
+
+
+def chaos(rows: Sequence[Row], last: int, key: str) -> float:
+    """Half of the 95 % interval of the mean error that one full run a packing would have.
+
+    With s the scatter within packings of m members, over P packings and the reference's mean:
+    t s sqrt((1 + 1/m) / P).
+    """
+    figure, runs = FIGURES[key], reference(rows, last)
+    seeds = sorted({row["seed"] for row in runs})
+    values = {
+        seed: np.array([figure.value(row) for row in runs if row["seed"] == seed]) for seed in seeds
+    }
+    found = nested(values)
+    members = found.members / found.packings
+    spread = found.within * np.sqrt((1 + 1 / members) / found.packings)
+    return float(student(found.members - found.packings) * spread / found.mean)
+
+
+def profile_error(rows: Sequence[Row], method: str, last: int) -> FloatArray:
+    """Of each packing: rms over the layers of the relative density's error over its mean."""
+    truth = {seed: layers(reference(rows, last), seed) for seed in seeds_of(rows, last)}
+    mine = [row for row in finished(rows, method, last) if "profile" in row]
+    return np.array(
+        [rms(np.array(row["profile"]) - truth[row["seed"]]) / truth[row["seed"]].mean()
+         for row in mine]
+    )  # fmt: skip
+
+
+def profile_chaos(rows: Sequence[Row], last: int) -> float:
+    """The same that one full run a packing would have against the mean of two, mean of packings.
+
+    A member less another has the variance 2 s^2; less the mean of two others 3/2 s^2.
+    """
+    found = []
+    for seed in seeds_of(rows, last):
+        one, other = (np.array(r["profile"]) for r in reference(rows, last) if r["seed"] == seed)
+        found.append(np.sqrt(3 / 4) * rms(one - other) / (one + other).mean() * 2)
+    return float(np.mean(found))
+
+
+def seeds_of(rows: Sequence[Row], last: int) -> list[int]:
+    """Packings of the reference."""
+    return sorted({row["seed"] for row in reference(rows, last)})
+
+
+def layers(rows: Sequence[Row], seed: int) -> FloatArray:
+    """Mean relative density of each layer over the members of a packing."""
+    return np.mean([row["profile"] for row in rows if row["seed"] == seed], axis=0)
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def cost(rows: Sequence[Row]) -> float:
+    """CPU time behind k_i [s], mean over packings."""
+    return float(np.mean([row["cpu_s"] for row in rows]))
+
+
+# --- the null hypothesis ---------------------------------------------------------------------
+
+
+def nearer(rows: Sequence[Row], moved: str, still: str, last: int) -> FloatArray:
+    """By how much moving is nearer to the reference than not moving, of each packing.
+
+    |error of ``still``| less |error of ``moved``|, over the reference's mean.
+    """
+    one, other = (judged(rows, method, last, "settlement") for method in (moved, still))
+    if one is None or other is None:
+        return np.empty(0)
+    both = sorted(set(one.seeds) & set(other.seeds))
+    return np.array(
+        [abs(other.error[other.seeds.index(s)]) - abs(one.error[one.seeds.index(s)]) for s in both]
+    )
+
+
+# --- the budget ------------------------------------------------------------------------------
+
+
+def settled(row: Row) -> float:
+    """Settlement [m] from the end of the window to the last cycles behind, means of `HALF` both."""
+    return float(np.mean(row["settlement"][-HALF:]) - np.mean(row["window"][-HALF:]))
+
+
+def of_place(rows: Sequence[Row], part: str) -> dict[tuple[int, int], Row]:
+    """Rows of a part by packing and member."""
+    return {(row["seed"], row["member"]): row for row in rows_of(rows, "budget", part)}
+
+
+def effect(rows: Sequence[Row], part: str, value: Callable[[Row], float]) -> FloatArray:
+    """A part less the run of every cycle, mean over the members of each packing."""
+    every, mine = of_place(rows, EVERY), of_place(rows, part)
+    found: dict[int, list[float]] = {}
+    for place in sorted(every.keys() & mine.keys()):
+        base = every[place]
+        same = over_same(base, mine[place]["cycles"][1] - base["cycles"][0])
+        found.setdefault(place[0], []).append(value(mine[place]) - value(same))
+    return np.array([np.mean(values) for values in found.values()])
+
+
+def over_same(row: Row, cycles: int) -> Row:
+    """A row of the budget whose settlement ends after so many cycles."""
+    return row | {"settlement": row["settlement"][:cycles]}
+
+
+def law_alone(rows: Sequence[Row], law: str = "log") -> FloatArray:
+    """Settlement over `JUMPED` cycles by a law fitted to the window's, less what came [m].
+
+    Both between means of `HALF` cycles, of each packing the mean over its members.
+    """
+    chosen = law_named(law)
+    found: dict[int, list[float]] = {}
+    for (seed, _), row in of_place(rows, EVERY).items():
+        path, start = np.array(row["window"]), row["cycles"][0]
+        cycle = np.arange(start - len(path) + 1.0, start + 1)
+        parameters = chosen.fit(cycle, path)
+        before, after = (
+            float(np.mean(chosen.value(parameters, cycle[-HALF:] + ahead))) for ahead in (0, JUMPED)
+        )
+        found.setdefault(seed, []).append(after - before - settled(over_same(row, JUMPED)))
+    return np.array([np.mean(values) for values in found.values()])
