@@ -142,6 +142,35 @@ def table_null(rows: Sequence[Row], last: int) -> str:
     return table(head, lines)
 
 
+def verdict(rows: Sequence[Row], last: int) -> str:
+    """In words, whether moving beats not moving by more than packings and chaos scatter."""
+    lines = []
+    for jumps in SCHEDULES:
+        gained = nearer(rows, f"{jumps} jumps", f"{jumps} jumps, nothing moved", last)
+        if len(gained) < 2:
+            continue
+        mean, half = interval(gained)
+        told = f"- {jumps} jumps: moving is {'nearer' if mean > 0 else 'farther'} by"
+        told += f" {100 * abs(mean):.0f} ± {100 * half:.0f} % of the reference's mean; "
+        if abs(mean) > half:
+            told += "the packings agree, " + (
+                "**and moving is better than not moving**."
+                if mean > 0
+                else "**and moving is worse than not moving**."
+            )
+        else:
+            need = packings_needed(gained)
+            told += "**which is not more than it scatters**"
+            told += f"; about {need:,} packings could tell." if mean > 0 else "."
+        lines.append(told)
+    return "\n".join(lines)
+
+
+def packings_needed(gained: FloatArray) -> int:
+    """Packings whose 95 % interval would be as wide as the mean: (2 s / mean)^2."""
+    return int(np.ceil((2 * gained.std(ddof=1) / gained.mean()) ** 2))
+
+
 BUDGET: tuple[tuple[str, Callable[[Row], float], float, int], ...] = (
     ("settlement of the first cycle, µm", lambda row: row["settlement"][0], 1e6, 1),
     ("settlement after 20 cycles, µm", settled, 1e6, 1),
@@ -202,6 +231,7 @@ def page(rows: Sequence[Row], last: int = LAST) -> str:
         "METHODS": table_methods(rows, last),
         "REFUSED": table_refused(rows, last),
         "NULL": table_null(rows, last),
+        "VERDICT": verdict(rows, last),
         "BUDGET": table_budget(rows),
         "MINUTES": f"{sum(r['cpu_s'] for r in rows if r['part'] in ('rivals', 'budget')) / 60:.0f}",
         **scatter(rows),
