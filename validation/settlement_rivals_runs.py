@@ -17,6 +17,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -75,15 +76,11 @@ def plan_rivals(work: Path, record: EnsembleRecord, last: int) -> Iterator[Plann
 
 
 def plan_budget(work: Path, record: EnsembleRecord) -> Iterator[Planned]:
-    """Every part of a jump at every place."""
-    for part in PARTS:
-        for seed in SEEDS:
-            for member in MEMBERS:
-                head = {"part": "budget", "method": part.name, "seed": seed, "member": member}
-                yield (
-                    head | {"last": PLACE},
-                    partial(part_run, part, seed, member, record, work / "budget"),
-                )
+    """Every part of a jump at every place, the first place of all packings before any second."""
+    for member, part, seed in product(MEMBERS, PARTS, SEEDS):
+        head = {"part": "budget", "method": part.name, "seed": seed, "member": member}
+        filled = partial(part_run, part, seed, member, record, work / "budget")
+        yield head | {"last": PLACE}, filled
 
 
 def plan_reference(record: EnsembleRecord, last: int) -> Iterator[Planned]:
