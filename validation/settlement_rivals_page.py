@@ -22,13 +22,13 @@ from validation.settlement_rivals_budget import AFTER, EVERY, PARTS, TWIN
 from validation.settlement_rivals_picture import draw, shown
 from validation.settlement_rivals_reading import (
     FIGURES,
+    beside,
     chaos,
     cost,
     effect,
     finished,
     judged,
     law_alone,
-    nearer,
     of_place,
     over_same,
     profile_chaos,
@@ -115,29 +115,20 @@ def said(refused: str) -> str:
 
 def table_null(rows: Sequence[Row], last: int) -> str:
     """Moving beside not moving, the same jumps, packing by packing."""
-    lines, whole = [], []
+    lines = []
     for jumps in SCHEDULES:
-        pair = (f"{jumps} jumps", f"{jumps} jumps, nothing moved")
-        one, other = (judged(rows, name, last, "settlement") for name in pair)
-        if one is None or other is None:
-            continue
-        gained = nearer(rows, *pair, last)
-        whole.append(gained)
-        lines.append(
-            [str(jumps), str(len(gained)), pm(one.error, 100, 0, " %"),
-             pm(other.error, 100, 0, " %"),
-             *(f"{100 * float(np.abs(found.error).mean()):.0f} %" for found in (one, other)),
-             pm(gained, 100, 0, " %"), f"{int((gained > 0).sum())} of {len(gained)}"]
-        )  # fmt: skip
-    if len(whole) > 1 and len({len(gained) for gained in whole}) == 1:
-        gained = np.mean(whole, axis=0)
-        counted = f"{int((gained > 0).sum())} of {len(gained)}"
-        lines.append(
-            ["mean of these", str(len(gained)), *["-"] * 4, pm(gained, 100, 0, " %"), counted]
-        )
+        found = beside(rows, jumps, last)
+        if found is not None:
+            sizes = (f"{100 * float(np.abs(e).mean()):.0f} %" for e in (found.moved, found.still))
+            lines.append(
+                [str(jumps), str(len(found.moved)), pm(found.moved, 100, 0, " %", True),
+                 pm(found.still, 100, 0, " %", True), pm(found.difference, 100, 0, " %", True),
+                 *sizes, pm(found.nearer, 100, 0, " %", True),
+                 f"{int((found.nearer > 0).sum())} of {len(found.nearer)}"]
+            )  # fmt: skip
     head = [
-        "jumps", "packings", "error, moved", "error, nothing moved", "mean size, moved",
-        "nothing moved", "moved is nearer by", "nearer in",
+        "jumps", "packings", "error, moved", "error, nothing moved", "difference",
+        "mean size, moved", "nothing moved", "moved is nearer by", "nearer in",
     ]  # fmt: skip
     return table(head, lines)
 
@@ -146,29 +137,46 @@ def verdict(rows: Sequence[Row], last: int) -> str:
     """In words, whether moving beats not moving by more than packings and chaos scatter."""
     lines = []
     for jumps in SCHEDULES:
-        gained = nearer(rows, f"{jumps} jumps", f"{jumps} jumps, nothing moved", last)
-        if len(gained) < 2:
+        found = beside(rows, jumps, last)
+        if found is None or len(found.moved) < 2:
             continue
-        mean, half = interval(gained)
-        told = f"- {jumps} jumps: moving is {'nearer' if mean > 0 else 'farther'} by"
-        told += f" {100 * abs(mean):.0f} ± {100 * half:.0f} % of the reference's mean; "
-        if abs(mean) > half:
-            told += "the packings agree, " + (
-                "**and moving is better than not moving**."
-                if mean > 0
-                else "**and moving is worse than not moving**."
-            )
+        (moved, m), (still, s), (near, n) = map(interval, (found.moved, found.still, found.nearer))
+        bias = {True: "is off by more than packings scatter", False: "can not be told from none"}
+        told = [
+            f"{jumps} jumps: the mean error with nothing moved {bias[abs(still) > s]}",
+            f"that of moving {bias[abs(moved) > m]}",
+        ]
+        better = "better" if near > 0 else "worse"
+        if abs(near) > n:
+            told.append(f"**packing by packing moving is {better}**")
         else:
-            need = packings_needed(gained)
-            told += "**which is not more than it scatters**"
-            told += f"; about {need:,} packings could tell." if mean > 0 else "."
-        lines.append(told)
+            told.append("**packing by packing moving is not better by more than it scatters**")
+            if near > 0:
+                told.append(f"about {packings_needed(found.nearer):,} packings could tell")
+        lines.append("- " + "; ".join(told) + ".")
     return "\n".join(lines)
 
 
 def packings_needed(gained: FloatArray) -> int:
     """Packings whose 95 % interval would be as wide as the mean: (2 s / mean)^2."""
     return int(np.ceil((2 * gained.std(ddof=1) / gained.mean()) ** 2))
+
+
+def jumps_lost(rows: Sequence[Row], last: int) -> str:
+    """In words, how many jumps were given up and why."""
+    lost = [
+        why
+        for jumps in SCHEDULES
+        for row in rows_of(rows, "rivals", f"{jumps} jumps", last)
+        for why in row["lost"]
+    ]
+    runs = sum(len(rows_of(rows, "rivals", f"{jumps} jumps", last)) for jumps in SCHEDULES)
+    lifts = sum("lifts the bed" in why for why in lost)
+    relaxed = sum(why.startswith("relaxation") for why in lost)
+    return (
+        f"in {runs} runs {len(lost)} attempts failed, {lifts} for a law that lifts the bed, "
+        f"{relaxed} for a relaxation that did not converge, {len(lost) - lifts - relaxed} else"
+    )
 
 
 BUDGET: tuple[tuple[str, Callable[[Row], float], float, int], ...] = (
@@ -231,6 +239,7 @@ def page(rows: Sequence[Row], last: int = LAST) -> str:
         "METHODS": table_methods(rows, last),
         "REFUSED": table_refused(rows, last),
         "NULL": table_null(rows, last),
+        "LOST": jumps_lost(rows, last),
         "VERDICT": verdict(rows, last),
         "BUDGET": table_budget(rows),
         "MINUTES": f"{sum(r['cpu_s'] for r in rows if r['part'] in ('rivals', 'budget')) / 60:.0f}",

@@ -168,18 +168,37 @@ def cost(rows: Sequence[Row]) -> float:
 # --- the null hypothesis ---------------------------------------------------------------------
 
 
-def nearer(rows: Sequence[Row], moved: str, still: str, last: int) -> FloatArray:
-    """By how much moving is nearer to the reference than not moving, of each packing.
+@dataclass(frozen=True)
+class Beside:
+    """Moving beside not moving, a value for each packing that both finished, over the reference's
+    mean of all packings."""
 
-    |error of ``still``| less |error of ``moved``|, over the reference's mean.
-    """
-    one, other = (judged(rows, method, last, "settlement") for method in (moved, still))
-    if one is None or other is None:
-        return np.empty(0)
-    both = sorted(set(one.seeds) & set(other.seeds))
-    return np.array(
-        [abs(other.error[other.seeds.index(s)]) - abs(one.error[one.seeds.index(s)]) for s in both]
+    moved: FloatArray
+    """Error of the settlement."""
+    still: FloatArray
+
+    @property
+    def difference(self) -> FloatArray:
+        """What moving adds to the settlement."""
+        return self.moved - self.still
+
+    @property
+    def nearer(self) -> FloatArray:
+        """By how much moving is nearer to the reference: difference of the errors' sizes."""
+        return np.abs(self.still) - np.abs(self.moved)
+
+
+def beside(rows: Sequence[Row], jumps: int, last: int) -> Beside | None:
+    """The same number of jumps, moved and not; None where no packing has both."""
+    names = f"{jumps} jumps", f"{jumps} jumps, nothing moved"
+    found = [judged(rows, name, last, "settlement") for name in names]
+    one, other = (
+        {} if each is None else dict(zip(each.seeds, each.error, strict=True)) for each in found
     )
+    both = sorted(one.keys() & other.keys())
+    if not both:
+        return None
+    return Beside(np.array([one[s] for s in both]), np.array([other[s] for s in both]))
 
 
 # --- the budget ------------------------------------------------------------------------------

@@ -25,11 +25,11 @@ from validation.settlement_rivals import (
 from validation.settlement_rivals_budget import EVERY, PLACE, TWIN
 from validation.settlement_rivals_reading import (
     FIGURES,
+    beside,
     chaos,
     effect,
     judged,
     law_alone,
-    nearer,
     profile_chaos,
     profile_error,
 )
@@ -160,10 +160,13 @@ def test_band_of_profiles_is_that_of_a_third_run() -> None:
 def test_nearer_is_told_from_sizes_of_errors() -> None:
     """Moving that is off by 0.1 to the other side is nearer than nothing moved, off by 0.3."""
     rows = [made_up("reference", EVERY, s, m, 1.0) for s in (1, 2) for m in (0, 1)]
-    rows += [made_up("rivals", "moved", s, 0, 1.1) for s in (1, 2)]
-    rows += [made_up("rivals", "still", 2, 0, 0.7)]
-    assert nearer(rows, "moved", "still", LAST) == pytest.approx([0.2])
-    assert not len(nearer(rows, "moved", "unknown", LAST))
+    rows += [made_up("rivals", "5 jumps", s, 0, 1.1) for s in (1, 2)]
+    assert beside(rows, 5, LAST) is None
+    rows += [made_up("rivals", "5 jumps, nothing moved", 2, 0, 0.7)]
+    found = beside(rows, 5, LAST)
+    assert found is not None
+    assert found.difference == pytest.approx([0.4])
+    assert found.nearer == pytest.approx([0.2])
 
 
 def test_fewer_grains_are_scaled_to_the_bed() -> None:
