@@ -193,7 +193,8 @@ def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, fol
     try:
         scene = method.kind(last).scene(seed)
     except SceneError as error:
-        return {"refused": " ".join(str(error).split()), "computed": 0, "cpu_s": 0.0}
+        why = error.what.splitlines()[-1].rpartition(".toml:")[2].partition(": ")[2]
+        return {"refused": why, "computed": 0, "cpu_s": 0.0}
     lines = {} if method.heavier == 1 else masses_scaled(scene, method.heavier)
     run = run_in(folder, scene, method.variant, lines)
     if not method.own_rain:
@@ -204,7 +205,7 @@ def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, fol
     except TrackbedError as error:
         if getattr(error, "from_outside", False):
             raise
-        refused = str(error).splitlines()[0]
+        refused = error.what.splitlines()[0]
     row = {"refused": refused, "steps_per_cycle": scene.steps_per_cycle} | reached(run)
     return row | {"engine": run.engine.version()}
 

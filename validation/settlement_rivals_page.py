@@ -107,10 +107,8 @@ def table_refused(rows: Sequence[Row], last: int) -> str:
 
 
 def said(refused: str) -> str:
-    """The reason without its numbers, which differ from packing to packing, and without paths."""
-    why = refused.partition("problem ")[2] or refused
-    words = [word for word in why.split() if "/" not in word or word == "radius/"]
-    return " ".join(words).partition(" is 0.")[0].partition(" -> ")[0]
+    """The reason without its figures, which differ from packing to packing."""
+    return refused.partition(" is 0.")[0].partition("; Hertz")[0]
 
 
 def table_null(rows: Sequence[Row], last: int) -> str:

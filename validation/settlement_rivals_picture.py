@@ -25,6 +25,8 @@ COLOURS = {
     "fewer grains": "#999999", "h = 0": "#999999",
 }  # fmt: skip
 """One a family."""
+TICKS = (2, 5, 10, 20, 50, 100)
+"""Of CPU time [s]."""
 PANELS = ("settlement", "coordination", "deflection")
 
 
@@ -47,7 +49,7 @@ def draw(rows: Sequence[Row], last: int, target: Path) -> None:
                 point(axis, rows, name, family, last, 100 * found.mean, half)
         axis.set_ylabel(f"error of the {FIGURES[key].words} [%]")
     axis = axes.flat[3]
-    axis.axhspan(0, 100 * profile_chaos(rows, last), color="0.88")
+    axis.axhline(100 * profile_chaos(rows, last), color="0.5", ls="--", lw=0.8)
     for name, family in shown():
         errors = profile_error(rows, name, last)
         if len(errors):
@@ -56,6 +58,8 @@ def draw(rows: Sequence[Row], last: int, target: Path) -> None:
     for axis in axes.flat:
         axis.axvline(cost(reference(rows, last)), color="0.5", lw=0.8, ls=":")
         axis.set(xscale="log", xlabel=f"CPU s to cycle {last} (dotted: every cycle)")
+        axis.set_xticks(TICKS, map(str, TICKS))
+        axis.minorticks_off()
     figure.savefig(target, dpi=80)
     plt.close(figure)
 
