@@ -154,24 +154,16 @@ def relax(
     started = time.process_time()
     position = np.ascontiguousarray(position, float)
     radius = np.ascontiguousarray(before.radius, float)
-    bed_check(position, radius)
     after = walls if walls_after is None else walls_after
-    if wall_names(after) != wall_names(walls):
-        raise UsageError(
-            f"the walls before, {wall_names(walls)}, are not those after, {wall_names(after)}",
-            remedy="the same walls belong to both; a piston may only move",
-        )
-    if method not in METHODS:
-        raise UsageError(f"there is no relaxation '{method}'", remedy=f"choose of {METHODS}")
-    if not (len(radius) and gravity > 0 and tolerance > 0):
-        raise UsageError("a relaxation wants grains, gravity above 0 and a tolerance above 0")
+    bed_check(position, radius)
+    _refuse_bad_input(walls, after, method, len(radius), gravity, tolerance)
     behind = behind_discs(before.position, walls)
     scene_before = Surroundings(radius, walls, behind, stiffness)
     scene = Surroundings(radius, after, behind, stiffness)
     carried = scene_before.search(before.position, 0.0)
-    weight = gravity * before.mass
+    mean_weight = gravity * float(before.mass.mean())
     if method == "smallest-move":
-        scale = _overlap_scale(scene, carried, overlap_cap, float(weight.mean()))
+        scale = _overlap_scale(scene, carried, overlap_cap, mean_weight)
         relaxed, converged, evaluations = _relax_by_move(
             scene_before,
             scene,
@@ -188,15 +180,15 @@ def relax(
         if method == "proximal":
             proximal = PROXIMAL_STIFFNESS
         else:
-            force[:, 2] = -weight
+            force[:, 2] = -gravity * before.mass
             force += 0.0 if external_force is None else external_force
             held = _frontier(carried, len(radius), frontier)
         energy = Energy(
             radius, force, position, proximal, scene.rows, scene.search, scene.row_stiffness
         )
-        length = float(overlap_under_force(weight.mean(), stiffness.grain, radius.mean() / 2))
+        length = float(overlap_under_force(mean_weight, stiffness.grain, radius.mean() / 2))
         relaxed, converged, evaluations = energy_minimise(
-            energy, position, ~held, length, tolerance * float(weight.mean()), evaluations_max
+            energy, position, ~held, length, tolerance * mean_weight, evaluations_max
         )
     touching = scene.search(relaxed, 0.0)
     move = np.linalg.norm(relaxed - position, axis=1)
@@ -224,6 +216,21 @@ def relax(
         error.best = result
         raise error
     return result
+
+
+def _refuse_bad_input(
+    walls: Walls, after: Walls, method: str, grains: int, gravity: float, tolerance: float
+) -> None:
+    """Raise `UsageError` for what `relax` can do nothing with."""
+    if wall_names(after) != wall_names(walls):
+        raise UsageError(
+            f"the walls before, {wall_names(walls)}, are not those after, {wall_names(after)}",
+            remedy="the same walls belong to both; a piston may only move",
+        )
+    if method not in METHODS:
+        raise UsageError(f"there is no relaxation '{method}'", remedy=f"choose of {METHODS}")
+    if not (grains and gravity > 0 and tolerance > 0):
+        raise UsageError("a relaxation wants grains, gravity above 0 and a tolerance above 0")
 
 
 def relax_bare(

@@ -190,9 +190,11 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
     folder = run.folder.path / name
     if run.folder.outcome(name) is None:
         folder = _begin(run, name)
-        before, target, piston_height = estimate(run, bed, h)
+        with run.clock.part("parse"):
+            window = window_load(run.folder.path / bed.window / "states.npz")
+        before, target, piston_height = estimate(run, window, bed.healing, h)
         if gain is None:
-            height = _fitted(run, bed).position[bed.healing :, :, 2]
+            height = window.position[bed.healing :, :, 2]
             checks.check_rise(run.scene, height, (target - before.position)[:, 2])
         else:
             target, piston_height = settled_by(gain, before, target, piston_height)
@@ -224,32 +226,26 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
     return Bed(bed.cycle + h, start, bed.window, bed.healing)
 
 
-def estimate(run: Run, bed: Bed, h: int) -> tuple[State, FloatArray, float]:
+def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, FloatArray, float]:
     """State before a jump, estimated positions after it (n, 3) and the piston's height, in metres.
 
-    The grains move as ``procedure.move`` says.  The piston follows the law of its own heights, so
-    that a loose grain can not lift it; it is never placed above where it is.
+    The grains move as ``procedure.move`` says, by a window without its ``healing`` first cycles.
+    The piston follows the law of its own heights, so that a loose grain can not lift it; it is
+    never placed above where it is.
     """
     procedure = run.scene.procedure
     assert procedure is not None
-    with run.clock.part("parse"):
-        window = _fitted(run, bed)
     with run.clock.part("fit"):
         law, move = law_named(procedure.law), move_named(procedure.move)
-        cycle = window.cycle[bed.healing :].astype(float)
-        position = window.position[bed.healing :]
+        cycle = window.cycle[healing:].astype(float)
+        position = window.position[healing:]
         field_ = move.displacement(cycle, position, window.radius, law, h, run.scene.container)
-        heights = window.piston_heights()[bed.healing :]
+        heights = window.piston_heights()[healing:]
         parameters = law.fit(cycle[law.first_state :], heights[law.first_state :])
         drop = float(law.increment(parameters, cycle[-1], cycle[-1] + h))
         drop = min(drop, 0.0) if h and move.moves_piston else 0.0
     before = window.state(-1)
     return before, before.position + field_, before.piston_height + drop
-
-
-def _fitted(run: Run, bed: Bed) -> Window:
-    """The window that a jump from ``bed`` is fitted to."""
-    return window_load(run.folder.path / bed.window / "states.npz")
 
 
 def settled_by(

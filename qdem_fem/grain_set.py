@@ -1,14 +1,12 @@
 """Many grains: made by seed on any number of processors, saved, loaded, meshed.
 
-python -m qdem_fem.grain_set --count 5700 --seed 1 --out grains.npz
+trackbed grains --count 5700 --seed 1 --out grains.npz
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import zipfile
-from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -82,11 +80,13 @@ def grains_make(
 
     Grain i depends on ``seed``, i and the recipe only; sizes on ``seed``, ``count`` and the
     grading: the same set for any number of ``workers`` (processes).  Raises `MeshError` for a
-    recipe that random grains do not meet, or a count below one.
+    recipe that random grains do not meet, a count below one, or a seed below zero.
     """
-    if count < 1 or workers < 1:
+    if count < 1 or workers < 1 or seed < 0:
         raise MeshError(
-            f"{count} grains on {workers} processors", where="grains_make", remedy="use 1 or more"
+            f"{count} grains of seed {seed} on {workers} processors",
+            where="grains_make",
+            remedy="use a seed of 0 or more, and 1 or more of the others",
         )
     sizes = sizes_drawn(grading, count, np.random.default_rng([seed, count]))
     make = partial(_batch_make, recipe=recipe or GrainRecipe(), seed=seed)
@@ -139,7 +139,7 @@ def grains_save(path: str | os.PathLike[str], grains: GrainSet) -> None:
 def grains_load(path: str | os.PathLike[str]) -> GrainSet:
     """Read what `grains_save` wrote, to the last digit; raises `MeshError` for another file."""
     where = f"grains {os.fspath(path)!r}"
-    remedy = "give a file that grains_save or python -m qdem_fem.grain_set wrote"
+    remedy = "give a file that grains_save or trackbed grains wrote"
     try:
         with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
             number = int(file["format"])
@@ -155,26 +155,3 @@ def grains_load(path: str | os.PathLike[str]) -> GrainSet:
             remedy=remedy,
         )
     return GrainSet(corners, nodes, faces.astype(np.int64), *shape)
-
-
-def main(words: Sequence[str] | None = None) -> None:
-    """Make a set and save it."""
-    parser = argparse.ArgumentParser(description="Makes random ballast grains, EN 13450 31.5/50 A.")
-    parser.add_argument("--count", type=int, default=5700)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--sphericity", type=float, default=GrainRecipe.sphericity)
-    parser.add_argument("--roundness", type=float, default=GrainRecipe.roundness)
-    parser.add_argument("--concavity", type=float, default=GrainRecipe.concavity)
-    parser.add_argument("--workers", type=int, default=1, help="processes")
-    parser.add_argument("--out", type=Path, required=True, help="the .npz to write")
-    given = parser.parse_args(words)
-    recipe = GrainRecipe(
-        sphericity=given.sphericity, roundness=given.roundness, concavity=given.concavity
-    )
-    grains = grains_make(given.count, given.seed, recipe, workers=given.workers)
-    grains_save(given.out, grains)
-    print(f"{given.out}: {len(grains)} grains, {grains.tetrahedra.sum()} tetrahedra")
-
-
-if __name__ == "__main__":
-    main()

@@ -6,26 +6,26 @@ an infinite beam on a Winkler foundation (Zimmermann 1888; Hetenyi, Beams on Ela
 holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat`
 names.
 
-    python -m qdem_fem.load_train --out train.csv
+    trackbed train --out train.csv
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from math import isfinite, pi
-from pathlib import Path
+from math import inf, isfinite, pi
 from typing import Any
 
 import numpy as np
 
 from qdem_fem.errors import ConditionError
-from qdem_fem.load_record import RATE, LoadRecord, load_record_write
+from qdem_fem.load_record import RATE, LoadRecord
 from qdem_fem.mesh_checks import FloatArray
 
 QUIET = 12.0
 """Distance from the sleeper, over the elastic length, within which an axle counts: e^-12."""
+LONGEST = 10_000_000
+"""Samples of a record: 17 minutes at 10 kHz."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,11 @@ class Train:
                 where="train",
                 remedy="give a whole number of cars and a share below 1",
             )
+
+    @property
+    def length(self) -> float:
+        """From the first axle to the last [m]."""
+        return (self.cars - 1) * self.car_length + self.bogie_distance + self.axle_distance
 
     @property
     def axles(self) -> FloatArray:
@@ -195,33 +200,15 @@ def train_record(
     It begins and ends with the nearest axle `QUIET` elastic lengths and half a spacing away; time
     0 is the first sample.
     """
-    if not (area > 0 and rate > 0):
+    if not (0 < area < inf and 0 < rate < inf):
         raise ConditionError(f"area {area} m^2, rate {rate} Hz", where="train",
                              remedy="give numbers above zero")  # fmt: skip
     lead = (QUIET * track.elastic_length + track.spacing / 2) / train.speed
-    last = 2 * lead + train.axles[-1] / train.speed
+    last = 2 * lead + train.length / train.speed
+    if not last * rate < LONGEST:
+        raise ConditionError(
+            f"the train takes {last:.3g} s to pass, {last * rate:.3g} samples", where="train",
+            remedy=f"give more speed or fewer cars: at most {LONGEST} samples",
+        )  # fmt: skip
     time = np.arange(int(np.ceil(last * rate)) + 1) / rate
     return LoadRecord(time, seat_forces(time - lead, train, track, flats) / area)
-
-
-def main(words: Sequence[str] | None = None) -> None:
-    """Write the record of a train as a CSV file."""
-    parser = argparse.ArgumentParser(description="Writes the made-up record of a passing train.")
-    parser.add_argument("--cars", type=int, default=Train.cars)
-    parser.add_argument("--speed", type=float, default=Train.speed, help="m/s")
-    parser.add_argument("--axle-load", type=float, default=Train.axle_load, help="N")
-    parser.add_argument("--first-share", type=float, default=Train.first_share,
-                        help="of an axle load on rail seat 1")  # fmt: skip
-    parser.add_argument("--modulus", type=float, default=Track.modulus, help="N/m^2")
-    parser.add_argument("--area", type=float, default=0.13 * 0.17, help="of a rail seat, m^2")
-    parser.add_argument("--out", type=Path, required=True, help="the .csv to write")
-    given = parser.parse_args(words)
-    train = Train(cars=given.cars, speed=given.speed, axle_load=given.axle_load,
-                  first_share=given.first_share)  # fmt: skip
-    record = train_record(train, Track(modulus=given.modulus), given.area)
-    load_record_write(given.out, record)
-    print(f"{given.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
-
-
-if __name__ == "__main__":
-    main()

@@ -175,6 +175,53 @@ def settle_values(
 
 
 @njit(cache=True)
+def driven_change(geometry: Geometry, contact: int, what: int, sense: float, df: Floats) -> None:
+    """Add the driven force itself to the changes ``df``: f_N with its friction, or f_T (step 2)."""
+    n, t = geometry.normal[contact], geometry.tangent[contact]
+    if what == NORMAL:
+        df[n] = 1.0
+        if t >= 0:
+            df[t] = geometry.mu[contact] * geometry.slip[contact]
+    elif what == TANGENTIAL:
+        df[t] = sense
+
+
+@njit(cache=True)
+def driven_end(
+    geometry: Geometry, contact: int, what: int, sense: float, ahead: float, left: float,
+    f: Floats, a: Floats, df: Floats, da: Floats,
+) -> tuple[float, int]:  # fmt: skip
+    """Step after which the driven contact is consistent, and the list it is on then (step 2).
+
+    A normal force until ``a_N = 0``, a tangential one until it sticks or slides, an offset until
+    nothing is ``left`` of its share.
+    """
+    n, t, mu = geometry.normal[contact], geometry.tangent[contact], geometry.mu[contact]
+    if what == NORMAL:
+        return reach_zero(-a[n], -da[n], ahead), NEW
+    if what == TANGENTIAL:
+        still = reach_zero(-sense * a[t], -sense * da[t], ahead)
+        slides = reach_zero(mu * f[n] - sense * f[t], mu * df[n] - sense * df[t], ahead)
+        if still < slides:
+            return still, STATIC
+        return slides, SLIDING_UP if sense > 0.0 else SLIDING_DOWN
+    return (left if ahead > 0.0 else np.inf), NEW
+
+
+@njit(cache=True)
+def lists_repeat(seen: Ints, repeats: int, signature: int) -> bool:
+    """Whether the lists, by their ``signature``, were the same before; it is noted in ``seen``.
+
+    ``repeats``: events at this place, of which ``seen`` keeps the last.
+    """
+    for k in range(min(repeats, len(seen))):
+        if seen[k] == signature:
+            return True
+    seen[repeats % len(seen)] = signature
+    return False
+
+
+@njit(cache=True)
 def drive(
     geometry: Geometry, reduced: Reduced, b: Floats, f: Floats, a: Floats, rate: Floats,
     what: int, contact: int, goal: float, reversal: bool, limit: int, codes: Ints, trace: Floats,
@@ -188,36 +235,20 @@ def drive(
     numbers, one for a contact in a list; ``trace`` (m, 7) takes driven contact, what, contact,
     from, to, step and s of each event while it has room; ``count`` (1,) counts events.
     """
-    n, t = geometry.normal[contact], geometry.tangent[contact]
     df, da = np.zeros(len(f)), np.zeros(len(f))
     seen = np.zeros(256, dtype=np.int64)
     signature, repeats, travelled, ahead, scale = 0, 0, 0.0, 1.0, 0.0
-    who, event, to = -1, NO_EVENT, NEW
-    sense = 1.0 if what != TANGENTIAL or a[t] < 0.0 else -1.0
-    share = geometry.mu[contact] * geometry.slip[contact]
-    sign, since_refresh = 0.0, 0
-    for _ in range(limit):
+    who, event, to, sign = -1, NO_EVENT, NEW, 0.0
+    sense = 1.0 if what != TANGENTIAL or a[geometry.tangent[contact]] < 0.0 else -1.0
+    for turn in range(1, limit + 1):
         force_change(geometry, reduced, rate, df, da)
-        if what == NORMAL:
-            df[n] = 1.0
-            if t >= 0:
-                df[t] = share
-        elif what == TANGENTIAL:
-            df[t] = sense
+        driven_change(geometry, contact, what, sense, df)
         if reversal and event != NO_EVENT:
             ahead = 1.0 if entering_rate(geometry, df, da, who, event, sign) >= 0.0 else -1.0
         step, who, event, to = first_event(geometry, reduced, f, a, df, da, ahead)
-        done = np.inf
-        if what == NORMAL:
-            done = reach_zero(-a[n], -da[n], ahead)
-        elif what == TANGENTIAL:
-            mu = geometry.mu[contact]
-            still = reach_zero(-sense * a[t], -sense * da[t], ahead)
-            slides = reach_zero(mu * f[n] - sense * f[t], mu * df[n] - sense * df[t], ahead)
-            done = min(still, slides)
-            to_end = STATIC if still < slides else (SLIDING_UP if sense > 0.0 else SLIDING_DOWN)
-        elif ahead > 0.0:
-            done = goal - travelled
+        done, end = driven_end(
+            geometry, contact, what, sense, ahead, goal - travelled, f, a, df, da
+        )  # fmt: skip
         back = travelled if ahead < 0.0 and what != OFFSET else np.inf
         if done == np.inf and step == np.inf and back == np.inf:
             return RAY, contact
@@ -229,13 +260,13 @@ def drive(
         a += (ahead * step) * da
         if what == OFFSET:
             b += (ahead * step) * rate
-        if last and back < done:
-            return RETURNED, contact
         if last:
+            if back < done:
+                return RETURNED, contact
             if what == NORMAL:
-                a[n] = 0.0
+                a[geometry.normal[contact]] = 0.0
             elif what == TANGENTIAL:
-                return (DONE if move_contact(geometry, reduced, contact, to_end) else SINGULAR), 0
+                return (DONE if move_contact(geometry, reduced, contact, end) else SINGULAR), 0
             return DONE, contact
         if count[0] < len(trace):
             row = trace[count[0]]
@@ -244,22 +275,16 @@ def drive(
         count[0] += 1
         signature ^= codes[who, reduced.kind[who]] ^ codes[who, to]
         scale = max(scale, abs(travelled))
-        if step > 1e-14 * scale:
-            repeats = 0
-        for k in range(min(repeats, len(seen))):
-            if seen[k] == signature:
-                return CYCLED, who
-        seen[repeats % len(seen)] = signature
+        repeats = 0 if step > 1e-14 * scale else repeats
+        if lists_repeat(seen, repeats, signature):
+            return CYCLED, who
         repeats += 1
         sign = slide_sign(to) if event == SLIDES else slide_sign(reduced.kind[who])
         if not move_contact(geometry, reduced, who, to):
             return SINGULAR, who
         snap_event(geometry, f, a, who, event, to)
-        since_refresh += 1
-        if since_refresh == REFRESH:
-            since_refresh = 0
-            if not reduced_refresh(geometry, reduced):
-                return SINGULAR, who
+        if turn % REFRESH == 0 and not reduced_refresh(geometry, reduced):
+            return SINGULAR, who
     return TOO_MANY, contact
 
 

@@ -18,6 +18,7 @@ the order in time; no time passes between them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,67 +37,110 @@ ROUND_OFF = 1e-12
 """Velocities this small against the largest are no approach."""
 
 
-def bouncing(
-    restitution: Floats, gap: Floats, before: Floats, free: Floats, slow: float, h: float
-) -> Flags:
-    """Contacts (nc,) that close within the step and approach faster than ``slow`` [m/s].
+@dataclass(frozen=True)
+class Closing:
+    """Contacts of a time step as its contact law sees them."""
 
-    ``gap`` [m] at the midpoint; ``before`` and ``free`` [m/s]: normal velocities at the start of
-    the step, and at its end without impulses.
-    """
-    found: Flags = (gap + 0.5 * h * free <= 0) & (before < -slow) & (restitution > 0)
+    restitution: Floats
+    """e, (nc,) [-]."""
+    friction: Floats
+    """mu, (nc,) [-]."""
+    gap: Floats
+    """At the midpoint, (nc,) [m]."""
+    before: Floats
+    """Normal velocities at the start of the step, (nc,) [m/s]."""
+    offset: Floats
+    """Relative velocities at its end without impulses, (nc, dim) [m/s]."""
+    turning: Floats
+    """What the turning of the bodies adds to ``u_N`` from the midpoint to the end, and takes from
+    ``before``, (nc,) [m/s]."""
+    slow: float
+    """What gravity gives in a step [m/s]: an approach as slow can not be told from rest."""
+    h: float
+    """Length of the step [s]."""
+    touching: float
+    """A gap this small is none [m]."""
+
+
+@dataclass(frozen=True)
+class Impulses:
+    """Impulses of all contacts of a step, and how well they were found."""
+
+    impulse: Floats
+    """p, (nc, dim) [N s]."""
+    velocity: Floats
+    """u at the end of the step, (nc, dim) [m/s]."""
+    error: float
+    """Scale-free residual, the greatest of all rounds [-]."""
+    message: str
+    """What the solver has to say of it."""
+
+
+def bouncing(closing: Closing) -> Flags:
+    """Contacts (nc,) that close within the step and approach faster than ``slow``."""
+    c = closing
+    closes = c.gap + 0.5 * c.h * c.offset[:, 0] <= 0
+    found: Flags = closes & (c.before < -c.slow) & (c.restitution > 0)
     return found
 
 
-def hit_by_others(
-    restitution: Floats, apart: Flags, push: Floats, after: Floats, diagonal: Floats, slow: float
-) -> Flags:
-    """Contacts (nc,) that other impulses closed faster than ``slow`` [m/s].
+def contact_shift(closing: Closing, bounce: Flags, turning: Floats | float = 0.0) -> Floats:
+    """What is added to u (nc, dim) so that ``u_N`` may not be negative [m/s].
 
-    ``apart``: those that are open and do not bounce; ``push`` [N s]: their own normal impulse;
-    ``after`` [m/s]: normal velocities with it, at the start of the step by the turning of the
-    bodies; ``diagonal`` of W [1/kg]: without its own impulse it would be ``u_N - W_NN p_N``.
+    ``e u_N-`` where contacts ``bounce``, else ``2 g / h``: an open one may close, not more.
+    ``turning``: inertial part of ``u_N+`` that is left out where it would ask bodies to part that
+    come to rest within the step.
     """
-    found: Flags = apart & (restitution > 0) & (push > 0) & (after - diagonal * push < -slow)
-    return found
+    c = closing
+    shift = np.zeros_like(c.offset)
+    may_close = np.maximum(np.maximum(c.gap, 0.0) * 2 / c.h, -turning)
+    shift[:, 0] = np.where(bounce, c.restitution * c.before, may_close)
+    return shift
 
 
-def impulses_in_turn(
-    bodies: BodySpace, solve: Solve, friction: Floats, restitution: Floats, gap: Floats,
-    before: Floats, offset: Floats, turning: Floats, slow: float, h: float, touching: float,
-) -> tuple[Floats, Floats, float, str]:  # fmt: skip
-    """Impulses (nc, dim) [N s] of all rounds, velocities (nc, dim) after them, the greatest error
-    and what its solution has to say.
+def hit_by_others(closing: Closing, bounce: Flags, found: Impulses, diagonal: Floats) -> Flags:
+    """Contacts (nc,) that are open, do not ``bounce``, and were closed by the impulses of those
+    that do, faster than ``slow``.
 
-    ``offset`` (nc, dim) [m/s]: relative velocities without impulses, ``turning`` (nc,) what the
-    turning of the bodies adds to their normal parts from the midpoint to the end, and takes from
-    ``before``; a gap of ``touching`` [m] or less is none; the rest as in `bouncing`.  At
-    restitution 1 the velocities at the midpoint, on which an impulse works, are then opposite
+    ``diagonal`` W_NN of W [1/kg]: without its own impulse a contact's velocity would be
+    ``u_N - W_NN p_N``, taken at the start of the step by the turning of the bodies.
+    """
+    c = closing
+    if not bounce.any():
+        return bounce
+    apart = ~bounce & ((c.gap > c.touching) | (c.before > c.slow)) & (c.restitution > 0)
+    push = found.impulse[:, 0]
+    alone = found.velocity[:, 0] - 2.0 * c.turning - diagonal * push
+    hit: Flags = apart & (push > 0) & (alone < -c.slow)
+    return hit
+
+
+def impulses_in_turn(bodies: BodySpace, closing: Closing, solve: Solve) -> Impulses:
+    """Impulses of all rounds.
+
+    At restitution 1 the velocities at the midpoint, on which an impulse works, are then opposite
     before and after it, and its work is none.
     """
-    velocity, gap = offset.copy(), gap.copy()
-    impulse = np.zeros_like(offset)
-    slow = max(slow, ROUND_OFF * float(np.abs(offset).max(initial=0.0)))
-    approach, worst, message = before, 0.0, ""
+    least = ROUND_OFF * float(np.abs(closing.offset).max(initial=0.0))
+    now = replace(closing, slow=max(closing.slow, least))
+    impulse = np.zeros_like(now.offset)
+    worst, message = 0.0, ""
     for turn in range(ROUNDS + 1):
-        bounce = bouncing(restitution, gap, approach, velocity[:, 0], slow, h)
+        bounce = bouncing(now)
         last = turn > 0 and (turn == ROUNDS or not bounce.any())
         bounce &= not last
-        resting = ((gap <= touching) | (restitution == 0.0)) & (velocity[:, 0] <= 0.0)
+        resting = ((now.gap <= now.touching) | (now.restitution == 0.0)) & (now.offset[:, 0] <= 0.0)
         taking = np.flatnonzero(bounce | resting | last)
-        shift = np.zeros_like(offset)
-        shift[:, 0] = np.where(bounce, restitution * approach, np.maximum(gap, 0.0) * 2 / h)
-        solution, error = solve(
-            bodies.of_contacts(taking), (velocity + shift)[taking], friction[taking]
-        )
-        push = np.zeros_like(offset)
-        push[taking] = solution.r.reshape(-1, offset.shape[1])
+        offset = (now.offset + contact_shift(now, bounce))[taking]
+        solution, error = solve(bodies.of_contacts(taking), offset, now.friction[taking])
+        push = np.zeros_like(impulse)
+        push[taking] = solution.r.reshape(-1, impulse.shape[1])
         impulse += push
-        velocity = velocity + bodies.product(push.ravel()).reshape(offset.shape)
+        velocity = now.offset + bodies.product(push.ravel()).reshape(impulse.shape)
         if error >= worst:
             worst, message = error, solution.message
         if last:
             break
-        gap[bounce] = np.minimum(gap[bounce], 0.0)  # it has closed
-        approach = velocity[:, 0] - 2.0 * turning
-    return impulse, velocity, worst, message
+        closed = np.where(bounce, np.minimum(now.gap, 0.0), now.gap)
+        now = replace(now, gap=closed, offset=velocity, before=velocity[:, 0] - 2.0 * now.turning)
+    return Impulses(impulse, velocity, worst, message)

@@ -25,7 +25,9 @@ is of first order in h where contacts open and close, of second order in between
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +38,14 @@ from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction_problem import BodySpace, FrictionSolution
 from rigid_lcp.motion import Motion, motion_with_rates
 from rigid_lcp.overlap_removal import OVERLAP, bodies_parted
-from rigid_lcp.passed_collisions import bouncing, hit_by_others, impulses_in_turn
+from rigid_lcp.passed_collisions import (
+    Closing,
+    Impulses,
+    bouncing,
+    contact_shift,
+    hit_by_others,
+    impulses_in_turn,
+)
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
 
@@ -83,55 +92,58 @@ def moreau_step(
     if len(contacts) == 0:
         end = bodies_parted(world, motion, world.drifted(free, 0.5 * h), pull, h)
         return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
-    inverse_mass = world.inverse_mass(middle)
-    bodies = body_space(contacts, middle.position, world.columns, inverse_mass)
-    turning = 0.5 * h * inertial_acceleration(planes_at_corners(contacts), middle)
-    if motion.dim == 3:  # spins change also while no force acts
-        coasting = motion_with_rates(middle, world.coasting(middle))
-        turning += 0.5 * h * relative_velocity(contacts, coasting)
-    before = relative_velocity(contacts, middle)[:, 0] - turning[:, 0]
-    offset = relative_velocity(contacts, free) + turning
-    gap = contacts.gap - 0.25 * h * turning[:, 0]
-    slow = float(np.linalg.norm(world.scene.gravity)) * h
-    shift = np.zeros_like(offset)
-    shift[:, 0] = contact_shift(contacts.restitution, gap, before, offset[:, 0], slow, h)
-    start = known_impulses(contacts, known, h)
-    solution = impulses_found(bodies, offset + shift, contacts.friction, start, tolerance, accept)
-    error = forces_error(bodies, solution, slow, offset + shift)
-    if error > START_AGAIN:  # jammed bodies may have no forces that part them as they turned
-        shift[:, 0] = contact_shift(
-            contacts.restitution, gap, before, offset[:, 0], slow, h, turning[:, 0]
-        )
-        solution = impulses_found(
-            bodies, offset + shift, contacts.friction, None, tolerance, accept
-        )  # fmt: skip
-        error = forces_error(bodies, solution, slow, offset + shift)
-    impulse = solution.r.reshape(-1, motion.dim)
-    after = solution.u.reshape(-1, motion.dim) - shift
-    message = solution.message
-    bounce = bouncing(contacts.restitution, gap, before, offset[:, 0], slow, h)
-    if bounce.any():
-        touching = OVERLAP * world.length
-        apart = ~bounce & ((gap > touching) | (before > slow))
-        waiting = hit_by_others(
-            contacts.restitution, apart, impulse[:, 0], after[:, 0] - 2.0 * turning[:, 0],
-            bodies.diagonal[:: motion.dim], slow,
-        )  # fmt: skip
-        if waiting.any():
-
-            def solve(part: BodySpace, q: Floats, mu: Floats) -> tuple[FrictionSolution, float]:
-                found = impulses_found(part, q, mu, None, tolerance, accept)
-                return found, forces_error(part, found, slow, q)
-
-            impulse, after, error, message = impulses_in_turn(
-                bodies, solve, contacts.friction, contacts.restitution, gap, before, offset,
-                turning[:, 0], slow, h, touching,
-            )  # fmt: skip
+    bodies = body_space(contacts, middle.position, world.columns, world.inverse_mass(middle))
+    closing = closing_contacts(world, contacts, middle, free, h)
+    solve = partial(impulses_judged, slow=closing.slow, tolerance=tolerance, accept=accept)
+    found = impulses_at_once(bodies, closing, solve, known_impulses(contacts, known, h))
+    if hit_by_others(closing, bouncing(closing), found, bodies.diagonal[:: motion.dim]).any():
+        found = impulses_in_turn(bodies, closing, solve)
     rates = free.rates
-    rates[world.movable] += _velocities(bodies, impulse, world.size)
+    rates[world.movable] += _velocities(bodies, found.impulse, world.size)
     end = world.drifted(motion_with_rates(middle, rates), 0.5 * h)
     end = bodies_parted(world, motion, end, pull, h)
-    return Step(end, contact_forces(contacts, impulse, after, h), error, message)
+    forces = contact_forces(contacts, found.impulse, found.velocity, h)
+    return Step(end, forces, found.error, found.message)
+
+
+def closing_contacts(
+    world: World, contacts: Contacts, middle: Motion, free: Motion, h: float
+) -> Closing:
+    """Gaps and relative velocities that the law of a step asks for (eq. 24).
+
+    ``middle``: the bodies at the midpoint with the rates of the start, ``free`` with those that
+    they would have at the end without impulses.
+    """
+    turning = 0.5 * h * inertial_acceleration(planes_at_corners(contacts), middle)
+    if middle.dim == 3:  # spins change also while no force acts
+        coasting = motion_with_rates(middle, world.coasting(middle))
+        turning += 0.5 * h * relative_velocity(contacts, coasting)
+    return Closing(
+        restitution=contacts.restitution,
+        friction=contacts.friction,
+        gap=contacts.gap - 0.25 * h * turning[:, 0],
+        before=relative_velocity(contacts, middle)[:, 0] - turning[:, 0],
+        offset=relative_velocity(contacts, free) + turning,
+        turning=turning[:, 0],
+        slow=float(np.linalg.norm(world.scene.gravity)) * h,
+        h=h,
+        touching=OVERLAP * world.length,
+    )
+
+
+def impulses_at_once(
+    bodies: BodySpace, closing: Closing, solve: Callable[..., tuple[FrictionSolution, float]],
+    start: Floats | None,
+) -> Impulses:  # fmt: skip
+    """Impulses that answer to all contacts together (eq. 27), looked for from ``start``."""
+    bounce = bouncing(closing)
+    shift = contact_shift(closing, bounce)
+    solution, error = solve(bodies, closing.offset + shift, closing.friction, start)
+    if error > START_AGAIN:  # jammed bodies may have no forces that part them as they turned
+        shift = contact_shift(closing, bounce, closing.turning)
+        solution, error = solve(bodies, closing.offset + shift, closing.friction)
+    velocity = solution.u.reshape(shift.shape) - shift
+    return Impulses(solution.r.reshape(shift.shape), velocity, error, solution.message)
 
 
 def planes_at_corners(contacts: Contacts) -> Contacts:
@@ -157,6 +169,15 @@ def impulses_found(
         bodies, offset.ravel(), friction, dim=offset.shape[1], start=start, tolerance=tolerance,
         accept=accept,
     )  # fmt: skip
+
+
+def impulses_judged(
+    bodies: BodySpace, offset: Floats, friction: Floats, start: Floats | None = None, *,
+    slow: float, tolerance: float, accept: float,
+) -> tuple[FrictionSolution, float]:  # fmt: skip
+    """Impulses and their `forces_error`, ``slow`` the velocity that gravity gives in a step."""
+    found = impulses_found(bodies, offset, friction, start, tolerance, accept)
+    return found, forces_error(bodies, found, slow, offset)
 
 
 def forces_error(
@@ -191,24 +212,6 @@ def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float)
     speed = np.linalg.norm(rates[:, :dim], axis=1)
     return h * (speed + np.linalg.norm(rates[:, dim:], axis=1) * world.reach) + (
         OVERLAP * world.length
-    )
-
-
-def contact_shift(
-    restitution: Floats, gap: Floats, before: Floats, free: Floats, slow: float, h: float,
-    turning: Floats | float = 0.0,
-) -> Floats:  # fmt: skip
-    """What is added to ``u_N+`` so that it may not be negative, (nc,) [m/s].
-
-    ``gap`` at the midpoint; ``before`` and ``free``: normal velocities at the start of the step,
-    and at its end without impulses.  Restitution acts on contacts that close within the step and
-    approach faster than ``slow``, the velocity that gravity gives in a step: what is slower can
-    not be told from rest.  ``turning``: inertial part of ``u_N+`` that is left out where it would
-    ask bodies to part that come to rest within the step.
-    """
-    bounce = bouncing(restitution, gap, before, free, slow, h)
-    return np.where(
-        bounce, restitution * before, np.maximum(np.maximum(gap, 0.0) * 2 / h, -turning)
     )
 
 

@@ -249,7 +249,8 @@ def liggghts_told(runs: Rows) -> str:
             spread += f", {100 * np.std(errors, ddof=1):.1f} % its scatter, "
             spread += f"{100 * np.mean(np.abs(errors)):.1f} % without signs"
         said.append(f"{way}: {cycles:.0f} cycles computed{spread} ({len(these)} seeds)")
-    wanted = {(way.name, seed) for way in jump_runs.WAYS for seed in range(1, jump_runs.SEEDS + 1)}
+    seeds = range(1, jump_runs.STUDY.seeds + 1)
+    wanted = {(way.name, seed) for way in jump_runs.STUDY.ways for seed in seeds}
     missing = sorted(wanted - {(run["way"], run["seed"]) for run in runs})
     text = ". ".join(said) + "." if said else ""
     if missing:
@@ -276,8 +277,8 @@ def page(rows: Rows, runs: Rows) -> str:
         "measured": measured_table(rows),
         "liggghts": liggghts_table(runs),
         "liggghts_told": liggghts_told(runs),
-        "liggghts_k_i": str(jump_runs.K_I),
-        "liggghts_last": str(jump_runs.LAST),
+        "liggghts_k_i": str(jump_runs.STUDY.k_i),
+        "liggghts_last": str(jump_runs.STUDY.last),
         "add_up": (
             f"at 0.02 the worst run on curves ended {100 * worst['error']:+.0f} % off "
             f"({worst['law']}, bursts of {worst['bursts']:g}, {worst['jumps']} jumps)."

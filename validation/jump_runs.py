@@ -27,9 +27,7 @@ from adapters.stages import Variant
 from scenes import scene_path
 from validation.settlement_ensemble import COARSE
 
-RECORD = Path(__file__).with_name("results") / "jump-control-liggghts.jsonl"
-K_I, LAST = 50, 300
-SEEDS = 5
+RESULTS = Path(__file__).with_name("results")
 
 
 @dataclass(frozen=True)
@@ -41,41 +39,64 @@ class Way:
     variant: Variant = field(default_factory=Variant)
 
 
-WAYS = (
-    Way("full", ("procedure.tolerance=0.1",), CONTROL),
-    Way("tolerance 0.1", ("procedure.tolerance=0.1",)),
-    Way("fixed h 20", ("procedure.k=20", "procedure.h=20")),
-    Way("tolerance 0.05", ("procedure.tolerance=0.05",)),
+@dataclass(frozen=True)
+class Study:
+    """Ways to the last cycle of a scene, run on some seeds, the full run first."""
+
+    scene_name: str
+    settings: tuple[str, ...]
+    k_i: int
+    shared: int
+    """Cycle up to which every way does what the full run does."""
+    last: int
+    seeds: int
+    ways: tuple[Way, ...]
+    record: Path
+
+    def scene(self, way: Way, seed: int) -> Scene:
+        """The bed of a seed, run in that way."""
+        own = (f"sample.seed={seed}", 'engine.name="liggghts"', f"procedure.k_i={self.k_i}")
+        total = (f"procedure.total_cycles={self.last}",)
+        return scene_load(
+            scene_path(self.scene_name), [*self.settings, *own, *total, *way.settings]
+        )
+
+
+STUDY = Study(
+    scene_name=COARSE.scene_name,
+    settings=COARSE.settings,
+    k_i=50,
+    shared=70,
+    last=300,
+    seeds=5,
+    ways=(
+        Way("full", ("procedure.tolerance=0.1",), CONTROL),
+        Way("tolerance 0.1", ("procedure.tolerance=0.1",)),
+        Way("fixed h 20", ("procedure.k=20", "procedure.h=20")),
+        Way("tolerance 0.05", ("procedure.tolerance=0.05",)),
+    ),
+    record=RESULTS / "jump-control-liggghts.jsonl",
 )
 
 
-def scene_of(way: Way, seed: int) -> Scene:
-    """The coarse bed of a seed, run in that way."""
-    own = (f"sample.seed={seed}", 'engine.name="liggghts"', f"procedure.k_i={K_I}")
-    total = (f"procedure.total_cycles={LAST}",)
-    return scene_load(
-        scene_path(COARSE.scene_name), [*COARSE.settings, *own, *total, *way.settings]
-    )
-
-
-def record_read(path: Path = RECORD) -> list[dict[str, Any]]:
+def record_read(path: Path = STUDY.record) -> list[dict[str, Any]]:
     """All runs of the record."""
     if not path.exists():
         return []
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
-def run(way: Way, seed: int, work: Path) -> dict[str, Any]:
+def run(study: Study, way: Way, seed: int, work: Path) -> dict[str, Any]:
     """One run to its end, in a folder of its own; the stages before the first jump are shared."""
     full = RunFolder(work / f"full-{seed}")
     home = RunFolder(work / f"{way.name.replace(' ', '-')}-{seed}")
     home.path.mkdir(parents=True, exist_ok=True)
     refused = ""
     with home.locked():
-        if way.variant.jumps:
-            home.share_start(RunFolder(full.path / CONTROL.name), K_I + 20)
+        if way.variant != CONTROL:
+            home.share_start(RunFolder(full.path / CONTROL.name), study.shared)
         try:
-            here = run_variant(home, scene_of(way, seed), way.variant, Progress(), True)
+            here = run_variant(home, study.scene(way, seed), way.variant, Progress(), True)
         except JumpRefused as error:
             here, refused = home, str(error)
     costs = [outcome.cost for outcome in here.outcomes() if outcome.stage != "preparation"]
@@ -125,20 +146,20 @@ def _last(event: dict[str, Any]) -> dict[str, Any]:
     return {key: short(value) for key, value in event.items() if key not in ("time", "event")}
 
 
-def main(words: Sequence[str] | None = None) -> None:
-    """Read the command line and go on."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+def go_on(study: Study, words: Sequence[str] | None = None) -> None:
+    """Read the command line and run what the record lacks."""
+    parser = argparse.ArgumentParser(description="Goes on where the record ends.")
     parser.add_argument("--work", type=Path, required=True, help="folder for the engine's files")
-    parser.add_argument("--only", nargs="+", choices=[way.name for way in WAYS])
-    parser.add_argument("--seeds", type=int, default=SEEDS)
-    parser.add_argument("--record", type=Path, default=RECORD)
+    parser.add_argument("--only", nargs="+", choices=[way.name for way in study.ways])
+    parser.add_argument("--seeds", type=int, default=study.seeds)
+    parser.add_argument("--record", type=Path, default=study.record)
     arguments = parser.parse_args(words)
-    for way in WAYS:
+    for way in study.ways:
         for seed in range(1, arguments.seeds + 1):
             done = {(one["way"], one["seed"]) for one in record_read(arguments.record)}
             if (arguments.only and way.name not in arguments.only) or (way.name, seed) in done:
                 continue
-            made = run(way, seed, arguments.work)
+            made = run(study, way, seed, arguments.work)
             with arguments.record.open("a", encoding="utf-8") as stream:
                 stream.write(json.dumps(made, separators=(",", ":")) + "\n")
             print(
@@ -147,4 +168,4 @@ def main(words: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    go_on(STUDY)

@@ -11,6 +11,7 @@ from typing import Any
 from adapters.engine import EngineStart
 from adapters.errors import TrackbedError
 from adapters.relaxation import Method, Relaxation, RelaxationNotConverged, relax
+from adapters.relaxation_kernel import BoolArray
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
@@ -57,8 +58,13 @@ class Relaxed:
     """Where the engine goes on, when it relaxed by itself; None: a resubmission."""
 
 
-def own(jump: Jumped, method: Method, tolerance: float = 0.01) -> Relaxation:
-    """A method of the project; what it had reached where it does not converge."""
+def own(
+    jump: Jumped, method: Method, tolerance: float = 0.01, frontier: BoolArray | None = None
+) -> Relaxation:
+    """A method of the project; what it had reached where it does not converge.
+
+    ``frontier`` (n,): grains that ``karrech2007`` holds; None: those at the walls.
+    """
     try:
         return relax(
             jump.estimate,
@@ -68,6 +74,7 @@ def own(jump: Jumped, method: Method, tolerance: float = 0.01) -> Relaxation:
             walls_after=jump.walls_after,
             method=method,
             tolerance=tolerance,
+            frontier="fixed" if frontier is None else frontier,
             evaluations_max=EVALUATIONS_MAX if method != "smallest-move" else 40_000,
         )
     except RelaxationNotConverged as error:

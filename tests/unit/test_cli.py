@@ -37,7 +37,9 @@ def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str])
     assert stop.value.code == 0
     text = capsys.readouterr().out
     shipped = {"doctor", "new", "run", "resume", "status", "report", "export", "fit", "relax"}
-    assert shipped | {"sweep", "qdem", "rigid", "validate", "cite"} == set(trackbed.VERBS)
+    assert shipped | {"sweep", "qdem", "grains", "train", "rigid", "validate", "cite"} == set(
+        trackbed.VERBS
+    )
     for verb in trackbed.VERBS:
         assert f"\n    {verb}" in text
     codes = {
@@ -98,6 +100,9 @@ def test_version() -> None:
         (["report", "no-such-run"], "no-such-run"),
         (["fit", "no-such-file.csv"], "no-such-file.csv"),
         (["relax", "no-such-state.npz", "--out", "x.npz"], "no-such-state.npz"),
+        (["grains", "--count", "9"], "required: --out"),
+        (["grains", "--out", "no-such-folder/x.npz"], "no-such-folder"),
+        (["train", "--out", "."], ". is a folder"),
     ],
 )
 def test_wrong_use(words: list[str], sentence: str, tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from qdem_fem.grain_form import (
 )
 from qdem_fem.grain_grading import BALLAST, EN_13450_A, Grading, passing_of, sizes_drawn
 from qdem_fem.grain_mesh import CORNERS, DIAGONALS, grain_faces, grain_tetrahedra, radius_ratios
-from qdem_fem.grain_set import GrainSet, grains_load, grains_make, grains_save, main
+from qdem_fem.grain_set import GrainSet, grains_load, grains_make, grains_save
 from qdem_fem.grain_sieve import sieve_size
 from qdem_fem.grain_surface import (
     edge_angles,
@@ -40,6 +40,7 @@ from qdem_fem.grain_surface import (
 from qdem_fem.mesh import element_gradients
 from qdem_fem.mesh_checks import FloatArray, IntArray
 from qdem_fem.surface import surface_faces
+from trackbed import main
 
 CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)]) - 0.5
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
@@ -360,6 +361,22 @@ def test_files_that_hold_no_grains_are_refused(some: GrainSet, tmp_path: Path) -
 
 
 def test_command_makes_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    main(["--count", "3", "--seed", "3", "--out", str(tmp_path / "g.npz")])
+    assert main(["grains", "--count", "3", "--seed", "3", "--out", str(tmp_path / "g.npz")]) == 0
     assert "3 grains" in capsys.readouterr().out
     assert len(grains_load(tmp_path / "g.npz")) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--count", "-1"], "-1 grains"),
+        (["--count", "2", "--seed", "-4"], "seed of 0 or more"),
+        (["--sphericity", "nan"], "no grain has sphericity nan"),
+    ],
+)
+def test_command_refuses_with_a_sentence(
+    words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["grains", *words, "--out", str(tmp_path / "g.npz")]) == 3
+    assert sentence in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -20,7 +20,6 @@ from qdem_fem.load_train import (
     Track,
     Train,
     WheelFlat,
-    main,
     seat_forces,
     seat_share,
     train_record,
@@ -31,6 +30,7 @@ from qdem_fem.mesh import TetMesh, element_gradients, lumped_mass
 from qdem_fem.sleeper_mesh import SleeperShape, sleeper_mesh
 from qdem_fem.sleeper_modes import free_modes
 from qdem_fem.spectra import fourier_spectrum
+from trackbed import main
 
 CONCRETE = Material(young=45e9, poisson=0.167, density=2350)
 TRACK = Track()
@@ -222,6 +222,9 @@ def test_peaks_of_the_spectrum_are_at_multiples_of_speed_over_car_length() -> No
         (lambda: Track(modulus=float("nan")), "modulus"),
         (lambda: seat_forces(np.zeros(1), Train(), TRACK, [WheelFlat(20, 1.0, 1.0)]), "axle 20"),
         (lambda: train_record(Train(), TRACK, area=0.0), "area 0"),
+        (lambda: train_record(Train(), TRACK, area=float("inf")), "area inf"),
+        (lambda: train_record(Train(speed=1e-9), TRACK, area=1.0), "more speed or fewer cars"),
+        (lambda: train_record(Train(cars=10**8), TRACK, area=1.0), "more speed or fewer cars"),
     ],
 )  # fmt: skip
 def test_a_train_that_can_not_be_is_refused(made: object, word: str) -> None:
@@ -317,6 +320,14 @@ def test_no_file_other_rates_and_wrong_seats(tmp_path: Path) -> None:
 
 def test_command_writes_a_record(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "train.csv"
-    main(["--cars", "1", "--out", str(path)])
+    assert main(["train", "--cars", "1", "--out", str(path)]) == 0
     assert "10000 Hz" in capsys.readouterr().out
     assert load_record_read(path).pressure.max() > 1e5
+
+
+def test_command_refuses_with_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["train", "--speed", "-3", "--out", str(tmp_path / "train.csv")]) == 3
+    assert "speed = -3.0" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from rigid_lcp.contacts import contact_frames
 from rigid_lcp.errors import NotConverged
+from rigid_lcp.passed_collisions import Closing, bouncing, contact_shift
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
-from rigid_lcp.time_stepping import contact_shift
 from validation.rigid_scenes import (
     G,
     block_on_incline,
@@ -114,15 +114,24 @@ def test_energy_never_grows_without_friction() -> None:
     assert run.overlap < 1e-5
 
 
+def one_contact(e: float, gap: float, before: float, free: float, h: float) -> Closing:
+    """A contact in the plane without friction, turning and gravity."""
+    one = np.ones(1)
+    return Closing(
+        restitution=e * one, friction=0 * one, gap=gap * one, before=before * one,
+        offset=np.array([[free, 0.0]]), turning=0 * one, slow=0.0, h=h, touching=0.0,
+    )  # fmt: skip
+
+
 @given(st.floats(0, 1), st.floats(0, 1e-3), st.floats(-2, 2), st.floats(-2, 2))
 def test_normal_work_is_never_positive(e: float, start: float, before: float, free: float) -> None:
     """Where an impulse acts, ``u_N+ = -shift`` and ``(u_N- + u_N+)/2 <= 0``.
 
     ``start >= 0``: gap at the start of the step, ``start + h/2 u_N-`` at its midpoint.
     """
-    h, one = 1e-3, np.ones(1)
-    gap = one * (start + h / 2 * before)
-    shift = contact_shift(e * one, gap, before * one, free * one, 0.0, h)[0]
+    h = 1e-3
+    closing = one_contact(e, start + h / 2 * before, before, free, h)
+    shift = contact_shift(closing, bouncing(closing))[0, 0]
     assert before - shift <= 1e-12
 
 
@@ -217,10 +226,8 @@ def test_poured_grains_come_to_rest() -> None:
 @given(st.floats(-1, 1), st.floats(-1e-3, 1e-3), st.floats(-2, 2), st.floats(-2, 2))
 def test_bodies_may_come_to_rest(turning: float, gap: float, before: float, free: float) -> None:
     """``u_N+ = turning`` at rest: allowed where nothing bounces, as jammed grains need it."""
-    h, one = 1e-3, np.ones(1)
-    shift = contact_shift(
-        0.0 * one, gap * one, before * one, free * one, 0.0, h, turning * one
-    )[0]  # fmt: skip
+    closing = one_contact(0.0, gap, before, free, 1e-3)
+    shift = contact_shift(closing, bouncing(closing), np.array([turning]))[0, 0]
     assert turning + shift >= 0.0
 
 

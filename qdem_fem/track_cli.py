@@ -1,0 +1,80 @@
+"""The verbs ``trackbed grains`` and ``trackbed train``: parts of a track, written as files."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+SEAT_AREA = 0.13 * 0.17
+"""Of a rail seat [m^2]: a foot of 130 mm on a pad of 170 mm."""
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``grains`` or ``train``; what is not given is the package's own."""
+    {"grains": _register_grains, "train": _register_train}[verb](parser)
+
+
+def _register_grains(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--out", type=Path, required=True, help="the .npz file to write")
+    parser.add_argument("--count", type=int, default=5700, help="grains (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=1, help="default: %(default)s")
+    for shape in ("sphericity", "roundness", "concavity"):
+        parser.add_argument(f"--{shape}", type=float, help="of every grain, 0 to 1")
+    parser.add_argument("--workers", type=int, default=1, help="processes (default: %(default)s)")
+    parser.set_defaults(command=grains_command)
+
+
+def _register_train(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--out", type=Path, required=True, help="the .csv file to write")
+    parser.add_argument("--cars", type=int)
+    parser.add_argument("--speed", type=float, help="m/s")
+    parser.add_argument("--axle-load", type=float, help="N")
+    parser.add_argument("--first-share", type=float, help="of an axle load on rail seat 1")
+    parser.add_argument("--modulus", type=float, help="of the track's foundation, N/m^2")
+    parser.add_argument(
+        "--area", type=float, default=SEAT_AREA, help="of a rail seat, m^2 (default: %(default)g)"
+    )
+    parser.set_defaults(command=train_command)
+
+
+def grains_command(arguments: argparse.Namespace) -> int:
+    """Make a set of random ballast grains, EN 13450 31.5/50 A, and save it."""
+    from qdem_fem.grain_form import GrainRecipe
+    from qdem_fem.grain_set import grains_make, grains_save
+
+    _refuse_no_folder(arguments.out)
+    recipe = GrainRecipe(**_given(arguments, "sphericity", "roundness", "concavity"))
+    grains = grains_make(arguments.count, arguments.seed, recipe, workers=arguments.workers)
+    grains_save(arguments.out, grains)
+    print(f"{arguments.out}: {len(grains)} grains, {grains.tetrahedra.sum()} tetrahedra")
+    return 0
+
+
+def train_command(arguments: argparse.Namespace) -> int:
+    """Write the made-up record of a passing train."""
+    from qdem_fem.load_record import load_record_write
+    from qdem_fem.load_train import Track, Train, train_record
+
+    _refuse_no_folder(arguments.out)
+    train = Train(**_given(arguments, "cars", "speed", "axle_load", "first_share"))
+    record = train_record(train, Track(**_given(arguments, "modulus")), arguments.area)
+    load_record_write(arguments.out, record)
+    print(f"{arguments.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
+    return 0
+
+
+def _given(arguments: argparse.Namespace, *names: str) -> dict[str, Any]:
+    """Those of the named arguments that were given."""
+    return {
+        name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None
+    }
+
+
+def _refuse_no_folder(out: Path) -> None:
+    """Raise `UsageError` where ``out`` can not be written, before minutes of work are lost."""
+    from qdem_fem.errors import UsageError
+
+    if out.is_dir() or not out.parent.is_dir():
+        why = "a folder" if out.is_dir() else "in a folder that is not there"
+        raise UsageError(f"{out} is {why}", where="--out", remedy="name a file in a folder that is")

@@ -1,0 +1,89 @@
+"""docs/paper-figures.md is what its record says, and its sentences hold there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenes import scene_path
+from validation.paper_figures import (
+    CELL_DEPTH,
+    NOTHING,
+    Row,
+    jump_row,
+    jumped_cell,
+    relaxed_rows,
+    rows_read,
+)
+from validation.paper_figures_page import (
+    FIRST,
+    PAGE,
+    errors_of,
+    exponent,
+    figure_rows,
+    page,
+    share_rising,
+    wins,
+)
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[Row]:
+    return rows_read()
+
+
+def test_page_is_made_from_the_record(rows: list[Row]) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    assert page(rows) == text
+    assert "{{" not in text
+
+
+def test_sentences_about_figure_5(rows: list[Row]) -> None:
+    """g_u falls, more slowly than k^-1/2; f_xi rises."""
+    for row in figure_rows(rows, "5"):
+        assert -0.5 < exponent(row["g_u"]) < 0
+        assert exponent(row["f_xi"]) > 0
+
+
+def test_sentences_about_figures_6_and_7(rows: list[Row]) -> None:
+    """Below the paper's errors on coordinates, and so is moving nothing; not on displacements."""
+    for law, least in (("linear", 0.025), ("log", 0.01)):
+        assert max(errors_of(rows, "coordinates", law, FIRST[0])) < 0.14
+        assert max(errors_of(rows, "loading", law, FIRST[-1])) > least
+    assert max(errors_of(rows, "coordinates", NOTHING)) < 0.02
+    for law in ("linear", "log"):
+        assert max(errors_of(rows, "coordinates", law, None, 20)) < 0.02
+        assert max(errors_of(rows, "loading", law, None, 20)) > 0.02
+    jumps = len(figure_rows(rows, "6, 7"))
+    assert wins(rows, "log", "linear") > 0.75 * jumps
+    assert wins(rows, "linear", NOTHING) < 0.5 * jumps
+    worse, steps = share_rising(rows, "loading", "log", 1)
+    assert 0.1 < worse / steps < 0.5
+    longer, steps = share_rising(rows, "loading", "log", 2)
+    assert longer > 0.9 * steps
+
+
+def test_the_cell_is_that_of_the_record(rows: list[Row]) -> None:
+    """Relaxed again, figures and sentences of Fig. 8 hold; the estimate overlaps as it should."""
+    from adapters.scene_file import scene_load
+
+    cell = jumped_cell(scene_load(scene_path("karrech")))
+    again = list(relaxed_rows(cell, "8", frontier=np.arange(9) > 0))
+    kept = {row["way"]: row for row in figure_rows(rows, "8")}
+    for row in again:
+        assert row["overlap"] == pytest.approx(kept[row["way"]]["overlap"], rel=1e-3, abs=1e-15)
+    assert kept["estimate"]["overlap"] == pytest.approx(CELL_DEPTH, rel=1e-3)
+    assert kept["karrech2007"]["overlap"] < 1e-4 * CELL_DEPTH
+
+
+def test_a_path_of_the_law_is_extrapolated_exactly() -> None:
+    """Grains on a logarithmic path: E_r of the log law is round-off, of nothing moved 1."""
+    generator = np.random.default_rng(1)
+    rate = generator.normal(size=(7, 3))
+    cycle = np.arange(1.0, 102.0)
+    position = 10 + 1e-2 * rate * np.log(cycle)[:, None, None]
+    row = jump_row(np.concatenate([position[:1], position]), position[:1], (10, 20, 40))
+    assert row["of_jump"]["log"] < 1e-9
+    assert row["of_jump"][NOTHING] == 1.0
+    assert row["settlement"]["log"] == pytest.approx(0.0, abs=1e-9)
+    assert row["of_jump"]["linear"] > 0.1
