@@ -237,6 +237,7 @@ def page(rows: Sequence[Row], last: int = LAST) -> str:
         "METHODS": table_methods(rows, last),
         "REFUSED": table_refused(rows, last),
         "NULL": table_null(rows, last),
+        "PLACES": str(len(of_place(rows, TWIN))),
         "LOST": jumps_lost(rows, last),
         "VERDICT": verdict(rows, last),
         "BUDGET": table_budget(rows),

@@ -4,9 +4,22 @@ from __future__ import annotations
 
 import pytest
 
+from validation.same_packing import interval
 from validation.settlement_rivals import METHODS, Row
-from validation.settlement_rivals_budget import PARTS
+from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
 from validation.settlement_rivals_page import PAGE, page
+from validation.settlement_rivals_reading import (
+    beside,
+    cost,
+    effect,
+    finished,
+    judged,
+    law_alone,
+    of_place,
+    over_same,
+    settled,
+)
+from validation.settlement_rivals_reference import LAWS, law_name
 from validation.settlement_rivals_runs import LAST, key, record_read
 
 
@@ -31,3 +44,50 @@ def test_record_holds_what_the_study_names(rows: list[Row]) -> None:
     assert rivals <= {method.name for method in METHODS}
     assert {row["method"] for row in rows if row["part"] == "budget"} <= {p.name for p in PARTS}
     assert all(row["last"] == LAST for row in rows if row["part"] != "budget")
+
+
+def test_sentences_about_moving(rows: list[Row]) -> None:
+    """Nothing moved settles too little, moving adds what lacks, and is not nearer for certain."""
+    for jumps, least, most in ((5, 0.25, 0.45), (2, 0.45, 0.65)):
+        found = beside(rows, jumps, LAST)
+        assert found is not None
+        assert len(found.still) == 5
+        still, half = interval(found.still)
+        assert half < -still
+        assert least < -still < most
+        added, half = interval(found.difference)
+        assert added > half
+        near, half = interval(found.nearer)
+        assert 0 < near < half
+        computed = [row["computed"] for row in finished(rows, f"{jumps} jumps", LAST)]
+        assert 0.4 < sum(computed) / len(computed) / 400 < 0.6
+
+
+def test_sentences_about_rivals(rows: list[Row]) -> None:
+    """Fitted laws are cheaper and miss by more; softer grains answer otherwise to a load."""
+    moved = judged(rows, "5 jumps", LAST, "settlement")
+    assert moved is not None
+    jumping = finished(rows, "5 jumps", LAST)
+    for law, cycles in LAWS:
+        name = law_name(law, cycles)
+        found = judged(rows, name, LAST, "settlement")
+        assert found is not None
+        assert abs(found.error).mean() > abs(moved.error).mean()
+        assert cost(finished(rows, name, LAST)) < cost(jumping)
+    for figure, sign in (("deflection", 1), ("stiffness", -1)):
+        found = judged(rows, "E/10", LAST, figure)
+        assert found is not None
+        assert sign * found.mean > max(found.half, 0.5)
+
+
+def test_sentences_about_the_budget(rows: list[Row]) -> None:
+    """No part but the jump shows in the settlement; the relaxation of an unmoved bed is none."""
+    for part in PARTS[1:]:
+        mean, half = interval(effect(rows, part.name, settled))
+        assert abs(mean) < half, part.name
+    gains = [settled(over_same(row, AFTER)) for row in of_place(rows, EVERY).values()]
+    assert interval(law_alone(rows))[1] > sum(gains) / len(gains)
+    saved, relaxed = (of_place(rows, PARTS[number].name) for number in (6, 7))
+    assert saved.keys() == relaxed.keys()
+    for place, row in saved.items():
+        assert row["settlement"] == relaxed[place]["settlement"]
