@@ -27,6 +27,8 @@ COLOURS = {
 """One a family."""
 TICKS = (2, 5, 10, 20, 50, 100)
 """Of CPU time [s]."""
+LINEAR = 50
+"""Error up to which its scale is linear [%]."""
 PANELS = ("settlement", "coordination", "deflection")
 
 
@@ -48,6 +50,7 @@ def draw(rows: Sequence[Row], last: int, target: Path) -> None:
                 half = 100 * found.half if found.half == found.half else 0.0
                 point(axis, rows, name, family, last, 100 * found.mean, half)
         axis.set_ylabel(f"error of the {FIGURES[key].words} [%]")
+        axis.set_yscale("symlog", linthresh=LINEAR)
     axis = axes.flat[3]
     axis.axhline(100 * profile_chaos(rows, last), color="0.5", ls="--", lw=0.8)
     for name, family in shown():
