@@ -108,7 +108,10 @@ def table_refused(rows: Sequence[Row], last: int) -> str:
 
 def said(refused: str) -> str:
     """The reason without its figures, which differ from packing to packing."""
-    return refused.partition(" is 0.")[0].partition("; Hertz")[0]
+    why = refused.rpartition("sentinel line: ")[2].removeprefix("ERROR: ")
+    for end in (" is 0.", "; Hertz", ": original"):
+        why = why.partition(end)[0]
+    return why
 
 
 def table_null(rows: Sequence[Row], last: int) -> str:
