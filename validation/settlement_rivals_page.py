@@ -18,7 +18,7 @@ from validation.settlement_ensemble import COARSE
 from validation.settlement_ensemble_page import short
 from validation.settlement_ensemble_reading import nested
 from validation.settlement_rivals import K_I, METHODS, Row
-from validation.settlement_rivals_budget import AFTER, EVERY, PARTS, TWIN
+from validation.settlement_rivals_budget import AFTER, EVERY, PARTS, PLACE, TWIN
 from validation.settlement_rivals_picture import draw, shown
 from validation.settlement_rivals_reading import (
     FIGURES,
@@ -38,7 +38,7 @@ from validation.settlement_rivals_reading import (
     rows_of,
     settled,
 )
-from validation.settlement_rivals_runs import LAST, SEEDS, record_read
+from validation.settlement_rivals_runs import LAST, MEMBERS, SEEDS, record_read
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "settlement-rivals.md"
@@ -104,6 +104,18 @@ def table_refused(rows: Sequence[Row], last: int) -> str:
             of = len(rows_of(rows, "rivals", method.name, last))
             lines.append([method.name, f"{count} of {of}", str(K_I + reached), why])
     return table(["way", "packings", "at the latest after cycle", "what was said"], lines)
+
+
+def missing(rows: Sequence[Row], last: int) -> str:
+    """In words, which runs the record lacks: methods by packings, parts of the budget by places."""
+    plans = [(method.name, "rivals", last, len(SEEDS)) for method in METHODS]
+    plans += [(part.name, "budget", PLACE, len(SEEDS) * len(MEMBERS)) for part in PARTS]
+    lacking = [
+        f"{name} ({made} of {planned})"
+        for name, part, end, planned in plans
+        if (made := len(rows_of(rows, part, name, end))) < planned
+    ]
+    return "; ".join(lacking) or "none"
 
 
 def said(refused: str) -> str:
@@ -238,6 +250,7 @@ def page(rows: Sequence[Row], last: int = LAST) -> str:
         "GIVEN": f"{1e6 * found.half_given:.0f}",
         "CHAOS": f"{100 * chaos(rows, last, 'settlement'):.0f}",
         "METHODS": table_methods(rows, last),
+        "MISSING": missing(rows, last),
         "REFUSED": table_refused(rows, last),
         "NULL": table_null(rows, last),
         "PLACES": str(len(of_place(rows, TWIN))),
