@@ -103,7 +103,7 @@ def table_refused(rows: Sequence[Row], last: int) -> str:
             reached = max(row["computed"] for row in mine if said(row["refused"]) == why)
             of = len(rows_of(rows, "rivals", method.name, last))
             lines.append([method.name, f"{count} of {of}", str(K_I + reached), why])
-    return table(["way", "packings", "at the latest after cycle", "what was said"], lines)
+    return table(["way", "packings", "kept up to cycle", "what was said"], lines)
 
 
 def missing(rows: Sequence[Row], last: int) -> str:
@@ -121,9 +121,10 @@ def missing(rows: Sequence[Row], last: int) -> str:
 def said(refused: str) -> str:
     """The reason without its figures, which differ from packing to packing."""
     why = refused.rpartition("sentinel line: ")[2].removeprefix("ERROR: ")
-    for end in (" is 0.", "; Hertz", ": original"):
+    for end in ("; Hertz", ": original", ". Please"):
         why = why.partition(end)[0]
-    return why
+    what, is_, bound = why.partition(" is 0.")
+    return f"{what} is {bound.partition(', ')[2]}" if is_ else why
 
 
 def table_null(rows: Sequence[Row], last: int) -> str:

@@ -86,7 +86,7 @@ def test_sentences_about_the_budget(rows: list[Row]) -> None:
         mean, half = interval(effect(rows, part.name, settled))
         assert abs(mean) < half, part.name
     gains = [settled(over_same(row, AFTER)) for row in of_place(rows, EVERY).values()]
-    assert interval(law_alone(rows))[1] > sum(gains) / len(gains)
+    assert interval(law_alone(rows))[1] > 0.8 * sum(gains) / len(gains)
     saved, relaxed = (of_place(rows, PARTS[number].name) for number in (6, 7))
     assert saved.keys() == relaxed.keys()
     for place, row in saved.items():
