@@ -310,3 +310,26 @@ def test_a_dense_gas_keeps_its_energy() -> None:
     for _ in range(100):
         run.advance(1e-2)
     assert run.energy == pytest.approx(begin, rel=1e-10)
+
+
+def test_loads_are_those_of_the_midpoint() -> None:
+    """A disc on a spring to the origin goes round: ``(cos w t, sin w t)``, to second order.
+
+    Taken where the step starts, the pull lags by half a step and turns into a push along the way:
+    the disc would gain ``w h / 2`` of its speed a radian.
+    """
+
+    def end(step: float) -> float:
+        scene = Scene(2, gravity=(0.0, 0.0))
+        scene.add(Disc(0.1), density=1.0, position=(1, 0), velocity=(0, 2))
+        mass = scene.bodies[0].mass
+        run = Simulation(
+            scene, step=step,
+            loads=lambda _, motion: np.append(-4.0 * mass * motion.position[0], 0.0)[None, :],
+        )  # fmt: skip
+        run.advance(3.0)
+        return float(np.linalg.norm(run.positions[0] - [np.cos(6.0), np.sin(6.0)]))
+
+    # the midpoint rule turns by w h - (w h)^3 / 24 a step, or with the kick in its middle + / 24
+    assert end(0.01) < 6.0 * 0.02**2 / 20
+    assert end(0.02) / end(0.01) == pytest.approx(4.0, rel=0.02)
