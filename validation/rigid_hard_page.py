@@ -67,10 +67,12 @@ it sinks in a little.  ODE is `World.step` (Dantzig) with friction limits from t
 the iteration and CFM 1e-12.  LMGC90 is `compas_lmgc90` (NLGS, IQS_CLB) with that binding's own
 settings.  Restitution 1 is ContactBounce of 1 in ODE, contacts of stiffness without damping in
 MuJoCo (solref of a negative stiffness, zero damping; it has no coefficient of restitution), RST_CLB
-in LMGC90.  A peer's force on the rod is what one step of 1 µs does to its velocity; at
-acceleration level they have nothing to be asked for, so none of them can refuse.  A peer's miss
-says what it was not made for, not that it is bad.  **Bold**: misses the bar.  Peers that
-did not run on a case are listed below the table with the reason.
+in LMGC90.  A peer's force on the rod is what one step of 1 µs does to its velocity: ODE bounds
+friction by the normal force there would be without it, one turn of what should go on to the limit;
+MuJoCo's convex friction parts what slides.  None of them works at acceleration level, so none can
+say that there is no force.  A peer's miss says what it was not made for, not that it is bad.
+**Bold**: misses the bar.  Peers that did not run on a case are listed below the table with the
+reason.
 """
 
 PICTURE = """
