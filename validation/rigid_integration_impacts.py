@@ -146,7 +146,7 @@ def impacts(quick: bool) -> list[Impact]:
         ),
         Impact(
             "gas of 36 discs, e = 1", "energy is kept", "energy off", dense_gas(), 1e-2,
-            0.1 if quick else 1.0, energy_off, 1e-10,
+            0.05 if quick else 0.3, energy_off, 1e-10,
         ),
         Impact(
             f"block bouncing flat, e = 1, {bounces} times", "energy is kept", "energy off",
