@@ -9,7 +9,7 @@ validation/results/rigid-integration.jsonl holds a line a row; ``table`` says of
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from functools import partial
 from itertools import chain
@@ -51,13 +51,6 @@ def plain(row: Any) -> Data:
     return data
 
 
-def measured(quick: bool, peers: bool, tables: Iterable[str] | None = None) -> Iterable[Data]:
-    """Lines of the tables asked for, each as it ends."""
-    for table in tables or TABLES:
-        for row in TABLES[table](quick, peers):
-            yield {"table": table} | plain(row)
-
-
 def record_read(path: Path = RECORD) -> list[Data]:
     """The lines of a record; none where there is no file."""
     if not path.is_file():
@@ -65,13 +58,17 @@ def record_read(path: Path = RECORD) -> list[Data]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
-def record_make(quick: bool, tables: Iterable[str] | None = None, path: Path = RECORD) -> None:
-    """Measure, peers too, and write the record after every table; others keep their lines."""
+def record_make(quick: bool, tables: Sequence[str] = (), path: Path = RECORD) -> None:
+    """Measure, peers too, and write the record after every table; others keep their lines.
+
+    ``tables``: those to measure, of `TABLES`; all of them if none is named.
+    """
     words = ["python", "-m", "validation.rigid_integration_page", "--run"] + ["--quick"] * quick
+    words += ["--only", *tables] if tables else []
+    origin = provenance(words)
+    kept = {name: origin[name] for name in ("commit", "command", "machine", "started")}
     for table in tables or TABLES:
-        origin = provenance([*words, "--only", table])
-        kept = {name: origin[name] for name in ("commit", "command", "machine", "started")}
-        made = [line | kept for line in measured(quick, True, [table])]
+        made = [{"table": table} | plain(row) | kept for row in TABLES[table](quick, True)]
         lines = {name: [o for o in record_read(path) if o["table"] == name] for name in TABLES}
         lines[table] = made
         text = "".join(json.dumps(line) + "\n" for part in lines.values() for line in part)
