@@ -69,10 +69,10 @@ settings.  Restitution 1 is ContactBounce of 1 in ODE, contacts of stiffness wit
 MuJoCo (solref of a negative stiffness, zero damping; it has no coefficient of restitution), RST_CLB
 in LMGC90.  A peer's force on the rod is what one step of 1 µs does to its velocity: ODE bounds
 friction by the normal force there would be without it, one turn of what should go on to the limit;
-MuJoCo's convex friction parts what slides.  None of them works at acceleration level, so none can
-say that there is no force.  A peer's miss says what it was not made for, not that it is bad.
-**Bold**: misses the bar.  Peers that did not run on a case are listed below the table with the
-reason.
+MuJoCo's convex friction lifts what slides, by a force that goes up as 1/h.  None of them works at
+acceleration level, so none can say that there is no force.  A peer's miss says what it was not made
+for, not that it is bad.  **Bold**: misses the bar.  Peers that did not run on a case are listed
+below the table with the reason.
 """
 
 PICTURE = """
