@@ -22,7 +22,7 @@ from adapters.run_folder import write_atomically
 from validation.rigid_integration_collisions import closed_form_rows, energy_rows
 from validation.rigid_integration_impacts import impact_rows, impacts
 from validation.rigid_integration_order import order_rows
-from validation.rigid_integration_steps import drifts, traces
+from validation.rigid_integration_steps import Trace, drifts, traces
 from validation.rigid_integration_zeno import zeno_rows
 
 Data = dict[str, Any]
@@ -43,8 +43,10 @@ TABLES: dict[str, Rows] = {
 
 
 def plain(row: Any) -> Data:
-    """A row as JSON has it: what is no finite number becomes null."""
+    """A row as JSON has it: what is no finite number becomes null, steps have six digits."""
     data = asdict(row)
+    if isinstance(row, Trace):
+        data["steps"] = [[round(at, 9), float(f"{h:.6g}"), kept] for at, h, kept in row.steps]
     for name, value in data.items():
         if isinstance(value, float) and not isfinite(value):
             data[name] = None

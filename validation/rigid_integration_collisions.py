@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from math import isfinite
 
 import numpy as np
@@ -94,7 +95,7 @@ def random_collision(
 def law_row(case: str, answer: str, measure: str, value: float, bar: float, start: float) -> Row:
     """A row of the law itself; ``start``: processor time when it began [s]."""
     return Row(
-        case, answer, "eqs 33 to 36", measure, value, f"<= {bar:.0e}", value <= bar, "",
+        case, answer, LAW, measure, value, f"<= {bar:.0e}", value <= bar, "",
         time.process_time() - start, 1, "" if isfinite(value) else "not solved",
     )  # fmt: skip
 
@@ -161,4 +162,4 @@ def energy_rows(count: int, seed: int = 1) -> Iterator[Row]:
         why = f"e scaled down in {scaled}" if scaled else ""
         if failed:
             why += f"{'; ' if why else ''}{failed} not solved"
-        yield Row(**(vars(made) | {"why": why, "steps": count, "ok": made.ok and not failed}))
+        yield replace(made, why=why, steps=count, ok=made.ok and not failed)

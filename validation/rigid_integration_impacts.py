@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, nan, sqrt
 
 import numpy as np
@@ -162,17 +162,15 @@ def impacts(quick: bool) -> list[Impact]:
 
 def impact_rows(impact: Impact, peers: bool) -> Iterator[Row]:
     """Ours by both methods, then the peers."""
-    for method in METHODS:
-        yield impact_ours(impact, method)
-    ours = impact_ours(impact, METHODS[0]) if peers else None
+    ours = [impact_ours(impact, method) for method in METHODS]
+    yield from ours
     steps = ceil(impact.seconds / impact.step - 1e-9)
-    for engine in impact.peers if ours else ():
-        data = scene_data(impact.scene, impacts=True)
+    data = scene_data(impact.scene, impacts=True)
+    for engine in impact.peers if peers else ():
         made = peer_run(engine, data, impact.seconds / steps, steps, every=impact.every)
         value = nan if made.why else impact.judge(impact.scene, made.path)
-        assert ours is not None
-        row = row_of_peer(ours, made, value, steps)
-        yield row if made.why else Row(**(vars(row) | {"why": _speeds(made.path)}))
+        row = row_of_peer(ours[0], made, value, steps)
+        yield replace(row, why=made.why or _speeds(made.path))
 
 
 def impact_ours(impact: Impact, method: Method) -> Row:

@@ -26,7 +26,7 @@ from validation.rigid_scenes import rocking_block
 
 Floats = NDArray[np.float64]
 METHODS: tuple[Method, ...] = ("acceleration", "time-stepping")
-PEER_STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
+PEER_STEPS = (4e-3, 1e-3, 2.5e-4, 5e-5)
 ROCKING = (0.2, 1.0, 0.5 * float(np.arctan2(0.2, 1.0)))
 """Half width, half height [m], lean [rad] of the rocking block."""
 

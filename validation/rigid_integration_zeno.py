@@ -8,18 +8,16 @@ from dataclasses import dataclass
 from math import ceil, nan, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigid_lcp.lasting_contacts import REST_SPEED
-from rigid_lcp.motion import Motion
 from rigid_lcp.simulation import Simulation
 from rigid_lcp.simulation_input import Method
+from validation.rigid_integration_steps import STAGES, Attempts
 from validation.rigid_scene_peers import peer_run, scene_data
 from validation.rigid_scenes import G, bouncing_disc, bouncing_time
 
-Floats = NDArray[np.float64]
 REST = 1e-3
-"""A disc rests when its speed stays below this share of that of its first impact."""
+"""A disc rests when it stays to land with less than this share of the speed of its first impact."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,7 @@ class Zeno:
 
 
 def rest_time(height: float, restitution: float) -> float:
-    """When the speed was last `REST` of the first impact's [s]: the end of flight k.
+    """When it last landed with `REST` of the first impact's speed [s]: the end of flight k.
 
     k is the last with ``e^k >= REST``; after it ``2 v e^(k+1) / (g (1-e))`` are left of
     `bouncing_time`.
@@ -63,19 +61,19 @@ def cut_off(height: float, restitution: float, radius: float = 0.1) -> float:
 
 
 def zeno(method: Method, step: float, restitution: float, height: float = 0.1) -> Zeno:
-    """Ours; a load of nothing notes times and speeds, as in `rigid_integration_steps`."""
-    noted = list[tuple[float, float]]()
-
-    def note(now: float, motion: Motion) -> Floats:
-        noted.append((now, abs(float(motion.velocity[0, 1]))))
-        return np.zeros((2, 3))
-
+    """Ours; noted after each step, and at acceleration level where the steps of its own begin."""
     scene = bouncing_disc(height, restitution).world.scene
-    run = Simulation(scene, method, step=step, loads=note)
-    start = time.process_time()
-    run.advance(1.1 * bouncing_time(height, restitution))
-    cost = time.process_time() - start
-    rest = _rest(noted, sqrt(2 * G * height))
+    begun = Attempts(len(scene.bodies))
+    run = Simulation(scene, method, step=step, loads=begun if method == "acceleration" else None)
+    floor, cost, noted = run.positions[0, 1] - height, 0.0, list[tuple[float, float, float]]()
+    while run.time < 1.1 * bouncing_time(height, restitution):
+        start = time.process_time()
+        run.advance(step)
+        cost += time.process_time() - start
+        noted.append((run.time, run.velocities[0, 1], run.positions[0, 1] - floor))
+    for now, motion in zip(begun.times[::STAGES], begun.starts, strict=True):
+        noted.append((now, motion.velocity[0, 1], motion.position[0, 1] - floor))
+    rest = _rest(sorted(noted), sqrt(2 * G * height))
     wanted = rest_time(height, restitution)
     return Zeno(
         restitution, method, step, rest, abs(rest / wanted - 1), run.pace.collisions, cost,
@@ -90,16 +88,27 @@ def zeno_peer(engine: str, step: float, restitution: float, height: float = 0.1)
     made = peer_run(engine, scene_data(scene, impacts=True), step, steps, every=1)
     if made.why:
         return Zeno(restitution, made.engine, step, nan, nan, 0, nan, 0, made.why, True)
-    noted = [(step * (k + 1), abs(float(v))) for k, v in enumerate(made.path[:, 0, 4])]
+    noted = [
+        (step * (k + 1), float(frame[4]), height + float(frame[1]))
+        for k, frame in enumerate(made.path[:, 0])
+    ]
     rest = _rest(noted, sqrt(2 * G * height))
     error = abs(rest / rest_time(height, restitution) - 1)
     return Zeno(restitution, made.engine, step, rest, error, 0, made.cpu_s, steps, "", True)
 
 
-def _rest(noted: Sequence[tuple[float, float]], first: float) -> float:
-    """The first time noted after the last speed of `REST` times ``first`` [m/s]; NaN if none."""
-    moving = [k for k, (_, speed) in enumerate(noted) if speed >= REST * first]
-    return noted[moving[-1] + 1][0] if moving[-1] + 1 < len(noted) else nan
+def _rest(noted: Sequence[tuple[float, float, float]], first: float) -> float:
+    """When the last flight ends that lands with `REST` times ``first`` [m/s] or more [s].
+
+    From times [s], velocities [m/s] and heights [m]: it lands with ``w = sqrt(v^2 + 2 g z)``, after
+    ``(v + w) / g``.  NaN where the last one noted is such a flight.
+    """
+    landing = [sqrt(v * v + 2 * G * max(z, 0.0)) for _, v, z in noted]
+    flying = [k for k, w in enumerate(landing) if w >= REST * first]
+    if flying[-1] + 1 == len(noted):
+        return nan
+    now, speed, _ = noted[flying[-1]]
+    return float(now + (speed + landing[flying[-1]]) / G)
 
 
 def zeno_rows(quick: bool, peers: bool) -> Iterator[Zeno]:
