@@ -211,7 +211,9 @@ def order_rows(
                 yield order_row(problem, method, step)
         for engine in problem.peers if peers else ():
             for step in PEER_STEPS:
-                yield peer_row(problem, engine, step)
+                yield (row := peer_row(problem, engine, step))
+                if not row.steps:
+                    break
 
 
 def order_fitted(rows: Sequence[OrderRow], least: float = 1e-11) -> float:
