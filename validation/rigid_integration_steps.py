@@ -198,4 +198,4 @@ def drifts(quick: bool) -> Iterator[Drift]:
         for friction in (0.0, ORBIT_FRICTION):
             # time stepping has nothing to leave out: its law of the gap keeps contacts closed
             for control in (True, False) if method == "acceleration" else (True,):
-                yield drift(method, step, friction, 0.1 if quick else 2.0, control)
+                yield drift(method, step, friction, 0.1 if quick else 5.0, control)
