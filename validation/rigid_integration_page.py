@@ -51,23 +51,19 @@ def order_of(rows: Sequence[Data]) -> float:
 
 
 def table_order(lines: Sequence[Data]) -> str:
-    """A row a method of a problem: longest and shortest step, errors, order, cost."""
+    """A row a method of a problem: errors by step, their order, the cost at the shortest."""
     rows = []
     answers = {problem.name: problem.answer for problem in PROBLEMS}
     ran = [line for line in of_table(lines, "order") if line["error"] is not None]
     for (problem, method), group in groupby(ran, lambda line: (line["problem"], line["method"])):
         mine = list(group)
-        first, last = mine[0], mine[-1]
         order = order_of(mine)
-        ours = not last["peer"]
         rows.append([
             f"{problem} ({answers[problem]})" if method == "acceleration" else "", method,
-            f"{number(1e3 * first['step'])}: {number(first['error'])}",
-            f"{number(1e3 * last['step'])}: **{number(last['error'])}**" if ours
-            else f"{number(1e3 * last['step'])}: {number(last['error'])}",
-            NONE if order != order else f"{order:.1f}", number(last["cpu_s"]),
+            ", ".join(f"{number(1e3 * line['step'])}: {number(line['error'])}" for line in mine),
+            NONE if order != order else f"{order:.1f}", number(mine[-1]["cpu_s"]),
         ])  # fmt: skip
-    head = ["motion (answer)", "method", "longest step, ms: error", "shortest", "order", "CPU s"]
+    head = ["motion (answer)", "method", "step, ms: error", "order", "CPU s of the last"]
     return table(head, rows)
 
 
@@ -161,6 +157,17 @@ def absent(lines: Sequence[Data]) -> str:
     )
 
 
+def misses(lines: Sequence[Data]) -> str:
+    """Rows of ours that miss their bar, or a sentence that none does."""
+    missed = [
+        f"* {line['case']}, {line['method']}: {line['measure']} {number(line['value'])} against "
+        f"{line['bar']}; {line['why']}"
+        for line in of_table(lines, "law") + of_table(lines, "impact")
+        if not line["peer"] and not line["ok"]
+    ]
+    return "\n".join(missed) or "None of the rows with a bar."
+
+
 def page(lines: Sequence[Data]) -> str:
     """The page as Markdown: the text, with its tables filled in."""
     commits = ", ".join(sorted({line["commit"][:9] for line in lines}))
@@ -172,7 +179,7 @@ def page(lines: Sequence[Data]) -> str:
         "TABLE_DRIFT": table_drift(lines), "TABLE_LAW": table_rows(lines, "law"),
         "TABLE_IMPACT": table_rows(lines, "impact"), "TABLE_ZENO": table_zeno(lines),
         "CUT_HALF": f"{cut_off(0.1, 0.5):.1e}", "CUT_NINE": f"{cut_off(0.1, 0.9):.1e}",
-        "KANE": number(kane["value"]), "ABSENT": absent(lines),
+        "KANE": number(kane["value"]), "ABSENT": absent(lines), "MISSES": misses(lines),
     }  # fmt: skip
     text = TEXT.read_text(encoding="utf-8")
     for name, value in filled.items():

@@ -35,6 +35,8 @@ def picture_draw(lines: Lines, path: Path) -> None:
 
 
 def _cost(axes: Any, problem: str, rows: Lines) -> None:
+    from matplotlib.ticker import NullFormatter
+
     for method, group in groupby(rows, lambda line: line["method"]):
         mine = list(group)
         mark, colour = LOOKS[method.partition(" ")[0]]
@@ -43,6 +45,7 @@ def _cost(axes: Any, problem: str, rows: Lines) -> None:
             marker=mark, color=colour, linestyle="--" if method.endswith("RK4") else "-",
             markerfacecolor="none" if mine[0]["peer"] else colour, linewidth=0.8, label=method,
         )  # fmt: skip
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set(title=problem, xlabel="CPU time, ms", ylabel="error, m or rad")
     axes.grid(alpha=0.3)
 
