@@ -117,11 +117,12 @@ def table_rows(lines: Sequence[Data], name: str) -> str:
         if line["peer"] and not line["steps"]:
             continue
         key = (line["case"], line["answer"], line["measure"], line["bar"])
-        bar = "reported" if "inf" in line["bar"] else line["bar"]
+        reported = "inf" in line["bar"]
+        bar = "reported" if reported else line["bar"]
         first = ["", "", ""] if key == before else [key[0], key[1], f"{key[2]} {bar}"]
         value = number(line["value"])
-        cells = [*first, line["method"], value if line["ok"] else f"**{value}**", line["why"],
-                 number(line["cpu_s"])]  # fmt: skip
+        value = value if line["ok"] or reported else f"**{value}**"
+        cells = [*first, line["method"], value, line["why"], number(line["cpu_s"])]
         rows.append([cell.replace("|", "\\|") for cell in cells])
         before = key
     return table(["case", "answer", "bar", "engine", "measured", "note", "CPU s"], rows)
@@ -163,7 +164,7 @@ def misses(lines: Sequence[Data]) -> str:
         f"* {line['case']}, {line['method']}: {line['measure']} {number(line['value'])} against "
         f"{line['bar']}; {line['why']}"
         for line in of_table(lines, "law") + of_table(lines, "impact")
-        if not line["peer"] and not line["ok"]
+        if not (line["peer"] or line["ok"] or "inf" in line["bar"])
     ]
     return "\n".join(missed) or "None of the rows with a bar."
 
