@@ -147,7 +147,7 @@ def energy_rows(count: int, seed: int = 1) -> Iterator[Row]:
             bodies, velocity, eps, mu = random_collision(generator)
             found = collide(
                 bodies, velocity, eps if rough else 1.0, mu if rough else 0.0, law=law,
-                energy="safe" if safe else "watched", max_rounds=500,
+                energy="safe" if safe else "watched",
             )  # fmt: skip
             before = kinetic_energy(bodies, velocity)
             change = kinetic_energy(bodies, found.velocity) / before - 1
