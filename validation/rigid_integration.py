@@ -33,7 +33,7 @@ TABLES: dict[str, Rows] = {
     "order": order_rows,
     "trace": lambda quick, peers: traces(0.05 if quick else 0.3),
     "drift": lambda quick, peers: drifts(quick),
-    "law": lambda quick, peers: chain(closed_form_rows(), energy_rows(10 if quick else 100)),
+    "law": lambda quick, peers: chain(closed_form_rows(), energy_rows(5 if quick else 100)),
     "impact": lambda quick, peers: chain.from_iterable(
         map(partial(impact_rows, peers=peers), impacts(quick))
     ),

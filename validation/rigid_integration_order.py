@@ -202,12 +202,12 @@ def order_rows(
 ) -> Iterator[OrderRow]:
     """Every problem at every step, by ours and, where asked for, the peers; a row as it ends.
 
-    ``quick``: the three longest steps only.
+    ``quick``: the two longest steps only.
     """
     for problem in problems:
         for method in METHODS:
             order_row(problem, method, problem.steps[method][0])  # compiles
-            for step in problem.steps[method][: 3 if quick else None]:
+            for step in problem.steps[method][: 2 if quick else None]:
                 yield order_row(problem, method, step)
         for engine in problem.peers if peers else ():
             for step in PEER_STEPS:

@@ -54,7 +54,7 @@ def run(quick: bool) -> list[Check]:
         *chain.from_iterable(trace_checks(each) for each in traces(0.05 if quick else 0.3)),
         *(drift_check(each) for each in drifts(quick)),
         *(row.check() for row in closed_form_rows()),
-        *(row.check() for row in energy_rows(10 if quick else 100)),
+        *(row.check() for row in energy_rows(5 if quick else 100)),
         *(row.check() for each in impacts(quick) for row in impact_rows(each, peers=False)),
         *zeno_checks(zeno_rows(quick, peers=False)),
     ]
