@@ -235,6 +235,8 @@ def test_rounds_that_do_not_end_are_cut() -> None:
     """After the rounds allowed the rest has no restitution: nothing approaches, and that is all."""
     bodies, velocity = network_bodies(80, 3)
     found = collide(bodies, velocity, 1.0, max_rounds=1)
+    assert "after 1 rounds the rest was taken without restitution" in found.message
+    assert "rounds" not in collide(bodies, velocity, 1.0, max_rounds=500).message
     normal = (bodies.jacobian @ found.velocity)[::2]
     assert found.solved
     assert normal.min() >= -1e-11 * np.abs(bodies.jacobian @ velocity).max()
