@@ -1,0 +1,358 @@
+"""The rigid bodies of a simulation: their state, and their place in a march."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem import kernel
+from qdem_fem.body import Body
+from qdem_fem.errors import ConditionError
+from qdem_fem.rigid_conditions import conditions_split, hold_of
+from qdem_fem.rigid_mass import (
+    RigidMass,
+    frequency_squared,
+    rigid_displacement_fit,
+    rigid_velocity_fit,
+    turn_matrix,
+)
+from qdem_fem.rigid_step import (
+    FREE,
+    STILL,
+    Rigid,
+)
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+STATE = ("shift", "velocity", "turn", "spin")
+
+
+@dataclass(frozen=True)
+class RigidNow:
+    """Motion of the rigid bodies at the time of the displacements."""
+
+    velocity: Floats
+    """Of the centres [m/s], (b, 3)."""
+    spin: Floats
+    """Angular momentum about the centres [kg m^2/s], (b, 3)."""
+
+
+class RigidBodies:
+    """Bodies with six freedoms each among those of a simulation.
+
+    Made with the simulation's assembly, whose fields have the displacement of all their nodes.
+    """
+
+    def __init__(self, run: Simulation) -> None:
+        self.run = run
+        self.number = np.array([i for i, body in enumerate(run.bodies) if body.rigid])
+        """Place of each among the bodies, (b,)."""
+        self.bodies: list[Body] = [run.bodies[i] for i in self.number]
+        self.own: list[RigidMass] = [body.rigid_mass for body in self.bodies]
+        self.mass = np.array([own.mass for own in self.own])
+        starts = run.first_node[self.number]
+        self.nodes = np.concatenate(
+            [start + np.arange(len(b.nodes)) for b, start in zip(self.bodies, starts, strict=True)]
+        )
+        """All nodes, in the numbers of all bodies, (v,)."""
+        counts = [len(body.nodes) for body in self.bodies]
+        self.body = np.repeat(np.arange(len(counts)), counts)
+        """The rigid body that each is of, (v,)."""
+        centre = np.array([own.centre for own in self.own])
+        self.arm = np.concatenate([body.nodes for body in self.bodies]) - centre[self.body]
+        self.place = run.assembly.place[self.nodes]
+        """Their numbers in the kernel, (v,)."""
+        self.of_place = np.full(run.assembly.n_nodes, -1)
+        self.of_place[self.place] = np.arange(len(self.nodes))
+        count = len(counts)
+        still = np.zeros((count, 3))
+        none = np.zeros(0, np.int64)
+        first, node_at, force_at, arm = self._vertices(np.arange(len(self.nodes)))
+        self._every = Rigid(
+            node_first=first, node_at=node_at, force_at=force_at, arm=arm,
+            inverse_mass=1 / self.mass,
+            axes=np.array([own.axes for own in self.own]),
+            inverse_inertia=1 / np.array([own.inertia for own in self.own]),
+            shift=still.copy(), velocity=still.copy(),
+            turn=np.tile(np.eye(4)[0], (count, 1)), spin=still.copy(),
+            given=np.full((count, 3), -1), given_weight=still.copy(),
+            turning=np.full(count, FREE),
+            load_first=np.zeros(count + 1, np.int64), load_component=none, load_series=none,
+            load_weight=np.zeros(0), load_arm=np.zeros((0, 3)),
+        )  # fmt: skip
+        self.kernel = self._every
+        self._seen: Integers | None = None
+        self._following = np.zeros(0, np.int64)
+        for b, body in enumerate(self.bodies):
+            self._shift_set(b, body._displacement)
+            self._velocity_set(b, body._velocity)
+
+    def _vertices(self, chosen: Integers) -> tuple[Any, ...]:
+        """First four entries of `Rigid` for some of the nodes, in their order."""
+        place = self.place[chosen]
+        return (
+            np.searchsorted(self.body[chosen], np.arange(len(self.bodies) + 1)),
+            4 * place,
+            4 * place + self.run.assembly.packed.node_window[place],
+            np.ascontiguousarray(self.arm[chosen]),
+        )
+
+    # --- what the user sets and sees -----------------------------------------------------------
+
+    def field_set(self, body: Body, name: str, values: Floats) -> None:
+        """Take a displacement or velocity (n, 3) of all nodes of a body.
+
+        Raises `ConditionError` for one that strains it.
+        """
+        b = [body is member for member in self.bodies].index(True)
+        (self._shift_set if name == "displacement" else self._velocity_set)(b, values)
+
+    def _shift_set(self, b: int, values: Floats) -> None:
+        body, state = self.bodies[b], self._every
+        omega = self._omega(b, state.spin[b])
+        state.shift[b], state.turn[b] = rigid_displacement_fit(
+            body.nodes, self.own[b].centre, values, body.name
+        )
+        state.spin[b] = self.inertia(b) @ omega
+
+    def _velocity_set(self, b: int, values: Floats) -> None:
+        arm = self.arm_now()[self.body == b]
+        velocity, omega = rigid_velocity_fit(arm, values, self.bodies[b].name)
+        self._every.velocity[b] = velocity
+        self._every.spin[b] = self.inertia(b) @ omega
+
+    def inertia(self, b: int) -> Floats:
+        """Inertia of a body about its centre as it is turned now, (3, 3) [kg m^2]."""
+        turn = np.eye(3) + turn_matrix(self._every.turn[b])
+        return np.asarray(turn @ self.own[b].tensor @ turn.T)
+
+    def arm_now(self) -> Floats:
+        """From the centres to all nodes as they are turned now [m], (v, 3)."""
+        return self._turned(self.body, self.arm)
+
+    def now(self) -> RigidNow:
+        """The motion at the time of the displacements."""
+        run = self.run
+        force, torque = self.forces()
+        state = self._every
+        if not run.motion.behind:
+            return RigidNow(state.velocity.copy(), state.spin.copy())
+        velocity = state.velocity + 0.5 * run.step * force / self.mass[:, None]
+        ahead = run.conditions.table(run.time + run.step * np.arange(2.0))
+        moved = state.given_weight * (ahead[1] - ahead[0])[state.given] / run.step
+        velocity = np.where(state.given < 0, velocity, 0.5 * (state.velocity + moved))
+        return RigidNow(velocity, state.spin + 0.5 * run.step * torque)
+
+    def forces(self) -> tuple[Floats, Floats]:
+        """Force [N] and torque about the centre [N m] on each body now, (b, 3) each."""
+        run, pulls = self.run, np.zeros((len(self.nodes), 3))
+        if run.contacts is not None:
+            run.contacts.refresh()
+            row = self.of_place[run.contacts.place]
+            pulls[row[row >= 0]] = run.contacts.kernel.force[row >= 0]
+        force, torque = self._resultant(self.body, self.arm_now(), pulls)
+        if (gravity := run.gravity_at(np.array([run.time]))) is not None:
+            force = force + self.mass[:, None] * gravity[0]
+        loads, levers = self.loads_now()
+        return force + loads, torque + levers
+
+    def loads_now(self) -> tuple[Floats, Floats]:
+        """Force [N] and torque [N m] of the loads on each body now, (b, 3) each."""
+        self.run.packed_lists()
+        state, run = self._every, self.run
+        size = state.load_weight * run.conditions.table(np.array([run.time]))[0][state.load_series]
+        body = np.repeat(np.arange(len(self.bodies)), np.diff(state.load_first))
+        pulls = size[:, None] * np.eye(3)[state.load_component]
+        arm = self._turned(body, state.load_arm)
+        return self._resultant(body, arm, pulls)
+
+    def _resultant(self, body: Integers, arm: Floats, pulls: Floats) -> tuple[Floats, Floats]:
+        force, torque = np.zeros((2, len(self.bodies), 3))
+        np.add.at(force, body, pulls)
+        np.add.at(torque, body, np.cross(arm, pulls))
+        return force, torque
+
+    def _turned(self, body: Integers, arm: Floats) -> Floats:
+        turns = np.array([turn_matrix(turn) for turn in self._every.turn])
+        return arm + np.einsum("vij,vj->vi", turns[body], arm)
+
+    def omega(self, spin: Floats) -> Floats:
+        """Angular velocities [1/s] of angular momenta (b, 3) about the centres."""
+        return np.array([self._omega(b, spin[b]) for b in range(len(self.bodies))])
+
+    def _omega(self, b: int, spin: Floats) -> Floats:
+        free = self._turns_free(b)
+        omega = np.zeros(3)
+        if free.any():
+            omega[free] = np.linalg.solve(self.inertia(b)[np.ix_(free, free)], spin[free])
+        return omega
+
+    def velocity_field(self) -> Floats:
+        """Velocity of all nodes at the time of the displacements [m/s], (v, 3)."""
+        now = self.now()
+        across = np.cross(self.omega(now.spin)[self.body], self.arm_now())
+        return np.asarray(now.velocity[self.body] + across)
+
+    def kinetic(self, motion: RigidNow | None = None) -> float:
+        """Kinetic energy of a motion, by default of the velocities as they are [J]."""
+        motion = motion or RigidNow(self._every.velocity, self._every.spin)
+        turning = (motion.spin * self.omega(motion.spin)).sum()
+        return 0.5 * float((self.mass[:, None] * motion.velocity**2).sum() + turning)
+
+    def moment(self) -> tuple[Floats, Floats]:
+        """``sum M d`` [kg m] and ``sum M V`` [kg m/s], (3,) each."""
+        state = self._every
+        return self.mass @ state.shift, self.mass @ state.velocity
+
+    # --- in a march ----------------------------------------------------------------------------
+
+    def lists_split(
+        self, loads: kernel.Loads, held: kernel.Constraints
+    ) -> tuple[kernel.Loads, kernel.Constraints]:
+        """Take from the lists what is on rigid bodies; returns the rest."""
+        loads, held, mine, holds = conditions_split(loads, held, self.of_place >= 0)
+        row, component = self.of_place[mine.node_at // 4], mine.node_at % 4
+        order = np.argsort(self.body[row], kind="stable")
+        row = row[order]
+        self._every = self._every._replace(
+            load_first=np.searchsorted(self.body[row], np.arange(len(self.bodies) + 1)),
+            load_component=component[order],
+            load_series=mine.series[order],
+            load_weight=mine.weight[order],
+            load_arm=np.ascontiguousarray(self.arm[row]),
+        )
+        row, component = self.of_place[holds.node_at // 4], holds.node_at % 4
+        for b, body in enumerate(self.bodies):
+            on = self.body[row] == b
+            hold = hold_of(
+                self.arm[row[on]], component[on], holds.series[on], holds.weight[on], body.name
+            )
+            self._every.given[b], self._every.given_weight[b] = hold.given, hold.weight
+            self._turning_set(b, hold.turning)
+        self._seen = None
+        return loads, held
+
+    def _turning_set(self, b: int, turning: int) -> None:
+        """Hold or free the turns of a body; what stops them does work, as it does on shifts."""
+        if turning == self._every.turning[b] == FREE:
+            return
+        before = self.kinetic()
+        omega = self._omega(b, self._every.spin[b])
+        self._every.turning[b] = turning
+        held = ~self._turns_free(b)
+        if self._every.turn[b, 1:][held].any():
+            raise ConditionError(
+                "what is to hold it has turned already, and can not be brought back",
+                where=self.bodies[b].name,
+                remedy="hold a rigid body before it turns",
+            )
+        omega[held] = 0.0
+        self._every.spin[b] = self.inertia(b) @ omega
+        self.run.motion.work[1] += self.kinetic() - before
+
+    def half_kick(self, sign: int) -> None:
+        """Take the motion half a step on (``sign`` 1) or back (-1), with its account of work."""
+        behind, now = self._ends()
+        to = now if sign > 0 else behind
+        self.run.motion.work += sign * self.half_work()
+        self._every.velocity[:], self._every.spin[:] = to.velocity, to.spin
+
+    def _ends(self) -> tuple[RigidNow, RigidNow]:
+        """The motion half a step ago, and now."""
+        state, now = self._every, self.now()
+        if self.run.motion.behind:
+            return RigidNow(state.velocity.copy(), state.spin.copy()), now
+        force, torque = self.forces()
+        half = 0.5 * self.run.step
+        change = np.where(self._every.given < 0, half * force / self.mass[:, None], 0.0)
+        return RigidNow(now.velocity - change, now.spin - half * torque), now
+
+    def half_work(self) -> Floats:
+        """Work in the half step up to now [J], (2,): of loads, of prescribed motion."""
+        behind, now = self._ends()
+        state, half = self._every, 0.5 * self.run.step
+        mean = 0.5 * (behind.velocity + now.velocity)
+        turn = 0.5 * (self.omega(behind.spin) + self.omega(now.spin))
+        loads, levers = self.loads_now()
+        missing = self.mass[:, None] * (now.velocity - behind.velocity) - half * self.forces()[0]
+        held = state.given >= 0
+        of_loads = half * (loads * mean + levers * turn).sum()
+        return np.array([of_loads, (missing * mean)[held].sum()])
+
+    def kernel_of(self, probed: Integers) -> Rigid:
+        """What a step of a march reads: vertices that may touch, and nodes that are probed.
+
+        ``probed``: 4 x kernel number of nodes of any bodies.  Other nodes follow when the march
+        comes back, by `follow`.
+        """
+        if self._seen is None or not np.array_equal(self._seen, probed):
+            needed = np.zeros(len(self.nodes), dtype=bool)
+            if self.run.contacts is not None:
+                row = self.of_place[self.run.contacts.place]
+                needed[row[row >= 0]] = True
+            row = self.of_place[probed // 4]
+            needed[row[row >= 0]] = True
+            names = ("node_first", "node_at", "force_at", "arm")
+            vertices = self._vertices(np.flatnonzero(needed))
+            self._following = np.flatnonzero(~needed)
+            self.kernel = self._every._replace(**dict(zip(names, vertices, strict=True)))
+            self._seen = probed.copy()
+        return self.kernel
+
+    def window(
+        self, steps: int, step: float, loads: kernel.Loads, held: kernel.Constraints,
+        probes: kernel.Probes, table: Floats, gravity: Floats | None, work: Floats,
+    ) -> tuple[int, float]:  # fmt: skip
+        """`Assembly.window` with rigid bodies that touch nothing."""
+        from qdem_fem.contact_window import window_run
+
+        done, bad, _ = window_run(
+            self.run, None, steps, step, loads, held, probes, table, gravity, work
+        )
+        return done, bad
+
+    def follow(self) -> None:
+        """Put the nodes that no step moves where their bodies are."""
+        at = 4 * self.place[self._following][:, None] + np.arange(3)
+        body, arm = self.body[self._following], self.arm[self._following]
+        moved = self._every.shift[body] + (self._turned(body, arm) - arm)
+        self.run.assembly.state.displacement[at] = moved
+
+    # --- for the step and the files ------------------------------------------------------------
+
+    def frequency_bound(self, nodes: Integers, stiffness: Floats) -> Floats:
+        """Highest omega^2 [1/s^2] of the body of each node under springs at these nodes, (c,).
+
+        ``nodes`` (c,) in the numbers of all bodies, ``stiffness`` (c,) [N/m] of all springs of a
+        node; zero for nodes of deformable bodies.
+        """
+        row = self.of_place[self.run.assembly.place[nodes]]
+        bound = np.zeros(len(nodes))
+        for b, own in enumerate(self.own):
+            mine = np.flatnonzero((row >= 0) & (self.body[np.maximum(row, 0)] == b))
+            free = np.append(self._every.given[b] < 0, self._turns_free(b))
+            if free.any() and len(mine):
+                bound[mine] = frequency_squared(own, self.arm[row[mine]], stiffness[mine], free)
+        return bound
+
+    def _turns_free(self, b: int) -> NDArray[np.bool_]:
+        """Which turns about the laboratory's axes a body may make, (3,)."""
+        turning = int(self._every.turning[b])
+        return np.array([turning in (FREE, axis) for axis in range(3)]) & (turning != STILL)
+
+    def stored(self) -> dict[str, NDArray[Any]]:
+        """The state, to the bit."""
+        return {f"rigid_{name}": getattr(self._every, name) for name in STATE}
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take what `stored` gave."""
+        for name in STATE:
+            getattr(self._every, name)[:] = arrays[f"rigid_{name}"]
