@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from qdem_fem import kernel
 from qdem_fem.contact_kernel import TOO_DEEP
-from qdem_fem.contact_spheres import ContactPlane
+from qdem_fem.contact_spheres import ContactPlane, SphereContact
 from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
+from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.contact_window import advance_of, window_run
 from qdem_fem.errors import ContactTooDeep, StepWarning
 
@@ -53,6 +54,7 @@ class Contacts(ABC):
     """
 
     kernel: Any
+    asked: SphereContact | SurfaceContact
     skin: float
     one: Floats
     """(c,) stiffness of one contact of each vertex [N/m]."""
