@@ -15,14 +15,13 @@ from qdem_fem.errors import ConditionError
 from qdem_fem.rigid_conditions import conditions_split, hold_of
 from qdem_fem.rigid_mass import (
     RigidMass,
-    frequency_squared,
     rigid_displacement_fit,
     rigid_velocity_fit,
+    stiffness_six,
     turn_matrix,
 )
 from qdem_fem.rigid_step import (
     FREE,
-    STILL,
     Rigid,
 )
 
@@ -58,6 +57,12 @@ class RigidBodies:
         self.bodies: list[Body] = [run.bodies[i] for i in self.number]
         self.own: list[RigidMass] = [body.rigid_mass for body in self.bodies]
         self.mass = np.array([own.mass for own in self.own])
+        self._tensor = np.array([own.tensor for own in self.own])
+        inertia = np.zeros((len(self.own), 6, 6))
+        inertia[:, :3, :3] = self.mass[:, None, None] * np.eye(3)
+        inertia[:, 3:, 3:] = self._tensor
+        self._root = np.linalg.inv(np.linalg.cholesky(inertia))
+        """Of the inertia, such that ``root K root^T`` has the squared frequencies, (b, 6, 6)."""
         starts = run.first_node[self.number]
         self.nodes = np.concatenate(
             [start + np.arange(len(b.nodes)) for b, start in zip(self.bodies, starts, strict=True)]
@@ -117,22 +122,22 @@ class RigidBodies:
 
     def _shift_set(self, b: int, values: Floats) -> None:
         body, state = self.bodies[b], self._every
-        omega = self._omega(b, state.spin[b])
+        omega = self.omega(state.spin)[b]
         state.shift[b], state.turn[b] = rigid_displacement_fit(
             body.nodes, self.own[b].centre, values, body.name
         )
-        state.spin[b] = self.inertia(b) @ omega
+        state.spin[b] = self.inertia()[b] @ omega
 
     def _velocity_set(self, b: int, values: Floats) -> None:
         arm = self.arm_now()[self.body == b]
         velocity, omega = rigid_velocity_fit(arm, values, self.bodies[b].name)
         self._every.velocity[b] = velocity
-        self._every.spin[b] = self.inertia(b) @ omega
+        self._every.spin[b] = self.inertia()[b] @ omega
 
-    def inertia(self, b: int) -> Floats:
-        """Inertia of a body about its centre as it is turned now, (3, 3) [kg m^2]."""
-        turn = np.eye(3) + turn_matrix(self._every.turn[b])
-        return np.asarray(turn @ self.own[b].tensor @ turn.T)
+    def inertia(self) -> Floats:
+        """Inertia of the bodies about their centres as they are turned now [kg m^2], (b, 3, 3)."""
+        turn = np.eye(3) + turn_matrix(self._every.turn)
+        return np.asarray(turn @ self._tensor @ turn.transpose(0, 2, 1))
 
     def arm_now(self) -> Floats:
         """From the centres to all nodes as they are turned now [m], (v, 3)."""
@@ -181,19 +186,14 @@ class RigidBodies:
         return force, torque
 
     def _turned(self, body: Integers, arm: Floats) -> Floats:
-        turns = np.array([turn_matrix(turn) for turn in self._every.turn])
-        return arm + np.einsum("vij,vj->vi", turns[body], arm)
+        return arm + np.einsum("vij,vj->vi", turn_matrix(self._every.turn)[body], arm)
 
     def omega(self, spin: Floats) -> Floats:
         """Angular velocities [1/s] of angular momenta (b, 3) about the centres."""
-        return np.array([self._omega(b, spin[b]) for b in range(len(self.bodies))])
-
-    def _omega(self, b: int, spin: Floats) -> Floats:
-        free = self._turns_free(b)
-        omega = np.zeros(3)
-        if free.any():
-            omega[free] = np.linalg.solve(self.inertia(b)[np.ix_(free, free)], spin[free])
-        return omega
+        free, inertia = self._turns_free(), self.inertia()
+        held = ~(free[:, :, None] & free[:, None, :])
+        inertia[held] = np.broadcast_to(np.eye(3), inertia.shape)[held]
+        return np.asarray(np.linalg.solve(inertia, (spin * free)[:, :, None])[:, :, 0])
 
     def velocity_field(self) -> Floats:
         """Velocity of all nodes at the time of the displacements [m/s], (v, 3)."""
@@ -245,9 +245,9 @@ class RigidBodies:
         if turning == self._every.turning[b] == FREE:
             return
         before = self.kinetic()
-        omega = self._omega(b, self._every.spin[b])
+        omega = self.omega(self._every.spin)[b]
         self._every.turning[b] = turning
-        held = ~self._turns_free(b)
+        held = ~self._turns_free()[b]
         if self._every.turn[b, 1:][held].any():
             raise ConditionError(
                 "what is to hold it has turned already, and can not be brought back",
@@ -255,7 +255,7 @@ class RigidBodies:
                 remedy="hold a rigid body before it turns",
             )
         omega[held] = 0.0
-        self._every.spin[b] = self.inertia(b) @ omega
+        self._every.spin[b] = self.inertia()[b] @ omega
         self.run.motion.work[1] += self.kinetic() - before
 
     def half_kick(self, sign: int) -> None:
@@ -335,18 +335,20 @@ class RigidBodies:
         node; zero for nodes of deformable bodies.
         """
         row = self.of_place[self.run.assembly.place[nodes]]
+        mine = row >= 0
+        body = self.body[row[mine]]
+        spring = stiffness_six(body, self.arm[row[mine]], stiffness[mine], len(self.bodies))
+        free = np.concatenate([self._every.given < 0, self._turns_free()], axis=1)
+        spring *= free[:, :, None] & free[:, None, :]
+        highest = np.linalg.eigvalsh(self._root @ spring @ self._root.transpose(0, 2, 1))[:, -1]
         bound = np.zeros(len(nodes))
-        for b, own in enumerate(self.own):
-            mine = np.flatnonzero((row >= 0) & (self.body[np.maximum(row, 0)] == b))
-            free = np.append(self._every.given[b] < 0, self._turns_free(b))
-            if free.any() and len(mine):
-                bound[mine] = frequency_squared(own, self.arm[row[mine]], stiffness[mine], free)
+        bound[mine] = highest[body]
         return bound
 
-    def _turns_free(self, b: int) -> NDArray[np.bool_]:
-        """Which turns about the laboratory's axes a body may make, (3,)."""
-        turning = int(self._every.turning[b])
-        return np.array([turning in (FREE, axis) for axis in range(3)]) & (turning != STILL)
+    def _turns_free(self) -> NDArray[np.bool_]:
+        """Which turns about the laboratory's axes each body may make, (b, 3)."""
+        turning = self._every.turning[:, None]
+        return np.asarray((turning == FREE) | (turning == np.arange(3)))
 
     def stored(self) -> dict[str, NDArray[Any]]:
         """The state, to the bit."""

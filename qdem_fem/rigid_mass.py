@@ -73,28 +73,28 @@ def cross_matrix(vector: Floats) -> Floats:
     return rows.reshape(*vector.shape[:-1], 3, 3)
 
 
-def frequency_squared(
-    own: RigidMass, arm: Floats, stiffness: Floats, free: NDArray[np.bool_]
-) -> float:
-    """Highest omega^2 [1/s^2] of a rigid body on springs to what does not move.
+def stiffness_six(body: Integers, arm: Floats, stiffness: Floats, count: int) -> Floats:
+    """``K = sum k J^T J`` of springs on rigid bodies, ``J = (1, -[r])``, (count, 6, 6).
 
-    ``arm`` (v, 3) [m]: from its centre to the springs; ``stiffness`` (v,) [N/m]: in all
-    directions; ``free`` (6,): shifts and turns that are not held.  The highest eigenvalue of
-    ``M^-1 K``, 6 by 6, with ``K = sum k J^T J``, ``J = (1, -[r])``.
+    ``body`` (v,), ``arm`` (v, 3) [m]: of each spring, from its body's centre; ``stiffness`` (v,)
+    [N/m]: in all directions.
     """
-    motion = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -cross_matrix(arm)], 2)
-    spring = np.einsum("v,vki,vkj->ij", stiffness, motion, motion)
-    inertia = np.zeros((6, 6))
-    inertia[:3, :3], inertia[3:, 3:] = own.mass * np.eye(3), own.tensor
-    chosen = np.ix_(free, free)
-    root = np.linalg.inv(np.linalg.cholesky(inertia[chosen]))
-    return float(np.linalg.eigvalsh(root @ spring[chosen] @ root.T)[-1])
+    total = np.bincount(body, stiffness, count)
+    first, second = np.zeros((count, 3)), np.zeros((count, 3, 3))
+    np.add.at(first, body, stiffness[:, None] * arm)
+    np.add.at(second, body, stiffness[:, None, None] * arm[:, :, None] * arm[:, None, :])
+    spring = np.zeros((count, 6, 6))
+    spring[:, :3, :3] = total[:, None, None] * np.eye(3)
+    spring[:, 3:, :3] = cross_matrix(first)
+    spring[:, :3, 3:] = -cross_matrix(first)
+    spring[:, 3:, 3:] = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+    return spring
 
 
 def turn_matrix(turn: Floats) -> Floats:
-    """``R - 1`` of a unit quaternion (4,), scalar first, without cancellation, (3, 3)."""
-    across = cross_matrix(turn[1:])
-    return np.asarray(2 * (turn[0] * across + across @ across))
+    """``R - 1`` of unit quaternions (..., 4), scalar first, without cancellation, (..., 3, 3)."""
+    across = cross_matrix(turn[..., 1:])
+    return np.asarray(2 * (turn[..., :1, None] * across + across @ across))
 
 
 def rigid_displacement_fit(

@@ -85,6 +85,12 @@ def triple(a: Any, i: int) -> Any:  # pragma: no cover
 
 
 @inlined
+def axis_of(axes: Any, b: int, i: int) -> Any:  # pragma: no cover
+    """Principal axis i of body b."""
+    return axes[b, i, 0], axes[b, i, 1], axes[b, i, 2]
+
+
+@inlined
 def turned_less(q: Any, a: Any) -> Any:  # pragma: no cover
     """``R(q) a - a``: with ``t = 2 v x a`` it is ``q0 t + v x t``."""
     v = q[1], q[2], q[3]
@@ -102,9 +108,8 @@ def turned(q: Any, a: Any) -> Any:  # pragma: no cover
 
 
 @inlined
-def turned_on(q: Any, axis: Any, angle: float) -> Any:  # pragma: no cover
-    """``q`` behind a turn by ``angle`` [rad] about ``axis`` (unit) of the body."""
-    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+def turned_on(q: Any, axis: Any, c: float, s: float) -> Any:  # pragma: no cover
+    """``q`` behind a turn about ``axis`` (unit) of the body; ``c``, ``s``: of half its angle."""
     x, y, z = s * axis[0], s * axis[1], s * axis[2]
     return (
         q[0] * c - q[1] * x - q[2] * y - q[3] * z,
@@ -114,31 +119,30 @@ def turned_on(q: Any, axis: Any, angle: float) -> Any:  # pragma: no cover
     )
 
 
-@exact
-def drift(q: Any, axes: Any, inverse: Any, spin: Any, step: float) -> Any:  # pragma: no cover
-    """The turn after ``step`` [s] without torque; ``axes`` (3, 3), ``inverse`` (3,) 1/I."""
-    back = q[0], -q[1], -q[2], -q[3]
-    own = turned(back, spin)
-    m0, m1, m2 = dot(triple(axes, 0), own), dot(triple(axes, 1), own), dot(triple(axes, 2), own)
-    half = 0.5 * step
-    angle = half * m0 * inverse[0]
-    q, (m1, m2) = turned_on(q, triple(axes, 0), angle), around(m1, m2, angle)
-    angle = half * m1 * inverse[1]
-    q, (m2, m0) = turned_on(q, triple(axes, 1), angle), around(m2, m0, angle)
-    angle = step * m2 * inverse[2]
-    q, (m0, m1) = turned_on(q, triple(axes, 2), angle), around(m0, m1, angle)
-    angle = half * m1 * inverse[1]
-    q, (m2, m0) = turned_on(q, triple(axes, 1), angle), around(m2, m0, angle)
-    q = turned_on(q, triple(axes, 0), half * m0 * inverse[0])
-    scale = 1.0 / np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    return q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale
+@inlined
+def around(q: Any, axis: Any, m: float, n: float, angle: float) -> Any:  # pragma: no cover
+    """``q`` behind a turn by ``angle`` [rad], and the next two components of a fixed vector."""
+    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    whole, across = c * c - s * s, 2.0 * c * s
+    return turned_on(q, axis, c, s), whole * m + across * n, whole * n - across * m
 
 
 @inlined
-def around(m: float, n: float, angle: float) -> Any:  # pragma: no cover
-    """The next two components of a fixed vector in a frame that turns by ``angle`` [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    return c * m + s * n, c * n - s * m
+def drift(c: Any, b: int, q: Any, spin: Any, step: float) -> Any:  # pragma: no cover
+    """The turn of body b after ``step`` [s] without torque."""
+    first, second, third = axis_of(c.axes, b, 0), axis_of(c.axes, b, 1), axis_of(c.axes, b, 2)
+    inverse = triple(c.inverse_inertia, b)
+    back = q[0], -q[1], -q[2], -q[3]
+    own = turned(back, spin)
+    m0, m1, m2 = dot(first, own), dot(second, own), dot(third, own)
+    half = 0.5 * step
+    q, m1, m2 = around(q, first, m1, m2, half * m0 * inverse[0])
+    q, m2, m0 = around(q, second, m2, m0, half * m1 * inverse[1])
+    q, m0, m1 = around(q, third, m0, m1, step * m2 * inverse[2])
+    q, m2, m0 = around(q, second, m2, m0, half * m1 * inverse[1])
+    q, m1, m2 = around(q, first, m1, m2, half * m0 * inverse[0])
+    scale = 1.0 / np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale
 
 
 @exact
@@ -151,14 +155,14 @@ def angular_velocity(c: Any, b: int, spin: Any) -> Any:  # pragma: no cover
     if turning != FREE:
         moment = 0.0  # e . I e of the axis e, which the turn about e leaves as it is
         for i in range(3):
-            along = turned(q, triple(c.axes[b], i))[turning]
+            along = turned(q, axis_of(c.axes, b, i))[turning]
             moment += along * along / c.inverse_inertia[b, i]
         rate = spin[turning] / moment
         if turning == 0:
             return rate, y, z
         return (x, rate, z) if turning == 1 else (x, y, rate)
     for i in range(3):
-        axis = turned(q, triple(c.axes[b], i))
+        axis = turned(q, axis_of(c.axes, b, i))
         rate = dot(axis, spin) * c.inverse_inertia[b, i]
         x, y, z = x + rate * axis[0], y + rate * axis[1], z + rate * axis[2]
     return x, y, z
@@ -170,7 +174,7 @@ def quaternion(c: Any, b: int) -> Any:  # pragma: no cover
     return c.turn[b, 0], c.turn[b, 1], c.turn[b, 2], c.turn[b, 3]
 
 
-@exact
+@inlined
 def pulls_take(c: Any, b: int, forces: Any) -> Any:  # pragma: no cover
     """Force [N] and torque [N m] of what lies at the vertices of body b, which is taken away."""
     q, force, torque = quaternion(c, b), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -206,17 +210,20 @@ def pull_add(force: Any, torque: Any, arm: Any, f: Any) -> Any:  # pragma: no co
     )
 
 
-@exact
+@inlined
 def vertices_place(
     c: Any, b: int, displacement: Any, velocity: Any, step: float
 ) -> None:  # pragma: no cover
     """Move the vertices of body b; their velocity is the way in this step over ``step`` [s]."""
-    q = quaternion(c, b)
+    q, rate = quaternion(c, b), 1.0 / step
+    x = turned_less(q, (1.0, 0.0, 0.0))
+    y = turned_less(q, (0.0, 1.0, 0.0))
+    z = turned_less(q, (0.0, 0.0, 1.0))
     for i in range(c.node_first[b], c.node_first[b + 1]):
-        less, at = turned_less(q, triple(c.arm, i)), c.node_at[i]
+        arm, at = triple(c.arm, i), c.node_at[i]
         for k in range(3):
-            there = c.shift[b, k] + less[k]
-            velocity[at + k] = (there - displacement[at + k]) / step
+            there = c.shift[b, k] + (x[k] * arm[0] + y[k] * arm[1] + z[k] * arm[2])
+            velocity[at + k] = (there - displacement[at + k]) * rate
             displacement[at + k] = there
 
 
@@ -233,12 +240,16 @@ def rigid_advance(
     """
     for b in range(c.inverse_mass.size):
         pull, twist = pulls_take(c, b, forces)
-        load, lever = loads_take(c, b, table[0])
-        spin = triple(c.spin, b)
-        slow = angular_velocity(c, b, spin)
+        load, lever = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        slow, fast, turning = load, load, c.turning[b]
+        loaded = c.load_first[b + 1] > c.load_first[b]
+        if loaded:
+            load, lever = loads_take(c, b, table[0])
+            slow = angular_velocity(c, b, triple(c.spin, b))
         for k in range(3):
             c.spin[b, k] += step * (twist[k] + lever[k])
-        fast = angular_velocity(c, b, triple(c.spin, b))
+        if loaded or turning != FREE:
+            fast = angular_velocity(c, b, triple(c.spin, b))
         done = 0.0
         for k in range(3):
             before = c.velocity[b, k]
@@ -256,9 +267,9 @@ def rigid_advance(
             c.velocity[b, k] = after
             done += load[k] * (before + after) + lever[k] * (slow[k] + fast[k])
         work[0] += 0.5 * step * done
-        turning, q = c.turning[b], quaternion(c, b)
+        q = quaternion(c, b)
         if turning == FREE:
-            q = drift(q, c.axes[b], c.inverse_inertia[b], triple(c.spin, b), step)
+            q = drift(c, b, q, triple(c.spin, b), step)
         elif turning != STILL:
             q = turned_about(q, fast, step)
         c.turn[b, 0], c.turn[b, 1], c.turn[b, 2], c.turn[b, 3] = q
@@ -271,4 +282,5 @@ def turned_about(q: Any, rate: Any, step: float) -> Any:  # pragma: no cover
     size = np.sqrt(dot(rate, rate))
     scale = 1.0 / size if size > 0.0 else 0.0
     axis = rate[0] * scale, rate[1] * scale, rate[2] * scale
-    return turned_on(q, turned((q[0], -q[1], -q[2], -q[3]), axis), size * step)
+    half, own = 0.5 * size * step, turned((q[0], -q[1], -q[2], -q[3]), axis)
+    return turned_on(q, own, np.cos(half), np.sin(half))
