@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 import qdem_fem as q
 from adapters.provenance import provenance
 from adapters.run_folder import write_atomically
+from qdem_fem.advise import compliance_of
 from qdem_fem.advise_cli import advice_check, advise_scene
 from qdem_fem.grain_form import GrainRecipe
 from qdem_fem.grain_grading import PAPER_SIZE
@@ -156,7 +157,10 @@ def top_part() -> Row:
 
 
 def advise_part() -> Row:
-    """Predicted and measured error of two rigid stones on a soft pad, by their modulus."""
+    """Predicted and measured error of two rigid stones on a soft pad, by their modulus.
+
+    ``paper``: compliance of a grain's softest vertex over that of a contact of Table 1.
+    """
     rows = []
     for young in (1e9, 3e9, 10e9, 30e9, 100e9, 300e9):
         marks = [f"body.{i}.material.young={young!r}" for i in (1, 2)]
@@ -166,7 +170,8 @@ def advise_part() -> Row:
             chosen = [replace(one, rigid=one.body != "pad") for one in advice]
             checked = advice_check(STONES, marks, chosen)
         rows.append({"young": young, "predicted": checked.predicted, "measured": checked.measured})
-    return {"rows": rows}
+    grain = q.Body(grains_make(1, 1, GrainRecipe(), PAPER_SIZE, 1).mesh(0), STONE)
+    return {"rows": rows, "paper": compliance_of(grain).vertex * 1.613e9}
 
 
 PARTS: dict[str, Callable[[], Row]] = {
