@@ -110,6 +110,11 @@ class RigidBodies:
             np.ascontiguousarray(self.arm[chosen]),
         )
 
+    def number_of(self, node: int) -> int:
+        """The rigid body that a node is of, in the numbers of all bodies; -1: none."""
+        row = int(self.of_place[self.run.assembly.place[node]])
+        return int(self.body[row]) if row >= 0 else -1
+
     # --- what the user sets and sees -----------------------------------------------------------
 
     def field_set(self, body: Body, name: str, values: Floats) -> None:

@@ -93,7 +93,9 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         if table.method == "static":
             held_check(run)
     except ConditionError as error:
-        where = "body" if error.where in bodies else error.where.replace("relax", "fix")
+        where = error.where.replace("relax", "fix")
+        if where in bodies:
+            where = f"body.{list(bodies).index(where)}"
         prepared.text.refuse([Problem(where, error_told(error))])
     return run, bodies
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,10 +17,13 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj
 
 import qdem_fem as q
+import trackbed
 from qdem_fem.contact_step import network_bound
-from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, Unstable
+from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, SceneError, Unstable
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.rigid_mass import cross_matrix, rigid_mass
+from qdem_fem.scene_build import simulation_of
+from qdem_fem.scene_checks import scene_load
 from validation.qdem_contact_trials import slope_gain
 
 Floats = NDArray[np.float64]
@@ -395,22 +399,24 @@ def test_held_and_driven_freedoms() -> None:
     body = spun(brick(), [1.0, 2, 3], [1.0, 1, 1])
     run = q.Simulation([body], step=1e-4, contact=FAR, threads=1)
     started = total(run)
-    run.fix(body, low)
+    fixed = run.fix(body, low)
     run.load(body, 0, [1.0, 2, 3])
     run.advance(0.01)
     assert not body.displacement.any()
     assert not body.velocity.any()
+    np.testing.assert_allclose(run.reaction(fixed), [-1.0, -2, -3], rtol=1e-12)
     assert run.energy().kinetic == 0.0
     assert run.energy().external == pytest.approx(-started, rel=1e-12)
 
     body = brick()
     run = q.Simulation([body], step=1e-4, contact=FAR, threads=1)
     mass = body.rigid_mass.mass
-    run.prescribe(body, body.nodes[:, 2] > -1, "x", lambda t: 3 * t**2)
+    driven = run.prescribe(body, body.nodes[:, 2] > -1, "x", lambda t: 3 * t**2)
     run.advance(0.1)
     np.testing.assert_allclose(body.displacement, np.tile([0.03, 0, 0], (27, 1)), atol=1e-12)
     assert run.energy().kinetic == pytest.approx(mass * 0.6**2 / 2, rel=1e-9)
     assert run.energy().external == pytest.approx(run.energy().kinetic, rel=1e-2)
+    assert run.reaction(driven)[0] == pytest.approx(6 * mass, rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -493,3 +499,54 @@ def test_resume_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     assert whole.energy() == second.energy()
     with pytest.raises(CheckpointError, match="rigid"):
         made(("lumped", False)).restore(tmp_path / "state.npz")
+
+
+SCENE = """
+[simulation]
+duration = 1e-5
+[[body]]
+name = "stone"
+rigid = true
+mesh = { box = { size = [0.02, 0.03, 0.05], cells = [1, 1, 1] } }
+material = { young = 3e10, poisson = 0.2, density = 2700, shear_viscosity = 1e4 }
+[contact]
+model = "spheres"
+radius = 0.006
+normal_stiffness = 1e8
+friction = 0.5
+[output]
+modes = 0
+[output.probes.top]
+nearest = [0, 0, 0.05]
+"""
+
+
+def test_a_scene_names_its_rigid_bodies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The key becomes the body's; its viscosity counts for nothing; what is refused has a key."""
+    file = tmp_path / "scene.toml"
+    file.write_text(SCENE, encoding="utf-8")
+    prepared = scene_load(file)
+    run, bodies = simulation_of(prepared)
+    assert bodies["stone"].rigid is True
+    assert not run.viscous
+    left = prepared.scene.left_out()
+    assert any("deformation" in text for text in left)
+    assert any(text.startswith("viscosity") for text in left)
+    assert trackbed.main(["qdem", str(file), "--no-pictures"]) == 0
+    assert "governed by contact" in capsys.readouterr().out
+    alone = SCENE[: SCENE.index("[contact]")] + SCENE[SCENE.index("[output]") :]
+    file.write_text(alone.replace("duration = 1e-5", "duration = 1e-5\nstep = 1e-6"))
+    assert trackbed.main(["qdem", str(file), "--force", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["critical_step"]["value"] is None
+    file.write_text(SCENE, encoding="utf-8")
+    lumped = scene_load(file, ['body.0.rigid="lumped"'])
+    assert simulation_of(lumped)[1]["stone"].rigid == "lumped"
+    with pytest.raises(SceneError, match="rigid"):
+        scene_load(file, ['body.0.rigid="stiff"'])
+    hinge = SCENE + '[[fix]]\nbody = "stone"\nnodes = { nearest = [0, 0, 0] }\n'
+    file.write_text(hinge, encoding="utf-8")
+    with pytest.raises(SceneError, match=r"body.0: what is held leaves the rigid body a motion"):
+        simulation_of(scene_load(file))
+    file.write_text(alone, encoding="utf-8")
+    with pytest.raises(ConditionError, match="double precision"):
+        simulation_of(scene_load(file, ['simulation.precision="float32"']))
