@@ -254,4 +254,4 @@ def _why(
 def error_together(advice: Sequence[Advice]) -> float:
     """Predicted error where all that may be rigid are [-]: the two greatest meet in a contact."""
     errors = sorted((one.error for one in advice if one.rigid), reverse=True)
-    return sum(errors[:2])
+    return min(1.0, sum(errors[:2]))

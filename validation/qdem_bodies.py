@@ -23,7 +23,7 @@ import qdem_fem as q
 from adapters.provenance import provenance
 from adapters.run_folder import write_atomically
 from qdem_fem.advise import compliance_of
-from qdem_fem.advise_cli import advice_check, advise_scene
+from qdem_fem.advise_check import advice_check, advise_scene
 from qdem_fem.grain_form import GrainRecipe
 from qdem_fem.grain_grading import PAPER_SIZE
 from qdem_fem.grain_set import grains_make

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import qdem_fem as q
 import trackbed
 from qdem_fem.advise import advise, compliance_of, error_together, stiffness_matrix
-from qdem_fem.advise_cli import advice_check, advise_scene
+from qdem_fem.advise_check import advice_check, advise_scene
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.sleeper_modes import free_modes
 from validation.qdem_bodies import STONES
