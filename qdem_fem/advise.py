@@ -219,7 +219,10 @@ def advise(run: Simulation, tolerance: float = 0.01) -> list[Advice]:
         if not why and mine.any():
             arm = body.nodes[node[mine] - start] - body.rigid_mass.centre
             try:
-                hold_of(arm, held.node_at[mine] % 4, held.series[mine], held.weight[mine], "")
+                component, series, weight = (
+                    values[mine] for values in (held.node_at % 4, held.series, held.weight)
+                )
+                hold_of(body.rigid_mass, arm, component, series, weight, body.name)
             except ConditionError as wrong:
                 why = wrong.what
         if any(((c.nodes >= start) & (c.nodes < stop)).any() for c in run.conditions.rollers) or (

@@ -90,9 +90,8 @@ class RigidBodies(RigidState):
         row, component = self.of_place[holds.node_at // 4], holds.node_at % 4
         for b, body in enumerate(self.bodies):
             on = self.body[row] == b
-            hold = hold_of(
-                self.arm[row[on]], component[on], holds.series[on], holds.weight[on], body.name
-            )
+            arm, series, weight = self.arm[row[on]], holds.series[on], holds.weight[on]
+            hold = hold_of(self.own[b], arm, component[on], series, weight, body.name)
             self._every.given[b], self._every.given_weight[b] = hold.given, hold.weight
             self._turning_set(b, hold.turning)
         self._seen = None

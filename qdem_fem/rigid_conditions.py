@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from qdem_fem import kernel
 from qdem_fem.errors import ConditionError
-from qdem_fem.rigid_mass import cross_matrix
+from qdem_fem.rigid_mass import RigidMass, cross_matrix
 from qdem_fem.rigid_step import FREE, STILL
 
 Floats = NDArray[np.float64]
@@ -32,18 +32,23 @@ class RigidHold:
 
 
 def hold_of(
-    arm: Floats, component: Integers, series: Integers, weight: Floats, where: str
+    own: RigidMass,
+    arm: Floats,
+    component: Integers,
+    series: Integers,
+    weight: Floats,
+    where: str,
 ) -> RigidHold:
     """The hold of a body by components of some nodes.
 
     ``arm`` (h, 3) [m]: from the centre to the node of each; ``component`` (h,); it follows
     ``weight`` (h,) times ``series`` (h,).  What the six freedoms may still do is the null space of
-    the components' motion.  It is taken where it is some of the three shifts and all turns, the
-    turn about one axis of coordinates through the centre, or none; then no finite motion leaves
-    it.  Raises `ConditionError` for any other, a hinge for example, and for components that
+    the components' motion.  It is taken where it is some of the three shifts with all turns about
+    the centre, the turn about one axis of coordinates through it, or none; then no finite motion
+    leaves it.  Raises `ConditionError` for any other, a hinge for example, and for components that
     follow different motions.
     """
-    size = max(float(abs(arm).max(initial=0.0)), 1e-300)
+    size = float(np.sqrt(own.inertia[-1] / own.mass))
     rows = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -cross_matrix(arm / size)], 2)
     rows = rows[np.arange(len(arm)), component]
     _, stretch, motions = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]))
@@ -51,7 +56,7 @@ def hold_of(
     left = loose.T @ loose
     mask = np.diag(left) > 0.5
     turns = mask[3:].sum()
-    if abs(left - np.diag(mask)).max() > 1e-6 or turns == 2 or (turns == 3 and len(set(mask)) > 2):
+    if abs(left - np.diag(mask)).max() > 1e-6 or turns == 2:
         raise ConditionError(
             "what is held leaves the rigid body a motion about its nodes, a hinge or a slope",
             where=where,

@@ -25,6 +25,7 @@ def page(parts: Data) -> str:
     """The whole page in Markdown."""
     rows = {name: part["rows"] for name, part in parts.items()}
     grains = [row for row in rows["inertia"] if row["body"].startswith("grain")]
+    over = [row["predicted"] / row["measured"] for row in rows["advise"]]
     least, most = min(r["least"] for r in grains), max(r["greatest"] for r in grains)
     return WORDS.read_text(encoding="utf-8").format(
         machine=parts["cost"]["origin"]["machine"],
@@ -48,7 +49,8 @@ def page(parts: Data) -> str:
             f"{r['predicted'] / r['measured']:.1f}"
             for r in rows["advise"]
         ),
-        paper=f"{parts['advise']['paper']:.1f} times",
+        over=f"{min(over):.1f} to {max(over):.1f}",
+        paper=f"{parts['advise']['paper']:.1f}",
         cost=_table(
             f"{r['contact']} | {1e6 * r['deformable_s']:.0f} µs | {1e6 * r['rigid_s']:.0f} µs | "
             f"{r['deformable_s'] / r['rigid_s']:.1f}"

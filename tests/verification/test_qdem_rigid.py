@@ -408,6 +408,14 @@ def test_held_and_driven_freedoms() -> None:
     assert run.energy().kinetic == 0.0
     assert run.energy().external == pytest.approx(-started, rel=1e-12)
 
+    body = spun(brick(), [1.0, 2, 3], [1.0, 1, 1])
+    run = q.Simulation([body], step=1e-4, contact=FAR, threads=1)
+    run.fix(body, 13)  # its centre: it goes on turning
+    run.advance(0.01)
+    assert abs(body.displacement[13]).max() < 1e-16
+    spin = (body.rigid_mass.tensor @ np.array([1.0, 2, 3])) @ [1.0, 2, 3]
+    assert run.energy().kinetic == pytest.approx(spin / 2, rel=1e-6)
+
     body = brick()
     run = q.Simulation([body], step=1e-4, contact=FAR, threads=1)
     mass = body.rigid_mass.mass
@@ -424,6 +432,7 @@ def test_held_and_driven_freedoms() -> None:
     [
         (lambda run, body: run.fix(body, 0), "leaves the rigid body a motion about its nodes"),
         (lambda run, body: run.fix(body, [0, 1]), "a hinge"),
+        (lambda run, body: (run.fix(body, 13), run.fix(body, 4, "x")), "a hinge"),  # two turns
         (lambda run, body: run.roller(body, 0, [0, 0, 1]), "is rigid"),
         (lambda run, body: run.periodic(body, 0, 1), "is rigid"),
         (
