@@ -40,5 +40,6 @@ validate:
 	$(bin)/trackbed validate qdem-hard-cases --quick
 	$(bin)/trackbed validate rigid --quick
 	$(bin)/trackbed validate rigid-hard-cases --quick
+	$(bin)/trackbed validate rigid-integration --quick
 	$(bin)/trackbed validate rigid-indeterminacy --quick
 	$(bin)/trackbed validate rigid-ballast --quick

@@ -25,6 +25,7 @@ VERBS = {
     "fit": (ADAPTERS, "fit a residual law to a run, dumps or a CSV series and extrapolate it"),
     "relax": (ADAPTERS, "bring the overlaps of a state back to equilibrium"),
     "qdem": ("qdem_fem.cli", "vibration and statics of deformable bodies, from a scene file"),
+    "advise": ("qdem_fem.advise_cli", "which bodies of a QDEM scene may be rigid, at what error"),
     "grains": ("qdem_fem.track_cli", "random ballast grains of a standard grading, as a file"),
     "train": ("qdem_fem.track_cli", "load of a passing train on a sleeper's rail seats, as CSV"),
     "rigid": ("rigid_lcp.cli", "rigid, sharp-edged grains with friction, from a scene file"),

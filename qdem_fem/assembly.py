@@ -38,7 +38,8 @@ class Assembly:
     """Bodies side by side; numbers of nodes and elements run through all of them.
 
     ``master`` (n,): the node that a node moves with, itself unless periodic; ``density_factor``
-    (m,) from mass scaling [-].
+    (m,) from mass scaling [-].  Elements of rigid bodies are in none of the arrays; their nodes
+    have a place in the fields, and a window of forces, which `qdem_fem.rigid_step` reads.
     """
 
     window_work = 100_000_000
@@ -57,33 +58,39 @@ class Assembly:
         kind: Any = np.dtype(dtype)
         self.dtype = kind
         self._first_node = np.cumsum([0] + [len(body.nodes) for body in bodies])
-        shifted = [
-            body.elements + start for body, start in zip(bodies, self._first_node, strict=False)
-        ]
-        self.elements = master[np.concatenate(shifted)]
-        volumes = np.concatenate([body.gradients[1] for body in bodies])
-        materials = [body.material for body in bodies]
+        none = np.zeros(0)
+        soft = [i for i, body in enumerate(bodies) if not body.rigid]
+        shifted = [bodies[i].elements + self._first_node[i] for i in soft]
+        self.elements = master[np.concatenate([*shifted, np.zeros((0, 4), np.int64)])]
+        volumes = np.concatenate([*(bodies[i].gradients[1] for i in soft), none])
+        materials = [bodies[i].material for i in soft]
         viscous = any(material.is_viscous for material in materials)
         names = ["lame_first", "lame_second"] + ["viscous_first", "viscous_second"] * viscous
-        moduli = [np.concatenate([getattr(m, name) for m in materials]) for name in names]
-        gradients = np.concatenate([body.gradients[0].reshape(-1, 9) for body in bodies])
+        moduli = [np.concatenate([*(getattr(m, name) for m in materials), none]) for name in names]
+        gradients = np.concatenate(
+            [*(bodies[i].gradients[0].reshape(-1, 9) for i in soft), none.reshape(0, 9)]
+        )
         rows = np.column_stack([gradients, *(modulus * volumes for modulus in moduli)])
 
-        mass = np.concatenate([m.density for m in materials]) * volumes / 4
+        mass = np.concatenate([*(m.density for m in materials), none]) * volumes / 4
         if density_factor is not None:
             mass = mass * density_factor
         self.mass: Floats = np.bincount(
             self.elements.ravel(), np.repeat(mass, 4), self.n_nodes
         ).astype(float)
-        """Quarter masses of the elements, summed [kg], (n,); zero for nodes that follow others."""
-        self.packed = layout_build(self.elements, self.n_nodes, rows, self.dtype)
+        """Quarter masses of the elements, summed [kg], (n,); zero for nodes that follow others,
+        and of rigid bodies."""
+        rigid = np.repeat([bool(body.rigid) for body in bodies], np.diff(self._first_node))
+        self.packed = layout_build(
+            self.elements, self.n_nodes, rows, self.dtype, np.flatnonzero(rigid)
+        )
         self.place = self.packed.node_place[master]
         """The kernel's number of a node, (n,)."""
         self.viscous = True if viscous else None
         self.law = kernel.LAWS[strain](kind.type(0.5))
         chunks = len(self.packed.layout.chunk_shift)
         most = threads or max(1, len(self.elements) // THREAD_ELEMENTS)
-        self.threads = min(most, numba.get_num_threads(), chunks)
+        self.threads = max(1, min(most, numba.get_num_threads(), chunks))
         inverse = np.zeros(self.n_nodes)
         used = self.mass > 0
         inverse[self.packed.node_place[used]] = 1 / self.mass[used]

@@ -1,9 +1,9 @@
-"""A deformable body: its mesh, its material, and its state as the user sees it."""
+"""A body: its mesh, its material, and its state as the user sees it."""
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ from qdem_fem.reference_forces import (
     stress_cauchy,
     von_mises,
 )
+from qdem_fem.rigid_mass import RigidMass, rigid_mass
 from qdem_fem.surface import surface_faces
 
 if TYPE_CHECKING:
@@ -33,10 +34,20 @@ class Body:
     ``mesh``: a `skfem.MeshTet`, a `meshio.Mesh`, a pair ``(nodes (n, 3) [m], elements (m, 4))``,
     a `qdem_fem.mesh.TetMesh` or the path of a mesh file.  Left-handed elements are turned
     (``mesh.flipped`` lists them).  Numbers of nodes and elements stay the user's own.
+    ``rigid``: the body has six freedoms and no strain; of its material only density and Poisson's
+    ratio (in contact) count.  ``"lumped"``: with the inertia of quarter masses at its nodes, which
+    a deformable body of this mesh has, instead of the solid's (`qdem_fem.rigid_mass`).
     Raises `MeshError`, `MaterialError`.
     """
 
-    def __init__(self, mesh: Any, material: Material, name: str = "body") -> None:
+    def __init__(
+        self,
+        mesh: Any,
+        material: Material,
+        name: str = "body",
+        *,
+        rigid: bool | Literal["lumped"] = False,
+    ) -> None:
         if not isinstance(name, str):
             raise ConditionError(f"{name!r} is no name", where="body", remedy="give a text")
         if not isinstance(material, Material):
@@ -45,7 +56,11 @@ class Body:
                 where=name,
                 remedy="give Material(young, poisson, density)",
             )
-        self.name = name
+        if rigid not in (False, True, "lumped"):
+            raise ConditionError(
+                f"rigid is {rigid!r}", where=name, remedy='give True, False or "lumped"'
+            )
+        self.name, self.rigid = name, rigid
         self.mesh = mesh if isinstance(mesh, TetMesh) else mesh_read(mesh, where=name)
         self.material = material.per_element(len(self.mesh.elements))
         self._displacement = np.zeros_like(self.mesh.nodes)
@@ -71,6 +86,12 @@ class Body:
     def gradients(self) -> tuple[Floats, Floats]:
         """Reference gradients of the shape functions [1/m], (m, 3, 3), and volumes [m^3], (m,)."""
         return element_gradients(self.nodes, self.elements)
+
+    @cached_property
+    def rigid_mass(self) -> RigidMass:
+        """Mass, centre and inertia as a rigid body."""
+        mass = np.asarray(self.material.density) * self.gradients[1]
+        return rigid_mass(self.nodes, self.elements, mass, lumped=self.rigid == "lumped")
 
     @property
     def displacement(self) -> Floats:
@@ -109,7 +130,9 @@ class Body:
         return self._simulation.strain if self._simulation is not None else "finger"
 
     def stress(self) -> Floats:
-        """Elastic Cauchy stress of the elements [Pa], (m, 3, 3) (eq. 2)."""
+        """Elastic Cauchy stress of the elements [Pa], (m, 3, 3) (eq. 2); zero of a rigid body."""
+        if self.rigid:
+            return np.zeros((len(self.elements), 3, 3))
         gradient = displacement_gradient(self.gradients[0], self.elements, self.displacement)
         nominal = STRESS[self.strain](gradient, self.material.lame_first, self.material.lame_second)
         return stress_cauchy(gradient, nominal, self.strain)

@@ -56,6 +56,8 @@ def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
         "critical_mode": critical.mode,
     }
     arrays |= assembly.stored()
+    if simulation.rigid is not None:
+        arrays |= simulation.rigid.stored()
     if simulation.contacts is not None:
         arrays |= simulation.contacts.stored()
     stream = io.BytesIO()
@@ -83,6 +85,8 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
         critical = CriticalStep(**head["critical_step"], mode=arrays["critical_mode"])
         previous = arrays["previous"]
         assembly.restore(arrays)
+        if simulation.rigid is not None:
+            simulation.rigid.restore(arrays)
         if simulation.contacts is not None:
             simulation.contacts.restore(arrays)
     except (KeyError, TypeError) as error:
@@ -134,6 +138,8 @@ def fingerprint(simulation: Simulation) -> dict[str, str]:
         marks[f"mesh of body {number}"] = _mark(body.nodes, body.elements)
         material = [np.asarray(getattr(body.material, f.name)) for f in fields(body.material)]
         marks[f"material of body {number}"] = _mark(*material)
+        if body.rigid:
+            marks[f"body {number} is rigid"] = str(body.rigid)
     return marks
 
 

@@ -163,10 +163,8 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
             f"{body['flipped']} turned right-handed, {body['unused_nodes']} unused nodes"
         )
     critical = content["critical_step"]
-    print(
-        f"critical step {critical['value']:.4g} s, governed by element {critical['element']} "
-        f"of {critical['body']}"
-    )
+    if critical["value"] is not None:
+        print(f"critical step {critical['value']:.4g} s, governed by {critical['governor']}")
     if critical["remark"]:
         print(f"warning: {critical['remark']}")
     if content["method"] == "dynamic":

@@ -72,6 +72,7 @@ class ConditionedBodies:
             raise ConditionError(
                 f"{normal!r} is no direction", where="roller", remedy="give three components"
             )
+        self._deformable_check(body, "roller", "fix components of its nodes")
         roller = Roller(self._nodes(body, nodes, "roller"), direction / length)
         self._before_change()
         self.conditions.rollers.append(roller)
@@ -120,6 +121,7 @@ class ConditionedBodies:
                 where="periodic",
                 remedy="join faces before the first advance and before asking for its step",
             )
+        self._deformable_check(body, "periodic", "leave it deformable")
         a, b = (body.nodes_select(nodes, "periodic") for nodes in (nodes_a, nodes_b))
         first = self._offset(body)
         one, other = partners(body.nodes, a, b, tolerance, body.name)
@@ -198,6 +200,11 @@ class ConditionedBodies:
         self.conditions.loads.append(load)
         self._changed(ties=False)
         return load
+
+    @staticmethod
+    def _deformable_check(body: Body, where: str, remedy: str) -> None:
+        if body.rigid:
+            raise ConditionError(f"{body.name} is rigid", where=where, remedy=remedy)
 
     def _begun(self) -> bool:
         """Whether nodes can no longer be joined."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from qdem_fem.contact_kernel import Contact, Planes, Spheres
 from qdem_fem.contact_search import Pairs, pairs_of, pairs_renew
 from qdem_fem.contact_spheres import SKIN, SphereContact, pair_stiffness, tangential_stiffness
 from qdem_fem.contact_state import Contacts, ContactTouching, Floats, Integers, planes_arrays
-from qdem_fem.contact_step import allowed_bound, network_bound
+from qdem_fem.contact_step import network_bound
 
 if TYPE_CHECKING:
     from qdem_fem.simulation import Simulation
@@ -39,6 +38,7 @@ class SphereContacts(Contacts):
         normal = by_body([asked.of_body(b.name, "normal_stiffness") for b in run.bodies])
         radius = by_body([asked.of_body(b.name, "radius") for b in run.bodies])
         poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
+        self.one = pair_stiffness(normal, normal.max(initial=0.0))
         self.skin = float(SKIN * radius.min() if asked.skin is None else asked.skin)
         size, walls = len(self.nodes), len(asked.planes)
         zero = np.zeros((size, 3))
@@ -90,20 +90,14 @@ class SphereContacts(Contacts):
             "normal_stiffness",
         )
 
-    @cached_property
-    def allowed(self) -> float:  # type: ignore[override]
-        """`allowed_bound` of as many contacts as were asked for [1/s^2]."""
-        normal = self.kernel.spheres.normal
-        greatest = pair_stiffness(normal, normal.max(initial=0.0))
-        return allowed_bound(greatest, self.inverse_mass, self.asked.contacts)
-
     def stiffness_now(self) -> float:
         """`network_bound` of the contacts there are now [1/s^2]."""
         ends = self._ends()
         normal = self.kernel.spheres.normal
         stiffness = pair_stiffness(normal[ends[:, 0]], normal[ends[:, 1]])
         walls = (self.kernel.planes.force != 0).any(axis=2).sum(axis=0)
-        return network_bound(ends, stiffness, 2 * normal * walls, self.inverse_mass)
+        wall = 2 * normal * walls
+        return network_bound(ends, stiffness, wall, self.inverse_mass, self.rigid_bound)
 
     def _ends(self) -> Integers:
         touching = np.flatnonzero(self.pairs.touching)

@@ -6,17 +6,18 @@ import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem import kernel
 from qdem_fem.contact_kernel import TOO_DEEP
-from qdem_fem.contact_spheres import ContactPlane
-from qdem_fem.contact_step import step_with_contact
-from qdem_fem.contact_window import advance_of, contact_window
+from qdem_fem.contact_spheres import ContactPlane, SphereContact
+from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
+from qdem_fem.contact_surface import SurfaceContact
+from qdem_fem.contact_window import advance_of, window_run
 from qdem_fem.errors import ContactTooDeep, StepWarning
 
 if TYPE_CHECKING:
@@ -53,9 +54,10 @@ class Contacts(ABC):
     """
 
     kernel: Any
+    asked: SphereContact | SurfaceContact
     skin: float
-    allowed: float
-    """Bound on omega^2 of the contacts that the time step allows for [1/s^2]."""
+    one: Floats
+    """(c,) stiffness of one contact of each vertex [N/m]."""
 
     def __init__(self, run: Simulation, contacts: float) -> None:
         self.run, self.contacts = run, contacts
@@ -70,6 +72,7 @@ class Contacts(ABC):
         inverse = np.asarray(run.assembly.state.inverse_mass, dtype=float)
         self.inverse_mass: Floats = inverse[self.place]
         """(c,) [1/kg]"""
+        self._allowed: float | None = None
         self.renewals = 0
         """Times that pairs were looked for."""
         self.warned = 0.0
@@ -110,6 +113,27 @@ class Contacts(ABC):
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take what `stored` gave."""
 
+    # --- for the time step ---------------------------------------------------------------------
+
+    @property
+    def allowed(self) -> float:
+        """Bound on omega^2 of the contacts that the time step allows for [1/s^2]."""
+        if self._allowed is None:
+            self._allowed = allowed_bound(
+                self.one, self.inverse_mass, self.contacts, self.rigid_bound
+            )
+        return self._allowed
+
+    def rigid_bound(self, stiffness: Floats) -> Floats:
+        """`RigidBodies.frequency_bound` of springs (c,) [N/m] at the vertices."""
+        if self.run.rigid is None:
+            return no_rigid(stiffness)
+        return self.run.rigid.frequency_bound(self.nodes, stiffness)
+
+    def held_anew(self) -> None:
+        """What is held has changed."""
+        self._allowed = None
+
     # --- in a march ----------------------------------------------------------------------------
 
     def refresh(self) -> None:
@@ -138,24 +162,15 @@ class Contacts(ABC):
         probes: kernel.Probes, table: Floats, gravity: Floats | None, work: Floats,
     ) -> tuple[int, float]:  # fmt: skip
         """`Assembly.window` with contact; comes back early where pairs have to be looked for."""
-        assembly = self.run.assembly
-        accelerations = assembly.gravity_packed(gravity)
-        before = numba.get_num_threads()
-        numba.set_num_threads(assembly.threads)
-        try:
-            done, bad, said = contact_window(
-                True if assembly.threads > 1 else None, assembly.law, assembly.viscous,
-                assembly.packed.layout, assembly.state, loads, held, probes, table,
-                accelerations, work, assembly.dtype.type(step), steps, self.kernel,
-            )  # fmt: skip
-        finally:
-            numba.set_num_threads(before)
+        done, bad, said = window_run(
+            self.run, self.kernel, steps, step, loads, held, probes, table, gravity, work
+        )
         if said == TOO_DEEP and not bad:
-            self.run.motion.steps_done += int(done)
+            self.run.motion.steps_done += done
             self.deep_check(said)
         if said:
             self.pairs_find()
-        return int(done), float(bad)
+        return done, bad
 
     def deep_check(self, said: int) -> None:
         """Raise `ContactTooDeep` with the deepest contact where a step said so."""
@@ -190,7 +205,7 @@ class Contacts(ABC):
         """The critical step of the elements, made shorter by the contacts it allows for."""
         value = step_with_contact(elements.value, self.allowed, viscous=self.run.viscous)
         remark = elements.remark
-        if value < elements.value * SHORTER:
+        if isfinite(elements.value) and value < elements.value * SHORTER:
             remark = (
                 f"{self.contacts:g} contacts of a vertex make the critical step "
                 f"{value / elements.value:.2g} times what the elements alone allow; a softer "

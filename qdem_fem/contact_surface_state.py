@@ -101,8 +101,7 @@ class SurfaceContacts(Contacts):
         )  # fmt: skip
         covering = np.zeros(size)
         np.add.at(covering, face, np.repeat(area[:, None] / 3, 3, axis=1))
-        greatest = pair_stiffness(modulus, modulus.max())[body_of[0]]
-        self.allowed = 2 * asked.contacts * float((greatest * covering * self.inverse_mass).max())
+        self.one = pair_stiffness(modulus, modulus.max())[body_of[0]] * covering
 
     @property
     def near(self) -> Near:
@@ -154,7 +153,8 @@ class SurfaceContacts(Contacts):
         stiffness = 2 * held * surface.modulus[surface.point_body]
         face = surface.point_node
         np.add.at(total, face, stiffness[:, None] * surface.point_share)
-        return float((total * self.inverse_mass).max(initial=0.0))
+        bound = total * self.inverse_mass + self.rigid_bound(total)
+        return float(bound.max(initial=0.0))
 
     def energy(self) -> tuple[float, float]:
         """Energy in the springs, and work that the sliders took since the start [J]."""

@@ -1,7 +1,7 @@
-"""The compiled loop over time steps with contact: the step of the elements, then the contact.
+"""The compiled loop over time steps with rigid bodies or contact beside the elements' own step.
 
 The step itself is `qdem_fem.kernel.window_build`'s, of one step, as it is without contact: what a
-scene without contact runs is not touched.  Contact forces of a displacement are found when that
+scene without both runs is not touched.  Contact forces of a displacement are found when that
 displacement is, and wait for the next step; so the springs and the fields are of one time.
 """
 
@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numba
 from numba import njit
 from numba.core import types
 from numba.extending import overload
@@ -18,8 +19,15 @@ from numba.extending import overload
 from qdem_fem import kernel
 from qdem_fem.contact_kernel import GO_ON, Contact, advance_one, advance_threads
 from qdem_fem.contact_surface_kernel import surface_step
+from qdem_fem.rigid_step import Rigid, rigid_advance
 
-SOURCES = ("kernel.py", "stress.py", "lanes.py", "contact_kernel.py", "contact_surface_kernel.py")
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+SOURCES = (
+    "kernel.py", "stress.py", "lanes.py", "contact_kernel.py", "contact_surface_kernel.py",
+    "rigid_step.py",
+)  # fmt: skip
 WINDOW_ONE: Any = kernel.window_kernel(1)
 WINDOW_THREADS: Any = kernel.window_kernel(2)
 
@@ -36,22 +44,54 @@ def _gravity_from(gravity: Any, k: int) -> Any:
     return lambda gravity, k: gravity[4 * k :]
 
 
-def places_of(contact: Any) -> Any:
-    """The vertices that contact may act on, their places in the forces, and the forces on all."""
+def places_of(contact: Any, nothing: Any) -> Any:
+    """The vertices that contact may act on, their places in the forces, and the forces on all.
+
+    ``nothing``: an empty array of integers, for no contact.
+    """
+    if contact is None:
+        return nothing, nothing, nothing.reshape(0, 1)
     if isinstance(contact, Contact):
         return contact.pairs.acting, contact.spheres.force_at, contact.force
     return contact.acting, contact.surface.force_at, contact.force
 
 
 @overload(places_of, strict=False)
-def _places_of(contact: Any) -> Any:
+def _places_of(contact: Any, nothing: Any) -> Any:
+    if isinstance(contact, types.NoneType):
+        return lambda contact, nothing: (nothing, nothing, nothing.reshape(0, 1))
     if contact.instance_class is Contact:
-        return lambda contact: (contact.pairs.acting, contact.spheres.force_at, contact.force)
-    return lambda contact: (contact.acting, contact.surface.force_at, contact.force)
+        return lambda contact, nothing: (
+            contact.pairs.acting, contact.spheres.force_at, contact.force
+        )  # fmt: skip
+    return lambda contact, nothing: (contact.acting, contact.surface.force_at, contact.force)
+
+
+def rigid_of(
+    rigid: Any, forces: Any, state: Any, table: Any, fall: Any, work: Any, step: float
+) -> None:
+    """One step of the rigid bodies, if there are any."""
+    if rigid is not None:
+        rigid_advance(
+            rigid, forces, state.displacement, state.velocity, table, fall, work, step
+        )  # fmt: skip
+
+
+@overload(rigid_of, strict=False)
+def _rigid_of(
+    rigid: Any, forces: Any, state: Any, table: Any, fall: Any, work: Any, step: float
+) -> Any:
+    if isinstance(rigid, types.NoneType):
+        return lambda rigid, forces, state, table, fall, work, step: None
+    return lambda rigid, forces, state, table, fall, work, step: rigid_advance(
+        rigid, forces, state.displacement, state.velocity, table, fall, work, step
+    )
 
 
 def advance_of(contact: Any, threads: Any, displacement: Any, velocity: Any, step: float) -> int:
     """One step of contact, by the type of ``contact``; ``threads``: True, or None for one."""
+    if contact is None:
+        return GO_ON
     if not isinstance(contact, Contact):
         return int(surface_step(contact, displacement, velocity, step))
     advance = advance_one if threads is None else advance_threads
@@ -60,6 +100,8 @@ def advance_of(contact: Any, threads: Any, displacement: Any, velocity: Any, ste
 
 @overload(advance_of, strict=False)
 def _advance_of(contact: Any, threads: Any, displacement: Any, velocity: Any, step: float) -> Any:
+    if isinstance(contact, types.NoneType):
+        return lambda contact, threads, displacement, velocity, step: GO_ON
     if contact.instance_class is not Contact:
         return lambda contact, threads, displacement, velocity, step: surface_step(
             contact, displacement, velocity, step
@@ -80,21 +122,23 @@ def contact_window_build(made_from: str) -> Any:
     def contact_window(
         threads: Any, law: Any, viscous: Any, layout: Any, state: Any, loads: Any, held: Any,
         probes: Any, table: Any, gravity: Any, work: Any, step: Any, steps: int, contact: Any,
+        rigid: Any,
     ) -> tuple[int, float, int]:  # fmt: skip  # pragma: no cover
-        """As `window` of `qdem_fem.kernel`, with a `Contact`; ``threads``: True, or None for one.
+        """As `window` of `qdem_fem.kernel`, with a `Contact` and a `Rigid`, or None instead of one.
 
-        Returns steps done, bad elements, and what the last step of contact said.  Comes back
-        where that is not `GO_ON`.
+        ``threads``: True, or None for one.  Returns steps done, bad elements, and what the last
+        step of contact said.  Comes back where that is not `GO_ON`.
         """
         stamp = made_from  # noqa: F841  (makes it a part of the key)
         forces = state.forces
-        acting, force_at, pull = places_of(contact)
+        acting, force_at, pull = places_of(contact, layout.piece_first[:0])
         for k in range(steps):
             for i in acting:
                 for c in range(3):
                     forces[force_at[i] + c] += pull[i, c]
             ahead = kernel.Probes(probes.node_at, probes.record, probes.stride, probes.first - k)
             row, fall = table[k : k + 2], gravity_from(gravity, k)
+            rigid_of(rigid, forces, state, row, fall, work, step)
             if threads is None:
                 _, bad = WINDOW_ONE(
                     law, viscous, layout, state, loads, held, ahead, row, fall, work, step, 1
@@ -120,3 +164,27 @@ def _sources_digest() -> str:
 
 
 contact_window: Any = contact_window_build(_sources_digest())
+
+
+def window_run(
+    run: Simulation, contact: Any, steps: int, step: float, loads: kernel.Loads,
+    held: kernel.Constraints, probes: kernel.Probes, table: Any, gravity: Any, work: Any,
+) -> tuple[int, float, int]:  # fmt: skip
+    """Run the loop on a simulation: steps done, bad elements, what the last contact said.
+
+    Arguments as of `qdem_fem.assembly.Assembly.window`; ``contact``: arrays of its model, or None.
+    """
+    assembly = run.assembly
+    rigid: Rigid | None = None if run.rigid is None else run.rigid.kernel_of(probes.node_at)
+    before = numba.get_num_threads()
+    numba.set_num_threads(assembly.threads)
+    try:
+        done, bad, said = contact_window(
+            True if assembly.threads > 1 else None, assembly.law, assembly.viscous,
+            assembly.packed.layout, assembly.state, loads, held, probes, table,
+            assembly.gravity_packed(gravity), work, assembly.dtype.type(step), steps, contact,
+            rigid,
+        )  # fmt: skip
+    finally:
+        numba.set_num_threads(before)
+    return int(done), float(bad), int(said)

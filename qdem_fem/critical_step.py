@@ -44,7 +44,8 @@ class CriticalStep:
     damping_ratio: float
     """Viscous damping of that motion, over the critical one [-]."""
     element: int
-    """The element that governs it: the one with most energy in that motion."""
+    """The element that governs it: the one with most energy in that motion; -1 where there is no
+    deformable body."""
     body: str
     """The body that element is in, by whose mesh it is numbered."""
     mode: Floats
@@ -53,6 +54,11 @@ class CriticalStep:
     """Force evaluations spent."""
     remark: str = ""
     """What to know of a step that one element makes much shorter than the others need."""
+
+    @property
+    def governor(self) -> str:
+        """What governs it, in words."""
+        return "contact" if self.element < 0 else f"element {self.element} of {self.body}"
 
 
 def lagged_viscous_step(stiffness: float, damping: float) -> float:
@@ -117,6 +123,9 @@ def highest_mode(
 def critical_step_find(run: Simulation) -> CriticalStep:
     """`highest_mode` of the kernel's own forces for small motions of a simulation as it is held."""
     assembly, (_, held) = run.assembly, run.packed_lists()
+    if not len(assembly.elements):
+        still = np.zeros((assembly.n_nodes, 3))
+        return CriticalStep(inf, 0.0, 0.0, -1, run.bodies[0].name, still, 0)
     size = PROBE_STRAIN * max(float(np.ptp(body.nodes, axis=0).max()) for body in run.bodies)
     nothing = np.ones((2, 1))
     follows = run.master != np.arange(len(run.master))
@@ -155,6 +164,7 @@ def short_step_remark(run: Simulation, stiffness: float, governing: Body, elemen
     samples = (
         element_step(body, slice(None, None, 1 + len(body.elements) // SAMPLE))
         for body in run.bodies
+        if not body.rigid
     )
     usual = float(np.median(np.concatenate(list(samples))))
     own = 2 / sqrt(stiffness) if stiffness > 0 else inf
@@ -171,6 +181,8 @@ def governing_element(run: Simulation, mode: Floats) -> tuple[Body, int]:
     """The element with most energy in a motion (n, 3), and its body."""
     found: list[tuple[float, Body, int]] = []
     for body, start in zip(run.bodies, run.first_node, strict=False):
+        if body.rigid:
+            continue
         gradients, volumes = body.gradients
         moved = mode[start : start + len(body.nodes)]
         gradient = displacement_gradient(gradients, body.elements, moved)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -69,9 +69,16 @@ class Packed:
 
 
 def layout_build(
-    elements: Integers, n_nodes: int, element_rows: Floats, dtype: DTypeLike
+    elements: Integers,
+    n_nodes: int,
+    element_rows: Floats,
+    dtype: DTypeLike,
+    loose: Integers | None = None,
 ) -> Packed:
     """Order a mesh for locality and lay its data out in blocks of lanes.
+
+    ``loose``: nodes of no element that forces act on all the same, in a window of their own
+    that no piece of the motion looks at.
 
     ``elements`` (m, 4); ``element_rows`` (m, 11 or 13): gradients of corners 1 to 3 [1/m], then
     Lame constants and viscosities times volume.  The last block is filled up with copies of
@@ -83,6 +90,8 @@ def layout_build(
     lanes = lane_count(np.dtype(dtype))
     element_order = _interleaved(element_order, lanes)
     m = len(element_order)
+    if not m:
+        return _loose_add(_layout_empty(node_order, node_place, element_rows), loose)
     blocks = -(-m // lanes)
     filled = np.concatenate([element_order, np.full(blocks * lanes - m, element_order[-1])])
 
@@ -126,7 +135,28 @@ def layout_build(
         piece_window=np.searchsorted(piece, np.arange(len(order) + 1)).astype(np.int64),
         window_shift=chunk_shift[window].astype(np.int64),
     )
-    return Packed(layout, node_order, node_place, element_order, int(starts[-1]), node_window)
+    packed = Packed(layout, node_order, node_place, element_order, int(starts[-1]), node_window)
+    return _loose_add(packed, loose)
+
+
+def _layout_empty(node_order: Integers, node_place: Integers, element_rows: Floats) -> Packed:
+    """The layout without any element: no chunk, no piece."""
+    none, end = np.zeros(0, np.int64), np.zeros(1, np.int64)
+    corners = np.zeros(0, np.int32)
+    layout = Layout(
+        corners, element_rows.ravel(), end, none, none, none, end, end.copy(), none
+    )  # fmt: skip
+    return Packed(layout, node_order, node_place, none, 0, np.full(len(node_order), -1))
+
+
+def _loose_add(packed: Packed, loose: Integers | None) -> Packed:
+    """A window more, for the forces on ``loose`` nodes."""
+    if loose is None or not len(loose):
+        return packed
+    place, start = packed.node_place[loose], packed.window_count
+    window = packed.node_window.copy()
+    window[place] = start + 4 * (np.arange(len(place)) - place)
+    return replace(packed, window_count=start + 4 * len(place), node_window=window)
 
 
 def _interleaved(order: Integers, lanes: int) -> Integers:

@@ -29,6 +29,8 @@ def velocity_now(run: Simulation) -> Floats:
         flat = _by_place(run, velocity + change)
         flat[held.node_at] = 0.5 * (_by_place(run, velocity)[held.node_at] + ahead)
         velocity = flat.reshape(-1, 4)[run.assembly.place, :3]
+    if run.rigid is not None:
+        velocity[run.rigid.nodes] = run.rigid.velocity_field()
     return velocity
 
 
@@ -39,6 +41,8 @@ def velocities_behind(run: Simulation) -> None:
         velocity = run.assembly.field("velocity")
         behind = velocity - 0.5 * run.step * _accelerations(run, displacement, velocity)
         run.motion.work -= half_work(run, behind, velocity)
+        if run.rigid is not None:
+            run.rigid.half_kick(-1)
         _, held = run.packed_lists()
         held.previous[:] = _by_place(run, behind)[held.node_at]
         run.assembly.field_set("velocity", behind)
@@ -50,6 +54,8 @@ def velocities_level(run: Simulation) -> None:
     if run.motion.behind:
         behind, level = run.assembly.field("velocity"), velocity_now(run)
         run.motion.work += half_work(run, behind, level)
+        if run.rigid is not None:
+            run.rigid.half_kick(1)
         run.assembly.field_set("velocity", level)
         run.motion.behind = False
 
@@ -70,7 +76,7 @@ def state_admit(run: Simulation) -> None:
 
 
 def half_work(run: Simulation, behind: Floats, level: Floats) -> Floats:
-    """Work in the half step up to now [J], (2,): of loads, of prescribed motion.
+    """Work in the half step up to now [J], (2,): of loads, of prescribed motion; not on rigid ones.
 
     ``behind`` and ``level``: velocities (n, 3) [m/s] half a step ago and now.
     """

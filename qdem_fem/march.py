@@ -55,11 +55,11 @@ def march(
     samples = Samples(motion.steps_done, steps, stride, len(nodes))
     if samples.first_step == motion.steps_done and len(samples.record):
         samples.record[0] = assembly.field("displacement")[nodes]
-    most = max(16, min(WINDOW_STEPS, assembly.window_work // len(assembly.elements)))
+    most = max(16, min(WINDOW_STEPS, assembly.window_work // max(1, len(assembly.elements))))
     if run.gravity is not None and run.gravity.varying is not None:
         most = GRAVITY_STEPS
     end = motion.steps_done + steps
-    window = assembly.window if run.contacts is None else run.contacts.window
+    window = (run.contacts or run.rigid or assembly).window
     while motion.steps_done < end:
         assembly.frames_renew()
         count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
@@ -74,6 +74,8 @@ def march(
         if gravity is not None and before is not None and done:
             after = moment(run)
             motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
+        if run.rigid is not None:
+            run.rigid.follow()
         motion_check(run, bad)
         if run.contacts is not None:
             run.contacts.step_check()
@@ -114,8 +116,7 @@ def step_check(run: Simulation) -> None:
     if run.step > critical.value:
         remark = (
             f"the step of {run.step:.4g} s is {run.step / critical.value:.4g} times the critical "
-            f"one, which element {critical.element} of {critical.body} governs: the motion will "
-            "grow without bound"
+            f"one, which {critical.governor} governs: the motion will grow without bound"
         )
     if remark and run.warned != critical.value:
         run.warned = critical.value
@@ -137,6 +138,8 @@ def moment(run: Simulation) -> tuple[Floats, Floats]:
     place, speed = (
         np.einsum("n,nc->c", mass, field(name)) for name in ("displacement", "velocity")
     )
+    if run.rigid is not None:
+        place, speed = (a + b for a, b in zip((place, speed), run.rigid.moment(), strict=True))
     return place, speed
 
 
@@ -167,7 +170,7 @@ def gravity_work(
 
 def motion_check(run: Simulation, bad: float) -> None:
     """Raise when the state can not be right: energy from nothing, or ``bad`` elements."""
-    kinetic = run.assembly.kinetic()
+    kinetic = run.assembly.kinetic() + (0.0 if run.rigid is None else run.rigid.kinetic())
     put_in = run.motion.put_in + abs(run.motion.work).sum() + abs(run.motion.gravity_work)
     ratio = run.step / run.critical_step.value
     if not kinetic <= GROWTH * put_in and (ratio > 1 or not np.isfinite(kinetic)):
@@ -175,8 +178,7 @@ def motion_check(run: Simulation, bad: float) -> None:
         raise Unstable(
             f"the motion grew without bound: {kinetic:.3g} J of kinetic energy from "
             f"{put_in:.3g} J put in; the step of {run.step:.4g} s is {ratio:.3f} times the "
-            f"critical one of {critical.value:.4g} s, which element {critical.element} of "
-            f"{critical.body} governs",
+            f"critical one of {critical.value:.4g} s, which {critical.governor} governs",
             where=f"t = {run.time:.6g} s, step {run.steps_done}",
             remedy="take a step below the critical one (safety 0.9 does), or mend the mesh",
         )
@@ -207,6 +209,9 @@ def inverted_find(bodies: Sequence[Body], displacement: Floats) -> tuple[str, in
     found: list[tuple[float, str, int, int]] = []
     start = 0
     for body in bodies:
+        if body.rigid:
+            start += len(body.nodes)
+            continue
         moved = displacement[start : start + len(body.nodes)]
         start += len(body.nodes)
         jacobian = 1 + volume_change(displacement_gradient(body.gradients[0], body.elements, moved))

@@ -12,6 +12,8 @@ from qdem_fem.errors import ConditionError
 from qdem_fem.leapfrog import accelerations_free, velocity_now
 
 if TYPE_CHECKING:
+    from qdem_fem.rigid_bodies import RigidBodies
+    from qdem_fem.series import Driver
     from qdem_fem.simulation import Simulation
 
 Floats = NDArray[np.float64]
@@ -30,6 +32,9 @@ def reaction(run: Simulation, condition: Held | Roller) -> Floats:
             where="reaction",
             remedy="give what fix, prescribe or roller returned",
         )
+    if run.rigid is not None and (b := run.rigid.number_of(condition.nodes[0])) >= 0:
+        assert isinstance(condition, Held)
+        return _rigid_reaction(run.rigid, b, condition)
     # the kernel's accelerations of what no element moves are none
     forces = run.assembly.mass[:, None] * accelerations_free(
         run, run.assembly.field("displacement"), velocity_now(run)
@@ -42,10 +47,23 @@ def reaction(run: Simulation, condition: Held | Roller) -> Floats:
     chosen = list(condition.components)
     total[chosen] = -forces[nodes][:, chosen].sum(axis=0)
     if condition.driver is not None:
-        before, now, after = condition.driver.sample(run.time + run.step * np.arange(-1.0, 2.0))[
-            :, 0
-        ]
-        bend = (after - 2 * now + before) / run.step**2
+        bend = _bend(run, condition.driver)
         factor = np.ones(len(first)) if condition.factor is None else condition.factor[first]
         total[chosen] += bend * (run.assembly.mass[nodes] * factor).sum()
+    return total
+
+
+def _bend(run: Simulation, driver: Driver) -> float:
+    """Acceleration that a driver prescribes now [m/s^2], for a factor of one."""
+    before, now, after = driver.sample(run.time + run.step * np.arange(-1.0, 2.0))[:, 0]
+    return float((after - 2 * now + before) / run.step**2)
+
+
+def _rigid_reaction(rigid: RigidBodies, b: int, condition: Held) -> Floats:
+    """The same for what holds rigid body b: ``M a - F`` of its components, without the couple."""
+    chosen, total = list(condition.components), np.zeros(3)
+    total[chosen] = -rigid.forces()[0][b][chosen]
+    if condition.driver is not None:
+        factor = 1.0 if condition.factor is None else float(condition.factor[0])
+        total[chosen] += rigid.mass[b] * factor * _bend(rigid.run, condition.driver)
     return total

@@ -169,11 +169,15 @@ def _meshes(summary: dict[str, Any]) -> Iterator[str]:
 def _step(summary: dict[str, Any]) -> Iterator[str]:
     critical = summary["critical_step"]
     yield "<h2>Time step</h2>"
-    text = (
-        f"Critical step {critical['value']:.4g} s (highest angular frequency "
-        f"{critical['omega']:.4g} 1/s); its motion is strongest in element {critical['element']} "
-        f"of {critical['body']}. "
-    )
+    text = "No elastic motion limits the step. "
+    if critical["value"] is not None and critical["element"] < 0:
+        text = f"Critical step {critical['value']:.4g} s, of contact between rigid bodies. "
+    elif critical["value"] is not None:
+        text = (
+            f"Critical step {critical['value']:.4g} s (highest angular frequency "
+            f"{critical['omega']:.4g} 1/s); its motion is strongest in element "
+            f"{critical['element']} of {critical['body']}. "
+        )
     if summary["method"] != "static":
         text += f"Used: {summary['step']:.4g} s, {100 * critical['share_used']:.1f} % of it."
     if critical["remark"]:

@@ -91,11 +91,13 @@ class Region(Table):
 
 
 class BodyTable(Table):
-    """One deformable body."""
+    """One body, deformable unless it is said to be rigid."""
 
     name: Name
     mesh: Mesh
     material: MaterialTable
+    rigid: bool | Literal["lumped"] = False
+    """Six freedoms and no element work; with the inertia of the solid, or of masses at nodes."""
     regions: dict[str, Region] = Field(default_factory=dict)
     """Material keys that differ, by the name of an element set."""
 
@@ -268,6 +270,7 @@ class Scene(Table):
         viscous = any(
             _is_viscous(body.material) or any(map(_is_viscous, body.regions.values()))
             for body in self.body
+            if not body.rigid
         )
         missing = [
             (not viscous, "viscosity: the material is elastic"),
@@ -283,6 +286,7 @@ class Scene(Table):
             ),
             (self.simulation.method == "static", "inertia: the answer is static"),
             (self.contact is None, "contact and friction between bodies"),
+            (any(body.rigid for body in self.body), "deformation of the bodies said to be rigid"),
             (True, "plasticity, damage and fracture"),
         ]
         return [text for absent, text in missing if absent]

@@ -61,7 +61,10 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     scene, table = prepared.scene, prepared.scene.simulation
     bodies = {
         body.name: qdem_fem.Body(
-            prepared.meshes[body.name], _material(body, prepared.meshes[body.name]), name=body.name
+            prepared.meshes[body.name],
+            _material(body, prepared.meshes[body.name]),
+            name=body.name,
+            rigid=body.rigid,
         )
         for body in scene.body
     }
@@ -86,11 +89,14 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
             problems.append(Problem(step.key, error_told(error)))
     prepared.text.refuse(problems)
     try:
-        run.packed_lists()  # rollers against prescribed motions
+        run.packed_lists()  # rollers against prescribed motions, what holds rigid bodies
         if table.method == "static":
             held_check(run)
     except ConditionError as error:
-        prepared.text.refuse([Problem(error.where.replace("relax", "fix"), error_told(error))])
+        where = error.where.replace("relax", "fix")
+        if where in bodies:
+            where = f"body.{list(bodies).index(where)}"
+        prepared.text.refuse([Problem(where, error_told(error))])
     return run, bodies
 
 

@@ -35,11 +35,13 @@ from qdem_fem.series import Driver, Value, is_real
 from qdem_fem.simulation_options import (
     bounds_check,
     numbers_check,
+    rigid_options_check,
     words_check,
 )
 
 if TYPE_CHECKING:
     from qdem_fem.contact_state import Contacts
+    from qdem_fem.rigid_bodies import RigidBodies
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -130,13 +132,15 @@ class Simulation(ConditionedBodies):
         contact_options_check(contact, precision, device)
         self._assembly_class = assembly_class(device)
         self.contact = contact
+        rigid_options_check(self.bodies, precision, device)
         self._contacts: Contacts | None = None
+        self._rigid: RigidBodies | None = None
         self.strain, self.precision, self.safety = strain, precision, safety
         self.threads, self.mass_scaling = threads, mass_scaling
         self.gravity = None if gravity is None else Driver(gravity, 3, "gravity")
         self._given_step = None if step is None else float(step)
         self.motion = Motion()
-        self.viscous = any(body.material.is_viscous for body in self.bodies)
+        self.viscous = any(b.material.is_viscous for b in self.bodies if not b.rigid)
         self._assembly: Assembly | None = None
         self._lists: tuple[kernel.Loads, kernel.Constraints] | None = None
         self._critical: CriticalStep | None = None
@@ -166,7 +170,7 @@ class Simulation(ConditionedBodies):
         step = self.safety * self.critical_step.value
         if not isfinite(step):
             raise ConditionError(
-                "every component of every node is held: no motion limits the step",
+                "every component of every node is held, or rigid: no motion limits the step",
                 where="simulation, step",
                 remedy="give step=",
             )
@@ -183,6 +187,9 @@ class Simulation(ConditionedBodies):
         mass = self.assembly.mass
         added = {}
         for body, start in zip(self.bodies, self.first_node, strict=False):
+            if body.rigid:
+                added[body.name] = 0.0
+                continue
             own = float((body.material.density * body.gradients[1]).sum())
             nodes = np.unique(self.master[start : start + len(body.nodes)])
             added[body.name] = float(mass[nodes].sum()) / own - 1 if self.mass_scaling else 0.0
@@ -239,7 +246,7 @@ class Simulation(ConditionedBodies):
         return History(samples.step_numbers * self.step, values)
 
     def relax(self, tolerance: float = 1e-8, max_steps: int = 100_000) -> StaticAnswer:
-        """Bring the bodies to rest in equilibrium with the loads of the present time.
+        """Bring deformable bodies to rest in equilibrium with the loads of the present time.
 
         Until the residual is below ``tolerance`` of the loads; time stands still, and `advance`
         goes on from there.  See `qdem_fem.dynamic_relaxation.relax` for what is raised.
@@ -249,6 +256,10 @@ class Simulation(ConditionedBodies):
                 "bodies in contact have no static answer here",
                 where="relax",
                 remedy="march, with viscosity, until they rest",
+            )
+        if self.rigid is not None:
+            raise ConditionError(
+                "rigid bodies have no static answer here", where="relax", remedy="march"
             )
         return relax(self, tolerance, max_steps)
 
@@ -260,8 +271,12 @@ class Simulation(ConditionedBodies):
         """Energies now [J]; elastic energy as `qdem_fem.reference_forces.elastic_energy`."""
         velocity = velocity_now(self)
         kinetic = 0.5 * float((self.assembly.mass * (velocity**2).sum(axis=1)).sum())
+        if self.rigid is not None:
+            kinetic += self.rigid.kinetic(self.rigid.now())
         elastic = 0.0
         for body in self.bodies:
+            if body.rigid:
+                continue
             gradients, volumes = body.gradients
             gradient = displacement_gradient(gradients, body.elements, body.displacement)
             material = body.material
@@ -271,6 +286,8 @@ class Simulation(ConditionedBodies):
         external = float(self.motion.work.sum()) + self.motion.gravity_work
         if self.motion.behind:
             external += float(half_work(self, self.assembly.field("velocity"), velocity).sum())
+            if self.rigid is not None:
+                external += float(self.rigid.half_work().sum())
         if self.contacts is None:
             return Energy(kinetic, float(elastic), external)
         return Energy(kinetic, float(elastic), external, *self.contacts.energy())
@@ -293,7 +310,8 @@ class Simulation(ConditionedBodies):
         if self._assembly is None:
             factor = None
             if self.mass_scaling is not None:
-                factor = mass_scaling_factor(self.bodies, self.mass_scaling)
+                soft = [body for body in self.bodies if not body.rigid]
+                factor = mass_scaling_factor(soft, self.mass_scaling)
             self._assembly = self._assembly_class(
                 self.bodies, self.master, self.strain, self.precision, self.threads, factor
             )
@@ -301,7 +319,16 @@ class Simulation(ConditionedBodies):
                 fields = [getattr(body, f"_{name}") for body in self.bodies]
                 self._assembly.field_set(name, np.concatenate(fields))
             self.motion.displacement_set = any(body._displacement.any() for body in self.bodies)
+            if any(body.rigid for body in self.bodies):
+                from qdem_fem.rigid_bodies import RigidBodies
+
+                self._rigid = RigidBodies(self)
         return self._assembly
+
+    @property
+    def rigid(self) -> RigidBodies | None:
+        """The rigid bodies; None where there are none."""
+        return self._rigid if self.assembly is not None else None
 
     @property
     def contacts(self) -> Contacts | None:
@@ -316,6 +343,8 @@ class Simulation(ConditionedBodies):
         """The kernel's lists of the present conditions."""
         if self._lists is None:
             self._lists = self.assembly.lists(self.conditions, self.gravity is not None)
+            if self.rigid is not None:
+                self._lists = self.rigid.lists_split(*self._lists)
         return self._lists
 
     def gravity_at(self, times: Floats) -> Floats | None:
@@ -332,6 +361,8 @@ class Simulation(ConditionedBodies):
         self._lists = None
         if ties:
             self._critical = None
+            if self._contacts is not None:
+                self._contacts.held_anew()
 
     def _field_of(self, body: Body, name: str) -> Floats:
         every = velocity_now(self) if name == "velocity" else self.assembly.field(name)
@@ -343,6 +374,8 @@ class Simulation(ConditionedBodies):
             return
         start = self._offset(body)
         velocities_level(self)
+        if self.rigid is not None and body.rigid:
+            self.rigid.field_set(body, name, values)
         field = self.assembly.field(name)
         field[start : start + len(body.nodes)] = values
         self.assembly.field_set(name, field)

@@ -64,3 +64,14 @@ def numbers_check(**given: Any) -> None:
     for name, number in given.items():
         if number is not None and not (is_real(number) and number > 0):
             raise ConditionError(f"{number!r} is not above zero", where=f"simulation, {name}")
+
+
+def rigid_options_check(bodies: Sequence[Body], precision: str, device: str) -> None:
+    """Raise `ConditionError` for rigid bodies where none are computed."""
+    rigid = [body.name for body in bodies if body.rigid]
+    if rigid and (precision != "float64" or device != "cpu"):
+        raise ConditionError(
+            f"{rigid[0]} is rigid: such bodies are computed in double precision on the processor",
+            where="simulation, rigid",
+            remedy='take precision="float64" and device="cpu"',
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
     """All figures of a finished run; SI units, ready for JSON."""
     run, cost = done.run, done.cost
     static = done.plan is None
-    elements = sum(len(body.elements) for body in done.bodies.values())
+    elements = sum(len(body.elements) for body in done.bodies.values() if not body.rigid)
     element_steps = 0 if done.plan is None else elements * done.plan.total
     rows, energy = (table_read(folder.path / name) for name in ("probes.csv", "energy.csv"))
     return {
@@ -53,15 +54,17 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
 
 
 def critical_step_of(run: Any) -> dict[str, Any]:
-    """The critical step [s], the element it hangs on, and its share that is used."""
+    """The critical step [s], what it hangs on, and its share that is used; None: there is none."""
     critical = run.critical_step
+    finite = isfinite(critical.value)
     return {
-        "value": float(critical.value),
+        "value": float(critical.value) if finite else None,
         "omega": float(critical.omega),
         "body": str(critical.body),
         "element": int(critical.element),
+        "governor": critical.governor,
         "remark": str(critical.remark),
-        "share_used": float(run.step) / float(critical.value),
+        "share_used": float(run.step) / float(critical.value) if finite else 0.0,
     }
 
 

@@ -87,7 +87,8 @@ def collide(
     ``velocity`` (ndof,) of the bodies [m/s, 1/s]; ``restitution`` eps and ``friction`` mu, (nc,) or
     one number, eps in [0, 1].  ``law``: what eps acts on with friction.  ``energy``: ``safe``
     scales eps down until energy does not grow, ``watched`` says so in the message only.
-    After ``max_rounds`` the rest is taken without restitution, which ends.  ``still`` [m/s]: an
+    After ``max_rounds`` the rest is taken without restitution, which ends, costs energy also at
+    eps = 1, and is said in the message.  ``still`` [m/s]: an
     approach not faster is none; ``rest_speed`` [m/s]: one not faster ends without a bounce, which
     cuts off bounces without end (Zeno).  ``drive`` (nc * dim,) [m/s]: relative velocities of the
     contacts while the bodies of J rest, those of walls that are moved from outside.
@@ -131,6 +132,8 @@ def collide(
     # the work of the impulses at the mean velocity: no difference of large energies
     change = 0.5 * float(impulse @ (first + bodies.jacobian @ after + moved))
     size = float(np.abs(impulse) @ np.abs(first))
+    if rounds > max_rounds and eps.any():
+        notes = f"after {max_rounds} rounds the rest was taken without restitution" + notes
     if factor < 1.0:
         notes = f"restitution was scaled by {factor:.3g}, as energy would have grown" + notes
     if change > ROUND_OFF * size:

@@ -175,7 +175,10 @@ class Simulation:
         return float(max(0.0, -gap.min(initial=0.0)))
 
     def _time_step(self, h: float) -> None:
-        loads = None if self.loads is None else self.loads(self.time + h / 2, self.motion)
+        loads = None
+        if self.loads is not None:
+            middle = self.world.drifted(self.motion, h / 2)
+            loads = self.loads(self.time + h / 2, middle)
         made = moreau_step(
             self.world, self.motion, loads, h, self.contacts, self.tolerance, self.accept
         )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from validation.rigid_integration_collisions import contact_rows
 
 Floats = NDArray[np.float64]
 GRAVITY, STEP = 9.81, 1e-3
@@ -52,12 +53,6 @@ def network_bodies(
     velocity[1::3] -= GRAVITY * STEP
     bodies = BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.diags_array(inverse)), 3)
     return bodies, velocity
-
-
-def contact_rows(normal: Floats, arm: Floats) -> Floats:
-    """Rows n, t of J for one body: ``n . (v + w x arm)``, t a quarter turn from n."""
-    tangent = np.array([-normal[1], normal[0]])
-    return np.array([[d[0], d[1], arm[0] * d[1] - arm[1] * d[0]] for d in (normal, tangent)])
 
 
 def network(grains: int, mu: float, seed: int = 0) -> FrictionProblem:

@@ -102,8 +102,10 @@ def faces_checks(quick: bool) -> list[Check]:
 # --- a block on a slope --------------------------------------------------------------------------
 
 
-def slope_gain(share: float, model: str = "spheres") -> tuple[float, float, float]:
-    """A cube on a wall, ``tan(alpha) = 1/2``, friction that share of it.
+def slope_gain(
+    share: float, model: str = "spheres", *, rigid: bool = False
+) -> tuple[float, float, float]:
+    """A cube, deformable or rigid, on a wall, ``tan(alpha) = 1/2``, friction that share of it.
 
     Gravity turns to the slope in 13 ms from an equilibrium.  Acceleration along the slope in the
     last 13 of 39 ms [m/s^2], that of a rigid block, and the way in that time [m].
@@ -117,20 +119,22 @@ def slope_gain(share: float, model: str = "spheres") -> tuple[float, float, floa
         contact = q.SphereContact(radius, stiffness / 9, share / 2, planes=walls)
     else:
         contact = q.SurfaceContact(stiffness / SIDE**2, share / 2, planes=walls)
-    body = q.Body(box_mesh((SIDE,) * 3, (2, 2, 2), "kuhn", (0, 0, height)), STONE)
+    body = q.Body(box_mesh((SIDE,) * 3, (2, 2, 2), "kuhn", (0, 0, height)), STONE, rigid=rigid)
     times = np.linspace(0, ramp, 200)
     along = GRAVITY * np.sin(alpha) * 0.5 * (1 - np.cos(np.pi * times / ramp))
     across = np.full(200, -GRAVITY * np.cos(alpha))
     run = q.Simulation([body], threads=1, contact=contact)
-    mass = run.assembly.mass  # a load by mass: no kernel with gravity has to be compiled for it
+    # a load by mass: no kernel with gravity has to be compiled for it
+    nodes = len(body.nodes)
+    mass = np.full(nodes, body.rigid_mass.mass / nodes) if rigid else run.assembly.mass
     weights = mass.sum() * np.column_stack([along, 0 * along, across])
     run.load(body, mass > 0, q.Series(times, weights), profile=mass / mass.sum())
     run.advance(2 * ramp)
     speed, place = body.velocity.mean(axis=0)[0], body.displacement.mean(axis=0)[0]
     run.advance(ramp)
     gain = (body.velocity.mean(axis=0)[0] - speed) / ramp
-    rigid = GRAVITY * (np.sin(alpha) - share / 2 * np.cos(alpha))
-    return float(gain), float(rigid), float(body.displacement.mean(axis=0)[0] - place)
+    coulomb = GRAVITY * (np.sin(alpha) - share / 2 * np.cos(alpha))
+    return float(gain), float(coulomb), float(body.displacement.mean(axis=0)[0] - place)
 
 
 def slope_checks() -> list[Check]:

@@ -1,6 +1,6 @@
 """Hard cases that are judged by more than a displacement: thresholds, forces, bounces, a jam.
 
-Ours only, unless said; each function gives the rows of one case.
+Ours only where no peers are asked for; each function gives the rows of one case.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from rigid_lcp.errors import NoSolution, RigidError
 from rigid_lcp.simulation import Simulation
 from rigid_lcp.simulation_input import Method
 from validation import rigid_scenes as scenes
+from validation.rigid_hard_peers import bounce_peer, rod_force_peer, rod_stepped_peer
 from validation.rigid_hard_trials import Row, Trial, greatest, trial_ours, trial_peer
 from validation.rigid_hopper import first_jam
 
@@ -72,7 +73,7 @@ def light_on_heavy_rows() -> list[Row]:
     )]  # fmt: skip
 
 
-def rod_rows() -> list[Row]:
+def rod_rows(peers: Sequence[str] = ()) -> list[Row]:
     """Painleve's rod either side of the friction above which no finite force exists."""
     rows = []
     limit = scenes.sliding_rod_limit(scenes.sliding_rod(1.0, method="acceleration"))
@@ -81,10 +82,10 @@ def rod_rows() -> list[Row]:
         mass, inertia = run.world.mass[0], run.world.inertia[0]
         centre = run.positions[0, 0]
         start, off, why = time.process_time(), nan, ""
+        x = float(run.world.contacts(run.motion, 1e-9 * run.world.length).point[0, 0]) - centre
+        exact = scenes.G / (below * (1 / mass + x * x / inertia))
         try:
             run.advance(run.step)
-            x = float(run.contacts.point[0, 0]) - centre
-            exact = scenes.G / (below * (1 / mass + x * x / inertia))
             off = abs(float(run.contacts.normal_force.sum()) / exact - 1)
         except RigidError as error:
             why = f"{type(error).__name__}: {error}"
@@ -94,6 +95,8 @@ def rod_rows() -> list[Row]:
             "acceleration", "force off it", off, f"<= {bar:.0e}", off <= bar, "",
             time.process_time() - start, 1, why,
         ))  # fmt: skip
+        ours = rows[-1]
+        rows += [rod_force_peer(ours, (1 - below) * limit, exact, peer) for peer in peers]
     for above in (1e-6, 1e-1):
         mu = (1 + above) * limit
         start, refused, why = time.process_time(), 0.0, ""
@@ -108,7 +111,10 @@ def rod_rows() -> list[Row]:
             "NoSolution raised", refused, ">= 1", refused == 1.0, "",
             time.process_time() - start, 1, why,
         ))  # fmt: skip
-        rows += _rod_stepped(mu, f"Painleve rod, mu = (1 + {above:g}) limit")
+        stepped = _rod_stepped(mu, f"Painleve rod, mu = (1 + {above:g}) limit")
+        theirs = [rod_stepped_peer(stepped, mu, peer) for peer in peers]
+        for k, row in enumerate(stepped):
+            rows += [row, *(measured[k] for measured in theirs)]
     return rows
 
 
@@ -136,7 +142,7 @@ def _rod_stepped(mu: float, case: str) -> list[Row]:
     ]  # fmt: skip
 
 
-def bounce_rows(bounces: int) -> list[Row]:
+def bounce_rows(bounces: int, peers: Sequence[str] = ()) -> list[Row]:
     """A disc that bounces with restitution 1: its energy a bounce."""
     height = 0.01
     period = 2 * sqrt(2 * height / scenes.G)
@@ -158,7 +164,7 @@ def bounce_rows(bounces: int) -> list[Row]:
             f"energy lost or gained a bounce, {bounces:.0e} bounces", drift, "<= 1e-13",
             drift <= 1e-13, "", time.process_time() - start, run.steps, why,
         ))  # fmt: skip
-    return rows
+    return rows + [bounce_peer(rows[0], bounces, height, period, peer) for peer in peers]
 
 
 def hopper_rows(quick: bool, peers: Sequence[str]) -> list[Row]:

@@ -2,6 +2,7 @@
 
     python -m validation.rigid_hard_page --run [--quick] [--only FAMILY ...]    measure, write both
     python -m validation.rigid_hard_page --run --ours          ours only; rows of peers are kept
+    python -m validation.rigid_hard_page --run --theirs        rows of peers are new, ours are kept
     python -m validation.rigid_hard_page --run --resume        go on with a run that was cut off
     python -m validation.rigid_hard_page                       write the page from the record
 
@@ -64,8 +65,14 @@ space in LMGC90.  MuJoCo runs with its most exact settings (elliptic cones, impr
 iterations without slip, contacts as stiff as its step allows): its contacts are soft by design, so
 it sinks in a little.  ODE is `World.step` (Dantzig) with friction limits from the normal forces of
 the iteration and CFM 1e-12.  LMGC90 is `compas_lmgc90` (NLGS, IQS_CLB) with that binding's own
-settings.  A peer's miss says what it was not made for, not that it is bad.  **Bold**: misses the
-bar.  Peers that did not run on a case are listed below the table with the reason.
+settings.  Restitution 1 is ContactBounce of 1 in ODE, contacts of stiffness without damping in
+MuJoCo (solref of a negative stiffness, zero damping; it has no coefficient of restitution), RST_CLB
+in LMGC90.  A peer's force on the rod is what one step of 1 µs does to its velocity: ODE bounds
+friction by the normal force there would be without it, one turn of what should go on to the limit;
+MuJoCo's convex friction lifts what slides, by a force that goes up as 1/h.  None of them works at
+acceleration level, so none can say that there is no force.  A peer's miss says what it was not made
+for, not that it is bad.  **Bold**: misses the bar.  Peers that did not run on a case are listed
+below the table with the reason.
 """
 
 PICTURE = """
@@ -217,12 +224,13 @@ def _unasked(lines: Sequence[Data]) -> list[str]:
 
 
 def measure(
-    quick: bool, only: Sequence[str] | None, resume: bool = False, ours: bool = False
-) -> None:
+    quick: bool, only: Sequence[str] | None, resume: bool = False, ours: bool = False,
+    theirs: bool = False,
+) -> None:  # fmt: skip
     """Run ours and the peers, family after family; each is in the record when it is done.
 
     ``resume``: families that the record has from the same code and command are left as they are.
-    ``ours``: peers do not run, their rows of the same cases are kept.
+    ``ours``: peers do not run, their rows of the same cases are kept; ``theirs``: ours are kept.
     """
     from validation.cases.rigid_hard_cases import FAMILIES, hard_rows
     from validation.rigid_scene_peers import PEERS
@@ -232,32 +240,29 @@ def measure(
         raise UsageError(
             f"no family {', '.join(sorted(strangers))}", remedy=f"one of {', '.join(FAMILIES)}"
         )
-    words = [
-        "python",
-        "-m",
-        "validation.rigid_hard_page",
-        "--run",
-        *["--quick"] * quick,
-        *["--ours"] * ours,
-    ]
+    words = ["python", "-m", "validation.rigid_hard_page", "--run"]
+    words += ["--quick"] * quick + ["--ours"] * ours + ["--theirs"] * theirs
     for name in only or FAMILIES:
         origin = provenance([*words, "--only", name])
         if resume and is_measured(_known(name), origin):
             continue
         rows = hard_rows(quick, () if ours else PEERS, [name])[name]
         made = record_lines(rows, origin, name)
-        if ours:
-            made = with_known_peers(made, _known(name))
+        if ours or theirs:
+            made = with_known(made, _known(name), peers=ours)
         lines = {each: _known(each) for each in FAMILIES} | {name: made}
         record_write([line for part in lines.values() for line in part])
 
 
-def with_known_peers(made: Sequence[Data], known: Sequence[Data]) -> list[Data]:
-    """Lines of ours, and after those of each case the lines that peers have there already."""
+def with_known(made: Sequence[Data], known: Sequence[Data], *, peers: bool) -> list[Data]:
+    """Lines of ours, and after those of each case the peers' lines.
+
+    ``peers``: theirs are the known lines, ours those just made; else the other way round.
+    """
     keys = ("case", "measure")
     lines = []
     for case in dict.fromkeys(tuple(line[key] for key in keys) for line in made):
-        for group, peer in ((made, False), (known, True)):
+        for group, peer in ((made if peers else known, False), (known if peers else made, True)):
             lines += [
                 line
                 for line in group
@@ -284,11 +289,12 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--run", action="store_true", help="measure first, and write the record")
     parser.add_argument("--quick", action="store_true", help="short runs")
     parser.add_argument("--ours", action="store_true", help="leave the rows of peers as they are")
+    parser.add_argument("--theirs", action="store_true", help="leave our rows as they are")
     parser.add_argument("--resume", action="store_true", help="leave out what is measured already")
     parser.add_argument("--only", nargs="+", metavar="FAMILY", help="measure these again only")
     arguments = parser.parse_args(words)
     if arguments.run:
-        measure(arguments.quick, arguments.only, arguments.resume, arguments.ours)
+        measure(arguments.quick, arguments.only, arguments.resume, arguments.ours, arguments.theirs)
     lines = record_read()
     write_atomically(PAGE, page(lines))
     picture_draw(lines, PAGE.with_suffix(".png"))

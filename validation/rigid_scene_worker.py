@@ -10,8 +10,9 @@ mujoco   MuJoCo (Todorov).  Slabs slide in x and y and turn about the normal of 
          iterations without slip, the stiffest contact it allows (time constant of two steps).
 ode      Open Dynamics Engine 0.16, ``World.step`` (Baraff's Dantzig).  Slabs are kept in the plane
          by a joint.  Its Python binding has boxes, spheres and planes only.
-lmgc90   LMGC90 (Dubois, Jean) as ``compas_lmgc90``: NLGS, law IQS_CLB.  Slabs are free in space;
-         half-spaces are large blocks; one coefficient of friction for all; no restitution.
+lmgc90   LMGC90 (Dubois, Jean) as ``compas_lmgc90``: `rigid_scene_lmgc90`.
+
+A scene with ``"top"`` is one free body in space: `rigid_scene_top`.
 """
 
 from __future__ import annotations
@@ -21,40 +22,22 @@ import math
 import subprocess
 import sys
 import time
-from importlib import import_module, metadata
+from importlib import import_module
 from typing import Any
 
-Data = dict[str, Any]
-
-
-class NotThere(Exception):
-    """The engine has no such shape, law or load; the message says which."""
-
-
-def pair_friction(a: Data, b: Data) -> float:
-    """The smaller of two bodies' coefficients; None leaves it to the other."""
-    given = [value for value in (a["friction"], b["friction"]) if value is not None]
-    return min(given, default=0.0)
-
-
-def pairs(scene: Data) -> list[tuple[int, int]]:
-    """Pairs of bodies of which one moves at least."""
-    bodies = scene["bodies"]
-    fixed = [body["fixed"] for body in bodies]
-    count = len(bodies)
-    return [(i, j) for i in range(count) for j in range(i) if not (fixed[i] and fixed[j])]
-
-
-def rectangle(vertices: list[list[float]]) -> tuple[float, float] | None:
-    """Width and height of a rectangle whose sides lie along the axes; else None."""
-    xs, ys = sorted({x for x, _ in vertices}), sorted({y for _, y in vertices})
-    if len(vertices) != 4 or len(xs) != 2 or len(ys) != 2:
-        return None
-    return xs[1] - xs[0], ys[1] - ys[0]
-
-
-def text(*numbers: float) -> str:
-    return " ".join(f"{number:.17g}" for number in numbers)
+from validation.rigid_scene_lmgc90 import run_lmgc90
+from validation.rigid_scene_shapes import (
+    Data,
+    NotThere,
+    Path,
+    frame_due,
+    pair_friction,
+    pair_restitution,
+    pairs,
+    rectangle,
+    text,
+)
+from validation.rigid_scene_top import run_mujoco_top, run_ode_top
 
 
 def mujoco_model(scene: Data, step: float) -> str:
@@ -121,8 +104,10 @@ def mujoco_model(scene: Data, step: float) -> str:
     )
 
 
-def run_mujoco(scene: Data, step: float, steps: int) -> tuple[list[list[float]], str, float]:
-    """Displacements (x, y, angle) of every body, version, CPU seconds of the steps."""
+def run_mujoco(scene: Data, step: float, steps: int, every: int = 0) -> tuple[Path, str, float]:
+    """Frames (`frame_due`), version, CPU seconds of the steps."""
+    if "top" in scene:
+        return run_mujoco_top(scene, step, steps)
     mujoco = import_module("mujoco")
     model = mujoco.MjModel.from_xml_string(mujoco_model(scene, step))
     state = mujoco.MjData(model)
@@ -134,15 +119,23 @@ def run_mujoco(scene: Data, step: float, steps: int) -> tuple[list[list[float]],
         mujoco_load = body.get("load")
         if mujoco_load is not None:
             state.qfrc_applied[3 * column : 3 * column + 3] = mujoco_load
-    start = time.process_time()
-    for _ in range(steps):
+    path: Path = []
+    cost = 0.0
+    for k in range(1, steps + 1):
+        start = time.process_time()
         mujoco.mj_step(model, state)
-    cost = time.process_time() - start
-    ends = [[0.0, 0.0, 0.0] for _ in scene["bodies"]]
-    for column, k in enumerate(moving):
-        x, y, turned = (float(v) for v in state.qpos[3 * column : 3 * column + 3])
-        ends[k] = [x, y, turned - scene["bodies"][k]["angle"]]
-    return ends, mujoco.__version__, cost
+        cost += time.process_time() - start
+        if not frame_due(k, steps, every):
+            continue
+        path.append([[0.0] * 6 for _ in scene["bodies"]])
+        for column, body in enumerate(moving):
+            place, rate = (
+                [float(v) for v in values[3 * column : 3 * column + 3]]
+                for values in (state.qpos, state.qvel)
+            )
+            place[2] -= scene["bodies"][body]["angle"]
+            path[-1][body] = place + rate
+    return path, mujoco.__version__, cost
 
 
 def ode_version() -> str:
@@ -155,8 +148,10 @@ def ode_version() -> str:
     return found.stdout.strip() or "of unknown version"
 
 
-def run_ode(scene: Data, step: float, steps: int) -> tuple[list[list[float]], str, float]:
+def run_ode(scene: Data, step: float, steps: int, every: int = 0) -> tuple[Path, str, float]:
     """As `run_mujoco`."""
+    if "top" in scene:
+        return run_ode_top(scene, step, steps, ode_version())
     ode = import_module("ode")
     world, space, group = ode.World(), ode.HashSpace(), ode.JointGroup()
     world.setCFM(1e-12)  # of 1e-12 to 1e-6 the value that keeps stacks best
@@ -204,15 +199,17 @@ def run_ode(scene: Data, step: float, steps: int) -> tuple[list[list[float]], st
         a, b = bodies[first.number], bodies[second.number]
         if a["fixed"] and b["fixed"]:
             return
-        bounce = min((r for r in (a["restitution"], b["restitution"]) if r is not None), default=0)
+        bounce = pair_restitution(a, b)
         for contact in ode.collide(first, second):
             contact.setMode(ode.ContactApprox1 | (ode.ContactBounce if bounce else 0))
             contact.setMu(pair_friction(a, b))
             contact.setBounce(bounce)
             ode.ContactJoint(world, group, contact).attach(first.getBody(), second.getBody())
 
-    start = time.process_time()
-    for _ in range(steps):
+    path: Path = []
+    cost = 0.0
+    for k in range(1, steps + 1):
+        start = time.process_time()
         for one, body in zip(placed, bodies, strict=True):
             if one is not None and body.get("load") is not None:
                 fx, fy, torque = body["load"]
@@ -221,113 +218,34 @@ def run_ode(scene: Data, step: float, steps: int) -> tuple[list[list[float]], st
         space.collide(None, touch)
         world.step(step)
         group.empty()
-    cost = time.process_time() - start
-    ends = []
-    for one, body in zip(placed, bodies, strict=True):
-        if one is None:
-            ends.append([0.0, 0.0, 0.0])
-            continue
-        x, y, _z = one.getPosition()
-        turn = one.getRotation()
-        angle = math.atan2(turn[3], turn[0]) - body["angle"]
-        ends.append([x - body["position"][0], y - body["position"][1], angle])
-    return ends, ode_version(), cost
+        cost += time.process_time() - start
+        if frame_due(k, steps, every):
+            path.append([_ode_state(one, body) for one, body in zip(placed, bodies, strict=True)])
+    return path, ode_version(), cost
 
 
-def slab(outline: list[list[float]], depth: float) -> Data:
-    """Vertices and outward faces of a slab over an anticlockwise outline (x, z)."""
-    count = len(outline)
-    vertices = [[x, y, z] for y in (-depth / 2, depth / 2) for x, z in outline]
-    near, far = list(range(count)), list(range(2 * count - 1, count - 1, -1))
-    sides = [[(k + 1) % count, k, count + k, count + (k + 1) % count] for k in range(count)]
-    return {"vertices": vertices, "faces": [near, far, *sides]}
-
-
-def run_lmgc90(scene: Data, step: float, steps: int) -> tuple[list[list[float]], str, float]:
-    """As `run_mujoco`; the scene is turned so that gravity points along -z."""
-    gx, gy = scene["gravity"]
-    weight = math.hypot(gx, gy)
-    if abs(weight - 9.81) > 1e-9:
-        raise NotThere(f"its gravity is 9.81 m/s^2, here {weight:g}")
-    right, up = (-gy / weight, gx / weight), (-gx / weight, -gy / weight)
-    bodies, depth = scene["bodies"], scene["depth"]
-    if any(body["restitution"] for body in bodies):
-        raise NotThere("its law IQS_CLB has no restitution")
-    if any(any(body["velocity"]) or body["spin"] for body in bodies if not body["fixed"]):
-        raise NotThere("its binding starts bodies at rest")
-    if any(body.get("load") for body in bodies):
-        raise NotThere("loads are not passed on to its binding here")
-    used = {pair_friction(bodies[i], bodies[j]) for i, j in pairs(scene)}
-    if len(used) > 1:
-        raise NotThere("its binding has one coefficient of friction for all contacts")
-    low = [min(body["position"][k] for body in bodies if not body["fixed"]) for k in (0, 1)]
-    high = [max(body["position"][k] for body in bodies if not body["fixed"]) for k in (0, 1)]
-    size = max(high[0] - low[0], high[1] - low[1], 4 * depth)
-    blocks, density = [], []
-    for body in bodies:
-        if body["kind"] == "disc":
-            raise NotThere("its binding has polyhedra only, no discs")
-        if body["kind"] == "half-space":
-            nx, ny = body["normal"]
-            tx, ty = -ny, nx
-            middle = [(a + b) / 2 for a, b in zip(low, high, strict=True)]
-            over = middle[0] * nx + middle[1] * ny - body["offset"]
-            foot = [middle[0] - over * nx, middle[1] - over * ny]
-            outline = [
-                [foot[0] + s * size * tx - d * size * nx, foot[1] + s * size * ty - d * size * ny]
-                for s, d in ((-1, 0), (-1, 1), (1, 1), (1, 0))
-            ]
-        else:
-            c, s = math.cos(body["angle"]), math.sin(body["angle"])
-            outline = [
-                [body["position"][0] + c * x - s * y, body["position"][1] + s * x + c * y]
-                for x, y in body["vertices"]
-            ]
-        turned = [[x * right[0] + y * right[1], x * up[0] + y * up[1]] for x, y in outline]
-        wide = 3 * depth if body["fixed"] else depth
-        blocks.append(slab(turned, wide))
-        area = sum(
-            a[0] * b[1] - b[0] * a[1]
-            for a, b in zip(outline, outline[1:] + outline[:1], strict=True)
-        ) / 2  # fmt: skip
-        density.append(2700.0 if body["fixed"] else body["mass"] / area / depth)
-    lmgc90 = import_module("compas_lmgc90.solver").Solver(dt=step)
-    lmgc90.geometry_from_v_f(blocks, density)
-    numpy = import_module("numpy")
-    for k, body in enumerate(bodies):
-        if body["fixed"]:
-            lmgc90.v_drvdof[k] = {freedom: numpy.zeros(6) for freedom in range(1, 7)}
-    lmgc90.contact_law("IQS_CLB", used.pop(), alert=1e-2 * depth)
-    lmgc90.preprocess()
-    first = lmgc90.lmgc90.get_initial_state()
-    begin = [list(place) for place in first.init_bodies]
-    frames = [numpy.array(frame).reshape(3, 3) for frame in first.init_body_frames]
-    start = time.process_time()
-    for _ in range(steps):
-        last = lmgc90.lmgc90.compute_one_step()
-    cost = time.process_time() - start
-    ends = []
-    for k in range(len(bodies)):
-        move = [b - a for a, b in zip(begin[k], last.bodies[k], strict=True)]
-        turn = numpy.array(last.body_frames[k]).reshape(3, 3).T @ frames[k]
-        ends.append([
-            move[0] * right[0] + move[2] * up[0], move[0] * right[1] + move[2] * up[1],
-            math.atan2(turn[2, 0], turn[0, 0]),
-        ])  # fmt: skip
-    return ends, metadata.version("compas_lmgc90"), cost
+def _ode_state(one: Any, body: Data) -> list[float]:
+    if one is None:
+        return [0.0] * 6
+    x, y, _ = one.getPosition()
+    turn = one.getRotation()
+    angle = math.atan2(turn[3], turn[0]) - body["angle"]
+    vx, vy, _ = one.getLinearVel()
+    spin = one.getAngularVel()[2]
+    return [x - body["position"][0], y - body["position"][1], angle, vx, vy, spin]
 
 
 ENGINES = {"mujoco": run_mujoco, "ode": run_ode, "lmgc90": run_lmgc90}
 
 
 def main(engine: str, source: str, target: str) -> None:
-    """Run and write ``{"displacement": [[x, y, angle]...], "version", "cpu_s"}`` or ``"why"``."""
+    """Run and write ``{"path", "version", "cpu_s"}`` or ``"why"``."""
     with open(source, encoding="utf-8") as file:
         job = json.load(file)
     result: Data
     try:
-        moves, version, cost = ENGINES[engine](job["scene"], job["step"], job["steps"])
-        result = {"displacement": moves, "version": version, "cpu_s": cost}
+        path, version, cost = ENGINES[engine](job["scene"], job["step"], job["steps"], job["every"])
+        result = {"path": path, "version": version, "cpu_s": cost}
     except NotThere as reason:
         result = {"why": str(reason)}
     with open(target, "w", encoding="utf-8") as file:

@@ -17,7 +17,7 @@ from validation.rigid_hard_page import (
     page,
     record_lines,
     record_read,
-    with_known_peers,
+    with_known,
 )
 from validation.rigid_hard_trials import Row
 
@@ -74,9 +74,19 @@ def test_rows_of_peers_are_kept() -> None:
     """A run of ours alone: new lines of ours, old ones of peers after those of the same case."""
     known = record_lines([row(), row(method="ODE", peer=True), row(case="gone", peer=True)], ORIGIN)
     made = record_lines([row(value=2e-12), row(case="new")], ORIGIN)
-    lines = with_known_peers(made, known)
+    lines = with_known(made, known, peers=True)
     assert [(line["case"], line["method"], line["value"]) for line in lines] == [
         ("box", "time-stepping", 2e-12), ("box", "ODE", 1e-12), ("new", "time-stepping", 1e-12),
+    ]  # fmt: skip
+
+
+def test_rows_of_ours_are_kept() -> None:
+    """A run of the peers: their lines are new, ours are those of before."""
+    known = record_lines([row(), row(method="ODE", peer=True)], ORIGIN)
+    made = record_lines([row(value=2e-12), row(method="ODE", value=3.0, peer=True)], ORIGIN)
+    lines = with_known(made, known, peers=False)
+    assert [(line["method"], line["value"]) for line in lines] == [
+        ("time-stepping", 1e-12), ("ODE", 3.0),
     ]  # fmt: skip
 
 

@@ -12,7 +12,10 @@ import pytest
 
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
+from validation import rigid_scene_lmgc90 as lmgc90
 from validation import rigid_scene_peers as peers
+from validation import rigid_scene_shapes as shapes
+from validation import rigid_scene_top as top
 from validation import rigid_scene_worker as worker
 from validation.rigid_scene_peers import PEERS, peer_missing, peer_run, scene_data
 
@@ -59,14 +62,15 @@ def test_friction_of_a_pair_is_as_in_a_scene(a: float | None, b: float | None, m
     world, motion = world_of(scene)
     assert world.contacts(motion, 0.1).friction == pytest.approx(mu)
     first, second = scene_data(scene)["bodies"]
-    assert worker.pair_friction(first, second) == mu
+    assert shapes.pair_friction(first, second) == mu
 
 
 def test_nothing_is_imported_unless_asked_for() -> None:
     """Neither the description nor the worker pulls an engine in."""
-    source = Path(worker.__file__).read_text() + Path(peers.__file__).read_text()
+    modules = (worker, peers, shapes, lmgc90, top)
+    source = "".join(Path(str(module.__file__)).read_text() for module in modules)
     for line in source.splitlines():
-        if line.startswith(("import ", "from ")):
+        if line.startswith(("import ", "from ")) and not line.startswith("from validation."):
             assert not any(name in line for name in ("mujoco", " ode", "lmgc90"))
 
 
@@ -97,19 +101,26 @@ def test_peer_that_dies_or_hangs_is_a_row(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_what_an_engine_lacks_is_said() -> None:
     scene = Scene(2)
-    scene.add(Polygon([(0, 0), (1, 0), (0, 1)]), density=1, restitution=0.5)
+    scene.add(Polygon([(0, 0), (1, 0), (0, 1)]), density=1, restitution=0.5, position=(0, 2))
     scene.add(HalfSpace((0, 1)), restitution=0.5)
-    data = scene_data(scene)
-    with pytest.raises(worker.NotThere, match="restitution"):
-        worker.mujoco_model(data, STEP)
-    with pytest.raises(worker.NotThere, match="restitution"):
-        worker.run_lmgc90(data, STEP, 1)
+    with pytest.raises(shapes.NotThere, match="restitution"):
+        worker.mujoco_model(scene_data(scene), STEP)
+    scene.add(HalfSpace((1, 0), -1), restitution=0.2)
+    with pytest.raises(shapes.NotThere, match="one coefficient of restitution"):
+        lmgc90.run_lmgc90(scene_data(scene), STEP, 1)
+    scene.bodies.pop()
+    with pytest.raises(shapes.NotThere, match="RST_CLB"):
+        lmgc90.run_lmgc90(scene_data(scene), STEP, 1)
+    scene.bodies[0].velocity[:] = 1.0, 0.0
+    scene.add(Polygon([(0, 0), (1, 0), (0, 1)]), density=1, position=(3, 2))
+    with pytest.raises(shapes.NotThere, match="at rest"):
+        lmgc90.run_lmgc90(scene_data(scene), STEP, 1)
 
 
 def test_slab_is_closed_and_faces_outwards() -> None:
     """Volume of a slab by the divergence theorem over its faces: area times depth, positive."""
     outline = [[0.0, 0.0], [2.0, 0.0], [1.5, 1.0], [0.0, 1.0]]
-    made = worker.slab(outline, 0.3)
+    made = shapes.slab(outline, 0.3)
     points = np.array(made["vertices"])
     volume = 0.0
     for face in made["faces"]:
@@ -148,3 +159,34 @@ def test_peer_takes_motion_and_loads(engine: str) -> None:
     t = 200 * STEP
     exact = np.array([t + t * t, 2 * t + (3 - G) * t * t / 2, 3 * t + 2 * t * t])
     np.testing.assert_allclose(made.displacement[0], exact, atol=2 * G * t * STEP)
+
+
+@pytest.mark.parametrize(
+    ("engine", "restitution"), [("mujoco", 1.0), ("ode", 0.5), ("lmgc90", 0.5)]
+)
+def test_peer_bounces_and_tells_its_path(engine: str, restitution: float) -> None:
+    """A box that lands flat, going sideways, leaves with ``e`` of its speed; a frame a step."""
+    if remedy := peer_missing(engine):
+        pytest.skip(remedy)
+    scene = Scene(2)
+    scene.add(
+        Polygon.rectangle(0.2, 0.2), density=1000, position=(0, 0.15), velocity=(0.5, 0),
+        restitution=restitution,
+    )  # fmt: skip
+    scene.add(HalfSpace((0, 1)))
+    made = peer_run(engine, scene_data(scene, impacts=True), STEP, 150, every=1)
+    assert made.why == ""
+    assert made.path.shape == (150, 2, 6)
+    landing = np.sqrt(2 * G * 0.05)
+    assert made.path[:, 0, 4].max() == pytest.approx(restitution * landing, rel=0.05)
+    np.testing.assert_allclose(made.path[-1, 0, [0, 3]], [0.075, 0.5], rtol=1e-6)
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "ode"])
+def test_peer_turns_a_top_about_an_axis_of_inertia(engine: str) -> None:
+    """2 rad about z, to (w h)^2 / 12 of it: the quaternion (cos 1, 0, 0, sin 1)."""
+    if remedy := peer_missing(engine):
+        pytest.skip(remedy)
+    body = {"inertia": [1.0, 1.5, 2.0], "spin": [0.0, 0.0, 4.0], "integrator": "RK4"}
+    made = peer_run(engine, {"top": body}, STEP, 500)
+    np.testing.assert_allclose(made.path[0, 0], [np.cos(1), 0, 0, np.sin(1)], atol=5e-6)

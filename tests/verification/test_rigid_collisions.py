@@ -14,34 +14,14 @@ from hypothesis import strategies as st
 from rigid_lcp.collisions import Collision, Floats, Law, collide
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import BodySpace
-from tests.rigid_networks import contact_rows, network_bodies
-
-
-def cradle(balls: int) -> BodySpace:
-    """Equal balls of mass 1 in a row that touch; n along the row."""
-    jacobian = np.zeros((2 * (balls - 1), 3 * balls))
-    for c in range(balls - 1):
-        for ball, sign, arm in ((c + 1, 1.0, -0.5), (c, -1.0, 0.5)):
-            rows = contact_rows(np.array([1.0, 0.0]), np.array([arm, 0.0]))
-            jacobian[2 * c : 2 * c + 2, 3 * ball : 3 * ball + 3] = sign * rows
-    inverse = np.ones(3 * balls)
-    inverse[2::3] = 10.0
-    return BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.diags_array(inverse)), 3)
-
-
-def one_body(contacts: list[tuple[list[float], list[float]]], inertia: float) -> BodySpace:
-    """A body of mass 1 on fixed walls: normals and arms of its contacts."""
-    rows = [contact_rows(np.array(n), np.array(arm)) for n, arm in contacts]
-    inverse = sp.diags_array([1.0, 1.0, 1.0 / inertia])
-    return BodySpace(sp.csr_array(np.vstack(rows)), sp.csr_array(inverse), 3)
-
-
-def kinetic_energy(bodies: BodySpace, velocity: Floats) -> float:
-    """``v M v / 2`` [J] of all bodies; freedoms of infinite mass (M^-1 = 0) have none."""
-    inverse = bodies.inverse_mass.toarray()
-    moves = np.flatnonzero(inverse.any(axis=1))
-    v = velocity[moves]
-    return 0.5 * float(v @ np.linalg.solve(inverse[np.ix_(moves, moves)], v))
+from tests.rigid_networks import network_bodies
+from validation.rigid_integration_collisions import (
+    cradle,
+    cradle_answer,
+    kinetic_energy,
+    one_body,
+    random_collision,
+)
 
 
 def energy_of(bodies: BodySpace, velocity: Floats, found: Collision) -> tuple[float, float]:
@@ -50,27 +30,27 @@ def energy_of(bodies: BodySpace, velocity: Floats, found: Collision) -> tuple[fl
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
-@pytest.mark.parametrize(
-    ("balls", "moving", "expected"),
-    [
-        (2, 1, [0.0, 1.0]),
-        (3, 1, [-1 / 3, 2 / 3, 2 / 3]),
-        (5, 1, [-0.6, 0.4, 0.4, 0.4, 0.4]),
-        (5, 2, [-0.2, -0.2, 0.8, 0.8, 0.8]),
-    ],
-)
-def test_cradle(balls: int, moving: int, expected: list[float], mu: float) -> None:
-    """The paper's law: all collide at once.  k balls into n: v' = v - 2 (n-k)/n, or + 2 k/n.
-
-    From eqs 35, 36 at eps = 1 all balls of a group leave alike; momentum and energy give the rest.
-    """
+@pytest.mark.parametrize(("balls", "moving"), [(2, 1), (3, 1), (5, 1), (5, 2)])
+def test_cradle(balls: int, moving: int, mu: float) -> None:
+    """The paper's law: all collide at once.  k balls into n: v' = v - 2 (n-k)/n, or + 2 k/n."""
     bodies = cradle(balls)
     velocity = np.zeros(3 * balls)
     velocity[: 3 * moving : 3] = 1.0
     found = collide(bodies, velocity, 1.0, mu)
     assert found.solved
-    assert found.velocity[::3] == pytest.approx(expected, abs=1e-12)
+    assert found.velocity[::3] == pytest.approx(cradle_answer(balls, moving), abs=1e-12)
     assert abs(found.energy_change) <= 1e-13
+
+
+def test_random_collisions_never_make_energy() -> None:
+    """Arms, normals, masses, eps and mu of every contact at random: both laws, a few of each."""
+    generator = np.random.default_rng(3)
+    for law in ("moreau", "newton", "moreau", "newton"):
+        bodies, velocity, eps, mu = random_collision(generator)
+        found = collide(bodies, velocity, eps, mu, law=law)  # type: ignore[arg-type]
+        before, after = energy_of(bodies, velocity, found)
+        assert found.solved, found.message
+        assert after <= before * (1 + 1e-12)
 
 
 @given(st.floats(0.0, 1.0), st.integers(0, 10**6))
@@ -255,6 +235,8 @@ def test_rounds_that_do_not_end_are_cut() -> None:
     """After the rounds allowed the rest has no restitution: nothing approaches, and that is all."""
     bodies, velocity = network_bodies(80, 3)
     found = collide(bodies, velocity, 1.0, max_rounds=1)
+    assert "after 1 rounds the rest was taken without restitution" in found.message
+    assert "rounds" not in collide(bodies, velocity, 1.0, max_rounds=500).message
     normal = (bodies.jacobian @ found.velocity)[::2]
     assert found.solved
     assert normal.min() >= -1e-11 * np.abs(bodies.jacobian @ velocity).max()

@@ -14,6 +14,9 @@ from rigid_lcp.lasting_contacts import first_fall
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
+from rigid_lcp.simulation_input import Method
+from validation.rigid_integration_scenes import falling_box
+from validation.rigid_integration_steps import grains_in_a_box
 from validation.rigid_scenes import (
     G,
     block_on_incline,
@@ -100,13 +103,8 @@ def test_both_methods_have_one_limit(mu: float) -> None:
 def test_both_methods_have_one_limit_with_impacts() -> None:
     """A box hits the floor with a corner, slides and turns: first order of time stepping."""
 
-    def end(method: str, step: float) -> Floats:
-        scene = Scene(2)
-        scene.add(
-            Polygon.rectangle(1, 0.5), density=1.0, position=(0, 0.6), angle=0.4, velocity=(1, 0)
-        )
-        scene.add(HalfSpace((0, 1)), friction=0.2, restitution=0.3)
-        run = Simulation(scene, method, step=step)  # type: ignore[arg-type]
+    def end(method: Method, step: float) -> Floats:
+        run = falling_box(method, step)
         run.advance(0.3)
         return np.array([*run.positions[0], run.angles[0]])
 
@@ -158,22 +156,6 @@ def test_step_is_halved_and_doubled() -> None:
     assert run.pace.step < 0.01
     run.advance(0.45)
     assert run.pace.step == 0.01
-
-
-def grains_in_a_box(seed: int) -> Scene:
-    """Discs and boxes that fly about."""
-    generator = np.random.default_rng(seed)
-    scene = Scene(2)
-    for k in range(5):
-        shape = Disc(0.04) if k % 2 else Polygon.rectangle(0.07, 0.05)
-        scene.add(
-            shape, density=2700, position=(0.1 + 0.12 * (k % 3), 0.1 + 0.12 * (k // 3)),
-            angle=generator.uniform(-1, 1), velocity=generator.uniform(-1, 1, 2), friction=0.3,
-            restitution=0.7,
-        )  # fmt: skip
-    for normal, offset in (((0, 1), 0.0), ((1, 0), 0.0), ((-1, 0), -0.44)):
-        scene.add(HalfSpace(normal, offset), restitution=0.7)
-    return scene
 
 
 @pytest.mark.parametrize("seed", [0, 1])

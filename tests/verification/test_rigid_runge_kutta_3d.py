@@ -7,15 +7,17 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from rigid_lcp.gyroscopic import angular_momentum
-from rigid_lcp.polyhedra import ballast_stone
-from rigid_lcp.rotations import quaternion_of_rotation, quaternion_rate, rotate
+from rigid_lcp.rotations import quaternion_of_rotation, rotate
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import HalfSpace
 from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
 from rigid_lcp.simulation import Simulation
+from rigid_lcp.simulation_input import Method
+from validation import rigid_integration_scenes as motions
+from validation.rigid_integration_scenes import STONE
+from validation.rigid_integration_scenes import STONE_SPIN as SPIN
 
 Floats = NDArray[np.float64]
 G = 9.81
@@ -31,52 +33,30 @@ def orders(error: Callable[[float], float], steps: list[float]) -> Floats:
 
 # --- free flight ---
 
-STONE = ballast_stone(np.random.default_rng(0), 0.05)
-SPIN = np.array([20.0, -35.0, 10.0])
-
-
-def stone_in_flight(method: str, step: float, seconds: float) -> Simulation:
-    scene = Scene(3)
-    scene.add(STONE, density=DENSITY, position=[0.0, 0.0, 0.0], velocity=[0.3, 0.0, 0.4], spin=SPIN)
-    run = Simulation(scene, method, step=step)  # type: ignore[arg-type]
-    run.advance(seconds)
-    return run
-
-
-def euler_equations(seconds: float) -> Floats:
-    """Orientation of the free stone, by SciPy: ``I w' = -w x I w`` with body components."""
-    inertia = STONE.mass_properties(DENSITY)[1]
-
-    def law(_: float, y: Floats) -> Floats:
-        spin = y[4:]
-        change = np.linalg.solve(inertia, -np.cross(spin, inertia @ spin))
-        return np.concatenate([quaternion_rate(y[:4], rotate(y[:4], spin)), change])
-
-    start = np.concatenate([[1.0, 0.0, 0.0, 0.0], SPIN])
-    return solve_ivp(law, (0, seconds), start, rtol=1e-13, atol=1e-13, method="DOP853").y[:4, -1]
-
 
 @pytest.mark.parametrize(("method", "order"), [("acceleration", 4.0), ("time-stepping", 2.0)])
-def test_a_free_stone_obeys_eulers_equations(method: str, order: float) -> None:
+def test_a_free_stone_obeys_eulers_equations(method: Method, order: float) -> None:
     """Spun 42 rad/s about no principal axis for half a turn; both to their orders."""
     seconds = 0.08
-    wanted = euler_equations(seconds)
+    wanted = motions.stone_in_flight_answer(seconds)
 
     def error(step: float) -> float:
-        turned = stone_in_flight(method, step, seconds).angles[0]
+        run = motions.stone_in_flight(method, step)
+        run.advance(seconds)
+        turned = run.angles[0]
         return float(np.linalg.norm(turned * np.sign(turned @ wanted) - wanted))
 
     assert np.allclose(orders(error, [2e-3, 1e-3, 5e-4]), order, atol=0.25)
 
 
 def test_a_free_stone_keeps_energy_and_angular_momentum() -> None:
-    run = stone_in_flight("acceleration", 1e-3, 0.2)
-    inertia = STONE.mass_properties(DENSITY)[1]
+    run = motions.stone_in_flight("acceleration", 1e-3)
+    run.advance(0.2)
+    mass, inertia = STONE.mass_properties(DENSITY)
     momentum = inertia @ SPIN
     found = angular_momentum(inertia, run.angles[0], run.spins[0])
     # fourth order: (|w| h)^4 = 3e-6 a radian, over 8 rad, with a constant of 1/120 at most
     assert np.linalg.norm(found - momentum) < 3e-7 * np.linalg.norm(momentum)
-    mass = STONE.mass_properties(DENSITY)[0]
     energy = 0.5 * mass * 0.25 + 0.5 * SPIN @ momentum
     assert run.energy == pytest.approx(energy, rel=3e-7)
 
@@ -128,74 +108,24 @@ def test_a_sphere_rolls_down_with_five_sevenths(azimuth: float) -> None:
 
 # --- a block that slides and turns on an incline ---
 
-CORNERS = np.array([[0.1, 0.0], [-0.05, 0.08], [-0.04, -0.09]])
-THICK = 0.04
-PRISM = Polyhedron(
-    np.vstack([np.column_stack([CORNERS, np.full(3, z)]) for z in (-THICK / 2, THICK / 2)])
-)
-SLOPE, FRICTION, KICK, TURN = 0.2, 0.4, np.array([1.0, 0.6]), 2.0
-
-
-def sliding_prism(method: str, step: float, seconds: float) -> Floats:
-    """Place along the incline, across it and angle of a kicked prism that stands on a triangle."""
-    normal = np.array([np.sin(SLOPE), 0.0, np.cos(SLOPE)])
-    turn = quaternion_of_rotation([0.0, SLOPE, 0.0])
-    scene = Scene(3)
-    start = THICK / 2 * normal
-    scene.add(
-        PRISM, density=DENSITY, position=start, angle=turn, friction=FRICTION,
-        velocity=rotate(turn, [*KICK, 0.0]), spin=TURN * normal,
-    )  # fmt: skip
-    scene.add(HalfSpace(normal, 0.0))
-    run = Simulation(scene, method, step=step)  # type: ignore[arg-type]
-    run.advance(seconds)
-    assert (run.contacts.status == "slide").all()
-    place = rotate(turn * [1, -1, -1, -1], run.positions[0] - start)
-    side = rotate(turn * [1, -1, -1, -1], rotate(run.angles[0], [1.0, 0.0, 0.0]))
-    return np.array([place[0], place[1], np.arctan2(side[1], side[0])])
-
-
-def sliding_equations(seconds: float) -> Floats:
-    """The same by SciPy, in the plane of the incline.
-
-    Three normal forces follow from the weight and from no moment tipping the prism: with the
-    lever (x, y, -h) of a corner and its friction ``-mu N s``, s the direction of its slip,
-    ``sum N = m g cos``, ``sum N (y - mu h s_y) = 0``, ``sum N (x - mu h s_x) = 0``.
-    """
-    mass, inertia = PRISM.mass_properties(DENSITY)
-    corners, height = CORNERS - PRISM.centroid[:2], THICK / 2
-
-    def law(_: float, y: Floats) -> Floats:
-        c, s = np.cos(y[2]), np.sin(y[2])
-        arm = corners @ np.array([[c, s], [-s, c]])
-        velocity = y[3:5] + y[5] * np.column_stack([-arm[:, 1], arm[:, 0]])
-        way = velocity / np.linalg.norm(velocity, axis=1)[:, None]
-        tipping = arm - FRICTION * height * way
-        weight = mass * G * np.cos(SLOPE)
-        force = np.linalg.solve(np.vstack([np.ones(3), tipping.T]), [weight, 0.0, 0.0])
-        drag = -FRICTION * force[:, None] * way
-        moment = float((arm[:, 0] * drag[:, 1] - arm[:, 1] * drag[:, 0]).sum())
-        pull = drag.sum(axis=0) / mass + [G * np.sin(SLOPE), 0.0]
-        return np.array([*y[3:], *pull, moment / inertia[2, 2]])
-
-    start = [0.0, 0.0, 0.0, *KICK, TURN]
-    return solve_ivp(law, (0, seconds), start, rtol=1e-12, atol=1e-13, method="DOP853").y[:3, -1]
-
 
 @pytest.mark.parametrize(
     ("method", "order", "steps"),
     [("acceleration", 4.0, [0.02, 0.01, 0.005]), ("time-stepping", 1.0, [8e-3, 4e-3, 2e-3])],
 )
-def test_a_block_slides_and_turns(method: str, order: float, steps: list[float]) -> None:
+def test_a_block_slides_and_turns(method: Method, order: float, steps: list[float]) -> None:
     """Both methods go to the one solution, Runge-Kutta with the fourth order.
 
     Time stepping takes the direction of friction from the end of the step: first order.
     """
     seconds = 0.12
-    wanted = sliding_equations(seconds)
+    wanted = motions.sliding_prism_answer(seconds)
 
     def error(step: float) -> float:
-        return float(np.abs(sliding_prism(method, step, seconds) - wanted).max())
+        run = motions.sliding_prism(method, step)
+        run.advance(seconds)
+        assert (run.contacts.status == "slide").all()
+        return float(np.abs(motions.sliding_prism_place(run) - wanted).max())
 
     assert np.allclose(orders(error, steps), order, atol=0.3)
     assert error(steps[-1]) < (1e-9 if method == "acceleration" else 2e-3)

@@ -15,6 +15,7 @@ from rigid_lcp.passed_collisions import Closing, bouncing, contact_shift
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
+from validation.rigid_integration_impacts import balls_in_a_row, dense_gas
 from validation.rigid_scenes import (
     G,
     block_on_incline,
@@ -266,13 +267,7 @@ def test_collisions_are_passed_on_within_a_step(gap: float, restitution: float) 
     share come in another order).  Momentum stays, energy never grows, the balls part."""
 
     def hit(method: str, step: float) -> Simulation:
-        scene = Scene(2, gravity=(0.0, 0.0))
-        for k in range(5):
-            place, speed = (0.1 + gap) * k - 0.01 * (k < 2), 1.0 * (k < 2)
-            scene.add(
-                Disc(0.05), density=1000.0, position=(place, 0.0), velocity=(speed, 0.0),
-                restitution=restitution,
-            )  # fmt: skip
+        scene = balls_in_a_row(gap, restitution)
         run = Simulation(scene, method, step=step)  # type: ignore[arg-type]
         before = run.energy
         for _ in range(20):
@@ -296,17 +291,31 @@ def test_collisions_are_passed_on_within_a_step(gap: float, restitution: float) 
 def test_a_dense_gas_keeps_its_energy() -> None:
     """36 discs in a box, e = 1, no friction, spaces of less than a step's way: most steps hold
     chains of collisions, and none changes the energy by more than round-off."""
-    scene = Scene(2, gravity=(0.0, 0.0))
-    for normal in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
-        scene.add(HalfSpace(normal, -0.33), restitution=1.0)
-    speeds = np.random.default_rng(5).standard_normal((36, 2))
-    for k, speed in enumerate(speeds):
-        place = (0.11 * (k % 6) - 0.275, 0.11 * (k // 6) - 0.275)
-        scene.add(
-            Disc(0.05), density=1000.0, position=place, velocity=tuple(speed), restitution=1.0
-        )
-    run = Simulation(scene, "time-stepping", step=1e-2)
+    run = Simulation(dense_gas(), "time-stepping", step=1e-2)
     begin = run.energy
     for _ in range(100):
         run.advance(1e-2)
     assert run.energy == pytest.approx(begin, rel=1e-10)
+
+
+def test_loads_are_those_of_the_midpoint() -> None:
+    """A disc on a spring to the origin goes round: ``(cos w t, sin w t)``, to second order.
+
+    Taken where the step starts, the pull lags by half a step and turns into a push along the way:
+    the disc would gain ``w h / 2`` of its speed a radian.
+    """
+
+    def end(step: float) -> float:
+        scene = Scene(2, gravity=(0.0, 0.0))
+        scene.add(Disc(0.1), density=1.0, position=(1, 0), velocity=(0, 2))
+        mass = scene.bodies[0].mass
+        run = Simulation(
+            scene, step=step,
+            loads=lambda _, motion: np.append(-4.0 * mass * motion.position[0], 0.0)[None, :],
+        )  # fmt: skip
+        run.advance(3.0)
+        return float(np.linalg.norm(run.positions[0] - [np.cos(6.0), np.sin(6.0)]))
+
+    # the midpoint rule turns by w h - (w h)^3 / 24 a step, or with the kick in its middle + / 24
+    assert end(0.01) < 6.0 * 0.02**2 / 20
+    assert end(0.02) / end(0.01) == pytest.approx(4.0, rel=0.02)
