@@ -544,7 +544,8 @@ def test_a_scene_names_its_rigid_bodies(tmp_path: Path, capsys: pytest.CaptureFi
     assert trackbed.main(["qdem", str(file), "--no-pictures"]) == 0
     assert "governed by contact" in capsys.readouterr().out
     alone = SCENE[: SCENE.index("[contact]")] + SCENE[SCENE.index("[output]") :]
-    file.write_text(alone.replace("duration = 1e-5", "duration = 1e-5\nstep = 1e-6"))
+    falls = "duration = 1e-5\nstep = 1e-6\ngravity = [0, 0, -9.81]"  # a loop compiled already
+    file.write_text(alone.replace("duration = 1e-5", falls), encoding="utf-8")
     assert trackbed.main(["qdem", str(file), "--force", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["critical_step"]["value"] is None
     file.write_text(SCENE, encoding="utf-8")
