@@ -162,7 +162,7 @@ def test_peer_takes_motion_and_loads(engine: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("engine", "restitution"), [("mujoco", 1.0), ("ode", 0.5), ("lmgc90", 0.5)]
+    ("engine", "restitution"), [("mujoco", 1.0), ("ode", 0.5), ("lmgc90", 1.0)]
 )
 def test_peer_bounces_and_tells_its_path(engine: str, restitution: float) -> None:
     """A box that lands flat, going sideways, leaves with ``e`` of its speed; a frame a step."""
