@@ -39,6 +39,9 @@ Floats = NDArray[np.float64]
 Law = Literal["newton", "moreau"]
 Energy = Literal["safe", "watched"]
 
+ROUNDS = 500
+"""Rounds of a collision until the rest ends without restitution: a row of balls takes one a ball,
+masses of a factor of 1e3 that touch anywhere some hundred."""
 ROUND_OFF = 1e-12
 """Velocities this small against the largest of the collision are no approach; energies likewise."""
 
@@ -77,7 +80,7 @@ def collide(
     law: Law = "moreau",
     energy: Energy = "safe",
     tolerance: float = 1e-12,
-    max_rounds: int = 50,
+    max_rounds: int = ROUNDS,
     still: float = 0.0,
     rest_speed: float = 0.0,
     drive: ArrayLike | None = None,
@@ -88,10 +91,10 @@ def collide(
     one number, eps in [0, 1].  ``law``: what eps acts on with friction.  ``energy``: ``safe``
     scales eps down until energy does not grow, ``watched`` says so in the message only.
     After ``max_rounds`` the rest is taken without restitution, which ends, costs energy also at
-    eps = 1, and is said in the message.  ``still`` [m/s]: an
-    approach not faster is none; ``rest_speed`` [m/s]: one not faster ends without a bounce, which
-    cuts off bounces without end (Zeno).  ``drive`` (nc * dim,) [m/s]: relative velocities of the
-    contacts while the bodies of J rest, those of walls that are moved from outside.
+    eps = 1, and is said in the message.  ``still`` [m/s]: an approach not faster is none;
+    ``rest_speed`` [m/s]: one not faster ends without a bounce, which cuts off bounces without end
+    (Zeno).  ``drive`` (nc * dim,) [m/s]: relative velocities of the contacts while the bodies of J
+    rest, those of walls that are moved from outside.
 
     Contacts are those of J: also touching ones with v = 0 take part, as they pass impulses on.
     Raises `ProblemError` for malformed input, `UsageError` for a choice that there is not.
