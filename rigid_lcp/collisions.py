@@ -91,11 +91,11 @@ def collide(
     ``velocity`` (ndof,) of the bodies [m/s, 1/s]; ``restitution`` eps and ``friction`` mu, (nc,) or
     one number, eps in [0, 1].  ``law``: what eps acts on with friction.  ``energy``: ``safe``
     scales eps down until energy does not grow, ``watched`` says so in the message only.
-    After ``max_rounds`` (None: 500, with friction 50) the rest is taken without restitution, which ends, costs energy also at
-    eps = 1, and is said in the message.  ``still`` [m/s]: an approach not faster is none;
-    ``rest_speed`` [m/s]: one not faster ends without a bounce, which cuts off bounces without end
-    (Zeno).  ``drive`` (nc * dim,) [m/s]: relative velocities of the contacts while the bodies of J
-    rest, those of walls that are moved from outside.
+    After ``max_rounds`` (None: 500, with friction 50) the rest is taken without restitution, which
+    ends, costs energy also at eps = 1, and is said in the message.  ``still`` [m/s]: an approach
+    not faster is none; ``rest_speed`` [m/s]: one not faster ends without a bounce, which cuts off
+    bounces without end (Zeno).  ``drive`` (nc * dim,) [m/s]: relative velocities of the contacts
+    while the bodies of J rest, those of walls that are moved from outside.
 
     Contacts are those of J: also touching ones with v = 0 take part, as they pass impulses on.
     Raises `ProblemError` for malformed input, `UsageError` for a choice that there is not.
