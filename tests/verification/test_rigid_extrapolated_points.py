@@ -16,8 +16,8 @@ from rigid_lcp.extrapolated_points import FIRST_SHIFT, extrapolated_points
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.proximal_newton import proximal_newton, proximal_point
-from rigid_lcp.solver_order import drift_from_paths
 from rigid_lcp.solver_trial import Trial
+from rigid_lcp.solver_turns import turns_from_paths
 from validation.rigid_packings import packing
 
 Floats = NDArray[np.float64]
@@ -80,8 +80,8 @@ def test_solves_a_packing_of_low_friction_that_nothing_else_does() -> None:
 def test_the_end_of_a_path_is_a_start_too() -> None:
     """A bed that sweeps, Newton and proximal points leave at 1e-8, from paths' ends alone."""
     trial = Trial(packing(60, 3, seed=208, friction=0.1), None, 1e-12)
-    assert drift_from_paths(trial, np.inf)
-    assert trial.best.method.startswith("interior-point + gauss-seidel + extrapolated points")
+    assert turns_from_paths(trial)
+    assert trial.best.method.startswith("gauss-seidel + extrapolated points")
     assert trial.best.residual <= 1e-12
 
 
