@@ -18,9 +18,10 @@ where theta doubles while points are found in few steps and falls where they are
 error of alpha or theta is left.  (Extrapolated centres: Gueler, SIAM J. Optim. 2 (1992) 649, for
 convex problems; with Coulomb's law nothing is proved, and the best point is kept.)
 
-Measured on what no other method of this package solved: 100 to 1,500 factorisations.  More sweeps
-before save little; a start inside the cones, where a path of the interior point ends, up to nine
-in ten of them (`rigid_lcp.solver_order`).
+Measured on what no other method of this package solved: 100 to 1,500 factorisations.  Sweeps
+between them, each going on from where the other ended, save up to nine in ten
+(`rigid_lcp.solver_turns`); so may a start inside the cones, where a path of the interior point
+ends.
 """
 
 from __future__ import annotations
@@ -63,23 +64,25 @@ def extrapolated_points(
     *,
     linear: Factorisation | None = None,
     factorisations: int = FACTORISATIONS,
+    patience: int = FACTORISATIONS,
 ) -> FrictionSolution:
     """Extrapolated proximal points from ``start`` (zero forces if None): see the module.
 
     ``start`` r (nc * dim,) [N or N s]; ``tolerance``: on the scale-free residual.  ``linear``:
-    factorisations of this problem's W, made if not given; at most ``factorisations`` are spent.
-    Where it converges `rigid_lcp.proximal_newton` needs far fewer.  ``work``: ``points`` and
-    ``factorisations``.
+    factorisations of this problem's W, made if not given; at most ``factorisations`` are spent, and
+    ``patience`` of them without halving the residual.  Where it converges
+    `rigid_lcp.proximal_newton` needs far fewer.  ``work``: ``points`` and ``factorisations``.
     """
     linear = linear or factorisation(problem)
     force = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
     best, least = force, problem.residual(force)
     residual, spent, points, easy = least, 0, 0, 0
+    mark, marked = least, 0
     shift, ahead, drift = FIRST_SHIFT, 0.0, np.zeros_like(force)
     endless = ENDLESS * max(problem.rho * length(problem.offset), length(force))
-    while least > tolerance and spent < factorisations and shift <= GREATEST_SHIFT:
+    while least > tolerance and spent < min(factorisations, marked + patience):
         centre = force + ahead * drift
-        if not length(centre) < endless:
+        if shift > GREATEST_SHIFT or not length(centre) < endless:
             break
         enough = max(FINER * min(residual, ROUGH), FINEST)
         point, found, steps = proximal_point(
@@ -98,6 +101,8 @@ def extrapolated_points(
         residual, easy = problem.residual(force), easy + 1
         if residual < least:
             best, least = force, residual
+        if least < 0.5 * mark:
+            mark, marked = least, spent
         if steps <= FEW_STEPS:
             ahead = min(2.0 * ahead + 1.0, FURTHEST)
         elif steps >= MANY_STEPS:

@@ -52,6 +52,7 @@ def gauss_seidel(
     momentum: bool = True,
     order: Order | Integers = "forward",
     sweeper: Sweeper | None = None,
+    last: bool = False,
 ) -> FrictionSolution:
     """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done.
 
@@ -59,7 +60,9 @@ def gauss_seidel(
     are plain, to smooth another method's point.  ``order``: ``forward`` visits the contacts as
     they are numbered, ``symmetric`` there and back in turn, an array of indices as it says.
     ``sweeper``: that of an earlier call for the same problem; the two options before are its own.
-    The best point of those looked at is returned.  Raises `UsageError` for an order that is no
+    The best point of those looked at is returned, or with ``last`` the one where the sweeps end: a
+    self-stress that has to grow does so without a better residual, and sweeps that go on from the
+    best point lose the way made.  Raises `UsageError` for an order that is no
     permutation.
     """
     contacts, dim = problem.contacts, problem.dim
@@ -74,7 +77,7 @@ def gauss_seidel(
         "\n  -> solve at velocity level, or use a method that changes all contacts at once"
     )
     return friction_solution(
-        problem, best.ravel(), tolerance, "gauss-seidel",
+        problem, force.ravel() if last else best.ravel(), tolerance, "gauss-seidel",
         {"sweeps": sweeper.done, "contact updates": sweeper.done * contacts},
         message=message if stuck else "",
     )  # fmt: skip

@@ -10,14 +10,17 @@
     convex path      without a start: a part of it, and Newton; solves most static piles.  Where it
                      does not, the path is bent to Coulomb's law, and Newton again
     smoothed path    from there on, as it needs not stay inside the cones
-                     (`rigid_lcp.smoothed_path`): kicked, tilted and slippery beds
+                     (`rigid_lcp.smoothed_path`): kicked, tilted and slippery beds.  Where
+                     factorisations are dear some sweeps go before it
+    by turns         from there on, sweeps of Gauss-Seidel and proximal points that run ahead of
+                     their drift (`rigid_lcp.extrapolated_points`): beds whose self-stress has to
+                     grow a long way before a contact lets go.  Neither goes back to its best point,
+                     as the residual does not show the way made
     Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
                      Newton at its end: first few sweeps and factorisations, then many, as what is
                      hard for the one is often easy for the other
-    extrapolated     proximal points that run ahead of their drift
-                     (`rigid_lcp.extrapolated_points`): beds whose self-stress has to grow a long
-                     way before a contact lets go.  Some from the end of each of three paths of the
-                     interior point, then from the best
+    by turns again   from the end of the convex path, and of three paths of the interior point;
+                     then extrapolated points from the best
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
                      goes to Newton, and if that is not enough to Gauss-Seidel and Newton again.
                      They end after the effort that `FALLBACK_SHARE` names, or before they begin
@@ -48,12 +51,12 @@ from numpy.typing import NDArray
 from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.frictionless import frictionless
-from rigid_lcp.gauss_seidel import gauss_seidel, sweeper_of
 from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
 from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
 from rigid_lcp.smoothed_path import smoothed_path
 from rigid_lcp.solver_cold import CONVEX_CONTACTS, convex_start
 from rigid_lcp.solver_trial import ENDLESS, FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
+from rigid_lcp.solver_turns import from_path, turns_from_paths
 from rigid_lcp.solver_warm import deep, yielding
 
 Floats = NDArray[np.float64]
@@ -78,9 +81,6 @@ DEAR_SWEEPS = 6000
 FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
 """What the paths of the interior point may cost in all before no further one is begun: so many
 times what was spent before them, or so many flops (some seconds) if that is more."""
-SMOOTHED_STEPS, SMOOTHED_DRIFT, SMOOTHED_USEFUL = 150, 80, 1e-6
-"""Factorisations along the smoothed path that goes on from the convex one, and of extrapolated
-points from where it ends, if that is no worse."""
 LAST_HOPS, LAST_FLOPS, LAST_FEW, LAST_MANY = 300, 4e10, 300, 3000
 """Where little else is left, from the beginning and with so many folds left behind: at most as many
 factorisations as all before or the last number, and at such a cost; or so few, if that is more."""
@@ -89,15 +89,6 @@ DRIFT, DRIFT_FLOPS = 1500, 5e9
 spent before, if that is more)."""
 FRICTION_STEPS = (10.0, 30.0, 100.0, 300.0)
 """Coefficients of friction at which greater ones stop on their way."""
-DRIFT_PATHS = (
-    Path(rounding=0.3, compliance=1e-4),
-    Path(rounding=1e-3, compliance=1e-4, lagged=True),
-    Path(convex=True, compliance=1e-4),
-)
-DRIFT_STEPS, DRIFT_SWEEPS, FEW_DRIFTS = 45, 200, 350
-"""Paths from whose ends they go first, steps along each, sweeps from its end, and factorisations:
-how many are needed differs by ten between starts that look alike, so a few of many starts cost
-less than many of one."""
 LAST_DRIFT, LAST_DRIFT_FLOPS = 4000, 4e10
 """The same after the paths, when nothing else is left: large packings of little friction take some
 ten seconds of it."""
@@ -132,7 +123,7 @@ def attempts(
         return trial
     if small and trial.sweep(start, FEW_SWEEPS, until=rough, factorisations=FEW):
         return trial
-    if trial.path_point is not None and smoothed_further(trial, trial.path_point):
+    if trial.path_point is not None and from_path(trial, trial.path_point):
         return trial
     moving = not small and start is not None
     if moving and tolerance < HAND_OVER and not trial.dear and deep(trial, start, accept):
@@ -193,9 +184,10 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         trial.best = replace(trial.best, status="no solution")
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
-    if drift_from_paths(trial, most):
+    if turns_from_paths(trial):
         return
-    if trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort)):
+    trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort))
+    if trial.best.solved:
         return
     for path, sweeps in PATHS:
         if trial.effort > most or not trial.affordable:
@@ -210,24 +202,12 @@ def fallback_paths(trial: Trial, accept: float) -> None:
             return
         if trial.best.residual <= accept and problem.contacts > FEW_CONTACTS:
             return
-    if smoothed(trial) or trial.drift(LAST_DRIFT, LAST_DRIFT_FLOPS):
+    if not smoothed(trial):
+        trial.drift(LAST_DRIFT, LAST_DRIFT_FLOPS)
+    if trial.best.solved:
         return
     if trial.effort <= most:
         trial.sweep(None, LAST_SWEEPS)
-
-
-def smoothed_further(trial: Trial, begin: tuple[Floats, float]) -> bool:
-    """The smoothed path from the forces and sigma where the convex one ended, and from its end
-    extrapolated points."""
-    found = smoothed_path(
-        trial.problem, trial.tolerance, begin, linear=trial.linear,
-        factorisations=min(SMOOTHED_STEPS, trial.affordable),
-    )  # fmt: skip
-    trial.keep(found)
-    trial.sharpen()
-    if trial.best.solved or found.residual > SMOOTHED_USEFUL:
-        return trial.best.solved
-    return trial.drift(SMOOTHED_DRIFT, DRIFT_FLOPS, found)
 
 
 def smoothed(trial: Trial) -> bool:
@@ -243,32 +223,6 @@ def smoothed(trial: Trial) -> bool:
     )  # fmt: skip
     trial.sharpen()
     return trial.best.solved
-
-
-def drift_from_paths(trial: Trial, most: float) -> bool:
-    """Extrapolated points, not many, from where each of a few paths ends; none is begun after an
-    effort of ``most``.
-
-    Forces there are inside their cones, far from every change of status, and so a self-stress has
-    less way to go than from swept ones, which lie on the cones' boundaries.
-    """
-    problem = trial.problem
-    for path in DRIFT_PATHS:
-        if trial.effort > most or not trial.affordable:
-            break
-        found = interior_point(
-            problem, None, max(HAND_OVER, trial.tolerance), path, linear=trial.linear,
-            iterations=min(DRIFT_STEPS, trial.affordable),
-        )  # fmt: skip
-        if trial.polish(trial.keep(found), factorisations=0):
-            return True
-        trial.sweeper = trial.sweeper or sweeper_of(problem)
-        swept = gauss_seidel(problem, found.r, trial.tolerance, DRIFT_SWEEPS, sweeper=trial.sweeper)
-        trial.keep(swept, "interior-point")
-        start = replace(swept, method="interior-point + gauss-seidel")
-        if trial.best.solved or trial.drift(FEW_DRIFTS, DRIFT_FLOPS, start):
-            return True
-    return False
 
 
 def proved_insoluble(problem: FrictionProblem) -> bool:

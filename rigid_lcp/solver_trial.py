@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import Factorisation, factorisation
 from rigid_lcp.cones import length
+from rigid_lcp.extrapolated_points import FACTORISATIONS as MANY_STEPS
 from rigid_lcp.extrapolated_points import extrapolated_points
 from rigid_lcp.friction_problem import (
     FrictionProblem,
@@ -123,22 +124,26 @@ class Trial:
         name = f"{after} + gauss-seidel" if after else "gauss-seidel"
         return self.best.solved or self.polish(found, name, factorisations)
 
-    def drift(self, most: int, flops: float, start: FrictionSolution | None = None) -> bool:
+    def drift(
+        self, most: int, flops: float, start: FrictionSolution | None = None,
+        patience: int = MANY_STEPS,
+    ) -> FrictionSolution:  # fmt: skip
         """Extrapolated proximal points from ``start`` (the best if None), with so many
-        factorisations at most and at about such a cost; whether the tolerance is reached."""
+        factorisations at most and at about such a cost."""
         self.linear = self.linear or factorisation(self.problem)
         count = int(min(most, flops / self.linear.flops, self.affordable))
-        if count < FEW_DRIFT:
-            return self.best.solved
         start = start or self.best
-        self.keep(
+        if count < FEW_DRIFT:
+            return start
+        found = self.keep(
             extrapolated_points(
-                self.problem, start.r, self.tolerance, linear=self.linear, factorisations=count
+                self.problem, start.r, self.tolerance, linear=self.linear, factorisations=count,
+                patience=patience,
             ),
             start.method,
         )  # fmt: skip
         self.sharpen()
-        return self.best.solved
+        return found
 
     def stick_if_likely(self) -> bool:
         """Where the best point looks like it: all contacts stick; whether that is the answer."""
@@ -157,9 +162,14 @@ class Trial:
     @property
     def dear(self) -> bool:
         """Whether a factorisation costs as much as many sweeps."""
+        return self.sweeps_a_factorisation > DEAR
+
+    @property
+    def sweeps_a_factorisation(self) -> float:
+        """How many sweeps cost as much as a factorisation."""
         self.linear = self.linear or factorisation(self.problem)
         update = UPDATE_FLOPS * self.problem.dim**2
-        return self.linear.flops > DEAR * update * self.problem.contacts
+        return self.linear.flops / (update * self.problem.contacts)
 
     @property
     def effort(self) -> float:

@@ -16,8 +16,9 @@ from rigid_lcp.extrapolated_points import FIRST_SHIFT, extrapolated_points
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.proximal_newton import proximal_newton, proximal_point
-from rigid_lcp.solver_order import drift_from_paths
 from rigid_lcp.solver_trial import Trial
+from rigid_lcp.solver_turns import turns_from_paths
+from validation.rigid_examination_families import family_named
 from validation.rigid_packings import packing
 
 Floats = NDArray[np.float64]
@@ -77,11 +78,37 @@ def test_solves_a_packing_of_low_friction_that_nothing_else_does() -> None:
     assert found.residual <= 1e-12
 
 
+def test_points_without_gain_are_left_after_their_patience() -> None:
+    """A wall that comes nearer and nearer with no ground to give way: no residual is halved."""
+    problem = squeezed_row()
+    problem = friction_problem(problem.delassus, problem.offset, np.array([0.0, 0.0, 1e6]), 2)
+    start = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
+    found = extrapolated_points(problem, start, 1e-16, patience=10)
+    assert not found.solved
+    assert found.work["factorisations"] <= 10 + module.STEPS
+
+
+def test_sweeps_and_points_by_turns_solve_a_bed_that_each_alone_leaves() -> None:
+    """A plane bed pushed against a wall (beds kicked 2 of the examination): turns take about 10,000
+    sweeps and 500 factorisations; so many sweeps end above 1e-6, and twice as many factorisations
+    from there above 1e-9."""
+    problem = family_named("beds kicked").posed(2026, 2).problem
+    space = problem.bodies
+    found = solve_friction(space, problem.offset, problem.friction, 2)
+    assert found.solved, found.message
+    assert found.method.startswith("gauss-seidel + extrapolated points")
+    swept = gauss_seidel(problem, None, 1e-12, 10_000)
+    assert swept.residual > 1e-6
+    assert extrapolated_points(problem, swept.r, factorisations=1000).residual > 1e-9
+    half = gauss_seidel(problem, None, 1e-12, 1000, last=True)
+    assert half.residual > gauss_seidel(problem, None, 1e-12, 1000).residual  # the best one is past
+
+
 def test_the_end_of_a_path_is_a_start_too() -> None:
     """A bed that sweeps, Newton and proximal points leave at 1e-8, from paths' ends alone."""
     trial = Trial(packing(60, 3, seed=208, friction=0.1), None, 1e-12)
-    assert drift_from_paths(trial, np.inf)
-    assert trial.best.method.startswith("interior-point + gauss-seidel + extrapolated points")
+    assert turns_from_paths(trial)
+    assert trial.best.method.startswith("gauss-seidel + extrapolated points")
     assert trial.best.residual <= 1e-12
 
 
