@@ -74,6 +74,16 @@ def test_sentences_about_rivals(rows: list[Row]) -> None:
         assert found is not None
         assert abs(found.error).mean() > abs(moved.error).mean()
         assert cost(finished(rows, name, LAST)) < cost(jumping)
+    twice = finished(rows, "step x 2", LAST)
+    assert 0.9 < cost(twice) / cost(jumping) < 1.1
+    for figure in ("settlement", "coordination", "deflection", "stiffness"):
+        found = judged(rows, "step x 2", LAST, figure)
+        assert found is not None
+        assert len(found.error) == 5
+        assert abs(found.mean) < found.half
+    thrice = judged(rows, "step x 3", LAST, "stiffness")
+    assert thrice is not None
+    assert -thrice.mean > thrice.half
     for figure, sign in (("deflection", 1), ("stiffness", -1)):
         found = judged(rows, "E/10", LAST, figure)
         assert found is not None
