@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from validation import jump_runs, jump_study
-from validation.law_page import per_cent, table
+from validation.law_page import per_cent
+from validation.page_text import page_filled, table
 
 TEMPLATE = Path(__file__).with_name("jump_page.md")
 PAGE = Path(__file__).parents[1] / "docs" / "jump-control.md"
@@ -295,10 +296,7 @@ def page(rows: Rows, runs: Rows) -> str:
         + ", ".join(dict.fromkeys(run["commit"] for run in runs))
         + ".",
     }
-    text = TEMPLATE.read_text(encoding="utf-8")
-    for name, words in parts.items():
-        text = text.replace("{{" + name + "}}", words)
-    return text
+    return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)
 
 
 def main() -> None:

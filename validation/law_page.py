@@ -5,12 +5,13 @@ The page is ``law_page.md`` beside this file, with tables and numbers of the rec
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
 from adapters.fit_regime import WHY_NOT
 from validation.law_study import LAWS, REGIME_CUTS, RIVALS, Row, record_read
+from validation.page_text import page_filled, table
 
 TEMPLATE = Path(__file__).with_name("law_page.md")
 PAGE = Path(__file__).parents[1] / "docs" / "laws.md"
@@ -44,12 +45,6 @@ NAMES = {
     "doublings": "engine beds, windows of 20 to 90 cycles, to 2 N_c",
     "engine": "engine beds from cycle 1, N_c = 10 to 100",
 }
-
-
-def table(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown."""
-    rule = ["---"] * len(head)
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in [head, rule, *lines])
 
 
 def per_cent(value: float, digits: int = 1) -> str:
@@ -198,10 +193,7 @@ def page(rows: Sequence[Row]) -> str:
         ),
         "bursts": f"{inside} of {of}",
     }
-    text = TEMPLATE.read_text(encoding="utf-8")
-    for name, words in parts.items():
-        text = text.replace("{{" + name + "}}", words)
-    return text
+    return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)
 
 
 def main() -> None:

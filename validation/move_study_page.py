@@ -13,7 +13,6 @@ import numpy as np
 
 from adapters.moves import moves_known
 from adapters.run_folder import write_atomically
-from validation.law_page import table
 from validation.move_study import Row, record_read
 from validation.move_study_engine import FULL, PAPER, SMALL, TWIN, Judged
 from validation.move_study_offline import OTHER_MEMBER
@@ -34,6 +33,7 @@ from validation.move_study_reading import (
     ways_of,
     wins,
 )
+from validation.page_text import page_filled, table
 
 TEMPLATE = Path(__file__).with_name("move_study_page.md")
 PAGE = Path(__file__).parents[1] / "docs" / "moves.md"
@@ -263,10 +263,7 @@ def page(offline: Sequence[Row], engine: Sequence[Row]) -> str:
         "PAPER_FIRST": first_cycle(paper, [w for w in moves_known() if w != "still"]),
         "ORIGIN": origin([*offline, *engine]),
     }
-    text = TEMPLATE.read_text(encoding="utf-8")
-    for name, part in parts.items():
-        text = text.replace("{{" + name + "}}", part)
-    return text
+    return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)
 
 
 def main() -> None:

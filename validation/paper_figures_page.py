@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from adapters.run_folder import write_atomically
-from validation.law_page import table
+from validation.page_text import page_filled, table
 from validation.paper_figures import FIRST, JUMPS, LAWS, NOTHING, OTHER, WINDOWS, Row, rows_read
 from validation.paper_figures_picture import draw
 
@@ -231,10 +231,7 @@ def page(rows: Sequence[Row]) -> str:
         "LENGTHS": ", ".join(map(str, JUMPS)),
         "ORIGIN": "; ".join(origin) + ".",
     }
-    text = TEXT.read_text(encoding="utf-8")
-    for name, part in parts.items():
-        text = text.replace("{{" + name + "}}", part)
-    return text
+    return page_filled(TEXT.read_text(encoding="utf-8"), parts)
 
 
 def main() -> None:

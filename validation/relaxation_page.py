@@ -12,6 +12,7 @@ import numpy as np
 
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
+from validation.page_text import page_filled
 from validation.relaxation_beds import AFTER
 from validation.relaxation_picture import draw
 from validation.relaxation_reading import (
@@ -224,7 +225,6 @@ def refusals(ways: Ways) -> str:
 def page(rows: Sequence[Row]) -> str:
     """The page of a record."""
     paper, beds = by_way(rows, "paper"), by_way(rows, "bed")
-    text = TEXT.read_text(encoding="utf-8")
     parts = {
         "TABLE_JUMPS": table_jumps(paper),
         "TABLE_PAPER": table_paper(paper),
@@ -237,9 +237,7 @@ def page(rows: Sequence[Row]) -> str:
         "COMMITS": ", ".join(dict.fromkeys(row["commit"] for row in rows)),
         "MACHINES": "; ".join(dict.fromkeys(row["machine"] for row in rows)),
     }
-    for name, part in parts.items():
-        text = text.replace(f"<{name}>", part)
-    return text
+    return page_filled(TEXT.read_text(encoding="utf-8"), parts)
 
 
 def main() -> None:

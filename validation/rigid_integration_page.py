@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from adapters.run_folder import write_atomically
+from validation.page_text import page_filled
 from validation.rigid_integration import TABLES, Data, record_make, record_read
 from validation.rigid_integration_order import PROBLEMS, OrderRow, order_fitted
 from validation.rigid_integration_picture import picture_draw
@@ -182,10 +183,7 @@ def page(lines: Sequence[Data]) -> str:
         "CUT_HALF": f"{cut_off(0.1, 0.5):.1e}", "CUT_NINE": f"{cut_off(0.1, 0.9):.1e}",
         "KANE": number(kane["value"]), "ABSENT": absent(lines), "MISSES": misses(lines),
     }  # fmt: skip
-    text = TEXT.read_text(encoding="utf-8")
-    for name, value in filled.items():
-        text = text.replace(f"<{name}>", value)
-    return text
+    return page_filled(TEXT.read_text(encoding="utf-8"), filled)
 
 
 def main(words: Sequence[str] | None = None) -> None:

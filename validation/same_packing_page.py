@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from adapters.run_folder import write_atomically
+from validation.page_text import page_filled
 from validation.same_packing import CYCLES, SEEDS, WAYS, interval
 from validation.same_packing_reading import (
     ENGINES,
@@ -177,7 +178,6 @@ def page(rows: Sequence[Row], yade: dict[str, Any]) -> str:
     runs = by_way(rows)
     grains = {row["grains"] for row in rows}
     steps = min(row["steps_per_cycle"] for row in rows)
-    text = TEXT.read_text(encoding="utf-8")
     parts = {
         "GRAINS": ", ".join(map(str, sorted(grains))),
         "STEPS": f"{steps:,}",
@@ -199,9 +199,7 @@ def page(rows: Sequence[Row], yade: dict[str, Any]) -> str:
         "VERSIONS": ", ".join(dict.fromkeys(row["engine"] for row in rows)),
         "COMMITS": ", ".join(dict.fromkeys(row["commit"][:7] for row in rows)),
     }
-    for name, part in parts.items():
-        text = text.replace(f"<{name}>", part)
-    return text
+    return page_filled(TEXT.read_text(encoding="utf-8"), parts)
 
 
 def draw(rows: Sequence[Row], target: Path) -> None:

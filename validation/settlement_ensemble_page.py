@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from adapters.run_folder import write_atomically
+from validation.page_text import page_filled
 from validation.same_packing_page import table
 from validation.settlement_ensemble import KINDS, Kind
 from validation.settlement_ensemble_picture import draw
@@ -200,7 +201,6 @@ def page(record: EnsembleRecord) -> str:
     kept = [each for piece in pieces if (each := record.kept(piece.name)) is not None]
     sizes = [path.stat().st_size for path in record.path.iterdir()]
     checkpoints = [path.stat().st_size for path in record.path.glob("*.restart.xz")]
-    text = TEXT.read_text(encoding="utf-8")
     parts = {
         "TABLE_PLAN": table_plan(),
         "TABLE_REACHED": table_reached(record),
@@ -212,9 +212,7 @@ def page(record: EnsembleRecord) -> str:
         "CHECKPOINT": f"{max(checkpoints) / 1e3:.0f} kB",
         "ORIGIN": origin(kept),
     }
-    for name, part in parts.items():
-        text = text.replace(f"<{name}>", part)
-    return text
+    return page_filled(TEXT.read_text(encoding="utf-8"), parts)
 
 
 def main() -> None:

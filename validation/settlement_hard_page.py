@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from adapters.run_folder import write_atomically
+from validation.page_text import page_filled
 from validation.same_packing_page import table
 from validation.settlement_hard_runs import Row, record_read
 from validation.settlement_hard_scenes import case_named
@@ -87,7 +88,6 @@ def table_packings(rows: Sequence[Row]) -> str:
 
 def page(rows: Sequence[Row]) -> str:
     """The page of a record."""
-    text = TEXT.read_text(encoding="utf-8")
     parts = {
         "TABLE_CASES": table_cases(rows),
         "REFUSALS": refusals(rows),
@@ -96,9 +96,7 @@ def page(rows: Sequence[Row]) -> str:
         "COMMITS": ", ".join(dict.fromkeys(row["commit"] for row in rows)),
         "MACHINES": "; ".join(dict.fromkeys(row["machine"] for row in rows)),
     }
-    for name, part in parts.items():
-        text = text.replace(f"<{name}>", part)
-    return text
+    return page_filled(TEXT.read_text(encoding="utf-8"), parts)
 
 
 def main() -> None:

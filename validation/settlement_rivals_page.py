@@ -12,7 +12,7 @@ import numpy as np
 
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
-from validation.law_page import table
+from validation.page_text import page_filled, table
 from validation.same_packing import interval
 from validation.settlement_ensemble import COARSE
 from validation.settlement_ensemble_page import short
@@ -233,7 +233,6 @@ def scatter(rows: Sequence[Row]) -> dict[str, str]:
 
 def page(rows: Sequence[Row], last: int = LAST) -> str:
     """The page of a record."""
-    text = TEMPLATE.read_text(encoding="utf-8")
     truth = reference(rows, last)
     figure = FIGURES["settlement"]
     values = {
@@ -262,9 +261,7 @@ def page(rows: Sequence[Row], last: int = LAST) -> str:
         **scatter(rows),
         "ORIGIN": f"{rows[0]['machine']}; {engines}; commits {commits}.",
     }
-    for name, part in parts.items():
-        text = text.replace(f"<{name}>", part)
-    return text
+    return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)
 
 
 def main() -> None:

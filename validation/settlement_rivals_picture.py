@@ -29,6 +29,8 @@ TICKS = (2, 5, 10, 20, 50, 100)
 """Of CPU time [s]."""
 LINEAR = 50
 """Error up to which its scale is linear [%]."""
+INTERVAL_FROM = 3
+"""Packings from which on an interval is drawn; that of two is as wide as the panel."""
 PANELS = ("settlement", "coordination", "deflection")
 
 
@@ -39,7 +41,7 @@ def draw(rows: Sequence[Row], last: int, target: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(2, 2, figsize=(11, 8), layout="constrained")
+    figure, axes = plt.subplots(2, 2, figsize=(13, 8), layout="constrained")
     for axis, key in zip(axes.flat, PANELS, strict=False):
         band = 100 * chaos(rows, last, key)
         axis.axhspan(-band, band, color="0.88")
@@ -47,10 +49,11 @@ def draw(rows: Sequence[Row], last: int, target: Path) -> None:
         for name, family in shown():
             found = judged(rows, name, last, key)
             if found is not None:
-                half = 100 * found.half if found.half == found.half else 0.0
+                half = 100 * found.half if len(found.error) >= INTERVAL_FROM else 0.0
                 point(axis, rows, name, family, last, 100 * found.mean, half)
         axis.set_ylabel(f"error of the {FIGURES[key].words} [%]")
-        axis.set_yscale("symlog", linthresh=LINEAR)
+        if max(map(abs, axis.get_ylim())) > LINEAR:
+            axis.set_yscale("symlog", linthresh=LINEAR)
     axis = axes.flat[3]
     axis.axhline(100 * profile_chaos(rows, last), color="0.5", ls="--", lw=0.8)
     for name, family in shown():
@@ -63,6 +66,7 @@ def draw(rows: Sequence[Row], last: int, target: Path) -> None:
         axis.set(xscale="log", xlabel=f"CPU s to cycle {last} (dotted: every cycle)")
         axis.set_xticks(TICKS, map(str, TICKS))
         axis.minorticks_off()
+    legend(figure, axes)
     figure.savefig(target, dpi=80)
     plt.close(figure)
 
@@ -76,8 +80,18 @@ def shown() -> list[tuple[str, str]]:
 def point(
     axis: Any, rows: Sequence[Row], name: str, family: str, last: int, error: float, half: float
 ) -> None:
-    """A method in a panel, its interval over packings as a bar."""
-    at = cost(finished(rows, name, last))
-    axis.errorbar(at, error, half, fmt="o", ms=4, lw=0.7, color=COLOURS[family])
-    text = name.replace(", nothing moved", ", still")
-    axis.annotate(text, (at, error), fontsize=7, xytext=(4, 3), textcoords="offset points")
+    """A method in a panel by its number, its interval over packings as a bar."""
+    at, number = cost(finished(rows, name, last)), [name for name, _ in shown()].index(name) + 1
+    label = f"{number}  {name}"
+    axis.errorbar(at, error, half, fmt="o", ms=4, lw=0.7, color=COLOURS[family], label=label)
+    axis.annotate(str(number), (at, error), fontsize=8, xytext=(3, 3), textcoords="offset points")
+
+
+def legend(figure: Any, axes: Any) -> None:
+    """All methods with their numbers, each once, to the right."""
+    found = {}
+    for axis in axes.flat:
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    labels = sorted(found, key=lambda label: int(label.split()[0]))
+    figure.legend([found[label] for label in labels], labels, loc="outside right", fontsize=8)
