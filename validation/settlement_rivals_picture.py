@@ -89,7 +89,7 @@ def point(
 
 def legend(figure: Any, axes: Any) -> None:
     """All methods with their numbers, each once, to the right."""
-    found = {}
+    found: dict[str, Any] = {}
     for axis in axes.flat:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
