@@ -193,6 +193,11 @@ class Trial:
         offered = self.problem.rho * length(self.problem.offset)
         return length(self.best.r) / offered if offered > 0.0 else 0.0
 
+    def endless(self, force: Floats) -> bool:
+        """Whether the greatest of forces r is so far above ``rho |q|`` that they look endless."""
+        offered = self.problem.rho * length(self.problem.offset)
+        return not float(np.abs(force).max(initial=0.0)) <= ENDLESS * offered
+
     def forget_endless(self) -> None:
         """No forces in place of endless ones, behind whose size any velocity hides."""
         if self.forces > ENDLESS:

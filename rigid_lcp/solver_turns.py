@@ -55,6 +55,8 @@ def by_turns(trial: Trial, force: Floats) -> bool:
     most, mark, waited = trial.effort + TURNS_FLOPS, np.inf, 0
     while waited < TURNS_PATIENCE and trial.effort < most and trial.affordable:
         found = swept(trial, force)
+        if trial.endless(found.r):  # sweeps diverge where friction makes W no descent
+            break
         if not trial.best.solved:
             found = trial.drift(TURN_STEPS, np.inf, found, TURN_PATIENCE)
         if trial.best.solved:

@@ -16,7 +16,7 @@ from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder
 from adapters.state import FloatArray, State
-from adapters.window import window_load
+from adapters.window import Window, window_load
 from scenes import scene_path
 
 QUIET = Progress(quiet=True)
@@ -150,8 +150,10 @@ def test_a_jump_that_lifts_the_bed_is_no_jump(
     real = stages.estimate
     metres_a_cycle = 1e-3
 
-    def lifted(run: stages.Run, bed: stages.Bed, h: int) -> tuple[State, FloatArray, float]:
-        before, _, height = real(run, bed, h)
+    def lifted(
+        run: stages.Run, window: Window, healing: int, h: int
+    ) -> tuple[State, FloatArray, float]:
+        before, _, height = real(run, window, healing, h)
         return before, before.position + np.array([0.0, 0.0, metres_a_cycle * h]), height
 
     monkeypatch.setattr(stages, "estimate", lifted)
