@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from qdem_fem.body import Body
 from qdem_fem.conditions import NodalLoad
 from qdem_fem.errors import ConditionError
+from qdem_fem.mesh import lumped_mass
 from qdem_fem.rigid_conditions import hold_of
 from qdem_fem.rigid_mass import cross_matrix
 from qdem_fem.series import Series
@@ -83,24 +84,18 @@ class Advice:
 
 
 def stiffness_matrix(body: Body) -> Any:
-    """K of linear elasticity [N/m], sparse (3 n, 3 n), of the tetrahedra's own gradients.
+    """K of linear elasticity [N/m], sparse (3 v, 3 v), of the v nodes of elements, in order."""
+    import skfem
+    from skfem.models.elasticity import linear_elasticity
 
-    ``K_ab = V (lambda g_a g_b^T + mu g_b g_a^T + mu g_a . g_b 1)``.
-    """
-    from scipy.sparse import coo_matrix
-
-    inner, volume = body.gradients
-    g = np.concatenate([-inner.sum(axis=1, keepdims=True), inner], axis=1)
+    used, elements = np.unique(body.elements, return_inverse=True)
+    grid = skfem.MeshTet(body.nodes[used].T.copy(), elements.reshape(-1, 4).T.copy())
+    basis = skfem.Basis(grid, skfem.ElementVector(skfem.ElementTetP1()), intorder=0)
     first, second = (
-        np.asarray(m) * volume for m in (body.material.lame_first, body.material.lame_second)
+        np.asarray(m)[:, None] for m in (body.material.lame_first, body.material.lame_second)
     )
-    parts = np.einsum("e,eai,ebj->eaibj", first, g, g)
-    parts += np.einsum("e,eaj,ebi->eaibj", second, g, g)
-    parts += np.einsum("e,eak,ebk,ij->eaibj", second, g, g, np.eye(3))
-    at = (3 * body.elements[:, :, None] + np.arange(3)).reshape(-1, 12)
-    rows, columns = np.repeat(at, 12, axis=1).ravel(), np.tile(at, (1, 12)).ravel()
-    size = 3 * len(body.nodes)
-    return coo_matrix((parts.ravel(), (rows, columns)), shape=(size, size)).tocsc()
+    at = basis.nodal_dofs.T.ravel()
+    return linear_elasticity(first, second).assemble(basis).tocsc()[at][:, at]
 
 
 def compliance_of(body: Body) -> BodyCompliance:
@@ -113,31 +108,29 @@ def compliance_of(body: Body) -> BodyCompliance:
     from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
     used = np.unique(body.elements)
-    free = (3 * used[:, None] + np.arange(3)).ravel()
-    stiffness = stiffness_matrix(body)[free][:, free]
+    stiffness = stiffness_matrix(body)
     arm = body.nodes[used] - body.rigid_mass.centre
-    mass = np.asarray(body.material.density) * body.gradients[1] / 4
-    nodal = np.bincount(body.elements.ravel(), np.repeat(mass, 4), len(body.nodes))[used]
-    weight = np.repeat(nodal, 3)
+    density, volume = np.asarray(body.material.density), body.gradients[1]
+    weight = np.repeat(lumped_mass(body.elements, volume, density, len(body.nodes))[used], 3)
     motion = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -cross_matrix(arm)], axis=2)
     motion = motion.reshape(-1, 6)
     resultant = np.linalg.inv(motion.T @ (weight[:, None] * motion))
-    kept = np.setdiff1d(np.arange(len(free)), _held_components(arm))
+    kept = np.setdiff1d(np.arange(len(weight)), _held_components(arm))
     factor = splu(stiffness[kept][:, kept])
 
     def answer(force: Floats) -> Floats:
         balanced = force - weight * (motion @ (resultant @ (motion.T @ force)))
-        moved = np.zeros(len(free))
+        moved = np.zeros(len(weight))
         moved[kept] = factor.solve(balanced[kept])
         return moved - motion @ (resultant @ (motion.T @ (weight * moved)))
 
     root = np.sqrt(weight)
-    operator = LinearOperator((len(free),) * 2, matvec=lambda x: root * answer(root * x.ravel()))
-    start = np.random.default_rng(0).normal(size=len(free))
+    operator = LinearOperator((len(weight),) * 2, matvec=lambda x: root * answer(root * x.ravel()))
+    start = np.random.default_rng(0).normal(size=len(weight))
     slowest = eigsh(operator, k=1, which="LA", tol=1e-4, v0=start, return_eigenvectors=False)[0]
     softest = 0.0
     for vertex in _vertices_sampled(arm, np.searchsorted(used, np.unique(body.surface))):
-        unit = np.zeros((3, len(free)))
+        unit = np.zeros((3, len(weight)))
         unit[np.arange(3), 3 * vertex + np.arange(3)] = 1.0
         own = np.array([answer(force)[3 * vertex : 3 * vertex + 3] for force in unit])
         softest = max(softest, float(np.linalg.eigvalsh((own + own.T) / 2)[-1]))

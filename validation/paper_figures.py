@@ -20,7 +20,6 @@ import numpy as np
 
 from adapters.engine import engine_named
 from adapters.laws import law_named
-from adapters.laws.law_karrech2007 import Karrech2007
 from adapters.progress import Progress
 from adapters.provenance import commit, machine
 from adapters.relaxation_kernel import BoolArray
@@ -39,6 +38,7 @@ from adapters.scene_file import scene_load
 from adapters.stages import Run, Variant, prepare
 from adapters.state import FloatArray
 from scenes import scene_path
+from validation.jump_runs import record_read
 from validation.move_study_offline import positions_read, states_at
 from validation.relaxation_jumps import Jumped
 from validation.relaxation_measures import measured
@@ -54,7 +54,7 @@ WINDOWS = (5, 10, 20, 40, 80)
 """k: cycles of the window."""
 JUMPS = (5, 10, 20, 40, 80)
 """h: cycles jumped."""
-LAWS = {"linear": law_named("linear"), "log": law_named("log"), "eq. 17": Karrech2007()}
+LAWS = {"linear": law_named("linear"), "log": law_named("log"), "eq. 17": law_named("karrech2007")}
 NOTHING, OTHER = "nothing moved", "another member"
 ACCURACY_CYCLES = 100
 """Cycles over which Fig. 5 follows g_u and f_xi."""
@@ -197,9 +197,9 @@ def rows_measured() -> Iterator[Row]:
     yield from relaxed_rows(jumped_as_shown(scene, position, radius), "9")
 
 
-def rows_read(path: Path = RECORD) -> list[Row]:
+def rows_read() -> list[Row]:
     """All rows of the record."""
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    return record_read(RECORD)
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -211,7 +211,7 @@ def main(words: Sequence[str] | None = None) -> None:
     origin = {"commit": commit(), "machine": machine()}
     new = [row | origin for row in measured_now]
     replaced = {row["figure"] for row in new}
-    old = [row for row in (rows_read() if RECORD.exists() else []) if row["figure"] not in replaced]
+    old = [row for row in rows_read() if row["figure"] not in replaced]
     rows = sorted(old + new, key=lambda row: row["figure"])
     write_atomically(RECORD, "".join(json.dumps(row) + "\n" for row in rows))
 

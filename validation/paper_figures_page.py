@@ -215,7 +215,6 @@ def page(rows: Sequence[Row]) -> str:
     (rain,) = figure_rows(rows, "3")
     origin = sorted({f"commit {row['commit'][:7]}, {row['machine']}" for row in rows})
     parts = {
-        "GRAINS": "1,085",
         "CLAIMS": claims(rows),
         "LOG_WINS": str(wins(rows, "log", NOTHING)),
         "LINEAR_WINS": str(wins(rows, "linear", NOTHING)),
