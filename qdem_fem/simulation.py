@@ -67,6 +67,8 @@ class Energy:
     """In the springs of contacts."""
     friction: float = 0.0
     """Work that sliders of contacts took since the start."""
+    viscous: float = 0.0
+    """What viscosity took since the start, where `Simulation.counts_viscous`."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +146,9 @@ class Simulation(ConditionedBodies):
         self._assembly: Assembly | None = None
         self._lists: tuple[kernel.Loads, kernel.Constraints] | None = None
         self._critical: CriticalStep | None = None
+        self.counts_viscous = False
+        """Whether the march counts what viscosity takes; every `VISCOUS_STEPS`, at two more
+        evaluations of the forces."""
         self.warned = nan
         """The critical step of which a warning was given [s]."""
         for body in self.bodies:
@@ -288,9 +293,9 @@ class Simulation(ConditionedBodies):
             external += float(half_work(self, self.assembly.field("velocity"), velocity).sum())
             if self.rigid is not None:
                 external += float(self.rigid.half_work().sum())
-        if self.contacts is None:
-            return Energy(kinetic, float(elastic), external)
-        return Energy(kinetic, float(elastic), external, *self.contacts.energy())
+        of_contact = (0.0, 0.0) if self.contacts is None else self.contacts.energy()
+        viscous = self.motion.viscous_work
+        return Energy(kinetic, float(elastic), external, *of_contact, viscous)
 
     def save(self, path: str | Path) -> None:
         """Write the state to a file (`qdem_fem.checkpoint.checkpoint_write`)."""
