@@ -134,6 +134,8 @@ def fingerprint(simulation: Simulation) -> dict[str, str]:
     }
     if simulation.contact is not None:
         marks["contact"] = repr(simulation.contact)
+        if simulation.contact.periodic is not None:
+            marks["periodic width"] = repr(simulation.contact.periodic)
     for number, body in enumerate(simulation.bodies):
         marks[f"mesh of body {number}"] = _mark(body.nodes, body.elements)
         material = [np.asarray(getattr(body.material, f.name)) for f in fields(body.material)]

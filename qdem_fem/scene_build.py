@@ -92,6 +92,9 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         run.packed_lists()  # rollers against prescribed motions, what holds rigid bodies
         if table.method == "static":
             held_check(run)
+        if scene.contact is not None and scene.contact.periodic is not None:
+            assert run.contacts is not None
+            run.contacts.images_check(run.contacts.reference)
     except ConditionError as error:
         where = error.where.replace("relax", "fix")
         if where in bodies:
