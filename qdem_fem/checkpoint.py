@@ -132,6 +132,10 @@ def fingerprint(simulation: Simulation) -> dict[str, str]:
         ),
         "periodic pairs": _mark(simulation.master),
     }
+    if conditions.absorbing:
+        marks["absorbing faces"] = _mark(
+            *(p for a in conditions.absorbing for p in (a.nodes, a.damping, a.stiffness))
+        )
     if simulation.contact is not None:
         marks["contact"] = repr(simulation.contact)
         if simulation.contact.periodic is not None:

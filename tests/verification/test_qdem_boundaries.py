@@ -10,11 +10,22 @@ import pytest
 from numpy.typing import NDArray
 
 import qdem_fem as q
+import trackbed
 from qdem_fem.contact_search import pairs_near, pairs_periodic
 from qdem_fem.errors import CheckpointError, ConditionError, SceneError
+from qdem_fem.leapfrog import accelerations_free
 from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.output import table_read
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
+from validation.qdem_boundary_waves import (
+    GROUND,
+    PRESSURE,
+    SPEED,
+    bar,
+    bar_share,
+    oblique_share,
+)
 
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
@@ -111,23 +122,23 @@ def slide(model: str, start: float, ways: int = 0) -> Floats:
     run.periodic(ground, x[:, 1] < 1e-9, x[:, 1] > WIDTH - 1e-9)
     run.fix(ground, x[:, 2] < -0.0199)
     stone.velocity = np.tile([0.0, 40.0, -0.5], (len(stone.nodes), 1))
-    run.advance(1.2e-4)
+    run.advance(6e-5)
     assert run.energy().friction > 0
     return np.asarray(stone.displacement)
 
 
 @pytest.mark.parametrize("model", ["spheres", "surface"])
 def test_a_joined_slab_has_no_seam(model: str) -> None:
-    """A block slides 4.8 mm along a joined slab: over its middle, over its seam, an image away.
+    """A block slides 2.4 mm along a joined slab: over its middle, over its seam, an image away.
 
     The slab's mesh repeats every 20 mm, so that the motion is the same but for rounding; how that
     grows is seen from two places off the seam.
     """
-    asked = slide(model, 0.031)
-    assert np.abs(asked[:, 1]).max() > 4e-3
-    rounding = 10 * np.abs(slide(model, 0.051) - asked).max() + 1e-13
+    asked = slide(model, 0.029)
+    assert np.abs(asked[:, 1]).max() > 2e-3
+    rounding = 10 * np.abs(slide(model, 0.049) - asked).max() + 1e-13
     assert rounding < 1e-8
-    for start, ways in ((0.071, 0), (0.091, 0), (0.091, -2)):
+    for start, ways in ((0.069, 0), (0.089, 0), (0.089, -2)):
         assert slide(model, start, ways) == pytest.approx(asked, abs=rounding)
 
 
@@ -235,6 +246,211 @@ def test_a_scene_names_the_width(tmp_path: Path) -> None:
         ('contact.periodic.axis="w"', "contact.periodic.axis: must be 'x', 'y' or 'z'"),
         ("contact.periodic.width=0", "contact.periodic.width: must be above 0"),
         ("contact.plane.0.normal=[0, 1, 1]", "contact.plane.0.normal: its normal has a part"),
+    ):
+        with pytest.raises(SceneError) as told:
+            simulation_of(scene_load(path, [change]))
+        assert words in str(told.value), change
+
+
+# --- absorbing faces ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("depth", [None, 0.5])
+@pytest.mark.parametrize("wave", ["p", "s"])
+def test_a_bar_sends_back_what_is_derived(wave: str, depth: float | None) -> None:
+    """A p- or s-pulse on the end of a bar, with dashpots, and with springs of a layer beside them.
+
+    The bar is a chain of planes, of which the answer is known for every frequency, mesh and step
+    included: to rounding (1e-9) what dashpots take; what is left, as soon as it has come out of
+    the springs and left the free end.  Dashpots alone let less than 2e-5 back of pulses of 5 cells.
+    """
+    share = bar_share(wave, depth, 80 if depth is None else 120)
+    assert share.absorbed == pytest.approx(share.absorbed_derived, abs=1e-9)
+    assert share.left == pytest.approx(share.left_derived, rel=1e-3)
+    if depth is None:
+        assert share.left == pytest.approx(share.left_derived, rel=1e-8)
+        assert share.left < 2e-5
+
+
+@pytest.mark.parametrize("end", ["fixed", "free"])
+def test_other_ends_send_all_back(end: str) -> None:
+    """Where the face is held or free: nothing is absorbed."""
+    share = bar_share("p", end=end)
+    assert share.left == pytest.approx(1.0, abs=0.01)
+    assert share.absorbed == 0.0
+
+
+def test_oblique_waves_come_back_as_derived() -> None:
+    """A packet at 30 degrees: the closed form's share, to second order in the cell; one at 60.
+
+    24 and 36 cells across the trace: the error falls by 1.5 squared at least.
+    """
+    coarse, fine = oblique_share(30.0, 24), oblique_share(30.0, 36)
+    errors = [share.left - share.left_derived for share in (coarse, fine)]
+    assert errors[0] > 1.5**2 * errors[1] > 0
+    assert errors[1] < 4e-4
+    steep = oblique_share(60.0, 24)
+    assert steep.left == pytest.approx(steep.left_derived, abs=4e-3)
+    assert 0.9 < steep.absorbed < 1 - steep.left
+
+
+def test_dashpots_alone_creep_and_a_depth_holds() -> None:
+    """A lasting pressure: speed P/(rho c_p) without a depth, displacement P H/(lambda + 2 mu) with.
+
+    It grows over 20 transits of the bar and stays for 40: of the bar's vibration less than 1e-4 is
+    left, of a spring's way exp(-t c/H).
+    """
+    pressure = 1e3
+    for depth in (None, 0.4):
+        run = bar(4)
+        body = run.bodies[0]
+        run.absorb(body, body.nodes[:, 0] > 0.35, depth)
+        transit = 0.4 / SPEED["p"]
+        run.pressure(body, body.nodes[:, 0] < 0.05, q.ramp(20 * transit, pressure))
+        run.advance(60 * transit)
+        speed = pressure / (GROUND.density * SPEED["p"])
+        if depth is None:
+            assert body.velocity[:, 0] == pytest.approx(speed, rel=1e-4)
+        else:
+            there = body.displacement[body.nodes[:, 0] > 0.35, 0]
+            assert there == pytest.approx(pressure * depth / PRESSURE, rel=1e-4)
+            assert np.abs(body.velocity).max() < 1e-4 * speed
+        energy = run.energy()
+        stored = energy.kinetic + energy.elastic + energy.absorbed + energy.foundation
+        assert stored == pytest.approx(energy.external, rel=1e-4)
+
+
+def corner(**options: Any) -> tuple[q.Simulation, q.Body]:
+    """A block whose faces x-max and y-max absorb, of two depths, held and moved elsewhere."""
+    body = q.Body(box_mesh((0.3, 0.2, 0.2), (3, 2, 2), "kuhn"), GROUND, name="block")
+    run = q.Simulation([body], threads=1, **options)
+    x, y, z = body.nodes.T
+    run.absorb(body, x > 0.29, 0.5)
+    run.absorb(body, y > 0.19, 0.2)
+    run.roller(body, (x > 0.29) & (z < 0.01), (1, 0, 2))
+    run.fix(body, (y > 0.19) & (z > 0.19), "y")
+    run.prescribe(body, x < 0.01, "z", q.ramp(1e-3, 1e-5))
+    run.load(body, (x > 0.29) & (y > 0.19), q.ramp(5e-4, (30.0, 20.0, 10.0)))
+    return run, body
+
+
+def test_energies_close_with_all_at_once() -> None:
+    """Loads on absorbing nodes, faces that meet, rollers and holds among them: second order.
+
+    The account errs as the trapezoidal rule does: a quarter with half the step; and by less than
+    1e-3.  Held components and rollers stay where they are.
+    """
+    missing = []
+    for safety in (0.4, 0.2):
+        run, body = corner(safety=safety)
+        run.advance(2e-3)
+        energy = run.energy()
+        stored = energy.kinetic + energy.elastic + energy.absorbed + energy.foundation
+        missing.append(abs(stored / energy.external - 1))
+        assert energy.absorbed > 0.05 * energy.external
+        x, y, z = body.nodes.T
+        slope = body.displacement[(x > 0.29) & (z < 0.01)] @ (1, 0, 2)
+        assert np.abs(slope).max() < 1e-18
+        assert not body.displacement[(y > 0.19) & (z > 0.19), 1].any()
+    assert 3 < missing[0] / missing[1] < 5
+    assert missing[1] < 1e-3
+
+
+def test_step_is_that_of_the_springs_alone(tmp_path: Path) -> None:
+    """Critical step against all eigenvalues; at 0.999 of it nothing grows; goes on to the bit.
+
+    Dashpots on the mean velocity leave it as it is: with them and without, the same number; springs
+    of a layer of 2 mm shorten it.  Random velocities, 20,000 steps: kinetic energy only falls.
+    """
+    steps = []
+    for depth in (None, 0.002):
+        run = bar(3)
+        body = run.bodies[0]
+        plain = run.critical_step.value
+        run.absorb(body, body.nodes[:, 0] > 0.25, depth)
+        assert run.absorbers is not None
+        columns, scale = [], np.sqrt(np.where(run.assembly.mass > 0, run.assembly.mass, 1.0))
+        for unit in np.eye(3 * len(body.nodes)):
+            u = 1e-9 * unit.reshape(-1, 3)[run.master]
+            rate = accelerations_free(run, u, 0 * u) / 1e-9
+            rate[run.master != np.arange(len(u))] = 0.0
+            columns.append(rate.ravel())
+        root = np.repeat(scale, 3)
+        kernel = -np.array(columns).T * root[:, None] / root
+        exact = 2 / np.sqrt(np.linalg.eigvalsh((kernel + kernel.T) / 2)[-1])
+        assert run.critical_step.value == pytest.approx(exact, rel=1e-4)
+        steps.append(run.critical_step.value / plain)
+    assert steps[0] == pytest.approx(1.0, rel=1e-4)
+    assert steps[1] < 0.7
+    run, body = corner(safety=0.999, strain="small")
+    for condition in run.conditions.loads[:]:
+        run.remove(condition)
+    body.velocity = 1e-3 * np.random.default_rng(4).normal(size=body.nodes.shape)
+    run.advance(2000 * run.step)
+    before = run.energy()
+    run.advance(20_000 * run.step)
+    assert run.energy().kinetic < before.kinetic + before.elastic + before.foundation
+    again, twin = corner(safety=0.999, strain="small")
+    again.remove(again.conditions.loads[0])
+    run.save(tmp_path / "state")
+    again.restore(tmp_path / "state")
+    for each in (run, again):
+        each.advance(1e-4)
+    assert np.array_equal(twin.displacement, body.displacement)
+    assert again.energy() == run.energy()
+
+
+def test_what_can_not_absorb_is_refused() -> None:
+    """Rigid bodies, single precision, no whole face, a depth of zero, a static answer."""
+    run = bar(2)
+    body = run.bodies[0]
+    face = body.nodes[:, 0] > 0.15
+    with pytest.raises(ConditionError, match="depth of 0"):
+        run.absorb(body, face, 0)
+    with pytest.raises(ConditionError, match="no surface face"):
+        run.absorb(body, 0)
+    run.absorb(body, face)
+    with pytest.raises(ConditionError, match="no static answer"):
+        run.relax()
+    stone = block("stone", (0, 0, 0), True)
+    with pytest.raises(ConditionError, match="is rigid"):
+        q.Simulation([stone]).absorb(stone, stone.nodes[:, 2] < 1e-9)
+    with pytest.raises(ConditionError, match="double precision"):
+        bar(2, precision="float32").absorb(body, face)
+
+
+ABSORBING = """
+[[body]]
+name = "ground"
+mesh = { box = { size = [0.2, 0.1, 0.1], cells = [2, 1, 1] } }
+material = { young = 200e6, poisson = 0.25, density = 2000 }
+[simulation]
+duration = 2e-3
+[[absorb]]
+body = "ground"
+nodes = { set = "z-min" }
+depth = 0.5
+[[pressure]]
+body = "ground"
+nodes = { set = "z-max" }
+pressure = { ramp = 1e-3, value = 1e3 }
+"""
+
+
+def test_a_scene_names_absorbing_faces(tmp_path: Path) -> None:
+    """Its energies are columns of energy.csv, which close; what is wrong is told with its key."""
+    path = tmp_path / "scene.toml"
+    path.write_text(ABSORBING)
+    assert trackbed.main(["qdem", str(path), "--no-pictures"]) == 0
+    rows = table_read(next(tmp_path.rglob("energy.csv")))
+    assert rows["absorbed"][-1] > 0.0 < rows["foundation"][-1]
+    stored = sum(rows[name] for name in ("kinetic", "elastic", "absorbed", "foundation"))
+    assert stored[-1] == pytest.approx(rows["external"][-1], rel=1e-3)
+    for change, words in (
+        ("absorb.0.depth=0", "absorb.0.depth: must be above 0"),
+        ("absorb.0.nodes={nearest=[0, 0, 0]}", "absorb.0: no surface face"),
+        ('simulation.method="static"', "absorb.0: a static answer"),
+        ('simulation.precision="float32"', "absorb.0: absorbing faces are computed in double"),
     ):
         with pytest.raises(SceneError) as told:
             simulation_of(scene_load(path, [change]))
