@@ -356,6 +356,29 @@ def test_energies_close_with_all_at_once() -> None:
     assert missing[1] < 1e-3
 
 
+def test_stone_falls_on_an_absorbing_joined_layer() -> None:
+    """A rigid stone hits a joined slab across its seam; the slab's ground absorbs: energies close.
+
+    What has come as the fall's energy is in the account to 1e-3, and vertical momentum to the
+    ground's force: of the springs and dashpots nothing is left out.
+    """
+    ground = slab()
+    stone = block("stone", (0.001, 0.089, 2 * RADIUS * 0.9), True)
+    run = q.Simulation([ground, stone], contact=touch("spheres"), threads=1, safety=0.2)
+    y, z = ground.nodes[:, 1], ground.nodes[:, 2]
+    run.periodic(ground, y < 1e-9, y > WIDTH - 1e-9)
+    run.absorb(ground, z < -0.0199, 0.5)
+    stone.velocity = np.tile([0.0, 3.0, -2.0], (len(stone.nodes), 1))
+    before = run.energy()
+    came = before.kinetic + before.contact
+    run.advance(1.5e-4)
+    energy = run.energy()
+    taken = energy.friction + energy.absorbed + energy.foundation
+    total = energy.kinetic + energy.elastic + energy.contact + taken
+    assert energy.absorbed > 1e-3 * came < energy.friction * 10
+    assert total == pytest.approx(came, rel=1e-3)
+
+
 def test_step_is_that_of_the_springs_alone(tmp_path: Path) -> None:
     """Critical step against all eigenvalues; at 0.999 of it nothing grows; goes on to the bit.
 
