@@ -20,7 +20,7 @@ from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.contact_window import advance_of, window_run
 from qdem_fem.errors import ContactTooDeep, StepWarning
-from qdem_fem.periodic import extents_check
+from qdem_fem.periodic import extents_check, joined_check
 
 if TYPE_CHECKING:
     from qdem_fem.critical_step import CriticalStep
@@ -173,6 +173,10 @@ class Contacts(ABC):
         cuts = zip(self.first_vertex[:-1], self.first_vertex[1:], self.outside, strict=True)
         along = [position[low:high, side.number][o.own] for low, high, o in cuts]
         slabs = [o.joined for o in self.outside]
+        for body, start, slab in zip(self.run.bodies, self.run.first_node, slabs, strict=False):
+            if not slab:
+                master = self.run.master[start : start + len(body.nodes)] - start
+                joined_check(body, master, side, self.where)
         extents_check(self.run.bodies, along, slabs, self.reach, side, self.where)
 
     @property

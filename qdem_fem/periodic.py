@@ -118,6 +118,19 @@ def twins_joined(nodes: Floats, master: Integers, side: PeriodicWidth) -> tuple[
     return low[one], high[one]
 
 
+def joined_check(body: Body, master: Integers, side: PeriodicWidth, where: str) -> None:
+    """Raise `ConditionError` for faces that are joined along the axis, but not over the width."""
+    apart = body.nodes[:, side.number] - body.nodes[master, side.number]
+    most = float(np.abs(apart).max(initial=0.0))
+    if most > NEAR * side.width:
+        raise ConditionError(
+            f"faces of {body.name} are joined over {most:.4g} m along {side.axis}, where contact "
+            f"repeats every {side.width:.4g} m",
+            where=where,
+            remedy="make the body as wide as the width, or do not join it along this axis",
+        )
+
+
 def extents_check(
     bodies: Sequence[Body],
     along: Sequence[Floats],

@@ -44,6 +44,7 @@ def page(parts: Data) -> str:
                 f"{row['absorbed']:.6f} | {row['absorbed_derived']:.6f}"
                 for row in rows["bar"]
             ),
+            "lost": f"{100 * max(1 - r['left'] - r['absorbed'] for r in rows['bar']):.1f} %",
             "oblique": _lines(_oblique(rows["oblique"])),
             "ground": _lines(_ground(rows["ground"])),
             "ground_words": _ground_words(rows["ground"]),
@@ -88,7 +89,7 @@ def _ground(rows: list[Data]) -> list[str]:
         for side in sorted({row["side"] for row in rows if row["end"] == "fixed"}):
             each = [ground_row(rows, load, side, end) for end in ENDS]
             errors = " | ".join(
-                f"{100 * row['error'][0]:.0f} %, {100 * row['error'][1]:.0f} %" for row in each
+                f"{100 * row['error'][0]:.2g} %, {100 * row['error'][1]:.2g} %" for row in each
             )
             lines.append(f"{load} | {side:g} m | {errors} | {each[2]['cpu_s']:.2f} s")
     return lines
