@@ -89,7 +89,7 @@ def _ground(rows: list[Data]) -> list[str]:
         for side in sorted({row["side"] for row in rows if row["end"] == "fixed"}):
             each = [ground_row(rows, load, side, end) for end in ENDS]
             errors = " | ".join(
-                f"{100 * row['error'][0]:.2g} %, {100 * row['error'][1]:.2g} %" for row in each
+                f"{100 * row['error'][0]:.3g} %, {100 * row['error'][1]:.3g} %" for row in each
             )
             lines.append(f"{load} | {side:g} m | {errors} | {each[2]['cpu_s']:.2f} s")
     return lines
