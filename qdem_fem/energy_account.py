@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
-STORED = ("kinetic", "elastic", "contact", "friction", "viscous")
+STORED = ("kinetic", "elastic", "contact", "friction", "viscous", "absorbed", "foundation")
 """Stored in the bodies or taken from them, where a run has it."""
 
 

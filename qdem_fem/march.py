@@ -64,7 +64,7 @@ def march(
         most = min(most, VISCOUS_STEPS)
         power = viscous_power(run)
     end = motion.steps_done + steps
-    window = (run.contacts or run.rigid or assembly).window
+    window = (run.contacts or run.rigid or run.absorbers or assembly).window
     while motion.steps_done < end:
         assembly.frames_renew()
         count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
@@ -137,7 +137,7 @@ def energy_set(run: Simulation) -> float:
     if still and run.contacts is None:
         return 0.0
     energy = run.energy()
-    return energy.kinetic + abs(energy.elastic) + energy.contact
+    return energy.kinetic + abs(energy.elastic) + energy.contact + energy.foundation
 
 
 def viscous_power(run: Simulation) -> float:

@@ -26,6 +26,8 @@ class Motion:
     """Work of gravity since the start [J]."""
     viscous_work: float = 0.0
     """Energy that viscosity took since the start [J]; counted where the simulation asks for it."""
+    absorbed: float = 0.0
+    """Energy that absorbing faces took since the start [J]."""
     displacement_set: bool = False
     """Whether the user set a displacement since the last step."""
     put_in: float = nan

@@ -28,6 +28,7 @@ ENERGY = 100
 ENERGIES = ("kinetic", "elastic", "external")
 CONTACT_ENERGIES = ("contact", "friction")
 VISCOUS_ENERGY = ("viscous",)
+ABSORBING_ENERGIES = ("absorbed", "foundation")
 COST = "cost.json"
 
 
@@ -274,9 +275,10 @@ def _cost_read(path: Path) -> dict[str, float]:
 
 
 def energy_names(run: Any) -> tuple[str, ...]:
-    """Columns of energy.csv beside the time; of contact and viscosity where they are counted."""
-    names = ENERGIES if run.contact is None else ENERGIES + CONTACT_ENERGIES
-    return names + VISCOUS_ENERGY * run.counts_viscous
+    """Columns of energy.csv beside the time; of what the scene has and counts."""
+    touching = () if run.contact is None else CONTACT_ENERGIES
+    ground = ABSORBING_ENERGIES if run.conditions.absorbing else ()
+    return ENERGIES + touching + VISCOUS_ENERGY * run.counts_viscous + ground
 
 
 def _tables(path: Path, probes: dict[str, Any], energies: tuple[str, ...]) -> tuple[Table, Table]:
