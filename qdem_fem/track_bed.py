@@ -37,6 +37,7 @@ from qdem_fem.grain_set import GrainSet, grains_make
 from qdem_fem.kinetic_damping import Rest, rest_find
 from qdem_fem.material import Material
 from qdem_fem.output import write_whole
+from qdem_fem.periodic import PeriodicWidth
 from qdem_fem.sleeper_mesh import SleeperShape
 from qdem_fem.track_bodies import GAP, TrackBox, grains_nodes, lattice_loose, sleeper_slice
 
@@ -84,6 +85,8 @@ class BedRecipe:
     """Simulated time of a stage after which it is given up [s]."""
     rigid: bool = True
     """Whether grains are rigid until the last stage."""
+    periodic: bool = False
+    """Whether the track repeats along y, as in the paper, in place of walls there."""
 
     def planes(self) -> tuple[ContactPlane, ...]:
         """Ground and sides."""
@@ -95,13 +98,16 @@ class BedRecipe:
             ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
             ((0.0, width, 0.0), (0.0, -1.0, 0.0)),
         ]
+        if self.periodic:
+            sides = sides[:2]
         return (ground, *(ContactPlane(*side, self.side_friction) for side in sides))
 
     def contact(self, names: Sequence[str], softness: float = 1.0) -> SphereContact:
         """Spheres of bodies with these names, their springs softer by a factor."""
         ballast, sleeper = self.stiffness
         each = {n: softness * (sleeper if n == SLEEPER else ballast) for n in names}
-        return SphereContact(self.radius, each, self.friction, self.planes())
+        width = PeriodicWidth("y", self.box.width) if self.periodic else None
+        return SphereContact(self.radius, each, self.friction, self.planes(), periodic=width)
 
     def told(self) -> str:
         """The recipe as a text, equal for equal beds."""

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from qdem_fem.contact_scene import ContactTable
+from qdem_fem.contact_scene import ContactTable, PeriodicTable
 from qdem_fem.kinetic_damping import Rest
 from qdem_fem.load_train import Track, Train
 from qdem_fem.material import Material
@@ -166,6 +166,8 @@ def _faults(text: SceneText) -> Iterator[Problem]:
             yield Problem("contact.model", "a track has spheres of one radius, and its own planes")
         if not isinstance(contact.radius, float | None):
             yield Problem("contact.radius", "one number for all bodies of a track")
+        if contact.periodic is not None and not _fits(contact.periodic, track):
+            yield Problem("contact.periodic", "a track repeats along y by its width")
         if not isinstance(stiffness, dict) or sorted(stiffness) != sorted(names):
             yield Problem("contact.normal_stiffness", "give {ballast = ..., sleeper = ...}")
     if simulation is not None and (simulation.gravity is None or simulation.method == "static"):
@@ -173,6 +175,10 @@ def _faults(text: SceneText) -> Iterator[Problem]:
     output = text.tables.get("output")
     if output is not None and output.probes:
         yield Problem("output.probes", "a track names its own points: B1 to B3, S1 to S3, sleeper")
+
+
+def _fits(periodic: PeriodicTable, track: object) -> bool:
+    return periodic.axis == "y" and periodic.width == getattr(track, "width", periodic.width)
 
 
 def load_of(track: TrackTable, folder: Path) -> TimeSeries:
@@ -203,7 +209,7 @@ def recipe_of(scene: TrackScene) -> BedRecipe:
         stiffness=(stiffness["ballast"], stiffness[SLEEPER]), friction=friction,
         side_friction=track.side_friction, gravity=scene.simulation.gravity,
         softness=track.softness, unbalanced=track.unbalanced, kinetic=track.kinetic,
-        loose=track.loose, patience=track.patience,
+        loose=track.loose, patience=track.patience, periodic=contact.periodic is not None,
     )  # fmt: skip
 
 

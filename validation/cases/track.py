@@ -1,7 +1,7 @@
 """A slice of ballasted track: prepared to equilibrium, loaded, taken up again.
 
     trackbed validate track --quick    20 grains: equilibrium, energies, resume, two frictions
-    trackbed validate track            also springs softer than Table 1's, deformable preparation
+    trackbed validate track            also softer springs, and what rigid grains save in the fall
 
 What the figures mean: ``docs/qdem-track.md``.
 """
