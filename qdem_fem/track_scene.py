@@ -73,7 +73,7 @@ class TrackTable(Table):
     beside: Annotated[int, Field(ge=1, le=100_000)]
     """Grains that fill the cribs."""
     seed: Annotated[int, Field(ge=0)] = 1
-    sizes: tuple[Positive, Positive] = (0.026, 0.034)
+    sizes: Annotated[tuple[Positive, Positive], Field(strict=False)] = (0.026, 0.034)
     """Least and greatest sieve size of the grains' meshes [m]; spheres make them larger."""
     cells: Cells
     """Of the sleeper's mesh, along, across and up."""
@@ -157,6 +157,8 @@ def _faults(text: SceneText) -> Iterator[Problem]:
             yield Problem(name, "[track] makes the bodies and their conditions")
     if isinstance(track, TrackTable) and (track.pressure is None) == (track.bogie is None):
         yield Problem("track", "give one of pressure, bogie")
+    if isinstance(track, TrackTable) and not track.sizes[0] < track.sizes[1]:
+        yield Problem("track.sizes", "the second must be the greater one")
     if contact is None and "contact" not in text.data:
         yield Problem("contact", "missing: a track needs it")
     if isinstance(contact, ContactTable):

@@ -44,7 +44,6 @@ model = "spheres"
 radius = 0.012
 normal_stiffness = { ballast = 1.613e9, sleeper = 2.39e9 }
 friction = 0.577
-periodic = { axis = "y", width = 0.42 }
 [simulation]
 duration = 0.015
 gravity = [0, 0, -9.81]
