@@ -50,9 +50,6 @@ Floats = NDArray[np.float64]
 STAGES = ("bed", "crib", "firm", "hard", "rest")
 ROUGH = (0.1, 1e-3, 0.02)
 """Unbalanced, kinetic and loose share that end the stages of softer springs."""
-LOOK = {True: 8, False: 40}
-"""Steps between two looks at rigid bodies, at deformable ones: a third of a period of a grain on
-its contacts, or less."""
 SLEEPER = "sleeper"
 
 
@@ -219,8 +216,7 @@ def _stage_run(
         (recipe.unbalanced, recipe.kinetic, recipe.loose) if stage in ("hard", "rest") else ROUGH
     )
     told = None if progress is None else (lambda rest: progress(stage, rest))
-    look = LOOK[recipe.rigid and not last]
-    rest = rest_find(run, *shares, recipe.patience, told, look)
+    rest = rest_find(run, *shares, recipe.patience, told)
     rests = {} if before is None else dict(before.rests)
     rests[stage] = {**asdict(rest), "step": run.step, "cpu_s": time.process_time() - started}
     moved = run.assembly.field("displacement")
