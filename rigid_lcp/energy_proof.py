@@ -36,9 +36,8 @@ def energy_least(problem: FrictionProblem) -> tuple[float, Floats]:
     w = problem.delassus
     form = sp.csr_array((w + w.T) * (0.5 * problem.rho))
     largest = float(abs(form).sum(axis=1).max())
-    force = np.zeros((problem.contacts, problem.dim))
-    force[:, 0] = problem.contacts**-0.5
-    force = force.ravel()
+    force = np.zeros(len(problem.offset))
+    force[:: problem.dim] = problem.contacts**-0.5
     energy, ahead, momentum = float(force @ (form @ force)), force, 1.0
     for _ in range(STEPS):
         step = _in_cones(ahead - (form @ ahead) / largest, problem)

@@ -26,7 +26,7 @@ def test_least_energy_of_one_contact_is_the_closed_form(mu):
     assert force[1] == pytest.approx(mu * force[0], abs=1e-6)
 
 
-@pytest.mark.parametrize("mu, given", [(0.38, False), (0.39, True)])
+@pytest.mark.parametrize(("mu", "given"), [(0.38, False), (0.39, True)])
 def test_energy_is_given_from_the_friction_that_reaches_where_it_is_negative(mu, given):
     """1 - 3 s + s^2 is negative from s = (3 - 5^(1/2)) / 2 = 0.38197 on."""
     problem = one_contact(1.5, mu)
@@ -68,8 +68,10 @@ def test_a_wedged_packing_with_noise_on_w_says_that_no_solution_need_exist():
     assert gives_energy(problem)
     found = solve_friction(problem.delassus, problem.offset, problem.friction, 3)
     assert found.status == "not converged"
-    assert "r . W r < 0" in found.message and "->" in found.message
-    assert np.isfinite(found.residual) and found.residual < 1e-2
+    assert "r . W r < 0" in found.message
+    assert "->" in found.message
+    assert np.isfinite(found.residual)
+    assert found.residual < 1e-2
 
 
 def test_noise_on_w_of_a_packing_that_can_not_wedge_is_accepted():
