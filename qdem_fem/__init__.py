@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from qdem_fem.dynamic_relaxation import StaticAnswer
     from qdem_fem.errors import QdemError, StepWarning
     from qdem_fem.material import Material
+    from qdem_fem.periodic import PeriodicWidth
     from qdem_fem.series import Series, ramp
     from qdem_fem.simulation import Energy, History, Simulation
 
@@ -26,6 +27,7 @@ _HOMES = {
     "Energy": "simulation",
     "History": "simulation",
     "Material": "material",
+    "PeriodicWidth": "periodic",
     "QdemError": "errors",
     "Series": "series",
     "Simulation": "simulation",
@@ -42,6 +44,7 @@ __all__ = [
     "Energy",
     "History",
     "Material",
+    "PeriodicWidth",
     "QdemError",
     "Series",
     "Simulation",

@@ -132,8 +132,14 @@ def fingerprint(simulation: Simulation) -> dict[str, str]:
         ),
         "periodic pairs": _mark(simulation.master),
     }
+    if conditions.absorbing:
+        marks["absorbing faces"] = _mark(
+            *(p for a in conditions.absorbing for p in (a.nodes, a.damping, a.stiffness))
+        )
     if simulation.contact is not None:
         marks["contact"] = repr(simulation.contact)
+        if simulation.contact.periodic is not None:
+            marks["periodic width"] = repr(simulation.contact.periodic)
     for number, body in enumerate(simulation.bodies):
         marks[f"mesh of body {number}"] = _mark(body.nodes, body.elements)
         material = [np.asarray(getattr(body.material, f.name)) for f in fields(body.material)]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qdem_fem.body import Body
-from qdem_fem.conditions import COMPONENTS, Conditions, Held, NodalLoad, Roller
+from qdem_fem.conditions import COMPONENTS, Absorbing, Conditions, Held, NodalLoad, Roller
 from qdem_fem.errors import ConditionError
-from qdem_fem.series import Driver, Value
+from qdem_fem.series import Driver, Value, is_real
 from qdem_fem.simulation_options import bodies_check, bodies_number
 from qdem_fem.surface import faces_within, pressure_forces
 
@@ -93,19 +93,30 @@ class ConditionedBodies:
 
     def pressure(self, body: Body, nodes: Any, pressure: Value) -> NodalLoad:
         """A ``pressure`` [Pa] along the inward reference normal of the faces within ``nodes``."""
-        self._offset(body)
-        local = body.nodes_select(nodes, "pressure")
-        mask = np.zeros(len(body.nodes), dtype=bool)
-        mask[local] = True
-        faces = faces_within(body.surface, mask)
-        if not len(faces):
-            raise ConditionError(
-                f"no surface face of {body.name} has all three nodes in the selection",
-                where="pressure",
-            )
+        local, faces = self._faces(body, nodes, "pressure")
         areas = pressure_forces(body.nodes, faces, len(body.nodes))[local]
         chosen = self._nodes(body, local, "pressure")
         return self._load(NodalLoad(chosen, areas, Driver(pressure, 1, "pressure")))
+
+    def absorb(self, body: Body, nodes: Any, depth: float | None = None) -> Absorbing:
+        """Let waves out through the faces within ``nodes``, by dashpots (`qdem_fem.absorbing`).
+
+        ``depth`` [m]: springs beside them, of a layer so deep of the body's material on rigid
+        ground; without them the body creeps under a load that lasts.  Components that are held or
+        prescribed have neither.
+        """
+        from qdem_fem.absorbing import face_tensors
+
+        if depth is not None and not (is_real(depth) and np.isfinite(depth) and depth > 0):
+            raise ConditionError(f"a depth of {depth!r} m is not above zero", where="absorb")
+        self._deformable_check(body, "absorb", "leave it deformable")
+        local, faces = self._faces(body, nodes, "absorb")
+        damping, stiffness = (part[local] for part in face_tensors(body, faces, depth))
+        absorbing = Absorbing(self._nodes(body, local, "absorb"), damping, stiffness)
+        self._before_change()
+        self.conditions.absorbing.append(absorbing)
+        self._changed(ties=True)
+        return absorbing
 
     def periodic(self, body: Body, nodes_a: Any, nodes_b: Any, tolerance: float = 1e-6) -> None:
         """Join opposite faces: every node of ``nodes_b`` moves as its partner of ``nodes_a``.
@@ -129,10 +140,11 @@ class ConditionedBodies:
             i, j = self.master[i], self.master[j]
             self.master[self.master == max(i, j)] = min(i, j)
 
-    def remove(self, condition: NodalLoad | Held | Roller) -> None:
-        """Take back a condition that `fix`, `prescribe`, `roller`, `load`, `pressure` returned."""
+    def remove(self, condition: NodalLoad | Held | Roller | Absorbing) -> None:
+        """Take back a condition that `fix`, `load`, `absorb` and the like returned."""
         lists: tuple[list[Any], ...] = (
-            self.conditions.loads, self.conditions.held, self.conditions.rollers
+            self.conditions.loads, self.conditions.held, self.conditions.rollers,
+            self.conditions.absorbing,
         )  # fmt: skip
         for conditions in lists:
             if condition in conditions:
@@ -155,6 +167,19 @@ class ConditionedBodies:
     def _nodes(self, body: Body, nodes: Any, where: str) -> Integers:
         start = self._offset(body)
         return body.nodes_select(nodes, where) + start
+
+    def _faces(self, body: Body, nodes: Any, where: str) -> tuple[Integers, Integers]:
+        """Nodes of a selection, and the surface faces (k, 3) with all three of theirs in it."""
+        self._offset(body)
+        local = body.nodes_select(nodes, where)
+        mask = np.zeros(len(body.nodes), dtype=bool)
+        mask[local] = True
+        faces = faces_within(body.surface, mask)
+        if not len(faces):
+            raise ConditionError(
+                f"no surface face of {body.name} has all three nodes in the selection", where=where
+            )
+        return local, faces
 
     def _probe(self, name: str, probe: Any) -> Integers:
         if isinstance(probe, tuple) and len(probe) == 2 and isinstance(probe[0], Body):

@@ -51,6 +51,17 @@ class Roller:
     normal: Floats
 
 
+@dataclass(eq=False)
+class Absorbing:
+    """Nodes of faces that absorb waves (`qdem_fem.absorbing.face_tensors`)."""
+
+    nodes: Integers
+    damping: Floats
+    """C (k, 3, 3) [N s/m]"""
+    stiffness: Floats
+    """K (k, 3, 3) [N/m]; zero without a depth"""
+
+
 @dataclass
 class Conditions:
     """All conditions of a simulation, in the order in which they were given."""
@@ -58,6 +69,7 @@ class Conditions:
     loads: list[NodalLoad] = field(default_factory=list)
     held: list[Held] = field(default_factory=list)
     rollers: list[Roller] = field(default_factory=list)
+    absorbing: list[Absorbing] = field(default_factory=list)
 
     def drivers(self) -> list[Driver]:
         """What changes with time, each once, loads first."""

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
+from numba.extending import overload
 
 from qdem_fem.contact_search import Pairs
 
@@ -129,6 +130,24 @@ def row_put(a: Any, i: int, values: Any) -> None:  # pragma: no cover
     a[i, 0], a[i, 1], a[i, 2] = values
 
 
+def image_less(d: Any, image: Any, p: int) -> Any:
+    """``d`` [m] less row p of ``image``; as it is where ``image`` is (0,): nothing is periodic."""
+    return d if image.ndim == 1 else less_row(d, image, p)
+
+
+@inlined
+def less_row(d: Any, image: Any, p: int) -> Any:  # pragma: no cover
+    """``d`` less row p of ``image``."""
+    return d[0] - image[p, 0], d[1] - image[p, 1], d[2] - image[p, 2]
+
+
+@overload(image_less, strict=False, jit_options={"error_model": "numpy", "forceinline": True})
+def _image_less(d: Any, image: Any, p: int) -> Any:
+    if image.ndim == 1:
+        return lambda d, image, p: d
+    return lambda d, image, p: less_row(d, image, p)
+
+
 @exact
 def spheres_move(c: Any, low: int, high: int, displacement: Any) -> float:  # pragma: no cover
     """Positions of the spheres ``low`` to ``high``; their greatest square way [m^2]."""
@@ -153,7 +172,7 @@ def pairs_forces(
         fx, fy, fz = 0.0, 0.0, 0.0
         for p in range(pairs.first[i], pairs.first[i + 1]):
             j = pairs.second[p]
-            d = minus(c.position, i, c.position, j)
+            d = image_less(minus(c.position, i, c.position, j), pairs.image, p)
             square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
             reach = sphere.radius[i] + sphere.radius[j]
             open_now = square >= reach * reach
@@ -235,7 +254,7 @@ def advance(c: Any, displacement: Any, velocity: Any, step: float) -> int:  # pr
     state that no step led to.  Returns `GO_ON`, `LOOK_ANEW` or `TOO_DEEP`.
     """
     # a parallel loop of numba takes arrays only: tuples are taken apart, and made anew within
-    (a0, a1, a2, a3, a4, a5, a6), (p0, p1, p2, p3, p4, p5, p6, p7), (w0, w1, w2, w3, w4) = c[:3]
+    (a0, a1, a2, a3, a4, a5, a6), (p0, p1, p2, p3, p4, p5, p6, p7, p8), (w0, w1, w2, w3, w4) = c[:3]
     friction, half_skin, start, position, force, slid = c[3:]
     count = position.shape[0]
     blocks = (count + BLOCK - 1) // BLOCK
@@ -243,7 +262,7 @@ def advance(c: Any, displacement: Any, velocity: Any, step: float) -> int:  # pr
     for stage in range(3):  # all spheres pass one stage before any begins the next
         for b in prange(blocks):
             own = Contact(
-                Spheres(a0, a1, a2, a3, a4, a5, a6), Pairs(p0, p1, p2, p3, p4, p5, p6, p7),
+                Spheres(a0, a1, a2, a3, a4, a5, a6), Pairs(p0, p1, p2, p3, p4, p5, p6, p7, p8),
                 Planes(w0, w1, w2, w3, w4), friction, half_skin, start, position, force, slid,
             )  # fmt: skip
             low, high = b * BLOCK, min(count, (b + 1) * BLOCK)

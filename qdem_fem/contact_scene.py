@@ -8,8 +8,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from qdem_fem.contact_options import Contact
-from qdem_fem.contact_spheres import ContactPlane, SphereContact
+from qdem_fem.contact_spheres import ContactPlane, SphereContact, planes_along_check
 from qdem_fem.contact_surface import SurfaceContact
+from qdem_fem.errors import ConditionError
+from qdem_fem.periodic import PeriodicWidth
 from qdem_fem.scene_types import Name, NonNegative, Positive, Table, Vector, number_or_table
 
 NumberByBody = Annotated[
@@ -29,6 +31,14 @@ class PlaneTable(Table):
     """By default that between bodies."""
 
 
+class PeriodicTable(Table):
+    """A layer that repeats along an axis; bodies touch across its sides."""
+
+    axis: Literal["x", "y", "z"]
+    width: Positive
+    """[m]"""
+
+
 class ContactTable(Table):
     """Contact between all bodies; left out of the kernel when not given."""
 
@@ -39,6 +49,8 @@ class ContactTable(Table):
     contacts: Annotated[int, Field(ge=1, le=1000)] | None = None
     """Contacts of a vertex at once that the time step allows for."""
     plane: Annotated[tuple[PlaneTable, ...], Field(strict=False)] = ()
+    periodic: PeriodicTable | None = None
+    """The width that contact repeats in; bodies have no sides to touch across when not given."""
     radius: NumberByBody | None = None
     """Of spheres [m]: a number, or by body."""
     normal_stiffness: NumberByBody | None = None
@@ -65,6 +77,8 @@ def contact_of(table: ContactTable | None) -> Contact | None:
     names = [*NEEDED[table.model], *OPTIONS[table.model]]
     given = {name: getattr(table, name) for name in names if getattr(table, name) is not None}
     planes = tuple(ContactPlane(p.point, p.normal, p.friction) for p in table.plane)
+    if table.periodic is not None:
+        given["periodic"] = PeriodicWidth(table.periodic.axis, table.periodic.width)
     made = SphereContact if table.model == "spheres" else SurfaceContact
     return made(friction=table.friction, planes=planes, **given)
 
@@ -95,6 +109,14 @@ def contact_faults(
     for number, plane in enumerate(table.plane):
         if not any(plane.normal):
             yield f"contact.plane.{number}.normal", "has no direction"
+        elif table.periodic is not None:
+            try:
+                planes_along_check(
+                    PeriodicWidth(table.periodic.axis, table.periodic.width),
+                    [ContactPlane(plane.point, plane.normal)],
+                )
+            except ConditionError as error:
+                yield f"contact.plane.{number}.normal", error.what
     if simulation is None:
         return
     for key, wrong, said in (

@@ -8,11 +8,14 @@ the cells lie changes nothing.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from qdem_fem.periodic import PeriodicWidth
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -37,6 +40,8 @@ class Pairs(NamedTuple):
     """(p, 3) force on i [N]."""
     acting: Any
     """(a,) the spheres to look at: those in a pair, or all where there are walls."""
+    image: Any
+    """(p, 3) from j to the image of it that i meets [m]; (0,) where nothing is periodic."""
 
 
 @njit(cache=True)
@@ -121,6 +126,37 @@ def pairs_near(
     return first, second[:found].copy()
 
 
+def pairs_periodic(
+    position: Floats, radius: Floats, body: Integers, skin: float, side: PeriodicWidth
+) -> tuple[Integers, Integers, Floats]:
+    """As `pairs_near`, of spheres i and the nearest images of others j: also ``n W e`` (p, 3) [m].
+
+    Positions are wrapped into one width, for the search alone; spheres near its lower side are
+    there a second time, beyond its upper one.
+    """
+    axis, width, count = side.number, side.width, len(position)
+    times = np.floor(position[:, axis] / width)
+    wrapped = position.copy()
+    wrapped[:, axis] -= times * width
+    ghost = np.flatnonzero(wrapped[:, axis] <= 2 * radius.max(initial=0.0) + skin)
+    own = np.concatenate([np.arange(count), ghost])
+    wrapped = wrapped[own]
+    wrapped[count:, axis] += width
+    times = times[own]
+    times[count:] -= 1
+    first, second = pairs_near(wrapped, radius[own], body[own], skin)
+    row = np.repeat(np.arange(len(own)), np.diff(first))
+    once = row < count  # two that are both there a second time are a pair already
+    one, other = row[once], second[once]
+    i, j, image = own[one], own[other], times[one] - times[other]
+    turned = i > j
+    image[turned] *= -1
+    i, j = np.minimum(i, j), np.maximum(i, j)
+    order = np.lexsort((j, i))
+    rows = np.concatenate([[0], np.cumsum(np.bincount(i, minlength=count))])
+    return rows, j[order], image[order, None] * side.way
+
+
 @njit(cache=True)
 def history_carry(old: Any, new: Any) -> None:  # pragma: no cover
     """Take what the pairs of ``old`` remember over to the same pairs of ``new``."""
@@ -137,7 +173,10 @@ def history_carry(old: Any, new: Any) -> None:  # pragma: no cover
                 new.pull[q] = old.pull[p]
 
 
-def pairs_of(first: Integers, second: Integers, walls: bool) -> Pairs:
+NO_IMAGE: Floats = np.zeros(0)
+
+
+def pairs_of(first: Integers, second: Integers, walls: bool, image: Floats = NO_IMAGE) -> Pairs:
     """Pairs without a history, from their rows; ``walls``: whether there are any."""
     count, size = len(second), len(first) - 1
     back = np.bincount(second, minlength=size)
@@ -150,14 +189,20 @@ def pairs_of(first: Integers, second: Integers, walls: bool) -> Pairs:
         np.zeros((count, 3)),
         np.zeros((count, 3)),
         np.flatnonzero((np.diff(first) > 0) | (back > 0) | walls),
+        image,
     )
 
 
 def pairs_renew(
-    old: Pairs | None, position: Floats, radius: Floats, body: Integers, skin: float, walls: bool
-) -> Pairs:
+    old: Pairs | None, position: Floats, radius: Floats, body: Integers, skin: float, walls: bool,
+    side: PeriodicWidth | None = None,
+) -> Pairs:  # fmt: skip
     """The list for spheres at ``position`` (c, 3) [m], with the history of the ``old`` one."""
-    new = pairs_of(*pairs_near(position, radius, body, skin), walls)
+    if side is None:
+        new = pairs_of(*pairs_near(position, radius, body, skin), walls)
+    else:
+        first, second, image = pairs_periodic(position, radius, body, skin, side)
+        new = pairs_of(first, second, walls, image)
     if old is not None:
         history_carry(old, new)
     return new

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import Contact, Planes, Spheres
-from qdem_fem.contact_search import Pairs, pairs_of, pairs_renew
+from qdem_fem.contact_search import NO_IMAGE, Pairs, pairs_of, pairs_renew
 from qdem_fem.contact_spheres import SKIN, SphereContact, pair_stiffness, tangential_stiffness
-from qdem_fem.contact_state import Contacts, ContactTouching, Floats, Integers, planes_arrays
+from qdem_fem.contact_state import (
+    Contacts,
+    ContactTouching,
+    Floats,
+    Integers,
+    outsides_of,
+    planes_arrays,
+)
 from qdem_fem.contact_step import network_bound
 
 if TYPE_CHECKING:
@@ -28,9 +36,12 @@ class SphereContacts(Contacts):
     kernel: Contact
 
     def __init__(self, run: Simulation, asked: SphereContact) -> None:
-        super().__init__(run, asked.contacts)
-        self.asked = asked
-        counts = [len(nodes) for nodes in self.local]
+        outside = [
+            replace(o, node=o.node[o.own], reference=o.reference[o.own], own=o.own[o.own])
+            for o in outsides_of(run, asked, 0.0)
+        ]
+        super().__init__(run, asked, outside)
+        counts = np.diff(self.first_vertex)
 
         def by_body(values: list[float]) -> Floats:
             return np.repeat(np.array(values, dtype=float), counts)
@@ -40,6 +51,7 @@ class SphereContacts(Contacts):
         poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
         self.one = pair_stiffness(normal, normal.max(initial=0.0))
         self.skin = float(SKIN * radius.min() if asked.skin is None else asked.skin)
+        self.reach = 2 * float(radius.max()) + self.skin
         size, walls = len(self.nodes), len(asked.planes)
         zero = np.zeros((size, 3))
         self.kernel = Contact(
@@ -48,7 +60,10 @@ class SphereContacts(Contacts):
                 np.repeat(np.arange(len(counts)), counts), radius, normal,
                 tangential_stiffness(normal, poisson),
             ),
-            pairs_of(np.zeros(size + 1, np.int64), np.zeros(0, np.int64), bool(walls)),
+            pairs_of(
+                np.zeros(size + 1, np.int64), np.zeros(0, np.int64), bool(walls),
+                NO_IMAGE if asked.periodic is None else np.zeros((0, 3)),
+            ),
             Planes(
                 *planes_arrays(asked.planes, asked.friction),
                 np.zeros((walls, size, 3)), np.zeros((walls, size, 3)),
@@ -72,7 +87,10 @@ class SphereContacts(Contacts):
     def lists_renew(self, position: Floats) -> None:
         """Look for pairs around vertices at (c, 3) [m]."""
         spheres, walls = self.kernel.spheres, bool(self.asked.planes)
-        pairs = pairs_renew(self.pairs, position, spheres.radius, spheres.body, self.skin, walls)
+        pairs = pairs_renew(
+            self.pairs, position, spheres.radius, spheres.body, self.skin, walls,
+            self.asked.periodic,
+        )  # fmt: skip
         self.kernel = self.kernel._replace(pairs=pairs)
 
     def deepest_words(self) -> tuple[str, str]:
@@ -108,6 +126,8 @@ class SphereContacts(Contacts):
         """Pairs that touch now, by their nodes."""
         ends, held = self._ends(), self.pairs.touching.astype(bool)
         apart = self.kernel.position[ends[:, 0]] - self.kernel.position[ends[:, 1]]
+        if self.asked.periodic is not None:
+            apart -= self.pairs.image[held]
         overlap = self.kernel.spheres.radius[ends].sum(axis=1) - np.linalg.norm(apart, axis=1)
         return ContactTouching(
             self.nodes[ends[:, 0]],
@@ -143,6 +163,8 @@ class SphereContacts(Contacts):
         """Everything that the next step reads, to the bit."""
         self.refresh()
         arrays = {f"contact_{name}": getattr(self.pairs, name) for name in PAIR_ARRAYS}
+        if self.asked.periodic is not None:
+            arrays["contact_image"] = self.pairs.image
         arrays |= {f"contact_{name}": getattr(self.kernel, name) for name in CONTACT_ARRAYS}
         return arrays | {
             f"contact_plane_{name}": getattr(self.kernel.planes, name) for name in PLANE_ARRAYS
@@ -152,7 +174,8 @@ class SphereContacts(Contacts):
         """Take what `stored` gave."""
         given = {name: arrays[f"contact_{name}"] for name in PAIR_ARRAYS}
         walls = bool(self.asked.planes)
-        pairs = pairs_of(given["first"].copy(), given["second"].copy(), walls)
+        image = NO_IMAGE if self.asked.periodic is None else arrays["contact_image"].copy()
+        pairs = pairs_of(given["first"].copy(), given["second"].copy(), walls, image)
         for name in ("touching", "spring", "pull"):
             getattr(pairs, name)[:] = given[name]
         self.kernel = self.kernel._replace(pairs=pairs)

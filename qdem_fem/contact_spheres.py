@@ -22,19 +22,22 @@ What follows from spheres at vertices, which have no spin (`docs/qdem-contact.md
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.errors import ConditionError
+from qdem_fem.periodic import PeriodicWidth
 from qdem_fem.series import is_real
 
 Floats = NDArray[np.float64]
 
 SKIN = 0.1
 """Thickness of the skin of the neighbour list, over the smallest radius."""
+ALONG = 1e-6
+"""Sine of the angle to an axis below which a wall is along it."""
 CONTACTS = 3
 """Contacts that a vertex may have at once for the time step still to be below the critical one."""
 
@@ -83,6 +86,8 @@ class SphereContact:
     """Of the neighbour list [m], which changes no force; a tenth of the radius by default."""
     contacts: int = CONTACTS
     """Contacts of a vertex at once that the time step allows for."""
+    periodic: PeriodicWidth | None = field(default=None, repr=False)
+    """Bodies touch across the sides of this width; not at all by default."""
 
     def __post_init__(self) -> None:
         for name in ("radius", "normal_stiffness"):
@@ -95,6 +100,7 @@ class SphereContact:
         if not (is_real(self.contacts) and self.contacts >= 1):
             raise ConditionError(f"{self.contacts!r} contacts of a vertex", where="contact")
         contact_planes_check(self.planes)
+        planes_along_check(self.periodic, self.planes)
 
     def of_body(self, name: str, quantity: str) -> float:
         """``radius`` or ``normal_stiffness`` of a body; `ConditionError` where it has none."""
@@ -143,3 +149,19 @@ def _plane_check(plane: ContactPlane, name: str) -> None:
             raise ConditionError("it has no direction", where=f"contact, {name}.normal")
     if plane.friction is not None:
         contact_number_check(plane.friction, f"{name}.friction", above=False)
+
+
+def planes_along_check(periodic: Any, planes: Sequence[ContactPlane]) -> None:
+    """Raise `ConditionError` for a wall across a periodic width: images would be behind it."""
+    if periodic is None:
+        return
+    if not isinstance(periodic, PeriodicWidth):
+        raise ConditionError(f"{periodic!r} is no PeriodicWidth", where="contact, periodic")
+    for number, plane in enumerate(planes):
+        normal = np.asarray(plane.normal, dtype=float)
+        if abs(normal[periodic.number]) > ALONG * np.linalg.norm(normal):
+            raise ConditionError(
+                f"its normal has a part along {periodic.axis}, where the width is periodic",
+                where=f"contact, plane.{number}",
+                remedy="a wall has to be parallel to the axis of the width",
+            )

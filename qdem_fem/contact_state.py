@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 
 from qdem_fem import kernel
 from qdem_fem.contact_kernel import TOO_DEEP
+from qdem_fem.contact_outside import Outside, outside_of
 from qdem_fem.contact_spheres import ContactPlane, SphereContact
 from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.contact_window import advance_of, window_run
 from qdem_fem.errors import ContactTooDeep, StepWarning
+from qdem_fem.periodic import extents_check, joined_check
 
 if TYPE_CHECKING:
     from qdem_fem.critical_step import CriticalStep
@@ -50,7 +52,7 @@ class ContactTouching:
 class Contacts(ABC):
     """Contact at the surface vertices of all bodies of a simulation, and what it remembers.
 
-    A model sets ``kernel``, the arrays that a step of it reads and writes, and ``skin`` [m].
+    A model sets ``kernel``, the arrays that a step of it reads and writes, ``skin`` and ``reach``.
     """
 
     kernel: Any
@@ -58,15 +60,21 @@ class Contacts(ABC):
     skin: float
     one: Floats
     """(c,) stiffness of one contact of each vertex [N/m]."""
+    reach: float
+    """Way within which two vertices may be looked at as touching [m]."""
 
-    def __init__(self, run: Simulation, contacts: float) -> None:
-        self.run, self.contacts = run, contacts
-        self.local = [np.unique(body.surface) for body in run.bodies]
+    def __init__(
+        self, run: Simulation, asked: SphereContact | SurfaceContact, outside: Sequence[Outside]
+    ) -> None:
+        self.run, self.asked, self.contacts = run, asked, asked.contacts
+        self.outside = outside
+        """What contact sees of every body."""
         starts = run.first_node[:-1]
-        self.nodes = np.concatenate([n + s for n, s in zip(self.local, starts, strict=True)])
-        """(c,) surface vertices, in the numbers of all bodies"""
-        own = zip(self.local, run.bodies, strict=True)
-        self.reference = np.concatenate([body.nodes[nodes] for nodes, body in own])
+        self.nodes = np.concatenate([o.node + s for o, s in zip(outside, starts, strict=True)])
+        """(c,) vertices, in the numbers of all bodies"""
+        self.first_vertex = np.concatenate([[0], np.cumsum([len(o.node) for o in outside])])
+        """First vertex of every body, and the end, (bodies + 1,)."""
+        self.reference = np.concatenate([o.reference for o in outside])
         self.place = run.assembly.place[self.nodes]
         self.force_at = 4 * self.place + run.assembly.packed.node_window[self.place]
         inverse = np.asarray(run.assembly.state.inverse_mass, dtype=float)
@@ -153,9 +161,29 @@ class Contacts(ABC):
         position = self.reference + displacement[4 * self.place[:, None] + np.arange(3)]
         if not np.isfinite(position).all():
             return  # what made it so is told by the march
+        self.images_check(position)
         self.lists_renew(position)
         self.kernel.start[:] = position
         self.renewals += 1
+
+    def images_check(self, position: Floats) -> None:
+        """Raise `ConditionError` for a body that would touch its own image across the width."""
+        if (side := self.asked.periodic) is None:
+            return
+        cuts = zip(self.first_vertex[:-1], self.first_vertex[1:], self.outside, strict=True)
+        along = [position[low:high, side.number][o.own] for low, high, o in cuts]
+        slabs = [o.joined for o in self.outside]
+        for body, start, slab in zip(self.run.bodies, self.run.first_node, slabs, strict=False):
+            if not slab:
+                master = self.run.master[start : start + len(body.nodes)] - start
+                joined_check(body, master, side, self.where)
+        extents_check(self.run.bodies, along, slabs, self.reach, side, self.where)
+
+    @property
+    def where(self) -> str:
+        """The time, for messages."""
+        done = self.run.motion.steps_done
+        return f"t = {self.run.time:.6g} s, step {done}" if done else "contact.periodic.width"
 
     def window(
         self, steps: int, step: float, loads: kernel.Loads, held: kernel.Constraints,
@@ -221,6 +249,17 @@ class Contacts(ABC):
         np.add.at(flat[:, :3], self.place, self.kernel.force)
         flat *= np.asarray(assembly.state.inverse_mass, dtype=float)[:, None]
         return flat[assembly.place, :3]
+
+
+def outsides_of(
+    run: Simulation, asked: SphereContact | SurfaceContact, reach: float
+) -> list[Outside]:
+    """`outside_of` every body; of slabs, images of faces up to ``reach`` [m] beyond a side."""
+    found = []
+    for body, start in zip(run.bodies, run.first_node, strict=False):
+        master = run.master[start : start + len(body.nodes)] - start
+        found.append(outside_of(body.nodes, body.surface, master, asked.periodic, reach))
+    return found
 
 
 def planes_arrays(planes: Sequence[ContactPlane], friction: float) -> tuple[Floats, Floats, Floats]:

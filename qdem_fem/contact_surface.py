@@ -22,7 +22,7 @@ Not for bodies thinner than ``depth``, or faces that bend back on themselves wit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,10 @@ from qdem_fem.contact_spheres import (
     ContactPlane,
     contact_number_check,
     contact_planes_check,
+    planes_along_check,
     value_of_body,
 )
+from qdem_fem.periodic import PeriodicWidth
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -61,6 +63,8 @@ class SurfaceContact:
     """Greatest depth [m]; a tenth of the median edge by default."""
     contacts: int = 2
     """Coverings of a vertex's area by contact that the time step allows for."""
+    periodic: PeriodicWidth | None = field(default=None, repr=False)
+    """Bodies touch across the sides of this width; not at all by default."""
 
     def __post_init__(self) -> None:
         values = self.modulus.values() if isinstance(self.modulus, Mapping) else [self.modulus]
@@ -72,6 +76,7 @@ class SurfaceContact:
         contact_number_check(self.contacts, "contacts", above=True)
         contact_number_check(self.points, "points", above=True)
         contact_planes_check(self.planes)
+        planes_along_check(self.periodic, self.planes)
 
     def of_body(self, name: str, quantity: str) -> float:
         """``modulus`` of a body; `ConditionError` where it has none."""

@@ -15,6 +15,7 @@ from qdem_fem.contact_kernel import (
     LOOK_ANEW,
     TOO_DEEP,
     exact,
+    image_less,
     inlined,
     minus,
     row,
@@ -88,8 +89,12 @@ class Near(NamedTuple):
     """(n,) area as the contact sees it, kept while it lasts [m^2]; negative: does not touch"""
     spring: Any
     """(n, 3) [m]"""
+    image: Any
+    """(n, 3) from the body to the image that it is near to [m]; (0,) where nothing is periodic"""
     edges: Any
     """(m, 2) pairs of edges"""
+    edge_image: Any
+    """(m, 3) from the second edge to its image [m]; (0,) where nothing is periodic"""
     edge_weight: Any
     """(m,) [m^2]"""
     edge_start: Any
@@ -333,7 +338,7 @@ def points_forces(c: Any, velocity: Any, step: float, moved: float) -> float:  #
         q = near.point[at]
         nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
         share = row(surface.point_share, q)
-        p = blend(x, nodes, share)
+        p = image_less(blend(x, nodes, share), near.image, at)
         faces = near.face[near.first[at] : near.first[at + 1]]
         g, n, f, below = depth_of(p, x, surface.face, faces)
         near.free[at] = -0.5 * g - moved if g > -np.inf else -1.0
@@ -369,7 +374,8 @@ def edges_forces(c: Any, velocity: Any, step: float) -> None:  # pragma: no cove
     for at in range(near.edges.shape[0]):
         a, b = near.edges[at, 0], near.edges[at, 1]
         i, j, k, m = surface.edge[a, 0], surface.edge[a, 1], surface.edge[b, 0], surface.edge[b, 1]
-        u, v, w = minus(x, j, x, i), minus(x, m, x, k), minus(x, i, x, k)
+        u, v = minus(x, j, x, i), minus(x, m, x, k)
+        w = image_less(minus(x, i, x, k), near.edge_image, at)
         uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
         determinant = uu * vv - uv * uv
         g, n, s, t = -1.0, (0.0, 0.0, 0.0), 0.0, 0.0

@@ -13,8 +13,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import row
+from qdem_fem.contact_search import NO_IMAGE
 from qdem_fem.contact_surface_kernel import Near, Surface, blend
 
+Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
@@ -43,20 +45,42 @@ def boxes_of(position: Any, parts: Any) -> tuple[Any, Any]:  # pragma: no cover
 
 @njit(cache=True)
 def boxes_near(
-    low: Any, high: Any, i: int, low_other: Any, high_other: Any, j: int, reach: float
+    low: Any, high: Any, i: int, low_other: Any, high_other: Any, j: int, reach: float, image: Any
 ) -> bool:  # pragma: no cover
-    """Whether two boxes are nearer than ``reach`` along every axis."""
+    """Whether two boxes are nearer than ``reach`` by every axis; the second moved by ``image``."""
     for c in range(3):
-        if low[i, c] - reach > high_other[j, c] or low_other[j, c] - reach > high[i, c]:
+        if (
+            low[i, c] - image[c] - reach > high_other[j, c]
+            or low_other[j, c] - reach > high[i, c] - image[c]
+        ):
             return False
     return True
 
 
 @njit(cache=True)
+def images_near(
+    low: Any, high: Any, a: int, b: int, reach: float, way: Any
+) -> tuple[int, int]:  # pragma: no cover
+    """First and last n for which the box of body b, moved by n ``way``, may be near that of a."""
+    for c in range(3):
+        if way[c] > 0.0:
+            return (
+                int(np.ceil((low[a, c] - high[b, c] - reach) / way[c])),
+                int(np.floor((high[a, c] - low[b, c] + reach) / way[c])),
+            )
+    return 0, 0
+
+
+@njit(cache=True)
 def points_near(
-    surface: Any, position: Any, box: Any, first_point: Any, first_face: Any, reach: float
-) -> tuple[Any, Any, Any, Any]:  # pragma: no cover
-    """``point``, ``body``, ``first`` and ``face`` of `Near`; ``box`` of bodies."""
+    surface: Any, position: Any, box: Any, first_point: Any, first_face: Any, reach: float,
+    way: Any, seam: Any,
+) -> tuple[Any, Any, Any, Any, Any]:  # fmt: skip  # pragma: no cover
+    """``point``, ``body``, ``first``, ``face`` of `Near`, image of the body; ``box`` of bodies.
+
+    ``way`` (3,) [m]: to the next image, zero where nothing is periodic; ``seam`` (b,) [m]: where
+    along it a body begins that is one with its images, of which a point is near to one; else NaN.
+    """
     low, high = box
     points = np.empty((len(surface.point_area), 3))
     for q in range(len(points)):
@@ -65,54 +89,77 @@ def points_near(
             position, nodes, row(surface.point_share, q)
         )
     face_low, face_high = boxes_of(position, surface.face)
-    found = np.empty((64, 3), np.int64)  # point, body, first face
+    found = np.empty((64, 4), np.int64)  # point, body, first face, image
     faces = np.empty(256, np.int64)
     count, total = 0, 0
     for a in range(len(low)):
         for b in range(len(low)):
-            if a == b or not boxes_near(low, high, a, low, high, b, reach):
+            if a == b:
                 continue
-            for q in range(first_point[a], first_point[a + 1]):
-                if not boxes_near(points, points, q, low, high, b, reach):
+            least, most = images_near(low, high, a, b, reach, way)
+            for n in range(least, most + 1):
+                image = n * way
+                if not boxes_near(low, high, a, low, high, b, reach, image):
                     continue
-                begin = total
-                for f in range(first_face[b], first_face[b + 1]):
-                    if boxes_near(points, points, q, face_low, face_high, f, reach):
-                        if total == len(faces):
-                            faces = grown(faces, total)
-                        faces[total] = f
-                        total += 1
-                if total > begin:
-                    if count == len(found):
-                        found = grown(found, count)
-                    found[count, 0], found[count, 1], found[count, 2] = q, b, begin
-                    count += 1
+                for q in range(first_point[a], first_point[a + 1]):
+                    if not boxes_near(points, points, q, low, high, b, reach, image):
+                        continue
+                    if not np.isnan(seam[b]) and image_of(points, q, seam[b], way) != n:
+                        continue
+                    begin = total
+                    for f in range(first_face[b], first_face[b + 1]):
+                        if boxes_near(points, points, q, face_low, face_high, f, reach, image):
+                            if total == len(faces):
+                                faces = grown(faces, total)
+                            faces[total] = f
+                            total += 1
+                    if total > begin:
+                        if count == len(found):
+                            found = grown(found, count)
+                        found[count, 0], found[count, 1] = q, b
+                        found[count, 2], found[count, 3] = begin, n
+                        count += 1
     first = np.empty(count + 1, np.int64)
     first[:count], first[count] = found[:count, 2], total
-    return found[:count, 0].copy(), found[:count, 1].copy(), first, faces[:total].copy()
+    return (
+        found[:count, 0].copy(), found[:count, 1].copy(), first, faces[:total].copy(),
+        found[:count, 3].copy(),
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def image_of(points: Any, q: int, seam: float, way: Any) -> int:  # pragma: no cover
+    """The image of a slab that begins at ``seam`` [m] that point q is at: between its two sides."""
+    for c in range(3):
+        if way[c] > 0.0:
+            return int(np.floor((points[q, c] - seam) / way[c]))
+    return 0
 
 
 @njit(cache=True)
 def edges_near(
-    surface: Any, position: Any, box: Any, first_edge: Any, reach: float
+    surface: Any, position: Any, box: Any, first_edge: Any, reach: float, way: Any
 ) -> Any:  # pragma: no cover
-    """Pairs (m, 2) of sharp edges of two bodies, of the first body's first."""
+    """Sharp edges of two bodies, of the first body's first, and the image of the second (m, 3)."""
     low, high = box
     edge_low, edge_high = boxes_of(position, surface.edge)
-    found, count = np.empty((64, 2), np.int64), 0
+    found, count = np.empty((64, 3), np.int64), 0
     for a in range(len(low)):
         for b in range(a + 1, len(low)):
-            if not boxes_near(low, high, a, low, high, b, reach):
-                continue
-            for i in range(first_edge[a], first_edge[a + 1]):
-                if not boxes_near(edge_low, edge_high, i, low, high, b, reach):
+            least, most = images_near(low, high, a, b, reach, way)
+            for n in range(least, most + 1):
+                image = n * way
+                if not boxes_near(low, high, a, low, high, b, reach, image):
                     continue
-                for j in range(first_edge[b], first_edge[b + 1]):
-                    if boxes_near(edge_low, edge_high, i, edge_low, edge_high, j, reach):
-                        if count == len(found):
-                            found = grown(found, count)
-                        found[count, 0], found[count, 1] = i, j
-                        count += 1
+                for i in range(first_edge[a], first_edge[a + 1]):
+                    if not boxes_near(edge_low, edge_high, i, low, high, b, reach, image):
+                        continue
+                    for j in range(first_edge[b], first_edge[b + 1]):
+                        if boxes_near(edge_low, edge_high, i, edge_low, edge_high, j, reach, image):
+                            if count == len(found):
+                                found = grown(found, count)
+                            found[count, 0], found[count, 1], found[count, 2] = i, j, n
+                            count += 1
     return found[:count].copy()
 
 
@@ -122,12 +169,14 @@ def near_of(
     first: Integers,
     face: Integers,
     edges: Integers,
+    image: Floats = NO_IMAGE,
+    edge_image: Floats = NO_IMAGE,
 ) -> Near:
     """Lists without a history."""
     count, pairs = len(point), len(edges)
     return Near(
         point, body, first, face, np.full(count, -1.0), np.full(count, -1.0), np.zeros((count, 3)),
-        edges, np.full(pairs, -1.0), np.zeros(pairs), np.zeros((pairs, 3)),
+        image, edges, edge_image, np.full(pairs, -1.0), np.zeros(pairs), np.zeros((pairs, 3)),
     )  # fmt: skip
 
 
@@ -136,7 +185,12 @@ def history_carry(old: Near, new: Near, bodies: int) -> None:
     here, there = same_keys(*(near.point * bodies + near.body for near in (old, new)))
     new.weight[there], new.spring[there] = old.weight[here], old.spring[here]
     most = 1 + max(int(near.edges.max(initial=0)) for near in (old, new))
-    here, there = same_keys(*(near.edges[:, 0] * most + near.edges[:, 1] for near in (old, new)))
+    keys = [near.edges[:, 0] * most + near.edges[:, 1] for near in (old, new)]
+    if new.edge_image.ndim > 1:  # one pair of edges may be near by several images
+        both = np.concatenate([old.edge_image, new.edge_image])
+        number = np.unique(both.sum(axis=1), return_inverse=True)[1]
+        keys = np.split(np.concatenate(keys) * (1 + number.max(initial=0)) + number, [len(keys[0])])
+    here, there = same_keys(*keys)
     for name in ("edge_weight", "edge_start", "edge_spring"):
         getattr(new, name)[there] = getattr(old, name)[here]
 
@@ -148,18 +202,24 @@ def same_keys(old: Integers, new: Integers) -> tuple[Integers, Integers]:
 
 
 def near_renew(
-    old: Near | None, surface: Surface, position: Any, firsts: tuple[Integers, ...], reach: float
-) -> Near:
+    old: Near | None, surface: Surface, position: Any, firsts: tuple[Integers, ...], reach: float,
+    way: Floats, seam: Floats,
+) -> Near:  # fmt: skip
     """The lists for vertices at ``position`` (c, 3) [m], with the history of the ``old`` ones.
 
-    ``firsts``: first vertex, face, point and edge of every body, and the ends.
+    ``firsts``: first vertex, face, point and edge of every body, and the ends; ``way`` and ``seam``
+    as of `points_near`.
     """
     node, face, point, edge = firsts
     low = np.minimum.reduceat(position, node[:-1])
     high = np.maximum.reduceat(position, node[:-1])
-    found = points_near(surface, position, (low, high), point, face, reach)
-    edges = edges_near(surface, position, (low, high), edge, reach)
-    new = near_of(*found, edges)
+    *found, times = points_near(surface, position, (low, high), point, face, reach, way, seam)
+    edges = edges_near(surface, position, (low, high), edge, reach, way)
+    images = (NO_IMAGE, NO_IMAGE)
+    if way.any():
+        images = (times[:, None] * way, edges[:, 2:] * way)
+    point, body, begin, faces = found
+    new = near_of(point, body, begin, faces, edges[:, :2].copy(), *images)
     if old is not None:
         history_carry(old, new, len(low))
     return new

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.contact_search import NO_IMAGE
 from qdem_fem.contact_spheres import pair_stiffness, tangential_stiffness
-from qdem_fem.contact_state import Contacts, Floats, planes_arrays
+from qdem_fem.contact_state import Contacts, Floats, outsides_of, planes_arrays
 from qdem_fem.contact_surface import DEPTH, SurfaceContact, face_points, sharp_edges
 from qdem_fem.contact_surface_kernel import Near, Surface, SurfaceTouch, Walls
 from qdem_fem.contact_surface_search import near_of, near_renew
@@ -28,30 +29,41 @@ class SurfaceContacts(Contacts):
     kernel: SurfaceTouch
 
     def __init__(self, run: Simulation, asked: SurfaceContact) -> None:
-        super().__init__(run, asked.contacts)
-        self.asked = asked
-        counts = np.array([len(nodes) for nodes in self.local])
-        starts = np.concatenate([[0], np.cumsum(counts)])
+        edge = [
+            np.linalg.norm(np.diff(body.nodes[body.surface[:, :2]], axis=1), axis=2)
+            for body in run.bodies
+        ]
+        self.depth = float(
+            DEPTH * np.median(np.concatenate(edge)) if asked.depth is None else asked.depth
+        )
+        self.skin = self.depth
+        # an image goes on beyond a side for as far as a point may, and then sees faces
+        super().__init__(run, asked, outsides_of(run, asked, 2 * (self.depth + self.skin)))
+        self.reach = 2 * (self.depth + self.skin)
+        counts, starts = np.diff(self.first_vertex), self.first_vertex
         share = face_points(int(asked.points))
         parts: list[list[Any]] = [[] for _ in range(7)]
         faces, areas, edges, opposite, edge_areas, points, shares = parts
-        for body, nodes, start in zip(run.bodies, self.local, starts, strict=False):
-            own = np.searchsorted(nodes, body.surface)
-            area = np.linalg.norm(face_area_vectors(body.nodes, body.surface), axis=1)
-            sharp, across = sharp_edges(body.nodes[nodes], own)
+        for o, start in zip(self.outside, starts, strict=False):
+            own, nodes, bearing = o.face, o.reference, np.flatnonzero(o.own)
+            area = np.linalg.norm(face_area_vectors(nodes, own), axis=1)
+            sharp, across = sharp_edges(nodes, own)
+            if o.joined:
+                once = o.own[sharp].any(axis=1) & ~o.image[sharp].any(axis=1)
+                sharp, across = sharp[once], across[once]
             by_edge = np.zeros(len(sharp))
             for k in range(2):  # a third of each of its two faces
                 three = np.column_stack([sharp, across[:, k]])
-                by_edge += np.linalg.norm(face_area_vectors(body.nodes[nodes], three), axis=1) / 3
+                by_edge += np.linalg.norm(face_area_vectors(nodes, three), axis=1) / 3
             for kept, new in (
                 (faces, own + start), (areas, area), (edges, sharp + start),
                 (opposite, across + start), (edge_areas, by_edge),
                 (points, np.concatenate([
-                    np.repeat(own + start, len(share), axis=0),
-                    np.repeat(np.arange(len(nodes))[:, None] + start, 3, axis=1),
+                    np.repeat(own[: o.own_faces] + start, len(share), axis=0),
+                    np.repeat(bearing[:, None] + start, 3, axis=1),
                 ])),
                 (shares, np.concatenate([
-                    np.tile(share, (len(own), 1)), np.tile([1.0, 0, 0], (len(nodes), 1)),
+                    np.tile(share, (o.own_faces, 1)), np.tile([1.0, 0, 0], (len(bearing), 1)),
                 ])),
             ):  # fmt: skip
                 kept.append(new)
@@ -66,15 +78,12 @@ class SurfaceContacts(Contacts):
         body_of = [np.repeat(np.arange(len(counts)), np.diff(first)) for first in self.firsts]
         modulus = np.array([asked.of_body(body.name, "modulus") for body in run.bodies])
         poisson = np.array([float(np.mean(body.material.poisson)) for body in run.bodies])
-        length = np.linalg.norm(self.reference[face[:, 1]] - self.reference[face[:, 0]], axis=1)
-        self.depth = float(DEPTH * np.median(length) if asked.depth is None else asked.depth)
-        self.skin = self.depth
         size, count, walls = len(self.nodes), int(self.firsts[2][-1]), len(asked.planes)
         point_face = np.concatenate([
-            np.concatenate([np.repeat(np.arange(begin, end), len(share)), np.full(vertices, -1)])
-            for begin, end, vertices in zip(
-                self.firsts[1][:-1], self.firsts[1][1:], counts, strict=True
-            )
+            np.concatenate([
+                np.repeat(begin + np.arange(o.own_faces), len(share)), np.full(o.own.sum(), -1),
+            ])
+            for begin, o in zip(self.firsts[1], self.outside, strict=False)
         ])  # fmt: skip
         fan = np.argsort(face.ravel(), kind="stable")
         nothing = np.zeros(0, np.int64)
@@ -90,7 +99,8 @@ class SurfaceContacts(Contacts):
                 modulus, tangential_stiffness(modulus, poisson),
             ),
             near_of(
-                nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2)
+                nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2),
+                *(NO_IMAGE if asked.periodic is None else np.zeros((0, 3)) for _ in range(2)),
             ),
             Walls(
                 *planes_arrays(asked.planes, asked.friction), np.full((walls, count), -1.0),
@@ -100,8 +110,17 @@ class SurfaceContacts(Contacts):
             zero.copy(), np.zeros(2), np.arange(size),
         )  # fmt: skip
         covering = np.zeros(size)
-        np.add.at(covering, face, np.repeat(area[:, None] / 3, 3, axis=1))
+        mine = np.concatenate([np.arange(len(o.face)) < o.own_faces for o in self.outside])
+        np.add.at(covering, face[mine], np.repeat(area[mine, None] / 3, 3, axis=1))
+        covering = self.shared(covering)
         self.one = pair_stiffness(modulus, modulus.max())[body_of[0]] * covering
+        self.way = np.zeros(3) if asked.periodic is None else asked.periodic.way
+
+    @property
+    def kept(self) -> list[str]:
+        """Names of the lists' arrays that a checkpoint keeps."""
+        images = ("image", "edge_image") if self.asked.periodic is None else ()
+        return [name for name in Near._fields if name not in images]
 
     @property
     def near(self) -> Near:
@@ -120,8 +139,25 @@ class SurfaceContacts(Contacts):
     def lists_renew(self, position: Floats) -> None:
         """Look for what is near around vertices at (c, 3) [m]."""
         reach = self.depth + self.skin
-        near = near_renew(self.near, self.kernel.surface, position, self.firsts, reach)
+        near = near_renew(
+            self.near, self.kernel.surface, position, self.firsts, reach, self.way,
+            self.seams(position),
+        )  # fmt: skip
         self.kernel = self.kernel._replace(near=near)
+
+    def seams(self, position: Floats) -> Floats:
+        """Where along the width a body begins that is one with its images, (b,) [m]; else NaN."""
+        start, side = np.full(len(self.outside), np.nan), self.asked.periodic
+        for b, (o, first) in enumerate(zip(self.outside, self.first_vertex, strict=False)):
+            if o.joined and side is not None:
+                start[b] = position[first + np.flatnonzero(o.own), side.number].min()
+        return start
+
+    def shared(self, values: Floats) -> Floats:
+        """(c,) for every vertex the sum over all that move with its node."""
+        total = np.zeros(self.run.assembly.n_nodes)
+        np.add.at(total, self.place, values)
+        return np.asarray(total[self.place])
 
     def deepest_words(self) -> tuple[str, str]:
         """That a point is too deep, and what to do."""
@@ -153,6 +189,7 @@ class SurfaceContacts(Contacts):
         stiffness = 2 * held * surface.modulus[surface.point_body]
         face = surface.point_node
         np.add.at(total, face, stiffness[:, None] * surface.point_share)
+        total = self.shared(total)
         bound = total * self.inverse_mass + self.rigid_bound(total)
         return float(bound.max(initial=0.0))
 
@@ -169,7 +206,7 @@ class SurfaceContacts(Contacts):
     def stored(self) -> dict[str, NDArray[Any]]:
         """Everything that the next step reads, to the bit."""
         self.refresh()
-        arrays = {f"contact_near_{name}": getattr(self.near, name) for name in Near._fields}
+        arrays = {f"contact_near_{name}": getattr(self.near, name) for name in self.kept}
         arrays |= {f"contact_{name}": getattr(self.kernel, name) for name in TOUCH_ARRAYS}
         return arrays | {
             f"contact_wall_{name}": getattr(self.kernel.walls, name) for name in WALL_ARRAYS
@@ -177,8 +214,8 @@ class SurfaceContacts(Contacts):
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take what `stored` gave."""
-        near = Near(*(arrays[f"contact_near_{name}"].copy() for name in Near._fields))
-        self.kernel = self.kernel._replace(near=near)
+        near = {name: arrays[f"contact_near_{name}"].copy() for name in self.kept}
+        self.kernel = self.kernel._replace(near=self.near._replace(**near))
         for name in TOUCH_ARRAYS:
             getattr(self.kernel, name)[:] = arrays[f"contact_{name}"]
         for name in WALL_ARRAYS:

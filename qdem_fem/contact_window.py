@@ -17,7 +17,8 @@ from numba.core import types
 from numba.extending import overload
 
 from qdem_fem import kernel
-from qdem_fem.contact_kernel import GO_ON, Contact, advance_one, advance_threads
+from qdem_fem.absorbing_step import Absorber, absorber_begin, absorber_end
+from qdem_fem.contact_kernel import GO_ON, Contact, advance_one, advance_threads, exact
 from qdem_fem.contact_surface_kernel import surface_step
 from qdem_fem.rigid_step import Rigid, rigid_advance
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 SOURCES = (
     "kernel.py", "stress.py", "lanes.py", "contact_kernel.py", "contact_surface_kernel.py",
-    "rigid_step.py",
+    "rigid_step.py", "absorbing_step.py",
 )  # fmt: skip
 WINDOW_ONE: Any = kernel.window_kernel(1)
 WINDOW_THREADS: Any = kernel.window_kernel(2)
@@ -88,6 +89,63 @@ def _rigid_of(
     )
 
 
+def absorb_before(absorber: Any, forces: Any, state: Any) -> None:
+    """What absorbing faces do before the motion, if there are any."""
+    if absorber is not None:
+        absorber_begin(absorber, forces, state.displacement, state.velocity)
+
+
+@overload(absorb_before, strict=False)
+def _absorb_before(absorber: Any, forces: Any, state: Any) -> Any:
+    if isinstance(absorber, types.NoneType):
+        return lambda absorber, forces, state: None
+    return lambda absorber, forces, state: absorber_begin(
+        absorber, forces, state.displacement, state.velocity
+    )
+
+
+def probes_of(absorber: Any, probes: Any) -> Any:
+    """What the step itself records: nothing where dashpots are still to slow it."""
+    return probes if absorber is None else probes._replace(first=2)
+
+
+@overload(probes_of, strict=False)
+def _probes_of(absorber: Any, probes: Any) -> Any:
+    if isinstance(absorber, types.NoneType):
+        return lambda absorber, probes: probes
+    return lambda absorber, probes: kernel.Probes(probes.node_at, probes.record, probes.stride, 2)
+
+
+def absorb_behind(
+    absorber: Any, state: Any, loads: Any, row: Any, probes: Any, work: Any, step: float
+) -> None:
+    """What dashpots do behind the motion, if there are any; then loads' work and probes are due."""
+    if absorber is not None:
+        absorber_slow(absorber, state, loads, row, probes, work, step)
+
+
+@overload(absorb_behind, strict=False)
+def _absorb_behind(
+    absorber: Any, state: Any, loads: Any, row: Any, probes: Any, work: Any, step: float
+) -> Any:
+    if isinstance(absorber, types.NoneType):
+        return lambda absorber, state, loads, row, probes, work, step: None
+    return lambda absorber, state, loads, row, probes, work, step: absorber_slow(
+        absorber, state, loads, row, probes, work, step
+    )
+
+
+@exact
+def absorber_slow(
+    absorber: Any, state: Any, loads: Any, row: Any, probes: Any, work: Any, step: float
+) -> None:  # pragma: no cover
+    """The dashpots of a step, its loads' work at the slower velocity, and its probes."""
+    fast = kernel.loads_power(loads, row, state.velocity)
+    absorber_end(absorber, state.inverse_mass, state.displacement, state.velocity, step)
+    work[0] += 0.5 * step * (kernel.loads_power(loads, row, state.velocity) - fast)
+    kernel.probes_take(probes, 1, state.displacement)
+
+
 def advance_of(contact: Any, threads: Any, displacement: Any, velocity: Any, step: float) -> int:
     """One step of contact, by the type of ``contact``; ``threads``: True, or None for one."""
     if contact is None:
@@ -122,9 +180,9 @@ def contact_window_build(made_from: str) -> Any:
     def contact_window(
         threads: Any, law: Any, viscous: Any, layout: Any, state: Any, loads: Any, held: Any,
         probes: Any, table: Any, gravity: Any, work: Any, step: Any, steps: int, contact: Any,
-        rigid: Any,
+        rigid: Any, absorber: Any,
     ) -> tuple[int, float, int]:  # fmt: skip  # pragma: no cover
-        """As `window` of `qdem_fem.kernel`, with a `Contact` and a `Rigid`, or None instead of one.
+        """As `window` of `qdem_fem.kernel`, with a `Contact`, a `Rigid`, an `Absorber`, or None.
 
         ``threads``: True, or None for one.  Returns steps done, bad elements, and what the last
         step of contact said.  Comes back where that is not `GO_ON`.
@@ -138,16 +196,20 @@ def contact_window_build(made_from: str) -> Any:
                     forces[force_at[i] + c] += pull[i, c]
             ahead = kernel.Probes(probes.node_at, probes.record, probes.stride, probes.first - k)
             row, fall = table[k : k + 2], gravity_from(gravity, k)
+            absorb_before(absorber, forces, state)
             rigid_of(rigid, forces, state, row, fall, work, step)
+            seen = probes_of(absorber, ahead)
             if threads is None:
                 _, bad = WINDOW_ONE(
-                    law, viscous, layout, state, loads, held, ahead, row, fall, work, step, 1
+                    law, viscous, layout, state, loads, held, seen, row, fall, work, step, 1
                 )
+                absorb_behind(absorber, state, loads, row[0], ahead, work, step)
                 said = advance_of(contact, None, state.displacement, state.velocity, step)
             else:
                 _, bad = WINDOW_THREADS(
-                    law, viscous, layout, state, loads, held, ahead, row, fall, work, step, 1
+                    law, viscous, layout, state, loads, held, seen, row, fall, work, step, 1
                 )
+                absorb_behind(absorber, state, loads, row[0], ahead, work, step)
                 said = advance_of(contact, True, state.displacement, state.velocity, step)
             if bad > 0.0 or said != GO_ON:
                 return k + 1, bad, said
@@ -176,6 +238,7 @@ def window_run(
     """
     assembly = run.assembly
     rigid: Rigid | None = None if run.rigid is None else run.rigid.kernel_of(probes.node_at)
+    absorber: Absorber | None = None if run.absorbers is None else run.absorbers.kernel
     before = numba.get_num_threads()
     numba.set_num_threads(assembly.threads)
     try:
@@ -183,8 +246,11 @@ def window_run(
             True if assembly.threads > 1 else None, assembly.law, assembly.viscous,
             assembly.packed.layout, assembly.state, loads, held, probes, table,
             assembly.gravity_packed(gravity), work, assembly.dtype.type(step), steps, contact,
-            rigid,
+            rigid, absorber,
         )  # fmt: skip
     finally:
         numba.set_num_threads(before)
+    if absorber is not None:
+        run.motion.absorbed += float(absorber.taken[0])
+        absorber.taken[0] = 0.0
     return int(done), float(bad), int(said)

@@ -135,6 +135,8 @@ def critical_step_find(run: Simulation) -> CriticalStep:
         scale = size / max(abs(u).max(), 1e-300)
         u, v = (assembly.hold(scale * field, held) for field in (u, v))
         change = assembly.accelerations_own(u, v, NO_LOADS, nothing, None)
+        if run.absorbers is not None:
+            change = change + run.absorbers.spring_accelerations(u)
         change = assembly.hold(change, held) / scale
         change[follows] = 0.0  # no motion of their own: the operator stays symmetric
         return change

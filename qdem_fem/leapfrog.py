@@ -26,7 +26,10 @@ def velocity_now(run: Simulation) -> Floats:
         _, held = run.packed_lists()
         table = run.conditions.table(run.time + run.step * np.arange(2.0))
         ahead = held.weight * (table[1] - table[0])[held.series] / run.step
-        flat = _by_place(run, velocity + change)
+        ahead_free = velocity + change
+        if run.absorbers is not None:
+            ahead_free = run.absorbers.slowed(ahead_free)
+        flat = _by_place(run, ahead_free)
         flat[held.node_at] = 0.5 * (_by_place(run, velocity)[held.node_at] + ahead)
         velocity = flat.reshape(-1, 4)[run.assembly.place, :3]
     if run.rigid is not None:
@@ -39,8 +42,13 @@ def velocities_behind(run: Simulation) -> None:
     if not run.motion.behind:
         displacement = run.assembly.field("displacement")
         velocity = run.assembly.field("velocity")
-        behind = velocity - 0.5 * run.step * _accelerations(run, displacement, velocity)
+        change = _accelerations(run, displacement, velocity)
+        if run.absorbers is not None:
+            change = change - run.absorbers.decelerations(velocity)
+        behind = velocity - 0.5 * run.step * change
         run.motion.work -= half_work(run, behind, velocity)
+        if run.absorbers is not None:
+            run.motion.absorbed -= run.absorbers.half_taken(behind, velocity)
         if run.rigid is not None:
             run.rigid.half_kick(-1)
         _, held = run.packed_lists()
@@ -54,6 +62,8 @@ def velocities_level(run: Simulation) -> None:
     if run.motion.behind:
         behind, level = run.assembly.field("velocity"), velocity_now(run)
         run.motion.work += half_work(run, behind, level)
+        if run.absorbers is not None:
+            run.motion.absorbed += run.absorbers.half_taken(behind, level)
         if run.rigid is not None:
             run.rigid.half_kick(1)
         run.assembly.field_set("velocity", level)
@@ -101,6 +111,8 @@ def accelerations_free(run: Simulation, displacement: Floats, velocity: Floats) 
     free = run.assembly.accelerations(
         displacement, velocity, loads, run.conditions.table(now), run.gravity_at(now)
     )
+    if run.absorbers is not None:
+        free = free + run.absorbers.spring_accelerations(displacement)
     return free if run.contacts is None else free + run.contacts.accelerations()
 
 

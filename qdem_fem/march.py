@@ -59,7 +59,7 @@ def march(
     if run.gravity is not None and run.gravity.varying is not None:
         most = GRAVITY_STEPS
     end = motion.steps_done + steps
-    window = (run.contacts or run.rigid or assembly).window
+    window = (run.contacts or run.rigid or run.absorbers or assembly).window
     while motion.steps_done < end:
         assembly.frames_renew()
         count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
@@ -129,7 +129,7 @@ def energy_set(run: Simulation) -> float:
     if still and run.contacts is None:
         return 0.0
     energy = run.energy()
-    return energy.kinetic + abs(energy.elastic) + energy.contact
+    return energy.kinetic + abs(energy.elastic) + energy.contact + energy.foundation
 
 
 def moment(run: Simulation) -> tuple[Floats, Floats]:

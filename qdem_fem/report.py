@@ -202,7 +202,7 @@ def _energy(summary: dict[str, Any]) -> Iterator[str]:
     yield _table(("energy", "J"), rows)
 
 
-NAMED = ("kinetic", "elastic", "contact", "friction", "external")
+NAMED = ("kinetic", "elastic", "contact", "friction", "absorbed", "foundation", "external")
 
 
 def _left_out(summary: dict[str, Any]) -> Iterator[str]:

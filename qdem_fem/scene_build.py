@@ -87,11 +87,16 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
             getattr(run, step.verb)(bodies[step.body], *arguments)
         except QdemError as error:
             problems.append(Problem(step.key, error_told(error)))
+    if table.method == "static" and scene.absorb:
+        problems.append(Problem("absorb.0", "a static answer has no waves: fix these nodes"))
     prepared.text.refuse(problems)
     try:
         run.packed_lists()  # rollers against prescribed motions, what holds rigid bodies
         if table.method == "static":
             held_check(run)
+        if scene.contact is not None and scene.contact.periodic is not None:
+            assert run.contacts is not None
+            run.contacts.images_check(run.contacts.reference)
     except ConditionError as error:
         where = error.where.replace("relax", "fix")
         if where in bodies:

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from qdem_fem.contact_scene import ContactTable, contact_faults
 from qdem_fem.errors import MeshError
 from qdem_fem.scene import (
+    Absorb,
     BodyTable,
     Condition,
     Fix,
@@ -197,6 +198,8 @@ def _condition(
         take(series_of, table.value, f"{key}.value", folder, vector=False)
     elif isinstance(table, Roller):
         take(unit_vector, table.normal, f"{key}.normal")
+    elif isinstance(table, Absorb):
+        arguments.append(table.depth)
     elif isinstance(table, Load):
         take(series_of, table.force, f"{key}.force", folder, vector=True)
     elif isinstance(table, Pressure):

@@ -26,6 +26,7 @@ ENERGY = 100
 """Least steps between rows of energies, unless asked otherwise: a row costs as much as twenty."""
 ENERGIES = ("kinetic", "elastic", "external")
 CONTACT_ENERGIES = ("contact", "friction")
+ABSORBING_ENERGIES = ("absorbed", "foundation")
 COST = "cost.json"
 
 
@@ -243,8 +244,9 @@ def _cost_read(path: Path) -> dict[str, float]:
 
 
 def energy_names(run: Any) -> tuple[str, ...]:
-    """Columns of energy.csv beside the time; of contact where there is any."""
-    return ENERGIES if run.contact is None else ENERGIES + CONTACT_ENERGIES
+    """Columns of energy.csv beside the time; of what the scene has."""
+    touching = () if run.contact is None else CONTACT_ENERGIES
+    return ENERGIES + touching + (ABSORBING_ENERGIES if run.conditions.absorbing else ())
 
 
 def _tables(path: Path, probes: dict[str, Any], energies: tuple[str, ...]) -> tuple[Table, Table]:

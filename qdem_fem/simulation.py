@@ -16,7 +16,7 @@ from qdem_fem.assembly import Assembly
 from qdem_fem.body import Body
 from qdem_fem.checkpoint import checkpoint_read, checkpoint_write
 from qdem_fem.conditioned_bodies import ConditionedBodies
-from qdem_fem.conditions import Held, Roller
+from qdem_fem.conditions import Absorbing, Held, Roller
 from qdem_fem.contact_options import Contact, contact_options_check, contacts_of
 from qdem_fem.critical_step import CriticalStep, critical_step_find
 from qdem_fem.dynamic_relaxation import StaticAnswer, relax
@@ -40,6 +40,7 @@ from qdem_fem.simulation_options import (
 )
 
 if TYPE_CHECKING:
+    from qdem_fem.absorbing import Absorbers
     from qdem_fem.contact_state import Contacts
     from qdem_fem.rigid_bodies import RigidBodies
 
@@ -67,6 +68,10 @@ class Energy:
     """In the springs of contacts."""
     friction: float = 0.0
     """Work that sliders of contacts took since the start."""
+    absorbed: float = 0.0
+    """What dashpots of absorbing faces took since the start."""
+    foundation: float = 0.0
+    """In the springs of absorbing faces."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +140,7 @@ class Simulation(ConditionedBodies):
         rigid_options_check(self.bodies, precision, device)
         self._contacts: Contacts | None = None
         self._rigid: RigidBodies | None = None
+        self._absorbers: Absorbers | None = None
         self.strain, self.precision, self.safety = strain, precision, safety
         self.threads, self.mass_scaling = threads, mass_scaling
         self.gravity = None if gravity is None else Driver(gravity, 3, "gravity")
@@ -245,6 +251,16 @@ class Simulation(ConditionedBodies):
             column += len(nodes)
         return History(samples.step_numbers * self.step, values)
 
+    def absorb(self, body: Body, nodes: Any, depth: float | None = None) -> Absorbing:
+        """`ConditionedBodies.absorb`, in double precision on the processor."""
+        if self.precision != "float64" or self._assembly_class is not Assembly:
+            raise ConditionError(
+                "absorbing faces are computed in double precision on the processor",
+                where="absorb",
+                remedy='take precision="float64" and device="cpu"',
+            )
+        return super().absorb(body, nodes, depth)
+
     def relax(self, tolerance: float = 1e-8, max_steps: int = 100_000) -> StaticAnswer:
         """Bring deformable bodies to rest in equilibrium with the loads of the present time.
 
@@ -260,6 +276,12 @@ class Simulation(ConditionedBodies):
         if self.rigid is not None:
             raise ConditionError(
                 "rigid bodies have no static answer here", where="relax", remedy="march"
+            )
+        if self.conditions.absorbing:
+            raise ConditionError(
+                "absorbing faces have no static answer here",
+                where="relax",
+                remedy="fix them, relax, and remove the fix before absorb",
             )
         return relax(self, tolerance, max_steps)
 
@@ -288,9 +310,17 @@ class Simulation(ConditionedBodies):
             external += float(half_work(self, self.assembly.field("velocity"), velocity).sum())
             if self.rigid is not None:
                 external += float(self.rigid.half_work().sum())
-        if self.contacts is None:
-            return Energy(kinetic, float(elastic), external)
-        return Energy(kinetic, float(elastic), external, *self.contacts.energy())
+        touching = (0.0, 0.0) if self.contacts is None else self.contacts.energy()
+        ground = (0.0, 0.0) if self.absorbers is None else self._ground_energy(velocity)
+        return Energy(kinetic, float(elastic), external, *touching, *ground)
+
+    def _ground_energy(self, velocity: Floats) -> tuple[float, float]:
+        """Taken by absorbing faces, and in their springs [J]; ``velocity`` (n, 3) [m/s]: of now."""
+        assert self.absorbers is not None
+        absorbed = self.motion.absorbed
+        if self.motion.behind:
+            absorbed += self.absorbers.half_taken(self.assembly.field("velocity"), velocity)
+        return absorbed, self.absorbers.spring_energy(self.assembly.field("displacement"))
 
     def save(self, path: str | Path) -> None:
         """Write the state to a file (`qdem_fem.checkpoint.checkpoint_write`)."""
@@ -337,6 +367,15 @@ class Simulation(ConditionedBodies):
             self._contacts = contacts_of(self, self.contact)
         return self._contacts
 
+    @property
+    def absorbers(self) -> Absorbers | None:
+        """Dashpots and springs of absorbing faces; None where there are none."""
+        if self._absorbers is None and self.conditions.absorbing:
+            from qdem_fem.absorbing import Absorbers
+
+            self._absorbers = Absorbers(self)
+        return self._absorbers
+
     # --- for the march and the files -----------------------------------------------------------
 
     def packed_lists(self) -> tuple[kernel.Loads, kernel.Constraints]:
@@ -358,7 +397,7 @@ class Simulation(ConditionedBodies):
         velocities_level(self)
 
     def _changed(self, ties: bool) -> None:
-        self._lists = None
+        self._lists = self._absorbers = None
         if ties:
             self._critical = None
             if self._contacts is not None:

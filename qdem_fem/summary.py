@@ -11,7 +11,7 @@ import numpy.typing as npt
 from qdem_fem.output import table_read
 from qdem_fem.run_folder import RunFolder
 from qdem_fem.scene_checks import Prepared
-from qdem_fem.scene_run import Done
+from qdem_fem.scene_run import ABSORBING_ENERGIES, CONTACT_ENERGIES, Done
 from qdem_fem.scene_series import TimeSeries
 from qdem_fem.spectra import Mode, peak_frequencies
 
@@ -99,7 +99,8 @@ def body_facts(body: Any) -> dict[str, Any]:
 
 def energy_facts(energy: dict[str, FloatArray]) -> dict[str, float]:
     """Energies at the end [J], and the greatest of external less all others on the way."""
-    names = [name for name in ("kinetic", "elastic", "contact", "friction") if name in energy]
+    known = ("kinetic", "elastic", *CONTACT_ENERGIES, *ABSORBING_ENERGIES)
+    names = [name for name in known if name in energy]
     stored = np.sum([energy[name] for name in names], axis=0)
     if "contact" in energy:  # overlap that the scene begins with is no work of its loads
         stored = stored - energy["contact"][0]

@@ -147,7 +147,7 @@ def test_faces_bear_the_pressure_of_their_depth() -> None:
         )
         run = touching([cube(below), inner])
         run.contacts.refresh()
-        count = len(run.contacts.local[0])
+        count = len(run.contacts.outside[0].node)
         lifted = run.contacts.kernel.force[count:, 2].sum()
         own = MODULUS / 2 * depth * (0.6 * SIDE) ** 2
         # the smaller face bears its half exactly; of the larger one the points beneath it do
