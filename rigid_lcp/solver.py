@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.cones import length
+from rigid_lcp.energy_proof import gives_energy
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import (
     ROUND_OFF,
@@ -43,6 +44,11 @@ TINY = 1e-60
 FEW_ISLANDS = 20
 """Up to so many islands, single contacts not counted, of a large problem are solved apart at once:
 a few grains that lie loose can keep a whole bed from converging.  More cost more than they gain."""
+
+ENERGY_GIVEN = (
+    "W gives energy to forces within the cones of friction (r . W r < 0), so a solution need not"
+    " exist; the best residual is {:.2g}\n  -> give W by its bodies (BodySpace), or to more digits"
+)
 
 
 def solve_friction(
@@ -137,6 +143,8 @@ def solve_auto(
             " a linear programme)\n  -> use impulses: a velocity-level time step, or look for"
             " contacts that bear on no mass",
         )
+    if not trial.best.solved and gives_energy(problem):
+        return trial.solution(message=ENERGY_GIVEN.format(trial.best.residual))
     return trial.solution()
 
 

@@ -19,6 +19,8 @@
     Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
                      Newton at its end: first few sweeps and factorisations, then many, as what is
                      hard for the one is often easy for the other
+                     Where W is found to give energy (`rigid_lcp.energy_proof`) no solution need
+                     exist, and one more turn is the last
     by turns again   from the end of the convex path, and of three paths of the interior point;
                      then extrapolated points from the best
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
@@ -49,6 +51,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import factorisation
+from rigid_lcp.energy_proof import gives_energy
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.frictionless import frictionless
 from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
@@ -56,7 +59,7 @@ from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
 from rigid_lcp.smoothed_path import smoothed_path
 from rigid_lcp.solver_cold import CONVEX_CONTACTS, convex_start
 from rigid_lcp.solver_trial import ENDLESS, FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
-from rigid_lcp.solver_turns import from_path, turns_from_paths
+from rigid_lcp.solver_turns import by_turns, from_path, turns_from_paths
 from rigid_lcp.solver_warm import deep, yielding
 
 Floats = NDArray[np.float64]
@@ -182,6 +185,9 @@ def fallback_paths(trial: Trial, accept: float) -> None:
     if trial.forces > ENDLESS and proved_insoluble(problem):  # a proof before the paths
         trial.forget_endless()
         trial.best = replace(trial.best, status="no solution")
+        return
+    if gives_energy(problem):  # nothing promises a solution: what is near is found in one turn
+        by_turns(trial, trial.best.r if trial.path_end is None else trial.path_end, patience=1)
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
     if turns_from_paths(trial):

@@ -49,11 +49,11 @@ def from_path(trial: Trial, begin: tuple[Floats, float]) -> bool:
     return trial.best.solved or smoothed_further(trial, begin) or by_turns(trial, trial.best.r)
 
 
-def by_turns(trial: Trial, force: Floats) -> bool:
-    """Sweeps and extrapolated points by turns, from forces r (nc * dim,) [N or N s]; whether the
-    tolerance is reached."""
+def by_turns(trial: Trial, force: Floats, patience: int = TURNS_PATIENCE) -> bool:
+    """Sweeps and extrapolated points by turns, from forces r (nc * dim,) [N or N s], until
+    ``patience`` of them failed to halve the least residual; whether the tolerance is reached."""
     most, mark, waited = trial.effort + TURNS_FLOPS, np.inf, 0
-    while waited < TURNS_PATIENCE and trial.effort < most and trial.affordable:
+    while waited < patience and trial.effort < most and trial.affordable:
         found = swept(trial, force)
         if trial.endless(found.r):  # sweeps diverge where friction makes W no descent
             break

@@ -138,6 +138,8 @@ def _summed(rows: Sequence[Row]) -> list[str]:
         words += f": residual {errors} in {costs}"
         if endless:  # forces that grow without bound make any residual small
             words += f"; on {endless} forces leave more than a tenth of the error of none"
+    given = sum(row.get("gives_energy", False) for row in rows)
+    words += f"; on {given} W is proved to give energy, so none need exist" * (given > 0)
     proved = sum(row["status"] == "no solution" for row in rows)
     words += f"; {proved} proved to have none" * (proved > 0)
     other = len(rows) - len(ended)

@@ -1,8 +1,8 @@
 """Ways to the same cycle: jumps, jumps that move nothing, and what a user would do instead.
 
-All but fewer grains, which need a rain of their own, begin at the states of the coarse ensemble's
-packings after k_i cycles.  A scene alone always begins with its rain; what it has no key for is
-written into the decks of the windows (`Changed`).
+All but fewer grains, which need a rain of their own, begin at the states of the ensemble's packings
+after k_i cycles: the coarse ensemble, or the confined one at paper scale.  A scene alone always
+begins with its rain; what it has no key for is written into the decks of the windows (`Changed`).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from adapters.stages import Run, Variant
 from adapters.state import FloatArray
 from adapters.window import window_load
 from validation.move_study_engine import cycles_of
-from validation.settlement_ensemble import COARSE, Kind, Piece
+from validation.settlement_ensemble import COARSE, CONFINED, Kind, Piece
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_ensemble_start import packing_lay
 
@@ -106,23 +106,25 @@ class Method:
     """Mass over that of the packing's state."""
     own_rain: bool = False
     """Whether it begins with a rain of its own."""
+    base: Kind = COARSE
+    """The ensemble with whose packings it begins."""
 
     def kind(self, last: int) -> Kind:
-        """The coarse ensemble's scene as this method changes it, to cycle ``last``."""
+        """The ensemble's scene as this method changes it, to cycle ``last``."""
         k = FIRST_WINDOW if self.variant.jumps else 100
-        keys = [*COARSE.settings, f"procedure.total_cycles={last}", *self.settings]
+        keys = [*self.base.settings, f"procedure.total_cycles={last}", *self.settings]
         if not any(key.startswith("procedure.tolerance") for key in self.settings):
-            h = jump_length(self.jumps, last) if self.jumps else 0
+            h = jump_length(self.jumps, last, self.base.k_i) if self.jumps else 0
             keys += [f"procedure.k={k}", f"procedure.h={h}"]
-        return replace(COARSE, settings=tuple(keys))
+        return replace(self.base, settings=tuple(keys))
 
 
-def jump_length(jumps: int, last: int) -> int:
+def jump_length(jumps: int, last: int, k_i: int = K_I) -> int:
     """Cycles h of each of equal ``jumps``: from k_i a window, then h, healing and a window each.
 
     ValueError where they do not end at cycle ``last``.
     """
-    block, rest = divmod(last - K_I - FIRST_WINDOW, jumps)
+    block, rest = divmod(last - k_i - FIRST_WINDOW, jumps)
     if rest or block <= HEALING + FIRST_WINDOW:
         raise ValueError(f"{jumps} equal jumps from windows of {FIRST_WINDOW} miss cycle {last}")
     return block - HEALING - FIRST_WINDOW
@@ -174,7 +176,18 @@ METHODS = (
     Method("tolerance 0.1", "tolerance", ("procedure.tolerance=0.1",), JUMPING),
     *jumping(10), longer(0.3), RESUBMITTED,
 )  # fmt: skip
-"""In the order in which they are run."""
+"""On the coarse bed, in the order in which they are run."""
+METHODS_OF: dict[str, tuple[Method, ...]] = {
+    COARSE.name: METHODS,
+    CONFINED.name: tuple(
+        replace(method, base=CONFINED)
+        for method in (
+            *jumping(2), longer(0.4), *jumping(5), longer(0.6),
+            Method("tolerance 0.02", "tolerance", ("procedure.tolerance=0.02",), JUMPING),
+        )
+    ),
+}  # fmt: skip
+"""By the name of the ensemble."""
 
 
 def run_in(
@@ -198,7 +211,7 @@ def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, fol
     lines = {} if method.heavier == 1 else masses_scaled(scene, method.heavier)
     run = run_in(folder, scene, method.variant, lines)
     if not method.own_rain:
-        packing_lay(run, Piece(COARSE, seed), record)
+        packing_lay(run, Piece(method.base, seed), record)
     refused = ""
     try:
         settle(run)
@@ -206,11 +219,12 @@ def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, fol
         if getattr(error, "from_outside", False):
             raise
         refused = error.what.splitlines()[0]
-    row = {"refused": refused, "steps_per_cycle": scene.steps_per_cycle} | reached(run)
+    row = {"refused": refused, "steps_per_cycle": scene.steps_per_cycle}
+    row |= reached(run, method.base.k_i)
     return row | {"engine": run.engine.version()}
 
 
-def reached(run: Run) -> Row:
+def reached(run: Run, k_i: int) -> Row:
     """Figures of a run as far as it has come, and what they cost behind cycle k_i.
 
     ``settlement``, ``state`` and ``profile`` as `figures_of`; ``computed`` cycles, ``cost`` CPU
@@ -227,11 +241,11 @@ def reached(run: Run) -> Row:
             found[cycle] = dict(zip(columns, values, strict=True))
     cost: dict[str, float] = {}
     for outcome in run.folder.outcomes():
-        if outcome.first_cycle >= K_I:
+        if outcome.first_cycle >= k_i:
             for purpose, seconds in outcome.cost.items():
                 cost[purpose] = cost.get(purpose, 0.0) + seconds
     row = {
-        "computed": len(found) - K_I,
+        "computed": len(found) - k_i,
         "cost": cost,
         "cpu_s": cost_total(cost),
         "lost": [why for name in run.folder.stage_names() if (why := run.folder.failure(name))],
@@ -243,17 +257,17 @@ def reached(run: Run) -> Row:
     assert preparation is not None
     height = preparation.notes["density_height"]
     layers = profile(run.scene, height, last.position[-1], last.radius)
-    return row | figures_of(found) | {"profile": layers}
+    return row | figures_of(found, k_i) | {"profile": layers}
 
 
-def figures_of(found: Mapping[int, Mapping[str, float]]) -> Row:
+def figures_of(found: Mapping[int, Mapping[str, float]], k_i: int) -> Row:
     """Figures from the columns of computed cycles.
 
     ``settlement`` [m] since the `BLOCK` up to k_i by the last cycle of each block that was computed
     whole, means of blocks both; ``state``: means of `STATE` over the last block.
     """
-    ends = range(K_I + BLOCK, max(found) + 1, BLOCK)
-    before = mean_of(found, K_I, "settlement")
+    ends = range(k_i + BLOCK, max(found) + 1, BLOCK)
+    before = mean_of(found, k_i, "settlement")
     return {
         "settlement": {
             str(end): mean_of(found, end, "settlement") - before

@@ -1,4 +1,4 @@
-"""What the rivals are compared with: members of the coarse ensemble, and laws fitted to them."""
+"""What the rivals are compared with: members of an ensemble, and laws fitted to their curves."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from adapters.fit_auto import outlook
 from adapters.laws import law_named
-from validation.settlement_ensemble import COARSE, Piece
+from validation.settlement_ensemble import Piece
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import BLOCK, FIRST_WINDOW, K_I, Row, figures_of, mean_of, profile
+from validation.settlement_rivals import BLOCK, FIRST_WINDOW, Row, figures_of, mean_of, profile
 
 LAWS = tuple(
     (law, cycles) for law in ("log", "auto") for cycles in (FIRST_WINDOW, 5 * FIRST_WINDOW)
@@ -31,35 +31,32 @@ def columns_by_cycle(piece: Piece, record: EnsembleRecord) -> dict[int, dict[str
     }
 
 
-def engine_s(found: dict[int, dict[str, float]], last: int) -> float:
+def engine_s(found: dict[int, dict[str, float]], k_i: int, last: int) -> float:
     """CPU time of the engine from k_i to ``last`` [s]."""
-    return float(sum(found[cycle]["cpu_s"] for cycle in range(K_I + 1, last + 1)))
+    return float(sum(found[cycle]["cpu_s"] for cycle in range(k_i + 1, last + 1)))
 
 
-def reference_row(seed: int, member: int, last: int, record: EnsembleRecord) -> Row:
+def reference_row(piece: Piece, last: int, record: EnsembleRecord) -> Row:
     """The figures of a member, whose state at ``last`` the ensemble keeps; time without Python."""
-    piece = Piece(COARSE, seed, member)
-    kept = record.kept(piece.name)
+    kept, k_i = record.kept(piece.name), piece.kind.k_i
     assert kept is not None
     found = columns_by_cycle(piece, record)
     found = {cycle: columns for cycle, columns in found.items() if cycle <= last}
-    cpu_s = engine_s(found, last)
+    cpu_s = engine_s(found, k_i, last)
     radius, position = record.states(piece.name)
-    layers = profile(COARSE.scene(seed), kept.density_height, position[last], radius)
-    row = {"computed": last - K_I, "cost": {"engine": cpu_s}, "cpu_s": cpu_s}
-    return row | figures_of(found) | {"profile": layers, "engine": kept.engine}
+    layers = profile(piece.kind.scene(piece.seed), kept.density_height, position[last], radius)
+    row = {"computed": last - k_i, "cost": {"engine": cpu_s}, "cpu_s": cpu_s}
+    return row | figures_of(found, k_i) | {"profile": layers, "engine": kept.engine}
 
 
-def law_row(
-    law: str, cycles: int, seed: int, member: int, last: int, record: EnsembleRecord
-) -> Row:
+def law_row(law: str, cycles: int, piece: Piece, last: int, record: EnsembleRecord) -> Row:
     """Settlement at ``last`` by a law fitted to the curve of a member: no bed is left.
 
     ``auto``: the prediction of `adapters.fit_auto` from all cycles since the rain; another: that
     law's value, fitted to the ``cycles`` behind k_i.
     """
-    found = columns_by_cycle(Piece(COARSE, seed, member), record)
-    first, end = (1 if law == "auto" else K_I + 1), K_I + cycles
+    found, k_i = columns_by_cycle(piece, record), piece.kind.k_i
+    first, end = (1 if law == "auto" else k_i + 1), k_i + cycles
     cycle = np.arange(first, end + 1, dtype=float)
     path = np.array([found[int(c)]["settlement"] for c in cycle])
     if law == "auto":
@@ -68,8 +65,8 @@ def law_row(
         chosen = law_named(law)
         at_end = chosen.value(chosen.fit(cycle, path), np.arange(last - BLOCK + 1.0, last + 1))
         predicted = float(np.mean(at_end))
-    settlement = predicted - mean_of(found, K_I, "settlement")
-    cpu_s = engine_s(found, end)
+    settlement = predicted - mean_of(found, k_i, "settlement")
+    cpu_s = engine_s(found, k_i, end)
     return {
         "computed": cycles,
         "cost": {"engine": cpu_s},

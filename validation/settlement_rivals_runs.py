@@ -1,12 +1,13 @@
 """Run the rivals of the settlement procedure on the coarse bed, and its error budget.
 
     python -m validation.settlement_rivals_runs --work FOLDER [--minutes M] [--last N]
-        [--only rivals|budget|reference] [--methods NAME ...]
+        [--kind coarse|confined] [--only rivals|budget|reference] [--methods NAME ...]
     python -m validation.settlement_rivals_page      docs/settlement-rivals.md and its picture
 
-Writes a line to ``validation/results/settlement-rivals.jsonl`` as each run ends and goes on where
-that ends; after M minutes it begins no further run.  ``reference`` reads the coarse ensemble, from
-another folder by ``--ensemble``, and needs no engine.  FOLDER may be thrown away.
+Writes a line to ``validation/results/settlement-rivals.jsonl`` (at paper scale, without budget, to
+``settlement-rivals-confined.jsonl``) as each run ends and goes on where that ends; after M minutes
+it begins no further run.  ``reference`` reads the ensemble, from another folder by ``--ensemble``,
+and needs no engine.  FOLDER may be thrown away.
 """
 
 from __future__ import annotations
@@ -26,10 +27,10 @@ from adapters.engine import interruptible
 from adapters.provenance import commit, machine
 from adapters.run_folder import RunFolder
 from validation.move_study import rounded
-from validation.settlement_ensemble import COARSE, Piece
+from validation.settlement_ensemble import COARSE, KINDS, Kind, Piece
 from validation.settlement_ensemble_record import RECORD as ENSEMBLE
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import METHODS, Method, Row, method_run
+from validation.settlement_rivals import METHODS_OF, Method, Row, method_run
 from validation.settlement_rivals_budget import EVERY, PARTS, PLACE, part_run
 from validation.settlement_rivals_reference import LAWS, law_name, law_row, reference_row
 
@@ -65,10 +66,10 @@ def rival_row(method: Method, seed: int, last: int, record: EnsembleRecord, fold
     return row
 
 
-def plan_rivals(work: Path, record: EnsembleRecord, last: int) -> Iterator[Planned]:
+def plan_rivals(work: Path, kind: Kind, record: EnsembleRecord, last: int) -> Iterator[Planned]:
     """Every method on every packing."""
-    for method in METHODS:
-        for seed in SEEDS:
+    for method in METHODS_OF[kind.name]:
+        for seed in range(1, kind.packings + 1):
             head = {"part": "rivals", "method": method.name, "seed": seed, "member": 0}
             folder = work / f"{method.name.replace(' ', '-').replace('/', '-')}-{seed}"
 
@@ -83,21 +84,19 @@ def plan_budget(work: Path, record: EnsembleRecord) -> Iterator[Planned]:
         yield head | {"last": PLACE}, filled
 
 
-def plan_reference(record: EnsembleRecord, last: int) -> Iterator[Planned]:
+def plan_reference(kind: Kind, record: EnsembleRecord, last: int) -> Iterator[Planned]:
     """Every member of the ensemble that has reached ``last``, and laws fitted to its curve."""
-    for seed in SEEDS:
-        for member in MEMBERS:
-            kept = record.kept(Piece(COARSE, seed, member).name)
-            if kept is None or kept.cycle < last:
-                continue
-            head = {"part": "reference", "method": EVERY, "seed": seed, "member": member}
-            yield head | {"last": last}, partial(reference_row, seed, member, last, record)
-            for law, cycles in LAWS:
-                head = {"part": "law", "method": law_name(law, cycles), "seed": seed}
-                yield (
-                    head | {"member": member, "last": last},
-                    partial(law_row, law, cycles, seed, member, last, record),
-                )
+    for seed, member in product(range(1, kind.packings + 1), range(kind.members)):
+        piece = Piece(kind, seed, member)
+        kept = record.kept(piece.name)
+        if kept is None or kept.cycle < last:
+            continue
+        head = {"part": "reference", "method": EVERY, "seed": seed, "member": member}
+        yield head | {"last": last}, partial(reference_row, piece, last, record)
+        for law, cycles in LAWS:
+            head = {"part": "law", "method": law_name(law, cycles), "seed": seed}
+            filled = partial(law_row, law, cycles, piece, last, record)
+            yield head | {"member": member, "last": last}, filled
 
 
 def go_on(
@@ -126,20 +125,24 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--work", type=Path, required=True, help="folder for the engine's files")
     parser.add_argument("--minutes", type=float, default=np.inf, help="begin no run after these")
     parser.add_argument("--last", type=int, default=LAST, help="cycle to compare at")
+    parser.add_argument("--kind", choices=METHODS_OF, default=COARSE.name, help="of ensemble")
     parser.add_argument("--only", nargs="+", choices=PARTS_OF_STUDY, default=PARTS_OF_STUDY)
     parser.add_argument("--methods", nargs="+", help="only these")
-    parser.add_argument("--record", type=Path, default=RECORD)
+    parser.add_argument("--record", type=Path, help="default: that of the kind")
     parser.add_argument("--ensemble", type=Path, default=ENSEMBLE, help="the ensemble's record")
     given = parser.parse_args(words)
-    record = EnsembleRecord(given.ensemble)
+    record, kind = EnsembleRecord(given.ensemble), KINDS[given.kind]
+    path = given.record or RECORD
+    if given.record is None and kind != COARSE:
+        path = RECORD.with_stem(f"{RECORD.stem}-{kind.name}")
     with interruptible(), RunFolder(given.work).locked():
         plans = {
-            "reference": plan_reference(record, given.last),
-            "rivals": plan_rivals(given.work, record, given.last),
-            "budget": plan_budget(given.work, record),
+            "reference": plan_reference(kind, record, given.last),
+            "rivals": plan_rivals(given.work, kind, record, given.last),
+            "budget": plan_budget(given.work, record) if kind == COARSE else iter(()),
         }
         for part in given.only:
-            go_on(plans[part], given.record, given.minutes, given.methods)
+            go_on(plans[part], path, given.minutes, given.methods)
 
 
 if __name__ == "__main__":
