@@ -81,16 +81,20 @@ def mass_scaling_facts(run: Any) -> dict[str, float]:
 def bodies_facts(bodies: dict[str, Any]) -> dict[str, Any]:
     """`body_facts` by name; of bodies that are named alike but for a number behind a dash, one
     entry: sums, and the smallest altitude."""
-    kinds: dict[str, list[dict[str, Any]]] = {}
+    kinds: dict[str, dict[str, dict[str, Any]]] = {}
     for name, body in bodies.items():
         stem, _, number = name.rpartition("-")
-        kinds.setdefault(stem if number.isdecimal() else name, []).append(body_facts(body))
-    found = {}
-    for kind, facts in kinds.items():
+        kinds.setdefault(stem if number.isdecimal() else name, {})[name] = body_facts(body)
+    found: dict[str, Any] = {}
+    for kind, by_name in kinds.items():
+        if len(by_name) == 1:
+            found |= by_name
+            continue
+        facts = list(by_name.values())
         least = min(facts, key=lambda one: float(one["smallest_altitude"]))
         own = ("smallest_altitude", "thinnest_element")
         total = {k: least[k] if k in own else sum(one[k] for one in facts) for k in facts[0]}
-        found[kind if len(facts) == 1 else f"{len(facts)} of {kind}"] = total
+        found[f"{len(facts)} of {kind}"] = total
     return found
 
 

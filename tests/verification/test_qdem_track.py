@@ -24,7 +24,7 @@ from qdem_fem.track_bed import Bed, BedRecipe, bed_read, bed_write, grains_of
 from qdem_fem.track_bodies import TrackBox, grains_nodes, lattice_loose, sleeper_slice
 from qdem_fem.track_figures import acceleration_spectrum, differences, mobility, peaks_of
 from qdem_fem.track_load import RISE, bogie_series
-from qdem_fem.track_scene import TrackPrepared
+from qdem_fem.track_scene import BogieTable, TrackPrepared, TrackTable
 from validation import track_page
 from validation.track_trials import SCENE
 
@@ -218,6 +218,12 @@ def test_scene_of_the_small_track_is_sound() -> None:
     assert isinstance(prepared, TrackPrepared)
     assert prepared.recipe.below + prepared.recipe.beside == 300
     assert prepared.scene.simulation.duration == pytest.approx(prepared.load.times[-1], abs=1e-3)
+
+
+def test_every_key_of_a_track_is_named_in_its_scene() -> None:
+    text = (Path(__file__).parents[2] / "scenes" / "track-small.toml").read_text(encoding="utf-8")
+    keys = [*TrackTable.model_fields, *BogieTable.model_fields]
+    assert [key for key in keys if key not in text] == []
 
 
 def test_page_is_written_from_its_records() -> None:
