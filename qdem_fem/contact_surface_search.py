@@ -13,7 +13,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import row
-from qdem_fem.contact_surface_kernel import Near, Surface, blend
+from qdem_fem.contact_surface_arrays import Near, Surface
+from qdem_fem.contact_surface_geometry import blend
 
 Integers = NDArray[np.int64]
 

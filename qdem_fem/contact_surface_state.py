@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from qdem_fem.contact_spheres import pair_stiffness, tangential_stiffness
 from qdem_fem.contact_state import Contacts, Floats, planes_arrays
 from qdem_fem.contact_surface import DEPTH, SurfaceContact, face_points, sharp_edges
-from qdem_fem.contact_surface_kernel import Near, Surface, SurfaceTouch, Walls
+from qdem_fem.contact_surface_arrays import Near, Surface, SurfaceTouch, Walls
 from qdem_fem.contact_surface_search import near_of, near_renew
 from qdem_fem.surface import face_area_vectors
 
