@@ -21,6 +21,8 @@ class Surface(NamedTuple):
     """(f, 3) vertices, outward"""
     face_area: Any
     """(f,) [m^2]"""
+    face_body: Any
+    """(f,)"""
     fan_first: Any
     """(c + 1,) first entry of a vertex in ``fan_face``"""
     fan_face: Any
@@ -76,6 +78,25 @@ class Near(NamedTuple):
     """(m, 3) [m]"""
 
 
+class Overlaps(NamedTuple):
+    """Pairs of faces of two bodies that may overlap, and what they remember."""
+
+    faces: Any
+    """(m, 2)"""
+    free: Any
+    """(m,) way of all vertices from ``start`` up to which they can not overlap [m]"""
+    area: Any
+    """(m,) of the overlap, times its weight [m^2]; negative: they do not overlap"""
+    spring: Any
+    """(m, 3) [m]"""
+    share: Any
+    """(m, 6) coordinates of the centre of pressure in the two faces"""
+    pull: Any
+    """(m, 6, 3) forces on their corners [N]"""
+    account: Any
+    """(m, 3) energy, work of the slider in this step [J], depth [m]"""
+
+
 class Walls(NamedTuple):
     """Rigid walls, and what each point remembers of each."""
 
@@ -86,9 +107,9 @@ class Walls(NamedTuple):
     friction: Any
     """(w,)"""
     weight: Any
-    """(w, q) [m^2]; negative: does not touch"""
+    """(w, q) [m^2] of points, or (w, q + f) and of faces; negative: does not touch"""
     spring: Any
-    """(w, q, 3) [m]"""
+    """(w, q, 3) [m], or (w, q + f, 3)"""
     force: Any
     """(w, 3) of the bodies on the wall [N]"""
 
@@ -98,6 +119,9 @@ class SurfaceTouch(NamedTuple):
 
     surface: Any
     near: Any
+    overlaps: Any
+    clipped: Any
+    """Whether faces bear by their overlaps, not by points within them."""
     walls: Any
     friction: Any
     half_skin: Any

@@ -64,6 +64,18 @@ def blend(field: Any, nodes: Any, share: Any) -> Any:  # pragma: no cover
 
 
 @inlined
+def velocity_of(velocity: Any, place: Any, nodes: Any, share: Any) -> Any:  # pragma: no cover
+    """Velocity at barycentric coordinates between three nodes [m/s]."""
+    i, j, k = place[nodes[0]], place[nodes[1]], place[nodes[2]]
+    a, b, c = share
+    return (
+        a * velocity[i] + b * velocity[j] + c * velocity[k],
+        a * velocity[i + 1] + b * velocity[j + 1] + c * velocity[k + 1],
+        a * velocity[i + 2] + b * velocity[j + 2] + c * velocity[k + 2],
+    )
+
+
+@inlined
 def dot(a: Any, b: Any) -> float:  # pragma: no cover
     """Scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

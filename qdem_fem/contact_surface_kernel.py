@@ -31,13 +31,21 @@ from qdem_fem.contact_surface_geometry import (
     face_normal,
     less,
     scaled,
+    velocity_of,
 )
+from qdem_fem.contact_surface_overlaps import overlaps_forces, wall_faces_forces
 
 FLAT = 50
 """Power of a cosine: a vertex or an edge 1 degree from flat bears under 1 %, 10 degrees, half."""
 PARALLEL = 1e-6
 """Square of the sine of the angle between edges below which they do not cross."""
-SOURCES = "contact_kernel.py", "contact_surface_geometry.py", "contact_surface_kernel.py"
+SOURCES = (
+    "contact_kernel.py",
+    "contact_surface_geometry.py",
+    "contact_surface_clip.py",
+    "contact_surface_overlaps.py",
+    "contact_surface_kernel.py",
+)
 
 
 @inlined
@@ -47,18 +55,6 @@ def force_add(force: Any, nodes: Any, share: Any, f: Any, sign: float) -> None: 
         force[nodes[0], k] += sign * share[0] * f[k]
         force[nodes[1], k] += sign * share[1] * f[k]
         force[nodes[2], k] += sign * share[2] * f[k]
-
-
-@inlined
-def velocity_of(velocity: Any, place: Any, nodes: Any, share: Any) -> Any:  # pragma: no cover
-    """Velocity at barycentric coordinates between three nodes [m/s]."""
-    i, j, k = place[nodes[0]], place[nodes[1]], place[nodes[2]]
-    a, b, c = share
-    return (
-        a * velocity[i] + b * velocity[j] + c * velocity[k],
-        a * velocity[i + 1] + b * velocity[j + 1] + c * velocity[k + 1],
-        a * velocity[i + 2] + b * velocity[j + 2] + c * velocity[k + 2],
-    )
 
 
 @exact
@@ -255,6 +251,12 @@ def surface_step_build(made_from: str) -> Any:
         moved = np.sqrt(far)
         deepest = max(points_forces(c, velocity, step, moved), walls_forces(c, velocity, step))
         edges_forces(c, velocity, step)
+        if c.clipped:
+            deepest = max(
+                deepest,
+                overlaps_forces(c, velocity, step, moved),
+                wall_faces_forces(c, velocity, step),
+            )
         if deepest > c.depth:
             return TOO_DEEP
         return LOOK_ANEW if far > c.half_skin**2 else GO_ON

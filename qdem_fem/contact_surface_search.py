@@ -13,7 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import row
-from qdem_fem.contact_surface_arrays import Near, Surface
+from qdem_fem.contact_surface_arrays import Near, Overlaps, Surface
 from qdem_fem.contact_surface_geometry import blend
 
 Integers = NDArray[np.int64]
@@ -94,22 +94,22 @@ def points_near(
 
 
 @njit(cache=True)
-def edges_near(
-    surface: Any, position: Any, box: Any, first_edge: Any, reach: float
+def parts_near(
+    parts: Any, position: Any, box: Any, first_part: Any, reach: float
 ) -> Any:  # pragma: no cover
-    """Pairs (m, 2) of sharp edges of two bodies, of the first body's first."""
+    """Pairs (m, 2) of faces or edges (k, n) of two bodies, of the first body's first."""
     low, high = box
-    edge_low, edge_high = boxes_of(position, surface.edge)
+    part_low, part_high = boxes_of(position, parts)
     found, count = np.empty((64, 2), np.int64), 0
     for a in range(len(low)):
         for b in range(a + 1, len(low)):
             if not boxes_near(low, high, a, low, high, b, reach):
                 continue
-            for i in range(first_edge[a], first_edge[a + 1]):
-                if not boxes_near(edge_low, edge_high, i, low, high, b, reach):
+            for i in range(first_part[a], first_part[a + 1]):
+                if not boxes_near(part_low, part_high, i, low, high, b, reach):
                     continue
-                for j in range(first_edge[b], first_edge[b + 1]):
-                    if boxes_near(edge_low, edge_high, i, edge_low, edge_high, j, reach):
+                for j in range(first_part[b], first_part[b + 1]):
+                    if boxes_near(part_low, part_high, i, part_low, part_high, j, reach):
                         if count == len(found):
                             found = grown(found, count)
                         found[count, 0], found[count, 1] = i, j
@@ -136,8 +136,7 @@ def history_carry(old: Near, new: Near, bodies: int) -> None:
     """Take what the pairs of ``old`` remember over to the same pairs of ``new``."""
     here, there = same_keys(*(near.point * bodies + near.body for near in (old, new)))
     new.weight[there], new.spring[there] = old.weight[here], old.spring[here]
-    most = 1 + max(int(near.edges.max(initial=0)) for near in (old, new))
-    here, there = same_keys(*(near.edges[:, 0] * most + near.edges[:, 1] for near in (old, new)))
+    here, there = same_pairs(old.edges, new.edges)
     for name in ("edge_weight", "edge_start", "edge_spring"):
         getattr(new, name)[there] = getattr(old, name)[here]
 
@@ -146,6 +145,35 @@ def same_keys(old: Integers, new: Integers) -> tuple[Integers, Integers]:
     """Places of the keys that are in both, in each."""
     _, here, there = np.intersect1d(old, new, assume_unique=True, return_indices=True)
     return here, there
+
+
+def same_pairs(old: Integers, new: Integers) -> tuple[Integers, Integers]:
+    """Places of the pairs (m, 2) that are in both, in each."""
+    most = 1 + max(int(pairs.max(initial=0)) for pairs in (old, new))
+    return same_keys(*(pairs[:, 0] * most + pairs[:, 1] for pairs in (old, new)))
+
+
+def overlaps_of(faces: Integers) -> Overlaps:
+    """Pairs of faces (m, 2) without a history."""
+    count = len(faces)
+    return Overlaps(
+        faces, np.full(count, -1.0), np.full(count, -1.0), np.zeros((count, 3)),
+        np.zeros((count, 6)), np.zeros((count, 6, 3)), np.zeros((count, 3)),
+    )  # fmt: skip
+
+
+def overlaps_renew(
+    old: Overlaps, surface: Surface, position: Any, firsts: tuple[Integers, ...], reach: float
+) -> Overlaps:
+    """The pairs of faces for vertices at ``position`` (c, 3) [m], with the history of the old."""
+    node, face = firsts[0], firsts[1]
+    low = np.minimum.reduceat(position, node[:-1])
+    high = np.maximum.reduceat(position, node[:-1])
+    new = overlaps_of(parts_near(surface.face, position, (low, high), face, reach))
+    here, there = same_pairs(old.faces, new.faces)
+    for name in ("area", "spring", "share", "pull", "account"):
+        getattr(new, name)[there] = getattr(old, name)[here]
+    return new
 
 
 def near_renew(
@@ -159,7 +187,7 @@ def near_renew(
     low = np.minimum.reduceat(position, node[:-1])
     high = np.maximum.reduceat(position, node[:-1])
     found = points_near(surface, position, (low, high), point, face, reach)
-    edges = edges_near(surface, position, (low, high), edge, reach)
+    edges = parts_near(surface.edge, position, (low, high), edge, reach)
     new = near_of(*found, edges)
     if old is not None:
         history_carry(old, new, len(low))

@@ -11,8 +11,13 @@ from numpy.typing import NDArray
 from qdem_fem.contact_spheres import pair_stiffness, tangential_stiffness
 from qdem_fem.contact_state import Contacts, Floats, planes_arrays
 from qdem_fem.contact_surface import DEPTH, SurfaceContact, face_points, sharp_edges
-from qdem_fem.contact_surface_arrays import Near, Surface, SurfaceTouch, Walls
-from qdem_fem.contact_surface_search import near_of, near_renew
+from qdem_fem.contact_surface_arrays import Near, Overlaps, Surface, SurfaceTouch, Walls
+from qdem_fem.contact_surface_search import (
+    near_of,
+    near_renew,
+    overlaps_of,
+    overlaps_renew,
+)
 from qdem_fem.surface import face_area_vectors
 
 if TYPE_CHECKING:
@@ -32,7 +37,8 @@ class SurfaceContacts(Contacts):
         self.asked = asked
         counts = np.array([len(nodes) for nodes in self.local])
         starts = np.concatenate([[0], np.cumsum(counts)])
-        share = face_points(int(asked.points))
+        self.clipped = asked.faces == "overlaps"
+        share = face_points(0 if self.clipped else int(asked.points))
         parts: list[list[Any]] = [[] for _ in range(7)]
         faces, areas, edges, opposite, edge_areas, points, shares = parts
         for body, nodes, start in zip(run.bodies, self.local, starts, strict=False):
@@ -69,7 +75,8 @@ class SurfaceContacts(Contacts):
         length = np.linalg.norm(self.reference[face[:, 1]] - self.reference[face[:, 0]], axis=1)
         self.depth = float(DEPTH * np.median(length) if asked.depth is None else asked.depth)
         self.skin = self.depth
-        size, count, walls = len(self.nodes), int(self.firsts[2][-1]), len(asked.planes)
+        size, walls = len(self.nodes), len(asked.planes)
+        count = int(self.firsts[2][-1]) + self.clipped * len(face)
         point_face = np.concatenate([
             np.concatenate([np.repeat(np.arange(begin, end), len(share)), np.full(vertices, -1)])
             for begin, end, vertices in zip(
@@ -82,9 +89,9 @@ class SurfaceContacts(Contacts):
         self.kernel = SurfaceTouch(
             Surface(
                 self.reference, 4 * self.place, self.force_at, face,
-                area, np.searchsorted(face.ravel()[fan], np.arange(size + 1)), fan // 3,
+                area, body_of[1], np.searchsorted(face.ravel()[fan], np.arange(size + 1)), fan // 3,
                 np.concatenate(points), np.concatenate(shares), point_face,
-                np.where(point_face >= 0, area[point_face] / len(share), 0.0), body_of[2],
+                np.where(point_face >= 0, area[point_face] / max(1, len(share)), 0.0), body_of[2],
                 np.concatenate(edges),
                 np.concatenate(opposite), np.concatenate(edge_areas), body_of[3],
                 modulus, tangential_stiffness(modulus, poisson),
@@ -92,6 +99,7 @@ class SurfaceContacts(Contacts):
             near_of(
                 nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2)
             ),
+            overlaps_of(nothing.reshape(0, 2)), self.clipped,
             Walls(
                 *planes_arrays(asked.planes, asked.friction), np.full((walls, count), -1.0),
                 np.zeros((walls, count, 3)), np.zeros((walls, 3)),
@@ -112,15 +120,21 @@ class SurfaceContacts(Contacts):
     def forget(self) -> None:
         """Let go of all springs."""
         self.near.free[:] = -1.0
-        for weight in (self.near.weight, self.near.edge_weight, self.kernel.walls.weight):
+        overlaps, walls = self.kernel.overlaps, self.kernel.walls
+        overlaps.free[:] = -1.0
+        for weight in (self.near.weight, self.near.edge_weight, overlaps.area, walls.weight):
             weight[:] = -1.0
-        for spring in (self.near.spring, self.near.edge_spring, self.kernel.walls.spring):
+        for spring in (self.near.spring, self.near.edge_spring, overlaps.spring, walls.spring):
             spring[:] = 0.0
 
     def lists_renew(self, position: Floats) -> None:
         """Look for what is near around vertices at (c, 3) [m]."""
         reach = self.depth + self.skin
-        near = near_renew(self.near, self.kernel.surface, position, self.firsts, reach)
+        surface = self.kernel.surface
+        if self.clipped:
+            found = overlaps_renew(self.kernel.overlaps, surface, position, self.firsts, reach)
+            self.kernel = self.kernel._replace(overlaps=found)
+        near = near_renew(self.near, surface, position, self.firsts, reach)
         self.kernel = self.kernel._replace(near=near)
 
     def deepest_words(self) -> tuple[str, str]:
@@ -150,11 +164,27 @@ class SurfaceContacts(Contacts):
             modulus = surface.modulus[surface.edge_body[edge]]
             np.add.at(total, surface.edge[edge], (2 * near.edge_weight[at] * modulus)[:, None])
         held = np.maximum(walls.weight, 0).sum(axis=0)
-        stiffness = 2 * held * surface.modulus[surface.point_body]
-        face = surface.point_node
-        np.add.at(total, face, stiffness[:, None] * surface.point_share)
+        points = len(surface.point_body)
+        stiffness = 2 * held[:points] * surface.modulus[surface.point_body]
+        np.add.at(total, surface.point_node, stiffness[:, None] * surface.point_share)
+        if self.clipped:
+            total += self.overlaps_stiffness(held[points:])
         bound = total * self.inverse_mass + self.rigid_bound(total)
         return float(bound.max(initial=0.0))
+
+    def overlaps_stiffness(self, held: Floats) -> Floats:
+        """Row sums (c,) [N/m] of the overlaps, and of areas ``held`` (f,) [m^2] by walls."""
+        surface, overlaps = self.kernel.surface, self.kernel.overlaps
+        total = np.zeros(len(self.nodes))
+        at = np.flatnonzero(overlaps.area > 0)
+        one, other = surface.modulus[surface.face_body[overlaps.faces[at]]].T
+        stiffness = 2 * pair_stiffness(one, other) * overlaps.area[at]
+        for side in range(2):
+            share = overlaps.share[at, 3 * side : 3 * side + 3]
+            np.add.at(total, surface.face[overlaps.faces[at, side]], stiffness[:, None] * share)
+        by_wall = 2 * held * surface.modulus[surface.face_body]
+        np.add.at(total, surface.face, np.repeat(by_wall[:, None], 3, axis=1))
+        return total
 
     def energy(self) -> tuple[float, float]:
         """Energy in the springs, and work that the sliders took since the start [J]."""
@@ -171,6 +201,8 @@ class SurfaceContacts(Contacts):
         self.refresh()
         arrays = {f"contact_near_{name}": getattr(self.near, name) for name in Near._fields}
         arrays |= {f"contact_{name}": getattr(self.kernel, name) for name in TOUCH_ARRAYS}
+        overlaps = self.kernel.overlaps
+        arrays |= {f"contact_overlaps_{name}": getattr(overlaps, name) for name in Overlaps._fields}
         return arrays | {
             f"contact_wall_{name}": getattr(self.kernel.walls, name) for name in WALL_ARRAYS
         }
@@ -178,7 +210,8 @@ class SurfaceContacts(Contacts):
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take what `stored` gave."""
         near = Near(*(arrays[f"contact_near_{name}"].copy() for name in Near._fields))
-        self.kernel = self.kernel._replace(near=near)
+        overlaps = (arrays[f"contact_overlaps_{name}"].copy() for name in Overlaps._fields)
+        self.kernel = self.kernel._replace(near=near, overlaps=Overlaps(*overlaps))
         for name in TOUCH_ARRAYS:
             getattr(self.kernel, name)[:] = arrays[f"contact_{name}"]
         for name in WALL_ARRAYS:
