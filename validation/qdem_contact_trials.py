@@ -33,6 +33,8 @@ def cube(
 # --- two cubes face to face ----------------------------------------------------------------------
 
 PRESSURE = 1e6
+FACES_OF = {"surface": "points", "overlaps": "overlaps"}
+"""What of a face bears, by the name of the model here."""
 STIFFNESS, MODULUS = 1.613e9, 3e12
 """k_n of Table 1 [N/m]; p [Pa/m], as stiff as a layer of the stone of 1 cm."""
 FACES = (  # cells below and above, radius of spheres [m] or points of a face's edge
@@ -46,7 +48,7 @@ def contact_made(model: str, detail: float, friction: float) -> q.SphereContact 
     """Spheres of radius ``detail`` [m], or surfaces of ``detail`` squared points a face."""
     if model == "spheres":
         return q.SphereContact(detail, STIFFNESS, friction)
-    return q.SurfaceContact(MODULUS, friction, points=int(detail))
+    return q.SurfaceContact(MODULUS, friction, points=int(detail), faces=FACES_OF[model])
 
 
 def faces_stress(model: str, below: int, above: int, detail: float) -> tuple[Floats, float, float]:
@@ -118,7 +120,9 @@ def slope_gain(
     if model == "spheres":
         contact = q.SphereContact(radius, stiffness / 9, share / 2, planes=walls)
     else:
-        contact = q.SurfaceContact(stiffness / SIDE**2, share / 2, planes=walls)
+        contact = q.SurfaceContact(
+            stiffness / SIDE**2, share / 2, planes=walls, faces=FACES_OF[model]
+        )
     body = q.Body(box_mesh((SIDE,) * 3, (2, 2, 2), "kuhn", (0, 0, height)), STONE, rigid=rigid)
     times = np.linspace(0, ramp, 200)
     along = GRAVITY * np.sin(alpha) * 0.5 * (1 - np.cos(np.pi * times / ramp))
