@@ -57,7 +57,7 @@ def force_add(force: Any, nodes: Any, share: Any, f: Any, sign: float) -> None: 
         force[nodes[2], k] += sign * share[2] * f[k]
 
 
-@exact
+@inlined
 def law(
     c: Any, spring: Any, at: int, n: Any, g: float, way: Any, k_n: float, k_t: float,
     friction: float,

@@ -15,6 +15,7 @@ from qdem_fem.contact_kernel import exact, inlined, row, row_put, series, slider
 from qdem_fem.contact_surface_clip import (
     COLUMNS,
     CORNERS,
+    OPPOSED,
     RIM,
     cut,
     overlap_forces,
@@ -22,6 +23,9 @@ from qdem_fem.contact_surface_clip import (
     triangle_normal,
 )
 from qdem_fem.contact_surface_geometry import dot, less, scaled, velocity_of
+
+TURN = 0.2
+"""Angle that the normals of two faces may turn by before they are looked at again."""
 
 
 @inlined
@@ -31,22 +35,40 @@ def corners_of(x: Any, face: Any, f: int) -> Any:  # pragma: no cover
 
 
 @exact
+def height_of(a: Any, double: float) -> float:  # pragma: no cover
+    """Least height of a triangle of twice the area ``double`` [m^2]."""
+    longest = 0.0
+    for k in range(3):
+        side = less(a[k], a[k - 1])
+        longest = max(longest, dot(side, side))
+    return double / np.sqrt(longest)
+
+
+@exact
 def way_free(a: Any, b: Any, reach: float) -> float:  # pragma: no cover
     """Way [m] that two triangles are short of overlapping by zero to ``reach`` at least.
 
-    One lies before the plane of the other by so much, or their boxes are ``reach`` and more apart.
+    One lies before the plane of the other by so much, or their boxes are apart by more than what
+    they may have of ``reach`` along an axis, or they do not oppose each other.  The last two hold
+    while their normals turn by less than `TURN`: no more than `TURN` / 2 of the heights is free.
     """
-    far = -np.inf
-    for c in range(3):
-        low_a, high_a = min(a[0][c], a[1][c], a[2][c]), max(a[0][c], a[1][c], a[2][c])
-        low_b, high_b = min(b[0][c], b[1][c], b[2][c]), max(b[0][c], b[1][c], b[2][c])
-        far = max(far, low_a - high_b - reach, low_b - high_a - reach)
-    n_a, n_b = triangle_normal(a)[0], triangle_normal(b)[0]
+    n_a, double_a = triangle_normal(a)
+    n_b, double_b = triangle_normal(b)
     before_a, before_b = np.inf, np.inf
     for k in range(3):
         before_a = min(before_a, dot(less(b[k], a[0]), n_a))
         before_b = min(before_b, dot(less(a[k], b[0]), n_b))
-    return max(far, before_a, before_b)
+    most = 0.5 * TURN * min(height_of(a, double_a), height_of(b, double_b))
+    if dot(n_a, n_b) > 2.0 * TURN - OPPOSED:
+        return max(most, before_a, before_b)
+    length = np.sqrt(2.0 - 2.0 * dot(n_a, n_b))
+    far = -np.inf
+    for c in range(3):
+        low_a, high_a = min(a[0][c], a[1][c], a[2][c]), max(a[0][c], a[1][c], a[2][c])
+        low_b, high_b = min(b[0][c], b[1][c], b[2][c]), max(b[0][c], b[1][c], b[2][c])
+        deep = reach * (abs(n_b[c] - n_a[c]) / length + TURN)
+        far = max(far, low_a - high_b - deep, low_b - high_a - deep)
+    return max(min(far, most), before_a, before_b)
 
 
 @inlined
@@ -61,7 +83,7 @@ def spring_fit(spring: Any, before: float, now: float) -> Any:  # pragma: no cov
     return spring, (before - now) * square
 
 
-@exact
+@inlined
 def pair_forces(
     c: Any, at: int, velocity: Any, step: float, moved: float, room: Any, sums: Any
 ) -> None:  # pragma: no cover
