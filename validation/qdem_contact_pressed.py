@@ -86,14 +86,13 @@ def disc_stress(model: str, edge: float) -> float:
 
 
 def disc_checks(quick: bool) -> list[Check]:
-    """On two meshes; of linear elements and a load as wide as an edge, (edge/R)^2 is the scale."""
+    """On two meshes; of linear elements and a load as wide as an edge, so without a bar."""
     checks = []
     for edge in (0.004,) if quick else (0.004, 0.0025):
         for model in MODELS:
             error = abs(disc_stress(model, edge) - 1)
             name = f"Brazilian disc, edges of {1e3 * edge:g} mm, {model}: stress at the centre"
-            bar = None if model == "spheres" else float((edge / RADIUS) ** 2)
-            checks.append(reported(f"{name}, error", error, bar))
+            checks.append(reported(f"{name}, error", error))
     return checks
 
 
