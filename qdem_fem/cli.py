@@ -7,6 +7,7 @@ import json
 import sys
 import time
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -67,6 +68,8 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
     from qdem_fem.scene_build import simulation_of
     from qdem_fem.scene_run import run_dynamic, run_static
     from qdem_fem.summary import summary_of
+    from qdem_fem.track_figures import track_facts, track_pictures
+    from qdem_fem.track_scene import TrackPrepared
 
     run, bodies = simulation_of(prepared)  # what it refuses must not leave a folder behind
     folder = RunFolder(path)
@@ -90,7 +93,11 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
                 warnings.showwarning = _warning_show
                 done = run_dynamic(prepared, run, bodies, folder, resume=goes_on, progress=progress)
         summary = summary_of(prepared, done, folder)
-        report_write(folder, manifest, summary, None if arguments.no_pictures else done)
+        more: Iterable[tuple[Path, str]] = ()
+        if isinstance(prepared, TrackPrepared):
+            summary["track"] = track_facts(path, prepared.load)
+            more = track_pictures(path, prepared.load)
+        report_write(folder, manifest, summary, None if arguments.no_pictures else done, more)
         write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
     return summary | {"folder": str(path)}
 
@@ -112,13 +119,13 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
     from qdem_fem.errors import StepWarning
     from qdem_fem.scene_build import simulation_of
     from qdem_fem.scene_run import plan_of
-    from qdem_fem.summary import body_facts, critical_step_of, mass_scaling_facts
+    from qdem_fem.summary import bodies_facts, critical_step_of, mass_scaling_facts
 
     run, bodies = simulation_of(prepared)
     outlook: dict[str, Any] = {
         "title": prepared.scene.title,
         "method": prepared.scene.simulation.method,
-        "bodies": {name: body_facts(body) for name, body in bodies.items()},
+        "bodies": bodies_facts(bodies),
         "critical_step": critical_step_of(run),
         "mass_scaling": mass_scaling_facts(run),
         "left_out": prepared.scene.left_out(),

@@ -81,6 +81,12 @@ class ContactTooDeep(QdemError):
     exit_code = 6
 
 
+class EnergyLost(QdemError):
+    """The account of energies does not close: the motion is not that of the bodies."""
+
+    exit_code = 6
+
+
 class CheckpointError(QdemError):
     """A saved state is damaged or belongs to another simulation."""
 

@@ -25,6 +25,8 @@ Integers = NDArray[np.int64]
 WINDOW_STEPS = 4096
 GRAVITY_STEPS = 16
 """Steps over which the momentum is interpolated for the work of a gravity that changes."""
+VISCOUS_STEPS = 16
+"""Steps between two evaluations of the power that viscosity takes."""
 GROWTH = 10.0
 """Kinetic energy over all energy ever put in, above which a motion is called unstable."""
 
@@ -58,6 +60,9 @@ def march(
     most = max(16, min(WINDOW_STEPS, assembly.window_work // max(1, len(assembly.elements))))
     if run.gravity is not None and run.gravity.varying is not None:
         most = GRAVITY_STEPS
+    if run.counts_viscous:
+        most = min(most, VISCOUS_STEPS)
+        power = viscous_power(run)
     end = motion.steps_done + steps
     window = (run.contacts or run.rigid or run.absorbers or assembly).window
     while motion.steps_done < end:
@@ -76,6 +81,9 @@ def march(
             motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
         if run.rigid is not None:
             run.rigid.follow()
+        if run.counts_viscous:
+            power, before_power = viscous_power(run), power
+            motion.viscous_work += 0.5 * run.step * done * (before_power + power)
         motion_check(run, bad)
         if run.contacts is not None:
             run.contacts.step_check()
@@ -130,6 +138,18 @@ def energy_set(run: Simulation) -> float:
         return 0.0
     energy = run.energy()
     return energy.kinetic + abs(energy.elastic) + energy.contact + energy.foundation
+
+
+def viscous_power(run: Simulation) -> float:
+    """What viscosity takes now [W]: ``-v.(f(u, v) - f(u, 0))``, v half a step behind."""
+    assembly = run.assembly
+    place, speed = (assembly.field(name) for name in ("displacement", "velocity"))
+    loads, _ = run.packed_lists()
+    idle = run.conditions.table(np.zeros(2))
+    moving, still = (
+        assembly.accelerations(place, v, loads, idle, None) for v in (speed, np.zeros_like(speed))
+    )
+    return -float((assembly.mass * ((moving - still) * speed).sum(axis=1)).sum())
 
 
 def moment(run: Simulation) -> tuple[Floats, Floats]:

@@ -24,6 +24,8 @@ class Motion:
     """Work of the loads and of prescribed motion since the start [J]."""
     gravity_work: float = 0.0
     """Work of gravity since the start [J]."""
+    viscous_work: float = 0.0
+    """Energy that viscosity took since the start [J]; counted where the simulation asks for it."""
     absorbed: float = 0.0
     """Energy that absorbing faces took since the start [J]."""
     displacement_set: bool = False

@@ -210,17 +210,23 @@ def picture_history(
     quantity: str = "displacement",
     unit: str = "m",
     rivals: Mapping[str, Curve] | None = None,
+    against: str = "time (s)",
+    logarithmic: bool = False,
 ) -> None:
-    """Draw histories by name against time; ``rivals`` dashed, on top, to compare with."""
+    """Draw histories by name against time, or spectra; ``rivals`` dashed, on top, to compare with.
+
+    ``against``: what the first of each curve's arrays is; ``logarithmic``: of the values."""
     every = [values for _, values in (*curves.values(), *(rivals or {}).values())]
-    scale, name = unit_of(max(float(np.abs(v).max(initial=0.0)) for v in every), unit)
+    scale, name = unit_of(max(float(np.nanmax(np.abs(v), initial=0.0)) for v in every), unit)
     with _figure(path, (7.2, 3.2)) as figure:
         panel = figure.subplots()
         for (label, (time, values)), colour in zip(curves.items(), _colours(), strict=False):
             panel.plot(time, values / scale, color=colour, label=label)
         for label, (time, values) in (rivals or {}).items():
             panel.plot(time, values / scale, color=RIVAL, ls="--", lw=1.1, label=label)
-        panel.set(xlabel="time (s)", ylabel=f"{quantity} ({name})")
+        panel.set(xlabel=against, ylabel=f"{quantity} ({name})")
+        if logarithmic:
+            panel.set_yscale("log")
         panel.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=4)
 
 

@@ -9,6 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from qdem_fem.energy_account import STORED
 from qdem_fem.output import table_read, write_whole
 from qdem_fem.run_folder import RunFolder
 from qdem_fem.scene_run import Done
@@ -37,10 +38,13 @@ summary { cursor: pointer; color: #0b5fa5; }
 
 
 def report_write(
-    folder: RunFolder, manifest: dict[str, Any], summary: dict[str, Any], done: Done | None
-) -> Path:
-    """Write the report of a finished run, and its pictures unless ``done`` is None; its path."""
-    pictures = [] if done is None else list(_pictures(folder.path, summary, done))
+    folder: RunFolder, manifest: dict[str, Any], summary: dict[str, Any], done: Done | None,
+    more: Iterable[tuple[Path, str]] = (),
+) -> Path:  # fmt: skip
+    """Write the report of a finished run, and its pictures unless ``done`` is None; its path.
+
+    ``more``: files and captions of further pictures."""
+    pictures = [] if done is None else [*more, *_pictures(folder.path, summary, done)]
     title = summary["title"] or "QDEM run"
     body = [
         f"<h1>{escape(title)}</h1>",
@@ -202,7 +206,7 @@ def _energy(summary: dict[str, Any]) -> Iterator[str]:
     yield _table(("energy", "J"), rows)
 
 
-NAMED = ("kinetic", "elastic", "contact", "friction", "absorbed", "foundation", "external")
+NAMED = (*STORED, "external")
 
 
 def _left_out(summary: dict[str, Any]) -> Iterator[str]:

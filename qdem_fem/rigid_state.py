@@ -135,6 +135,11 @@ class RigidState:
         self._every.velocity[b] = velocity
         self._every.spin[b] = self._inertia_of(b) @ omega
 
+    def stop(self, chosen: NDArray[np.bool_]) -> None:
+        """Set velocities and turns of some of the bodies (b,) to zero."""
+        self._every.velocity[chosen] = 0.0
+        self._every.spin[chosen] = 0.0
+
     def _inertia_of(self, b: int) -> Floats:
         turn = np.eye(3) + turn_matrix(self._every.turn[b])
         return np.asarray(turn @ self._tensor[b] @ turn.T)
@@ -165,9 +170,13 @@ class RigidState:
 
     def kinetic(self, motion: RigidNow | None = None) -> float:
         """Kinetic energy of a motion, by default of the velocities as they are [J]."""
+        return float(self.kinetic_each(motion).sum())
+
+    def kinetic_each(self, motion: RigidNow | None = None) -> Floats:
+        """The same of each body [J], (b,)."""
         motion = motion or RigidNow(self._every.velocity, self._every.spin)
-        turning = (motion.spin * self.omega(motion.spin)).sum()
-        return 0.5 * float((self.mass[:, None] * motion.velocity**2).sum() + turning)
+        turning = (motion.spin * self.omega(motion.spin)).sum(axis=1)
+        return np.asarray(0.5 * (self.mass * (motion.velocity**2).sum(axis=1) + turning))
 
     def moment(self) -> tuple[Floats, Floats]:
         """``sum M d`` [kg m] and ``sum M V`` [kg m/s], (3,) each."""

@@ -249,8 +249,13 @@ class Output(Table):
     """Between rows of energy.csv [s]; by default a 200th of the duration, at least 100 steps."""
     vtu_interval: Positive | None = None
     """Between VTU files [s]; by default only the end is written."""
+    magnification: Positive | None = None
+    """Of displacements in a PNG picture beside every VTU file; none when not given."""
     checkpoint_interval: Interval = 300.0
     """Between checkpoints, by the clock on the wall [s]."""
+    audit: Share | None = None
+    """Share of the greatest energy that may be missing in the account of energies, what viscosity
+    takes included; a run stops beyond it.  Not looked at when not given."""
     probes: dict[Name, Probe] = Field(default_factory=dict)
     modes: Annotated[int, Field(ge=0, le=20)] = 3
     """Number of modes sought in each probe's free motion."""

@@ -57,7 +57,10 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     """
     import qdem_fem
     from qdem_fem.rigid_motions import held_check
+    from qdem_fem.track_scene import TrackPrepared, track_enter
 
+    if isinstance(prepared, TrackPrepared):
+        return track_enter(prepared)
     scene, table = prepared.scene, prepared.scene.simulation
     bodies = {
         body.name: qdem_fem.Body(

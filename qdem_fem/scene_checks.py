@@ -80,6 +80,10 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     when the scene or an override can not be read.
     """
     text = scene_read(path, overrides)
+    if "track" in text.data:
+        from qdem_fem.track_scene import track_load
+
+        return track_load(text)
     problems = list(text.problems)
     folder = text.path.parent
     meshes, found = _meshes(text, folder)
@@ -100,7 +104,7 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     for _, output in _tables(text, Output):
         found = list(_probes(output, names, meshes, probes))
         problems += found
-    problems += _times(text)
+    problems += output_faults(text)
     for _, contact in _tables(text, ContactTable):
         faults = contact_faults(contact, text.tables.get("simulation"), names)
         problems += [Problem(*fault) for fault in faults]
@@ -237,7 +241,7 @@ def _without_body(probe: Probe) -> Nodes:
     return Nodes(**probe.model_dump(exclude={"body"}))
 
 
-def _times(text: SceneText) -> Iterator[Problem]:
+def output_faults(text: SceneText) -> Iterator[Problem]:
     """What duration, step and intervals demand of one another."""
     simulation = text.tables.get("simulation")
     output = text.tables.get("output", Output())

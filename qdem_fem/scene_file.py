@@ -114,11 +114,16 @@ def scene_read(path: Path | str, overrides: Sequence[str] = ()) -> SceneText:
 def _tables_check(scene: SceneText) -> None:
     """Check each table on its own, so that a wrong one never hides what is wrong elsewhere."""
     data = scene.data
+    known = Scene.model_fields
+    if "track" in data:
+        from qdem_fem.track_scene import TrackScene
+
+        known = TrackScene.model_fields
     for name in data:
-        if name not in Scene.model_fields:
-            near = did_you_mean(name, Scene.model_fields)
+        if name not in known:
+            near = did_you_mean(name, known)
             scene.problems.append(Problem(name, f"unknown key{near}"))
-    for name, definition in Scene.model_fields.items():
+    for name, definition in known.items():
         model = _model_in(definition.annotation)
         if name not in data or model is None:
             if definition.is_required():
@@ -127,7 +132,7 @@ def _tables_check(scene: SceneText) -> None:
                 scene.problems.append(Problem(name, f"must be a text, not {_shown(data[name])}"))
             continue
         value = data[name]
-        if name in ("simulation", "contact", "output"):
+        if name in ("simulation", "contact", "output", "track"):
             _table_check(scene, name, model, value)
         elif not isinstance(value, list) or (not value and definition.is_required()):
             scene.problems.append(Problem(name, f"write [[{name}]] tables, not {_shown(value)}"))

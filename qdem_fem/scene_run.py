@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.errors import Interrupted
-from qdem_fem.output import Table, bodies_vtu_write, pvd_write, write_whole
+from qdem_fem.energy_account import energy_facts
+from qdem_fem.errors import EnergyLost, Interrupted
+from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, write_whole
 from qdem_fem.run_folder import RunFolder
 from qdem_fem.scene_checks import Prepared
 
@@ -26,6 +27,7 @@ ENERGY = 100
 """Least steps between rows of energies, unless asked otherwise: a row costs as much as twenty."""
 ENERGIES = ("kinetic", "elastic", "external")
 CONTACT_ENERGIES = ("contact", "friction")
+VISCOUS_ENERGY = ("viscous",)
 ABSORBING_ENERGIES = ("absorbed", "foundation")
 COST = "cost.json"
 
@@ -115,10 +117,15 @@ def run_dynamic(
     goes_on = resume and folder.checkpoint.exists()
     if goes_on:
         run.restore(folder.checkpoint)
+    run.counts_viscous = prepared.scene.output.audit is not None and run.viscous
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
     plan = plan_of(prepared, float(run.step))
     rows, energies = _tables(folder.path, probes, energy_names(run))
-    record = _Record(run, list(bodies.values()), plan, folder.path, rows, energies)
+    output = prepared.scene.output
+    record = _Record(
+        run, list(bodies.values()), plan, folder.path, rows, energies, output.audit,
+        output.magnification,
+    )  # fmt: skip
     if goes_on:
         record.go_on()
     else:
@@ -180,6 +187,10 @@ class _Record:
     path: Path
     rows: Table
     energies: Table
+    audit: float | None = None
+    """Share of the greatest energy that may be missing."""
+    magnification: float | None = None
+    """Of displacements in pictures beside the VTU files."""
     cost: dict[str, float] = field(default_factory=dict)
     """``cpu_s`` and ``wall_s`` of advancing so far [s]."""
 
@@ -217,13 +228,33 @@ class _Record:
         self.rows.append(np.column_stack([number * plan.step, *columns]))
         if run.steps_done % plan.energy == 0 or run.steps_done == plan.total:
             self.energies.append(_energy_row(run, run.steps_done * plan.step))
+            self.audit_hold()
         self.write_fields()
+
+    def audit_hold(self) -> None:
+        """Raise `EnergyLost` where the account of energies so far does not close."""
+        if self.audit is None:
+            return
+        missing = energy_facts(table_read(self.energies.path))["relative_imbalance"]
+        if missing > self.audit:
+            raise EnergyLost(
+                f"{missing:.2e} of the greatest energy is missing in the account; "
+                f"{self.audit:.2g} is allowed",
+                where=f"t = {self.run.time:.6g} s, step {self.run.steps_done}",
+                remedy="take a shorter step (simulation.safety), or look in energy.csv what grows",
+            )
 
     def write_fields(self) -> None:
         """Write the VTU file that is due now, and the list of all."""
         files = self.plan.field_files(self.run.steps_done)
         if files and files[-1][0] == self.run.steps_done:
-            bodies_vtu_write(self.path / files[-1][2], self.bodies)
+            target = self.path / files[-1][2]
+            bodies_vtu_write(target, self.bodies)
+            if self.magnification is not None:
+                from qdem_fem.pictures import picture_deformed
+
+                picture = target.with_name(f"picture-{target.stem}.png")
+                picture_deformed(picture, self.bodies, magnification=self.magnification)
             pvd_write(self.path / "fields.pvd", [(when, name) for _, when, name in files])
 
 
@@ -244,9 +275,10 @@ def _cost_read(path: Path) -> dict[str, float]:
 
 
 def energy_names(run: Any) -> tuple[str, ...]:
-    """Columns of energy.csv beside the time; of what the scene has."""
+    """Columns of energy.csv beside the time; of what the scene has and counts."""
     touching = () if run.contact is None else CONTACT_ENERGIES
-    return ENERGIES + touching + (ABSORBING_ENERGIES if run.conditions.absorbing else ())
+    ground = ABSORBING_ENERGIES if run.conditions.absorbing else ()
+    return ENERGIES + touching + VISCOUS_ENERGY * run.counts_viscous + ground
 
 
 def _tables(path: Path, probes: dict[str, Any], energies: tuple[str, ...]) -> tuple[Table, Table]:

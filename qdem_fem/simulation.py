@@ -68,6 +68,8 @@ class Energy:
     """In the springs of contacts."""
     friction: float = 0.0
     """Work that sliders of contacts took since the start."""
+    viscous: float = 0.0
+    """What viscosity took since the start, where `Simulation.counts_viscous`."""
     absorbed: float = 0.0
     """What dashpots of absorbing faces took since the start."""
     foundation: float = 0.0
@@ -150,6 +152,9 @@ class Simulation(ConditionedBodies):
         self._assembly: Assembly | None = None
         self._lists: tuple[kernel.Loads, kernel.Constraints] | None = None
         self._critical: CriticalStep | None = None
+        self.counts_viscous = False
+        """Whether the march counts what viscosity takes; every `VISCOUS_STEPS`, at two more
+        evaluations of the forces."""
         self.warned = nan
         """The critical step of which a warning was given [s]."""
         for body in self.bodies:
@@ -312,7 +317,8 @@ class Simulation(ConditionedBodies):
                 external += float(self.rigid.half_work().sum())
         touching = (0.0, 0.0) if self.contacts is None else self.contacts.energy()
         ground = (0.0, 0.0) if self.absorbers is None else self._ground_energy(velocity)
-        return Energy(kinetic, float(elastic), external, *touching, *ground)
+        viscous = self.motion.viscous_work
+        return Energy(kinetic, float(elastic), external, *touching, viscous, *ground)
 
     def _ground_energy(self, velocity: Floats) -> tuple[float, float]:
         """Taken by absorbing faces, and in their springs [J]; ``velocity`` (n, 3) [m/s]: of now."""

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from qdem_fem.energy_account import energy_facts
 from qdem_fem.output import table_read
 from qdem_fem.run_folder import RunFolder
 from qdem_fem.scene_checks import Prepared
-from qdem_fem.scene_run import ABSORBING_ENERGIES, CONTACT_ENERGIES, Done
+from qdem_fem.scene_run import Done
 from qdem_fem.scene_series import TimeSeries
 from qdem_fem.spectra import Mode, peak_frequencies
 
@@ -38,7 +39,7 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
         "steps": 0 if done.plan is None else done.plan.total,
         "critical_step": critical_step_of(run),
         "mass_scaling": mass_scaling_facts(run),
-        "bodies": {name: body_facts(body) for name, body in done.bodies.items()},
+        "bodies": bodies_facts(done.bodies),
         "cost": {**cost, "million_elements_per_s": element_steps / 1e6 / cost["wall_s"]}
         if element_steps and cost["wall_s"]
         else dict(cost),
@@ -77,6 +78,22 @@ def mass_scaling_facts(run: Any) -> dict[str, float]:
     return {"added_mass": float(added), "share": float(added / sum(own.values()))}
 
 
+def bodies_facts(bodies: dict[str, Any]) -> dict[str, Any]:
+    """`body_facts` by name; of bodies that are named alike but for a number behind a dash, one
+    entry: sums, and the smallest altitude."""
+    kinds: dict[str, list[dict[str, Any]]] = {}
+    for name, body in bodies.items():
+        stem, _, number = name.rpartition("-")
+        kinds.setdefault(stem if number.isdecimal() else name, []).append(body_facts(body))
+    found = {}
+    for kind, facts in kinds.items():
+        least = min(facts, key=lambda one: float(one["smallest_altitude"]))
+        own = ("smallest_altitude", "thinnest_element")
+        total = {k: least[k] if k in own else sum(one[k] for one in facts) for k in facts[0]}
+        found[kind if len(facts) == 1 else f"{len(facts)} of {kind}"] = total
+    return found
+
+
 def body_facts(body: Any) -> dict[str, Any]:
     """Figures of a body's mesh: counts, what was mended, smallest altitude [m], mass [kg]."""
     from qdem_fem.mesh import altitudes
@@ -94,22 +111,6 @@ def body_facts(body: Any) -> dict[str, Any]:
         "thinnest_element": thinnest,
         "volume": float(volumes.sum()),
         "mass": float((volumes * body.material.density).sum()),
-    }
-
-
-def energy_facts(energy: dict[str, FloatArray]) -> dict[str, float]:
-    """Energies at the end [J], and the greatest of external less all others on the way."""
-    known = ("kinetic", "elastic", *CONTACT_ENERGIES, *ABSORBING_ENERGIES)
-    names = [name for name in known if name in energy]
-    stored = np.sum([energy[name] for name in names], axis=0)
-    if "contact" in energy:  # overlap that the scene begins with is no work of its loads
-        stored = stored - energy["contact"][0]
-    missing = energy["external"] - stored
-    greatest = float(max(np.abs(energy["external"]).max(), stored.max()))
-    return {
-        **{name: float(energy[name][-1]) for name in [*names, "external"]},
-        "greatest_imbalance": float(np.abs(missing).max()),
-        "relative_imbalance": float(np.abs(missing).max()) / greatest if greatest > 0 else 0.0,
     }
 
 

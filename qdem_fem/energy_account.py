@@ -1,0 +1,26 @@
+"""The account of energies of a run: what is stored, taken and put in, and what is missing."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+STORED = ("kinetic", "elastic", "contact", "friction", "viscous", "absorbed", "foundation")
+"""Stored in the bodies or taken from them, where a run has it."""
+
+
+def energy_facts(energy: dict[str, FloatArray]) -> dict[str, float]:
+    """Energies at the end [J], and the greatest of external less all others on the way."""
+    names = [name for name in STORED if name in energy]
+    stored = np.sum([energy[name] for name in names], axis=0)
+    if "contact" in energy:  # overlap that the scene begins with is no work of its loads
+        stored = stored - sum(energy[name][0] for name in ("contact", "elastic"))
+    missing = energy["external"] - stored
+    greatest = float(max(np.abs(energy["external"]).max(), stored.max()))
+    return {
+        **{name: float(energy[name][-1]) for name in [*names, "external"]},
+        "greatest_imbalance": float(np.abs(missing).max()),
+        "relative_imbalance": float(np.abs(missing).max()) / greatest if greatest > 0 else 0.0,
+    }

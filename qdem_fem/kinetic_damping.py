@@ -1,0 +1,188 @@
+"""Rest by kinetic damping: a march whose velocities are set to zero at every peak of the motion.
+
+Undamped motion under constant loads turns potential energy into kinetic and back; at a peak of the
+kinetic energy the potential has its least, so what moves is stopped there and begins anew
+(Cundall 1976).  It needs no coefficient and no viscosity, and serves bodies in frictional contact,
+rigid or not, which have no static answer in `qdem_fem.dynamic_relaxation`.
+
+The peak is that of all bodies together (``each=False``), or of each body by itself: grains in a
+bed strike at different times, and while one falls the sum of all grows, so that the others go on
+rattling; stopped one by one, each lands as if it did not bounce.
+
+What is at rest is said by two numbers (`Rest`), never by a number of steps.  Time goes on while a
+simulation is damped, so its loads should be constant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.errors import ConditionError, NotConverged
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+Floats = NDArray[np.float64]
+
+LOOK = 40
+"""Steps between two looks at the kinetic energy."""
+WAIT = 4
+"""Looks without a greater kinetic energy after which a body is past its peak: a grain that
+topples while it trembles goes on."""
+CHECK = 25
+"""Looks between two judgements of the state."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """How near to equilibrium bodies in contact are, and what it took."""
+
+    unbalanced: float
+    """Root mean square of `resultants` over the mean of `contact_forces` [-]."""
+    kinetic: float
+    """Kinetic energy over that of springs and elements [-]; greatest since the last judgement."""
+    loose: float
+    """Share of bodies on which `resultants` exceed half the weight [-]."""
+    touching: int
+    """Vertices that touch."""
+    peaks: int
+    """Times that a body was stopped, or all together."""
+    steps: int
+    time: float
+    """Simulated [s]."""
+
+
+def resultants(run: Simulation) -> Floats:
+    """Contact force, weight and loads on each body now [N], (bodies, 3); zero along what is held.
+
+    Zero in equilibrium: elastic and viscous forces cancel within a body and are not in it.
+    """
+    contacts = run.contacts
+    if contacts is None:
+        raise ConditionError("bodies that do not touch", where="kinetic damping", remedy="contact=")
+    contacts.refresh()
+    total = np.zeros((len(run.bodies), 3))
+    np.add.at(total, bodies_of(run, contacts.nodes), contacts.kernel.force)
+    now = np.array([run.time])
+    gravity = run.gravity_at(now)
+    if gravity is not None:
+        total += masses(run)[:, None] * gravity[0]
+    for load in run.conditions.loads:
+        force = load.weights * load.driver.sample(now)[0]
+        np.add.at(total, bodies_of(run, load.nodes), force)
+    for held in run.conditions.held:
+        for component in held.components:
+            total[bodies_of(run, held.nodes), component] = 0.0
+    for roller in run.conditions.rollers:
+        mine = np.unique(bodies_of(run, roller.nodes))
+        total[mine] -= np.outer(total[mine] @ roller.normal, roller.normal)
+    return total
+
+
+def bodies_of(run: Simulation, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Numbers of the bodies that nodes, in the numbers of all bodies, belong to."""
+    return np.asarray(np.searchsorted(run.first_node, nodes, side="right") - 1)
+
+
+def masses(run: Simulation) -> Floats:
+    """Mass of each body [kg], (bodies,)."""
+    return np.array(
+        [float((b.material.density * b.gradients[1]).sum()) for b in run.bodies], dtype=float
+    )
+
+
+def contact_forces(run: Simulation) -> Floats:
+    """Sizes of the contact forces on vertices that touch something, walls included [N], (t,)."""
+    assert run.contacts is not None
+    size = np.linalg.norm(run.contacts.kernel.force, axis=1)
+    return np.asarray(size[size > 0])
+
+
+def kinetic_each(run: Simulation) -> Floats:
+    """Kinetic energy of each body by the velocities as they are, half a step behind [J], (b,)."""
+    own = np.asarray(run.assembly.state.velocity).reshape(-1, 4)[run.assembly.place, :3]
+    nodal = 0.5 * run.assembly.mass * np.einsum("nc,nc->n", own, own)
+    each = np.add.reduceat(nodal, run.first_node[:-1])
+    if run.rigid is not None:
+        each[[body.rigid is not False for body in run.bodies]] += run.rigid.kinetic_each()
+    return np.asarray(each)
+
+
+def stop(run: Simulation, bodies: NDArray[np.bool_]) -> None:
+    """Set the velocities of some bodies (b,) to zero; the account of energies is not told."""
+    still = np.repeat(bodies, np.diff(run.first_node))
+    at = run.assembly.place[still]
+    run.assembly.state.velocity.reshape(-1, 4)[at] = 0.0
+    if run.rigid is not None:
+        run.rigid.stop(bodies[[body.rigid is not False for body in run.bodies]])
+
+
+def rest_find(
+    run: Simulation, unbalanced: float, kinetic: float, loose: float, most: float,
+    progress: Callable[[Rest], None] | None = None, look: int = LOOK, each: bool = True,
+) -> Rest:  # fmt: skip
+    """March with kinetic damping until the bodies are in equilibrium; they are at rest then.
+
+    ``unbalanced``, ``kinetic`` and ``loose``: greatest shares of `Rest` that are equilibrium;
+    ``most``: simulated time [s] after which `NotConverged` is raised, the state reached being
+    kept; ``look``: steps between two looks at the motion, some per period of a grain on its
+    contacts; ``each``: bodies are stopped one by one.
+    The account of energies knows nothing of what is taken at peaks.
+    """
+    first, begun, peaks, looks = run.steps_done, run.time, 0, 0
+    peak = np.zeros(len(run.bodies))
+    since = np.zeros(len(run.bodies), int)
+    greatest = 0.0
+    every = np.ones(len(run.bodies), bool)
+    while True:
+        run.advance(look * run.step)
+        now = kinetic_each(run)
+        greatest, looks = max(greatest, float(now.sum())), looks + 1
+        if not each:
+            now = np.full_like(now, now.sum())
+        since = np.where(now > peak, 0, since + 1)
+        peak = np.maximum(peak, now)
+        past = since >= (WAIT if each else 1)
+        if past.any():
+            stop(run, past)
+            peaks += int(past.sum()) if each else 1
+            peak[past] = 0.0
+            since[past] = 0
+        if looks < CHECK:
+            continue
+        rest = _judged(run, greatest, peaks, run.steps_done - first, run.time - begun)
+        looks, greatest = 0, 0.0
+        if progress is not None:
+            progress(rest)
+        if rest.unbalanced <= unbalanced and rest.kinetic <= kinetic and rest.loose <= loose:
+            stop(run, every)
+            return rest
+        if rest.time > most:
+            raise NotConverged(
+                f"no equilibrium after {rest.time:.4g} s: unbalanced force "
+                f"{rest.unbalanced:.3g} of the mean contact force ({unbalanced:g} asked), kinetic "
+                f"energy {rest.kinetic:.3g} of that of springs ({kinetic:g} asked), "
+                f"{rest.loose:.3g} of the bodies loose ({loose:g} asked)",
+                where=f"kinetic damping, {peaks} peaks",
+                remedy="give it more time, or ask for less",
+            )
+
+
+def _judged(run: Simulation, greatest: float, peaks: int, steps: int, time: float) -> Rest:
+    energy = run.energy()
+    stored = energy.elastic + energy.contact
+    forces = contact_forces(run)
+    size = np.linalg.norm(resultants(run), axis=1)
+    gravity = run.gravity_at(np.array([run.time]))
+    weight = 0.0 if gravity is None else masses(run) * float(np.linalg.norm(gravity[0]))
+    return Rest(
+        unbalanced=float(np.sqrt((size**2).mean()) / forces.mean()) if len(forces) else np.inf,
+        kinetic=greatest / stored if stored > 0 else np.inf,
+        loose=float((size > 0.5 * weight).mean()),
+        touching=len(forces), peaks=peaks, steps=steps, time=time,
+    )  # fmt: skip

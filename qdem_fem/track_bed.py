@@ -1,0 +1,306 @@
+"""The prepared bed: grains fall, the sleeper is laid on them, cribs are filled, all comes to rest.
+
+Section 4 of the paper embeds the sleeper in the ballast and lets both settle by free fall.  Here
+that is done in `STAGES`, each ended by kinetic damping (`qdem_fem.kinetic_damping`):
+
+* ``bed``: the grains below the sleeper fall, rigid and on springs softer by ``softness``, whose
+  steps are longer by its root;
+* ``crib``: the sleeper is laid on the highest grain below it and goes down upright, grains fall
+  beside it, alike;
+* ``firm``: the same with springs softer by the root of ``softness`` only;
+* ``hard``: with the springs asked for: what overlaps too much for them moves apart;
+* ``rest``: deformable bodies on the springs asked for, as the run has them.
+
+Only the last stage says what the state is worth; the others say where grains begin.  What each
+leaves is a file, from which the next goes on, and any number of runs: other loads, other
+frictions.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.body import Body
+from qdem_fem.contact_spheres import ContactPlane, SphereContact
+from qdem_fem.errors import CheckpointError
+from qdem_fem.grain_grading import Grading
+from qdem_fem.grain_set import GrainSet, grains_make
+from qdem_fem.kinetic_damping import Rest, rest_find
+from qdem_fem.material import Material
+from qdem_fem.output import write_whole
+from qdem_fem.periodic import PeriodicWidth
+from qdem_fem.sleeper_mesh import SleeperShape
+from qdem_fem.track_bodies import GAP, TrackBox, grains_nodes, lattice_loose, sleeper_slice
+
+if TYPE_CHECKING:
+    from qdem_fem.mesh import TetMesh
+    from qdem_fem.simulation import Simulation
+
+Floats = NDArray[np.float64]
+
+STAGES = ("bed", "crib", "firm", "hard", "rest")
+ROUGH = (0.1, 1e-3, 0.02)
+"""Unbalanced, kinetic and loose share that end the stages of softer springs."""
+SLEEPER = "sleeper"
+
+
+@dataclass(frozen=True)
+class BedRecipe:
+    """Everything that the prepared bed depends on, SI."""
+
+    box: TrackBox
+    below: int
+    """Grains below the sleeper."""
+    beside: int
+    """Grains that fall into the cribs."""
+    seed: int
+    sizes: tuple[float, float]
+    """Least and greatest sieve size of the grains' meshes [m]."""
+    shape: SleeperShape
+    cells: tuple[int, int, int]
+    ballast: Material
+    sleeper: Material
+    radius: float
+    stiffness: tuple[float, float]
+    """k_n of ballast and sleeper [N/m]."""
+    friction: float
+    side_friction: float
+    """Of the walls at the sides; smooth ones are planes of symmetry."""
+    gravity: tuple[float, float, float]
+    softness: float
+    unbalanced: float
+    kinetic: float
+    loose: float
+    """Greatest shares of `Rest` that are equilibrium."""
+    patience: float
+    """Simulated time of a stage after which it is given up [s]."""
+    rigid: bool = True
+    """Whether grains are rigid until the last stage."""
+    periodic: bool = False
+    """Whether the track repeats along y, as in the paper, in place of walls there."""
+
+    def planes(self) -> tuple[ContactPlane, ...]:
+        """Ground and sides."""
+        length, width = self.box.length, self.box.width
+        ground = ContactPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        sides = [
+            ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+            ((length, 0.0, 0.0), (-1.0, 0.0, 0.0)),
+            ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            ((0.0, width, 0.0), (0.0, -1.0, 0.0)),
+        ]
+        if self.periodic:
+            sides = sides[:2]
+        return (ground, *(ContactPlane(*side, self.side_friction) for side in sides))
+
+    def contact(self, names: Sequence[str], softness: float = 1.0) -> SphereContact:
+        """Spheres of bodies with these names, their springs softer by a factor."""
+        ballast, sleeper = self.stiffness
+        each = {n: softness * (sleeper if n == SLEEPER else ballast) for n in names}
+        width = PeriodicWidth("y", self.box.width) if self.periodic else None
+        return SphereContact(self.radius, each, self.friction, self.planes(), periodic=width)
+
+    def told(self) -> str:
+        """The recipe as a text, equal for equal beds."""
+        return json.dumps(asdict(self), sort_keys=True, default=np.ndarray.tolist)
+
+
+@dataclass(frozen=True, eq=False)
+class Bed:
+    """A prepared bed, or what a stage on the way to it left."""
+
+    stage: str
+    nodes: list[Floats]
+    """Reference positions of each body's nodes [m]; grains below, beside, then the sleeper."""
+    displacement: Floats
+    """Of all nodes [m], (n, 3)."""
+    contact: dict[str, NDArray[Any]]
+    """Pairs and springs, as `Contacts.stored` gives them; empty before the last stage."""
+    rests: dict[str, dict[str, float]]
+    """`qdem_fem.kinetic_damping.Rest` of each stage done, and its ``cpu_s``."""
+
+    @property
+    def positions(self) -> list[Floats]:
+        """Where the nodes of each body are now [m]."""
+        ends = np.cumsum([len(nodes) for nodes in self.nodes])[:-1]
+        moved = np.split(self.displacement, ends)
+        return [nodes + u for nodes, u in zip(self.nodes, moved, strict=True)]
+
+
+def grains_of(recipe: BedRecipe) -> GrainSet:
+    """The grains of a bed."""
+    grading = Grading(np.array(recipe.sizes), np.array([0.0, 1.0]))
+    return grains_make(recipe.below + recipe.beside, recipe.seed, None, grading)
+
+
+def names_of(count: int, sleeper: bool) -> list[str]:
+    """Names of the bodies: ``grain-0`` and so on, and the sleeper."""
+    return [f"grain-{number}" for number in range(count)] + [SLEEPER] * sleeper
+
+
+def meshes_of(recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats]) -> list[TetMesh]:
+    """Meshes of bodies at their places: grains, and the sleeper where nodes are one more."""
+    meshes = [replace(grains.mesh(i), nodes=x) for i, x in enumerate(nodes[: len(grains)])]
+    if len(nodes) > len(grains):
+        block = sleeper_slice(recipe.shape, recipe.box, 0.0, recipe.radius, recipe.cells)
+        meshes.append(replace(block, nodes=nodes[-1]))
+    return meshes
+
+
+def bodies_of_bed(
+    recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats], *, rigid: bool
+) -> dict[str, Body]:
+    """Bodies by name; of masses at their nodes where rigid, as deformable ones have them."""
+    sleeper = len(nodes) > recipe.below + recipe.beside
+    names = names_of(len(nodes) - sleeper, sleeper)
+    return {
+        name: Body(
+            mesh, recipe.sleeper if name == SLEEPER else recipe.ballast, name=name,
+            rigid="lumped" if rigid else False,
+        )
+        for name, mesh in zip(names, meshes_of(recipe, grains, nodes), strict=True)
+    }  # fmt: skip
+
+
+def bed_prepare(
+    recipe: BedRecipe, path: Path, threads: int | None = None,
+    progress: Callable[[str, Rest], None] | None = None,
+) -> Bed:  # fmt: skip
+    """The bed in the file ``path``; made there, stage after stage, where it is not yet.
+
+    Raises `CheckpointError` for a file of another recipe, `NotConverged` where a stage finds no
+    equilibrium.
+    """
+    bed = bed_read(path, recipe) if path.exists() else None
+    grains = grains_of(recipe)
+    for number, stage in enumerate(STAGES):
+        if bed is not None and STAGES.index(bed.stage) >= number:
+            continue
+        bed = _stage_run(recipe, grains, stage, bed, threads, progress)
+        bed_write(path, recipe, bed)
+    assert bed is not None
+    return bed
+
+
+def _stage_run(
+    recipe: BedRecipe, grains: GrainSet, stage: str, before: Bed | None, threads: int | None,
+    progress: Callable[[str, Rest], None] | None,
+) -> Bed:  # fmt: skip
+    import time
+
+    from qdem_fem.simulation import Simulation
+
+    started = time.process_time()
+    last = stage == STAGES[-1]
+    nodes = _nodes_begin(recipe, grains, stage, before)
+    bodies = bodies_of_bed(recipe, grains, nodes, rigid=recipe.rigid and not last)
+    softness = {"firm": recipe.softness**0.5, "hard": 1.0, "rest": 1.0}.get(stage, recipe.softness)
+    contact = recipe.contact(list(bodies), softness)
+    if not last and recipe.rigid:
+        contact = replace(contact, contacts=1)
+    run = Simulation(
+        list(bodies.values()), gravity=recipe.gravity, threads=threads, contact=contact
+    )
+    if SLEEPER in bodies:
+        sleeper_guide(run, bodies[SLEEPER], upright=stage == "crib")
+    shares = (
+        (recipe.unbalanced, recipe.kinetic, recipe.loose) if stage in ("hard", "rest") else ROUGH
+    )
+    told = None if progress is None else (lambda rest: progress(stage, rest))
+    rest = rest_find(run, *shares, recipe.patience, told)
+    rests = {} if before is None else dict(before.rests)
+    rests[stage] = {**asdict(rest), "step": run.step, "cpu_s": time.process_time() - started}
+    moved = run.assembly.field("displacement")
+    assert run.contacts is not None
+    springs = run.contacts.stored() if last else {}
+    return Bed(stage, [body.nodes for body in run.bodies], moved, springs, rests)
+
+
+def _nodes_begin(
+    recipe: BedRecipe, grains: GrainSet, stage: str, before: Bed | None
+) -> list[Floats]:
+    """Where the bodies of a stage begin [m]."""
+    if before is None:
+        loose = grains_nodes(grains)[: recipe.below]
+        return lattice_loose(loose, recipe.box, 0.0, recipe.radius, recipe.seed)
+    if stage != "crib":
+        return before.positions
+    below, radius, shape = before.positions, recipe.radius, recipe.shape
+    middle, half = recipe.box.width / 2, shape.width / 2
+    reach = half + 2 * radius
+    every = np.concatenate(below)
+    under = np.abs(every[:, 1] - middle) <= reach
+    bottom = float(every[under, 2].max()) + 2 * radius + GAP
+    block = sleeper_slice(shape, recipe.box, bottom, radius, recipe.cells)
+    beside = lattice_loose(
+        grains_nodes(grains)[recipe.below :], recipe.box,
+        float(every[:, 2].max()) + radius + GAP, radius, recipe.seed + 1,
+        (middle - reach + radius, middle + reach - radius),
+    )  # fmt: skip
+    return [*below, *beside, block.nodes]
+
+
+def sleeper_guide(run: Simulation, sleeper: Body, *, upright: bool) -> None:
+    """Hold a slice: its ends in their planes, or, while it is laid, all but its way down."""
+    if upright and sleeper.rigid:
+        run.fix(sleeper, np.arange(len(sleeper.nodes)), "xy")
+    else:
+        run.fix(sleeper, sleeper.mesh.node_sets["ends"], "x")
+
+
+def bed_enter(run: Simulation, bed: Bed) -> None:
+    """Put a simulation of a bed's bodies into the prepared state, springs included, at rest.
+
+    Its friction, loads and conditions may be others than those it was prepared with: springs
+    beyond Coulomb's limit slip in the first step.
+    """
+    at = 0
+    for body, nodes in zip(run.bodies, bed.nodes, strict=True):
+        body.displacement = bed.displacement[at : at + len(nodes)]
+        at += len(nodes)
+    if run.contacts is not None and bed.contact:
+        run.contacts.restore({**bed.contact, "contact_slid": 0 * bed.contact["contact_slid"]})
+
+
+def bed_write(path: Path, recipe: BedRecipe, bed: Bed) -> None:
+    """Write a bed, atomically."""
+    stream = BytesIO()
+    head = {"recipe": recipe.told(), "stage": bed.stage, "rests": bed.rests}
+    np.savez_compressed(
+        stream, head=json.dumps(head), nodes=np.concatenate(bed.nodes),
+        counts=[len(nodes) for nodes in bed.nodes], displacement=bed.displacement,
+        **bed.contact,  # type: ignore[arg-type]
+    )  # fmt: skip
+    write_whole(path, stream.getvalue())
+
+
+def bed_read(path: Path, recipe: BedRecipe) -> Bed:
+    """Read what `bed_write` wrote for this recipe; raises `CheckpointError` else."""
+    remedy = "give another file, or remove it to prepare the bed anew"
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        head = json.loads(str(arrays.pop("head")))
+        counts, nodes = arrays.pop("counts"), arrays.pop("nodes")
+        displacement = arrays.pop("displacement")
+        told, stage, rests = head["recipe"], head["stage"], head["rests"]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise CheckpointError(f"no bed ({error})", where=str(path), remedy=remedy) from error
+    if told != recipe.told():
+        there, here = json.loads(told), json.loads(recipe.told())
+        other = [name for name in here if there.get(name) != here[name]]
+        raise CheckpointError(
+            f"it holds a bed that was prepared otherwise: {', '.join(other)} differ",
+            where=str(path), remedy=remedy,
+        )  # fmt: skip
+    parts = np.split(nodes, np.cumsum(counts)[:-1])
+    return Bed(stage, parts, displacement, arrays, rests)

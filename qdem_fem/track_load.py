@@ -1,0 +1,37 @@
+"""The load of one bogie on the rail seat of a slice, from `qdem_fem.load_train`, or a record."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from qdem_fem.load_record import RATE
+from qdem_fem.load_train import Track, Train, seat_share
+from qdem_fem.mesh_checks import FloatArray
+from qdem_fem.scene_series import TimeSeries
+
+RISE = 0.01
+"""Time over which the load of a bogie that is still far begins and ends [s]."""
+
+
+def bogie_series(
+    train: Train, track: Track, share: float, lead: float, rest: float, rate: float = RATE
+) -> TimeSeries:
+    """Force on the seat of a slice while the first bogie of a train passes [N], (k, 3), down.
+
+    The front axle begins ``lead`` [m] before the sleeper and the rear one ends as far behind it,
+    then ``rest`` [s] of no load; at both ends the force grows and dies over `RISE` as half a
+    cosine.  ``share``: of a seat's force, what the slice takes of it.
+    """
+    axles = train.axles[:2]
+    end = (2 * lead + axles[1]) / train.speed
+    time = np.arange(int(np.ceil((end + rest) * rate)) + 1) / rate
+    front = train.speed * time - lead
+    of_wheels = sum(seat_share(front - axle, track) for axle in axles)
+    ramp = np.clip(np.minimum(time, end - time) / RISE, 0.0, 1.0)
+    size = share * train.first_share * train.axle_load * of_wheels * (1 - np.cos(np.pi * ramp)) / 2
+    return TimeSeries(time, down(size))
+
+
+def down(size: FloatArray) -> FloatArray:
+    """Forces of these sizes (k,) [N] along -z, (k, 3)."""
+    return np.outer(size, [0.0, 0.0, -1.0])

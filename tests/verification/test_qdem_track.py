@@ -1,0 +1,226 @@
+"""The track: rest by kinetic damping, the viscous account, the bed, loads, and what is drawn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import qdem_fem as q
+from qdem_fem import kinetic_damping, march
+from qdem_fem.cli import Progress
+from qdem_fem.errors import CheckpointError, EnergyLost, NotConverged, SceneError
+from qdem_fem.load_train import Track, Train, seat_share
+from qdem_fem.material import Material
+from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.run_folder import RunFolder
+from qdem_fem.scene_build import simulation_of
+from qdem_fem.scene_checks import scene_load
+from qdem_fem.scene_run import run_dynamic
+from qdem_fem.sleeper_mesh import SleeperShape
+from qdem_fem.track_bed import Bed, BedRecipe, bed_read, bed_write, grains_of
+from qdem_fem.track_bodies import TrackBox, grains_nodes, lattice_loose, sleeper_slice
+from qdem_fem.track_figures import acceleration_spectrum, differences, mobility, peaks_of
+from qdem_fem.track_load import RISE, bogie_series
+from qdem_fem.track_scene import TrackPrepared
+from validation import track_page
+from validation.track_trials import SCENE
+
+GRAVITY = (0.0, 0.0, -9.81)
+STONE = Material(1e8, 0.2, 2700.0, shear_viscosity=100.0)
+RADIUS, STIFFNESS = 0.01, 1e5
+RECIPE = BedRecipe(
+    box=TrackBox(0.2, 0.42), below=6, beside=2, seed=3, sizes=(0.026, 0.034),
+    shape=SleeperShape(), cells=(2, 3, 2), ballast=STONE, sleeper=STONE, radius=0.012,
+    stiffness=(1e9, 2e9), friction=0.5, side_friction=0.0, gravity=GRAVITY, softness=1e-4,
+    unbalanced=0.1, kinetic=0.01, loose=0.02, patience=5.0,
+)  # fmt: skip
+
+
+def stacked(rigid: bool) -> q.Simulation:
+    """Two cubes of 5 cm, one above the other, a little apart, above the ground."""
+    ground = q.ContactPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    bodies = [
+        q.Body(box_mesh((0.05, 0.05, 0.05), (1, 1, 1), origin=(0.0, 0.0, z)), STONE, rigid=rigid)
+        for z in (0.0101, 0.0803)
+    ]
+    contact = q.SphereContact(RADIUS, STIFFNESS, 0.5, (ground,))
+    return q.Simulation(bodies, gravity=GRAVITY, threads=1, contact=contact)
+
+
+@pytest.mark.parametrize(("rigid", "each"), [(True, True), (True, False), (False, True)])
+def test_cubes_come_to_rest_on_springs_that_bear_their_weight(rigid: bool, each: bool) -> None:
+    # The ground bears both; four mirrored springs of 2 k give way by W/(8 k) if the cube is rigid.
+    # What is unbalanced, 1 % of the force on a vertex, leaves at most some per cent of a body's.
+    run = stacked(rigid)
+    rest = kinetic_damping.rest_find(run, 1e-2, 1e-3, 0.0, 2.0, look=10 if rigid else 40, each=each)
+    weight = 9.81 * kinetic_damping.masses(run)
+    assert run.contacts is not None
+    assert rest.unbalanced <= 1e-2
+    assert -run.contacts.plane_force(0)[2] == pytest.approx(weight.sum(), rel=2e-2)
+    if rigid:
+        overlap = RADIUS - (0.0101 + run.bodies[0].displacement[:, 2].mean())
+        assert overlap == pytest.approx(weight.sum() / (8 * STIFFNESS), rel=2e-2)
+
+
+def test_no_equilibrium_in_time_is_told() -> None:
+    with pytest.raises(NotConverged, match=r"asked.*kinetic energy.*bodies loose"):
+        kinetic_damping.rest_find(stacked(True), 1e-3, 1e-4, 0.0, 1e-3, look=1)
+
+
+def shaken(folder: Path, text: str = "") -> tuple[object, ...]:
+    """A scene of a viscous block that is struck, with an audit."""
+    path = folder / "scene.toml"
+    path.write_text(
+        """
+        [[body]]
+        name = "block"
+        mesh = { box = { size = [0.2, 0.1, 0.1], cells = [2, 1, 1] } }
+        material = { young = 1e8, poisson = 0.2, density = 2000.0, shear_viscosity = 2000.0 }
+        [simulation]
+        duration = 0.01
+        safety = 0.02
+        threads = 1
+        [[load]]
+        body = "block"
+        nodes = { set = "x-max" }
+        force = { times = [0, 1e-3, 2e-3], values = [[0, 0, 0], [500, 200, 0], [0, 0, 0]] }
+        [output]
+        energy_interval = 1e-3
+        audit = 1e-2
+        """
+        + text,
+        encoding="utf-8",
+    )
+    prepared = scene_load(path)
+    return prepared, *simulation_of(prepared), RunFolder(folder / "run")
+
+
+def test_what_viscosity_takes_closes_the_account(tmp_path: Path) -> None:
+    prepared, run, bodies, folder = shaken(tmp_path)
+    with folder.locked(), Progress() as progress:  # type: ignore[attr-defined]
+        run_dynamic(prepared, run, bodies, folder, resume=False, progress=progress)  # type: ignore[arg-type]
+    energy = run.energy()  # type: ignore[attr-defined]
+    kept = energy.kinetic + energy.elastic + energy.viscous
+    assert energy.viscous > 0.05 * energy.external  # or the test shows nothing
+    assert kept == pytest.approx(energy.external, rel=1e-2)
+
+
+def test_a_run_whose_account_does_not_close_stops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(march, "viscous_power", lambda run: 0.0)
+    prepared, run, bodies, folder = shaken(tmp_path)
+    with (
+        folder.locked(),  # type: ignore[attr-defined]
+        Progress() as progress,
+        pytest.raises(EnergyLost, match="missing in the account"),
+    ):
+        run_dynamic(prepared, run, bodies, folder, resume=False, progress=progress)  # type: ignore[arg-type]
+
+
+def test_loose_grains_touch_neither_each_other_nor_walls_nor_sleeper() -> None:
+    band = (0.13, 0.29)
+    grains = grains_nodes(grains_of(RECIPE))
+    placed = lattice_loose(grains, RECIPE.box, 0.0, RECIPE.radius, 5, band)
+    assert len(placed) == 8
+    for i, nodes in enumerate(placed):
+        assert (nodes >= RECIPE.radius).all()
+        assert (nodes[:, :2] <= np.array([0.2, 0.42]) - RECIPE.radius).all()
+        y = nodes[:, 1]
+        assert y.max() <= band[0] - RECIPE.radius or y.min() >= band[1] + RECIPE.radius
+        for other in placed[:i]:
+            apart = np.linalg.norm(nodes[:, None] - other[None], axis=2).min()
+            assert apart > 2 * RECIPE.radius
+
+
+def test_slice_of_a_sleeper_reaches_from_wall_to_wall() -> None:
+    block = sleeper_slice(RECIPE.shape, RECIPE.box, 0.3, RECIPE.radius, (8, 4, 3))
+    ends = block.nodes[block.node_sets["ends"], 0]
+    assert ends.min() - RECIPE.radius == pytest.approx(0.0, abs=2e-6)
+    assert ends.max() + RECIPE.radius == pytest.approx(0.2, abs=2e-6)
+    assert block.nodes[:, 2].min() == pytest.approx(0.3)
+    assert len(block.node_sets["seat"]) > 5
+    assert block.nodes[block.node_sets["S2"], 0] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_a_bed_is_read_as_written_and_refused_for_another_recipe(tmp_path: Path) -> None:
+    path = tmp_path / "bed.npz"
+    nodes = [np.arange(6.0).reshape(2, 3), np.ones((1, 3))]
+    bed = Bed("rest", nodes, np.full((3, 3), 0.5), {"contact_slid": np.ones(2)}, {"rest": {}})
+    bed_write(path, RECIPE, bed)
+    found = bed_read(path, RECIPE)
+    assert [x.tolist() for x in found.positions] == [(x + 0.5).tolist() for x in nodes]
+    assert found.contact["contact_slid"].tolist() == [1.0, 1.0]
+    with pytest.raises(CheckpointError, match="friction differ"):
+        bed_read(path, replace(RECIPE, friction=0.6))
+    path.write_bytes(b"PK")
+    with pytest.raises(CheckpointError, match="no bed"):
+        bed_read(path, RECIPE)
+
+
+def test_the_load_of_a_bogie_is_that_of_its_axles_and_begins_and_ends_at_rest() -> None:
+    train, track = Train(cars=1), Track()
+    series = bogie_series(train, track, 0.4, 3.0, 0.05)
+    force = -series.values[:, 2]
+    assert force[0] == 0.0
+    assert not force[series.times > (6.0 + 2.1) / 32.0].any()
+    at = 3.0 / 32.0  # the front axle stands over the sleeper
+    expected = 0.4 * 50e3 * (seat_share(np.zeros(1), track) + seat_share(np.array([-2.1]), track))
+    assert np.interp(at, series.times, force) == pytest.approx(float(expected[0]), rel=1e-3)
+    inside = (series.times > RISE) & (series.times < (6.0 + 2.1) / 32.0 - RISE)
+    impulse = np.trapezoid(force[inside], series.times[inside])
+    whole = 2 * 0.4 * 50e3 * track.spacing / train.speed  # sum of shares is one
+    assert impulse == pytest.approx(whole, rel=0.05)  # e^-3.5: what lies beyond 3 m
+
+
+def test_accelerations_and_spectra_of_known_motions() -> None:
+    time = np.arange(4001) * 1e-4
+    when, velocity, acceleration = differences(time, 3.0 * time**2)
+    assert velocity == pytest.approx(6.0 * when, rel=1e-9)
+    assert acceleration == pytest.approx(6.0, rel=1e-6)
+    swing = 1e-3 * np.sin(2 * np.pi * 320.0 * time) * np.sin(np.pi * time / 0.4) ** 2
+    frequency, size = acceleration_spectrum(time, swing)
+    assert peaks_of(frequency, size, 1) == pytest.approx([320.0], abs=2.5)
+    force = np.zeros((len(time), 3))
+    force[:, 2] = swing
+    from qdem_fem.scene_series import TimeSeries
+
+    frequency, ratio = mobility(time, 2e-6 * swing, TimeSeries(time, force))
+    at = np.argmin(np.abs(frequency - 320.0))  # V = 2 pi f 2e-6 F
+    assert ratio[at] == pytest.approx(2 * np.pi * 320.0 * 2e-6, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("pressure = {", 'bogie = {}\npressure = {'), "give one of pressure, bogie"),
+        (("[contact]", "[[fix]]\nbody = 'a'\n[contact]"), "makes the bodies and their conditions"),
+        (("radius =", "periodic = {axis='y', width=0.4}\nradius="), "repeats along y"),
+        (("sleeper = 2.39e9", "concrete = 2.39e9"), "give {ballast = ..., sleeper = ...}"),
+        (("below = 14", "bellow = 14"), "did you mean below"),
+        (("gravity = [0, 0, -9.81]", ""), "needs gravity"),
+    ],
+)  # fmt: skip
+def test_a_wrong_track_is_refused_with_a_sentence(
+    tmp_path: Path, change: tuple[str, str], said: str
+) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.replace(*change), encoding="utf-8")
+    with pytest.raises(SceneError, match=said.replace("{", r"\{").replace("...", r"\.\.\.")):
+        scene_load(path)
+
+
+def test_scene_of_the_small_track_is_sound() -> None:
+    prepared = scene_load(Path(__file__).parents[2] / "scenes" / "track-small.toml")
+    assert isinstance(prepared, TrackPrepared)
+    assert prepared.recipe.below + prepared.recipe.beside == 300
+    assert prepared.scene.simulation.duration == pytest.approx(prepared.load.times[-1], abs=1e-3)
+
+
+def test_page_is_written_from_its_records() -> None:
+    small = track_page.record_read(track_page.SMALL) if track_page.SMALL.exists() else None
+    expected = track_page.page_text(track_page.record_read(), small)
+    assert track_page.PAGE.read_text(encoding="utf-8") == expected
