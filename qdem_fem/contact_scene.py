@@ -61,13 +61,15 @@ class ContactTable(Table):
     """Of two surfaces of the body's material [Pa/m]: a number, or by body."""
     points: Annotated[int, Field(ge=1, le=20)] | None = None
     """A face of a surface has that many points squared."""
+    faces: Literal["points", "overlaps"] | None = None
+    """What of a face bears: points within it, or its exact overlaps with other faces."""
     depth: Positive | None = None
     """Greatest depth of a surface in another [m]."""
 
 
 NEEDED = {"spheres": ("radius", "normal_stiffness"), "surface": ("modulus",)}
 """Keys of each model that have no default."""
-OPTIONS = {"spheres": ("skin", "contacts"), "surface": ("points", "depth", "contacts")}
+OPTIONS = {"spheres": ("skin", "contacts"), "surface": ("points", "faces", "depth", "contacts")}
 
 
 def contact_of(table: ContactTable | None) -> Contact | None:

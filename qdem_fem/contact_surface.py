@@ -16,6 +16,10 @@ the depth, and a force acts on the nodes of the face beneath as its gradient say
 momentum and moment.  Friction is a spring with a slider, as of spheres, of
 ``p_t = p / (2 (1 + nu))`` for the same area.
 
+With ``faces="overlaps"`` the sum becomes an integral: pairs of faces bear by the exact polygon
+of their overlap (`qdem_fem.contact_surface_clip`).  Pressure between flat faces is then exact on
+any two meshes.  Pointed vertices and sharp edges bear as before.
+
 Not for bodies thinner than ``depth``, or faces that bend back on themselves within it.
 """
 
@@ -34,6 +38,7 @@ from qdem_fem.contact_spheres import (
     planes_along_check,
     value_of_body,
 )
+from qdem_fem.errors import ConditionError
 from qdem_fem.periodic import PeriodicWidth
 
 Floats = NDArray[np.float64]
@@ -41,6 +46,7 @@ Integers = NDArray[np.int64]
 
 DEPTH = 0.1
 """Greatest depth, over the median edge of the surfaces."""
+FACES = "points", "overlaps"
 SHARP = 0.9
 """Cosine between the normals of two faces below which their edge is one that may cross others."""
 
@@ -61,6 +67,8 @@ class SurfaceContact:
     """A face has that many points squared within it."""
     depth: float | None = None
     """Greatest depth [m]; a tenth of the median edge by default."""
+    faces: str = "points"
+    """What of a face bears: ``"points"`` within it, or its exact ``"overlaps"`` with others."""
     contacts: int = 2
     """Coverings of a vertex's area by contact that the time step allows for."""
     periodic: PeriodicWidth | None = field(default=None, repr=False)
@@ -75,6 +83,12 @@ class SurfaceContact:
         contact_number_check(self.friction, "friction", above=False)
         contact_number_check(self.contacts, "contacts", above=True)
         contact_number_check(self.points, "points", above=True)
+        if self.faces not in FACES:
+            raise ConditionError(
+                f"faces do not bear by {self.faces!r}",
+                where="contact, faces",
+                remedy=f"take one of {', '.join(FACES)}",
+            )
         contact_planes_check(self.planes)
         planes_along_check(self.periodic, self.planes)
 
@@ -95,7 +109,7 @@ def face_points(parts: int) -> Floats:
             thirds.append((3 * i + 1, 3 * j + 1))
             if j < parts - i - 1:
                 thirds.append((3 * i + 2, 3 * j + 2))
-    first, second = np.array(thirds, dtype=float).T / (3 * parts)
+    first, second = np.array(thirds, dtype=float).reshape(-1, 2).T / max(1, 3 * parts)
     return np.column_stack([1 - first - second, first, second])
 
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import row
 from qdem_fem.contact_search import NO_IMAGE
-from qdem_fem.contact_surface_kernel import Near, Surface, blend
+from qdem_fem.contact_surface_arrays import Near, Overlaps, Surface
+from qdem_fem.contact_surface_geometry import blend
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -137,12 +138,15 @@ def image_of(points: Any, q: int, seam: float, way: Any) -> int:  # pragma: no c
 
 
 @njit(cache=True)
-def edges_near(
-    surface: Any, position: Any, box: Any, first_edge: Any, reach: float, way: Any
+def parts_near(
+    parts: Any, position: Any, box: Any, first_part: Any, stop_part: Any, reach: float, way: Any
 ) -> Any:  # pragma: no cover
-    """Sharp edges of two bodies, of the first body's first, and the image of the second (m, 3)."""
+    """Faces or edges (k, n) of two bodies, of the first's first, and the second's image (m, 3).
+
+    ``first_part``, ``stop_part``: first of every body, and the one behind its last.
+    """
     low, high = box
-    edge_low, edge_high = boxes_of(position, surface.edge)
+    part_low, part_high = boxes_of(position, parts)
     found, count = np.empty((64, 3), np.int64), 0
     for a in range(len(low)):
         for b in range(a + 1, len(low)):
@@ -151,11 +155,11 @@ def edges_near(
                 image = n * way
                 if not boxes_near(low, high, a, low, high, b, reach, image):
                     continue
-                for i in range(first_edge[a], first_edge[a + 1]):
-                    if not boxes_near(edge_low, edge_high, i, low, high, b, reach, image):
+                for i in range(first_part[a], stop_part[a]):
+                    if not boxes_near(part_low, part_high, i, low, high, b, reach, image):
                         continue
-                    for j in range(first_edge[b], first_edge[b + 1]):
-                        if boxes_near(edge_low, edge_high, i, edge_low, edge_high, j, reach, image):
+                    for j in range(first_part[b], stop_part[b]):
+                        if boxes_near(part_low, part_high, i, part_low, part_high, j, reach, image):
                             if count == len(found):
                                 found = grown(found, count)
                             found[count, 0], found[count, 1], found[count, 2] = i, j, n
@@ -184,13 +188,7 @@ def history_carry(old: Near, new: Near, bodies: int) -> None:
     """Take what the pairs of ``old`` remember over to the same pairs of ``new``."""
     here, there = same_keys(*(near.point * bodies + near.body for near in (old, new)))
     new.weight[there], new.spring[there] = old.weight[here], old.spring[here]
-    most = 1 + max(int(near.edges.max(initial=0)) for near in (old, new))
-    keys = [near.edges[:, 0] * most + near.edges[:, 1] for near in (old, new)]
-    if new.edge_image.ndim > 1:  # one pair of edges may be near by several images
-        both = np.concatenate([old.edge_image, new.edge_image])
-        number = np.unique(both.sum(axis=1), return_inverse=True)[1]
-        keys = np.split(np.concatenate(keys) * (1 + number.max(initial=0)) + number, [len(keys[0])])
-    here, there = same_keys(*keys)
+    here, there = same_pairs(old.edges, new.edges, old.edge_image, new.edge_image)
     for name in ("edge_weight", "edge_start", "edge_spring"):
         getattr(new, name)[there] = getattr(old, name)[here]
 
@@ -199,6 +197,47 @@ def same_keys(old: Integers, new: Integers) -> tuple[Integers, Integers]:
     """Places of the keys that are in both, in each."""
     _, here, there = np.intersect1d(old, new, assume_unique=True, return_indices=True)
     return here, there
+
+
+def same_pairs(
+    old: Integers, new: Integers, old_image: Floats = NO_IMAGE, new_image: Floats = NO_IMAGE
+) -> tuple[Integers, Integers]:
+    """Places of the pairs (m, 2) that are in both, in each; of one image (m, 3) [m], if any."""
+    most = 1 + max(int(pairs.max(initial=0)) for pairs in (old, new))
+    keys = [pairs[:, 0] * most + pairs[:, 1] for pairs in (old, new)]
+    if new_image.ndim > 1:  # one pair may be near by several images
+        both = np.concatenate([old_image, new_image]).sum(axis=1)
+        number = np.unique(both, return_inverse=True)[1]
+        keys = np.split(np.concatenate(keys) * (1 + number.max(initial=0)) + number, [len(keys[0])])
+    return same_keys(*keys)
+
+
+def overlaps_of(faces: Integers, image: Floats = NO_IMAGE) -> Overlaps:
+    """Pairs of faces (m, 2) without a history."""
+    count = len(faces)
+    return Overlaps(
+        faces, np.full(count, -1.0), np.full(count, -1.0), np.zeros((count, 3)),
+        np.zeros((count, 6)), np.zeros((count, 6, 3)), np.zeros((count, 3)), image,
+    )  # fmt: skip
+
+
+def overlaps_renew(
+    old: Overlaps, surface: Surface, position: Any, firsts: tuple[Integers, ...], reach: float,
+    way: Floats, stop: Integers,
+) -> Overlaps:  # fmt: skip
+    """The pairs of faces for vertices at ``position`` (c, 3) [m], with the history of the old.
+
+    ``stop`` (b,): behind the last face of each body that is no image of another.
+    """
+    node, face = firsts[0], firsts[1]
+    low = np.minimum.reduceat(position, node[:-1])
+    high = np.maximum.reduceat(position, node[:-1])
+    found = parts_near(surface.face, position, (low, high), face, stop, reach, way)
+    new = overlaps_of(found[:, :2].copy(), found[:, 2:] * way if way.any() else NO_IMAGE)
+    here, there = same_pairs(old.faces, new.faces, old.image, new.image)
+    for name in ("area", "spring", "share", "pull", "account"):
+        getattr(new, name)[there] = getattr(old, name)[here]
+    return new
 
 
 def near_renew(
@@ -214,7 +253,7 @@ def near_renew(
     low = np.minimum.reduceat(position, node[:-1])
     high = np.maximum.reduceat(position, node[:-1])
     *found, times = points_near(surface, position, (low, high), point, face, reach, way, seam)
-    edges = edges_near(surface, position, (low, high), edge, reach, way)
+    edges = parts_near(surface.edge, position, (low, high), edge, edge[1:], reach, way)
     images = (NO_IMAGE, NO_IMAGE)
     if way.any():
         images = (times[:, None] * way, edges[:, 2:] * way)

@@ -12,8 +12,13 @@ from qdem_fem.contact_search import NO_IMAGE
 from qdem_fem.contact_spheres import pair_stiffness, tangential_stiffness
 from qdem_fem.contact_state import Contacts, Floats, outsides_of, planes_arrays
 from qdem_fem.contact_surface import DEPTH, SurfaceContact, face_points, sharp_edges
-from qdem_fem.contact_surface_kernel import Near, Surface, SurfaceTouch, Walls
-from qdem_fem.contact_surface_search import near_of, near_renew
+from qdem_fem.contact_surface_arrays import Near, Overlaps, Surface, SurfaceTouch, Walls
+from qdem_fem.contact_surface_search import (
+    near_of,
+    near_renew,
+    overlaps_of,
+    overlaps_renew,
+)
 from qdem_fem.surface import face_area_vectors
 
 if TYPE_CHECKING:
@@ -41,7 +46,8 @@ class SurfaceContacts(Contacts):
         super().__init__(run, asked, outsides_of(run, asked, 2 * (self.depth + self.skin)))
         self.reach = 2 * (self.depth + self.skin)
         counts, starts = np.diff(self.first_vertex), self.first_vertex
-        share = face_points(int(asked.points))
+        self.clipped = asked.faces == "overlaps"
+        share = face_points(0 if self.clipped else int(asked.points))
         parts: list[list[Any]] = [[] for _ in range(7)]
         faces, areas, edges, opposite, edge_areas, points, shares = parts
         for o, start in zip(self.outside, starts, strict=False):
@@ -78,22 +84,27 @@ class SurfaceContacts(Contacts):
         body_of = [np.repeat(np.arange(len(counts)), np.diff(first)) for first in self.firsts]
         modulus = np.array([asked.of_body(body.name, "modulus") for body in run.bodies])
         poisson = np.array([float(np.mean(body.material.poisson)) for body in run.bodies])
-        size, count, walls = len(self.nodes), int(self.firsts[2][-1]), len(asked.planes)
+        size, walls = len(self.nodes), len(asked.planes)
+        count = int(self.firsts[2][-1]) + self.clipped * len(face)
         point_face = np.concatenate([
             np.concatenate([
                 np.repeat(begin + np.arange(o.own_faces), len(share)), np.full(o.own.sum(), -1),
             ])
             for begin, o in zip(self.firsts[1], self.outside, strict=False)
         ])  # fmt: skip
+        mine = np.concatenate([np.arange(len(o.face)) < o.own_faces for o in self.outside])
+        self.stop_face = self.firsts[1][:-1] + [o.own_faces for o in self.outside]
+        """Behind the last face of each body that is no image of another."""
         fan = np.argsort(face.ravel(), kind="stable")
         nothing = np.zeros(0, np.int64)
         zero = np.zeros((size, 3))
         self.kernel = SurfaceTouch(
             Surface(
                 self.reference, 4 * self.place, self.force_at, face,
-                area, np.searchsorted(face.ravel()[fan], np.arange(size + 1)), fan // 3,
+                area, np.where(mine, body_of[1], -1),
+                np.searchsorted(face.ravel()[fan], np.arange(size + 1)), fan // 3,
                 np.concatenate(points), np.concatenate(shares), point_face,
-                np.where(point_face >= 0, area[point_face] / len(share), 0.0), body_of[2],
+                np.where(point_face >= 0, area[point_face] / max(1, len(share)), 0.0), body_of[2],
                 np.concatenate(edges),
                 np.concatenate(opposite), np.concatenate(edge_areas), body_of[3],
                 modulus, tangential_stiffness(modulus, poisson),
@@ -102,6 +113,11 @@ class SurfaceContacts(Contacts):
                 nothing, nothing, np.zeros(1, np.int64), nothing, nothing.reshape(0, 2),
                 *(NO_IMAGE if asked.periodic is None else np.zeros((0, 3)) for _ in range(2)),
             ),
+            overlaps_of(
+                nothing.reshape(0, 2),
+                NO_IMAGE if asked.periodic is None else np.zeros((0, 3)),
+            ),
+            self.clipped,
             Walls(
                 *planes_arrays(asked.planes, asked.friction), np.full((walls, count), -1.0),
                 np.zeros((walls, count, 3)), np.zeros((walls, 3)),
@@ -110,7 +126,6 @@ class SurfaceContacts(Contacts):
             zero.copy(), np.zeros(2), np.arange(size),
         )  # fmt: skip
         covering = np.zeros(size)
-        mine = np.concatenate([np.arange(len(o.face)) < o.own_faces for o in self.outside])
         np.add.at(covering, face[mine], np.repeat(area[mine, None] / 3, 3, axis=1))
         covering = self.shared(covering)
         self.one = pair_stiffness(modulus, modulus.max())[body_of[0]] * covering
@@ -131,18 +146,26 @@ class SurfaceContacts(Contacts):
     def forget(self) -> None:
         """Let go of all springs."""
         self.near.free[:] = -1.0
-        for weight in (self.near.weight, self.near.edge_weight, self.kernel.walls.weight):
+        overlaps, walls = self.kernel.overlaps, self.kernel.walls
+        overlaps.free[:] = -1.0
+        for weight in (self.near.weight, self.near.edge_weight, overlaps.area, walls.weight):
             weight[:] = -1.0
-        for spring in (self.near.spring, self.near.edge_spring, self.kernel.walls.spring):
+        for spring in (self.near.spring, self.near.edge_spring, overlaps.spring, walls.spring):
             spring[:] = 0.0
 
     def lists_renew(self, position: Floats) -> None:
         """Look for what is near around vertices at (c, 3) [m]."""
         reach = self.depth + self.skin
+        surface = self.kernel.surface
+        if self.clipped:
+            found = overlaps_renew(
+                self.kernel.overlaps, surface, position, self.firsts, reach, self.way,
+                self.stop_face,
+            )  # fmt: skip
+            self.kernel = self.kernel._replace(overlaps=found)
         near = near_renew(
-            self.near, self.kernel.surface, position, self.firsts, reach, self.way,
-            self.seams(position),
-        )  # fmt: skip
+            self.near, surface, position, self.firsts, reach, self.way, self.seams(position)
+        )
         self.kernel = self.kernel._replace(near=near)
 
     def seams(self, position: Floats) -> Floats:
@@ -186,12 +209,28 @@ class SurfaceContacts(Contacts):
             modulus = surface.modulus[surface.edge_body[edge]]
             np.add.at(total, surface.edge[edge], (2 * near.edge_weight[at] * modulus)[:, None])
         held = np.maximum(walls.weight, 0).sum(axis=0)
-        stiffness = 2 * held * surface.modulus[surface.point_body]
-        face = surface.point_node
-        np.add.at(total, face, stiffness[:, None] * surface.point_share)
+        points = len(surface.point_body)
+        stiffness = 2 * held[:points] * surface.modulus[surface.point_body]
+        np.add.at(total, surface.point_node, stiffness[:, None] * surface.point_share)
+        if self.clipped:
+            total += self.overlaps_stiffness(held[points:])
         total = self.shared(total)
         bound = total * self.inverse_mass + self.rigid_bound(total)
         return float(bound.max(initial=0.0))
+
+    def overlaps_stiffness(self, held: Floats) -> Floats:
+        """Row sums (c,) [N/m] of the overlaps, and of areas ``held`` (f,) [m^2] by walls."""
+        surface, overlaps = self.kernel.surface, self.kernel.overlaps
+        total = np.zeros(len(self.nodes))
+        at = np.flatnonzero(overlaps.area > 0)
+        one, other = surface.modulus[surface.face_body[overlaps.faces[at]]].T
+        stiffness = 2 * pair_stiffness(one, other) * overlaps.area[at]
+        for side in range(2):
+            share = overlaps.share[at, 3 * side : 3 * side + 3]
+            np.add.at(total, surface.face[overlaps.faces[at, side]], stiffness[:, None] * share)
+        by_wall = 2 * held * surface.modulus[surface.face_body]
+        np.add.at(total, surface.face, np.repeat(by_wall[:, None], 3, axis=1))
+        return total
 
     def energy(self) -> tuple[float, float]:
         """Energy in the springs, and work that the sliders took since the start [J]."""
@@ -208,6 +247,8 @@ class SurfaceContacts(Contacts):
         self.refresh()
         arrays = {f"contact_near_{name}": getattr(self.near, name) for name in self.kept}
         arrays |= {f"contact_{name}": getattr(self.kernel, name) for name in TOUCH_ARRAYS}
+        overlaps = self.kernel.overlaps
+        arrays |= {f"contact_overlaps_{name}": getattr(overlaps, name) for name in Overlaps._fields}
         return arrays | {
             f"contact_wall_{name}": getattr(self.kernel.walls, name) for name in WALL_ARRAYS
         }
@@ -215,7 +256,10 @@ class SurfaceContacts(Contacts):
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take what `stored` gave."""
         near = {name: arrays[f"contact_near_{name}"].copy() for name in self.kept}
-        self.kernel = self.kernel._replace(near=self.near._replace(**near))
+        overlaps = (arrays[f"contact_overlaps_{name}"].copy() for name in Overlaps._fields)
+        self.kernel = self.kernel._replace(
+            near=self.near._replace(**near), overlaps=Overlaps(*overlaps)
+        )
         for name in TOUCH_ARRAYS:
             getattr(self.kernel, name)[:] = arrays[f"contact_{name}"]
         for name in WALL_ARRAYS:

@@ -7,8 +7,6 @@ displacement is, and wait for the next step; so the springs and the fields are o
 
 from __future__ import annotations
 
-import hashlib
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numba
@@ -18,17 +16,22 @@ from numba.extending import overload
 
 from qdem_fem import kernel
 from qdem_fem.absorbing_step import Absorber, absorber_begin, absorber_end
-from qdem_fem.contact_kernel import GO_ON, Contact, advance_one, advance_threads, exact
+from qdem_fem.contact_kernel import (
+    GO_ON,
+    Contact,
+    advance_one,
+    advance_threads,
+    exact,
+    sources_digest,
+)
+from qdem_fem.contact_surface_kernel import SOURCES as SURFACE_SOURCES
 from qdem_fem.contact_surface_kernel import surface_step
 from qdem_fem.rigid_step import Rigid, rigid_advance
 
 if TYPE_CHECKING:
     from qdem_fem.simulation import Simulation
 
-SOURCES = (
-    "kernel.py", "stress.py", "lanes.py", "contact_kernel.py", "contact_surface_kernel.py",
-    "rigid_step.py", "absorbing_step.py",
-)  # fmt: skip
+SOURCES = "kernel.py", "stress.py", "lanes.py", "rigid_step.py", "absorbing_step.py"
 WINDOW_ONE: Any = kernel.window_kernel(1)
 WINDOW_THREADS: Any = kernel.window_kernel(2)
 
@@ -218,14 +221,7 @@ def contact_window_build(made_from: str) -> Any:
     return contact_window
 
 
-def _sources_digest() -> str:
-    digest = hashlib.sha256()
-    for name in SOURCES:
-        digest.update(Path(__file__).with_name(name).read_bytes())
-    return digest.hexdigest()
-
-
-contact_window: Any = contact_window_build(_sources_digest())
+contact_window: Any = contact_window_build(sources_digest(*SOURCES, *SURFACE_SOURCES))
 
 
 def window_run(

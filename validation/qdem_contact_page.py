@@ -14,6 +14,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+from validation.qdem_contact_hertz import CELLS, CLOSED_RADIUS, SIZE
+
 ROOT = Path(__file__).parents[1]
 WORDS = Path(__file__).with_suffix(".md")
 RECORD = ROOT / "validation" / "results" / "qdem-contact.json"
@@ -52,6 +54,8 @@ def page_text(record: dict[str, Any]) -> str:
     """The page for a record."""
     checks = record["checks"]
     text = WORDS.read_text(encoding="utf-8")
+    for cells in CELLS:
+        text = text.replace(f"[[cells {cells}]]", f"{CLOSED_RADIUS / (SIZE / (4 * cells)):.1f}")
     text = FIGURE.sub(lambda found: figure_of(checks, *found.groups()), text)
     origin = record["provenance"]
     made = f"`{origin['command']}` on {origin['machine']}, {origin['started'][:10]}."

@@ -1,0 +1,62 @@
+"""Hard cases of contact by all models: energies close, momentum stays, the step is what it says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from validation.qdem_contact_hard import (
+    CASES,
+    CLOSES,
+    account,
+    momenta,
+    near_critical,
+    spinning,
+)
+from validation.qdem_contact_pressed import MODELS, tetrahedron
+
+BY_MODEL = pytest.mark.parametrize("model", MODELS)
+SHORT = [words for words in CASES if words != "spinning grain"]
+
+
+@BY_MODEL
+@pytest.mark.parametrize("words", SHORT)
+def test_energies_close(words: str, model: str) -> None:
+    """Within a thousandth of the greatest there was; and the bodies did touch."""
+    lacks, stored, _ = account(*CASES[words](model))
+    assert lacks < CLOSES
+    assert stored > 0.01
+
+
+@BY_MODEL
+def test_spinning_grain_keeps_its_angular_momentum(model: str) -> None:
+    """Without friction: to rounding of some thousand steps; and friction took nothing."""
+    run, duration = spinning(model)
+    before = momenta(run)
+    lacks, stored, lost = account(run, duration)
+    assert lacks < CLOSES
+    assert stored > 1e-3
+    assert lost == 0.0
+    change = np.abs(momenta(run) - before)[3:].max()
+    assert change < 1e-11 * np.linalg.norm(before[3:])
+
+
+@BY_MODEL
+def test_critical_step_with_contact(model: str) -> None:
+    """0.999 of it: silent and bounded; 1.001 of it: a warning.  No more is to be had of energies:
+
+    at a share s of its critical step that of a mode wavers by up to s^2/(1 - s^2) of itself.
+    """
+    below, above = near_critical(model, 0.999), near_critical(model, 1.001)
+    assert not below[1]
+    assert below[0] < 0.1
+    assert above[1]
+
+
+@BY_MODEL
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_tetrahedron_stands_on_its_vertex(model: str, friction: float) -> None:
+    """Spring of a vertex ``p/2 A/3 (three faces of c = 1/3)`` against the weight: it stays."""
+    worst, aside = tetrahedron(model, friction)
+    assert worst < 1e-9
+    assert aside < 1e-12
