@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from adapters.run_folder import write_atomically
-from validation.qdem_bodies import RECORD, record_read
+from validation.parts_record import parts_read
+from validation.qdem_bodies import RECORD
 
 WORDS = Path(__file__).with_suffix(".md")
 PAGE = RECORD.parents[2] / "docs" / "qdem-bodies.md"
@@ -107,5 +108,5 @@ def picture(parts: Data, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    write_atomically(PAGE, page(record_read()))
-    picture(record_read(), PICTURE)
+    write_atomically(PAGE, page(parts_read(RECORD)))
+    picture(parts_read(RECORD), PICTURE)

@@ -6,10 +6,9 @@ python -m validation.qdem_boundaries_page      writes docs/qdem-boundaries.md an
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +17,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import qdem_fem as q
-from adapters.provenance import provenance
-from adapters.run_folder import write_atomically
 from qdem_fem.leapfrog import accelerations_free
 from qdem_fem.mesh_generation import box_mesh
+from validation.parts_record import parts_measure
 from validation.qdem_boundary_waves import GROUND, bar, bar_share, oblique_share
 from validation.qdem_contact_packing import GRAIN, RADIUS, STIFFNESS, lattice, seconds_a_step
 
@@ -202,26 +200,5 @@ PARTS: dict[str, Callable[[], Row]] = {
 }
 
 
-def record_read() -> dict[str, Row]:
-    """The committed record by part."""
-    lines = RECORD.read_text(encoding="utf-8").splitlines()
-    return {line["part"]: line for line in map(json.loads, lines)}
-
-
-def main(words: Sequence[str] | None = None) -> None:
-    """Measure; a part's line of the record is replaced as soon as the part is done."""
-    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
-    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
-    for name in parser.parse_args(words).only:
-        started = time.process_time()
-        line = {"part": name, **PARTS[name]()}
-        line["cpu_s"] = round(time.process_time() - started, 1)
-        line["origin"] = provenance(["python", "-m", "validation.qdem_boundaries", "--only", name])
-        known = (record_read() if RECORD.exists() else {}) | {name: line}
-        text = "".join(json.dumps(known[part]) + "\n" for part in PARTS if part in known)
-        write_atomically(RECORD, text)
-        print(json.dumps(line), flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    parts_measure(PARTS, RECORD, "validation.qdem_boundaries", __doc__)

@@ -14,7 +14,8 @@ import numpy as np
 
 from adapters.run_folder import write_atomically
 from validation.page_text import page_filled
-from validation.qdem_boundaries import RECORD, record_read
+from validation.parts_record import parts_read
+from validation.qdem_boundaries import RECORD
 from validation.qdem_boundary_waves import GROUND, oblique_derived
 
 WORDS = Path(__file__).with_suffix(".md")
@@ -149,5 +150,5 @@ def picture(parts: Data, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    write_atomically(PAGE, page(record_read()))
-    picture(record_read(), PICTURE)
+    write_atomically(PAGE, page(parts_read(RECORD)))
+    picture(parts_read(RECORD), PICTURE)

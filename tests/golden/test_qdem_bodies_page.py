@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from validation.qdem_bodies import record_read
+from validation.parts_record import parts_read
+from validation.qdem_bodies import RECORD
 from validation.qdem_bodies_page import PAGE, order, page
 
 
 def test_page_is_the_records() -> None:
     """Byte for byte."""
-    assert PAGE.read_text(encoding="utf-8") == page(record_read())
+    assert PAGE.read_text(encoding="utf-8") == page(parts_read(RECORD))
 
 
 def test_record_holds_what_the_page_says() -> None:
     """Order one in 1/E, order two in the step, a prediction that bounds, a step that is cheaper."""
-    parts = record_read()
+    parts = parts_read(RECORD)
     assert all(0.9 < order(parts["stiffness"]["rows"], cells) < 1.1 for cells in (2, 3))
     first, *_, last = parts["top"]["rows"]
     assert first["error"] / last["error"] > 0.5 * (first["step"] / last["step"]) ** 2

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from validation.qdem_boundaries import record_read
+from validation.parts_record import parts_read
+from validation.qdem_boundaries import RECORD
 from validation.qdem_boundaries_page import PAGE, ground_row, page
 
 
 def test_page_is_the_records() -> None:
     """Byte for byte."""
-    assert PAGE.read_text(encoding="utf-8") == page(record_read())
+    assert PAGE.read_text(encoding="utf-8") == page(parts_read(RECORD))
 
 
 def test_record_holds_what_the_page_says() -> None:
     """Bars as derived, angles to second order, a step that dashpots leave, an end that pays."""
-    parts = {name: part["rows"] for name, part in record_read().items()}
+    parts = {name: part["rows"] for name, part in parts_read(RECORD).items()}
     for row in parts["bar"]:
         assert abs(row["absorbed"] - row["absorbed_derived"]) < 1e-9
     for row in parts["oblique"]:
