@@ -14,17 +14,18 @@ if TYPE_CHECKING:
     from qdem_fem.contact_surface import SurfaceContact
     from qdem_fem.critical_step import CriticalStep
     from qdem_fem.dynamic_relaxation import StaticAnswer
+    from qdem_fem.energies import Energy
     from qdem_fem.errors import QdemError, StepWarning
     from qdem_fem.material import Material
     from qdem_fem.periodic import PeriodicWidth
     from qdem_fem.series import Series, ramp
-    from qdem_fem.simulation import Energy, History, Simulation
+    from qdem_fem.simulation import History, Simulation
 
 _HOMES = {
     "Body": "body",
     "ContactPlane": "contact_spheres",
     "CriticalStep": "critical_step",
-    "Energy": "simulation",
+    "Energy": "energies",
     "History": "simulation",
     "Material": "material",
     "PeriodicWidth": "periodic",

@@ -20,17 +20,14 @@ from qdem_fem.conditions import Absorbing, Held, Roller
 from qdem_fem.contact_options import Contact, contact_options_check, contacts_of
 from qdem_fem.critical_step import CriticalStep, critical_step_find
 from qdem_fem.dynamic_relaxation import StaticAnswer, relax
+from qdem_fem.energies import Energy, energy_now
 from qdem_fem.errors import ConditionError
-from qdem_fem.leapfrog import half_work, velocities_level, velocity_now
+from qdem_fem.leapfrog import velocities_level, velocity_now
 from qdem_fem.march import march
 from qdem_fem.mass_scaling import mass_scaling_factor
 from qdem_fem.motion import Motion
 from qdem_fem.reactions import reaction
-from qdem_fem.reference_forces import (
-    Strain,
-    displacement_gradient,
-    elastic_energy,
-)
+from qdem_fem.reference_forces import Strain
 from qdem_fem.series import Driver, Value, is_real
 from qdem_fem.simulation_options import (
     bounds_check,
@@ -52,28 +49,6 @@ STEPS_MOST = 2**53
 """Numbers of steps are exact as floats up to here."""
 SAMPLES = 1000
 """Samples of an advance whose sampling is not given."""
-
-
-@dataclass(frozen=True)
-class Energy:
-    """Energies at a time [J]."""
-
-    kinetic: float
-    elastic: float
-    external: float
-    """Work of loads, gravity and prescribed motion since the start.
-
-    What it takes to hold a node that a user's state had moved away is not counted."""
-    contact: float = 0.0
-    """In the springs of contacts."""
-    friction: float = 0.0
-    """Work that sliders of contacts took since the start."""
-    viscous: float = 0.0
-    """What viscosity took since the start, where `Simulation.counts_viscous`."""
-    absorbed: float = 0.0
-    """What dashpots of absorbing faces took since the start."""
-    foundation: float = 0.0
-    """In the springs of absorbing faces."""
 
 
 @dataclass(frozen=True)
@@ -295,38 +270,8 @@ class Simulation(ConditionedBodies):
         return reaction(self, condition)
 
     def energy(self) -> Energy:
-        """Energies now [J]; elastic energy as `qdem_fem.reference_forces.elastic_energy`."""
-        velocity = velocity_now(self)
-        kinetic = 0.5 * float((self.assembly.mass * (velocity**2).sum(axis=1)).sum())
-        if self.rigid is not None:
-            kinetic += self.rigid.kinetic(self.rigid.now())
-        elastic = 0.0
-        for body in self.bodies:
-            if body.rigid:
-                continue
-            gradients, volumes = body.gradients
-            gradient = displacement_gradient(gradients, body.elements, body.displacement)
-            material = body.material
-            elastic += elastic_energy(
-                gradient, volumes, material.lame_first, material.lame_second, self.strain
-            ).sum()
-        external = float(self.motion.work.sum()) + self.motion.gravity_work
-        if self.motion.behind:
-            external += float(half_work(self, self.assembly.field("velocity"), velocity).sum())
-            if self.rigid is not None:
-                external += float(self.rigid.half_work().sum())
-        touching = (0.0, 0.0) if self.contacts is None else self.contacts.energy()
-        ground = (0.0, 0.0) if self.absorbers is None else self._ground_energy(velocity)
-        viscous = self.motion.viscous_work
-        return Energy(kinetic, float(elastic), external, *touching, viscous, *ground)
-
-    def _ground_energy(self, velocity: Floats) -> tuple[float, float]:
-        """Taken by absorbing faces, and in their springs [J]; ``velocity`` (n, 3) [m/s]: of now."""
-        assert self.absorbers is not None
-        absorbed = self.motion.absorbed
-        if self.motion.behind:
-            absorbed += self.absorbers.half_taken(self.assembly.field("velocity"), velocity)
-        return absorbed, self.absorbers.spring_energy(self.assembly.field("displacement"))
+        """Energies now [J], see `Energy`."""
+        return energy_now(self)
 
     def save(self, path: str | Path) -> None:
         """Write the state to a file (`qdem_fem.checkpoint.checkpoint_write`)."""

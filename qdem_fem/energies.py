@@ -1,0 +1,73 @@
+"""Energies of a simulation now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.leapfrog import half_work, velocity_now
+from qdem_fem.reference_forces import displacement_gradient, elastic_energy
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies at a time [J]."""
+
+    kinetic: float
+    elastic: float
+    external: float
+    """Work of loads, gravity and prescribed motion since the start.
+
+    What it takes to hold a node that a user's state had moved away is not counted."""
+    contact: float = 0.0
+    """In the springs of contacts."""
+    friction: float = 0.0
+    """Work that sliders of contacts took since the start."""
+    viscous: float = 0.0
+    """What viscosity took since the start, where `Simulation.counts_viscous`."""
+    absorbed: float = 0.0
+    """What dashpots of absorbing faces took since the start."""
+    foundation: float = 0.0
+    """In the springs of absorbing faces."""
+
+
+def energy_now(run: Simulation) -> Energy:
+    """Energies now [J]; elastic energy as `qdem_fem.reference_forces.elastic_energy`."""
+    velocity, motion = velocity_now(run), run.motion
+    kinetic = 0.5 * float((run.assembly.mass * (velocity**2).sum(axis=1)).sum())
+    if run.rigid is not None:
+        kinetic += run.rigid.kinetic(run.rigid.now())
+    elastic = sum(
+        elastic_energy(
+            displacement_gradient(body.gradients[0], body.elements, body.displacement),
+            body.gradients[1], body.material.lame_first, body.material.lame_second, run.strain,
+        ).sum()
+        for body in run.bodies
+        if not body.rigid
+    )  # fmt: skip
+    external = float(motion.work.sum()) + motion.gravity_work
+    if motion.behind:
+        external += float(half_work(run, run.assembly.field("velocity"), velocity).sum())
+        if run.rigid is not None:
+            external += float(run.rigid.half_work().sum())
+    touching = (0.0, 0.0) if run.contacts is None else run.contacts.energy()
+    ground = ground_energies(run, velocity)
+    return Energy(kinetic, float(elastic), external, *touching, motion.viscous_work, *ground)
+
+
+def ground_energies(run: Simulation, velocity: Floats) -> tuple[float, float]:
+    """Taken by absorbing faces, and in their springs [J]; ``velocity`` (n, 3) [m/s]: of now."""
+    if run.absorbers is None:
+        return 0.0, 0.0
+    absorbed = run.motion.absorbed
+    if run.motion.behind:
+        absorbed += run.absorbers.half_taken(run.assembly.field("velocity"), velocity)
+    return absorbed, run.absorbers.spring_energy(run.assembly.field("displacement"))
