@@ -32,6 +32,9 @@ SHOWN = 0.06
 """Greatest displacement in a picture, over the size of the bodies."""
 LIGHT = np.array([-0.25, -0.75, 0.6])
 """Direction the light comes from, in the frame right, away from the viewer, up."""
+HEIGHT, WIDTHS, BAR_WIDTH = 4.4, (2.8, 7.6), 1.6
+"""Of the picture of bodies, least and greatest width, and what its colour bar takes [in]: a tall
+body in a wide frame would stand beside an empty half."""
 FEATURE = np.cos(np.radians(30))
 """Cosine of the angle between two faces above which their edge is no feature of the shape."""
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -77,10 +80,13 @@ def picture_deformed(
         magnification = magnification_round(bodies)
     frame = view_frame(azimuth, elevation)
     corners, stress = _faces(bodies, magnification)
+    seen = corners @ frame.T
+    across, _, up = np.ptp(seen.reshape(-1, 3), axis=0)
+    wide = float(np.clip(HEIGHT * across / up + BAR_WIDTH, *WIDTHS))
     unit, name = unit_of(float(stress.max(initial=0.0)), "Pa")
-    with _figure(path, (7.6, 4.4)) as figure:
+    with _figure(path, (wide, HEIGHT)) as figure:
         panel = figure.subplots()
-        _paint(panel, corners @ frame.T, stress / unit, f"von Mises stress ({name})")
+        _paint(panel, seen, stress / unit, f"von Mises stress ({name})")
         _outline(panel, bodies, frame)
         _frame_draw(panel, frame)
         panel.set(aspect="equal", title=f"Displacement \N{MULTIPLICATION SIGN} {magnification:g}")

@@ -223,6 +223,17 @@ def test_pictures_are_written_and_repeat(tmp_path: Path) -> None:
     assert drawn[0] == drawn[1]
 
 
+def test_a_tall_body_is_not_drawn_beside_an_empty_half(tmp_path: Path) -> None:
+    """Seen 0.17 wide and 1.05 high: with its colour bar half as wide as the picture of a beam."""
+    tall = body()
+    tall.nodes = tall.nodes * [0.05, 0.1, 1.0]
+    widths = []
+    for name, one in (("tall", tall), ("beam", body())):
+        picture_deformed(tmp_path / f"{name}.png", [one], magnification=1.0)
+        widths.append(int.from_bytes((tmp_path / f"{name}.png").read_bytes()[16:20], "big"))
+    assert widths[0] < 0.5 * widths[1]
+
+
 def test_motionless_body_is_drawn(tmp_path: Path) -> None:
     """No displacement and no stress: a picture all the same, of magnification 1."""
     one = body()
