@@ -68,8 +68,6 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
     from qdem_fem.scene_build import simulation_of
     from qdem_fem.scene_run import run_dynamic, run_static
     from qdem_fem.summary import summary_of
-    from qdem_fem.track_figures import track_facts, track_pictures
-    from qdem_fem.track_scene import TrackPrepared
 
     run, bodies = simulation_of(prepared)  # what it refuses must not leave a folder behind
     folder = RunFolder(path)
@@ -94,7 +92,11 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
                 done = run_dynamic(prepared, run, bodies, folder, resume=goes_on, progress=progress)
         summary = summary_of(prepared, done, folder)
         more: Iterable[tuple[Path, str]] = ()
-        if isinstance(prepared, TrackPrepared):
+        if "track" in prepared.text.data:  # other scenes do not pay for its import
+            from qdem_fem.track_figures import track_facts, track_pictures
+            from qdem_fem.track_scene import TrackPrepared
+
+            assert isinstance(prepared, TrackPrepared)
             summary["track"] = track_facts(path, prepared.load)
             more = track_pictures(path, prepared.load)
         report_write(folder, manifest, summary, None if arguments.no_pictures else done, more)

@@ -57,9 +57,11 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     """
     import qdem_fem
     from qdem_fem.rigid_motions import held_check
-    from qdem_fem.track_scene import TrackPrepared, track_enter
 
-    if isinstance(prepared, TrackPrepared):
+    if "track" in prepared.text.data:  # other scenes do not pay for its import
+        from qdem_fem.track_scene import TrackPrepared, track_enter
+
+        assert isinstance(prepared, TrackPrepared)
         return track_enter(prepared)
     scene, table = prepared.scene, prepared.scene.simulation
     bodies = {

@@ -18,9 +18,9 @@
                      as the residual does not show the way made
     Gauss-Seidel     with momentum, from the start given or from nothing, and proximal points by
                      Newton at its end: first few sweeps and factorisations, then many, as what is
-                     hard for the one is often easy for the other
-                     Where W is found to give energy (`rigid_lcp.energy_proof`) no solution need
-                     exist, and one more turn is the last
+                     hard for the one is often easy for the other.  Where W is found to give
+                     energy (`rigid_lcp.energy_proof`) no solution need exist, and one more turn is
+                     the last
     by turns again   from the end of the convex path, and of three paths of the interior point;
                      then extrapolated points from the best
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
