@@ -1,12 +1,13 @@
 """Compute the reference ensemble of the settlement study, window by window.
 
     python -m validation.settlement_ensemble_runs --work FOLDER [--only confined|partial|coarse]
-        [--minutes M]
+        [--runs NAME ...] [--minutes M]
 
 Goes on where the record (validation/results/settlement-ensemble) ends, with one engine process.  Of
 the kind that is asked, or of that with the smallest part done, the run with the fewest cycles is
-next, so that an ensemble grows evenly.  After M minutes it ends with the window in progress; a kill
-loses that window and nothing else.  FOLDER holds nothing that is needed again.
+next, so that an ensemble grows evenly.  Named runs alone (such as ``confined-1-0``) let processes
+in several copies of the record share an ensemble.  After M minutes it ends with the window in
+progress; a kill loses that window and nothing else.  FOLDER holds nothing that is needed again.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import argparse
 import json
 import shutil
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
@@ -79,10 +80,13 @@ def share_done(kind: Kind, record: EnsembleRecord) -> float:
     return done / sum(piece.last - piece.first for piece in pieces)
 
 
-def next_piece(kinds: Sequence[Kind], record: EnsembleRecord) -> Piece | None:
-    """The run whose turn it is; None when all are through."""
+def next_piece(
+    kinds: Sequence[Kind], record: EnsembleRecord, names: Collection[str] = ()
+) -> Piece | None:
+    """The run whose turn it is, of ``names`` where there are any; None when all are through."""
     for kind in sorted(kinds, key=lambda kind: share_done(kind, record)):
-        found = [(cycles_done(piece, record), piece) for piece in kind.runs()]
+        asked = (piece for piece in kind.runs() if not names or piece.name in names)
+        found = [(cycles_done(piece, record), piece) for piece in asked]
         waiting = [(cycles, piece) for cycles, piece in found if cycles is not None]
         if waiting:
             return min(waiting, key=lambda pair: pair[0])[1]
@@ -204,15 +208,29 @@ def _window(piece: Piece, run: Run, record: EnsembleRecord, kept: Kept | None, b
 
 
 def go_on(
-    kinds: Sequence[Kind], record: EnsembleRecord, work: Path, minutes: float = np.inf
+    kinds: Sequence[Kind],
+    record: EnsembleRecord,
+    work: Path,
+    minutes: float = np.inf,
+    names: Collection[str] = (),
 ) -> None:
-    """Window after window until all runs of ``kinds`` are through, or ``minutes`` are over."""
+    """Window after window until all runs of ``kinds`` are through, or ``minutes`` are over.
+
+    Of these runs those of ``names`` where there are any; `UsageError` for a name that is no run's.
+    """
+    known = {piece.name for kind in kinds for piece in kind.runs()}
+    if strange := sorted(set(names) - known):
+        raise UsageError(
+            f"no run of the ensemble is named {', '.join(strange)}",
+            where="--runs",
+            remedy=f"name some of {', '.join(sorted(known))}",
+        )
     began = time.monotonic()
     origin()
     with interruptible(), RunFolder(work).locked():
         record.tidy()
         while time.monotonic() - began < 60 * minutes:
-            piece = next_piece(kinds, record)
+            piece = next_piece(kinds, record, names)
             if piece is None:
                 print("all runs are through", flush=True)
                 return
@@ -238,11 +256,14 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--work", type=Path, required=True, help="folder for the engine's files")
     parser.add_argument("--only", nargs="+", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--runs", nargs="+", default=[], metavar="NAME", help="only these runs")
     parser.add_argument("--minutes", type=float, default=np.inf, help="begin no window after these")
     parser.add_argument("--record", type=Path, default=RECORD, help="folder of the record")
     arguments = parser.parse_args(words)
     kinds = [KINDS[name] for name in arguments.only]
-    go_on(kinds, EnsembleRecord(arguments.record), arguments.work, arguments.minutes)
+    go_on(
+        kinds, EnsembleRecord(arguments.record), arguments.work, arguments.minutes, arguments.runs
+    )
 
 
 if __name__ == "__main__":

@@ -166,6 +166,17 @@ def test_ensemble_grows_evenly(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert next_piece([TINY, other], record) == Piece(other, 1)
 
 
+def test_named_runs_share_an_ensemble(whole: EnsembleRecord, tmp_path: Path) -> None:
+    """Two copies of the record, each with runs of its own, give together the record of one."""
+    record = EnsembleRecord(tmp_path / "record")
+    go_on([TINY], record, tmp_path / "work", names=["tiny-1", "tiny-1-1"])
+    assert {path.stem for path in record.path.glob("*.csv")} == {"tiny-1", "tiny-1-1"}
+    go_on([TINY], record, tmp_path / "work", names=set(RUNS) - {"tiny-1", "tiny-1-1"})
+    assert content(record) == content(whole)
+    with pytest.raises(UsageError, match="no run of the ensemble is named tiny-9"):
+        go_on([TINY], record, tmp_path / "work", names=["tiny-9"])
+
+
 def test_members_differ_by_one_grain(whole: EnsembleRecord) -> None:
     """Number 0 goes on as it is, number 1 with one grain 1e-10 m aside; packings by their seed."""
     for seed in (1, 2):
