@@ -47,6 +47,11 @@ class Stretch:
         """Mean settlement a cycle [m]."""
         return float(self.gain.mean())
 
+    def part(self, begin: int, end: int) -> Stretch:
+        """Its cycles from number ``begin`` up to ``end``, the first being 0."""
+        columns = (one[begin:end] for one in (self.gain, self.coordination, self.deflection))
+        return Stretch(self.first_cycle + begin, *columns)
+
 
 @dataclass(frozen=True, eq=False)
 class Rates:

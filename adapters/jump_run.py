@@ -109,6 +109,22 @@ def stretch_of(rows: list[dict[str, Any]], before: float) -> Stretch:
     )
 
 
+def stretches_of(run: Run, bed: Bed, begin: int) -> tuple[Stretch, ...]:
+    """Cycles computed from cycle ``begin`` to the bed's, a stretch a window, healing left out."""
+    stretches: list[Stretch] = []
+    settlement = 0.0
+    for outcome in run.folder.outcomes():
+        if outcome.last_cycle > bed.cycle:
+            break
+        rows = [{"settlement": settlement, "cycle": outcome.first_cycle}, *outcome.rows]
+        settlement = float(rows[-1]["settlement"])
+        healed = sum(row["kind"] != "computed" for row in outcome.rows)
+        first = max(healed, begin - outcome.first_cycle)
+        if outcome.stage == "window" and first < len(outcome.rows):
+            stretches.append(stretch_of(rows[first + 1 :], float(rows[first]["settlement"])))
+    return tuple(stretches)
+
+
 def refused(run: Run, decision: Decision) -> JumpRefused:
     """The error of a run that may not jump."""
     return JumpRefused(

@@ -20,7 +20,8 @@ from adapters.errors import (
     SceneError,
     UsageError,
 )
-from adapters.jump_run import settle_controlled
+from adapters.jump_history import SEATING, gain_of
+from adapters.jump_run import settle_controlled, stretches_of
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder, disk_full_named, write_atomically
 from adapters.scene import Scene, flat_keys
@@ -78,7 +79,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
         if not why:
             try:
                 with disk_full_named(run.folder.path):
-                    moved = stages.jump(run, bed, h, attempt)
+                    moved = stages.jump(run, bed, h, attempt, history_gain(run, bed, h))
                     cycles = p.healing_cycles + p.window_cycles
                     return stages.compute(run, moved, cycles, p.healing_cycles)
             except (EngineFailed, NotCredible, NotConverged) as error:
@@ -93,6 +94,15 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
         where=str(run.folder.path),
         remedy="more cycles k before the jump, or a shorter h; the cycles before it are kept",
     )
+
+
+def history_gain(run: Run, bed: Bed, h: int) -> float | None:
+    """Settlement over a jump [m] by all cycles computed but the first seating; None: by the law."""
+    p = run.scene.procedure
+    assert p is not None
+    if p.settlement == "law" or h == 0:
+        return None
+    return gain_of(stretches_of(run, bed, max(1, round(SEATING * p.k_i))), h).mean
 
 
 def run_scene(

@@ -212,15 +212,17 @@ class Procedure(Table):
     """Law of the residual displacement."""
     move: str = MOVE_DEFAULT
     """What a jump moves: a way of `adapters.moves`."""
+    settlement: Literal["law", "history"] = "law"
+    """What the mean grain settles by in a jump of h cycles: its law, or all cycles computed."""
     relaxation: Literal["smallest-move", "karrech2007", "proximal", "none"] = "smallest-move"
     total_cycles: Count
     """Cycles computed and jumped at the end."""
 
     @model_serializer(mode="wrap")
     def _without_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Stored runs are older than the keys ``move`` and ``tolerance``: at their defaults they
-        are left out."""
-        newer = {"move": MOVE_DEFAULT, "tolerance": None}
+        """Stored runs are older than the keys ``move``, ``tolerance`` and ``settlement``: at their
+        defaults they are left out."""
+        newer = {"move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
         record: dict[str, Any] = whole(self)
         return {
             key: value for key, value in record.items() if key not in newer or value != newer[key]

@@ -228,6 +228,16 @@ def _jumps(scene: _Values) -> Iterator[Problem]:
                 yield Problem(key, "missing: give k and h, or a tolerance instead of both")
 
 
+def _settlement(scene: _Values) -> Iterator[Problem]:
+    if not scene.has_table("procedure") or scene.need("procedure.settlement") == "law":
+        return
+    key = "procedure.settlement"
+    if _present(scene, TOLERANCE_KEY):
+        yield Problem(key, "with a tolerance jumps forecast the settlement: leave this out")
+    if scene.need("procedure.move") == "still":
+        yield Problem(key, "move 'still' moves nothing, so no settlement: leave one of them out")
+
+
 def _launcher(scene: _Values) -> Iterator[Problem]:
     words = [Path(word).name for word in scene.get("engine.launcher") or ()]
     if scene.need("engine.name") == "yade" and set(words) & MPI_STARTERS:
@@ -336,6 +346,7 @@ CHECKS: tuple[Check, ...] = (
     _partial_piston,
     _procedure,
     _jumps,
+    _settlement,
     _launcher,
     _law,
     _move,

@@ -210,6 +210,8 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
         state_save(before.moved(target), folder / "estimated.npz")
         state_save(after, folder / "relaxed.npz")
         notes = {"h": h, "attempt": attempt, "relaxation": record}
+        if gain is not None:
+            notes["gain"] = gain
         rows = [_row(run, after, "jumped")] if h else []
         cost = run.clock.lap()
         folder = _finish(

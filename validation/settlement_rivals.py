@@ -142,6 +142,12 @@ def jumping(jumps: int) -> tuple[Method, Method]:
     )
 
 
+def remembering(jumps: int) -> Method:
+    """So many equal jumps whose mean grain settles by the slopes of all cycles computed."""
+    keys = ('procedure.settlement="history"',)
+    return Method(f"{jumps} jumps, by history", "history", keys, JUMPING, jumps)
+
+
 def softer(factor: int) -> Method:
     """Young's modulus of the grains over ``factor``, and the longer time step that goes with it."""
     return Method(f"E/{factor}", "softer", (f"material.grain.young={1e9 / factor!r}",))
@@ -174,7 +180,7 @@ METHODS = (
     *jumping(5), *jumping(2), softer(10), longer(0.8), faster(4), heavier(10), longer(0.4),
     softer(30), softer(100), heavier(100), longer(1.0), longer(0.6), faster(2), FEWER,
     Method("tolerance 0.1", "tolerance", ("procedure.tolerance=0.1",), JUMPING),
-    *jumping(10), longer(0.3), RESUBMITTED,
+    *jumping(10), longer(0.3), RESUBMITTED, remembering(5), remembering(2),
 )  # fmt: skip
 """On the coarse bed, in the order in which they are run."""
 METHODS_OF: dict[str, tuple[Method, ...]] = {
@@ -182,7 +188,7 @@ METHODS_OF: dict[str, tuple[Method, ...]] = {
     CONFINED.name: tuple(
         replace(method, base=CONFINED)
         for method in (
-            *jumping(2), longer(0.4), *jumping(5), longer(0.6),
+            *jumping(2), longer(0.4), *jumping(5), remembering(2), remembering(5), longer(0.6),
             Method("tolerance 0.02", "tolerance", ("procedure.tolerance=0.02",), JUMPING),
         )
     ),

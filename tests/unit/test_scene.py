@@ -299,6 +299,7 @@ REFUSED = [
     ("procedure.healing_cycles", "healing_cycles = -1", "at least 0"),
     ("procedure.law", 'law = "lug"', "did you mean log?"),
     ("procedure.move", 'move = "shrink"', "did you mean shrunk?"),
+    ("procedure.settlement", 'settlement = "past"', "'law' or 'history'"),
     ("procedure.relaxation", 'relaxation = "smallest move"', "did you mean smallest-move?"),
     ("procedure.total_cycles", "total_cycles = 1", "must exceed k_i ="),
     ("engine.name", 'name = "ligghts"', "did you mean liggghts?"),
