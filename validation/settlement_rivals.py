@@ -27,9 +27,10 @@ from adapters.stages import Run, Variant
 from adapters.state import FloatArray
 from adapters.window import window_load
 from validation.move_study_engine import cycles_of
-from validation.settlement_ensemble import COARSE, CONFINED, Kind, Piece
+from validation.settlement_ensemble import COARSE, CONFINED, STEP, Kind, Piece
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_ensemble_start import packing_lay
+from validation.settlement_rivals_continuity import sides_of
 
 Row = dict[str, Any]
 K_I = COARSE.k_i
@@ -204,10 +205,13 @@ def run_in(
     return Run(scene, RunFolder(folder), Changed(lines), variant, Progress(quiet=True), True)
 
 
-def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, folder: Path) -> Row:
+def method_run(
+    method: Method, seed: int, member: int, last: int, record: EnsembleRecord, folder: Path
+) -> Row:
     """A method on a packing to cycle ``last`` in ``folder``: what is kept of it.
 
-    A run that was refused or failed says why, with what it had reached.
+    ``member``: one grain begins so many times `STEP` aside.  A run that was refused or failed says
+    why, with what it had reached.
     """
     try:
         scene = method.kind(last).scene(seed)
@@ -215,7 +219,8 @@ def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, fol
         why = error.what.splitlines()[-1].rpartition(".toml:")[2].partition(": ")[2]
         return {"refused": why, "computed": 0, "cpu_s": 0.0}
     lines = {} if method.heavier == 1 else masses_scaled(scene, method.heavier)
-    run = run_in(folder, scene, method.variant, lines)
+    variant = replace(method.variant, perturbation=member * STEP)
+    run = run_in(folder, scene, variant, lines)
     if not method.own_rain:
         packing_lay(run, Piece(method.base, seed), record)
     refused = ""
@@ -233,8 +238,8 @@ def method_run(method: Method, seed: int, last: int, record: EnsembleRecord, fol
 def reached(run: Run, k_i: int) -> Row:
     """Figures of a run as far as it has come, and what they cost behind cycle k_i.
 
-    ``settlement``, ``state`` and ``profile`` as `figures_of`; ``computed`` cycles, ``cost`` CPU
-    time [s] by purpose, ``lost`` why stages were given up.
+    ``settlement``, ``state``, ``profile`` as `figures_of`; ``sides`` of jumps; ``computed`` cycles,
+    ``cost`` CPU time [s] by purpose, ``lost`` why stages were given up.
     """
     first = run.folder.outcome("window_000000")
     assert first is not None
@@ -254,6 +259,7 @@ def reached(run: Run, k_i: int) -> Row:
         "computed": len(found) - k_i,
         "cost": cost,
         "cpu_s": cost_total(cost),
+        "sides": sides_of(run),
         "lost": [why for name in run.folder.stage_names() if (why := run.folder.failure(name))],
     }
     if len(names) == 1:

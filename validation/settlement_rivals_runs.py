@@ -59,21 +59,24 @@ def key(row: Row) -> Key:
     return row["part"], row["method"], row["seed"], row["member"], row["last"]
 
 
-def rival_row(method: Method, seed: int, last: int, record: EnsembleRecord, folder: Path) -> Row:
+def rival_row(
+    method: Method, seed: int, member: int, last: int, record: EnsembleRecord, folder: Path
+) -> Row:
     """What is kept of a method on a packing; its ``folder`` is not."""
-    row = method_run(method, seed, last, record, folder)
+    row = method_run(method, seed, member, last, record, folder)
     shutil.rmtree(folder, ignore_errors=True)
     return row
 
 
 def plan_rivals(work: Path, kind: Kind, record: EnsembleRecord, last: int) -> Iterator[Planned]:
-    """Every method on every packing."""
-    for method in METHODS_OF[kind.name]:
+    """Every method on every packing; at paper scale, of fewer packings, as every member too."""
+    members = range(1 if kind == COARSE else kind.members)
+    for method, member in product(METHODS_OF[kind.name], members):
         for seed in range(1, kind.packings + 1):
-            head = {"part": "rivals", "method": method.name, "seed": seed, "member": 0}
-            folder = work / f"{method.name.replace(' ', '-').replace('/', '-')}-{seed}"
-
-            yield head | {"last": last}, partial(rival_row, method, seed, last, record, folder)
+            head = {"part": "rivals", "method": method.name, "seed": seed, "member": member}
+            folder = work / f"{method.name.replace(' ', '-').replace('/', '-')}-{seed}-{member}"
+            filled = partial(rival_row, method, seed, member, last, record, folder)
+            yield head | {"last": last}, filled
 
 
 def plan_budget(work: Path, record: EnsembleRecord) -> Iterator[Planned]:

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from adapters.engine_fake import FakeEngine
+from adapters.procedure import run_scene
+from adapters.progress import Progress
+from adapters.run_folder import RunFolder
+from adapters.scene_file import scene_load
+from adapters.stages import Run, Variant
+from tests.small_bed import small_bed
 from validation.settlement_ensemble import COARSE, CONFINED
 from validation.settlement_rivals import (
     BLOCK,
@@ -24,6 +32,13 @@ from validation.settlement_rivals import (
     masses_scaled,
 )
 from validation.settlement_rivals_budget import EVERY, PLACE, TWIN
+from validation.settlement_rivals_continuity import (
+    COLUMNS,
+    CYCLES,
+    share_continued,
+    sides_of,
+    sides_without_jump,
+)
 from validation.settlement_rivals_reading import (
     FIGURES,
     beside,
@@ -214,3 +229,56 @@ def test_a_law_that_holds_misses_nothing() -> None:
     missed = [law_alone([place(EVERY, 0, settlement)])[0] for settlement in (path, steeper)]
     assert missed[0] == pytest.approx(0, abs=1e-12)
     assert missed[1] < -1e-6
+
+
+# --- how a bed goes on behind a jump -------------------------------------------------------------
+
+
+def sides(seed: int, first: int, last: int, shock: float = 0.0) -> Row:
+    """u = ln N with gains that scatter by their own size about it, a ``shock`` behind the jump."""
+    random = np.random.default_rng(seed)
+    parts = {}
+    for name, start in (("before", first - CYCLES), ("after", last)):
+        cycle = start + 1 + np.arange(CYCLES)
+        gain = 1 / cycle * (1 + random.normal(size=CYCLES) + (shock if name == "after" else 0))
+        level = 3.0 + 0.1 * random.normal(size=CYCLES) + (0.1 * shock if name == "after" else 0)
+        parts[name] = {"settlement": gain, "coordination_number": level, "piston_stiffness": level}
+    return {"first": first, "last": last, **parts}
+
+
+def test_a_bed_that_goes_on_is_seen_to_and_a_shock_is_not_passed() -> None:
+    """Of independent cycles some 95 % pass (bar 90 % of 400), though the bed slows down fivefold;
+    with a shock of four standard deviations of a cycle fewer than a tenth."""
+    same = [sides(seed, 100, 500) for seed in range(400)]
+    shocked = [sides(seed, 100, 500, shock=4.0) for seed in range(400)]
+    for column in COLUMNS:
+        assert share_continued(same, column) > 0.9
+        assert share_continued(shocked, column) < 0.1
+
+
+def test_sides_of_a_run_are_its_table(tmp_path: Path) -> None:
+    """Cycles before and behind both jumps, settlement cycle by cycle; a full run has the same."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(small_bed(k=12, h=8, total_cycles=60))
+    run_scene(scene, tmp_path / "run", progress=Progress(quiet=True))
+    folder = RunFolder(tmp_path / "run")
+    run = Run(scene_load(scene, ()), folder, FakeEngine(), Variant(), Progress(quiet=True))
+    found = sides_of(run)
+    assert [(one["first"], one["last"]) for one in found] == [(14, 22), (35, 43)]
+    with (folder.path / "settlement.csv").open() as stream:
+        rows = {int(row["cycle"]): row for row in csv.DictReader(stream)}
+    settled = {cycle: float(row["settlement"]) for cycle, row in rows.items()}
+    for one in found:
+        for name, start in (("before", one["first"] - CYCLES), ("after", one["last"])):
+            gain = [settled[start + n + 1] - settled[start + n] for n in range(CYCLES)]
+            assert one[name]["settlement"] == pytest.approx(gain, rel=1e-6)
+            touching = [float(rows[start + n + 1]["coordination_number"]) for n in range(CYCLES)]
+            assert one[name]["coordination_number"] == pytest.approx(touching)
+    cycle = np.arange(1.0, 61)
+    columns = {column: np.log(cycle) for column in COLUMNS}
+    full = sides_without_jump(columns, cycle, 14, 22)
+    assert full["before"]["settlement"] == pytest.approx(
+        np.log(np.arange(5, 15) / np.arange(4, 14))
+    )
+    assert full["after"]["settlement"][0] == pytest.approx(np.log(23 / 22))
+    assert full["after"]["piston_stiffness"] == pytest.approx(np.log(np.arange(23, 33)))

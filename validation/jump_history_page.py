@@ -1,0 +1,190 @@
+"""Make docs/jump-history.md and its picture: ``python -m validation.jump_history_page``.
+
+Jumps on the curves of the reference ensemble, where every cycle is known: what each way to forecast
+the settlement of a jump errs by, with no bed, no relaxation and no engine.  Seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from adapters.jump_history import SEATING, gain_of
+from adapters.jump_rates import Stretch
+from adapters.laws import law_named
+from adapters.run_folder import write_atomically
+from adapters.state import FloatArray
+from validation.page_text import page_filled, table
+from validation.settlement_ensemble import COARSE, CONFINED, Kind, Piece
+from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals import FIRST_WINDOW, HEALING, jump_length
+from validation.settlement_rivals_reading import rms
+from validation.settlement_rivals_reference import columns_by_cycle
+
+TEMPLATE = Path(__file__).with_suffix(".md")
+PAGE = Path(__file__).parents[1] / "docs" / "jump-history.md"
+CASES: tuple[tuple[Kind, int, tuple[int, ...]], ...] = (
+    (COARSE, 500, (2, 5, 10)),
+    (COARSE, 2800, (2, 5, 10, 20)),
+    (CONFINED, 230, (2, 5)),
+)
+"""Ensemble, last cycle, numbers of equal jumps."""
+
+Way = Callable[[Sequence[Stretch], int], float]
+"""Settlement [m] over a jump of h cycles behind the last of the stretches that were computed."""
+
+
+def way_nothing(known: Sequence[Stretch], h: int) -> float:
+    """The null hypothesis."""
+    return 0.0
+
+
+def way_window(known: Sequence[Stretch], h: int) -> float:
+    """The logarithm fitted to the last window, as the procedure does with every grain."""
+    law, last = law_named("log"), known[-1]
+    cycle = last.first_cycle + np.arange(len(last.gain) + 1.0)
+    path = np.append(0.0, np.cumsum(last.gain))
+    return float(law.increment(law.fit(cycle, path), cycle[-1], cycle[-1] + h))
+
+
+def way_one_slope(known: Sequence[Stretch], h: int) -> float:
+    """One slope du / d ln N for all cycles computed."""
+    span = sum(np.log(one.last_cycle / one.first_cycle) for one in known)
+    return float(sum(one.gain.sum() for one in known) / span * np.log1p(h / known[-1].last_cycle))
+
+
+def way_history(known: Sequence[Stretch], h: int) -> float:
+    """`adapters.jump_history`."""
+    return gain_of(known, h).mean
+
+
+WAYS: dict[str, Way] = {
+    "nothing": way_nothing,
+    "log, last window": way_window,
+    "one slope of all cycles": way_one_slope,
+    "history": way_history,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Forecasts:
+    """Errors of a way over all runs of an ensemble."""
+
+    kind: Kind
+    last: int
+    jumps: int
+    way: str
+    error: FloatArray
+    """Settlement by the jumps less that of the run, over the mean of all runs, shape (r,)."""
+
+    @property
+    def computed(self) -> float:
+        """Share of the cycles behind k_i that is computed."""
+        cycles = FIRST_WINDOW + self.jumps * (HEALING + FIRST_WINDOW)
+        return cycles / (self.last - self.kind.k_i)
+
+
+def stretch(curve: FloatArray, first: int, last: int) -> Stretch:
+    """Cycles behind ``first`` to ``last`` of a settlement ``curve`` [m] by cycle, 0 first."""
+    gain = np.diff(curve[first : last + 1])
+    return Stretch(first, gain, np.zeros(len(gain)), np.zeros(len(gain)))
+
+
+def jumped_error(curve: FloatArray, k_i: int, last: int, jumps: int, way: Way) -> float:
+    """Settlement by equal jumps less that of the ``curve`` [m]; windows and healing are its own."""
+    h = jump_length(jumps, last, k_i)
+    end = k_i + FIRST_WINDOW
+    known = [stretch(curve, round(SEATING * k_i), k_i), stretch(curve, k_i, end)]
+    error = 0.0
+    for _ in range(jumps):
+        error += way(known, h) - float(curve[end + h] - curve[end])
+        end += h + HEALING + FIRST_WINDOW
+        known.append(stretch(curve, end - FIRST_WINDOW, end))
+    return error
+
+
+def curves_of(kind: Kind, last: int, record: EnsembleRecord) -> list[FloatArray]:
+    """Settlement [m] by cycle, from 0 on, of all members that have come to ``last``."""
+    curves = []
+    for piece in kind.runs():
+        kept = record.kept(piece.name)
+        if isinstance(piece, Piece) and piece.packing and kept and kept.cycle >= last:
+            found = columns_by_cycle(piece, record)
+            path = [found[cycle]["settlement"] for cycle in range(1, last + 1)]
+            curves.append(np.append(0.0, path))
+    return curves
+
+
+def study(record: EnsembleRecord) -> list[Forecasts]:
+    """All cases, all ways."""
+    found = []
+    for kind, last, numbers in CASES:
+        curves = curves_of(kind, last, record)
+        scale = float(np.mean([curve[last] - curve[kind.k_i] for curve in curves]))
+        for jumps in numbers:
+            for name, way in WAYS.items():
+                errors = [jumped_error(one, kind.k_i, last, jumps, way) for one in curves]
+                found.append(Forecasts(kind, last, jumps, name, np.array(errors) / scale))
+    return found
+
+
+def table_errors(found: Sequence[Forecasts]) -> str:
+    """A line for each schedule: mean, scatter and root mean square of each way."""
+    lines = []
+    for kind, last, numbers in CASES:
+        for jumps in numbers:
+            mine = [f for f in found if (f.kind, f.last, f.jumps) == (kind, last, jumps)]
+            cells = [
+                f"{100 * f.error.mean():+.0f} ± {100 * f.error.std(ddof=1):.0f} "
+                f"(**{100 * rms(f.error):.0f}**)"
+                for f in mine
+            ]
+            share = f"{100 * mine[0].computed:.0f}"
+            lines.append([f"{kind.name} to {last:,}", str(len(mine[0].error)), str(jumps), share])
+            lines[-1] += cells
+    head = ["run", "runs", "jumps", "cycles computed, %", *(f"{name}, %" for name in WAYS)]
+    return table(head, lines)
+
+
+def draw(found: Sequence[Forecasts], target: Path) -> None:
+    """Root mean square error against the share of cycles computed, a panel an ensemble."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, len(CASES), figsize=(13, 4), layout="constrained")
+    colours = dict(zip(WAYS, ("0.5", "#0072B2", "#E69F00", "#882255"), strict=True))
+    for axis, (kind, last, _) in zip(axes, CASES, strict=True):
+        for name in WAYS:
+            mine = [f for f in found if (f.kind, f.last, f.way) == (kind, last, name)]
+            share = [100 * f.computed for f in mine]
+            errors = [100 * rms(f.error) for f in mine]
+            axis.plot(share, errors, "o-", color=colours[name], label=name)
+        axis.set(
+            title=f"{kind.name}, to cycle {last:,}", ylim=(0, None),
+            xlabel="cycles computed [%]", ylabel="error of the settlement, rms over runs [%]",
+        )  # fmt: skip
+    axes[0].legend(fontsize=8)
+    figure.savefig(target, dpi=80)
+    plt.close(figure)
+
+
+def page(found: Sequence[Forecasts]) -> str:
+    """The page of a study."""
+    parts = {"ERRORS": table_errors(found), "K": str(FIRST_WINDOW), "HEALING": str(HEALING)}
+    return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)
+
+
+def main() -> None:
+    """Write page and picture."""
+    found = study(EnsembleRecord())
+    write_atomically(PAGE, page(found))
+    draw(found, PAGE.with_suffix(".png"))
+
+
+if __name__ == "__main__":
+    main()

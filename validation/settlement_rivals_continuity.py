@@ -1,0 +1,86 @@
+"""Whether a bed goes on behind a jump as it went before it: no transient, no shock.
+
+Settlement a cycle, coordination number and piston stiffness in the first cycles behind a jump,
+healing cycles among them, beside the last cycles before it.  A bed without any jump drifts and
+scatters too; so the same question is put to the full runs at the same cycles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtrit
+
+from adapters.stages import Run
+from adapters.state import FloatArray
+from validation.move_study_engine import cycles_of
+
+Row = dict[str, Any]
+CYCLES = 10
+"""On each side of a jump."""
+COLUMNS = ("settlement", "coordination_number", "piston_stiffness")
+"""Settlement gained in each cycle [m], grains that touch a grain, N/m."""
+PROBABILITY = 0.95
+
+
+def sides_of(run: Run) -> list[Row]:
+    """Of every jump that stands: cycles ``first`` to ``last``, `COLUMNS` ``before`` and ``after``.
+
+    Settlement is that of each cycle, in the first one behind the jump since the jump's own end.
+    """
+    outcomes = run.folder.outcomes()
+    found = []
+    for (before, jump), (_, after) in zip(pairwise(outcomes), pairwise(outcomes[1:]), strict=False):
+        if jump.stage != "jump":
+            continue
+        sides: Row = {"first": jump.first_cycle, "last": jump.last_cycle}
+        for name, outcome, start in (("before", before, np.nan), ("after", after, jump.rows)):
+            table = cycles_of(run, f"window_{outcome.first_cycle:06d}", slice(None))
+            path = np.array(table["settlement"])
+            zero = start[0]["settlement"] if isinstance(start, list) else np.nan
+            table["settlement"] = np.diff(path, prepend=zero).tolist()
+            part = slice(-CYCLES, None) if name == "before" else slice(CYCLES)
+            sides[name] = {column: table[column][part] for column in COLUMNS}
+        found.append(sides)
+    return found
+
+
+def sides_without_jump(
+    columns: Mapping[str, FloatArray], cycle: FloatArray, first: int, last: int
+) -> Row:
+    """The same of a run that computed every cycle: `CYCLES` up to ``first`` and behind ``last``."""
+    gains = dict(columns) | {"settlement": np.diff(columns["settlement"], prepend=np.nan)}
+    inside = {
+        "before": (cycle > first - CYCLES) & (cycle <= first),
+        "after": (cycle > last) & (cycle <= last + CYCLES),
+    }
+    sides: Row = {"first": first, "last": last}
+    for name, rows in inside.items():
+        sides[name] = {column: gains[column][rows].tolist() for column in COLUMNS}
+    return sides
+
+
+def continues(sides: Row, column: str) -> bool:
+    """Whether the mean behind a jump is the one before it, within their own scatter.
+
+    Settlement a cycle is multiplied by the cycle's number, the slope of the logarithm: that a bed
+    slows down is no transient.  The bound is Student's (Welch) at `PROBABILITY` for independent
+    cycles; bursts last longer than one, so a bed without a jump passes less often, and tells by how
+    much.
+    """
+    before, after = (np.array(sides[name][column], float) for name in ("before", "after"))
+    if column == "settlement":
+        before = before * (sides["first"] - len(before) + 1 + np.arange(len(before)))
+        after = after * (sides["last"] + 1 + np.arange(len(after)))
+    noise = [one.var(ddof=1) / len(one) for one in (before, after)]
+    freedom = len(before) + len(after) - 2
+    bound = stdtrit(freedom, (1 + PROBABILITY) / 2) * np.sqrt(sum(noise))
+    return bool(abs(after.mean() - before.mean()) <= bound)
+
+
+def share_continued(sides: Sequence[Row], column: str) -> float:
+    """Share of jumps behind which a column goes on as before; nan for none."""
+    return float(np.mean([continues(one, column) for one in sides])) if sides else float("nan")
