@@ -34,6 +34,9 @@
     islands          what is still not solved, each island apart, by all of this (large problems
                      of few islands at once)
 
+Forces to start from that are no nearer to the answer than none (by the natural map) are left aside:
+they would keep the convex path, which needs no start, from being tried first.
+
 Every method alone can fail on real problems: Newton far from a solution, the interior point where
 its path folds back, Gauss-Seidel on tall piles.  Together they fail seldom (`docs/rigid-solvers.md`
 counts it); there is no proof: read ``status`` and ``residual``.
@@ -115,6 +118,7 @@ def attempts(
     if trial.best.solved:
         trial.sharpen()
         return trial
+    start = trial.start
     if not problem.friction.any():
         trial.keep(frictionless(problem, start, tolerance))
         if trial.best.solved:

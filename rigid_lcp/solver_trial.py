@@ -67,8 +67,13 @@ class Trial:
         self.sweeper: Sweeper | None = None
         self.path_end: Floats | None = None
         self.path_point: tuple[Floats, float] | None = None
+        self.start: Floats | None = None
+        """The forces given to start from; None where they are no nearer than none at all."""
         if start is not None:
-            self.keep(friction_solution(problem, start, tolerance, "start"))
+            begun = friction_solution(problem, start, tolerance, "start")
+            if begun.solved or 0 < begun.residual * length(start) < problem.error_without_forces:
+                self.start = start
+                self.keep(begun)
 
     def keep(self, found: FrictionSolution, after: str = "") -> FrictionSolution:
         """Count the work of a solution and keep it if it is the best; gives it back."""

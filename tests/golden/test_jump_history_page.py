@@ -1,0 +1,71 @@
+"""docs/jump-history.md is what the ensemble's record says, and its sentences hold in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adapters.state import FloatArray
+from validation.jump_history_page import (
+    PAGE,
+    WAYS,
+    Forecasts,
+    jumped_error,
+    page,
+    study,
+    way_history,
+    way_nothing,
+    way_one_slope,
+    way_window,
+)
+from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals_reading import rms
+
+
+@pytest.fixture(scope="module")
+def found() -> list[Forecasts]:
+    return study(EnsembleRecord())
+
+
+def errors(found: list[Forecasts], name: str, kind: str, jumps: int, last: int) -> FloatArray:
+    """Of a way in a case."""
+    (mine,) = (
+        f.error for f in found if (f.way, f.kind.name, f.jumps, f.last) == (name, kind, jumps, last)
+    )
+    return mine
+
+
+def test_page_is_made_from_the_record(found: list[Forecasts]) -> None:
+    """Made again, the page is the one that ships."""
+    assert page(found) == PAGE.read_text(encoding="utf-8")
+    assert PAGE.with_suffix(".png").exists()
+
+
+def test_a_logarithm_is_met_by_every_way_but_nothing() -> None:
+    """u = a ln N: no error; with nothing, all that the jumps gained."""
+    cycle = np.arange(501.0)
+    curve = 1e-4 * np.log(np.maximum(cycle, 1))
+    for way in (way_window, way_one_slope, way_history):
+        assert abs(jumped_error(curve, 100, 500, 2, way)) < 1e-9
+    gained = curve[285] - curve[120] + curve[475] - curve[310]
+    assert jumped_error(curve, 100, 500, 2, way_nothing) == pytest.approx(-gained)
+
+
+def test_sentences_of_the_page(found: list[Forecasts]) -> None:
+    """Long jumps of the coarse bed: half the last window's error, bias below a tenth; one slope of
+    all cycles scatters least and settles too little on each; where the bed is quiet the last window
+    is as good."""
+    for jumps in (2, 5, 10, 20):
+        of = {way: errors(found, way, "coarse", jumps, 2800) for way in WAYS}
+        assert abs(of["history"].mean()) < 0.1
+        assert rms(of["history"]) < 0.7 * rms(of["log, last window"])
+        assert rms(of["history"]) < rms(of["nothing"])
+        assert of["one slope of all cycles"].std() < min(
+            of[way].std() for way in ("history", "log, last window")
+        )
+    for one in found:
+        if one.way == "one slope of all cycles":
+            assert one.error.mean() < 0
+        if one.way == "log, last window" and one.kind.name == "confined":
+            history = errors(found, "history", "confined", one.jumps, one.last)
+            assert rms(one.error) < 1.2 * rms(history)
