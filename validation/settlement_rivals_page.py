@@ -176,15 +176,11 @@ def packings_needed(gained: FloatArray) -> int:
     return int(np.ceil((2 * gained.std(ddof=1) / gained.mean()) ** 2))
 
 
-def jumps_lost(rows: Sequence[Row], last: int) -> str:
-    """In words, how many jumps were given up and why."""
-    lost = [
-        why
-        for jumps in SCHEDULES
-        for row in rows_of(rows, "rivals", f"{jumps} jumps", last)
-        for why in row["lost"]
-    ]
-    runs = sum(len(rows_of(rows, "rivals", f"{jumps} jumps", last)) for jumps in SCHEDULES)
+def jumps_lost(rows: Sequence[Row], last: int, family: str = "procedure") -> str:
+    """In words, how many jumps of a family of methods were given up and why."""
+    names = [method.name for method in METHODS if method.family == family and method.jumps]
+    found = [row for name in names for row in rows_of(rows, "rivals", name, last)]
+    lost, runs = [why for row in found for why in row["lost"]], len(found)
     lifts = sum("lifts the bed" in why for why in lost)
     relaxed = sum(why.startswith("relaxation") for why in lost)
     return (
@@ -255,6 +251,7 @@ def page(rows: Sequence[Row], last: int = LAST) -> str:
         "NULL": table_null(rows, last),
         "PLACES": str(len(of_place(rows, TWIN))),
         "LOST": jumps_lost(rows, last),
+        "LOST_HISTORY": jumps_lost(rows, last, "history"),
         "VERDICT": verdict(rows, last),
         "BUDGET": table_budget(rows),
         "MINUTES": f"{sum(r['cpu_s'] for r in rows if r['part'] in ('rivals', 'budget')) / 60:.0f}",

@@ -63,6 +63,32 @@ def test_sentences_about_moving(rows: list[Row]) -> None:
         assert 0.4 < sum(computed) / len(computed) / 400 < 0.6
 
 
+def test_sentences_about_history(rows: list[Row]) -> None:
+    """A seventh as many attempts fail, two jumps cost half as much, the error is not greater."""
+    lost = {
+        family: sum(
+            len(row["lost"])
+            for jumps in (5, 2)
+            for row in finished(rows, f"{jumps} jumps{family}", LAST)
+        )
+        for family in ("", ", by history")
+    }
+    assert 5 < lost[""] / lost[", by history"] < 9
+    law, history = (finished(rows, f"2 jumps{end}", LAST) for end in ("", ", by history"))
+    assert len(history) == 5
+    assert 0.4 < cost(history) / cost(law) < 0.6
+    for jumps in (5, 2):
+        found, before = (
+            judged(rows, f"{jumps} jumps{end}", LAST, "settlement") for end in (", by history", "")
+        )
+        assert found is not None
+        assert before is not None
+        assert abs(found.mean) < found.half
+        assert abs(found.mean) < abs(before.mean) + 0.01
+    twice = finished(rows, "step x 2", LAST)
+    assert 1.7 < cost(twice) / cost(history) < 2.4
+
+
 def test_sentences_about_rivals(rows: list[Row]) -> None:
     """Fitted laws are cheaper and miss by more; softer grains answer otherwise to a load."""
     moved = judged(rows, "5 jumps", LAST, "settlement")
