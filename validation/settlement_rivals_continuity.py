@@ -2,7 +2,9 @@
 
 Settlement a cycle, coordination number and piston stiffness in the first cycles behind a jump,
 healing cycles among them, beside the last cycles before it.  A bed without any jump drifts and
-scatters too; so the same question is put to the full runs at the same cycles.
+wanders too: over hundreds of cycles its coordination number changes by far more than ten cycles
+scatter.  So what is judged is the change from before to behind, beside the changes of full runs
+between the same cycles.
 """
 
 from __future__ import annotations
@@ -63,24 +65,33 @@ def sides_without_jump(
     return sides
 
 
-def continues(sides: Row, column: str) -> bool:
-    """Whether the mean behind a jump is the one before it, within their own scatter.
+def change_of(sides: Row, column: str) -> float:
+    """Mean behind a jump less mean before it.
 
     Settlement a cycle is multiplied by the cycle's number, the slope of the logarithm: that a bed
-    slows down is no transient.  The bound is Student's (Welch) at `PROBABILITY` for independent
-    cycles; bursts last longer than one, so a bed without a jump passes less often, and tells by how
-    much.
+    slows down is no transient.
     """
     before, after = (np.array(sides[name][column], float) for name in ("before", "after"))
     if column == "settlement":
         before = before * (sides["first"] - len(before) + 1 + np.arange(len(before)))
         after = after * (sides["last"] + 1 + np.arange(len(after)))
-    noise = [one.var(ddof=1) / len(one) for one in (before, after)]
-    freedom = len(before) + len(after) - 2
-    bound = stdtrit(freedom, (1 + PROBABILITY) / 2) * np.sqrt(sum(noise))
-    return bool(abs(after.mean() - before.mean()) <= bound)
+    return float(after.mean() - before.mean())
 
 
-def share_continued(sides: Sequence[Row], column: str) -> float:
-    """Share of jumps behind which a column goes on as before; nan for none."""
-    return float(np.mean([continues(one, column) for one in sides])) if sides else float("nan")
+def continues(sides: Row, others: Sequence[Row], column: str) -> bool:
+    """Whether the change over a jump is one that full runs have between the same cycles.
+
+    ``others``: their sides, n of them; the bound is Student's for one more of the same kind,
+    t s sqrt(1 + 1/n), at `PROBABILITY`.
+    """
+    changes = np.array([change_of(one, column) for one in others])
+    bound = stdtrit(len(changes) - 1, (1 + PROBABILITY) / 2) * changes.std(ddof=1)
+    bound *= np.sqrt(1 + 1 / len(changes))
+    return bool(abs(change_of(sides, column) - changes.mean()) <= bound)
+
+
+def share_continued(pairs: Sequence[tuple[Row, Sequence[Row]]], column: str) -> float:
+    """Share of jumps, each with the sides of full runs, that `continues`; nan for none."""
+    if not pairs:
+        return float("nan")
+    return float(np.mean([continues(one, others, column) for one, others in pairs]))

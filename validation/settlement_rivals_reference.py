@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from adapters.fit_auto import outlook
 from adapters.laws import law_named
-from validation.settlement_ensemble import Piece
+from validation.settlement_ensemble import Kind, Piece
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import BLOCK, FIRST_WINDOW, Row, figures_of, mean_of, profile
+from validation.settlement_rivals import (
+    BLOCK,
+    FIRST_WINDOW,
+    Row,
+    figures_of,
+    mean_of,
+    profile,
+)
+from validation.settlement_rivals_continuity import COLUMNS, CYCLES, sides_without_jump
 
 LAWS = tuple(
     (law, cycles) for law in ("log", "auto") for cycles in (FIRST_WINDOW, 5 * FIRST_WINDOW)
@@ -31,13 +41,32 @@ def columns_by_cycle(piece: Piece, record: EnsembleRecord) -> dict[int, dict[str
     }
 
 
+def sides_of_reference(
+    kind: Kind, record: EnsembleRecord, first: int, last: int
+) -> list[dict[str, Any]]:
+    """What every member that came so far has on both sides of cycles ``first`` to ``last``."""
+    sides = []
+    for piece in kind.runs():
+        kept = record.kept(piece.name)
+        if piece.packing is None or kept is None or kept.cycle < last + CYCLES:
+            continue
+        found = columns_by_cycle(piece, record)
+        cycle = np.array(sorted(found), float)
+        columns = {name: np.array([found[int(c)][name] for c in cycle]) for name in COLUMNS}
+        sides.append(sides_without_jump(columns, cycle, first, last))
+    return sides
+
+
 def engine_s(found: dict[int, dict[str, float]], k_i: int, last: int) -> float:
     """CPU time of the engine from k_i to ``last`` [s]."""
     return float(sum(found[cycle]["cpu_s"] for cycle in range(k_i + 1, last + 1)))
 
 
 def reference_row(piece: Piece, last: int, record: EnsembleRecord) -> Row:
-    """The figures of a member, whose state at ``last`` the ensemble keeps; time without Python."""
+    """The figures of a member, whose state at ``last`` the ensemble keeps; time without Python.
+
+    ``begun``: settlement [m] from the rain to k_i.
+    """
     kept, k_i = record.kept(piece.name), piece.kind.k_i
     assert kept is not None
     found = columns_by_cycle(piece, record)
@@ -45,7 +74,8 @@ def reference_row(piece: Piece, last: int, record: EnsembleRecord) -> Row:
     cpu_s = engine_s(found, k_i, last)
     radius, position = record.states(piece.name)
     layers = profile(piece.kind.scene(piece.seed), kept.density_height, position[last], radius)
-    row = {"computed": last - k_i, "cost": {"engine": cpu_s}, "cpu_s": cpu_s}
+    row: Row = {"computed": last - k_i, "cost": {"engine": cpu_s}, "cpu_s": cpu_s}
+    row["begun"] = mean_of(found, k_i, "settlement")
     return row | figures_of(found, k_i) | {"profile": layers, "engine": kept.engine}
 
 
