@@ -14,9 +14,11 @@ from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.page_text import page_filled, table
 from validation.same_packing import interval
+from validation.settlement_bars import sides_compared, table_bars
 from validation.settlement_ensemble import COARSE
 from validation.settlement_ensemble_page import short
 from validation.settlement_ensemble_reading import nested
+from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import K_I, METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS, PLACE, TWIN
 from validation.settlement_rivals_picture import draw, shown
@@ -230,6 +232,7 @@ def scatter(rows: Sequence[Row]) -> dict[str, str]:
 def page(rows: Sequence[Row], last: int = LAST) -> str:
     """The page of a record."""
     truth = reference(rows, last)
+    compared = sides_compared(rows, COARSE, EnsembleRecord())
     figure = FIGURES["settlement"]
     values = {
         seed: np.array([figure.value(row) for row in truth if row["seed"] == seed])
@@ -246,6 +249,7 @@ def page(rows: Sequence[Row], last: int = LAST) -> str:
         "GIVEN": f"{1e6 * found.half_given:.0f}",
         "CHAOS": f"{100 * chaos(rows, last, 'settlement'):.0f}",
         "METHODS": table_methods(rows, last),
+        "BARS": table_bars(compared, [method.name for method in METHODS], last),
         "MISSING": missing(rows, last),
         "REFUSED": table_refused(rows, last),
         "NULL": table_null(rows, last),

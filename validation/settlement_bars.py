@@ -1,0 +1,167 @@
+"""The bars that jumps are to reach at paper scale, from the record of the rivals.
+
+Every figure is that of all runs of a method, several a packing, beside the reference ensemble's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from adapters.state import FloatArray
+from validation.page_text import table
+from validation.settlement_ensemble import Kind
+from validation.settlement_ensemble_reading import Nested, nested
+from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals import Row
+from validation.settlement_rivals_continuity import COLUMNS, share_continued
+from validation.settlement_rivals_reading import (
+    FIGURES,
+    cost,
+    finished,
+    judged,
+    profile_error,
+    reference,
+)
+from validation.settlement_rivals_reference import sides_of_reference
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A figure, and what it is to be."""
+
+    words: str
+    unit: str
+    bound: float
+    value: Callable[[Sequence[Row], str, int], float]
+    """Of rows, method and last cycle; nan where the record does not tell."""
+    least: bool = False
+    """Whether the bound is the least that is asked, not the most."""
+
+    def met(self, value: float) -> bool:
+        """Whether a figure is what it is to be; nan is not."""
+        return bool(value >= self.bound if self.least else value <= self.bound)
+
+
+def runs_by_packing(rows: Sequence[Row], key: str) -> dict[int, FloatArray]:
+    """A figure of all runs of each packing."""
+    found: dict[int, list[float]] = {}
+    for row in rows:
+        found.setdefault(row["seed"], []).append(FIGURES[key].value(row))
+    return {seed: np.array(values) for seed, values in sorted(found.items())}
+
+
+def settlement_of(rows: Sequence[Row], last: int) -> Nested:
+    """Settlement of the reference from k_i to ``last`` [m], with its intervals."""
+    return nested(runs_by_packing(reference(rows, last), "settlement"))
+
+
+def settlement_total(rows: Sequence[Row], last: int) -> float:
+    """Mean settlement of the reference from the rain to ``last`` [m]; nan where it is not kept."""
+    begun = [row.get("begun", np.nan) for row in reference(rows, last)]
+    return float(np.mean(begun)) + settlement_of(rows, last).mean
+
+
+def bias(rows: Sequence[Row], method: str, last: int) -> float:
+    """Size of the mean settlement's error over the total settlement [%]."""
+    found = judged(rows, method, last, "settlement")
+    scale = settlement_of(rows, last).mean / settlement_total(rows, last)
+    return 100 * abs(found.mean) * scale if found else np.nan
+
+
+def bias_beside_interval(rows: Sequence[Row], method: str, last: int) -> float:
+    """The same error over half of the interval that the reference's mean has from these packings:
+    1 is its end."""
+    found, truth = judged(rows, method, last, "settlement"), settlement_of(rows, last)
+    return abs(found.mean) * truth.mean / truth.half_given if found else np.nan
+
+
+def spread(rows: Sequence[Row], method: str, last: int) -> float:
+    """Standard deviation of the settlement over all runs, over the reference's [-]."""
+    mine, truth = (
+        np.array([FIGURES["settlement"].value(row) for row in found])
+        for found in (finished(rows, method, last), reference(rows, last))
+    )
+    return float(mine.std(ddof=1) / truth.std(ddof=1)) if len(mine) > 1 else np.nan
+
+
+def error_of(key: str) -> Callable[[Sequence[Row], str, int], float]:
+    """Size of the mean error of a figure [%]."""
+
+    def error(rows: Sequence[Row], method: str, last: int) -> float:
+        found = judged(rows, method, last, key)
+        return 100 * abs(found.mean) if found else np.nan
+
+    return error
+
+
+def error_of_profile(rows: Sequence[Row], method: str, last: int) -> float:
+    """Error of the density profile, rms over layers, mean over runs [%]."""
+    errors = profile_error(rows, method, last)
+    return 100 * float(errors.mean()) if len(errors) else np.nan
+
+
+def gained_time(rows: Sequence[Row], method: str, last: int) -> float:
+    """T_full / T - 1 of CPU time behind k_i, all counted [%]."""
+    mine = finished(rows, method, last)
+    return 100 * (cost(reference(rows, last)) / cost(mine) - 1) if mine else np.nan
+
+
+def sides_compared(rows: Sequence[Row], kind: Kind, record: EnsembleRecord) -> list[Row]:
+    """Rows whose jumps have the sides of full runs beside their own, as ``others``."""
+    known = cache(partial(sides_of_reference, kind, record))
+
+    def compared(row: Row) -> Row:
+        sides = [one | {"others": known(one["first"], one["last"])} for one in row["sides"]]
+        return row | {"sides": sides}
+
+    return [compared(row) if "sides" in row else row for row in rows]
+
+
+def continued(column: str) -> Callable[[Sequence[Row], str, int], float]:
+    """Share of all jumps behind which a column goes on as before [%]."""
+
+    def share(rows: Sequence[Row], method: str, last: int) -> float:
+        mine = finished(rows, method, last)
+        pairs = [(one, one["others"]) for row in mine for one in row.get("sides", [])]
+        return 100 * share_continued(pairs, column)
+
+    return share
+
+
+BARS = (
+    Bar("bias over the total settlement", "%", 1.0, bias),
+    Bar("bias over half the reference's interval", "", 1.0, bias_beside_interval),
+    Bar("spread over the reference's", "", 1.3, spread),
+    Bar("coordination number", "%", 3.0, error_of("coordination")),
+    Bar("density profile", "%", 2.0, error_of_profile),
+    Bar("elastic deflection", "%", 2.0, error_of("deflection")),
+    Bar("gained time", "%", 400.0, gained_time, least=True),
+    *(
+        Bar(f"{words} goes on", "%", 90.0, continued(column), least=True)
+        for column, words in zip(COLUMNS, ("rate", "coordination", "stiffness"), strict=True)
+    ),
+)
+"""Either of the first two is enough."""
+
+
+def told(bar: Bar, value: float) -> str:
+    """A figure as it stands in a table, bold where it is what it is to be."""
+    if value != value:
+        return "-"
+    text = f"{value:.0f}" if bar.least else f"{value:.1f}"
+    return f"**{text}**" if bar.met(value) else text
+
+
+def table_bars(rows: Sequence[Row], methods: Sequence[str], last: int) -> str:
+    """A line a method, a column a bar."""
+    asked = ["bar", *(f"{'≥' if bar.least else '≤'} {bar.bound:g} {bar.unit}" for bar in BARS)]
+    lines = [
+        [name, *(told(bar, bar.value(rows, name, last)) for bar in BARS)]
+        for name in methods
+        if finished(rows, name, last)
+    ]
+    return table(["way", *(bar.words for bar in BARS)], [asked, *lines])
