@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.cones import length
-from rigid_lcp.energy_proof import gives_energy
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import (
     ROUND_OFF,
@@ -143,7 +142,7 @@ def solve_auto(
             " a linear programme)\n  -> use impulses: a velocity-level time step, or look for"
             " contacts that bear on no mass",
         )
-    if not trial.best.solved and gives_energy(problem):
+    if not trial.best.solved and trial.gives_energy:
         return trial.solution(message=ENERGY_GIVEN.format(trial.best.residual))
     return trial.solution()
 

@@ -54,7 +54,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import factorisation
-from rigid_lcp.energy_proof import gives_energy
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.frictionless import frictionless
 from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
@@ -190,7 +189,7 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         trial.forget_endless()
         trial.best = replace(trial.best, status="no solution")
         return
-    if gives_energy(problem):  # nothing promises a solution: what is near is found in one turn
+    if trial.gives_energy:  # what is near is found in one turn
         by_turns(trial, trial.best.r if trial.path_end is None else trial.path_end, patience=1)
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)

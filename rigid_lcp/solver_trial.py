@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import Factorisation, factorisation
 from rigid_lcp.cones import length
+from rigid_lcp.energy_proof import gives_energy
 from rigid_lcp.extrapolated_points import FACTORISATIONS as MANY_STEPS
 from rigid_lcp.extrapolated_points import extrapolated_points
 from rigid_lcp.friction_problem import (
@@ -74,6 +76,11 @@ class Trial:
             if begun.solved or 0 < begun.residual * length(start) < problem.error_without_forces:
                 self.start = start
                 self.keep(begun)
+
+    @cached_property
+    def gives_energy(self) -> bool:
+        """Whether W is proved to give energy, so that nothing promises a solution."""
+        return gives_energy(self.problem)
 
     def keep(self, found: FrictionSolution, after: str = "") -> FrictionSolution:
         """Count the work of a solution and keep it if it is the best; gives it back."""

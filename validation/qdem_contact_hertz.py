@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 import qdem_fem as q
+from qdem_fem.errors import NotConverged
 from qdem_fem.mesh_generation import box_mesh
 from validation.case import Check
 from validation.qdem_judge import stiffness
@@ -119,7 +120,10 @@ def contact_of(model: str, edge: float) -> q.SphereContact | q.SurfaceContact:
 
 
 def rest(run: q.Simulation, period: float, tolerance: float = 1e-6, most: int = 600) -> None:
-    """March until kinetic energy is a share of all; velocities go to zero at its peaks."""
+    """March until kinetic energy is a share of all; velocities go to zero at its peaks.
+
+    Raises `NotConverged` after the ``most`` looks.
+    """
     before = 0.0
     for _ in range(most):
         run.advance(period / 20)
@@ -133,6 +137,11 @@ def rest(run: q.Simulation, period: float, tolerance: float = 1e-6, most: int = 
             before = 0.0
         else:
             before = e.kinetic
+    raise NotConverged(
+        f"the kinetic energy is {e.kinetic / (e.elastic + e.contact):.1e} of the others",
+        where=f"the trial after {most} looks",
+        remedy="look at its step and damping: without rest no force is that of equilibrium",
+    )
 
 
 def hertz_pressed(model: str, cells: int) -> tuple[float, float, float, float]:

@@ -1,6 +1,6 @@
 """A sleeper block on polyhedral ballast in space: settlement against the step, and what it costs.
 
-    python -m validation.rigid_ballast_3d --run [--quick]    measure what is missing, write it all
+    python -m validation.rigid_ballast_3d --run [--quick] [--out FILE]    what the record lacks
     python -m validation.rigid_ballast_3d                    write the page from the record
     python -m validation.rigid_ballast_3d --chains RUN       and the picture of force chains, from
                                                    the folder of a run of the scene
@@ -232,6 +232,7 @@ def main(words: Sequence[str] | None = None) -> None:
 
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--run", action="store_true", help="measure what is missing first")
+    parser.add_argument("--out", type=Path, default=RECORD, help="record of --run, to begin anew")
     parser.add_argument("--quick", action="store_true", help="a small bed, which is not recorded")
     parser.add_argument("--chains", type=Path, metavar="RUN", help="folder of a run of the scene")
     given = parser.parse_args(words)
@@ -240,7 +241,7 @@ def main(words: Sequence[str] | None = None) -> None:
             print(json.dumps(line))
         return
     if given.run:
-        study_run(Study(), SAMPLES, STEPS, RECORD)
+        study_run(Study(), SAMPLES, STEPS, given.out)
     if given.chains:
         chains_write(given.chains)
     page_write(record_read())
