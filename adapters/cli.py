@@ -153,8 +153,8 @@ def cycle_by_cycle_flag(parser: argparse.ArgumentParser) -> None:
     """Add ``--cycle-by-cycle``."""
     parser.add_argument(
         "--cycle-by-cycle", action="store_true",
-        help="with a tolerance: where the bed ratchets or collapses, so that no jump is allowed, "
-        "compute every cycle instead of stopping with exit code 6",
+        help="where the bed ratchets or collapses, so that no jump is allowed, or a jump and its "
+        "shorter tries failed, compute cycles instead of stopping with exit code 6",
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -68,7 +69,8 @@ def settle(run: Run) -> Bed:
 def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
     """A jump of ``h`` cycles and the window after it; a failed jump is tried again, half as long.
 
-    Raises `NotCredible` when the jump and its retries failed.
+    Where the jump and its retries failed: `compute_on` if the run may compute what it can not jump,
+    else raises `NotCredible`.
     """
     p = run.scene.procedure
     assert p is not None
@@ -89,11 +91,34 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                 run.folder.give_up(name, why)
                 run.progress.say(f"the jump of {h} cycles from {bed.cycle} failed: {why}")
         h = h // 2 if h > 1 else h
+    failed = f"the jump from cycle {bed.cycle} failed {RETRIES + 1} times, the last time: {why}"
+    if run.cycle_by_cycle:
+        run.progress.say(f"{failed}; computing on")
+        return compute_on(run, bed)
     raise NotCredible(
-        f"the jump from cycle {bed.cycle} failed {RETRIES + 1} times, the last time: {why}",
+        failed,
         where=str(run.folder.path),
-        remedy="more cycles k before the jump, or a shorter h; the cycles before it are kept",
+        remedy="more cycles k before the jump, a shorter h, or windows in its place: "
+        "trackbed resume RUN --cycle-by-cycle; the cycles before it are kept",
     )
+
+
+def compute_on(run: Run, bed: Bed) -> Bed:
+    """Windows in place of a jump: one at the first place that no jump leaves, twice as many at each
+    further one, so that tries stay few where none succeeds."""
+    p = run.scene.procedure
+    assert p is not None
+    last_tries = (
+        n for n in run.folder.stage_names() if re.fullmatch(rf"jump_\d+_{RETRIES + 1}", n)
+    )
+    places = sum(
+        bool(run.folder.failure(name)) and int(name.split("_")[1]) <= bed.cycle
+        for name in last_tries
+    )
+    end = min(p.total_cycles, bed.cycle + p.window_cycles * 2 ** (places - 1))
+    while bed.cycle < end:
+        bed = stages.compute(run, bed, min(p.window_cycles, end - bed.cycle))
+    return bed
 
 
 def history_gain(run: Run, bed: Bed, h: int) -> float | None:

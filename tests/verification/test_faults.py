@@ -22,6 +22,7 @@ from adapters.errors import EngineFailed, NotCredible
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder
 from adapters.scene import Scene
+from adapters.stages import Bed
 from tests.small_bed import small_bed
 
 SCENE = small_bed(k=4, h=8, total_cycles=24)
@@ -294,6 +295,31 @@ def test_jump_that_fails_for_good(
         assert table(run).decode().splitlines()[-1].startswith("6,")
     events = [event["event"] for event in RunFolder(run).events()]
     assert events.count("jump failed") == 4
+
+
+def test_cycles_in_place_of_jumps_that_fail_for_good(
+    scene: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With --cycle-by-cycle, of a refused run on too: every cycle is there, computed, and places
+    where jumps are tried get rarer: one window of 4 behind the first, two behind the next."""
+    run = scene.parent / "run"
+
+    def fail(*_: object) -> Bed:
+        raise NotCredible("made to fail")
+
+    monkeypatch.setattr(stages, "jump", fail)
+    assert trackbed.main(["run", str(scene)]) == 6
+    assert trackbed.main(["resume", str(run), "--cycle-by-cycle"]) == 0
+    lines = table(run).decode().splitlines()[1:]
+    assert [int(line.split(",")[0]) for line in lines] == list(range(1, 25))
+    assert not any("jumped" in line for line in lines)
+    failed = [e["stage"] for e in RunFolder(run).events() if e["event"] == "jump failed"]
+    places = sorted({int(name.split("_")[1]) for name in failed})
+    assert places == [6, 10]  # at 18 no jump of 8 and a window fit before the end
+    again = scene.parent / "again"
+    words = ["run", str(scene), "--run-folder", str(again), "--cycle-by-cycle"]
+    assert trackbed.main(words) == 0
+    assert table(again) == table(run)
 
 
 @pytest.mark.parametrize("stop_at", [1, 2, 3])
