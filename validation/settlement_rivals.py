@@ -181,7 +181,7 @@ METHODS = (
     *jumping(5), *jumping(2), softer(10), longer(0.8), faster(4), heavier(10), longer(0.4),
     softer(30), softer(100), heavier(100), longer(1.0), longer(0.6), faster(2), FEWER,
     Method("tolerance 0.1", "tolerance", ("procedure.tolerance=0.1",), JUMPING),
-    *jumping(10), longer(0.3), RESUBMITTED, remembering(5), remembering(2),
+    *jumping(10), longer(0.3), RESUBMITTED, remembering(5), remembering(2), remembering(10),
 )  # fmt: skip
 """On the coarse bed, in the order in which they are run."""
 METHODS_OF: dict[str, tuple[Method, ...]] = {
