@@ -26,7 +26,8 @@ from qdem_fem.track_bed import Bed, BedRecipe, bed_read, bed_write, grains_of
 from qdem_fem.track_bodies import TrackBox, grains_nodes, lattice_loose, sleeper_slice
 from qdem_fem.track_figures import acceleration_spectrum, differences, mobility, peaks_of
 from qdem_fem.track_load import RISE, bogie_series
-from qdem_fem.track_scene import BogieTable, TrackPrepared, TrackTable
+from qdem_fem.track_scene import TrackPrepared
+from qdem_fem.track_table import BogieTable, TrackTable
 from validation import track_page
 from validation.track_trials import SCENE
 
@@ -149,7 +150,8 @@ def test_a_run_whose_account_does_not_close_stops(
 def test_loose_grains_touch_neither_each_other_nor_walls_nor_sleeper() -> None:
     band = (0.13, 0.29)
     grains = grains_nodes(grains_of(RECIPE))
-    placed = lattice_loose(grains, RECIPE.box, 0.0, RECIPE.radius, 5, band)
+    rooms = [(0.0, 0.2, 0.0, band[0]), (0.0, 0.2, band[1], 0.42)]
+    placed = lattice_loose(grains, rooms, 0.0, RECIPE.radius, 5)
     assert len(placed) == 8
     for i, nodes in enumerate(placed):
         assert (nodes >= RECIPE.radius).all()
