@@ -22,6 +22,7 @@ import json
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -152,8 +153,12 @@ class Bed:
 
 def grains_of(recipe: BedRecipe) -> GrainSet:
     """The grains of a bed."""
-    grading = Grading(np.array(recipe.sizes), np.array([0.0, 1.0]))
-    return grains_make(recipe.below + recipe.beside, recipe.seed, None, grading)
+    return _grains_made(recipe.below + recipe.beside, recipe.seed, recipe.sizes)
+
+
+@lru_cache(maxsize=1)  # 30 ms a grain, and a run asks twice
+def _grains_made(count: int, seed: int, sizes: tuple[float, float]) -> GrainSet:
+    return grains_make(count, seed, None, Grading(np.array(sizes), np.array([0.0, 1.0])))
 
 
 def names_of(count: int, sleeper: bool) -> list[str]:
