@@ -76,14 +76,14 @@ def report_write(
 def _pictures(path: Path, summary: dict[str, Any], done: Done) -> Iterator[tuple[Path, str]]:
     """Draw what there is to draw; file and caption of each picture."""
     from qdem_fem import pictures
+    from qdem_fem.pictures_bodies import OUTLINED, picture_deformed, spheres_bearing
 
     deformed = path / "picture-deformed.png"
-    factor = pictures.picture_deformed(deformed, list(done.bodies.values()))
+    bodies = list(done.bodies.values())
+    factor = picture_deformed(deformed, bodies, bearing=spheres_bearing(done.run))
     when = "at rest" if done.plan is None else f"at t = {summary['time']:.6g} s"
-    yield (
-        deformed,
-        f"Bodies {when}, displacement magnified {factor:g} times; thin lines: undeformed.",
-    )
+    lines = "; thin lines: undeformed" * (len(bodies) <= OUTLINED)
+    yield deformed, f"Bodies {when}, displacement magnified {factor:g} times{lines}."
     if done.plan is None:
         return
     rows, energy = table_read(path / "probes.csv"), table_read(path / "energy.csv")

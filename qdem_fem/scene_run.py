@@ -251,10 +251,12 @@ class _Record:
             target = self.path / files[-1][2]
             bodies_vtu_write(target, self.bodies)
             if self.magnification is not None:
-                from qdem_fem.pictures import picture_deformed
+                from qdem_fem.pictures_bodies import picture_deformed, spheres_bearing
 
-                picture = target.with_name(f"picture-{target.stem}.png")
-                picture_deformed(picture, self.bodies, magnification=self.magnification)
+                picture_deformed(
+                    target.with_name(f"picture-{target.stem}.png"), self.bodies,
+                    magnification=self.magnification, bearing=spheres_bearing(self.run),
+                )  # fmt: skip
             pvd_write(self.path / "fields.pvd", [(when, name) for _, when, name in files])
 
 

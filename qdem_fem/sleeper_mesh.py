@@ -135,6 +135,24 @@ def sleeper_mesh(shape: SleeperShape, along: int = 80, across: int = 8, up: int 
     return TetMesh(nodes, mesh.elements, node_sets=sets)
 
 
+def sleeper_half(shape: SleeperShape, along: int, across: int, up: int) -> TetMesh:
+    """The half of a sleeper from end 1 to its middle, ``along`` cells long, as `sleeper_mesh`.
+
+    Its node sets without those of the other half, and ``ends``: the plane of symmetry at the
+    middle.  Raises `MeshError` for fewer than 3 cells along.
+    """
+    whole = sleeper_mesh(shape, 2 * along, across, up)
+    middle = shape.length / 2
+    kept = whole.nodes[whole.elements, 0].mean(axis=1) < middle
+    nodes = np.unique(whole.elements[kept])
+    number = np.full(len(whole.nodes), -1)
+    number[nodes] = np.arange(len(nodes))
+    sets = {name: number[old][number[old] >= 0] for name, old in whole.node_sets.items()}
+    sets = {name: mine for name, mine in sets.items() if len(mine)}
+    sets["ends"] = np.flatnonzero(whole.nodes[nodes, 0] > middle - NEAR * shape.length)
+    return TetMesh(whole.nodes[nodes], number[whole.elements[kept]], node_sets=sets)
+
+
 def _cells_shared(shares: FloatArray, count: int) -> IntArray:
     """``count`` whole cells by shares that add up to one, one each at least."""
     if count < len(shares):

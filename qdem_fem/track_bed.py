@@ -22,6 +22,7 @@ import json
 import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,7 +40,8 @@ from qdem_fem.material import Material
 from qdem_fem.output import write_whole
 from qdem_fem.periodic import PeriodicWidth
 from qdem_fem.sleeper_mesh import SleeperShape
-from qdem_fem.track_bodies import GAP, TrackBox, grains_nodes, lattice_loose, sleeper_slice
+from qdem_fem.track_bodies import GAP, TrackBox, grains_nodes
+from qdem_fem.track_layout import Part, TrackLayout
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
@@ -87,6 +89,16 @@ class BedRecipe:
     """Whether grains are rigid until the last stage."""
     periodic: bool = False
     """Whether the track repeats along y, as in the paper, in place of walls there."""
+    part: Part = "slice"
+    shoulder: tuple[float, float] | None = None
+    """As in `TrackLayout`."""
+
+    @property
+    def layout(self) -> TrackLayout:
+        """Where sleeper and ballast lie."""
+        return TrackLayout(
+            self.part, self.box, self.shape, self.cells, self.radius, self.shoulder
+        )  # fmt: skip
 
     def planes(self) -> tuple[ContactPlane, ...]:
         """Ground and sides."""
@@ -110,8 +122,11 @@ class BedRecipe:
         return SphereContact(self.radius, each, self.friction, self.planes(), periodic=width)
 
     def told(self) -> str:
-        """The recipe as a text, equal for equal beds."""
-        return json.dumps(asdict(self), sort_keys=True, default=np.ndarray.tolist)
+        """The recipe as a text, equal for equal beds; that of a slice names no part."""
+        told = asdict(self)
+        if self.part == "slice":
+            del told["part"], told["shoulder"]
+        return json.dumps(told, sort_keys=True, default=np.ndarray.tolist)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +153,12 @@ class Bed:
 
 def grains_of(recipe: BedRecipe) -> GrainSet:
     """The grains of a bed."""
-    grading = Grading(np.array(recipe.sizes), np.array([0.0, 1.0]))
-    return grains_make(recipe.below + recipe.beside, recipe.seed, None, grading)
+    return _grains_made(recipe.below + recipe.beside, recipe.seed, recipe.sizes)
+
+
+@lru_cache(maxsize=1)  # 30 ms a grain, and a run asks twice
+def _grains_made(count: int, seed: int, sizes: tuple[float, float]) -> GrainSet:
+    return grains_make(count, seed, None, Grading(np.array(sizes), np.array([0.0, 1.0])))
 
 
 def names_of(count: int, sleeper: bool) -> list[str]:
@@ -151,8 +170,7 @@ def meshes_of(recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats]) -> l
     """Meshes of bodies at their places: grains, and the sleeper where nodes are one more."""
     meshes = [replace(grains.mesh(i), nodes=x) for i, x in enumerate(nodes[: len(grains)])]
     if len(nodes) > len(grains):
-        block = sleeper_slice(recipe.shape, recipe.box, 0.0, recipe.radius, recipe.cells)
-        meshes.append(replace(block, nodes=nodes[-1]))
+        meshes.append(replace(recipe.layout.sleeper(0.0), nodes=nodes[-1]))
     return meshes
 
 
@@ -229,31 +247,24 @@ def _nodes_begin(
     recipe: BedRecipe, grains: GrainSet, stage: str, before: Bed | None
 ) -> list[Floats]:
     """Where the bodies of a stage begin [m]."""
+    layout, loose = recipe.layout, grains_nodes(grains)
     if before is None:
-        loose = grains_nodes(grains)[: recipe.below]
-        return lattice_loose(loose, recipe.box, 0.0, recipe.radius, recipe.seed)
+        return layout.grains_below(loose[: recipe.below], recipe.seed)
     if stage != "crib":
         return before.positions
-    below, radius, shape = before.positions, recipe.radius, recipe.shape
-    middle, half = recipe.box.width / 2, shape.width / 2
-    reach = half + 2 * radius
+    below, radius = before.positions, recipe.radius
     every = np.concatenate(below)
-    under = np.abs(every[:, 1] - middle) <= reach
-    bottom = float(every[under, 2].max()) + 2 * radius + GAP
-    block = sleeper_slice(shape, recipe.box, bottom, radius, recipe.cells)
-    beside = lattice_loose(
-        grains_nodes(grains)[recipe.below :], recipe.box,
-        float(every[:, 2].max()) + radius + GAP, radius, recipe.seed + 1,
-        (middle - reach + radius, middle + reach - radius),
-    )  # fmt: skip
-    return [*below, *beside, block.nodes]
+    bottom = float(every[layout.under(every), 2].max()) + 2 * radius + GAP
+    top = float(every[:, 2].max()) + radius + GAP
+    beside = layout.grains_beside(loose[recipe.below :], top, recipe.seed + 1)
+    return [*below, *beside, layout.sleeper(bottom).nodes]
 
 
 def sleeper_guide(run: Simulation, sleeper: Body, *, upright: bool) -> None:
-    """Hold a slice: its ends in their planes, or, while it is laid, all but its way down."""
+    """Hold a sleeper in its planes of symmetry, or, while it is laid, all but its way down."""
     if upright and sleeper.rigid:
         run.fix(sleeper, np.arange(len(sleeper.nodes)), "xy")
-    else:
+    elif "ends" in sleeper.mesh.node_sets:
         run.fix(sleeper, sleeper.mesh.node_sets["ends"], "x")
 
 

@@ -1,4 +1,4 @@
-"""Bodies of a small ballasted track: loose grains on a lattice, and a slice of a sleeper.
+"""Bodies of a ballasted track: loose grains on a lattice, and a slice of a sleeper.
 
 Axes: x along the sleeper, y along the track, z up from the ground.  A slice is what lies between
 two planes across the sleeper, which are planes of symmetry of the model: smooth walls for grains,
@@ -7,7 +7,7 @@ no displacement along x for the sleeper's ends.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,10 @@ GAP = 1e-6
 """Left between bodies that are put beside each other, or beside a wall [m]."""
 
 
+Room = tuple[float, float, float, float]
+"""From x to x and from y to y [m]."""
+
+
 @dataclass(frozen=True)
 class TrackBox:
     """Where the track lies: 0 <= x <= length, 0 <= y <= width, z >= 0 [m]."""
@@ -35,15 +39,15 @@ class TrackBox:
 
 
 def lattice_loose(
-    grains: Sequence[FloatArray], box: TrackBox, bottom: float, radius: float, seed: int,
-    keep_off: tuple[float, float] | None = None,
+    grains: Sequence[FloatArray], rooms: Sequence[Room], bottom: float, radius: float, seed: int,
+    share: Callable[[FloatArray], FloatArray] = np.ones_like,
 ) -> list[FloatArray]:  # fmt: skip
     """Nodes of grains turned at random, in columns on a lattice; none touches another or a wall.
 
-    ``grains``: nodes (n, 3) [m] of each about its centroid, ``radius`` [m] of their spheres;
-    columns are filled from ``bottom`` [m] up, always the lowest one next.  ``keep_off``: y from
-    which to which the sleeper stands, where no grain is put.  Raises `MeshError` for a box too
-    narrow for the largest grain.
+    ``grains``: nodes (n, 3) [m] of each about its centroid, ``radius`` [m] of their spheres, which
+    stay within the ``rooms``.  Columns are filled from ``bottom`` [m] up, always that one next
+    which is lowest over its ``share`` of the greatest height, a function of x (k,) [m] that is
+    above zero.  Raises `MeshError` for rooms too narrow for the largest grain.
     """
     random = np.random.default_rng(seed)
     turns = Rotation.random(len(grains), random_state=seed)
@@ -51,21 +55,21 @@ def lattice_loose(
     low = np.array([nodes.min(axis=0) for nodes in turned]) - radius
     high = np.array([nodes.max(axis=0) for nodes in turned]) + radius
     cell = (high - low).max(axis=0) + GAP
-    bands = [(0.0, box.width)]
-    if keep_off is not None:
-        bands = [(0.0, keep_off[0]), (keep_off[1], box.width)]
-    y = np.concatenate([_centres(a, b, cell[1]) for a, b in bands])
-    x = _centres(0.0, box.length, cell[0])
-    spots = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    grids = [
+        np.meshgrid(_centres(*room[:2], cell[0]), _centres(*room[2:], cell[1])) for room in rooms
+    ]
+    spots = np.concatenate([np.stack(grid, axis=-1).reshape(-1, 2) for grid in grids])
+    spots = spots[np.lexsort(spots.T[::-1])]
     if not len(spots):
         raise MeshError(
             f"grains up to {cell.max():.3g} m wide, spheres included, do not fit in it",
             where="track, box", remedy="give a greater box, or smaller grains",
         )  # fmt: skip
     height = bottom + 1e-3 * random.random(len(spots))
+    shares = share(spots[:, 0])
     placed = []
     for nodes, least, most in zip(turned, low, high, strict=True):
-        column = int(height.argmin())
+        column = int(((height - bottom) / shares).argmin())
         middle = 0.5 * (least + most)[:2]
         corner = np.array([*(spots[column] - middle), height[column] - least[2]])
         placed.append(nodes + corner)

@@ -1,4 +1,4 @@
-"""Scenes with a table ``[track]``: ballast and a slice of a sleeper in place of ``[[body]]``.
+"""Scenes with a table ``[track]``: ballast and a sleeper, or part of it, in place of ``[[body]]``.
 
 ``scenes/track-small.toml`` explains every key.  `track_load` checks such a scene; `track_enter`
 prepares the bed, or takes it from its file, and gives the simulation that begins there.
@@ -18,14 +18,12 @@ from pydantic import Field
 
 from qdem_fem.contact_scene import ContactTable, PeriodicTable
 from qdem_fem.kinetic_damping import Rest
-from qdem_fem.load_train import Track, Train
 from qdem_fem.material import Material
 from qdem_fem.mesh_checks import FloatArray, IntArray
-from qdem_fem.scene import BodyTable, MaterialTable, Scene, SeriesTable
+from qdem_fem.scene import BodyTable, Scene
 from qdem_fem.scene_checks import Prepared, Step, output_faults
 from qdem_fem.scene_file import Problem, SceneText
-from qdem_fem.scene_series import TimeSeries, WrongSeries, series_of
-from qdem_fem.scene_types import Cells, NonNegative, Positive, Share, Table, Text
+from qdem_fem.scene_series import TimeSeries, WrongSeries
 from qdem_fem.sleeper_mesh import SleeperShape
 from qdem_fem.track_bed import (
     SLEEPER,
@@ -38,68 +36,11 @@ from qdem_fem.track_bed import (
     sleeper_guide,
 )
 from qdem_fem.track_bodies import TrackBox
-from qdem_fem.track_load import bogie_series, down
+from qdem_fem.track_table import TrackTable, loads_of, track_faults
 
 BELOW = 0.1
 """Depth below the sleeper of the grains that are watched [m], as the paper's accelerometers; in a
 bed less than twice as deep its half."""
-POINTS = {"B1": 0.2, "B2": 0.5, "B3": 0.8}
-"""Where along a slice grains are watched, over its length: towards the sleeper's end, below the
-rail, towards the sleeper's centre."""
-
-
-class BogieTable(Table):
-    """The first bogie of a train (`qdem_fem.load_train`)."""
-
-    axle_load: Positive = 100e3
-    """Of both wheels [N]."""
-    speed: Positive = 32.0
-    """[m/s]"""
-    lead: Positive = 3.0
-    """From the front axle to the sleeper at first, from it to the rear axle at last [m]."""
-    rest: NonNegative = 0.05
-    """Time without load at the end [s]."""
-
-
-class TrackTable(Table):
-    """Grains, a slice of a sleeper on them, and a load on its rail seat."""
-
-    length: Positive
-    """Of the slice, along the sleeper [m]."""
-    width: Positive
-    """Along the track, from one middle between sleepers to the next [m]."""
-    below: Annotated[int, Field(ge=1, le=100_000)]
-    """Grains below the sleeper."""
-    beside: Annotated[int, Field(ge=1, le=100_000)]
-    """Grains that fill the cribs."""
-    seed: Annotated[int, Field(ge=0)] = 1
-    sizes: Annotated[tuple[Positive, Positive], Field(strict=False)] = (0.026, 0.034)
-    """Least and greatest sieve size of the grains' meshes [m]; spheres make them larger."""
-    cells: Cells
-    """Of the sleeper's mesh, along, across and up."""
-    share: Positive
-    """Part of the force on a rail seat that the slice takes [-]."""
-    ballast: MaterialTable
-    sleeper: MaterialTable
-    side_friction: NonNegative = 0.0
-    """Of the walls at the sides; without it they are planes of symmetry."""
-    bed: Text
-    """File of the prepared bed, made where it is not there; relative to the scene file."""
-    prepared_friction: NonNegative | None = None
-    """Friction that the bed is prepared with; by default that of the contact."""
-    softness: Share = 1e-4
-    """Of the springs while grains fall, over those of the run."""
-    unbalanced: Share = 0.05
-    kinetic: Share = 0.01
-    loose: Share = 0.02
-    """Greatest shares of `qdem_fem.kinetic_damping.Rest` that are equilibrium."""
-    patience: Positive = 5.0
-    """Simulated time after which a stage of the preparation is given up [s]."""
-    pressure: SeriesTable | None = None
-    """Pressure on the rail seat [Pa], as the paper's record; or a bogie."""
-    seat_area: Positive = 0.13 * 0.17
-    """Of the pressure [m^2]."""
-    bogie: BogieTable | None = None
 
 
 class TrackScene(Scene):
@@ -123,28 +64,32 @@ class TrackPrepared(Prepared):
 
     recipe: BedRecipe
     bed_file: Path
-    load: TimeSeries
-    """On the rail seat [N], (k, 3)."""
+    loads: tuple[TimeSeries, ...]
+    """On each rail seat [N], (k, 3)."""
+
+    @property
+    def load(self) -> TimeSeries:
+        """On the first rail seat."""
+        return self.loads[0]
 
 
 def track_load(text: SceneText) -> TrackPrepared:
     """Check a scene with ``[track]``; raises `SceneError` with all that is wrong."""
     problems = list(text.problems) + list(_faults(text))
-    load = None
+    loads: tuple[TimeSeries, ...] = ()
     track = text.tables.get("track")
     if isinstance(track, TrackTable):
         try:
-            load = load_of(track, text.path.parent)
+            loads = loads_of(track, text.path.parent)
         except WrongSeries as wrong:
             problems.append(wrong.problem)
     text.refuse(problems + list(output_faults(text)))
     scene = TrackScene.model_validate(text.data)
-    assert load is not None
     track = scene.track
     bed_file = text.path.parent / track.bed
-    steps = [Step("track", "load", SLEEPER, (np.zeros(0, np.int64), load))]
+    steps = [Step("track", "load", SLEEPER, (np.zeros(0, np.int64), load)) for load in loads]
     return TrackPrepared(
-        scene, text, {}, steps, {}, {}, recipe=recipe_of(scene), bed_file=bed_file, load=load
+        scene, text, {}, steps, {}, {}, recipe=recipe_of(scene), bed_file=bed_file, loads=loads
     )
 
 
@@ -155,10 +100,8 @@ def _faults(text: SceneText) -> Iterator[Problem]:
     for name in ("body", "fix", "prescribe", "roller", "load", "pressure", "periodic"):
         if name in text.data:
             yield Problem(name, "[track] makes the bodies and their conditions")
-    if isinstance(track, TrackTable) and (track.pressure is None) == (track.bogie is None):
-        yield Problem("track", "give one of pressure, bogie")
-    if isinstance(track, TrackTable) and not track.sizes[0] < track.sizes[1]:
-        yield Problem("track.sizes", "the second must be the greater one")
+    if isinstance(track, TrackTable):
+        yield from track_faults(track)
     if contact is None and "contact" not in text.data:
         yield Problem("contact", "missing: a track needs it")
     if isinstance(contact, ContactTable):
@@ -183,17 +126,6 @@ def _fits(periodic: PeriodicTable, track: object) -> bool:
     return periodic.axis == "y" and periodic.width == getattr(track, "width", periodic.width)
 
 
-def load_of(track: TrackTable, folder: Path) -> TimeSeries:
-    """Force on the rail seat of the slice over time [N], (k, 3)."""
-    if track.bogie is not None:
-        one = track.bogie
-        train = Train(cars=1, axle_load=one.axle_load, speed=one.speed)
-        return bogie_series(train, Track(), track.share, one.lead, one.rest)
-    assert track.pressure is not None
-    found = series_of(track.pressure, "track.pressure", folder, vector=False)
-    return TimeSeries(found.times, down(track.share * track.seat_area * found.values))
-
-
 def recipe_of(scene: TrackScene) -> BedRecipe:
     """How the bed of a scene is prepared."""
     track, contact = scene.track, scene.contact
@@ -212,6 +144,7 @@ def recipe_of(scene: TrackScene) -> BedRecipe:
         side_friction=track.side_friction, gravity=scene.simulation.gravity,
         softness=track.softness, unbalanced=track.unbalanced, kinetic=track.kinetic,
         loose=track.loose, patience=track.patience, periodic=contact.periodic is not None,
+        part=track.part, shoulder=track.shoulder,
     )  # fmt: skip
 
 
@@ -240,8 +173,10 @@ def track_enter(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     )  # fmt: skip
     sleeper = bodies[SLEEPER]
     sleeper_guide(run, sleeper, upright=False)
-    seat = sleeper.mesh.node_sets["seat"]
-    run.load(sleeper, seat, Series(prepared.load.times, prepared.load.values))
+    sets = sleeper.mesh.node_sets
+    seats = [sets[name] for name in sorted(sets) if name.startswith("seat")]
+    for seat, load in zip(seats, prepared.loads, strict=True):
+        run.load(sleeper, seat, Series(load.times, load.values))
     bed_enter(run, bed)
     prepared.meshes.update({name: body.mesh for name, body in bodies.items()})
     prepared.probes.update(points_of(recipe, bed, bodies))
@@ -254,7 +189,7 @@ def points_of(
     """Bodies and nodes that are watched: grains at B1 to B3, S1 to S3 on the sleeper, all of it.
 
     A grain is the one whose centre is nearest to `BELOW` the sleeper's bottom, in the plane of its
-    middle, at `POINTS`; ``B2a`` is the nearest to B2's, as in the paper.
+    middle, at `TrackLayout.watched`; ``B2a`` is the nearest to B2's, as in the paper.
     """
     positions = bed.positions
     centres = np.array([x.mean(axis=0) for x in positions[: recipe.below]])
@@ -266,9 +201,8 @@ def points_of(
         body = next(f"grain-{i}" for i in order if f"grain-{i}" != but)
         found[name] = (body, np.arange(len(bodies[body].nodes)))
 
-    for name, share in POINTS.items():
-        place = [share * recipe.box.length, recipe.box.width / 2, max(bottom - BELOW, bottom / 2)]
-        watch(name, np.array(place))
+    for name, x in recipe.layout.watched().items():
+        watch(name, np.array([x, recipe.box.width / 2, max(bottom - BELOW, bottom / 2)]))
     second = found["B2"][0]
     watch("B2a", centres[int(second.removeprefix("grain-"))], second)
     sleeper = bodies[SLEEPER]

@@ -20,7 +20,7 @@ from qdem_fem.scene_checks import scene_load
 from qdem_fem.scene_run import run_dynamic
 from qdem_fem.simulation import Simulation
 from qdem_fem.track_bed import bed_prepare, bodies_of_bed, grains_of
-from qdem_fem.track_bodies import grains_nodes, lattice_loose
+from qdem_fem.track_bodies import grains_nodes
 from qdem_fem.track_figures import track_facts
 from qdem_fem.track_scene import TrackPrepared
 from validation.case import Check
@@ -186,8 +186,7 @@ def fall_checks(folder: Path) -> list[Check]:
     """Processor time that a simulated second of the fall costs, grains deformable or rigid."""
     recipe = scene_at(folder).recipe
     grains = grains_of(recipe)
-    loose = grains_nodes(grains)
-    nodes = lattice_loose(loose, recipe.box, 0.0, recipe.radius, recipe.seed)
+    nodes = recipe.layout.grains_below(grains_nodes(grains), recipe.seed)
     spent = []
     for rigid in (False, True):
         bodies = bodies_of_bed(recipe, grains, nodes, rigid=rigid)

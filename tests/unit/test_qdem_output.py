@@ -16,15 +16,12 @@ from hypothesis import strategies as st
 from qdem_fem.errors import DiskFull, UsageError
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, vtu_write, write_whole
-from qdem_fem.pictures import (
+from qdem_fem.pictures import picture_energy, picture_history, picture_spectrum, unit_of
+from qdem_fem.pictures_bodies import (
     feature_edges,
     magnification_round,
     nodal_average,
     picture_deformed,
-    picture_energy,
-    picture_history,
-    picture_spectrum,
-    unit_of,
     view_frame,
 )
 from qdem_fem.surface import surface_faces

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import image
 
 import qdem_fem as q
 from qdem_fem import kinetic_damping, march
@@ -15,6 +16,7 @@ from qdem_fem.errors import CheckpointError, EnergyLost, NotConverged, SceneErro
 from qdem_fem.load_train import Track, Train, seat_share
 from qdem_fem.material import Material
 from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.pictures_bodies import picture_deformed, spheres_bearing
 from qdem_fem.run_folder import RunFolder
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
@@ -24,7 +26,8 @@ from qdem_fem.track_bed import Bed, BedRecipe, bed_read, bed_write, grains_of
 from qdem_fem.track_bodies import TrackBox, grains_nodes, lattice_loose, sleeper_slice
 from qdem_fem.track_figures import acceleration_spectrum, differences, mobility, peaks_of
 from qdem_fem.track_load import RISE, bogie_series
-from qdem_fem.track_scene import BogieTable, TrackPrepared, TrackTable
+from qdem_fem.track_scene import TrackPrepared
+from qdem_fem.track_table import BogieTable, TrackTable
 from validation import track_page
 from validation.track_trials import SCENE
 
@@ -68,6 +71,29 @@ def test_cubes_come_to_rest_on_springs_that_bear_their_weight(rigid: bool, each:
 def test_no_equilibrium_in_time_is_told() -> None:
     with pytest.raises(NotConverged, match=r"asked.*kinetic energy.*bodies loose"):
         kinetic_damping.rest_find(stacked(True), 1e-3, 1e-4, 0.0, 1e-3, look=1)
+
+
+def test_spheres_that_bear_are_drawn_between_bodies(tmp_path: Path) -> None:
+    # Both cubes are let down until they touch: four spheres on the ground, four pairs between.
+    # Seen from the side, the middle of the gap is white but for spheres.
+    run = stacked(True)
+    for number, body in enumerate(run.bodies):
+        body.displacement = np.tile([0.0, 0.0, -2e-4 - 2e-4 * number], (len(body.nodes), 1))
+    bearing = spheres_bearing(run)
+    assert bearing is not None
+    assert bearing.nodes.tolist() == list(range(12))
+    drawn = []
+    for spheres in (None, bearing):
+        file = tmp_path / "picture.png"
+        view = {"azimuth": -90.0, "elevation": 0.0, "magnification": 1.0}
+        picture_deformed(file, run.bodies, bearing=spheres, **view)
+        pixels = image.imread(file)[:, :450, :3]  # without the colour bar
+        cubes = np.flatnonzero((np.ptp(pixels, axis=2) > 0.15).sum(axis=1) > 50)
+        at = int(np.argmax(np.diff(cubes)))
+        drawn.append(bool((pixels[(cubes[at] + cubes[at + 1]) // 2] < 0.97).any()))
+    assert drawn == [False, True]
+    block = q.Simulation([q.Body(box_mesh((1, 1, 1), (1, 1, 1)), STONE)])
+    assert spheres_bearing(block) is None
 
 
 def shaken(folder: Path, text: str = "") -> tuple[object, ...]:
@@ -124,7 +150,8 @@ def test_a_run_whose_account_does_not_close_stops(
 def test_loose_grains_touch_neither_each_other_nor_walls_nor_sleeper() -> None:
     band = (0.13, 0.29)
     grains = grains_nodes(grains_of(RECIPE))
-    placed = lattice_loose(grains, RECIPE.box, 0.0, RECIPE.radius, 5, band)
+    rooms = [(0.0, 0.2, 0.0, band[0]), (0.0, 0.2, band[1], 0.42)]
+    placed = lattice_loose(grains, rooms, 0.0, RECIPE.radius, 5)
     assert len(placed) == 8
     for i, nodes in enumerate(placed):
         assert (nodes >= RECIPE.radius).all()

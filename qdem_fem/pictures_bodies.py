@@ -1,0 +1,242 @@
+"""Pictures of deformed bodies as PNG, and of the spheres by which they bear on one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from qdem_fem.pictures import figure_written, round_below, unit_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from qdem_fem.simulation import Simulation
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+SHOWN = 0.06
+"""Greatest displacement in a picture, over the size of the bodies."""
+LIGHT = np.array([-0.25, -0.75, 0.6])
+"""Direction the light comes from, in the frame right, away from the viewer, up."""
+HEIGHT, WIDTHS, BAR_WIDTH = 4.4, (2.8, 7.6), 1.6
+"""Of the picture of bodies, least and greatest width, and what its colour bar takes [in]: a tall
+body in a wide frame would stand beside an empty half."""
+FEATURE = np.cos(np.radians(30))
+"""Cosine of the angle between two faces above which their edge is no feature of the shape."""
+OUTLINED = 20
+"""Most bodies whose undeformed edges are drawn: of a heap they would hide it."""
+DISC_CORNERS = 20
+"""Of the polygon that a sphere is drawn as."""
+DISC_FACE, DISC_EDGE = (0.80, 0.77, 0.72, 0.55), (0.45, 0.42, 0.38, 0.7)
+"""Colours of it, red, green, blue and how opaque."""
+
+
+class Bearing(NamedTuple):
+    """Spheres that bear a force now."""
+
+    nodes: IntArray
+    """Their vertices in the numbers of all bodies, (s,)."""
+    radius: FloatArray
+    """[m], (s,)."""
+
+
+def spheres_bearing(run: Simulation) -> Bearing | None:
+    """Which spheres of a simulation bear, on others or on a wall; None in other contact models."""
+    contacts: Any = run.contacts
+    if contacts is None:
+        return None
+    from qdem_fem.contact_sphere_state import SphereContacts
+
+    if not isinstance(contacts, SphereContacts):
+        return None
+    contacts.refresh()
+    bears = np.asarray(contacts.kernel.force).any(axis=1)
+    return Bearing(contacts.nodes[bears], contacts.kernel.spheres.radius[bears])
+
+
+def picture_deformed(
+    path: Path,
+    bodies: Sequence[Any],
+    *,
+    magnification: float | None = None,
+    bearing: Bearing | None = None,
+    azimuth: float = -62.0,
+    elevation: float = 24.0,
+) -> float:
+    """Draw the deformed surfaces of all bodies with their von Mises stress; the magnification.
+
+    ``bodies`` are `qdem_fem.Body`.  By default displacements are magnified by a round factor that
+    makes the greatest `SHOWN` of the bodies' size.  The undeformed edges of up to `OUTLINED` bodies
+    are drawn thin.  The viewer stands at ``azimuth`` and ``elevation`` [degrees] as in matplotlib's
+    3-D axes.  ``bearing``: spheres of contact, drawn around their vertices as those are now.
+    Faces are sorted from back to front (painter's algorithm): those that pierce each other may
+    be drawn in the wrong order.
+    """
+    if magnification is None:
+        magnification = magnification_round(bodies)
+    frame = view_frame(azimuth, elevation)
+    corners, stress = _faces(bodies, magnification)
+    seen = corners @ frame.T
+    spheres = None
+    if bearing is not None:
+        moved = [body.nodes + magnification * body.displacement for body in bodies]
+        spheres = discs(np.concatenate(moved)[bearing.nodes] @ frame.T, bearing.radius)
+    across, _, up = np.ptp(seen.reshape(-1, 3), axis=0)
+    wide = float(np.clip(HEIGHT * across / up + BAR_WIDTH, *WIDTHS))
+    unit, name = unit_of(float(stress.max(initial=0.0)), "Pa")
+    with figure_written(path, (wide, HEIGHT)) as figure:
+        panel = figure.subplots()
+        _paint(panel, seen, stress / unit, f"von Mises stress ({name})", spheres)
+        if len(bodies) <= OUTLINED:
+            _outline(panel, bodies, frame)
+        _frame_draw(panel, frame)
+        told = f"Displacement \N{MULTIPLICATION SIGN} {magnification:g}"
+        told += "\ngrey: spheres that bear" * (spheres is not None)
+        panel.set(aspect="equal", title=told)
+        panel.set_axis_off()
+        panel.margins(0.03)
+        panel.autoscale_view()
+        _scale_bar(panel)
+    return magnification
+
+
+def view_frame(azimuth: float, elevation: float) -> FloatArray:
+    """Rows: right, away from the viewer, up; orthonormal (3, 3)."""
+    a, e = np.radians([azimuth, elevation])
+    right = np.array([-np.sin(a), np.cos(a), 0.0])
+    away = -np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    return np.array([right, away, np.cross(right, away)])
+
+
+def magnification_round(bodies: Sequence[Any]) -> float:
+    """1, 2 or 5 times a power of ten, the greatest that keeps displacements below `SHOWN`."""
+    nodes = np.concatenate([body.nodes for body in bodies])
+    size = float(np.linalg.norm(nodes.max(axis=0) - nodes.min(axis=0)))
+    moved = max(float(np.abs(body.displacement).max(initial=0.0)) for body in bodies)
+    if not (moved > 0 and np.isfinite(moved)):
+        return 1.0
+    return max(1.0, round_below(SHOWN * size / moved))
+
+
+def nodal_average(elements: IntArray, values: FloatArray, count: int) -> FloatArray:
+    """Mean of the values (m,) of each node's elements, (count,); zero for unused nodes."""
+    total = np.bincount(elements.ravel(), np.repeat(values, elements.shape[1]), count)
+    return np.asarray(total / np.maximum(np.bincount(elements.ravel(), minlength=count), 1))
+
+
+def _faces(bodies: Sequence[Any], magnification: float) -> tuple[FloatArray, FloatArray]:
+    """Corners (k, 3, 3) [m] of the deformed surface faces and their stress (k,) [Pa]."""
+    corners, stress = [], []
+    for body in bodies:
+        position = body.nodes + magnification * body.displacement
+        corners.append(position[body.surface])
+        nodal = nodal_average(body.elements, body.von_mises(), len(body.nodes))
+        stress.append(nodal[body.surface].mean(axis=1))
+    return np.concatenate(corners), np.concatenate(stress)
+
+
+def _paint(
+    panel: Axes, corners: FloatArray, values: FloatArray, label: str,
+    spheres: tuple[FloatArray, FloatArray] | None,
+) -> None:  # fmt: skip
+    """Faces towards the viewer, shaded, and spheres as `discs` gives them, from back to front;
+    ``corners`` (k, 3, 3) in the frame."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import Normalize
+
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    normal /= np.where(length > 0, length, 1)[:, None]
+    seen = np.flatnonzero(normal[:, 1] < 0)
+    scale = Normalize(0.0, float(values.max(initial=0.0)) or 1.0)
+    colour = colormaps["viridis"](scale(values[seen]))
+    light = np.clip(normal[seen] @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1)
+    colour[:, :3] *= (0.7 + 0.3 * light)[:, None]
+    edge, shapes = colour, list(corners[seen][:, :, [0, 2]])
+    away = corners[seen, :, 1].mean(axis=1)
+    if spheres is not None:
+        shapes += list(spheres[0])
+        away = np.concatenate([away, spheres[1]])
+        colour, edge = (
+            np.concatenate([colour, np.tile(one, (len(spheres[1]), 1))])
+            for one in (DISC_FACE, DISC_EDGE)
+        )
+    order = np.argsort(-away, kind="stable")
+    drawn = [shapes[i] for i in order]
+    panel.add_collection(
+        PolyCollection(drawn, facecolors=colour[order], edgecolors=edge[order], linewidths=0.25)
+    )
+    panel.figure.colorbar(
+        ScalarMappable(scale, "viridis"), ax=panel, label=label, shrink=0.7, pad=0.02
+    )
+
+
+def _outline(panel: Axes, bodies: Sequence[Any], frame: FloatArray) -> None:
+    """Sharp edges of the undeformed bodies."""
+    from matplotlib.collections import LineCollection
+
+    lines = [(body.nodes @ frame.T)[feature_edges(body.nodes, body.surface)] for body in bodies]
+    places = np.concatenate(lines)[:, :, [0, 2]]
+    panel.add_collection(LineCollection(list(places), colors="#555555", linewidths=0.5))
+
+
+def feature_edges(nodes: FloatArray, faces: IntArray) -> IntArray:
+    """Edges (e, 2) whose two faces meet at a sharp angle, or that have not two faces."""
+    normal = np.cross(
+        nodes[faces[:, 1]] - nodes[faces[:, 0]], nodes[faces[:, 2]] - nodes[faces[:, 0]]
+    )
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort(edges.T)
+    edges, owner = edges[order], owner[order]
+    unique, first, count = np.unique(edges, axis=0, return_index=True, return_counts=True)
+    second = np.minimum(first + 1, len(owner) - 1)
+    cosine = np.einsum("ij,ij->i", normal[owner[first]], normal[owner[second]])
+    return np.asarray(unique[(count != 2) | (cosine < FEATURE)])
+
+
+def _frame_draw(panel: Axes, frame: FloatArray) -> None:
+    """The three axes in the lower left corner, away from the bodies."""
+    inset = panel.inset_axes((0.0, 0.0, 0.12, 0.2))
+    for axis, letter in enumerate("xyz"):
+        right, up = frame[0, axis], frame[2, axis]
+        inset.annotate(
+            "", (right, up), (0, 0), arrowprops={"arrowstyle": "-|>", "lw": 0.9, "color": "#333333"}
+        )
+        inset.text(1.3 * right, 1.3 * up, letter, ha="center", va="center", fontsize=8)
+    inset.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")
+    inset.set_axis_off()
+
+
+def _scale_bar(panel: Axes) -> None:
+    """A bar of a round length of the reference shape."""
+    low, high = panel.get_xlim()
+    length = round_below((high - low) / 5)
+    unit, name = unit_of(length, "m")
+    bottom, top = panel.get_ylim()
+    y = bottom - 0.04 * (top - bottom)
+    panel.plot([high - length, high], [y, y], color="#333333", lw=1.5, clip_on=False)
+    panel.text(
+        high - length / 2, y - 0.02 * (top - bottom), f"{length / unit:g} {name}",
+        ha="center", va="top", fontsize=8,
+    )  # fmt: skip
+
+
+def discs(centre: FloatArray, radius: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Outlines of spheres as the viewer sees them, and where in the row of faces they belong.
+
+    ``centre`` (s, 3) [m] in the frame right, away from the viewer, up; ``radius`` (s,) [m].
+    Polygons (s, `DISC_CORNERS`, 2) [m], and the distance of the spheres' far sides (s,) [m]: drawn
+    by that, a sphere lies behind the faces at its own vertex and before bodies behind it.
+    """
+    turn = 2 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    return centre[:, None, [0, 2]] + radius[:, None, None] * circle, centre[:, 1] + radius
