@@ -110,17 +110,27 @@ class SphereContacts(Contacts):
 
     def stiffness_now(self) -> float:
         """`network_bound` of the contacts there are now [1/s^2]."""
-        ends = self._ends()
+        springs = self._springs(self._ends(), (self.kernel.planes.force != 0).any(axis=2))
+        return network_bound(*springs, self.inverse_mass, self.rigid_bound)
+
+    def springs_near(self) -> tuple[Integers, Floats, Floats]:
+        """`Contacts.springs_near`"""
+        self.refresh()
+        planes, kernel = self.kernel.planes, self.kernel
+        away = np.einsum("cwk,wk->wc", kernel.start[:, None] - planes.point, planes.normal)
+        return self._springs(self._ends(every=True), away - kernel.spheres.radius < self.skin / 2)
+
+    def _springs(self, ends: Integers, walls: NDArray[np.bool_]) -> tuple[Integers, Floats, Floats]:
+        """k_n of pairs (p, 2), and of all walls (w, c) of each vertex [N/m], behind the pairs."""
         normal = self.kernel.spheres.normal
         stiffness = pair_stiffness(normal[ends[:, 0]], normal[ends[:, 1]])
-        walls = (self.kernel.planes.force != 0).any(axis=2).sum(axis=0)
-        wall = 2 * normal * walls
-        return network_bound(ends, stiffness, wall, self.inverse_mass, self.rigid_bound)
+        return ends, stiffness, 2 * normal * walls.sum(axis=0)
 
-    def _ends(self) -> Integers:
-        touching = np.flatnonzero(self.pairs.touching)
+    def _ends(self, *, every: bool = False) -> Integers:
+        """Vertices (p, 2) of the pairs that touch, or of all in the list."""
         row = np.repeat(np.arange(len(self.nodes)), np.diff(self.pairs.first))
-        return np.column_stack([row[touching], self.pairs.second[touching]])
+        ends = np.column_stack([row, self.pairs.second])
+        return ends if every else ends[self.pairs.touching.astype(bool)]
 
     def touching(self) -> ContactTouching:
         """Pairs that touch now, by their nodes."""
@@ -183,4 +193,4 @@ class SphereContacts(Contacts):
             getattr(self.kernel, name)[:] = arrays[f"contact_{name}"]
         for name in PLANE_ARRAYS:
             getattr(self.kernel.planes, name)[:] = arrays[f"contact_plane_{name}"]
-        self.stale = False
+        self.stale, self._near = False, None
