@@ -299,9 +299,7 @@ class Assembly:
         gravity: Floats | None,
     ) -> Floats:
         """`accelerations` within the frames, by the kernel: one step of one second of a copy."""
-        if self._scratch is None:
-            self._scratch = self._state(np.asarray(self.state.inverse_mass, dtype=float))
-        scratch = self._scratch
+        scratch = self.scratch
         if self.viscous is None:  # no digit of the forces is lost to a velocity they do not need
             velocity = np.zeros_like(velocity)
         self._write(scratch.displacement, displacement)
@@ -312,6 +310,31 @@ class Assembly:
         )
         scratch.forces[:] = 0.0
         return self._read(scratch.velocity) - before
+
+    @property
+    def scratch(self) -> kernel.State:
+        """A state beside that of the bodies, with their masses."""
+        if self._scratch is None:
+            self._scratch = self._state(np.asarray(self.state.inverse_mass, dtype=float))
+        return self._scratch
+
+    def viscous_power(self) -> float:
+        """What viscosity takes now [W]: ``-v.(f(u, v) - f(u, 0))``, v half a step behind.
+
+        In the frames of the bodies: viscous forces take nothing from the motion of a frame.
+        """
+        speed, taken = self._read(self.state.velocity), 0.0
+        for given, sign in ((self.state.velocity, -1.0), (0.0, 1.0)):
+            self.scratch.displacement[:] = self.state.displacement
+            self.scratch.velocity[:] = given
+            self.kernel_run(
+                self.scratch, 1, 1.0, NO_LOADS, NO_CONSTRAINTS, NO_PROBES, np.ones((2, 1)), None,
+                np.zeros(2),
+            )  # fmt: skip
+            faster = self._read(self.scratch.velocity) - (speed if sign < 0 else 0.0)
+            taken += sign * float(np.einsum("n,nc,nc->", self.mass, faster, speed))
+        self.scratch.forces[:] = 0.0
+        return taken
 
     def hold(self, values: Floats, held: kernel.Constraints) -> Floats:
         """``values`` (n, 3) without their parts along held components and roller normals."""

@@ -18,7 +18,7 @@ from numba.extending import overload
 
 from qdem_fem.contact_search import Pairs
 
-BLOCK = 2048
+BLOCK = 512
 """Spheres that one thread takes at a time."""
 GO_ON, LOOK_ANEW, TOO_DEEP = 0, 1, 2
 """What a step says: go on; a vertex has left the skin; two spheres are too deep in each other."""
@@ -222,11 +222,11 @@ def series(one: float, other: float) -> float:  # pragma: no cover
 def planes_forces(
     c: Any, low: int, high: int, velocity: Any, step: float
 ) -> float:  # pragma: no cover
-    """Add the forces of the walls on spheres ``low`` to ``high``; greatest overlap over radius."""
-    planes, deepest = c.planes, 0.0
-    for w in range(planes.point.shape[0]):
-        n, spring, force = row(planes.normal, w), planes.spring[w], planes.force[w]
-        for i in range(low, high):
+    """Add the forces of the walls on acting spheres near them; greatest overlap over radius."""
+    planes, pairs, deepest = c.planes, c.pairs, 0.0
+    for i in pairs.acting[low:high]:
+        for w in pairs.wall[pairs.wall_first[i] : pairs.wall_first[i + 1]]:
+            n, spring, force = row(planes.normal, w), planes.spring[w], planes.force[w]
             d, radius = minus(c.position, i, planes.point, w), c.spheres.radius[i]
             overlap = radius - (d[0] * n[0] + d[1] * n[1] + d[2] * n[2])
             if overlap <= 0.0 and force[i, 0] == 0.0 and force[i, 1] == 0.0 and force[i, 2] == 0.0:
@@ -265,7 +265,8 @@ def advance(c: Any, displacement: Any, velocity: Any, step: float) -> int:  # pr
     state that no step led to.  Returns `GO_ON`, `LOOK_ANEW` or `TOO_DEEP`.
     """
     # a parallel loop of numba takes arrays only: tuples are taken apart, and made anew within
-    (a0, a1, a2, a3, a4, a5, a6), (p0, p1, p2, p3, p4, p5, p6, p7, p8), (w0, w1, w2, w3, w4) = c[:3]
+    (a0, a1, a2, a3, a4, a5, a6), pairs, (w0, w1, w2, w3, w4) = c[:3]
+    p0, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10 = pairs
     friction, half_skin, start, position, force, slid = c[3:]
     count = position.shape[0]
     blocks = (count + BLOCK - 1) // BLOCK
@@ -273,7 +274,8 @@ def advance(c: Any, displacement: Any, velocity: Any, step: float) -> int:  # pr
     for stage in range(3):  # all spheres pass one stage before any begins the next
         for b in prange(blocks):
             own = Contact(
-                Spheres(a0, a1, a2, a3, a4, a5, a6), Pairs(p0, p1, p2, p3, p4, p5, p6, p7, p8),
+                Spheres(a0, a1, a2, a3, a4, a5, a6),
+                Pairs(p0, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10),
                 Planes(w0, w1, w2, w3, w4), friction, half_skin, start, position, force, slid,
             )  # fmt: skip
             low, high = b * BLOCK, min(count, (b + 1) * BLOCK)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from qdem_fem.contact_options import Contact
-from qdem_fem.contact_spheres import ContactPlane, SphereContact, planes_along_check
+from qdem_fem.contact_spheres import NEAR, ContactPlane, SphereContact, planes_along_check
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.errors import ConditionError
 from qdem_fem.periodic import PeriodicWidth
@@ -46,8 +46,8 @@ class ContactTable(Table):
     """Spheres at the vertices of the surface, as in the paper, or the surfaces themselves."""
     friction: NonNegative
     """Coulomb's coefficient."""
-    contacts: Annotated[int, Field(ge=1, le=1000)] | None = None
-    """Contacts of a vertex at once that the time step allows for."""
+    contacts: Annotated[int, Field(ge=1, le=1000)] | Literal["near"] | None = None
+    """Contacts of a vertex at once that the time step allows for, or those near it at first."""
     plane: Annotated[tuple[PlaneTable, ...], Field(strict=False)] = ()
     periodic: PeriodicTable | None = None
     """The width that contact repeats in; bodies have no sides to touch across when not given."""
@@ -108,6 +108,8 @@ def contact_faults(
             missing = [name for name in names if name not in given]
             if missing:
                 yield f"contact.{quantity}", f"body {missing[0]!r} has none"
+    if table.model == "surface" and table.contacts == NEAR:
+        yield "contact.contacts", "'near' is for spheres: give a number"
     for number, plane in enumerate(table.plane):
         if not any(plane.normal):
             yield f"contact.plane.{number}.normal", "has no direction"

@@ -39,9 +39,13 @@ class Pairs(NamedTuple):
     pull: Any
     """(p, 3) force on i [N]."""
     acting: Any
-    """(a,) the spheres to look at: those in a pair, or all where there are walls."""
+    """(a,) the spheres to look at: those in a pair or near a wall."""
     image: Any
     """(p, 3) from j to the image of it that i meets [m]; (0,) where nothing is periodic."""
+    wall_first: Any
+    """First entry in ``wall`` of every sphere, and the end, (c + 1,)."""
+    wall: Any
+    """The walls that each sphere is near."""
 
 
 @njit(cache=True)
@@ -176,8 +180,18 @@ def history_carry(old: Any, new: Any) -> None:  # pragma: no cover
 NO_IMAGE: Floats = np.zeros(0)
 
 
-def pairs_of(first: Integers, second: Integers, walls: bool, image: Floats = NO_IMAGE) -> Pairs:
-    """Pairs without a history, from their rows; ``walls``: whether there are any."""
+def walls_near(
+    position: Floats, radius: Floats, point: Floats, normal: Floats, way: float
+) -> NDArray[np.bool_]:
+    """Which spheres (c,) touch which walls (w,), or will on a ``way`` [m]; (c, w)."""
+    apart = np.einsum("cwk,wk->cw", position[:, None] - point, normal)
+    return np.asarray(apart - radius[:, None] < way)
+
+
+def pairs_of(
+    first: Integers, second: Integers, walls: NDArray[np.bool_], image: Floats = NO_IMAGE
+) -> Pairs:
+    """Pairs without a history, from their rows; ``walls`` (c, w) that spheres are near."""
     count, size = len(second), len(first) - 1
     back = np.bincount(second, minlength=size)
     return Pairs(
@@ -188,14 +202,16 @@ def pairs_of(first: Integers, second: Integers, walls: bool, image: Floats = NO_
         np.zeros(count, np.uint8),
         np.zeros((count, 3)),
         np.zeros((count, 3)),
-        np.flatnonzero((np.diff(first) > 0) | (back > 0) | walls),
+        np.flatnonzero((np.diff(first) > 0) | (back > 0) | walls.any(axis=1)),
         image,
+        np.concatenate([[0], np.cumsum(walls.sum(axis=1))]),
+        np.nonzero(walls)[1],
     )
 
 
 def pairs_renew(
-    old: Pairs | None, position: Floats, radius: Floats, body: Integers, skin: float, walls: bool,
-    side: PeriodicWidth | None = None,
+    old: Pairs | None, position: Floats, radius: Floats, body: Integers, skin: float,
+    walls: NDArray[np.bool_], side: PeriodicWidth | None = None,
 ) -> Pairs:  # fmt: skip
     """The list for spheres at ``position`` (c, 3) [m], with the history of the ``old`` one."""
     if side is None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import Contact, Planes, Spheres
-from qdem_fem.contact_search import NO_IMAGE, Pairs, pairs_of, pairs_renew
+from qdem_fem.contact_search import NO_IMAGE, Pairs, pairs_of, pairs_renew, walls_near
 from qdem_fem.contact_spheres import SKIN, SphereContact, pair_stiffness, tangential_stiffness
 from qdem_fem.contact_state import (
     Contacts,
@@ -61,7 +61,7 @@ class SphereContacts(Contacts):
                 tangential_stiffness(normal, poisson),
             ),
             pairs_of(
-                np.zeros(size + 1, np.int64), np.zeros(0, np.int64), bool(walls),
+                np.zeros(size + 1, np.int64), np.zeros(0, np.int64), np.zeros((size, 0), bool),
                 NO_IMAGE if asked.periodic is None else np.zeros((0, 3)),
             ),
             Planes(
@@ -81,17 +81,23 @@ class SphereContacts(Contacts):
     def forget(self) -> None:
         """Let go of all springs."""
         self.pairs.touching[:] = 0
+        self.kernel.force[:] = 0.0
         self.kernel.planes.spring[:] = 0.0
         self.kernel.planes.force[:] = 0.0
 
     def lists_renew(self, position: Floats) -> None:
         """Look for pairs around vertices at (c, 3) [m]."""
-        spheres, walls = self.kernel.spheres, bool(self.asked.planes)
+        spheres = self.kernel.spheres
         pairs = pairs_renew(
-            self.pairs, position, spheres.radius, spheres.body, self.skin, walls,
+            self.pairs, position, spheres.radius, spheres.body, self.skin, self.walls(position),
             self.asked.periodic,
         )  # fmt: skip
         self.kernel = self.kernel._replace(pairs=pairs)
+
+    def walls(self, position: Floats) -> NDArray[np.bool_]:
+        """Which vertices at (c, 3) [m] may touch which walls before pairs are looked for anew."""
+        radius, planes = self.kernel.spheres.radius, self.kernel.planes
+        return walls_near(position, radius, planes.point, planes.normal, self.skin)
 
     def deepest_words(self) -> tuple[str, str]:
         """The pair that overlaps most, and what to do."""
@@ -110,17 +116,26 @@ class SphereContacts(Contacts):
 
     def stiffness_now(self) -> float:
         """`network_bound` of the contacts there are now [1/s^2]."""
-        ends = self._ends()
+        walls = (self.kernel.planes.force != 0).any(axis=2).sum(axis=0)
+        springs = self._springs(self._ends(), walls)
+        return network_bound(*springs, self.inverse_mass, self.rigid_bound)
+
+    def springs_near(self) -> tuple[Integers, Floats, Floats]:
+        """`Contacts.springs_near`"""
+        self.refresh()
+        return self._springs(self._ends(every=True), np.diff(self.pairs.wall_first))
+
+    def _springs(self, ends: Integers, walls: Integers) -> tuple[Integers, Floats, Floats]:
+        """k_n of pairs (p, 2), and of so many walls (c,) of each vertex [N/m], behind the pairs."""
         normal = self.kernel.spheres.normal
         stiffness = pair_stiffness(normal[ends[:, 0]], normal[ends[:, 1]])
-        walls = (self.kernel.planes.force != 0).any(axis=2).sum(axis=0)
-        wall = 2 * normal * walls
-        return network_bound(ends, stiffness, wall, self.inverse_mass, self.rigid_bound)
+        return ends, stiffness, 2 * normal * walls
 
-    def _ends(self) -> Integers:
-        touching = np.flatnonzero(self.pairs.touching)
+    def _ends(self, *, every: bool = False) -> Integers:
+        """Vertices (p, 2) of the pairs that touch, or of all in the list."""
         row = np.repeat(np.arange(len(self.nodes)), np.diff(self.pairs.first))
-        return np.column_stack([row[touching], self.pairs.second[touching]])
+        ends = np.column_stack([row, self.pairs.second])
+        return ends if every else ends[self.pairs.touching.astype(bool)]
 
     def touching(self) -> ContactTouching:
         """Pairs that touch now, by their nodes."""
@@ -173,7 +188,7 @@ class SphereContacts(Contacts):
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take what `stored` gave."""
         given = {name: arrays[f"contact_{name}"] for name in PAIR_ARRAYS}
-        walls = bool(self.asked.planes)
+        walls = self.walls(arrays["contact_start"])
         image = NO_IMAGE if self.asked.periodic is None else arrays["contact_image"].copy()
         pairs = pairs_of(given["first"].copy(), given["second"].copy(), walls, image)
         for name in ("touching", "spring", "pull"):
@@ -183,4 +198,4 @@ class SphereContacts(Contacts):
             getattr(self.kernel, name)[:] = arrays[f"contact_{name}"]
         for name in PLANE_ARRAYS:
             getattr(self.kernel.planes, name)[:] = arrays[f"contact_plane_{name}"]
-        self.stale = False
+        self.stale, self._near = False, None

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,8 @@ ALONG = 1e-6
 """Sine of the angle to an axis below which a wall is along it."""
 CONTACTS = 3
 """Contacts that a vertex may have at once for the time step still to be below the critical one."""
+NEAR: Literal["near"] = "near"
+"""In place of their number: those it may have with what is within the skin now."""
 
 
 def tangential_stiffness(normal: Any, poisson: Any) -> Any:
@@ -84,8 +86,10 @@ class SphereContact:
     planes: Sequence[ContactPlane] = ()
     skin: float | None = None
     """Of the neighbour list [m], which changes no force; a tenth of the radius by default."""
-    contacts: int = CONTACTS
-    """Contacts of a vertex at once that the time step allows for."""
+    contacts: int | Literal["near"] = CONTACTS
+    """Contacts of a vertex at once that the time step allows for; or ``"near"``: those within the
+    skin when the march begins (`qdem_fem.contact_near`), for deformable bodies that lie together.
+    A march that meets more stops."""
     periodic: PeriodicWidth | None = field(default=None, repr=False)
     """Bodies touch across the sides of this width; not at all by default."""
 
@@ -97,7 +101,7 @@ class SphereContact:
         if self.skin is not None:
             contact_number_check(self.skin, "skin", above=True)
         contact_number_check(self.friction, "friction", above=False)
-        if not (is_real(self.contacts) and self.contacts >= 1):
+        if self.contacts != NEAR and not (is_real(self.contacts) and self.contacts >= 1):
             raise ConditionError(f"{self.contacts!r} contacts of a vertex", where="contact")
         contact_planes_check(self.planes)
         planes_along_check(self.periodic, self.planes)

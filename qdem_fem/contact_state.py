@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from qdem_fem import kernel
 from qdem_fem.contact_kernel import TOO_DEEP
+from qdem_fem.contact_near import near_check, near_step
 from qdem_fem.contact_outside import Outside, outside_of
-from qdem_fem.contact_spheres import ContactPlane, SphereContact
+from qdem_fem.contact_spheres import NEAR, ContactPlane, SphereContact
 from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.contact_window import advance_of, window_run
-from qdem_fem.errors import ContactTooDeep, StepWarning
+from qdem_fem.errors import ConditionError, ContactTooDeep, StepWarning
 from qdem_fem.periodic import extents_check, joined_check
 
 if TYPE_CHECKING:
@@ -81,6 +82,7 @@ class Contacts(ABC):
         self.inverse_mass: Floats = inverse[self.place]
         """(c,) [1/kg]"""
         self._allowed: float | None = None
+        self._near: float | None = None
         self.renewals = 0
         """Times that pairs were looked for."""
         self.warned = 0.0
@@ -100,6 +102,13 @@ class Contacts(ABC):
     @abstractmethod
     def stiffness_now(self) -> float:
         """Bound on omega^2 of the contacts there are now [1/s^2]."""
+
+    def springs_near(self) -> tuple[Integers, Floats, Floats]:
+        """Ends (p, 2), k_n (p,) and k_n to walls (c,) [N/m] of all contacts there can be before
+        pairs are looked for anew: no vertex then is half a skin from where it was."""
+        raise ConditionError(
+            "what is near is told of spheres", where="contact, contacts", remedy="give a number"
+        )
 
     @abstractmethod
     def deepest_words(self) -> tuple[str, str]:
@@ -127,6 +136,7 @@ class Contacts(ABC):
     def allowed(self) -> float:
         """Bound on omega^2 of the contacts that the time step allows for [1/s^2]."""
         if self._allowed is None:
+            assert self.contacts != NEAR
             self._allowed = allowed_bound(
                 self.one, self.inverse_mass, self.contacts, self.rigid_bound
             )
@@ -140,7 +150,14 @@ class Contacts(ABC):
 
     def held_anew(self) -> None:
         """What is held has changed."""
-        self._allowed = None
+        self._allowed = self._near = None
+
+    def near_step(self) -> float:
+        """`qdem_fem.contact_near.near_step` of the present list of pairs [s]."""
+        self.refresh()
+        if self._near is None:
+            self._near = near_step(self)
+        return self._near
 
     # --- in a march ----------------------------------------------------------------------------
 
@@ -163,6 +180,7 @@ class Contacts(ABC):
             return  # what made it so is told by the march
         self.images_check(position)
         self.lists_renew(position)
+        self._near = None
         self.kernel.start[:] = position
         self.renewals += 1
 
@@ -213,7 +231,13 @@ class Contacts(ABC):
         return f"node {node - self.run.first_node[body]} of {self.run.bodies[body].name}"
 
     def step_check(self) -> None:
-        """Warn where the contacts there are now make the step too long."""
+        """Warn where the contacts there are now make the step too long.
+
+        Raises `Unstable` where those near now would, if the step was made for those near once.
+        """
+        if self.contacts == NEAR:
+            near_check(self.run.step, self.near_step(), self.where)
+            return
         bound = self.stiffness_now()
         if bound <= max(self.allowed, self.warned):
             return
@@ -231,6 +255,8 @@ class Contacts(ABC):
 
     def critical_step(self, elements: CriticalStep) -> CriticalStep:
         """The critical step of the elements, made shorter by the contacts it allows for."""
+        if self.contacts == NEAR:
+            return replace(elements, value=min(elements.value, self.near_step()))
         value = step_with_contact(elements.value, self.allowed, viscous=self.run.viscous)
         remark = elements.remark
         if isfinite(elements.value) and value < elements.value * SHORTER:

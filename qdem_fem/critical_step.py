@@ -120,8 +120,13 @@ def highest_mode(
     return step, stiffness, damping, vector.reshape(n, 3) / root, count
 
 
-def critical_step_find(run: Simulation) -> CriticalStep:
-    """`highest_mode` of the kernel's own forces for small motions of a simulation as it is held."""
+def critical_step_find(
+    run: Simulation, springs: Callable[[Floats], Floats] | None = None
+) -> CriticalStep:
+    """`highest_mode` of the kernel's own forces for small motions of a simulation as it is held.
+
+    ``springs``: accelerations (n, 3) [m/s^2] that springs beside the elements make of u (n, 3) [m].
+    """
     assembly, (_, held) = run.assembly, run.packed_lists()
     if not len(assembly.elements):
         still = np.zeros((assembly.n_nodes, 3))
@@ -137,6 +142,8 @@ def critical_step_find(run: Simulation) -> CriticalStep:
         change = assembly.accelerations_own(u, v, NO_LOADS, nothing, None)
         if run.absorbers is not None:
             change = change + run.absorbers.spring_accelerations(u)
+        if springs is not None:
+            change = change + springs(u)
         change = assembly.hold(change, held) / scale
         change[follows] = 0.0  # no motion of their own: the operator stays symmetric
         return change

@@ -25,8 +25,8 @@ Integers = NDArray[np.int64]
 WINDOW_STEPS = 4096
 GRAVITY_STEPS = 16
 """Steps over which the momentum is interpolated for the work of a gravity that changes."""
-VISCOUS_STEPS = 16
-"""Steps between two evaluations of the power that viscosity takes."""
+VISCOUS_STEPS = 64
+"""Steps between two evaluations of the power that viscosity takes: few beside the motion's own."""
 GROWTH = 10.0
 """Kinetic energy over all energy ever put in, above which a motion is called unstable."""
 
@@ -62,7 +62,7 @@ def march(
         most = GRAVITY_STEPS
     if run.counts_viscous:
         most = min(most, VISCOUS_STEPS)
-        power = viscous_power(run)
+        power = run.assembly.viscous_power()
     end = motion.steps_done + steps
     window = (run.contacts or run.rigid or run.absorbers or assembly).window
     while motion.steps_done < end:
@@ -82,7 +82,7 @@ def march(
         if run.rigid is not None:
             run.rigid.follow()
         if run.counts_viscous:
-            power, before_power = viscous_power(run), power
+            power, before_power = run.assembly.viscous_power(), power
             motion.viscous_work += 0.5 * run.step * done * (before_power + power)
         motion_check(run, bad)
         if run.contacts is not None:
@@ -138,18 +138,6 @@ def energy_set(run: Simulation) -> float:
         return 0.0
     energy = run.energy()
     return energy.kinetic + abs(energy.elastic) + energy.contact + energy.foundation
-
-
-def viscous_power(run: Simulation) -> float:
-    """What viscosity takes now [W]: ``-v.(f(u, v) - f(u, 0))``, v half a step behind."""
-    assembly = run.assembly
-    place, speed = (assembly.field(name) for name in ("displacement", "velocity"))
-    loads, _ = run.packed_lists()
-    idle = run.conditions.table(np.zeros(2))
-    moving, still = (
-        assembly.accelerations(place, v, loads, idle, None) for v in (speed, np.zeros_like(speed))
-    )
-    return -float((assembly.mass * ((moving - still) * speed).sum(axis=1)).sum())
 
 
 def moment(run: Simulation) -> tuple[Floats, Floats]:

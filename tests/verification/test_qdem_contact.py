@@ -22,13 +22,14 @@ from qdem_fem.contact_kernel import (
     advance_threads,
     slider,
 )
-from qdem_fem.contact_search import pairs_near, pairs_renew
+from qdem_fem.contact_search import pairs_near, pairs_renew, walls_near
 from qdem_fem.contact_spheres import pair_stiffness, tangential_stiffness
 from qdem_fem.contact_step import allowed_bound, network_bound, step_with_contact
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 EPS = float(np.finfo(float).eps)
+NO_WALLS = np.zeros((2, 0), bool)
 
 
 def pairs_twin(position: Floats, radius: Floats, body: Integers, skin: float) -> Integers:
@@ -104,14 +105,16 @@ def cloud(seed: int, count: int, walls: bool, skin: float = 0.2) -> Contact:
     across = random.normal(size=(2 * walls, 3))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     size = np.zeros((count, 3))
+    point = ((reference @ across.T).min(axis=0) - 0.25)[:, None] * across
+    near = walls_near(reference, radius, point, across, skin)
     return Contact(
         Spheres(
             reference, 4 * np.arange(count), 4 * np.arange(count), body, radius, normal,
             tangential_stiffness(normal, 0.2),
         ),
-        pairs_renew(None, reference, radius, body, skin, walls),
+        pairs_renew(None, reference, radius, body, skin, near),
         Planes(
-            ((reference @ across.T).min(axis=0) - 0.25)[:, None] * across, across,
+            point, across,
             np.array([0.2, 0.7])[: 2 * walls],
             np.zeros((2 * walls, count, 3)), np.zeros((2 * walls, count, 3)),
         ),
@@ -146,7 +149,9 @@ def test_kernel_is_its_twin(walls: bool) -> None:
         slipped, held = slipped + (stretched > 0.1).sum(), held + (stretched > 0).sum()
         if said == LOOK_ANEW:
             position = c.spheres.reference + at
-            pairs = pairs_renew(c.pairs, position, c.spheres.radius, c.spheres.body, 0.2, walls)
+            radius, body = c.spheres.radius, c.spheres.body
+            near = walls_near(position, radius, c.planes.point, c.planes.normal, 0.2)
+            pairs = pairs_renew(c.pairs, position, radius, body, 0.2, near)
             c = c._replace(pairs=pairs)
             c.start[:] = position
             renewed += 1
@@ -210,7 +215,7 @@ def test_what_a_step_says() -> None:
     c.spheres.radius[:] = 0.5
     c.spheres.reference[:] = [[0, 0, 0], [2.0, 0, 0]]
     c = c._replace(
-        pairs=pairs_renew(None, c.spheres.reference, c.spheres.radius, np.arange(2), 9.0, False)
+        pairs=pairs_renew(None, c.spheres.reference, c.spheres.radius, np.arange(2), 9.0, NO_WALLS)
     )
     c.start[:] = c.spheres.reference
     still = np.zeros(8)
@@ -232,7 +237,9 @@ def test_spheres_that_turn_as_one_strain_their_spring() -> None:
     c.spheres.reference[:] = [[-0.48, 0, 0], [0.48, 0, 0]]
     c = c._replace(
         friction=np.inf,
-        pairs=pairs_renew(None, c.spheres.reference, c.spheres.radius, c.spheres.body, 1.0, False),
+        pairs=pairs_renew(
+            None, c.spheres.reference, c.spheres.radius, c.spheres.body, 1.0, NO_WALLS
+        ),
     )
     at = c.spheres.reference
     for k in range(10):

@@ -1,0 +1,69 @@
+"""The critical step for all contacts that may form near where vertices are now.
+
+`qdem_fem.contact_step.allowed_bound` holds for any contacts there may ever be, and pays for it: it
+gives the lightest vertex of all as many as the scene allows, to another as light, and adds what
+elements do to what contact does, though they do it elsewhere.  Bodies that lie together in a bed
+touch where they touch.  Until pairs are looked for anew, no contact acts that is not in the list of
+pairs; and a spring of ``k_n`` along n and ``k_t < k_n`` across is at most one of ``k_n`` in all
+directions:
+
+    k_n n n^T + k_t (1 - n n^T) <= k_n 1,   so   K_c <= K_near
+
+for any of the listed pairs that touch, and any directions.  The critical step with ``K + K_near``
+is found as that of the elements is, by Lanczos iterations.  It holds until the list is renewed, and
+is found anew then.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.critical_step import critical_step_find
+from qdem_fem.errors import ConditionError, Unstable
+
+if TYPE_CHECKING:
+    from qdem_fem.contact_state import Contacts
+
+Floats = NDArray[np.float64]
+
+
+def near_step(contacts: Contacts) -> float:
+    """Critical step [s] for any contacts there can be before pairs are looked for anew.
+
+    Raises `ConditionError` for rigid bodies, whose vertices have no mass of their own.
+    """
+    if contacts.run.rigid is not None:
+        raise ConditionError(
+            "contacts near a rigid body do not tell its step",
+            where="contact, contacts",
+            remedy="give a number of contacts",
+        )
+    ends, stiffness, wall = contacts.springs_near()
+
+    def springs(u: Floats) -> Floats:
+        """``-M^-1 K_near u`` [m/s^2], (n, 3)."""
+        moved = u[contacts.nodes]
+        pull = -wall[:, None] * moved
+        of_pairs = stiffness[:, None] * (moved[ends[:, 1]] - moved[ends[:, 0]])
+        np.add.at(pull, ends[:, 0], of_pairs)
+        np.subtract.at(pull, ends[:, 1], of_pairs)
+        change = np.zeros_like(u)
+        change[contacts.nodes] = pull * contacts.inverse_mass[:, None]
+        return change
+
+    return critical_step_find(contacts.run, springs).value
+
+
+def near_check(step: float, near: float, where: str) -> None:
+    """Raise `Unstable` where a ``step`` [s] is above that for the contacts that are near now."""
+    if step > near:
+        raise Unstable(
+            f"vertices have come near each other whose contacts make the critical step {near:.4g} "
+            f"s; the step is {step:.4g} s, for those that were near when the march began",
+            where=where,
+            remedy='begin again with a number of contacts in place of "near", or with a lower '
+            "safety",
+        )
