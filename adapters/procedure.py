@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -14,23 +13,17 @@ from adapters import stages
 from adapters.engine import engine_found, engine_named, interruptible
 from adapters.engine_names import REAL_ENGINES
 from adapters.errors import (
-    EngineFailed,
     EngineMissing,
-    NotConverged,
-    NotCredible,
     SceneError,
     UsageError,
 )
-from adapters.jump_history import SEATING, gain_of
-from adapters.jump_run import settle_controlled, stretches_of
+from adapters.jump_fixed import settle_fixed
+from adapters.jump_run import settle_controlled
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder, disk_full_named, write_atomically
 from adapters.scene import Scene, flat_keys
 from adapters.scene_file import scene_load
 from adapters.stages import Bed, Clock, Run, Variant
-
-RETRIES = 3
-"""How often a failed jump is tried again, each time half as long."""
 
 OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
 """What may stand in a run folder before its manifest is written."""
@@ -53,81 +46,7 @@ def settle(run: Run) -> Bed:
     bed = replace(bed, start=replace(bed.start, perturbation=run.variant.perturbation))
     if p.tolerance is not None and run.variant.jumps and not run.variant.still:
         return settle_controlled(run, bed)
-    k = p.window_cycles
-    bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
-    for number in range(p.total_cycles):
-        longest = p.total_cycles - bed.cycle - p.healing_cycles - k
-        h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
-        if not run.variant.jumps or longest < min(p.h or (0,)):
-            break
-        bed = jump_and_heal(run, bed, h)
-    while bed.cycle < p.total_cycles:
-        bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
-    return bed
-
-
-def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
-    """A jump of ``h`` cycles and the window after it; a failed jump is tried again, half as long.
-
-    Where the jump and its retries failed: `compute_on` if the run may compute what it can not jump,
-    else raises `NotCredible`.
-    """
-    p = run.scene.procedure
-    assert p is not None
-    why = ""
-    for attempt in range(1, RETRIES + 2):
-        name = f"jump_{bed.cycle:06d}_{attempt}"
-        why = run.folder.failure(name)
-        if not why:
-            try:
-                with disk_full_named(run.folder.path):
-                    moved = stages.jump(run, bed, h, attempt, history_gain(run, bed, h))
-                    cycles = p.healing_cycles + p.window_cycles
-                    return stages.compute(run, moved, cycles, p.healing_cycles)
-            except (EngineFailed, NotCredible, NotConverged) as error:
-                if isinstance(error, EngineFailed) and error.from_outside:
-                    raise
-                why = str(error)
-                run.folder.give_up(name, why)
-                run.progress.say(f"the jump of {h} cycles from {bed.cycle} failed: {why}")
-        h = h // 2 if h > 1 else h
-    failed = f"the jump from cycle {bed.cycle} failed {RETRIES + 1} times, the last time: {why}"
-    if run.cycle_by_cycle:
-        run.progress.say(f"{failed}; computing on")
-        return compute_on(run, bed)
-    raise NotCredible(
-        failed,
-        where=str(run.folder.path),
-        remedy="more cycles k before the jump, a shorter h, or windows in its place: "
-        "trackbed resume RUN --cycle-by-cycle; the cycles before it are kept",
-    )
-
-
-def compute_on(run: Run, bed: Bed) -> Bed:
-    """Windows in place of a jump: one at the first place that no jump leaves, twice as many at each
-    further one, so that tries stay few where none succeeds."""
-    p = run.scene.procedure
-    assert p is not None
-    last_tries = (
-        n for n in run.folder.stage_names() if re.fullmatch(rf"jump_\d+_{RETRIES + 1}", n)
-    )
-    places = sum(
-        bool(run.folder.failure(name)) and int(name.split("_")[1]) <= bed.cycle
-        for name in last_tries
-    )
-    end = min(p.total_cycles, bed.cycle + p.window_cycles * 2 ** (places - 1))
-    while bed.cycle < end:
-        bed = stages.compute(run, bed, min(p.window_cycles, end - bed.cycle))
-    return bed
-
-
-def history_gain(run: Run, bed: Bed, h: int) -> float | None:
-    """Settlement over a jump [m] by all cycles computed but the first seating; None: by the law."""
-    p = run.scene.procedure
-    assert p is not None
-    if p.settlement == "law" or h == 0:
-        return None
-    return gain_of(stretches_of(run, bed, max(1, round(SEATING * p.k_i))), h).mean
+    return settle_fixed(run, bed)
 
 
 def run_scene(

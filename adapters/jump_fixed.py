@@ -1,0 +1,100 @@
+"""A run whose windows and jumps have given lengths k and h, as in Fig. 10 of Karrech et al. (2007).
+
+A jump that fails is tried again shorter; what the mean grain settles by is its law's or, where the
+scene says so, that of all cycles computed (`adapters.jump_history`).
+"""
+
+from __future__ import annotations
+
+import re
+
+from adapters import stages
+from adapters.errors import EngineFailed, NotConverged, NotCredible
+from adapters.jump_history import SEATING, gain_of
+from adapters.jump_run import stretches_of
+from adapters.run_folder import disk_full_named
+from adapters.stages import Bed, Run
+
+RETRIES = 3
+"""How often a failed jump is tried again, each time half as long."""
+
+
+def settle_fixed(run: Run, bed: Bed) -> Bed:
+    """From the bed after k_i cycles to the end: k cycles and a jump of h, again and again."""
+    p = run.scene.procedure
+    assert p is not None
+    k = p.window_cycles
+    bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
+    for number in range(p.total_cycles):
+        longest = p.total_cycles - bed.cycle - p.healing_cycles - k
+        h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
+        if not run.variant.jumps or longest < min(p.h or (0,)):
+            break
+        bed = jump_and_heal(run, bed, h)
+    while bed.cycle < p.total_cycles:
+        bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
+    return bed
+
+
+def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
+    """A jump of ``h`` cycles and the window after it; a failed jump is tried again, half as long.
+
+    Where the jump and its retries failed: `compute_on` if the run may compute what it can not jump,
+    else raises `NotCredible`.
+    """
+    p = run.scene.procedure
+    assert p is not None
+    why = ""
+    for attempt in range(1, RETRIES + 2):
+        name = f"jump_{bed.cycle:06d}_{attempt}"
+        why = run.folder.failure(name)
+        if not why:
+            try:
+                with disk_full_named(run.folder.path):
+                    moved = stages.jump(run, bed, h, attempt, history_gain(run, bed, h))
+                    cycles = p.healing_cycles + p.window_cycles
+                    return stages.compute(run, moved, cycles, p.healing_cycles)
+            except (EngineFailed, NotCredible, NotConverged) as error:
+                if isinstance(error, EngineFailed) and error.from_outside:
+                    raise
+                why = str(error)
+                run.folder.give_up(name, why)
+                run.progress.say(f"the jump of {h} cycles from {bed.cycle} failed: {why}")
+        h = h // 2 if h > 1 else h
+    failed = f"the jump from cycle {bed.cycle} failed {RETRIES + 1} times, the last time: {why}"
+    if run.cycle_by_cycle:
+        run.progress.say(f"{failed}; computing on")
+        return compute_on(run, bed)
+    raise NotCredible(
+        failed,
+        where=str(run.folder.path),
+        remedy="more cycles k before the jump, a shorter h, or windows in its place: "
+        "trackbed resume RUN --cycle-by-cycle; the cycles before it are kept",
+    )
+
+
+def compute_on(run: Run, bed: Bed) -> Bed:
+    """Windows in place of a jump: one at the first place that no jump leaves, twice as many at each
+    further one, so that tries stay few where none succeeds."""
+    p = run.scene.procedure
+    assert p is not None
+    last_tries = (
+        n for n in run.folder.stage_names() if re.fullmatch(rf"jump_\d+_{RETRIES + 1}", n)
+    )
+    places = sum(
+        bool(run.folder.failure(name)) and int(name.split("_")[1]) <= bed.cycle
+        for name in last_tries
+    )
+    end = min(p.total_cycles, bed.cycle + p.window_cycles * 2 ** (places - 1))
+    while bed.cycle < end:
+        bed = stages.compute(run, bed, min(p.window_cycles, end - bed.cycle))
+    return bed
+
+
+def history_gain(run: Run, bed: Bed, h: int) -> float | None:
+    """Settlement over a jump [m] by all cycles computed but the first seating; None: by the law."""
+    p = run.scene.procedure
+    assert p is not None
+    if p.settlement == "law" or h == 0:
+        return None
+    return gain_of(stretches_of(run, bed, max(1, round(SEATING * p.k_i))), h).mean
