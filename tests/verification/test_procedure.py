@@ -125,11 +125,13 @@ def test_failed_jump_is_tried_again_half_as_long(
     lengths: list[int] = []
     real = stages.jump
 
-    def fail_twice(run: stages.Run, bed: stages.Bed, h: int, attempt: int) -> stages.Bed:
+    def fail_twice(
+        run: stages.Run, bed: stages.Bed, h: int, attempt: int, gain: float | None
+    ) -> stages.Bed:
         lengths.append(h)
         if attempt <= 2:
             raise NotConverged("made to fail")
-        return real(run, bed, h, attempt)
+        return real(run, bed, h, attempt, gain)
 
     monkeypatch.setattr(stages, "jump", fail_twice)
     rows = settle(tmp_path / "run", "procedure.total_cycles=90")
