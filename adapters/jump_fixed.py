@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
+
 from adapters import stages
 from adapters.errors import EngineFailed, NotConverged, NotCredible
-from adapters.jump_history import SEATING, gain_of
+from adapters.jump_history import SEATING, Jumped, asked_gain
 from adapters.jump_run import stretches_of
 from adapters.run_folder import disk_full_named
 from adapters.stages import Bed, Run
@@ -97,4 +99,21 @@ def history_gain(run: Run, bed: Bed, h: int) -> float | None:
     assert p is not None
     if p.settlement == "law" or h == 0:
         return None
-    return gain_of(stretches_of(run, bed, max(1, round(SEATING * p.k_i))), h).mean
+    begin = max(1, round(SEATING * p.k_i))
+    return asked_gain(stretches_of(run, begin, bed.cycle), h, jumps_of(run, begin, bed.cycle))
+
+
+def jumps_of(run: Run, begin: int, end: int) -> list[Jumped]:
+    """Jumps that stand up to cycle ``end``, each with what was known since ``begin`` before it."""
+    p = run.scene.procedure
+    assert p is not None
+    outcomes = [one for one in run.folder.outcomes() if one.last_cycle <= end]
+    found = []
+    for before, jump, behind in zip(outcomes, outcomes[1:], outcomes[2:], strict=False):
+        if jump.stage != "jump" or not jump.rows:
+            continue
+        rows = [before.rows[-1], jump.rows[-1], [jump.rows[-1], *behind.rows][p.healing_cycles]]
+        cycles = np.array([row["cycle"] for row in rows], int)
+        settled = np.array([row["settlement"] for row in rows], float)
+        found.append(Jumped(stretches_of(run, begin, int(cycles[0])), cycles, settled))
+    return found

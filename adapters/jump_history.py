@@ -10,6 +10,10 @@ seen through the noise of each block of computed cycles; its best linear unbiase
 jump (ordinary kriging, Matheron 1963) weighs the last window alone where cycles are quiet, and all
 blocks where they are not.  Behind the last block the walk's mean does not change, so the gain is
 the logarithm's with that slope.
+
+A bed that was moved settles more in the first cycle behind the jump than it would have: contacts
+that were moved do not bear yet.  What earlier jumps and their healing cycles gained beyond the
+forecast is taken off the next jump, with what its own healing cycles will gain so (`asked_gain`).
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 
 from adapters.jump_rates import Noise, Stretch, noise_of
-from adapters.state import FloatArray
+from adapters.state import FloatArray, IntArray
 
 DRIFT = 1.0
 """Standard deviation of the slope's change over a unit of ln N, over the mean slope."""
@@ -37,6 +41,35 @@ class Gain:
 
     mean: float
     error: float
+
+
+@dataclass(frozen=True, eq=False)
+class Jumped:
+    """A jump that was made, with the healing cycles behind it."""
+
+    known: tuple[Stretch, ...]
+    """Cycles computed before it."""
+    cycles: IntArray
+    """Cycles done before it, behind it, and behind the healing cycles, shape (3,)."""
+    settlement: FloatArray
+    """At their ends [m], shape (3,)."""
+
+
+def asked_gain(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
+    """Settlement [m] to move the mean grain by in a jump of ``h`` cycles, 0 at least.
+
+    The forecast less what ``jumps`` before gained beyond theirs, all in all, and less the mean of
+    what healing cycles did.  Bursts of the healing cycles count as the jump's own.
+    """
+    gained, healed = [], []
+    for one in jumps:
+        before, behind, after = one.cycles.tolist()
+        all_in_all = gain_of(one.known, after - before).mean
+        in_healing = all_in_all - gain_of(one.known, behind - before).mean
+        gained.append(float(one.settlement[2] - one.settlement[0]) - all_in_all)
+        healed.append(float(one.settlement[2] - one.settlement[1]) - in_healing)
+    expected = sum(healed) / len(healed) if healed else 0.0
+    return max(gain_of(known, h).mean - sum(gained) - expected, 0.0)
 
 
 def blocks_of(stretches: Sequence[Stretch]) -> tuple[Stretch, ...]:

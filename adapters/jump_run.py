@@ -109,12 +109,12 @@ def stretch_of(rows: list[dict[str, Any]], before: float) -> Stretch:
     )
 
 
-def stretches_of(run: Run, bed: Bed, begin: int) -> tuple[Stretch, ...]:
-    """Cycles computed from cycle ``begin`` to the bed's, a stretch a window, healing left out."""
+def stretches_of(run: Run, begin: int, end: int) -> tuple[Stretch, ...]:
+    """Cycles computed from cycle ``begin`` to ``end``, a stretch a window, healing left out."""
     stretches: list[Stretch] = []
     settlement = 0.0
     for outcome in run.folder.outcomes():
-        if outcome.last_cycle > bed.cycle:
+        if outcome.last_cycle > end:
             break
         rows = [{"settlement": settlement, "cycle": outcome.first_cycle}, *outcome.rows]
         settlement = float(rows[-1]["settlement"])

@@ -121,13 +121,13 @@ def sides_compared(rows: Sequence[Row], kind: Kind, record: EnsembleRecord) -> l
     return [compared(row) if "sides" in row else row for row in rows]
 
 
-def continued(column: str) -> Callable[[Sequence[Row], str, int], float]:
+def continued(column: str, skipped: int = 0) -> Callable[[Sequence[Row], str, int], float]:
     """Share of all jumps behind which a column goes on as before [%]."""
 
     def share(rows: Sequence[Row], method: str, last: int) -> float:
         mine = finished(rows, method, last)
         pairs = [(one, one["others"]) for row in mine for one in row.get("sides", [])]
-        return 100 * share_continued(pairs, column)
+        return 100 * share_continued(pairs, column, skipped)
 
     return share
 
@@ -140,6 +140,7 @@ BARS = (
     Bar("density profile", "%", 2.0, error_of_profile),
     Bar("elastic deflection", "%", 2.0, error_of("deflection")),
     Bar("gained time", "%", 400.0, gained_time, least=True),
+    Bar("rate behind the first cycle goes on", "%", 90.0, continued(COLUMNS[0], 1), least=True),
     *(
         Bar(f"{words} goes on", "%", 90.0, continued(column), least=True)
         for column, words in zip(COLUMNS, ("rate", "coordination", "stiffness"), strict=True)

@@ -65,8 +65,8 @@ def sides_without_jump(
     return sides
 
 
-def change_of(sides: Row, column: str) -> float:
-    """Mean behind a jump less mean before it.
+def change_of(sides: Row, column: str, skipped: int = 0) -> float:
+    """Mean behind a jump, or behind so many ``skipped`` cycles more, less mean before it.
 
     Settlement a cycle is multiplied by the cycle's number, the slope of the logarithm: that a bed
     slows down is no transient.
@@ -75,23 +75,25 @@ def change_of(sides: Row, column: str) -> float:
     if column == "settlement":
         before = before * (sides["first"] - len(before) + 1 + np.arange(len(before)))
         after = after * (sides["last"] + 1 + np.arange(len(after)))
-    return float(after.mean() - before.mean())
+    return float(after[skipped:].mean() - before.mean())
 
 
-def continues(sides: Row, others: Sequence[Row], column: str) -> bool:
+def continues(sides: Row, others: Sequence[Row], column: str, skipped: int = 0) -> bool:
     """Whether the change over a jump is one that full runs have between the same cycles.
 
     ``others``: their sides, n of them; the bound is Student's for one more of the same kind,
     t s sqrt(1 + 1/n), at `PROBABILITY`.
     """
-    changes = np.array([change_of(one, column) for one in others])
+    changes = np.array([change_of(one, column, skipped) for one in others])
     bound = stdtrit(len(changes) - 1, (1 + PROBABILITY) / 2) * changes.std(ddof=1)
     bound *= np.sqrt(1 + 1 / len(changes))
-    return bool(abs(change_of(sides, column) - changes.mean()) <= bound)
+    return bool(abs(change_of(sides, column, skipped) - changes.mean()) <= bound)
 
 
-def share_continued(pairs: Sequence[tuple[Row, Sequence[Row]]], column: str) -> float:
+def share_continued(
+    pairs: Sequence[tuple[Row, Sequence[Row]]], column: str, skipped: int = 0
+) -> float:
     """Share of jumps, each with the sides of full runs, that `continues`; nan for none."""
     if not pairs:
         return float("nan")
-    return float(np.mean([continues(one, others, column) for one, others in pairs]))
+    return float(np.mean([continues(one, others, column, skipped) for one, others in pairs]))

@@ -7,7 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.jump_history import DRIFT, LONGEST_BLOCK, blocks_of, gain_of, slope_weights
+from adapters.jump_history import (
+    DRIFT,
+    LONGEST_BLOCK,
+    Jumped,
+    asked_gain,
+    blocks_of,
+    gain_of,
+    slope_weights,
+)
 from adapters.jump_rates import Stretch
 from adapters.state import FloatArray
 
@@ -92,6 +100,29 @@ def test_unit_of_length_is_free(unit: float, gains: list[float], h: int) -> None
     assert other.mean == pytest.approx(unit * one.mean, rel=1e-6, abs=1e-9 * unit)
     assert other.error == pytest.approx(unit * one.error, rel=1e-6, abs=1e-9 * unit)
     assert one.mean >= 0
+
+
+def test_what_a_jump_leaves_too_much_is_taken_off_the_next() -> None:
+    """u = a ln N, and 3 um more in the healing cycles of every jump: behind the second jump, and
+    every one after it, the bed is where the logarithm has it; behind the first 3 um too low."""
+    more, k, h, healing, end = 3e-6, 20, 60, 5, 70
+    settled = {n: SLOPE * np.log(n) for n in range(10, end + 1)}
+    windows = [(10, end)]
+    jumps: list[Jumped] = []
+    for number in range(4):
+        known = [stretch(a, np.diff([settled[n] for n in range(a, b + 1)])) for a, b in windows]
+        gain = asked_gain(known, h, jumps)
+        settled[end + h] = settled[end] + gain
+        healed, last = end + h + healing, end + h + healing + k
+        for n in range(end + h + 1, last + 1):
+            settled[n] = settled[end + h] + SLOPE * np.log(n / (end + h)) + more
+        cycles = np.array([end, end + h, healed])
+        jumps.append(Jumped(tuple(known), cycles, np.array([settled[n] for n in cycles])))
+        windows.append((healed, last))
+        missed = settled[last] - SLOPE * np.log(last)
+        assert missed == pytest.approx(more if number == 0 else 0.0, abs=1e-12)
+        end = last
+    assert asked_gain(known, 1, jumps) == 0  # never less than nothing
 
 
 def test_blocks_cut_no_cycle_and_lose_none() -> None:
