@@ -72,8 +72,14 @@ class TrackLayout:
 
     def under(self, places: FloatArray) -> NDArray[np.bool_]:
         """Whether spheres at (k, 3) [m] are where the sleeper goes down, (k,)."""
-        aside = np.abs(places[:, 1] - self.box.width / 2) <= self._reach
+        aside = np.abs(self.across(places)) <= self._reach
         return np.asarray(aside & (self.beyond(places[:, 0]) <= 2 * self.radius))
+
+    def across(self, places: FloatArray) -> FloatArray:
+        """How far places (k, 3) [m] lie from the plane of the sleeper's middle, along y; where the
+        track repeats a grain may have left the box, and counts where its image is, (k,) [m]."""
+        away = places[:, 1] - self.box.width / 2
+        return np.asarray(away - self.box.width * np.round(away / self.box.width))
 
     def grains_below(self, grains: Sequence[FloatArray], seed: int) -> list[FloatArray]:
         """Loose grains on the ground, nodes of each [m]: as high as the flat top reaches, and from

@@ -193,6 +193,7 @@ def points_of(
     """
     positions = bed.positions
     centres = np.array([x.mean(axis=0) for x in positions[: recipe.below]])
+    centres[:, 1] = recipe.layout.across(centres)
     bottom = float(positions[-1][:, 2].min())
     found: dict[str, tuple[str, IntArray]] = {}
 
@@ -202,7 +203,7 @@ def points_of(
         found[name] = (body, np.arange(len(bodies[body].nodes)))
 
     for name, x in recipe.layout.watched().items():
-        watch(name, np.array([x, recipe.box.width / 2, max(bottom - BELOW, bottom / 2)]))
+        watch(name, np.array([x, 0.0, max(bottom - BELOW, bottom / 2)]))
     second = found["B2"][0]
     watch("B2a", centres[int(second.removeprefix("grain-"))], second)
     sleeper = bodies[SLEEPER]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,8 +12,9 @@ from scipy.optimize import curve_fit
 from scipy.spatial import cKDTree
 
 import qdem_fem as q
-from qdem_fem import track_scene
+from qdem_fem import track_bed, track_scene
 from qdem_fem.errors import SceneError
+from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.sleeper_mesh import SleeperShape
@@ -21,7 +23,8 @@ from qdem_fem.track_bed import Bed, grains_of, sleeper_guide
 from qdem_fem.track_bodies import TrackBox, grains_nodes
 from qdem_fem.track_layout import TrackLayout
 from qdem_fem.track_scene import TrackPrepared, track_enter
-from validation.track_trials import SCENE
+from validation import track_periodic
+from validation.track_trials import SCENE, scene_at
 
 CONCRETE = Material(45e9, 0.167, 2350.0)
 WHOLE = TrackLayout("whole", TrackBox(5.0, 0.6), SleeperShape(), (24, 4, 3), 0.012, (0.5, 1.3))
@@ -173,3 +176,33 @@ def test_scenes_of_half_and_whole_sleepers_are_sound(name: str, grains: int) -> 
     nodes = recipe.layout.sleeper(0.0).nodes  # spheres overlap: no cell is wider than one
     for axis in (0, 2):
         assert np.diff(np.unique(nodes[:, axis].round(9))).max() <= 2 * recipe.radius
+
+
+def test_a_bed_that_repeats_rests_where_all_are_stopped_together() -> None:
+    record = json.loads(track_periodic.RECORD.read_text(encoding="utf-8"))
+    assert not record["one by one"]["hard"]["reached"]
+    for stage in ("hard", "rest"):
+        assert record["all together"][stage]["reached"]
+        assert record["all together"][stage]["loose"] == 0.0
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_hard_stages_of_a_periodic_bed_are_stopped_together(
+    periodic: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[bool] = []
+
+    def find(run: object, *shares: object, each: bool) -> Rest:
+        asked.append(each)
+        return Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
+
+    monkeypatch.setattr(track_bed, "rest_find", find)
+    recipe = scene_at(tmp_path, *(track_periodic.WIDTH,) * periodic).recipe
+    track_bed.bed_prepare(recipe, tmp_path / "bed.npz", 1)
+    assert asked == [True] * 3 + [not periodic] * 2
+
+
+def test_a_grain_that_left_a_periodic_box_counts_where_its_image_is() -> None:
+    places = np.array([[2.5, y, 0.3] for y in (0.3, 0.3 + 0.6, 0.3 - 1.2, 0.6, 0.9 + 0.2)])
+    assert WHOLE.across(places) == pytest.approx([0.0, 0.0, 0.0, 0.3, 0.2], abs=1e-12)
+    assert WHOLE.under(places).tolist() == [True, True, True, False, False]
