@@ -228,6 +228,5 @@ def test_every_key_of_a_track_is_named_in_its_scene() -> None:
 
 
 def test_page_is_written_from_its_records() -> None:
-    small = track_page.record_read(track_page.SMALL) if track_page.SMALL.exists() else None
-    expected = track_page.page_text(track_page.record_read(), small)
+    expected = track_page.page_text(*track_page.records())
     assert track_page.PAGE.read_text(encoding="utf-8") == expected
