@@ -1,0 +1,135 @@
+"""What a bogie does to the small track: figures of finished runs of its scene.
+
+    trackbed qdem scenes/track-small.toml --run-folder run
+    python -m validation.track_bogie scenes/track-small.toml run [ANOTHER ...]
+
+Writes ``validation/results/track-bogie.json``, by the name of each run's folder: settlement at each
+passage of an axle, lateral over vertical motion, peaks of spectra and mobility, account and cost.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.contact_sphere_state import SphereContacts
+from qdem_fem.contact_spheres import pair_stiffness
+from qdem_fem.load_train import Train
+from qdem_fem.mesh_checks import FloatArray
+from qdem_fem.output import table_read, write_whole
+from qdem_fem.run_folder import machine
+from qdem_fem.scene_build import simulation_of
+from qdem_fem.scene_checks import scene_load
+from qdem_fem.simulation import Simulation
+from qdem_fem.track_bed import BedRecipe, bed_read
+from qdem_fem.track_figures import GRAINS, SENSORS, track_facts
+from qdem_fem.track_scene import BogieTable, TrackPrepared, TrackScene
+from validation.track_page import BOGIE
+
+NEARLY = 0.99
+"""Of Coulomb's limit, what counts as being there."""
+POINTS = (*GRAINS, "sleeper")
+
+
+def passages(bogie: BogieTable) -> tuple[FloatArray, FloatArray]:
+    """Times at which the two axles are on the sleeper, and at which each passage ends (2,) [s].
+
+    The first ends half-way to the second, the second when that axle is ``lead`` behind.
+    """
+    axles = Train(cars=1, axle_load=bogie.axle_load, speed=bogie.speed).axles[:2]
+    on = (bogie.lead + axles) / bogie.speed
+    return on, np.array([on.mean(), on[1] + bogie.lead / bogie.speed])
+
+
+def settlement_at(time: FloatArray, down: FloatArray, ends: FloatArray) -> list[dict[str, float]]:
+    """Greatest settlement within each passage, and that at its end [m], of a point that is ``down``
+    [m] below where it was at ``time`` [s]."""
+    found = []
+    for begin, end in zip([0.0, *ends[:-1]], ends, strict=True):
+        within = (time >= begin) & (time <= end)
+        found.append({"greatest": float(down[within].max()), "end": float(down[within][-1])})
+    return found
+
+
+def mobilised(run: Simulation, recipe: BedRecipe, friction: float) -> dict[str, float]:
+    """Median of ``|F_t|/(mu F_n)`` of pairs that touch, and share of them near Coulomb's limit [-].
+
+    ``F_n`` is k_n times the overlap; what else there is of the force is across it.
+    """
+    assert isinstance(run.contacts, SphereContacts)
+    run.contacts.refresh()
+    found = run.contacts.touching()
+    sleeper = np.maximum(found.first, found.second) >= run.first_node[-2]
+    push = found.overlap * np.where(sleeper, pair_stiffness(*recipe.stiffness), recipe.stiffness[0])
+    across = np.sqrt(np.maximum((found.force**2).sum(axis=1) - push**2, 0.0))
+    share = across / (friction * push)
+    return {"median": float(np.median(share)), "at_limit": float((share > NEARLY).mean())}
+
+
+def run_facts(prepared: TrackPrepared, folder: Path) -> dict[str, Any]:
+    """All figures of one run."""
+    result, manifest = (
+        json.loads((folder / name).read_text(encoding="utf-8"))
+        for name in ("result.json", "manifest.json")
+    )
+    assert isinstance(prepared.scene, TrackScene)
+    bogie = prepared.scene.track.bogie
+    assert bogie is not None
+    rows = table_read(folder / "probes.csv")
+    on, ends = passages(bogie)
+    facts = track_facts(folder, prepared.load)
+    points = {}
+    for name in POINTS:
+        y, z = (rows[f"{name}_{axis}"] - rows[f"{name}_{axis}"][0] for axis in "yz")
+        points[name] = {
+            "passages": settlement_at(rows["time"], -z, ends),
+            "final": facts[name]["settlement"],
+            "lateral_over_vertical": float(np.abs(y).max() / np.abs(z).max()),
+        }
+    scene = manifest["scene"]
+    return {
+        "friction": scene["contact"]["friction"],
+        "prepared_friction": prepared.recipe.friction,
+        "seed": scene["track"]["seed"],
+        "threads": scene["simulation"]["threads"],
+        "step": result["step"],
+        "steps": result["steps"],
+        "cost": result["cost"],
+        "energy": result["energy"],
+        "load_greatest": float(-prepared.load.values[:, 2].min()),
+        "axles": on.tolist(),
+        "points": points,
+        "spectra": {name: facts[name]["peaks"] for name in SENSORS},
+        "mobility": {name: facts[name]["mobility_peaks"] for name in GRAINS},
+    }
+
+
+def main() -> None:
+    """Read the runs and write the record."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("run", type=Path, nargs="+")
+    arguments = parser.parse_args()
+    prepared = scene_load(arguments.scene)
+    assert isinstance(prepared, TrackPrepared)
+    assert prepared.scene.contact is not None
+    run, _ = simulation_of(prepared)
+    names = [arguments.scene, *arguments.run]
+    record = {
+        "command": "python -m validation.track_bogie " + " ".join(path.name for path in names),
+        "machine": machine(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "mobilised": mobilised(run, prepared.recipe, prepared.scene.contact.friction),
+        "rests": bed_read(prepared.bed_file, prepared.recipe).rests,
+        "runs": {path.name: run_facts(prepared, path) for path in arguments.run},
+    }
+    write_whole(BOGIE, json.dumps(record, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
