@@ -28,7 +28,8 @@ from qdem_fem.scene_checks import scene_load
 from qdem_fem.simulation import Simulation
 from qdem_fem.track_bed import BedRecipe, bed_read
 from qdem_fem.track_figures import GRAINS, SENSORS, track_facts
-from qdem_fem.track_scene import BogieTable, TrackPrepared, TrackScene
+from qdem_fem.track_scene import TrackPrepared, TrackScene
+from qdem_fem.track_table import BogieTable
 from validation.track_page import BOGIE
 
 NEARLY = 0.99
