@@ -64,7 +64,8 @@ def test_sentences_about_moving(rows: list[Row]) -> None:
 
 
 def test_sentences_about_history(rows: list[Row]) -> None:
-    """A seventh as many attempts fail, two jumps cost half as much, the error is not greater."""
+    """Next to no attempt fails, two jumps cost two fifths, the mean errs by at most 2 %; behind the
+    seating cycle beds go on as full runs do."""
     lost = {
         family: sum(
             len(row["lost"])
@@ -73,20 +74,17 @@ def test_sentences_about_history(rows: list[Row]) -> None:
         )
         for family in ("", ", by history")
     }
-    assert 5 < lost[""] / lost[", by history"] < 9
+    assert lost[", by history"] <= 1 < 20 < lost[""]
     law, history = (finished(rows, f"2 jumps{end}", LAST) for end in ("", ", by history"))
     assert len(history) == 5
-    assert 0.4 < cost(history) / cost(law) < 0.6
+    assert 0.35 < cost(history) / cost(law) < 0.45
     for jumps in (5, 2):
-        found, before = (
-            judged(rows, f"{jumps} jumps{end}", LAST, "settlement") for end in (", by history", "")
-        )
+        found = judged(rows, f"{jumps} jumps, by history", LAST, "settlement")
         assert found is not None
-        assert before is not None
-        assert abs(found.mean) < found.half
-        assert abs(found.mean) < abs(before.mean) + 0.01
+        assert abs(found.mean) < 0.025
+        assert found.half > 0.3
     twice = finished(rows, "step x 2", LAST)
-    assert 1.7 < cost(twice) / cost(history) < 2.4
+    assert 0.35 < cost(history) / cost(twice) < 0.45
 
 
 def test_sentences_about_rivals(rows: list[Row]) -> None:
