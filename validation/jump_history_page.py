@@ -29,7 +29,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "jump-history.md"
 CASES: tuple[tuple[Kind, int, tuple[int, ...]], ...] = (
     (COARSE, 500, (2, 5, 10)),
     (COARSE, 2800, (2, 5, 10, 20)),
-    (CONFINED, 230, (2, 5)),
+    (CONFINED, 270, (2, 5)),
 )
 """Ensemble, last cycle, numbers of equal jumps."""
 
