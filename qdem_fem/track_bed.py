@@ -12,8 +12,8 @@ that is done in `STAGES`, each ended by kinetic damping (`qdem_fem.kinetic_dampi
 * ``rest``: deformable bodies on the springs asked for, as the run has them.
 
 Bodies are stopped one by one, but in the last two stages of a bed that no wall holds along y all
-together: it slides as a whole, by some mm, and hard contacts rattle so fast that each body has a
-peak every 160 steps, 0.1 ms.  Stopped at each, the heap sinks by g times 0.1 ms/2, half a
+together: it slides as a whole, and hard contacts rattle so fast that each body has a peak every
+160 steps, 0.1 ms.  Stopped at each, the heap sinks by g times 0.1 ms/2, half a
 millimetre a second, for ever.
 
 Only the last stage says what the state is worth; the others say where grains begin.  What each

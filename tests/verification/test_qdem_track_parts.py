@@ -24,6 +24,7 @@ from qdem_fem.track_bodies import TrackBox, grains_nodes
 from qdem_fem.track_layout import TrackLayout
 from qdem_fem.track_scene import TrackPrepared, track_enter
 from validation import track_periodic
+from validation.track_split import ghosts, shared_nodes
 from validation.track_trials import SCENE, scene_at
 
 CONCRETE = Material(45e9, 0.167, 2350.0)
@@ -212,3 +213,15 @@ def test_a_grain_that_left_a_periodic_box_counts_where_its_image_is() -> None:
     places = np.array([[2.5, y, 0.3] for y in (0.3, 0.3 + 0.6, 0.3 - 1.2, 0.6, 0.9 + 0.2)])
     assert WHOLE.across(places) == pytest.approx([0.0, 0.0, 0.0, 0.3, 0.2], abs=1e-12)
     assert WHOLE.under(places).tolist() == [True, True, True, False, False]
+
+
+def test_what_processes_tell_each_other_is_counted() -> None:
+    """A row of vertices 10 mm apart, cut in three: two radii and the skin reach over two of them,
+    so two are told across each cut, each way; two elements on a face share its three nodes."""
+    every = np.column_stack([0.01 * np.arange(30), np.zeros(30), np.zeros(30)])
+    told, heard = ghosts(0.012, None, every, np.arange(30) // 10, 3)
+    assert told.tolist() == heard.tolist() == [2, 4, 2]
+    rolled, _ = ghosts(0.012, 0.3, every[:, [1, 0, 2]], np.arange(30) // 10, 3)
+    assert rolled.tolist() == [4, 4, 4]
+    pair = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+    assert shared_nodes(pair, np.array([0, 1]), 2).tolist() == [3, 3]
