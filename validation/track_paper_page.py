@@ -1,0 +1,151 @@
+"""The page on the paper's track, written from its record.
+
+python -m validation.track_paper scenes/track-paper.toml --work FOLDER    the record
+python -m validation.track_paper_page                                     writes the page
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from validation.page_text import page_filled, table
+from validation.track_paper import RECORD
+from validation.track_periodic import LIMIT
+from validation.track_periodic import RECORD as REPEATED
+
+WORDS = Path(__file__).with_suffix(".md")
+PAGE = Path(__file__).parents[1] / "docs" / "qdem-track-paper.md"
+CAR = 0.625
+"""From one car to the next at the paper's speed [s]: front axles at 0.11, 0.73, ... s (Fig. 7)."""
+PAPER_RATE, PAPER_ELEMENTS, PAPER_STEP = 56.5e6, 622_591 + 284_241, 1e-7
+"""Element-steps a second of one card, from the paper's beam: 488,361 elements, 2e7 steps, 2 days;
+elements and step [s] of its track."""
+LINK = 10e9
+"""Bytes a second that a link between processes is taken to carry."""
+
+
+def page(record: dict[str, Any], repeated: dict[str, Any]) -> str:
+    """The page for the record, and that of a bed that repeats."""
+    marches = [record[name] for name in sorted(record) if name.startswith("march_")]
+    one = marches[0]
+    elements = one["elements_ballast"] + one["elements_sleeper"]
+    return page_filled(WORDS.read_text(encoding="utf-8"), {
+        "command": f"`{record['command']}`", "machine": record["machine"],
+        "date": record["started"][:10], "cells": " x ".join(map(str, record["cells"])),
+        "grains": f"{record['grains']:,}", "ballast": f"{one['elements_ballast']:,}",
+        "sleeper": f"{one['elements_sleeper']:,}", "nodes": f"{one['nodes']:,}",
+        "step": f"{1e6 * one['step']:.3f}", "prepared": prepared(record),
+        "threads": " | ".join(threads(m["threads"]) for m in marches),
+        "rule": "|".join(["---"] * len(marches)), "steps": steps(marches),
+        "limit": str(LIMIT), "loose": f"{repeated['one by one']['hard']['loose']:.2f}",
+        "periodic_command": repeated["command"], "periodic": periodic(repeated),
+        "passage": passage(one, elements),
+        "split": table([], split(record["split"])).split("\n", 2)[2],
+        "judged": judged(record["split"], one),
+    })  # fmt: skip
+
+
+def threads(count: int) -> str:
+    """One thread, two threads."""
+    return "one thread" if count == 1 else f"{count} threads"
+
+
+def prepared(record: dict[str, Any]) -> str:
+    """How far the bed is."""
+    fall, high = record["fall"], record["heights"]
+    state = "at rest by the bar of that stage" if fall["rest"] else "**not at rest**"
+    rows = [
+        ("processor time of the grains", f"{record['grains_cpu_s']:.0f} s"),
+        ("processor time of the fall (stage `bed`, rigid grains)", f"{fall['cpu_s']:.0f} s"),
+        ("its steps, of", f"{fall['steps']:,}, {1e6 * fall['step']:.1f} µs"),
+        ("processor time of one, over all", f"{1e3 * fall['seconds_a_step']:.1f} ms"),
+        ("simulated", f"{fall['time']:.3f} s"),
+        ("unbalanced force, loose bodies", f"{fall['unbalanced']:.3g}, {fall['loose']:.3g}"),
+        ("highest grain where the sleeper is laid", f"{high['top']:.3f} m"),
+        ("95 of 100 centres there lie below", f"{high['most']:.3f} m"),
+    ]
+    return f"The bed is {state}.\n\n" + table(["what", "measured"], rows)
+
+
+def periodic(repeated: dict[str, Any]) -> str:
+    """Rows of how a bed that repeats comes to rest."""
+    ways = repeated["one by one"], repeated["all together"]
+    rows = []
+    for stage in ("hard", "rest"):
+        found = [way.get(stage) for way in ways]
+        told = [
+            "not begun" if f is None else "at rest" if f["reached"] else "no rest" for f in found
+        ]
+        rows.append([f"stage `{stage}`", *told])
+        for name, unit in (("time", " s"), ("unbalanced", ""), ("loose", ""), ("cpu_s", " s")):
+            cells = ["" if f is None else f"{f[name]:.3g}{unit}" for f in found]
+            rows.append([{"time": "simulated", "cpu_s": "processor time"}.get(name, name), *cells])
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def steps(marches: list[dict[str, Any]]) -> str:
+    """Rows of what a step costs, a column a march."""
+    rows = [
+        ("processor time of a step", [f"{1e3 * m['seconds_a_step']:.1f} ms" for m in marches]),
+        ("wall time of it, machine shared", [f"{1e3 * m['wall_a_step']:.1f} ms" for m in marches]),
+        ("million element-steps a processor second", [f"{m['mels']:.1f}" for m in marches]),
+        ("million element-steps a second of wall", [f"{m['mels_wall']:.1f}" for m in marches]),
+        ("memory, resident", [f"{m['resident'] / 1e9:.2f} GB" for m in marches]),
+        ("processor time to build it", [f"{m['built_cpu_s']:.0f} s" for m in marches]),
+    ]  # fmt: skip
+    return "\n".join("| " + " | ".join([name, *cells]) + " |" for name, cells in rows)
+
+
+def passage(one: dict[str, Any], elements: int) -> str:
+    """What a car costs, beside the paper."""
+    count = CAR / one["step"]
+    ours = count * elements
+    theirs = CAR / PAPER_STEP * PAPER_ELEMENTS
+    hours = ours / one["mels"] / 1e6 / 3600
+    return (
+        f"One car passes in {CAR} s: {count / 1e6:.2f} million steps of {elements:,} elements, "
+        f"{ours:.2e} element-steps, **{hours:.0f} h** of one thread.  The paper's {theirs:.2e} "
+        f"take {theirs / PAPER_RATE / 3600:.0f} h of one of its cards at the "
+        f"{PAPER_RATE / 1e6:.1f} million a second of its beam (488,361 elements, 2e7 steps, two "
+        "days, no contact); what its track took, it does not say.  Half an hour would ask for "
+        f"{ours / 1800 / 1e6:,.0f} million a second.  No GPU was at hand."
+    )
+
+
+def split(counts: list[dict[str, Any]]) -> list[list[str]]:
+    """Rows of the counts."""
+    names = {"x": "the sleeper (5 m)", "y": "the track (0.6 m, periodic)"}
+    return [
+        [names[c["axis"]], str(c["parts"]), f"{c['vertices']:,}", f"{c['shared']:,}",
+         f"{c['bytes'] / 1e3:,.0f} kB", f"{c['busiest']:.2f}"]
+        for c in counts
+    ]  # fmt: skip
+
+
+def judged(counts: list[dict[str, Any]], one: dict[str, Any]) -> str:
+    """What the bytes mean beside a step."""
+    best = max((c for c in counts if c["axis"] == "x"), key=lambda c: c["parts"])
+    other = max((c for c in counts if c["axis"] == "y"), key=lambda c: c["parts"])
+    share = best["busiest"] * one["seconds_a_step"] / best["parts"]
+    told = best["bytes"] / LINK
+    return (
+        f"Along the sleeper, {best['parts']} processes: {1e6 * told:.0f} µs a step at "
+        f"{LINK / 1e9:g} GB/s, beside {1e3 * share:.1f} ms of computing on such cores: "
+        f"{100 * told / share:.2f} %.  Along the track it is "
+        f"{other['bytes'] / best['bytes']:.1f} times as much.  On cards a step of such a part "
+        "takes some tenths of a millisecond, and a message begins in some microseconds: there, "
+        "what is inside has to be computed while the rim is told.  In slabs along the sleeper a "
+        "process has two neighbours at most, whatever their number."
+    )
+
+
+def records() -> tuple[dict[str, Any], dict[str, Any]]:
+    """The committed records that `page` takes."""
+    first, second = (json.loads(path.read_text(encoding="utf-8")) for path in (RECORD, REPEATED))
+    return first, second
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(*records()), encoding="utf-8")
