@@ -14,6 +14,7 @@ from validation.page_text import page_filled, table
 from validation.track_paper import RECORD
 from validation.track_periodic import LIMIT
 from validation.track_periodic import RECORD as REPEATED
+from validation.track_split import RECORD as SPLIT
 
 WORDS = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "qdem-track-paper.md"
@@ -26,8 +27,8 @@ LINK = 10e9
 """Bytes a second that a link between processes is taken to carry."""
 
 
-def page(record: dict[str, Any], repeated: dict[str, Any]) -> str:
-    """The page for the record, and that of a bed that repeats."""
+def page(record: dict[str, Any], repeated: dict[str, Any], lying: dict[str, Any]) -> str:
+    """The page for the record, that of a bed that repeats, and that of a split one at rest."""
     marches = [record[name] for name in sorted(record) if name.startswith("march_")]
     one = marches[0]
     elements = one["elements_ballast"] + one["elements_sleeper"]
@@ -41,7 +42,8 @@ def page(record: dict[str, Any], repeated: dict[str, Any]) -> str:
         "rule": "|".join(["---"] * len(marches)), "steps": steps(marches),
         "limit": str(LIMIT), "loose": f"{repeated['one by one']['hard']['loose']:.2f}",
         "periodic_command": repeated["command"], "periodic": periodic(repeated),
-        "passage": passage(one, elements),
+        "lying": str(lying["grains"]), "split_command": lying["command"],
+        "met": f"{lying['split'][0]['vertices']} vertices", "passage": passage(one, elements),
         "split": table([], split(record["split"])).split("\n", 2)[2],
         "judged": judged(record["split"], one),
     })  # fmt: skip
@@ -141,10 +143,10 @@ def judged(counts: list[dict[str, Any]], one: dict[str, Any]) -> str:
     )
 
 
-def records() -> tuple[dict[str, Any], dict[str, Any]]:
+def records() -> list[dict[str, Any]]:
     """The committed records that `page` takes."""
-    first, second = (json.loads(path.read_text(encoding="utf-8")) for path in (RECORD, REPEATED))
-    return first, second
+    paths = (RECORD, REPEATED, SPLIT)
+    return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
 
 
 if __name__ == "__main__":

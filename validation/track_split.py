@@ -1,5 +1,7 @@
 """What several processes would have to tell each other a step, counted on a bed as it lies.
 
+    python -m validation.track_split SCENE    of a scene's prepared bed: its record
+
 The domain is cut into slabs of equal numbers of elements.  A grain belongs to the process in whose
 slab its centre lies, with all its elements: only the sleeper is cut.  A step then needs
 
@@ -13,6 +15,9 @@ handed on anew only where the lists of pairs are made anew.
 
 from __future__ import annotations
 
+import argparse
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,9 +26,13 @@ from scipy.spatial import cKDTree
 from qdem_fem.contact_spheres import SKIN
 from qdem_fem.grain_set import GrainSet
 from qdem_fem.mesh_checks import FloatArray, IntArray
+from qdem_fem.output import write_whole
+from qdem_fem.scene_checks import scene_load
 from qdem_fem.surface import surface_faces
-from qdem_fem.track_bed import BedRecipe, meshes_of
+from qdem_fem.track_bed import BedRecipe, bed_read, grains_of, meshes_of
+from qdem_fem.track_scene import TrackPrepared
 
+RECORD = Path(__file__).parent / "results" / "track-split.json"
 VECTOR = 24
 """Bytes of three double numbers."""
 PARTS = (2, 4, 8)
@@ -96,3 +105,24 @@ def shared_nodes(elements: IntArray, owner: IntArray, parts: int) -> IntArray:
     touched = np.zeros((elements.max() + 1, parts), bool)
     touched[elements.ravel(), np.repeat(owner, 4)] = True
     return np.asarray(touched[touched.sum(axis=1) > 1].sum(axis=0))
+
+
+def main() -> None:
+    """Count on the prepared bed of a scene and write the record."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
+    parser.add_argument("scene", type=Path)
+    arguments = parser.parse_args()
+    prepared = scene_load(arguments.scene)
+    assert isinstance(prepared, TrackPrepared)
+    recipe = prepared.recipe
+    bed = bed_read(prepared.bed_file, recipe)
+    record = {
+        "command": f"python -m validation.track_split scenes/{arguments.scene.name}",
+        "stage": bed.stage, "grains": recipe.below + recipe.beside,
+        "split": split_counts(recipe, grains_of(recipe), bed.positions),
+    }  # fmt: skip
+    write_whole(RECORD, json.dumps(record, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
