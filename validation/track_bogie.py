@@ -17,23 +17,16 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact_sphere_state import SphereContacts
-from qdem_fem.contact_spheres import pair_stiffness
 from qdem_fem.load_train import Train
 from qdem_fem.mesh_checks import FloatArray
 from qdem_fem.output import table_read, write_whole
 from qdem_fem.run_folder import machine
-from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
-from qdem_fem.simulation import Simulation
-from qdem_fem.track_bed import BedRecipe, bed_read
 from qdem_fem.track_figures import GRAINS, SENSORS, track_facts
 from qdem_fem.track_scene import TrackPrepared, TrackScene
 from qdem_fem.track_table import BogieTable
 from validation.track_page import BOGIE
 
-NEARLY = 0.99
-"""Of Coulomb's limit, what counts as being there."""
 POINTS = (*GRAINS, "sleeper")
 
 
@@ -55,21 +48,6 @@ def settlement_at(time: FloatArray, down: FloatArray, ends: FloatArray) -> list[
         within = (time >= begin) & (time <= end)
         found.append({"greatest": float(down[within].max()), "end": float(down[within][-1])})
     return found
-
-
-def mobilised(run: Simulation, recipe: BedRecipe, friction: float) -> dict[str, float]:
-    """Median of ``|F_t|/(mu F_n)`` of pairs that touch, and share of them near Coulomb's limit [-].
-
-    ``F_n`` is k_n times the overlap; what else there is of the force is across it.
-    """
-    assert isinstance(run.contacts, SphereContacts)
-    run.contacts.refresh()
-    found = run.contacts.touching()
-    sleeper = np.maximum(found.first, found.second) >= run.first_node[-2]
-    push = found.overlap * np.where(sleeper, pair_stiffness(*recipe.stiffness), recipe.stiffness[0])
-    across = np.sqrt(np.maximum((found.force**2).sum(axis=1) - push**2, 0.0))
-    share = across / (friction * push)
-    return {"median": float(np.median(share)), "at_limit": float((share > NEARLY).mean())}
 
 
 def run_facts(prepared: TrackPrepared, folder: Path) -> dict[str, Any]:
@@ -118,15 +96,11 @@ def main() -> None:
     arguments = parser.parse_args()
     prepared = scene_load(arguments.scene)
     assert isinstance(prepared, TrackPrepared)
-    assert prepared.scene.contact is not None
-    run, _ = simulation_of(prepared)
     names = [arguments.scene, *arguments.run]
     record = {
         "command": "python -m validation.track_bogie " + " ".join(path.name for path in names),
         "machine": machine(),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "mobilised": mobilised(run, prepared.recipe, prepared.scene.contact.friction),
-        "rests": bed_read(prepared.bed_file, prepared.recipe).rests,
         "runs": {path.name: run_facts(prepared, path) for path in arguments.run},
     }
     write_whole(BOGIE, json.dumps(record, indent=1) + "\n")

@@ -2,6 +2,7 @@
 
     trackbed validate track --json validation/results/track.json    the record of 20 grains
     python -m validation.track_small SCENE                          what 300 grains cost
+    python -m validation.track_stand SCENE [SCENE ...]              whether prepared beds stand
     python -m validation.track_bogie SCENE RUN                      what a bogie does to them
     python -m validation.track_page                                 writes docs/qdem-track.md
 
@@ -12,6 +13,7 @@ The words are in ``track_page.md`` beside this file; every figure in them is loo
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ WORDS = Path(__file__).with_suffix(".md")
 RECORD = ROOT / "validation" / "results" / "track.json"
 SMALL = ROOT / "validation" / "results" / "track-small.json"
 BOGIE = ROOT / "validation" / "results" / "track-bogie.json"
+STAND = ROOT / "validation" / "results" / "track-stand.json"
 PAGE = ROOT / "docs" / "qdem-track.md"
 
 
@@ -31,33 +34,56 @@ def record_read(path: Path = RECORD) -> dict[str, Any]:
     return found
 
 
-def records() -> tuple[dict[str, Any], dict[str, Any] | None, dict[str, Any] | None]:
-    """The record of 20 grains, and those of 300 where they were made."""
-    small, bogie = (record_read(path) if path.exists() else None for path in (SMALL, BOGIE))
-    return record_read(), small, bogie
+def stand_text(record: dict[str, Any]) -> str:
+    """How beds stand without their load."""
+    lines = [
+        f"`{record['command']}`, {record['machine']}, {record['started'][:10]}: "
+        f"{1e3 * record['time']:g} ms without the load.",
+        "",
+        "| friction: prepared with, let go with | pairs that touch | friction in use, median | "
+        "pairs at Coulomb's limit | sinking of the sleeper | sliders' work over springs' energy |",
+        "|---|---|---|---|---|---|",
+    ]
+    for bed in record["beds"].values():
+        used = bed["mobilised"]
+        lines.append(
+            f"| {bed['prepared_friction']:g}, {bed['friction']:g} | {used['pairs']:.0f} | "
+            f"{used['median']:.2f} | {used['at_limit']:.2f} | {1e9 * bed['sinking']:.0f} nm | "
+            f"{bed['slid'] / bed['elastic']:.2g} |"
+        )
+    return "\n".join([*lines, ""])
 
 
 def small_text(record: dict[str, Any]) -> str:
     """What the track of 300 grains costs."""
+    steps = record["duration"] / record["step"]
+    wall, spent = record["wall_a_step"], record["cpu_a_step"]
     lines = [
-        "## 300 grains",
-        f"`{record['command']}`, one thread, {record['machine']}, {record['started'][:10]}: "
-        f"{record['elements']:,} elements, {record['nodes']:,} nodes, a step of "
-        f"{1e6 * record['step']:.3g} µs.  {record['state']}",
+        f"`{record['command']}`, {record['machine']}, {record['started'][:10]}: "
+        f"{record['elements']:,} elements, {record['nodes']:,} nodes.  A step of "
+        f"{1e6 * record['step']:.3g} µs with contacts near; {1e6 * record['step_three']:.3g} µs "
+        f"with three contacts of a vertex, {1e6 * record['step_elements']:.3g} µs without contact.",
         "",
         "| what | measured |",
         "|---|---|",
-        f"| processor time of a step | {1e6 * record['seconds_a_step']:.0f} µs |",
-        f"| million elements a second | {record['mels']:.3g} |",
-        f"| processor seconds a simulated second | {record['cpu_a_second']:.0f} |",
-        f"| one bogie, {record['duration']:g} s, by that, with the account of energies | "
-        f"{record['bogie_cpu'] / 60:.0f} min of one core |",
-    ]
-    for stage, rest in record["rests"].items():
-        lines.append(
+        f"| a step on one thread, the account within: wall, processor time | "
+        f"{1e6 * wall['1']:.0f} µs, {1e6 * spent['1']:.0f} µs |",
+        f"| a step on two threads, other programs on the same two cores: wall time | "
+        f"{1e6 * wall['2']:.0f} µs |",
+        f"| the same bits on one thread and on two | {'yes' if record['same_bits'] else 'no'} |",
+        f"| million elements a second, one thread | {record['elements'] / spent['1'] / 1e6:.3g} |",
+        *(
+            f"| {name}: processor time | {1e6 * one:.0f} µs |"
+            for name, one in record["parts"].items()
+        ),
+        f"| one bogie, {record['duration']:g} s, by that | "
+        f"{steps * spent['1'] / 60:.0f} min of one core |",
+        *(
             f"| preparation, stage {stage}: processor time, steps | {rest['cpu_s']:.0f} s, "
             f"{rest['steps']:,} |"
-        )
+            for stage, rest in record["rests"].items()
+        ),
+    ]
     return "\n".join([*lines, ""])
 
 
@@ -84,8 +110,8 @@ def bogie_text(record: dict[str, Any]) -> str:
         for number, axle in enumerate(("first", "second")):
             for key, told in (("greatest", "greatest"), ("end", "behind it")):
                 cells = [run["points"][name]["passages"][number][key] for run in runs]
-                what = f"settlement of {name}, {axle} axle, {told} [mm]"
-                lines.append(row(what, *(f"{1e3 * cell:.3g}" for cell in cells)))
+                what = f"settlement of {name}, {axle} axle, {told} [µm]"
+                lines.append(row(what, *(f"{1e6 * cell:.3g}" for cell in cells)))
         cells = [run["points"][name]["lateral_over_vertical"] for run in runs]
         what = f"lateral over vertical motion of {name}, greatest"
         lines.append(row(what, *(f"{cell:.2g}" for cell in cells)))
@@ -112,19 +138,33 @@ def bogie_text(record: dict[str, Any]) -> str:
     return "\n".join([*lines, ""])
 
 
-def page_text(
-    record: dict[str, Any], small: dict[str, Any] | None, bogie: dict[str, Any] | None
-) -> str:
+OF_300: dict[str, tuple[Path, Callable[[dict[str, Any]], str]]] = {
+    "stand": (STAND, stand_text),
+    "small": (SMALL, small_text),
+    "bogie": (BOGIE, bogie_text),
+}
+"""Records of 300 grains and what tells them, by their place in the words."""
+
+
+def records() -> dict[str, dict[str, Any]]:
+    """The record of 20 grains, and those of 300 as far as they were made."""
+    paths = {"track": RECORD} | {name: path for name, (path, _) in OF_300.items()}
+    return {name: record_read(path) for name, path in paths.items() if path.exists()}
+
+
+def page_text(found: dict[str, dict[str, Any]]) -> str:
     """The page for the records."""
+    record = found["track"]
     checks = record["checks"]
     text = WORDS.read_text(encoding="utf-8")
     text = FIGURE.sub(lambda found: figure_of(checks, *found.groups()), text)
     origin = record["provenance"]
     made = f"`{origin['command']}` on {origin['machine']}, {origin['started'][:10]}."
     text = text.replace("[[table]]", table_of(checks)).replace("[[made]]", made)
-    text = text.replace("[[small]]", "" if small is None else small_text(small))
-    return text.replace("[[bogie]]", "It was not run." if bogie is None else bogie_text(bogie))
+    for name, (_, told) in OF_300.items():
+        text = text.replace(f"[[{name}]]", told(found[name]) if name in found else "Not measured.")
+    return text
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page_text(*records()), encoding="utf-8")
+    PAGE.write_text(page_text(records()), encoding="utf-8")

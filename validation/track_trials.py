@@ -8,9 +8,11 @@ import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
+from qdem_fem import march
 from qdem_fem.energy_account import energy_facts
 from qdem_fem.errors import StepWarning
 from qdem_fem.output import table_read
@@ -41,6 +43,7 @@ prepared_friction = 0.577
 pressure = { times = [0.0, 0.005, 0.010], values = [0.0, 750e3, 0.0] }
 [contact]
 model = "spheres"
+contacts = "near"
 radius = 0.012
 normal_stiffness = { ballast = 1.613e9, sleeper = 2.39e9 }
 friction = 0.577
@@ -59,6 +62,10 @@ FRICTIONS = (0.577, 1.73)
 SOFTER = (0.1, 0.01)
 """Springs of the contacts over Table 1's."""
 FALL_STEPS = 3000
+HEAVIER = (1.2e-6, 1.5e-6, 2e-6)
+"""Steps [s] that mass scaling brings every element to."""
+ACCOUNT_STEPS = (16, 256, 1024)
+"""Steps between two looks at what viscosity takes."""
 
 
 class Quiet:
@@ -161,24 +168,46 @@ def resume_check(folder: Path) -> Check:
     return Check("resumed run less uninterrupted one", apart, "== 0", apart == 0.0, "m")
 
 
+def compared(name: str, one: TrackTrial, reference: TrackTrial) -> list[Check]:
+    """Step, processor time and motion of the sleeper, over or beside the reference's."""
+    ratios = [
+        ("step over", one.step / reference.step),
+        ("processor time over", one.cpu / reference.cpu),
+        *(
+            (f"{word}, greatest, beside", one.facts["sleeper"][key] / known - 1)
+            for word, key in (
+                ("settlement", "settlement_greatest"),
+                ("lateral", "lateral_greatest"),
+            )
+            for known in [reference.facts["sleeper"][key]]
+        ),
+    ]
+    return [Check(f"{name}: {what} the reference's", r, "reported", True) for what, r in ratios]
+
+
 def speed_checks(folder: Path, reference: TrackTrial) -> list[Check]:
-    """Softer springs of the contacts: longer steps, and what they cost in error."""
-    checks = []
-    known = reference.facts["sleeper"]["settlement_greatest"]
+    """What makes a run cheaper, and what it costs in error: fewer looks at viscosity, heavier small
+    elements, softer springs; and the step for any contacts, which near ones make longer."""
+    checks = compared("three contacts", trial(folder, "three", "contact.contacts=3"), reference)
+    for steps in ACCOUNT_STEPS:
+        with patch.object(march, "VISCOUS_STEPS", (steps, steps)):
+            one = trial(folder, f"account-{steps}")
+        checks += [
+            Check(f"account every {steps} steps: missing", one.energy["relative_imbalance"],
+                  "<= 0.001", one.energy["relative_imbalance"] <= 1e-3),
+            Check(f"account every {steps} steps: processor time over the reference's",
+                  one.cpu / reference.cpu, "reported", True),
+        ]  # fmt: skip
+    for step in HEAVIER:
+        one = trial(folder, f"heavier-{step}", f"simulation.mass_scaling={step}")
+        checks += compared(f"mass scaling to {1e6 * step:g} µs", one, reference)
     for softer in SOFTER:
         stiffness = f"{{ballast={softer * 1.613e9:g}, sleeper={softer * 2.39e9:g}}}"
         one = trial(
             folder, f"softer-{softer}", f"contact.normal_stiffness={stiffness}",
             f"track.bed=bed-{softer}.npz", f"track.softness={1e-4 / softer:g}",
         )  # fmt: skip
-        error = one.facts["sleeper"]["settlement_greatest"] / known - 1
-        checks += [
-            Check(f"springs times {softer}: step over Table 1's", one.step / reference.step,
-                  "reported", True),
-            Check(f"springs times {softer}: processor time over Table 1's",
-                  one.cpu / reference.cpu, "reported", True),
-            Check(f"springs times {softer}: greatest settlement, error", error, "reported", True),
-        ]  # fmt: skip
+        checks += compared(f"springs times {softer}", one, reference)
     return checks
 
 

@@ -273,5 +273,5 @@ def test_every_key_of_a_track_is_named_in_its_scene() -> None:
 
 
 def test_page_is_written_from_its_records() -> None:
-    expected = track_page.page_text(*track_page.records())
+    expected = track_page.page_text(track_page.records())
     assert track_page.PAGE.read_text(encoding="utf-8") == expected
