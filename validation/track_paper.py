@@ -182,7 +182,8 @@ def main() -> None:
     print(json.dumps(timed), flush=True)
     record = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
     record |= {
-        "command": f"python -m validation.track_paper scenes/{arguments.scene.name}",
+        "command": f"python -m validation.track_paper scenes/{arguments.scene.name} "
+        f"--work FOLDER --fall {arguments.fall:g}",
         "machine": machine(), "started": started, "fall": fallen,
         "grains": len(grains), "cells": recipe.cells,
         f"march_{arguments.threads}": timed, "heights": heights(recipe, nodes),
