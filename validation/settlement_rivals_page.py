@@ -14,12 +14,17 @@ from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.page_text import page_filled, table
 from validation.same_packing import interval
-from validation.settlement_bars import sides_compared, table_bars
-from validation.settlement_ensemble import COARSE
+from validation.settlement_bars import (
+    settlement_of,
+    settlement_total,
+    sides_compared,
+    table_bars,
+)
+from validation.settlement_ensemble import COARSE, CONFINED
 from validation.settlement_ensemble_page import short
 from validation.settlement_ensemble_reading import nested
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import K_I, METHODS, Row
+from validation.settlement_rivals import K_I, METHODS, METHODS_OF, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS, PLACE, TWIN
 from validation.settlement_rivals_picture import draw, shown
 from validation.settlement_rivals_reading import (
@@ -40,7 +45,8 @@ from validation.settlement_rivals_reading import (
     rows_of,
     settled,
 )
-from validation.settlement_rivals_runs import LAST, MEMBERS, SEEDS, record_read
+from validation.settlement_rivals_reference import LAWS, law_name
+from validation.settlement_rivals_runs import LAST, MEMBERS, RECORD_PAPER, SEEDS, record_read
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "settlement-rivals.md"
@@ -229,6 +235,41 @@ def scatter(rows: Sequence[Row]) -> dict[str, str]:
     }
 
 
+def paper_scale(last: int) -> dict[str, str]:
+    """What the record at paper scale has so far: bars, runs of each method, the reference."""
+    rows = record_read(RECORD_PAPER)
+    names = [method.name for method in METHODS_OF[CONFINED.name]]
+    planned = CONFINED.packings * CONFINED.members
+    made = {name: len(rows_of(rows, "rivals", name, last)) for name in names}
+    methods = [*names, *(law_name(law, cycles) for law, cycles in LAWS)]
+    truth = settlement_of(rows, last)
+    return {
+        "PAPER_BARS": table_bars(sides_compared(rows, CONFINED, EnsembleRecord()), methods, last),
+        "PAPER_WAY": table_on_the_way(rows, "2 jumps, by history", last),
+        "PAPER_RUNS": "; ".join(f"{name} ({count} of {planned})" for name, count in made.items()),
+        "PAPER_MEAN": f"{1e6 * truth.mean:.0f}",
+        "PAPER_TOTAL": f"{1e6 * settlement_total(rows, last):.0f}",
+        "PAPER_GIVEN": f"{1e6 * truth.half_given:.1f}",
+        "PAPER_MEMBERS": f"{truth.members} members of {truth.packings} packings",
+    }
+
+
+def table_on_the_way(rows: Sequence[Row], name: str, last: int) -> str:
+    """Settlement of each run of a method less its packing's reference, where both tell it [um]."""
+    mine, truth = rows_of(rows, "rivals", name, last), reference(rows, last)
+    found = {}
+    for row in mine:
+        same = [one["settlement"] for one in truth if one["seed"] == row["seed"]]
+        found[f"{row['seed']}-{row['member']}"] = {
+            int(cycle): 1e6 * (value - float(np.mean([one[cycle] for one in same])))
+            for cycle, value in row["settlement"].items()
+            if same
+        }
+    cycles = sorted(set.intersection(*(set(errors) for errors in found.values())))
+    lines = [[run, *(f"{errors[c]:+.1f}" for c in cycles)] for run, errors in found.items()]
+    return table(["packing and member", *(f"cycle {c}" for c in cycles)], lines)
+
+
 def page(rows: Sequence[Row], last: int = LAST) -> str:
     """The page of a record."""
     truth = reference(rows, last)
@@ -249,6 +290,7 @@ def page(rows: Sequence[Row], last: int = LAST) -> str:
         "GIVEN": f"{1e6 * found.half_given:.0f}",
         "CHAOS": f"{100 * chaos(rows, last, 'settlement'):.0f}",
         "METHODS": table_methods(rows, last),
+        **paper_scale(last),
         "BARS": table_bars(compared, [method.name for method in METHODS], last),
         "MISSING": missing(rows, last),
         "REFUSED": table_refused(rows, last),

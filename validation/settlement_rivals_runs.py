@@ -27,7 +27,7 @@ from adapters.engine import interruptible
 from adapters.provenance import commit, machine
 from adapters.run_folder import RunFolder
 from validation.move_study import rounded
-from validation.settlement_ensemble import COARSE, KINDS, Kind, Piece
+from validation.settlement_ensemble import COARSE, CONFINED, KINDS, Kind, Piece
 from validation.settlement_ensemble_record import RECORD as ENSEMBLE
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import METHODS_OF, Method, Row, method_run
@@ -35,6 +35,8 @@ from validation.settlement_rivals_budget import EVERY, PARTS, PLACE, part_run
 from validation.settlement_rivals_reference import LAWS, law_name, law_row, reference_row
 
 RECORD = Path(__file__).with_name("results") / "settlement-rivals.jsonl"
+RECORD_PAPER = RECORD.with_stem(f"{RECORD.stem}-{CONFINED.name}")
+"""At paper scale."""
 LAST = 500
 """Cycle at which methods are compared: one whose state the ensemble keeps."""
 PARTS_OF_STUDY = ("reference", "rivals", "budget")
@@ -137,7 +139,7 @@ def main(words: Sequence[str] | None = None) -> None:
     record, kind = EnsembleRecord(given.ensemble), KINDS[given.kind]
     path = given.record or RECORD
     if given.record is None and kind != COARSE:
-        path = RECORD.with_stem(f"{RECORD.stem}-{kind.name}")
+        path = RECORD_PAPER
     with interruptible(), RunFolder(given.work).locked():
         plans = {
             "reference": plan_reference(kind, record, given.last),
