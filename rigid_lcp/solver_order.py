@@ -34,8 +34,8 @@
     islands          what is still not solved, each island apart, by all of this (large problems
                      of few islands at once)
 
-Forces to start from that are no nearer to the answer than none (by the natural map) are left aside:
-they would keep the convex path, which needs no start, from being tried first.
+Forces to start from that are twice as far from the answer as none (by the natural map) are left
+aside: they would keep the convex path, which needs no start, from being tried first.
 
 Every method alone can fail on real problems: Newton far from a solution, the interior point where
 its path folds back, Gauss-Seidel on tall piles.  Together they fail seldom (`docs/rigid-solvers.md`

@@ -50,6 +50,9 @@ MOST_FLOPS, MOST_FACTORED = 4e11, 1e7
 """An effort (some 20 s), and a number of factorisations times contacts (some 10 s), beyond which no
 factorisation is begun.  Only large problems come there: one of 10,400 contacts between spheres
 takes 1.5e10 flops, most of a second, and one of 10,000 between discs 20 ms."""
+MISLED = 2.0
+"""Error of forces to start from over that of none above which they are left aside: those of a step
+before that know but some of the contacts may be a little above 1, and lead on."""
 ENDLESS = 1e6
 """Forces over ``rho |q|`` that look endless."""
 GREAT_FORCES = 1e4
@@ -70,10 +73,10 @@ class Trial:
         self.path_end: Floats | None = None
         self.path_point: tuple[Floats, float] | None = None
         self.start: Floats | None = None
-        """The forces given to start from; None where they are no nearer than none at all."""
+        """The forces given to start from; None where they mislead."""
         if start is not None:
             begun = friction_solution(problem, start, tolerance, "start")
-            if begun.solved or 0 < begun.residual * length(start) < problem.error_without_forces:
+            if begun.residual * length(start) < MISLED * problem.error_without_forces:
                 self.start = start
                 self.keep(begun)
 
