@@ -7,6 +7,7 @@ scene says so, that of all cycles computed (`adapters.jump_history`).
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from adapters import stages
 from adapters.errors import EngineFailed, NotConverged, NotCredible
 from adapters.jump_history import SEATING, Jumped, asked_gain
 from adapters.jump_run import stretches_of
-from adapters.run_folder import disk_full_named
+from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
 
 RETRIES = 3
@@ -99,21 +100,20 @@ def history_gain(run: Run, bed: Bed, h: int) -> float | None:
     assert p is not None
     if p.settlement == "law" or h == 0:
         return None
-    begin = max(1, round(SEATING * p.k_i))
-    return asked_gain(stretches_of(run, begin, bed.cycle), h, jumps_of(run, begin, bed.cycle))
+    begin, outcomes = max(1, round(SEATING * p.k_i)), run.folder.outcomes()
+    known = stretches_of(outcomes, begin, bed.cycle)
+    return asked_gain(known, h, jumps_of(outcomes, begin, bed.cycle, p.healing_cycles))
 
 
-def jumps_of(run: Run, begin: int, end: int) -> list[Jumped]:
+def jumps_of(outcomes: Sequence[Outcome], begin: int, end: int, healing: int) -> list[Jumped]:
     """Jumps that stand up to cycle ``end``, each with what was known since ``begin`` before it."""
-    p = run.scene.procedure
-    assert p is not None
-    outcomes = [one for one in run.folder.outcomes() if one.last_cycle <= end]
+    outcomes = [one for one in outcomes if one.last_cycle <= end]
     found = []
     for before, jump, behind in zip(outcomes, outcomes[1:], outcomes[2:], strict=False):
         if jump.stage != "jump" or not jump.rows:
             continue
-        rows = [before.rows[-1], jump.rows[-1], [jump.rows[-1], *behind.rows][p.healing_cycles]]
+        rows = [before.rows[-1], jump.rows[-1], [jump.rows[-1], *behind.rows][healing]]
         cycles = np.array([row["cycle"] for row in rows], int)
         settled = np.array([row["settlement"] for row in rows], float)
-        found.append(Jumped(stretches_of(run, begin, int(cycles[0])), cycles, settled))
+        found.append(Jumped(stretches_of(outcomes, begin, int(cycles[0])), cycles, settled))
     return found

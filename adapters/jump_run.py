@@ -6,7 +6,7 @@ decisions on the finished stages, and finds there what it would do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from math import isfinite, nan
 from typing import Any
@@ -20,7 +20,7 @@ from adapters.jump_control import Control, Decision, Settings, begin, decide, ob
 from adapters.jump_rates import Stretch
 from adapters.jump_record import CHECK, DECISION
 from adapters.report_history import cost_total
-from adapters.run_folder import disk_full_named
+from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
 
 
@@ -109,11 +109,11 @@ def stretch_of(rows: list[dict[str, Any]], before: float) -> Stretch:
     )
 
 
-def stretches_of(run: Run, begin: int, end: int) -> tuple[Stretch, ...]:
+def stretches_of(outcomes: Sequence[Outcome], begin: int, end: int) -> tuple[Stretch, ...]:
     """Cycles computed from cycle ``begin`` to ``end``, a stretch a window, healing left out."""
     stretches: list[Stretch] = []
     settlement = 0.0
-    for outcome in run.folder.outcomes():
+    for outcome in outcomes:
         if outcome.last_cycle > end:
             break
         rows = [{"settlement": settlement, "cycle": outcome.first_cycle}, *outcome.rows]
