@@ -101,19 +101,18 @@ def history_gain(run: Run, bed: Bed, h: int) -> float | None:
     if p.settlement == "law" or h == 0:
         return None
     begin, outcomes = max(1, round(SEATING * p.k_i)), run.folder.outcomes()
-    known = stretches_of(outcomes, begin, bed.cycle)
-    return asked_gain(known, h, jumps_of(outcomes, begin, bed.cycle, p.healing_cycles))
+    known = stretches_of(outcomes, begin, bed.cycle, left_out=1)
+    return asked_gain(known, h, jumps_of(outcomes, bed.cycle))
 
 
-def jumps_of(outcomes: Sequence[Outcome], begin: int, end: int, healing: int) -> list[Jumped]:
-    """Jumps that stand up to cycle ``end``, each with what was known since ``begin`` before it."""
+def jumps_of(outcomes: Sequence[Outcome], end: int) -> list[Jumped]:
+    """Jumps that stand up to cycle ``end``, each with the window behind it."""
     outcomes = [one for one in outcomes if one.last_cycle <= end]
     found = []
     for before, jump, behind in zip(outcomes, outcomes[1:], outcomes[2:], strict=False):
-        if jump.stage != "jump" or not jump.rows:
-            continue
-        rows = [before.rows[-1], jump.rows[-1], [jump.rows[-1], *behind.rows][healing]]
-        cycles = np.array([row["cycle"] for row in rows], int)
-        settled = np.array([row["settlement"] for row in rows], float)
-        found.append(Jumped(stretches_of(outcomes, begin, int(cycles[0])), cycles, settled))
+        if jump.stage == "jump" and jump.rows:
+            rows = [one.rows[-1] for one in (before, jump, behind)]
+            cycles = np.array([row["cycle"] for row in rows], int)
+            settled = np.array([row["settlement"] for row in rows], float)
+            found.append(Jumped(cycles, settled))
     return found

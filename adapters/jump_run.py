@@ -109,8 +109,13 @@ def stretch_of(rows: list[dict[str, Any]], before: float) -> Stretch:
     )
 
 
-def stretches_of(outcomes: Sequence[Outcome], begin: int, end: int) -> tuple[Stretch, ...]:
-    """Cycles computed from cycle ``begin`` to ``end``, a stretch a window, healing left out."""
+def stretches_of(
+    outcomes: Sequence[Outcome], begin: int, end: int, left_out: int | None = None
+) -> tuple[Stretch, ...]:
+    """Cycles computed from cycle ``begin`` to ``end``, a stretch a window.
+
+    Of its healing cycles the first ``left_out`` are left out; None: all.
+    """
     stretches: list[Stretch] = []
     settlement = 0.0
     for outcome in outcomes:
@@ -119,6 +124,7 @@ def stretches_of(outcomes: Sequence[Outcome], begin: int, end: int) -> tuple[Str
         rows = [{"settlement": settlement, "cycle": outcome.first_cycle}, *outcome.rows]
         settlement = float(rows[-1]["settlement"])
         healed = sum(row["kind"] != "computed" for row in outcome.rows)
+        healed = healed if left_out is None else min(healed, left_out)
         first = max(healed, begin - outcome.first_cycle)
         if outcome.stage == "window" and first < len(outcome.rows):
             stretches.append(stretch_of(rows[first + 1 :], float(rows[first]["settlement"])))

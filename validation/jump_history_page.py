@@ -7,12 +7,13 @@ the settlement of a jump errs by, with no bed, no relaxation and no engine.  Sec
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from adapters.jump_history import SEATING, gain_of
+from adapters.jump_history import SEATING, Jumped, asked_gain
 from adapters.jump_rates import Stretch
 from adapters.laws import law_named
 from adapters.run_folder import write_atomically
@@ -32,33 +33,38 @@ CASES: tuple[tuple[Kind, int, tuple[int, ...]], ...] = (
     (CONFINED, 270, (2, 5)),
 )
 """Ensemble, last cycle, numbers of equal jumps."""
+FIRST_CYCLE, KAPPA = 0.15, 0.1
+"""What a moved bed was made to settle more by, over what it was moved by: in the first cycle behind
+the jump, and times 1 / n in each later one."""
 
-Way = Callable[[Sequence[Stretch], int], float]
-"""Settlement [m] over a jump of h cycles behind the last of the stretches that were computed."""
+Way = Callable[[Sequence[Stretch], int, Sequence[Jumped]], float]
+"""Settlement [m] over a jump of h cycles behind the last of the stretches that were computed, and
+the jumps between them."""
 
 
-def way_nothing(known: Sequence[Stretch], h: int) -> float:
+def way_nothing(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
     """The null hypothesis."""
     return 0.0
 
 
-def way_window(known: Sequence[Stretch], h: int) -> float:
+def way_window(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
     """The logarithm fitted to the last window, as the procedure does with every grain."""
-    law, last = law_named("log"), known[-1]
+    law, computed = law_named("log"), known[-1]
+    last = computed.part(max(len(computed.gain) - FIRST_WINDOW, 0), len(computed.gain))
     cycle = last.first_cycle + np.arange(len(last.gain) + 1.0)
     path = np.append(0.0, np.cumsum(last.gain))
     return float(law.increment(law.fit(cycle, path), cycle[-1], cycle[-1] + h))
 
 
-def way_one_slope(known: Sequence[Stretch], h: int) -> float:
+def way_one_slope(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
     """One slope du / d ln N for all cycles computed."""
     span = sum(np.log(one.last_cycle / one.first_cycle) for one in known)
     return float(sum(one.gain.sum() for one in known) / span * np.log1p(h / known[-1].last_cycle))
 
 
-def way_history(known: Sequence[Stretch], h: int) -> float:
+def way_history(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
     """`adapters.jump_history`."""
-    return gain_of(known, h).mean
+    return asked_gain(known, h, jumps)
 
 
 WAYS: dict[str, Way] = {
@@ -77,6 +83,8 @@ class Forecasts:
     last: int
     jumps: int
     way: str
+    moved: bool
+    """Whether the bed settles more behind a jump, as a moved one does."""
     error: FloatArray
     """Settlement by the jumps less that of the run, over the mean of all runs, shape (r,)."""
 
@@ -93,17 +101,30 @@ def stretch(curve: FloatArray, first: int, last: int) -> Stretch:
     return Stretch(first, gain, np.zeros(len(gain)), np.zeros(len(gain)))
 
 
-def jumped_error(curve: FloatArray, k_i: int, last: int, jumps: int, way: Way) -> float:
-    """Settlement by equal jumps less that of the ``curve`` [m]; windows and healing are its own."""
+def jumped_error(
+    curve: FloatArray, k_i: int, last: int, jumps: int, way: Way, moved: bool = False
+) -> float:
+    """Settlement by equal jumps less that of the ``curve`` [m].
+
+    Windows and healing are its own; where the bed is ``moved`` they settle more by `FIRST_CYCLE`
+    and `KAPPA`.
+    """
     h = jump_length(jumps, last, k_i)
     end = k_i + FIRST_WINDOW
     known = [stretch(curve, round(SEATING * k_i), k_i), stretch(curve, k_i, end)]
-    error = 0.0
+    since = np.arange(1, HEALING + FIRST_WINDOW + 1)
+    more = moved * np.where(since == 1, FIRST_CYCLE, KAPPA / since)
+    settled, made = float(curve[end]), list[Jumped]()
     for _ in range(jumps):
-        error += way(known, h) - float(curve[end + h] - curve[end])
-        end += h + HEALING + FIRST_WINDOW
-        known.append(stretch(curve, end - FIRST_WINDOW, end))
-    return error
+        gain, before, behind = way(known, h, made), end, end + h
+        end = behind + len(since)
+        path = curve[behind : end + 1] + gain * np.append(0.0, np.cumsum(more))
+        window = stretch(path, 0, len(since))
+        known.append(replace(window.part(1, len(since)), first_cycle=behind + 1))
+        ends = settled + np.array([0.0, gain, gain + window.gain.sum()])
+        made.append(Jumped(np.array([before, behind, end]), ends))
+        settled = float(ends[2])
+    return settled - float(curve[end])
 
 
 def curves_of(kind: Kind, last: int, record: EnsembleRecord) -> list[FloatArray]:
@@ -124,15 +145,15 @@ def study(record: EnsembleRecord) -> list[Forecasts]:
     for kind, last, numbers in CASES:
         curves = curves_of(kind, last, record)
         scale = float(np.mean([curve[last] - curve[kind.k_i] for curve in curves]))
-        for jumps in numbers:
-            for name, way in WAYS.items():
-                errors = [jumped_error(one, kind.k_i, last, jumps, way) for one in curves]
-                found.append(Forecasts(kind, last, jumps, name, np.array(errors) / scale))
+        for jumps, (name, way), moved in product(numbers, WAYS.items(), (False, True)):
+            errors = [jumped_error(one, kind.k_i, last, jumps, way, moved) for one in curves]
+            found.append(Forecasts(kind, last, jumps, name, moved, np.array(errors) / scale))
     return found
 
 
-def table_errors(found: Sequence[Forecasts]) -> str:
+def table_errors(found: Sequence[Forecasts], moved: bool) -> str:
     """A line for each schedule: mean, scatter and root mean square of each way."""
+    found = [one for one in found if one.moved == moved]
     lines = []
     for kind, last, numbers in CASES:
         for jumps in numbers:
@@ -160,7 +181,8 @@ def draw(found: Sequence[Forecasts], target: Path) -> None:
     colours = dict(zip(WAYS, ("0.5", "#0072B2", "#E69F00", "#882255"), strict=True))
     for axis, (kind, last, _) in zip(axes, CASES, strict=True):
         for name in WAYS:
-            mine = [f for f in found if (f.kind, f.last, f.way) == (kind, last, name)]
+            key = (kind, last, name, False)
+            mine = [f for f in found if (f.kind, f.last, f.way, f.moved) == key]
             share = [100 * f.computed for f in mine]
             errors = [100 * rms(f.error) for f in mine]
             axis.plot(share, errors, "o-", color=colours[name], label=name)
@@ -175,7 +197,14 @@ def draw(found: Sequence[Forecasts], target: Path) -> None:
 
 def page(found: Sequence[Forecasts]) -> str:
     """The page of a study."""
-    parts = {"ERRORS": table_errors(found), "K": str(FIRST_WINDOW), "HEALING": str(HEALING)}
+    parts = {
+        "ERRORS": table_errors(found, False),
+        "ERRORS_MOVED": table_errors(found, True),
+        "K": str(FIRST_WINDOW),
+        "HEALING": str(HEALING),
+        "FIRST_CYCLE": f"{FIRST_CYCLE:g}",
+        "KAPPA": f"{KAPPA:g}",
+    }
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)
 
 

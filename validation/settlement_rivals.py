@@ -143,10 +143,14 @@ def jumping(jumps: int) -> tuple[Method, Method]:
     )
 
 
-def remembering(jumps: int) -> Method:
-    """So many equal jumps whose mean grain settles by the slopes of all cycles computed."""
-    keys = ('procedure.settlement="history"',)
-    return Method(f"{jumps} jumps, by history", "history", keys, JUMPING, jumps)
+def remembering(jumps: int, move: str = "") -> Method:
+    """So many equal jumps whose mean grain settles by the slopes of all cycles computed.
+
+    ``move``: how grains move beside one another, where that is not the default.
+    """
+    keys = ('procedure.settlement="history"', *([f'procedure.move="{move}"'] if move else []))
+    moved = f", {move}" if move else ""
+    return Method(f"{jumps} jumps, by history{moved}", f"history{moved}", keys, JUMPING, jumps)
 
 
 def softer(factor: int) -> Method:
@@ -182,6 +186,7 @@ METHODS = (
     softer(30), softer(100), heavier(100), longer(1.0), longer(0.6), faster(2), FEWER,
     Method("tolerance 0.1", "tolerance", ("procedure.tolerance=0.1",), JUMPING),
     *jumping(10), longer(0.3), RESUBMITTED, remembering(5), remembering(2), remembering(10),
+    remembering(2, "profile"), remembering(5, "profile"),
 )  # fmt: skip
 """On the coarse bed, in the order in which they are run."""
 METHODS_OF: dict[str, tuple[Method, ...]] = {
@@ -189,7 +194,8 @@ METHODS_OF: dict[str, tuple[Method, ...]] = {
     CONFINED.name: tuple(
         replace(method, base=CONFINED)
         for method in (
-            *jumping(2), longer(0.4), *jumping(5), remembering(2), remembering(5), longer(0.6),
+            *jumping(2), longer(0.4), *jumping(5), remembering(2), remembering(2, "profile"),
+            remembering(5), longer(0.6),
             Method("tolerance 0.02", "tolerance", ("procedure.tolerance=0.02",), JUMPING),
         )
     ),
