@@ -27,11 +27,12 @@ def found() -> list[Forecasts]:
     return study(EnsembleRecord())
 
 
-def errors(found: list[Forecasts], name: str, kind: str, jumps: int, last: int) -> FloatArray:
+def errors(
+    found: list[Forecasts], name: str, kind: str, jumps: int, last: int, moved: bool = False
+) -> FloatArray:
     """Of a way in a case."""
-    (mine,) = (
-        f.error for f in found if (f.way, f.kind.name, f.jumps, f.last) == (name, kind, jumps, last)
-    )
+    key = (name, kind, jumps, last, moved)
+    (mine,) = (f.error for f in found if (f.way, f.kind.name, f.jumps, f.last, f.moved) == key)
     return mine
 
 
@@ -52,20 +53,23 @@ def test_a_logarithm_is_met_by_every_way_but_nothing() -> None:
 
 
 def test_sentences_of_the_page(found: list[Forecasts]) -> None:
-    """Long jumps of the coarse bed: half the last window's error, bias below a tenth; one slope of
-    all cycles scatters least and settles too little on each; where the bed is quiet the last window
-    is as good."""
+    """Long jumps of the coarse bed: half the last window's error, bias at most a tenth; one slope
+    of all cycles scatters least and settles too little on each; on the quiet bed history is as
+    good as the last window within 2 %, and twice as good where a moved bed settles more."""
     for jumps in (2, 5, 10, 20):
         of = {way: errors(found, way, "coarse", jumps, 2800) for way in WAYS}
         assert abs(of["history"].mean()) < 0.1
-        assert rms(of["history"]) < 0.7 * rms(of["log, last window"])
+        assert rms(of["history"]) < (0.5 if jumps < 20 else 0.8) * rms(of["log, last window"])
         assert rms(of["history"]) < rms(of["nothing"])
         assert of["one slope of all cycles"].std() < min(
             of[way].std() for way in ("history", "log, last window")
         )
     for one in found:
-        if one.way == "one slope of all cycles":
+        if one.way == "one slope of all cycles" and not one.moved:
             assert one.error.mean() < 0
-        if one.way == "log, last window" and one.kind.name == "confined":
-            history = errors(found, "history", "confined", one.jumps, one.last)
-            assert rms(one.error) < 1.2 * rms(history)
+        if one.way == "log, last window":
+            history = errors(found, "history", one.kind.name, one.jumps, one.last, one.moved)
+            if one.moved:
+                assert rms(one.error) > 1.5 * rms(history)
+            elif one.kind.name == "confined":
+                assert rms(history) < rms(one.error) + 0.02
