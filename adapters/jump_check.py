@@ -22,6 +22,7 @@ from adapters.jump_control import (
 )
 from adapters.jump_forecast import forecast_of, gain_between
 from adapters.jump_rates import Stretch, block_count, noise_of, rates_of, state_trend
+from adapters.jump_slopes import Landing, reseating, slopes_of, unmoved
 from adapters.state import FloatArray
 
 ROLL_BACK = 2.0
@@ -38,15 +39,20 @@ class Check:
 
     accepted: bool
     gained: float
-    """Settlement of the bed from the jump's start to the end of its healing cycles."""
+    """Settlement of the bed from the jump's start to the end of its healing cycles, with what it
+    settled in the window because it was moved."""
     expected: float
     """The same by the rates computed on both sides: the corrected gain."""
     noise: float
     """Standard error of ``expected`` from the noise of the rates."""
     form: float
-    """Standard deviation of ``expected`` from the unknown exponent."""
+    """Standard deviation of ``expected`` from the unknown exponent, and from that of kappa."""
     error: float
-    """``gained`` less ``expected``, over the total settlement."""
+    """``gained`` less ``expected`` and what was to be made good, over the total settlement."""
+    reseated: float
+    """What the bed settled more behind the jump because it was moved."""
+    kappa: float
+    """Of `adapters.jump_slopes`, by all jumps up to this one."""
     rate_expected: float
     """Rate forecast for the window [m a cycle]."""
     rate_observed: float
@@ -67,14 +73,17 @@ def judge(
 ) -> Check:
     """Compare a jump with the window behind it.
 
-    ``stretch``: the window's cycles behind the healing ones; ``settlement`` [m] at its end.  The
+    ``stretch``: all cycles behind the jump, healing ones first; ``settlement`` [m] at its end.  The
     gain that is expected is that of all rates on both sides; where the window's rate is another
     than the forecast, beyond noise, that of a power law through the two rates.
     """
-    past = noise_of(control.stretches)
-    before = forecast_of(rates_of(control.stretches))
+    landings, windows, behind = joined_by_jump(control, decision, settings, stretch)
+    kappa, kappa_error = slopes_of(behind, landings).kappa()
+    every = tuple(unmoved(one, landings, kappa) for one in windows)
+    stretch = every[-1]
+    past = noise_of(every[:-1])
+    before = forecast_of(rates_of(every[:-1]))
     start, end = float(control.cycle), float(stretch.first_cycle)
-    every = (*control.stretches, stretch)
     noises = noise_of(every).variance
     k = len(stretch.gain)
     rate_expected = float(before.gain(end, float(stretch.last_cycle))) / k
@@ -100,9 +109,16 @@ def judge(
         shares = np.concatenate(
             [x * start * (before.influence @ before.weight), np.full(blocks, x * end / k)]
         )
+    sources = sources_of(every, noises, shares)
+    by_kappa = sum(
+        source[3] * float(reseating(one, landings).sum())
+        for source, one in zip(sources, windows, strict=True)
+    )
+    form = hypot(form, kappa_error * by_kappa)
     gained = settlement - float(stretch.gain.sum()) - control.settlement
+    healed = float(both.gain(float(landings[-1].cycle), end))
     total = abs(control.settlement + gained)
-    error = gained - expected
+    error = gained - expected - decision.made_good
     relative = error / total if total > 0 else (inf if error else 0.0)
     return Check(
         accepted=abs(relative) <= ROLL_BACK * settings.tolerance,
@@ -115,9 +131,26 @@ def judge(
         rate_observed=stretch.rate,
         deviation=deviation,
         changed=changed,
-        sources=sources_of(every, noises, shares),
+        reseated=gained - decision.moved - healed,
+        kappa=kappa,
+        sources=sources,
         state_misses=tuple(_state_miss(control, stretch, name) for name in STATES),
     )
+
+
+def joined_by_jump(
+    control: Control, decision: Decision, settings: Settings, stretch: Stretch
+) -> tuple[tuple[Landing, ...], tuple[Stretch, ...], tuple[Stretch, ...]]:
+    """Landings, windows and windows with healing cycles, those of a jump the last of each.
+
+    ``stretch``: all cycles behind the jump.  Its first cycle is left out: contacts that were moved
+    do not bear yet.
+    """
+    landing = Landing(stretch.first_cycle, decision.moved)
+    k = len(stretch.gain)
+    window, behind = (stretch.part(min(one, k - 1), k) for one in (settings.healing, 1))
+    landings = (*control.landings, landing)
+    return landings, (*control.windows, window), (*control.behind, behind)
 
 
 def sources_of(
@@ -159,18 +192,26 @@ def accept(
     realised error exceeds its own standard error by.  Where the rate changed, the past is
     forgotten.
     """
+    landings, windows, behind = joined_by_jump(control, decision, settings, stretch)
+    stretch = windows[-1]
     total = abs(control.settlement + check.gained)
     certain = abs(check.error) * total - hypot(check.noise, check.form) if total else 0.0
     error = max(certain / (settings.tolerance * total) if total else 0.0, LEAST_ERROR)
     factor = SAFETY * error**-0.35 * control.last_error**0.2
     cycles, curve = curve_of(stretch, settlement)
-    before = () if check.changed else control.stretches
+    if check.changed:
+        windows, behind = windows[-1:], behind[-1:]
     past = ((), ()) if check.changed else (control.curve_cycle, control.curve_settlement)
     return replace(
         control,
         cycle=stretch.last_cycle,
         settlement=settlement,
-        stretches=joined(before, stretch),
+        windows=joined(windows[:-1], windows[-1]),
+        behind=joined(behind[:-1], behind[-1]),
+        landings=landings,
+        kappa=check.kappa,
+        ahead=control.ahead + check.gained - check.expected,
+        reseated=control.reseated + check.reseated,
         curve_cycle=past[0] + cycles,
         curve_settlement=past[1] + curve,
         last_jump=decision.jump,

@@ -11,11 +11,16 @@ cycles at N to the end of the m healing cycles behind it, over the total settlem
 u counted from the prepared bed, before its first load cycle; "true" is what the bed would have
 gained on the mean, had every cycle been computed.  It is a bound a jump; how errors of several
 jumps add up is told by `adapters.jump_band`.
+
+A bed that was moved settles more than it would have (`adapters.jump_slopes`): rates are those of
+the bed itself, and what it is ahead of them by, all earlier jumps and the cycles behind them
+together, is taken off the next jump with what the bed will settle more behind that one.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import exp, inf
 
 import numpy as np
@@ -32,6 +37,7 @@ from adapters.jump_rates import (
     slope_trend,
     state_trend,
 )
+from adapters.jump_slopes import Landing, reseating, slopes_of, unmoved
 from adapters.scene import FIRST_WINDOW
 from adapters.state import FloatArray
 
@@ -79,8 +85,18 @@ class Control:
     cycle: int
     settlement: float
     """Since the preparation [m]."""
-    stretches: tuple[Stretch, ...] = ()
-    """Computed cycles that still count."""
+    windows: tuple[Stretch, ...] = ()
+    """Computed cycles that still count, healing ones left out."""
+    behind: tuple[Stretch, ...] = ()
+    """The same with healing cycles from the second on, which tell kappa best."""
+    landings: tuple[Landing, ...] = ()
+    """Jumps that stand."""
+    kappa: float = 0.0
+    """Of `adapters.jump_slopes`."""
+    ahead: float = 0.0
+    """What the bed has settled beyond its own rates, all jumps together [m]."""
+    reseated: float = 0.0
+    """What it settled more because it was moved [m]."""
     curve_cycle: tuple[float, ...] = ()
     curve_settlement: tuple[float, ...] = ()
     """The run's own curve since the past was forgotten last [m]."""
@@ -94,6 +110,17 @@ class Control:
     """Jumps from this state that were taken back."""
     window: int = FIRST_WINDOW
     """Cycles of the last window."""
+
+    @cached_property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """`windows` of the bed itself, without what jumps made it settle more."""
+        return tuple(unmoved(one, self.landings, self.kappa) for one in self.windows)
+
+    @property
+    def share(self) -> float:
+        """What the bed settles more behind a jump, over what it is moved by; from 0 to 1."""
+        moved = sum(one.moved for one in self.landings)
+        return min(max(self.reseated / moved, 0.0), 1.0) if moved else 0.0
 
 
 @dataclass(frozen=True)
@@ -109,6 +136,10 @@ class Decision:
     """Cycles h."""
     gain: float = 0.0
     """Settlement expected over the h cycles [m]."""
+    moved: float = 0.0
+    """Settlement that the mean grain is moved by [m]."""
+    made_good: float = 0.0
+    """What is to be gained beyond ``gain``, for the sake of earlier jumps [m]."""
     half_width: float = 0.0
     """How far that can be off with `PROBABILITY`, before it is tried [m]."""
     limits: tuple[tuple[str, float], ...] = ()
@@ -134,13 +165,19 @@ def observe(control: Control, stretch: Stretch, settlement: float) -> Control:
 
     Errors observed count less the longer ago they are: their limit doubles with every window.
     """
-    known = joined(control.stretches, stretch)
+    behind = joined(control.behind, stretch)
+    kappa = slopes_of(behind, control.landings).kappa()[0] if control.landings else 0.0
+    more = kappa * float(reseating(stretch, control.landings).sum())
     cycles, curve = curve_of(stretch, settlement)
     return replace(
         control,
         cycle=stretch.last_cycle,
         settlement=settlement,
-        stretches=known,
+        windows=joined(control.windows, stretch),
+        behind=behind,
+        kappa=kappa,
+        ahead=control.ahead + more,
+        reseated=control.reseated + more,
         curve_cycle=control.curve_cycle + cycles,
         curve_settlement=control.curve_settlement + curve,
         longest=control.longest * GROWTH,
@@ -203,6 +240,8 @@ def decide(control: Control, settings: Settings) -> Decision:
     window = window_of(control, settings, forecast, limits)
     width = float(np.interp(jump, grid, np.hypot(*widths)))
     gain = float(forecast.gain(control.cycle, control.cycle + float(jump)))
+    moved = (gain - control.ahead) / (1 + control.share)
+    moved = moved if moved * gain > 0 else 0.0
     total = abs(control.settlement + gain)
     known = replace(
         known,
@@ -223,6 +262,8 @@ def decide(control: Control, settings: Settings) -> Decision:
         jump=jump,
         window=min(window, left - jump - settings.healing),
         gain=gain,
+        moved=moved,
+        made_good=moved * (1 + control.share) - gain,
         half_width=width,
         why=f"{binding} allows {jump} cycles",
     )

@@ -118,7 +118,7 @@ def noise_of(stretches: Sequence[Stretch]) -> Noise:
     cycles = np.concatenate([one.first_cycle + 0.5 + np.arange(len(one.gain)) for one in stretches])
     rate = smooth.at(cycles)
     residual = np.concatenate([one.gain for one in stretches]) - rate
-    if total < 4 or not residual.any():
+    if total < 4 or not residual @ residual:
         return Noise(np.zeros(len(stretches)), 1.0)
     scale, standard = np.ones(total), residual
     if (rate > 0).all():

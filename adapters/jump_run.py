@@ -67,7 +67,7 @@ def jump_and_check(
     healing = settings.healing
     try:
         with disk_full_named(run.folder.path):
-            moved = stages.jump(run, bed, decision.jump, decision.attempt, decision.gain)
+            moved = stages.jump(run, bed, decision.jump, decision.attempt, decision.moved)
             after = stages.compute(run, moved, healing + decision.window, healing)
     except (EngineFailed, NotCredible, NotConverged) as error:
         if isinstance(error, EngineFailed) and error.from_outside:
@@ -77,8 +77,7 @@ def jump_and_check(
         return bed, reject(control, decision, nan, settings)
     rows = _rows(run, after)
     settlement = float(rows[-1]["settlement"])
-    healed = rows[healing - 1] if healing else _jump_row(run, name)
-    stretch = stretch_of(rows[healing:], float(healed["settlement"]))
+    stretch = stretch_of(rows, float(_jump_row(run, name)["settlement"]))
     check = judge(control, decision, settings, stretch, settlement)
     told = {"jump": decision.jump, "window": healing + decision.window, **asdict(check)}
     journal.write(CHECK, decision.cycle, decision.attempt, told)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -12,6 +12,7 @@ from adapters.engine_fake import FakeBed
 from adapters.jump_check import accept, judge, reject
 from adapters.jump_control import Decision, Settings, begin, decide, observe
 from adapters.jump_rates import Stretch
+from adapters.jump_slopes import Landing, unmoved
 from adapters.state import FloatArray
 
 Law = Callable[[FloatArray], FloatArray]
@@ -51,6 +52,10 @@ class Curve:
     seed: int = 1
     jitter: float = 0.0
     """Deviation of each reading [m]."""
+    first_cycle: float = 0.0
+    """What the bed settles more in the first cycle behind a jump, over what it was moved by."""
+    kappa: float = 0.0
+    """The same in the n-th, times n (`jump_slopes`)."""
 
     @property
     def bed(self) -> FakeBed:
@@ -68,6 +73,9 @@ class Measured:
 
     path: FloatArray
     """Settlement after 0, 1, 2, ... cycles [m]."""
+    first_cycle: float = 0.0
+    kappa: float = 0.0
+    """As `Curve` has them."""
 
     @property
     def bed(self) -> Measured:
@@ -112,6 +120,14 @@ def stretch_of(bed: FakeBed | Measured, first: int, cycles: int) -> Stretch:
     return Stretch(first, np.diff(bed.settlement(first, cycles)), unknown, unknown)
 
 
+def moved_more(curve: Curve | Measured, stretch: Stretch, landings: Sequence[Landing]) -> Stretch:
+    """A stretch as it is behind jumps: the bed settles more."""
+    more = unmoved(stretch, landings, -curve.kappa)
+    if landings and landings[-1].cycle == stretch.first_cycle:
+        more.gain[0] += (curve.first_cycle - curve.kappa) * landings[-1].moved
+    return more
+
+
 def play(curve: Curve | Measured, k_i: int, settings: Settings) -> Play:
     """Let the controller run on a curve from the state after ``k_i`` cycles."""
     out, bed = Play(), curve.bed
@@ -127,15 +143,15 @@ def play(curve: Curve | Measured, k_i: int, settings: Settings) -> Play:
             break
         if decision.action == "compute":
             window = stretch_of(bed, control.cycle, decision.window)
+            window = moved_more(curve, window, control.landings)
             out.computed += decision.window
             control = observe(control, window, control.settlement + float(window.gain.sum()))
             continue
         landed = control.cycle + decision.jump
-        healed = stretch_of(bed, landed, settings.healing)
-        window = stretch_of(bed, landed + settings.healing, decision.window)
+        window = stretch_of(bed, landed, settings.healing + decision.window)
+        window = moved_more(curve, window, (*control.landings, Landing(landed, decision.moved)))
         out.computed += settings.healing + decision.window
-        gained = decision.gain + float(healed.gain.sum())
-        settlement = control.settlement + gained + float(window.gain.sum())
+        settlement = control.settlement + decision.moved + float(window.gain.sum())
         check = judge(control, decision, settings, window, settlement)
         told = asdict(check) | {
             "jump": decision.jump,

@@ -9,18 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters import jump_history
-from adapters.jump_history import (
+from adapters import jump_slopes
+from adapters.jump_history import Jumped, asked_gain
+from adapters.jump_rates import Stretch
+from adapters.jump_slopes import (
     LONGEST_BLOCK,
     LONGEST_RESEATING,
-    Jumped,
+    Landing,
     Slopes,
-    asked_gain,
     blocks_of,
     slopes_of,
     system_of,
+    unmoved,
 )
-from adapters.jump_rates import Stretch
 from adapters.state import FloatArray
 
 SLOPE = 3e-5
@@ -188,7 +189,7 @@ def test_what_a_moved_bed_settles_more_is_taken_off(monkeypatch: pytest.MonkeyPa
     assert missed[0] > 0.25 * SLOPE * np.log(130 / 70)
     assert np.abs(missed[1:]).max() < 0.5 * missed[0]
     assert (np.diff(np.abs(missed)) < 0).all()
-    monkeypatch.setattr(jump_history, "RESEATING", 1e-6)
+    monkeypatch.setattr(jump_slopes, "RESEATING", 1e-6)
     blind = jumping(log_gain, more, 4)
     assert np.abs(blind[1:]).max() > 5 * np.abs(missed[1:]).max()
 
@@ -203,7 +204,7 @@ def test_nothing_is_asked_where_too_much_was_gained() -> None:
 def test_blocks_cut_no_cycle_and_lose_none() -> None:
     """Blocks follow one another, no longer than they may be, or one cycle; behind a jump each
     knows what kappa = 1 would add: G over the cycle since."""
-    jump = Jumped(np.array([50, 4990, 5020]), np.array([0.0, 7.0, 8.0]))
+    jump = Landing(4990, 7.0)
     for one, made in (
         (log_stretch(1, 50), []),
         (log_stretch(90, 110), []),
@@ -237,3 +238,26 @@ def test_bed_without_motion_and_bed_that_rises() -> None:
 def test_slopes_of_a_logarithm_are_one() -> None:
     """Every block of u = a ln N has the slope a."""
     assert slopes_of([log_stretch(10, 70), log_stretch(500, 520)]).slope == pytest.approx(SLOPE)
+
+
+def test_kappa_is_found_with_its_error_and_taken_out() -> None:
+    """u = a ln N and kappa G / n behind two jumps: kappa within a fifth and within two standard
+    errors that are three tenths of those before; taken out, three quarters of it are gone."""
+    kappa, landings = 0.08, [Landing(150, 2 * SLOPE), Landing(400, 3 * SLOPE)]
+    known = [log_stretch(10, 70)]
+    for one in landings:
+        bare = log_stretch(one.cycle + 1, one.cycle + 25)
+        known.append(unmoved(bare, [one], -kappa))
+    slopes = slopes_of(known, landings)
+    found, error = slopes.kappa()
+    assert found == pytest.approx(kappa, rel=0.2)
+    assert abs(found - kappa) < 2 * error
+    assert error < 0.3 * jump_slopes.RESEATING
+    bare = log_stretch(151, 175).gain.sum()
+    left = unmoved(known[1], landings, found).gain.sum() - bare
+    assert abs(left) < 0.25 * (known[1].gain.sum() - bare)
+
+
+def test_no_jump_tells_no_kappa() -> None:
+    """Nothing is taken out, and the standard error stays what it was before."""
+    assert slopes_of([log_stretch(10, 70)]).kappa() == (0.0, jump_slopes.RESEATING)

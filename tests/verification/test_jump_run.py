@@ -76,7 +76,7 @@ def test_to_the_end_with_its_control(tmp_path: Path) -> None:
 
 
 def test_the_mean_grain_moves_by_what_was_decided(tmp_path: Path) -> None:
-    """Before relaxation the mean drop of each jump is the decision's gain, to round-off."""
+    """Before relaxation the mean drop of each jump is what the decision says, to round-off."""
     run(tmp_path, 120)
     folder = RunFolder(tmp_path / "run")
     held = checks_of(folder.events())
@@ -90,7 +90,7 @@ def test_the_mean_grain_moves_by_what_was_decided(tmp_path: Path) -> None:
                 and o.last_cycle == decision["cycle"]
             )  # fmt: skip
             before = np.load(folder.path / window / "states.npz")["position"][-1, :, 2].mean()
-            assert before - moved == pytest.approx(decision["gain"], rel=1e-6)
+            assert before - moved == pytest.approx(decision["moved"], rel=1e-6)
 
 
 def test_load_step_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
