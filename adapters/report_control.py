@@ -33,6 +33,7 @@ def control(record: Record) -> str:
                 plain(decision["window"], "d"),
                 bound,
                 micrometres(decision["gain"]) if decision["jump"] else "",
+                micrometres(decision["moved"]) if decision["jump"] else "",
                 micrometres(decision["half_width"]) if decision["jump"] else "",
                 per_cent(check["error"], "+.2f") if check else "",
                 plain(check["deviation"], "+.1f") if check else "",
@@ -47,6 +48,13 @@ def control(record: Record) -> str:
         "sides of the jump; above twice the tolerance the jump is taken back. Jumps taken back: "
         f"{sum(not check['accepted'] for check in checks.values())}."
     )
+    held = [check for check in checks.values() if check["accepted"]]
+    if held:
+        definition += paragraph(
+            f"Behind its {len(held)} jumps the bed settled by "
+            f"{micrometres(sum(check['reseated'] for check in held))} µm more because it was moved "
+            f"(in the n-th cycle {held[-1]['kappa']:.3f} / n of what it was moved by)."
+        )
     ends = f"{micrometres(band.low)} to {micrometres(band.high)} µm"
     mean = f"{micrometres(band.mean_low)} to {micrometres(band.mean_high)} µm"
     return section(
@@ -63,8 +71,9 @@ def control(record: Record) -> str:
         ),
         table(
             "Every decision. <i>k</i>: cycles computed next; beside it the paper's lower bound for "
-            "independent increments (eq. 15). The last column names the rule that set <i>h</i>, "
-            "and the longest jump by each.",
+            "independent increments (eq. 15). <i>Moved by</i>: the gain expected less what the bed "
+            "is ahead of its own rates by, and what it will settle more because it was moved. The "
+            "last column names the rule that set <i>h</i>, and the longest jump by each.",
             (
                 "cycle",
                 "",
@@ -72,6 +81,7 @@ def control(record: Record) -> str:
                 "<i>k</i>",
                 "eq. 15",
                 "gain expected (µm)",
+                "moved by (µm)",
                 "half-width (µm)",
                 "realised error",
                 "rate off by (standard errors)",
@@ -79,6 +89,6 @@ def control(record: Record) -> str:
                 "why",
             ),
             rows,
-            words=frozenset({10}),
+            words=frozenset({11}),
         ),
     )

@@ -105,6 +105,15 @@ def tolerance_table(rows: Rows) -> str:
     return table(["tolerance", *HEAD], lines)
 
 
+def moved_table(rows: Rows) -> str:
+    """All laws together for each way in which moved beds settle more."""
+    lines = []
+    for first_cycle, kappa in jump_study.MOVED:
+        these = group(rows, "moved", first_cycle=first_cycle, kappa=kappa)
+        lines.append([f"{first_cycle:g} G", f"{kappa:g} G / n", *cells(these)])
+    return table(["more in the first cycle", "in the n-th", *HEAD], lines)
+
+
 def far_table(rows: Rows) -> str:
     """To 100,000 cycles."""
     laws = dict.fromkeys(row["law"] for row in group(rows, "far"))
@@ -273,6 +282,7 @@ def page(rows: Rows, runs: Rows) -> str:
         "noise": noise_table(rows),
         "bar": bar_told(rows),
         "tolerances": tolerance_table(rows),
+        "moved": moved_table(rows),
         "far": far_table(rows),
         "hard": hard_table(rows),
         "measured": measured_table(rows),
