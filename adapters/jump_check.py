@@ -20,7 +20,7 @@ from adapters.jump_control import (
     curve_of,
     joined,
 )
-from adapters.jump_forecast import forecast_of, gain_between
+from adapters.jump_forecast import Forecast, forecast_of, gain_between
 from adapters.jump_rates import Stretch, block_count, noise_of, rates_of, state_trend
 from adapters.jump_slopes import Landing, reseating, slopes_of, unmoved
 from adapters.state import FloatArray
@@ -80,62 +80,92 @@ def judge(
     landings, windows, behind = joined_by_jump(control, decision, settings, stretch)
     kappa, kappa_error = slopes_of(behind, landings).kappa()
     every = tuple(unmoved(one, landings, kappa) for one in windows)
-    stretch = every[-1]
-    past = noise_of(every[:-1])
-    before = forecast_of(rates_of(every[:-1]))
-    start, end = float(control.cycle), float(stretch.first_cycle)
-    noises = noise_of(every).variance
-    k = len(stretch.gain)
-    rate_expected = float(before.gain(end, float(stretch.last_cycle))) / k
-    known = np.array(before.half_widths(end, float(stretch.last_cycle), PROBABILITY)) / k
-    student = float(stdtrit(before.freedom, (1 + PROBABILITY) / 2))
-    error = sqrt(float(past.variance[-1]) / k + float((known / student) @ (known / student)))
-    difference = stretch.rate - rate_expected
-    deviation = difference / error if error > 0 else (inf if difference else 0.0)
+    window, noises = every[-1], noise_of(every).variance
+    before, both = forecast_of(rates_of(every[:-1])), forecast_of(rates_of(every))
+    start, end = float(control.cycle), float(window.first_cycle)
+    rate_expected, deviation = rate_beside(before, every[:-1], window)
     changed = abs(deviation) > CHANGED
-    both = forecast_of(rates_of(every))
-    widths = both.half_widths(start, end, PROBABILITY)
-    student = float(stdtrit(both.freedom, (1 + PROBABILITY) / 2))
-    noise, form = (float(width) / student for width in widths)
-    expected, shares = float(both.gain(start, end)), both.shares(start, end)
     if changed:
-        rate = float(before.rate @ before.weight)
-        expected = gain_between(rate, stretch.rate, start, end)
-        sides = float(before.weight @ before.error**2), float(noises[-1]) / k
-        noise = 0.5 * log(end / start) * sqrt(sides[0] * start**2 + sides[1] * end**2)
-        form = abs(expected - 0.5 * (end - start) * (rate + stretch.rate)) / 2
-        x = 0.5 * log(end / start)
-        blocks = len(both.influence) - len(before.influence)
-        shares = np.concatenate(
-            [x * start * (before.influence @ before.weight), np.full(blocks, x * end / k)]
-        )
-    sources = sources_of(every, noises, shares)
+        expected = expected_by_two_rates(before, both, window, float(noises[-1]), start)
+    else:
+        expected = expected_by_all(both, start, end)
+    sources = sources_of(every, noises, expected.shares)
     by_kappa = sum(
         source[3] * float(reseating(one, landings).sum())
         for source, one in zip(sources, windows, strict=True)
     )
-    form = hypot(form, kappa_error * by_kappa)
-    gained = settlement - float(stretch.gain.sum()) - control.settlement
+    gained = settlement - float(window.gain.sum()) - control.settlement
     healed = float(both.gain(float(landings[-1].cycle), end))
     total = abs(control.settlement + gained)
-    error = gained - expected - decision.made_good
+    error = gained - expected.mean - decision.made_good
     relative = error / total if total > 0 else (inf if error else 0.0)
     return Check(
         accepted=abs(relative) <= ROLL_BACK * settings.tolerance,
         gained=gained,
-        expected=expected,
-        noise=noise,
-        form=form,
+        expected=expected.mean,
+        noise=expected.noise,
+        form=hypot(expected.form, kappa_error * by_kappa),
         error=relative,
         rate_expected=rate_expected,
-        rate_observed=stretch.rate,
+        rate_observed=window.rate,
         deviation=deviation,
         changed=changed,
         reseated=gained - decision.moved - healed,
         kappa=kappa,
         sources=sources,
-        state_misses=tuple(_state_miss(control, stretch, name) for name in STATES),
+        state_misses=tuple(_state_miss(control, window, name) for name in STATES),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """Gain over a jump and its healing cycles by the rates on both sides; metres."""
+
+    mean: float
+    noise: float
+    """Standard error from the noise of the rates."""
+    form: float
+    """Standard deviation from the unknown exponent."""
+    shares: FloatArray
+    """Derivative by the gain of each block, shape (b,)."""
+
+
+def rate_beside(before: Forecast, past: Sequence[Stretch], window: Stretch) -> tuple[float, float]:
+    """Rate forecast for a window [m a cycle], and what the window's exceeds it by in standard
+    errors: of the window's own noise and of the forecast ``before`` it, made from ``past``."""
+    start, end, k = float(window.first_cycle), float(window.last_cycle), len(window.gain)
+    expected = float(before.gain(start, end)) / k
+    known = np.array(before.half_widths(start, end, PROBABILITY)) / k
+    student = float(stdtrit(before.freedom, (1 + PROBABILITY) / 2))
+    noise = float(noise_of(past).variance[-1]) / k
+    error = sqrt(noise + float((known / student) @ (known / student)))
+    difference = window.rate - expected
+    return expected, difference / error if error > 0 else (inf if difference else 0.0)
+
+
+def expected_by_all(both: Forecast, start: float, end: float) -> Expected:
+    """By the forecast of all windows on both sides."""
+    student = float(stdtrit(both.freedom, (1 + PROBABILITY) / 2))
+    noise, form = (float(one) / student for one in both.half_widths(start, end, PROBABILITY))
+    return Expected(float(both.gain(start, end)), noise, form, both.shares(start, end))
+
+
+def expected_by_two_rates(
+    before: Forecast, both: Forecast, window: Stretch, variance: float, start: float
+) -> Expected:
+    """By a power law through the rate before the jump and the ``window``'s.
+
+    ``variance``: long-run one of the window's gains [m^2 a cycle].
+    """
+    end, k, rate = float(window.first_cycle), len(window.gain), float(before.rate @ before.weight)
+    mean = gain_between(rate, window.rate, start, end)
+    sides = float(before.weight @ before.error**2), variance / k
+    x = 0.5 * log(end / start)
+    noise = x * sqrt(sides[0] * start**2 + sides[1] * end**2)
+    form = abs(mean - 0.5 * (end - start) * (rate + window.rate)) / 2
+    blocks = len(both.influence) - len(before.influence)
+    shares = [x * start * (before.influence @ before.weight), np.full(blocks, x * end / k)]
+    return Expected(mean, noise, form, np.concatenate(shares))
 
 
 def joined_by_jump(
