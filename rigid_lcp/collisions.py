@@ -12,7 +12,7 @@ cradle of three the last ball leaves with 2/3, not with all.
 
 Energy: ``E' - E = sum (1 - eps_c) dp_c v_c / 2``.  Contacts that part already (v > 0) are erased
 first (section 4, point 3), so every ``v_c <= 0``: energy never grows, also with different eps, and
-is conserved exactly at eps = 1.  Erased contacts may approach afterwards; then the next round
+is conserved to round-off at eps = 1.  Erased contacts may approach afterwards; then the next round
 follows, until nothing approaches.
 
 With friction, Coulomb's law acts on the impulses.  ``newton``: eps on normal velocities only; with
@@ -25,15 +25,24 @@ watched, and eps scaled down where it would grow: at eps = 0 it can not.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigid_lcp.cones import length
 from rigid_lcp.errors import ProblemError, UsageError
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, FrictionSolution, Status
+from rigid_lcp.friction_problem import (
+    MOST_FRICTION,
+    BodySpace,
+    FrictionProblem,
+    FrictionSolution,
+    Status,
+    friction_solution,
+)
 from rigid_lcp.frictionless import frictionless
-from rigid_lcp.problem_input import finite_numbers
+from rigid_lcp.problem_input import check_factors, finite_numbers, in_range, one_number
 
 Floats = NDArray[np.float64]
 Law = Literal["newton", "moreau"]
@@ -45,6 +54,10 @@ a factor of 1e3 that touch anywhere take some hundred; with it, where one in fiv
 end, and energy is lost anyway."""
 ROUND_OFF = 1e-12
 """Velocities this small against the largest of the collision are no approach; energies likewise."""
+WORK_ROUND_OFF = 1e-15
+"""Round-off of ``p W p`` beside its largest parts [-]."""
+LEAST_TOLERANCE = 1e-16
+"""The smallest residual that is asked for [-]."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +116,7 @@ def collide(
     dim, before = _moving(bodies, velocity)
     nc = bodies.jacobian.shape[0] // dim
     eps = _one_a_contact("restitution", restitution, 1.0, nc)
-    mu = _one_a_contact("friction", friction, np.inf, nc)
+    mu = _one_a_contact("friction", friction, MOST_FRICTION, nc)
     if max_rounds is None:
         max_rounds = ROUNDS_ROUGH if mu.any() else ROUNDS
     _check_choices(law, energy, tolerance, max_rounds, still, rest_speed)
@@ -113,7 +126,8 @@ def collide(
     first = bodies.jacobian @ before + moved
     none = max(still, ROUND_OFF * float(np.abs(first).max(initial=0.0)))
     after, impulse = before.copy(), np.zeros(nc * dim)
-    worst, rounds, factor, notes = 0.0, 0, 1.0, ""
+    worst, rounds, factor = 0.0, 0, 1.0
+    told: list[str] = []
     status: Status = "solved"
     while True:
         now = bodies.jacobian @ after + moved
@@ -121,7 +135,8 @@ def collide(
         if not (normal < -none).any():
             break
         if rounds > max_rounds:
-            status, notes = "not converged", f"contacts still approach after {rounds} rounds"
+            status = "not converged"
+            told.append(f"contacts still approach after {rounds} rounds")
             break
         last = rounds == max_rounds
         taking = np.arange(nc) if last else np.flatnonzero(normal <= none)
@@ -133,18 +148,18 @@ def collide(
         after = after + bodies.inverse_mass @ (bodies.jacobian.T @ part)
         worst, rounds, factor = max(worst, solution.residual), rounds + 1, min(factor, used)
         if not solution.solved:
-            status, notes = solution.status, solution.message
+            status = solution.status
+            told.append(solution.message)
             break
     # the work of the impulses at the mean velocity: no difference of large energies
     change = 0.5 * float(impulse @ (first + bodies.jacobian @ after + moved))
-    size = float(np.abs(impulse) @ np.abs(first))
     if rounds > max_rounds and eps.any():
-        notes = f"after {max_rounds} rounds the rest was taken without restitution" + notes
+        told.insert(0, f"after {max_rounds} rounds the rest was taken without restitution")
     if factor < 1.0:
-        notes = f"restitution was scaled by {factor:.3g}, as energy would have grown" + notes
-    if change > ROUND_OFF * size:
-        notes = f"energy grew by {change:.3g} J\n  -> use energy='safe', or law='moreau'" + notes
-    return Collision(after, impulse, change, worst, status, rounds, factor, notes)
+        told.insert(0, f"restitution was scaled by {factor:.3g}, as energy would have grown")
+    if change > work_round_off(bodies, impulse, first):
+        told.append(f"energy grew by {change:.3g} J\n  -> use energy='safe', or law='moreau'")
+    return Collision(after, impulse, change, worst, status, rounds, factor, "; ".join(told))
 
 
 def collision_round(
@@ -168,9 +183,10 @@ def collision_round(
         problem = FrictionProblem(None, excess.ravel(), mu[taking], dim, part)
         solution = impulses_of(problem, tolerance)
         p = solution.r
+        if energy != "safe" or not (used.any() and problem.friction.any()):
+            break  # without friction energy can not grow
         change = 0.5 * float(p @ (2.0 * v + part.product(p)))
-        size = float(np.abs(p) @ np.abs(v))
-        if energy != "safe" or change <= ROUND_OFF * size or factor == 0.0 or not used.any():
+        if change <= work_round_off(part, p, v):
             break
         factor = 0.5 * factor if factor > 0.01 else 0.0
     impulse = np.zeros(bodies.jacobian.shape[0])
@@ -178,8 +194,34 @@ def collision_round(
     return impulse, solution, factor
 
 
+def work_round_off(bodies: BodySpace, impulse: Floats, velocity: Floats) -> float:
+    """Round-off of the work of impulses p (nc * dim,) [N s] at contacts that approached with
+    ``velocity`` (nc * dim,) [m/s]: a growth of energy [J] that is none.
+
+    A light body between heavy ones makes ``p W p`` a small difference of large numbers, each of
+    the size ``p_c^2 W_cc``.
+    """
+    own = WORK_ROUND_OFF * float(impulse**2 @ bodies.diagonal)
+    return ROUND_OFF * float(np.abs(impulse) @ np.abs(velocity)) + own
+
+
 def impulses_of(problem: FrictionProblem, tolerance: float) -> FrictionSolution:
-    """Solve eq. 36 without friction, or Coulomb's law on impulses with it."""
+    """Solve eq. 36 without friction, or Coulomb's law on impulses with it.
+
+    The residual is relative to impulses; beside those of heavy bodies it hides the velocities of
+    light ones, so that it is asked to be as small beside the velocities too.
+    """
+    found = _impulses_at(problem, tolerance)
+    error = found.residual * length(found.r) / problem.rho
+    if found.solved and error > (most := tolerance * length(problem.offset)):
+        finer = max(found.residual * most / error, LEAST_TOLERANCE)
+        again = _impulses_at(problem, finer)
+        if again.residual < found.residual:
+            found = friction_solution(problem, again.r, tolerance, again.method, again.work)
+    return found
+
+
+def _impulses_at(problem: FrictionProblem, tolerance: float) -> FrictionSolution:
     if not problem.friction.any():
         return frictionless(problem, None, tolerance)
     if problem.dim == 2 and problem.contacts <= 300:
@@ -203,14 +245,17 @@ def _moving(bodies: BodySpace, velocity: ArrayLike) -> tuple[int, Floats]:
             f"they are a {type(bodies).__name__}", where="bodies",
             remedy="give a BodySpace: a collision needs J and M^-1 apart",
         )  # fmt: skip
-    if bodies.body_size not in (3, 6):
+    check_factors(bodies)
+    dim = 2 if bodies.body_size == 3 else 3
+    rows, freedoms = bodies.jacobian.shape
+    if rows % dim:
         raise ProblemError(
-            f"a body has {bodies.body_size} freedoms", where="body_size",
-            remedy="give 3 in 2D and 6 in 3D",
+            f"jacobian has {rows} rows, which are not {dim} a contact", where="bodies",
+            remedy="give a contact 2 rows where a body has 3 freedoms, and 3 where it has 6",
         )  # fmt: skip
-    freedoms = bodies.jacobian.shape[1]
     before = _numbers_of("velocity", velocity, freedoms, "one number a freedom, as J has columns")
-    return (2 if bodies.body_size == 3 else 3), before
+    in_range(before, "velocity", least=0.0)
+    return dim, before
 
 
 def _numbers_of(name: str, values: ArrayLike, count: int, remedy: str) -> Floats:
@@ -234,7 +279,7 @@ def _one_a_contact(name: str, values: ArrayLike, upper: float, nc: int) -> Float
     if len(bad):
         raise ProblemError(
             f"{name} is {array[bad[0]]:g}", where=f"{name}, contact {bad[0]}",
-            remedy="give a number of 0 or more" + (", at most 1" if upper == 1.0 else ""),
+            remedy=f"give 0 to {upper:g}",
         )  # fmt: skip
     return array
 
@@ -247,11 +292,10 @@ def _check_choices(
             raise UsageError(
                 f"{name} is {given!r}", where=name, remedy="give one of " + ", ".join(known)
             )
-    least = {"tolerance": tolerance, "still": still, "rest_speed": rest_speed}
-    for name, value in least.items():
-        if not (0.0 <= value < np.inf) or (name == "tolerance" and value == 0.0):
-            raise UsageError(f"{name} is {value!r}", where=name, remedy="give a positive number")
-    if isinstance(max_rounds, bool) or max_rounds != int(max_rounds) or max_rounds < 0:
+    one_number(tolerance, "tolerance")
+    one_number(still, "still", zero=True)
+    one_number(rest_speed, "rest_speed", zero=True)
+    if isinstance(max_rounds, bool) or not isinstance(max_rounds, Integral) or max_rounds < 0:
         raise UsageError(
             f"max_rounds is {max_rounds!r}", where="max_rounds", remedy="give a count of 0 or more"
         )

@@ -42,6 +42,26 @@ def test_cradle(balls: int, moving: int, mu: float) -> None:
     assert abs(found.energy_change) <= 1e-13
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize("light", [1e-5, 1e-6, 1e-8])
+def test_a_light_ball_between_heavy_ones_takes_no_energy(light: float, mu: float) -> None:
+    """1, m, 1 in a row, e = 1: the first stops, both others leave with 1, but for O(m).
+
+    Their gaps close with ``1 + 1/m`` times what the light ball's impulses differ by, so round-off
+    is 1e-16 / m of the velocities.
+    """
+    bodies = cradle(3)
+    mass = sp.diags_array(np.repeat([1.0, 1.0 / light, 1.0], 3), format="csr")
+    bodies = replace(bodies, inverse_mass=mass)
+    found = collide(bodies, [1.0, *[0.0] * 8], 1.0, mu)
+    assert found.solved
+    assert found.restitution_scale == 1.0
+    assert found.message == ""
+    lost = -light / (2 + light)  # of the first ball: v0, then v0 + 1 twice, momentum 1
+    np.testing.assert_allclose(found.velocity[::3], [lost, 1 + lost, 1 + lost], atol=4e-15 / light)
+    assert abs(found.energy_change) <= 4e-15 / light
+
+
 def test_random_collisions_never_make_energy() -> None:
     """Arms, normals, masses, eps and mu of every contact at random: both laws, a few of each."""
     generator = np.random.default_rng(3)
@@ -263,8 +283,27 @@ def test_malformed_input(
 
 
 @pytest.mark.parametrize(
+    ("jacobian", "inverse_mass", "where"),
+    [
+        (sp.csr_array([[1.0, 0, 0], [0, np.nan, 0]]), sp.eye_array(3), "not finite"),
+        (sp.eye_array(3).tocsr()[:2], np.nan * sp.eye_array(3), "not finite"),
+        (sp.eye_array(3).tocsr()[:2], -1.0 * sp.eye_array(3), "negative"),
+        (sp.eye_array(3).tocsr()[:2], sp.eye_array(6), "shape"),
+        (sp.eye_array(3).tocsc()[:2], sp.eye_array(3), "by rows"),
+        (sp.eye_array(3).tocsr(), sp.eye_array(3), "3 rows"),
+    ],
+    ids=["J nan", "M nan", "M negative", "M shape", "J by columns", "J rows"],
+)  # fmt: skip
+def test_bodies_that_are_none(jacobian: Any, inverse_mass: Any, where: str) -> None:
+    """No answer is made of them: what is not a number approaches nothing, and looked solved."""
+    with pytest.raises(ProblemError, match=where):
+        collide(BodySpace(jacobian, inverse_mass.tocsr(), 3), [-1.0, 0.0, 0.0], 0.5)
+
+
+@pytest.mark.parametrize(
     "wrong",
     [
+        {"tolerance": None}, {"max_rounds": "a"}, {"max_rounds": np.inf},
         {"law": "x"}, {"energy": "zz"}, {"still": np.nan}, {"rest_speed": -1.0},
         {"tolerance": 0.0}, {"tolerance": np.nan}, {"max_rounds": -1}, {"max_rounds": 0.5},
     ],
