@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
-from rigid_lcp.errors import SceneError, UsageError
+from rigid_lcp.errors import SceneError, ShapeError, UsageError
 from rigid_lcp.motion import Motion
 from rigid_lcp.scene import Scene
 from rigid_lcp.scene_input import Loads
@@ -41,7 +43,7 @@ def scene_read(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # Windows editors put a mark at the begin
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(
             f"the scene can not be read ({error})", where=str(path), remedy="name a TOML file"
@@ -66,10 +68,28 @@ def scene_read(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
 def _problem(text: str, path: Path, problem: Any) -> str:
     key = ".".join(str(part) for part in problem["loc"])
     line = key_line(text, [str(part) for part in problem["loc"]])
-    what = str(problem["msg"]).removeprefix("Value error, ")
-    value = problem.get("input")
-    shown = f", not {value!r}" if isinstance(value, bool | int | float | str) else ""
+    if problem["type"] == "extra_forbidden":
+        what, shown = f"unknown key{did_you_mean(problem['loc'])}", ""
+    else:
+        what = str(problem["msg"]).removeprefix("Value error, ")
+        value = problem.get("input")
+        shown = f", not {value!r}" if isinstance(value, bool | int | float | str) else ""
     return f"{path}{f':{line}' if line else ''}: {f'{key}: ' if key else ''}{what}{shown}"
+
+
+def did_you_mean(key: Sequence[str | int]) -> str:
+    """``; did you mean X?`` for the nearest of the keys of its table, or what they are.
+
+    ``key``: the path to a key that the table has not, with the numbers of entries.
+    """
+    table: type[BaseModel] = SceneTables
+    *tables, last = key
+    for name in (part for part in tables if isinstance(part, str)):
+        annotation = table.model_fields[name].annotation
+        inner = [kind for kind in get_args(annotation) or (annotation,) if kind is not None]
+        table = next(kind for kind in inner if issubclass(kind, BaseModel))
+    near = get_close_matches(str(last).lower(), table.model_fields, n=1)
+    return f"; did you mean {near[0]}?" if near else f"; known: {', '.join(table.model_fields)}"
 
 
 def key_line(text: str, key: Sequence[str]) -> int:
@@ -142,7 +162,9 @@ def scene_build(file: SceneFile) -> Scene:
         }
 
     for i, ground in enumerate(tables.ground):
-        scene.add(HalfSpace(ground.normal, ground.offset), name=f"ground {i}", **own(ground))
+        with shape_named(f"ground {i}"):
+            plane = HalfSpace(ground.normal, ground.offset)
+        scene.add(plane, name=f"ground {i}", **own(ground))
     for body in tables.body:
         given: dict[str, Any] = {
             key: value
@@ -159,11 +181,18 @@ def scene_build(file: SceneFile) -> Scene:
     return scene
 
 
+@contextmanager
+def shape_named(where: str) -> Iterator[None]:
+    """Put the name of what has the shape into a `ShapeError`."""
+    try:
+        yield
+    except ShapeError as error:
+        raise ShapeError(error.what, where=where, remedy=error.remedy) from error
+
+
 def shape_of(body: BodyTable, dim: int) -> Any:
     """The shape that a body's table names.  Raises `ShapeError` with the body's name."""
-    from rigid_lcp.errors import ShapeError
-
-    try:
+    with shape_named(f"body {body.name}"):
         if dim == 2:
             from rigid_lcp.shapes_2d import Disc, Polygon
 
@@ -179,8 +208,6 @@ def shape_of(body: BodyTable, dim: int) -> Any:
         if body.box is not None:
             return box(*body.box)
         return Polyhedron(np.array(body.vertices))
-    except ShapeError as error:
-        raise ShapeError(error.what, where=f"body {body.name}", remedy=error.remedy) from error
 
 
 def loads_of(file: SceneFile) -> Loads | None:

@@ -141,9 +141,11 @@ class Load(Table):
     end: Positive | None = None
 
     @model_validator(mode="after")
-    def _ends_after_it_begins(self) -> Load:
+    def _is_a_whole(self) -> Load:
         if self.end is not None and self.end <= self.begin:
             raise ValueError(f"end ({self.end:g} s) is not after begin ({self.begin:g} s)")
+        if self.frequency is None and (self.least is not None or self.phase != 0.0):
+            raise ValueError("least and phase are of a cyclic load: give its frequency too")
         return self
 
 
@@ -214,12 +216,15 @@ class SceneTables(Table):
             if len(value) != self.dimensions:
                 raise ValueError(f"{key} has {len(value)} numbers in {self.dimensions} dimensions")
         names = [body.name for body in self.body]
+        held = {body.name for body in self.body if body.fixed}
         if len(set(names)) < len(names):
             twice = next(name for name in names if names.count(name) > 1)
             raise ValueError(f"two bodies have the name {twice}")
         for i, load in enumerate(self.load):
             if load.body not in names:
                 raise ValueError(f"load.{i}.body: there is no body {load.body}")
+            if load.body in held:
+                raise ValueError(f"load.{i}.body: {load.body} is fixed, no load moves it")
         for i, body in enumerate(self.body):
             if body.inertia is not None and (self.dimensions == 3 or body.fixed):
                 raise ValueError(f"body.{i}.inertia: for bodies that move, in 2 dimensions")

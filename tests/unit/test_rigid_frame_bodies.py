@@ -46,7 +46,7 @@ def test_a_run_that_asks_for_neither_keeps_no_bodies(tmp_path):
     ("coefficient = 1e-7", "coefficient = 0", "greater than 0"),
     ("tension = 1.2e4", "tension = 4e4\nmodulus = 3.0", "both modulus"),
     ("step = 2e-3", 'step = 2e-3\nmethod = "acceleration"', "acceleration level"),
-    ("every = 2", "evry = 2", "Extra"),
+    ("every = 2", "evry = 2", "evry: unknown key; did you mean every"),
 ])  # fmt: skip
 def test_tables_that_are_refused(tmp_path, old, new, words):
     with pytest.raises(SceneError, match=words):

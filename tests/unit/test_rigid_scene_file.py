@@ -93,11 +93,38 @@ def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
             '[[load]]\nbody = "block"\nforce = [1, 0]\nbegin = 2\nend = 1\n[[body]]',
             "load.0: end .1 s. is not after begin",
         ),
+        (  # it would be constant
+            "[[body]]",
+            '[[load]]\nbody = "block"\nforce = [1, 0]\nleast = [0, 0]\n[[body]]',
+            "load.0: least and phase are of a cyclic load",
+        ),
+        (  # it would do nothing
+            "[[body]]",
+            '[[load]]\nbody = "a"\nforce = [1, 0]\n'
+            '[[body]]\nname = "a"\nradius = 1\nfixed = true\n[[body]]',
+            "load.0.body: a is fixed",
+        ),
+        ("density =", "densty =", "body.0.densty: unknown key; did you mean density?"),
+        ("[[ground]]", "[[grund]]", "grund: unknown key; did you mean ground?"),
+        ("density =", "colour = 1\ndensity =", "body.0.colour: unknown key; known: name, box,"),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(SceneError, match=r"(?s)" + said):
         scene_read(written(tmp_path, SMALL.replace(old, new)))
+
+
+def test_a_file_of_a_windows_editor_is_read(tmp_path: Path) -> None:
+    """With a byte order mark and its ends of lines."""
+    path = tmp_path / "scene.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + SMALL.replace("\n", "\r\n").encode())
+    assert scene_read(path).tables == scene_read(written(tmp_path, SMALL)).tables
+
+
+def test_a_ground_without_a_direction_is_named(tmp_path: Path) -> None:
+    text = SMALL + "\n[[ground]]\nnormal = [0, 0]\n"
+    with pytest.raises(ShapeError, match="ground 1: the normal"):
+        scene_build(scene_read(written(tmp_path, text)))
 
 
 def test_a_polygon_that_is_not_convex_is_named_by_its_body(tmp_path: Path) -> None:
