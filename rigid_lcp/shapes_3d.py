@@ -127,10 +127,7 @@ class Polyhedron:
         """Corners of each face, anticlockwise from outside; outward unit normals (f, 3);
         distances d of the faces from the centre of mass [m], (f,), as in eq. 9."""
         if len(self.faces) < 4 or self.width <= FLATNESS * self.reach:
-            raise ShapeError(
-                f"its points lie in a plane within {FLATNESS:g} of its size", where="Polyhedron",
-                remedy="give at least four points that span a volume",
-            )  # fmt: skip
+            raise _flat()
 
     @cached_property
     def edges(self) -> Ints:
@@ -218,11 +215,18 @@ def _hull(points: ArrayLike) -> tuple[Ints, Floats]:
     return triangles, given[corners]
 
 
+def _flat() -> ShapeError:
+    return ShapeError(
+        f"its points lie in a plane within {FLATNESS:g} of its size", where="Polyhedron",
+        remedy="give at least four points that span a volume",
+    )  # fmt: skip
+
+
 def _faces(points: Floats, triangles: Ints) -> tuple[list[Ints], Floats, Floats]:
     """Planes of the hull, from the largest triangle down: loops of corners, normals, distances.
 
     A plane takes every point within `FLATNESS`; so slivers, which have no normal of their own to
-    speak of, vanish into the faces beside them.
+    speak of, vanish into the faces beside them.  Raises `ShapeError` where one plane takes all.
     """
     corner = points[triangles]
     area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -236,6 +240,8 @@ def _faces(points: Floats, triangles: Ints) -> tuple[list[Ints], Floats, Floats]
             continue
         unit = area[first] / np.sqrt(squares[first])
         in_plane = np.abs((points - corner[first, 0]) @ unit) < tolerance
+        if in_plane.all():
+            raise _flat()
         mine = in_plane[triangles].all(axis=1)
         unit = area[mine & free].sum(axis=0)
         unit /= np.linalg.norm(unit)

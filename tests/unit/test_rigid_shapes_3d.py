@@ -98,6 +98,8 @@ def test_what_is_no_size_is_refused(make: Callable[[], object]) -> None:
 def test_flatter_than_faces_are_told_apart_is_flat(high: float) -> None:
     with pytest.raises(ShapeError, match="in a plane"):
         Polyhedron([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, high]])
+    with pytest.raises(ShapeError, match="in a plane"):  # and no warning before it
+        box(1.0, 1.0, high)
 
 
 def test_a_shape_of_corners_is_made_again_to_the_last_bit() -> None:
