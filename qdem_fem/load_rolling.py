@@ -56,9 +56,9 @@ class Rolling:
     """Of the rail's head, across [m]."""
     rail_mass: float = 50.4
     """[kg/m]"""
-    pad: float = 110e6
+    pad: float = 225e6
     """Stiffness of a rail pad [N/m]."""
-    pad_loss: float = 0.2
+    pad_loss: float = 0.25
     sleeper: float = 84.0
     """Mass of half a sleeper [kg]."""
     ballast_loss: float = 1.0
