@@ -33,6 +33,9 @@ NO_CONSTRAINTS = kernel.Constraints(
 )
 NO_PROBES = kernel.Probes(np.zeros(0, np.int64), np.zeros((0, 0, 3)), 1, 1)
 
+EVERY = slice(None)
+"""Of all nodes."""
+
 
 class Assembly:
     """Bodies side by side; numbers of nodes and elements run through all of them.
@@ -115,23 +118,23 @@ class Assembly:
             inverse,
         )
 
-    def _read(self, flat: Any) -> Floats:
+    def _read(self, flat: Any, nodes: slice = EVERY) -> Floats:
         """A field of the state by the user's numbers, (n, 3), as the kernel has it."""
-        return np.asarray(flat).reshape(-1, 4)[self.place, :3].astype(float)
+        return np.asarray(flat).reshape(-1, 4)[self.place[nodes], :3].astype(float)
 
     def _write(self, flat: Any, values: Floats) -> None:
         flat.reshape(-1, 4)[self.place, :3] = values
 
-    def field(self, name: str) -> Floats:
-        """``displacement`` [m] or ``velocity`` [m/s] of all nodes, (n, 3)."""
-        own = self._read(getattr(self.state, name))
+    def field(self, name: str, nodes: slice = EVERY) -> Floats:
+        """``displacement`` [m] or ``velocity`` [m/s] of all nodes, or of some, (n, 3)."""
+        own = self._read(getattr(self.state, name), nodes)
         if self.frames is None:
             return own
         to_world = {
             "displacement": self.frames.displacement_world,
             "velocity": self.frames.velocity_world,
         }
-        return to_world[name](own)
+        return to_world[name](own, nodes)
 
     def field_set(self, name: str, values: Floats) -> None:
         """Set a field of all nodes, (n, 3); nodes that follow others take their master's."""

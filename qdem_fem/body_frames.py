@@ -106,9 +106,10 @@ class BodyFrames:
             left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
             self.rotation[:-1][moving] = (left @ right)[moving]
 
-    def displacement_world(self, own: Floats) -> Floats:
-        """``u`` of ``u'`` (n, 3) [m]; in the laboratory's frame to the same bits."""
-        return self._displacement_at(slice(None), own, self.shift)
+    def displacement_world(self, own: Floats, nodes: slice = slice(None)) -> Floats:
+        """``u`` of ``u'`` (n, 3) [m] of all nodes or some; in the laboratory's frame to the same
+        bits."""
+        return self._displacement_at(nodes, own, self.shift)
 
     def _displacement_at(self, nodes: slice | Integers, own: Floats, shift: Floats) -> Floats:
         frame = self.of_node[nodes]
@@ -122,18 +123,18 @@ class BodyFrames:
         moved = np.einsum("nij,nj->ni", back, world - self.shift[self.of_node])
         return moved + np.einsum("nij,nj->ni", back - np.eye(3), self.arm)
 
-    def velocity_world(self, own: Floats) -> Floats:
-        """``v`` of ``v'`` (n, 3) [m/s]."""
-        return self.turned(own) + self.velocity[self.of_node]
+    def velocity_world(self, own: Floats, nodes: slice = slice(None)) -> Floats:
+        """``v`` of ``v'`` (n, 3) [m/s] of all nodes or some."""
+        return self.turned(own, nodes) + self.velocity[self.of_node[nodes]]
 
     def velocity_own(self, world: Floats) -> Floats:
         """``v'`` of ``v`` (n, 3) [m/s]."""
         back = self.rotation[self.of_node].transpose(0, 2, 1)
         return np.einsum("nij,nj->ni", back, world - self.velocity[self.of_node])
 
-    def turned(self, own: Floats) -> Floats:
-        """Vectors of the frames (n, 3) as the laboratory sees them."""
-        return np.einsum("nij,nj->ni", self.rotation[self.of_node], own)
+    def turned(self, own: Floats, nodes: slice = slice(None)) -> Floats:
+        """Vectors of the frames (n, 3), at all nodes or some, as the laboratory sees them."""
+        return np.einsum("nij,nj->ni", self.rotation[self.of_node[nodes]], own)
 
     def loads_turned(self, loads: kernel.Loads, user_node: Integers) -> kernel.Loads:
         """Loads in the directions of the frames; ``user_node`` (n,): number by kernel number.

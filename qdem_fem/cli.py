@@ -98,6 +98,7 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
 
             assert isinstance(prepared, TrackPrepared)
             summary["track"] = track_facts(path, prepared.load)
+            summary["bed"] = prepared.stand
             more = track_pictures(path, prepared.load)
         report_write(folder, manifest, summary, None if arguments.no_pictures else done, more)
         write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
@@ -194,6 +195,8 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
     for name, modes in content.get("modes", {}).items():
         found = [f"{mode['frequency']:.6g} Hz" for mode in modes]
         print(f"{name}: {', '.join(found)}")
+    if bed := content.get("bed"):
+        print(f"the bed: {bed['told']}")
     print(f"not in this run: {'; '.join(content['left_out'])}")
     if "cost" in content:
         cost = content["cost"]

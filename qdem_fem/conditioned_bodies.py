@@ -35,6 +35,7 @@ class ConditionedBodies:
         counts = [len(body.nodes) for body in self.bodies]
         self.first_node = np.concatenate([[0], np.cumsum(counts)])
         """First node of every body in the numbers of all, and their count, (bodies + 1,)."""
+        self._starts = {id(b): int(at) for b, at in zip(self.bodies, self.first_node, strict=False)}
         self.master = np.arange(self.first_node[-1])
         """The node that a node moves with: itself unless periodic, (n,)."""
 
@@ -155,14 +156,15 @@ class ConditionedBodies:
         raise ConditionError("it is none of the simulation's conditions", where="remove")
 
     def _offset(self, body: Body) -> int:
-        if not any(body is member for member in self.bodies):
+        start = self._starts.get(id(body))
+        if start is None:
             name = body.name if isinstance(body, Body) else f"a {type(body).__name__}"
             raise ConditionError(
                 f"{name} is not a body of this simulation",
                 where="body",
                 remedy="the first argument is one of the bodies it was made of",
             )
-        return int(self.first_node[[body is member for member in self.bodies].index(True)])
+        return start
 
     def _nodes(self, body: Body, nodes: Any, where: str) -> Integers:
         start = self._offset(body)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from qdem_fem import kernel
-from qdem_fem.assembly import Assembly
+from qdem_fem.assembly import EVERY, Assembly
 from qdem_fem.body import Body
 from qdem_fem.errors import LibraryMissing
 from qdem_fem.lanes import lane_count
@@ -153,8 +153,8 @@ class CudaAssembly(Assembly):
         masses = cuda.to_device(inverse_mass.astype(self.dtype))
         return kernel.State(zeros(), zeros(), zeros(), masses)
 
-    def _read(self, flat: Any) -> Floats:
-        return flat.copy_to_host().reshape(-1, 4)[self.place, :3].astype(float)
+    def _read(self, flat: Any, nodes: slice = EVERY) -> Floats:
+        return flat.copy_to_host().reshape(-1, 4)[self.place[nodes], :3].astype(float)
 
     def _write(self, flat: Any, values: Floats) -> None:
         rows = np.zeros((self.n_nodes, 4), self.dtype)

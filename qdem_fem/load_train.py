@@ -3,8 +3,8 @@
 The record of the paper's Fig. 5 is not published.  Axles move at constant speed over a rail that is
 an infinite beam on a Winkler foundation (Zimmermann 1888; Hetenyi, Beams on Elastic Foundation,
 1946, ch. 2), and a sleeper takes what the foundation carries over its share of the track.  That
-holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat`
-names.
+holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat` or
+a `qdem_fem.load_roughness.Roughness` names.
 
     trackbed train --out train.csv
 """
@@ -14,13 +14,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from math import inf, isfinite, pi
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from qdem_fem.errors import ConditionError
 from qdem_fem.load_record import RATE, LoadRecord
 from qdem_fem.mesh_checks import FloatArray
+
+if TYPE_CHECKING:
+    from qdem_fem.load_roughness import Roughness
 
 QUIET = 12.0
 """Distance from the sleeper, over the elastic length, within which an axle counts: e^-12."""
@@ -51,7 +54,7 @@ class Train:
     """Share of an axle load on the rail of seat 1; the paper's two rails differ [-]."""
 
     def __post_init__(self) -> None:
-        _refuse_unless_positive(self, "train")
+        refuse_unless_positive(self, "train")
         if not (self.axle_distance < self.bogie_distance < self.car_length):
             raise ConditionError(
                 f"axles {self.axle_distance} m, bogies {self.bogie_distance} m and cars "
@@ -65,6 +68,11 @@ class Train:
                 where="train",
                 remedy="give a whole number of cars and a share below 1",
             )
+
+    @property
+    def wheel_loads(self) -> FloatArray:
+        """Of an axle, on the rails of seat 1 and 2 [N], (2,)."""
+        return self.axle_load * np.array([self.first_share, 1 - self.first_share])
 
     @property
     def length(self) -> float:
@@ -91,7 +99,7 @@ class Track:
     """From sleeper to sleeper [m]."""
 
     def __post_init__(self) -> None:
-        _refuse_unless_positive(self, "track")
+        refuse_unless_positive(self, "track")
 
     @property
     def elastic_length(self) -> float:
@@ -120,7 +128,8 @@ class WheelFlat:
     multiples of 2 pi times the radius."""
 
 
-def _refuse_unless_positive(thing: Any, where: str) -> None:
+def refuse_unless_positive(thing: Any, where: str) -> None:
+    """Raise `ConditionError` unless every field of a dataclass is a number above zero."""
     for field in fields(thing):
         value = getattr(thing, field.name)
         if not (isfinite(value) and value > 0):
@@ -156,11 +165,10 @@ def seat_forces(
     Added forces of flats act where their wheel is.  Raises `ConditionError` for a flat on an axle
     that the train does not have, or of no size.
     """
-    shares = np.array([train.first_share, 1 - train.first_share])
     total = np.zeros((len(time), 2))
     for axle in train.axles:
         share = seat_share(train.speed * time - axle, track)
-        total += np.outer(share, train.axle_load * shares)
+        total += np.outer(share, train.wheel_loads)
     for flat in flats:
         if not (0 <= flat.axle < 4 * train.cars and min(flat.duration, flat.wheel_radius) > 0):
             raise ConditionError(
@@ -193,12 +201,13 @@ def train_spectrum(frequency: FloatArray, train: Train, track: Track) -> np.ndar
 
 
 def train_record(
-    train: Train, track: Track, area: float, flats: Sequence[WheelFlat] = (), rate: float = RATE
-) -> LoadRecord:
+    train: Train, track: Track, area: float, flats: Sequence[WheelFlat] = (), rate: float = RATE,
+    roughness: Roughness | None = None,
+) -> LoadRecord:  # fmt: skip
     """The pressure on both seats of ``area`` [m^2] while the train passes, sampled at ``rate``.
 
     It begins and ends with the nearest axle `QUIET` elastic lengths and half a spacing away; time
-    0 is the first sample.
+    0 is the first sample.  ``roughness``: what rolling adds, too.
     """
     if not (0 < area < inf and 0 < rate < inf):
         raise ConditionError(f"area {area} m^2, rate {rate} Hz", where="train",
@@ -211,4 +220,11 @@ def train_record(
             remedy=f"give more speed or fewer cars: at most {LONGEST} samples",
         )  # fmt: skip
     time = np.arange(int(np.ceil(last * rate)) + 1) / rate
-    return LoadRecord(time, seat_forces(time - lead, train, track, flats) / area)
+    force = seat_forces(time - lead, train, track, flats)
+    if roughness is not None:
+        from qdem_fem.load_rolling import rolling_forces
+
+        force += rolling_forces(
+            time - lead, train.speed, train.axles, train.wheel_loads, track, roughness
+        )
+    return LoadRecord(time, force / area)

@@ -50,6 +50,7 @@ def report_write(
         f"<h1>{escape(title)}</h1>",
         _claim(summary),
         *(_figure(path, caption) for path, caption in pictures),
+        *_bed(summary),
         *_probes(summary),
         *_modes(summary),
         *_meshes(summary),
@@ -207,6 +208,12 @@ def _energy(summary: dict[str, Any]) -> Iterator[str]:
 
 
 NAMED = (*STORED, "external")
+
+
+def _bed(summary: dict[str, Any]) -> Iterator[str]:
+    """How the prepared bed of a track stands."""
+    if "bed" in summary:
+        yield f"<h2>The prepared bed</h2><p>{escape(summary['bed']['told'].capitalize())}.</p>"
 
 
 def _left_out(summary: dict[str, Any]) -> Iterator[str]:

@@ -355,9 +355,9 @@ class Simulation(ConditionedBodies):
                 self._contacts.held_anew()
 
     def _field_of(self, body: Body, name: str) -> Floats:
-        every = velocity_now(self) if name == "velocity" else self.assembly.field(name)
         start = self._offset(body)
-        return every[start : start + len(body.nodes)]
+        own = slice(start, start + len(body.nodes))
+        return velocity_now(self)[own] if name == "velocity" else self.assembly.field(name, own)
 
     def _field_set(self, body: Body, name: str, values: Floats) -> None:
         if self._assembly is None:

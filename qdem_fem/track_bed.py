@@ -26,7 +26,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
@@ -147,6 +147,8 @@ class Bed:
     """Pairs and springs, as `Contacts.stored` gives them; empty before the last stage."""
     rests: dict[str, dict[str, float]]
     """`qdem_fem.kinetic_damping.Rest` of each stage done, and its ``cpu_s``."""
+    stands: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """`qdem_fem.track_stand.Stand` by the friction and time that it was let go with."""
 
     @property
     def positions(self) -> list[Floats]:
@@ -292,7 +294,7 @@ def bed_enter(run: Simulation, bed: Bed) -> None:
 def bed_write(path: Path, recipe: BedRecipe, bed: Bed) -> None:
     """Write a bed, atomically."""
     stream = BytesIO()
-    head = {"recipe": recipe.told(), "stage": bed.stage, "rests": bed.rests}
+    head = {"recipe": recipe.told(), "stage": bed.stage, "rests": bed.rests, "stands": bed.stands}
     np.savez_compressed(
         stream, head=json.dumps(head), nodes=np.concatenate(bed.nodes),
         counts=[len(nodes) for nodes in bed.nodes], displacement=bed.displacement,
@@ -311,6 +313,7 @@ def bed_read(path: Path, recipe: BedRecipe) -> Bed:
         counts, nodes = arrays.pop("counts"), arrays.pop("nodes")
         displacement = arrays.pop("displacement")
         told, stage, rests = head["recipe"], head["stage"], head["rests"]
+        stands = head.get("stands", {})
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise CheckpointError(f"no bed ({error})", where=str(path), remedy=remedy) from error
     if told != recipe.told():
@@ -321,4 +324,4 @@ def bed_read(path: Path, recipe: BedRecipe) -> Bed:
             where=str(path), remedy=remedy,
         )  # fmt: skip
     parts = np.split(nodes, np.cumsum(counts)[:-1])
-    return Bed(stage, parts, displacement, arrays, rests)
+    return Bed(stage, parts, displacement, arrays, rests, stands)

@@ -33,6 +33,10 @@ def _register_train(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--first-share", type=float, help="of an axle load on rail seat 1")
     parser.add_argument("--modulus", type=float, help="of the track's foundation, N/m^2")
     parser.add_argument(
+        "--roughness", choices=["smooth", "average"], help="of a rail that is not even"
+    )
+    parser.add_argument("--seed", type=int, help="of the roughness (default: 1)")
+    parser.add_argument(
         "--area", type=float, default=SEAT_AREA, help="of a rail seat, m^2 (default: %(default)g)"
     )
     parser.set_defaults(command=train_command)
@@ -53,12 +57,19 @@ def grains_command(arguments: argparse.Namespace) -> int:
 
 def train_command(arguments: argparse.Namespace) -> int:
     """Write the made-up record of a passing train."""
+    from qdem_fem.errors import UsageError
     from qdem_fem.load_record import load_record_write
+    from qdem_fem.load_roughness import Roughness
     from qdem_fem.load_train import Track, Train, train_record
 
     _refuse_no_folder(arguments.out)
     train = Train(**_given(arguments, "cars", "speed", "axle_load", "first_share"))
-    record = train_record(train, Track(**_given(arguments, "modulus")), arguments.area)
+    track, rough = Track(**_given(arguments, "modulus")), None
+    if arguments.roughness is not None:
+        rough = Roughness(arguments.roughness, **_given(arguments, "seed"))
+    elif arguments.seed is not None:
+        raise UsageError("--seed is that of a roughness", remedy="give --roughness, too")
+    record = train_record(train, track, arguments.area, roughness=rough)
     load_record_write(arguments.out, record)
     print(f"{arguments.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
     return 0

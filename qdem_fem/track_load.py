@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from qdem_fem.load_record import RATE
+from qdem_fem.load_rolling import rolling_forces
+from qdem_fem.load_roughness import Roughness
 from qdem_fem.load_train import Track, Train, seat_share
 from qdem_fem.mesh_checks import FloatArray
 from qdem_fem.scene_series import TimeSeries
@@ -14,13 +16,15 @@ RISE = 0.01
 
 
 def bogie_series(
-    train: Train, track: Track, share: float, lead: float, rest: float, rate: float = RATE
-) -> TimeSeries:
+    train: Train, track: Track, share: float, lead: float, rest: float, rate: float = RATE,
+    roughness: Roughness | None = None,
+) -> TimeSeries:  # fmt: skip
     """Force on the seat of a slice while the first bogie of a train passes [N], (k, 3), down.
 
     The front axle begins ``lead`` [m] before the sleeper and the rear one ends as far behind it,
     then ``rest`` [s] of no load; at both ends the force grows and dies over `RISE` as half a
-    cosine.  ``share``: of a seat's force, what the slice takes of it.
+    cosine.  ``share``: of a seat's force, what the slice takes of it; ``roughness``: what rolling
+    adds to it, too.
     """
     axles = train.axles[:2]
     end = (2 * lead + axles[1]) / train.speed
@@ -28,8 +32,12 @@ def bogie_series(
     front = train.speed * time - lead
     of_wheels = sum(seat_share(front - axle, track) for axle in axles)
     ramp = np.clip(np.minimum(time, end - time) / RISE, 0.0, 1.0)
-    size = share * train.first_share * train.axle_load * of_wheels * (1 - np.cos(np.pi * ramp)) / 2
-    return TimeSeries(time, down(size))
+    force = train.first_share * train.axle_load * of_wheels
+    if roughness is not None:
+        force += rolling_forces(
+            time - lead / train.speed, train.speed, axles, train.wheel_loads[:1], track, roughness
+        )[:, 0]
+    return TimeSeries(time, down(share * force * (1 - np.cos(np.pi * ramp)) / 2))
 
 
 def down(size: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from qdem_fem.contact_scene import ContactTable, PeriodicTable
+from qdem_fem.contact_spheres import SphereContact
 from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
 from qdem_fem.mesh_checks import FloatArray, IntArray
@@ -29,11 +30,8 @@ from qdem_fem.track_bed import (
     SLEEPER,
     Bed,
     BedRecipe,
-    bed_enter,
     bed_prepare,
-    bodies_of_bed,
-    grains_of,
-    sleeper_guide,
+    names_of,
 )
 from qdem_fem.track_bodies import TrackBox
 from qdem_fem.track_table import TrackTable, loads_of, track_faults
@@ -66,6 +64,8 @@ class TrackPrepared(Prepared):
     bed_file: Path
     loads: tuple[TimeSeries, ...]
     """On each rail seat [N], (k, 3)."""
+    stand: dict[str, Any] = field(default_factory=dict)
+    """`qdem_fem.track_stand.Stand` of the bed, and what it is told as; filled by `track_enter`."""
 
     @property
     def load(self) -> TimeSeries:
@@ -148,36 +148,42 @@ def recipe_of(scene: TrackScene) -> BedRecipe:
     )  # fmt: skip
 
 
+def contact_of(prepared: TrackPrepared) -> SphereContact:
+    """Contact of the run: that of the bed, with the scene's own friction, skin and step."""
+    table, recipe = prepared.scene.contact, prepared.recipe
+    assert table is not None
+    every = recipe.contact(names_of(recipe.below + recipe.beside, sleeper=True))
+    contacts = every.contacts if table.contacts is None else table.contacts
+    return replace(every, friction=table.friction, skin=table.skin, contacts=contacts)
+
+
 def track_enter(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     """The simulation of a track in its prepared state, and its bodies by name.
 
-    Fills the meshes, the probes and the load's nodes of ``prepared``.
+    Fills the meshes, the probes and the stand of ``prepared``.  Raises `NotConverged` for a bed
+    that finds no equilibrium or creeps.
     """
-    from dataclasses import replace
-
     from qdem_fem.series import Series
-    from qdem_fem.simulation import Simulation
+    from qdem_fem.track_stand import bed_begin, bed_judge
 
     scene, recipe = prepared.scene, prepared.recipe
-    table = scene.simulation
+    assert isinstance(scene, TrackScene)
+    table, track = scene.simulation, scene.track
     bed = bed_prepare(recipe, prepared.bed_file, table.threads, _Told())
-    bodies = bodies_of_bed(recipe, grains_of(recipe), bed.nodes, rigid=False)
-    assert scene.contact is not None
-    contact = replace(recipe.contact(list(bodies)), friction=scene.contact.friction)
-    if scene.contact.contacts is not None:
-        contact = replace(contact, contacts=scene.contact.contacts)
-    run = Simulation(
-        list(bodies.values()), strain=table.strain, step=table.step, safety=table.safety,
-        gravity=table.gravity, threads=table.threads, mass_scaling=table.mass_scaling,
-        contact=contact,
+    contact = contact_of(prepared)
+    stand = bed_judge(
+        recipe, bed, prepared.bed_file, contact, track.stand, track.creep, table.threads
+    )
+    run, bodies = bed_begin(
+        recipe, bed, contact, strain=table.strain, step=table.step, safety=table.safety,
+        threads=table.threads, mass_scaling=table.mass_scaling,
     )  # fmt: skip
     sleeper = bodies[SLEEPER]
-    sleeper_guide(run, sleeper, upright=False)
     sets = sleeper.mesh.node_sets
     seats = [sets[name] for name in sorted(sets) if name.startswith("seat")]
     for seat, load in zip(seats, prepared.loads, strict=True):
         run.load(sleeper, seat, Series(load.times, load.values))
-    bed_enter(run, bed)
+    prepared.stand.update(asdict(stand), creep=stand.creep, told=stand.told())
     prepared.meshes.update({name: body.mesh for name, body in bodies.items()})
     prepared.probes.update(points_of(recipe, bed, bodies))
     return run, bodies

@@ -11,6 +11,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from qdem_fem.load_roughness import RailKind, Roughness, WheelKind
 from qdem_fem.load_train import Track, Train
 from qdem_fem.scene import MaterialTable, SeriesTable
 from qdem_fem.scene_file import Problem
@@ -24,6 +25,17 @@ LEAST_SHOULDER = 0.1
 """Ballast beyond a free end, at least [m]: room for a grain and what is between."""
 
 
+class RoughnessTable(Table):
+    """Of wheels and rail (`qdem_fem.load_roughness.Roughness`)."""
+
+    rail: RailKind = "smooth"
+    wheel: WheelKind = "disc"
+    seed: Annotated[int, Field(ge=0)] = 1
+    amplitude: NonNegative = 1.0
+    highest: Positive = 2000.0
+    """Frequency up to which there is any [Hz]."""
+
+
 class BogieTable(Table):
     """The first bogie of a train (`qdem_fem.load_train`)."""
 
@@ -35,6 +47,8 @@ class BogieTable(Table):
     """From the front axle to the sleeper at first, from it to the rear axle at last [m]."""
     rest: NonNegative = 0.05
     """Time without load at the end [s]."""
+    roughness: RoughnessTable | None = None
+    """What rolling adds; without it the load has next to nothing above 100 Hz."""
 
 
 class TrackTable(Table):
@@ -74,6 +88,10 @@ class TrackTable(Table):
     kinetic: Share = 0.01
     loose: Share = 0.02
     """Greatest shares of `qdem_fem.kinetic_damping.Rest` that are equilibrium."""
+    stand: Positive = 5e-4
+    """How long the bed is let go without its load, to see whether it stands [s]."""
+    creep: Positive = 0.01
+    """Greatest work of sliders in that time over the energy of springs and elements."""
     patience: Positive = 5.0
     """Simulated time after which a stage of the preparation is given up [s]."""
     pressure: SeriesTable | None = None
@@ -120,7 +138,9 @@ def loads_of(track: TrackTable, folder: Path) -> tuple[TimeSeries, ...]:
     if track.bogie is not None:
         one = track.bogie
         train = Train(cars=1, axle_load=one.axle_load, speed=one.speed)
-        return seats * (bogie_series(train, Track(), share, one.lead, one.rest),)
+        rough = None if one.roughness is None else Roughness(**one.roughness.model_dump())
+        series = bogie_series(train, Track(), share, one.lead, one.rest, roughness=rough)
+        return seats * (series,)
     found: list[TimeSeries] = []
     for name in ("pressure", "pressure_other")[:seats]:
         table = getattr(track, name)

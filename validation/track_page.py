@@ -4,6 +4,8 @@
     python -m validation.track_small SCENE                          what 300 grains cost
     python -m validation.track_stand SCENE [SCENE ...]              whether prepared beds stand
     python -m validation.track_bogie SCENE RUN                      what a bogie does to them
+    python -m validation.track_rolling                              what rough rails add to its load
+    python -m validation.track_packings RUN RUN RUN                 it on several packings
     python -m validation.track_page                                 writes docs/qdem-track.md
 
 The words are in ``track_page.md`` beside this file; every figure in them is looked up, as
@@ -18,6 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from validation.qdem_contact_page import FIGURE, figure_of, table_of
+from validation.track_packings import PACKINGS, packings_text
+from validation.track_rolling import ROLLING, rolling_text
 
 ROOT = Path(__file__).parents[1]
 WORDS = Path(__file__).with_suffix(".md")
@@ -142,6 +146,8 @@ OF_300: dict[str, tuple[Path, Callable[[dict[str, Any]], str]]] = {
     "stand": (STAND, stand_text),
     "small": (SMALL, small_text),
     "bogie": (BOGIE, bogie_text),
+    "rolling": (ROLLING, rolling_text),
+    "packings": (PACKINGS, packings_text),
 }
 """Records of 300 grains and what tells them, by their place in the words."""
 

@@ -226,3 +226,26 @@ def test_a_saved_flight_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     for name in ("displacement", "velocity"):
         assert (getattr(other, name) == getattr(body, name)).all()
     assert again.energy() == run.energy()
+
+
+@pytest.mark.parametrize("precision", ["float64", "float32"])
+def test_a_bodys_field_is_its_part_of_all_and_reads_no_more(
+    precision: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mesh = box_mesh((0.1, 0.1, 0.1), (1, 1, 1))
+    bodies = [q.Body(mesh, q.Material(1e9, 0.2, 2e3), name=name) for name in "abc"]
+    run = q.Simulation(bodies, precision=precision, threads=1)
+    for number, body in enumerate(bodies):
+        body.velocity = np.full((8, 3), 1.0 + number)
+    run.advance(20 * run.step)
+    every = run.assembly.field("displacement")
+    read, counts = type(run.assembly)._read, []
+
+    def spy(assembly: Any, flat: Any, *nodes: slice) -> Any:
+        found = read(assembly, flat, *nodes)
+        counts.append(len(found))
+        return found
+
+    monkeypatch.setattr(type(run.assembly), "_read", spy)
+    assert (bodies[1].displacement == every[8:16]).all()
+    assert counts == [8]

@@ -1,0 +1,137 @@
+"""Whether a prepared bed stands: let go without its load, how much its sliders take.
+
+Kinetic damping stops what moves, so a bed whose contacts lie at Coulomb's limit passes for one at
+rest, and creeps when it is let go.  That hangs on the friction of the run, which may be another
+than the one the bed was prepared with.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.body import Body
+from qdem_fem.contact_sphere_state import SphereContacts
+from qdem_fem.contact_spheres import SphereContact, pair_stiffness
+from qdem_fem.errors import NotConverged, StepWarning
+from qdem_fem.mesh_checks import FloatArray
+from qdem_fem.simulation import Simulation
+from qdem_fem.track_bed import (
+    SLEEPER,
+    Bed,
+    BedRecipe,
+    bed_enter,
+    bed_write,
+    bodies_of_bed,
+    grains_of,
+    sleeper_guide,
+)
+
+NEARLY = 0.99
+"""Of Coulomb's limit, what counts as being there."""
+
+
+@dataclass(frozen=True)
+class Stand:
+    """How a bed stands with the friction of a run."""
+
+    friction: float
+    time: float
+    """Without the load [s]."""
+    pairs: int
+    """Of spheres that touch, at first."""
+    median: float
+    """Of the friction in use at first, ``|F_t|/(mu F_n)`` [-]."""
+    at_limit: float
+    """Share of pairs `NEARLY` at Coulomb's limit, at first [-]."""
+    sinking: float
+    """Of the sleeper [m]."""
+    slid: float
+    """Work of the sliders [J]."""
+    elastic: float
+    """Energy of springs and elements, at first [J]."""
+
+    @property
+    def creep(self) -> float:
+        """Work of sliders over energy of springs and elements [-]."""
+        if self.slid == 0:
+            return 0.0
+        return self.slid / self.elastic if self.elastic > 0 else np.inf
+
+    def told(self) -> str:
+        """In a sentence's words."""
+        return (
+            f"let go for {1e3 * self.time:g} ms with friction {self.friction:g}, its sliders take "
+            f"{self.creep:.2g} of the energy of its springs, and {self.at_limit:.0%} of the pairs "
+            "that touch are at Coulomb's limit"
+        )
+
+
+def mobilised(run: Simulation, recipe: BedRecipe, friction: float) -> FloatArray:
+    """Friction in use ``|F_t|/(mu F_n)`` of each pair that touches [-], (p,).
+
+    ``F_n`` is k_n times the overlap; what else there is of the force is across it.
+    """
+    assert isinstance(run.contacts, SphereContacts)
+    run.contacts.refresh()
+    found = run.contacts.touching()
+    sleeper = np.maximum(found.first, found.second) >= run.first_node[-2]
+    push = found.overlap * np.where(sleeper, pair_stiffness(*recipe.stiffness), recipe.stiffness[0])
+    across = np.sqrt(np.maximum((found.force**2).sum(axis=1) - push**2, 0.0))
+    return np.asarray(across / (friction * push)) if friction > 0 else np.ones_like(push)
+
+
+def bed_begin(
+    recipe: BedRecipe, bed: Bed, contact: SphereContact, **options: Any
+) -> tuple[Simulation, dict[str, Body]]:
+    """A simulation that begins in a prepared bed, and its bodies by name; ``options``: its own."""
+    bodies = bodies_of_bed(recipe, grains_of(recipe), bed.nodes, rigid=False)
+    run = Simulation(list(bodies.values()), gravity=recipe.gravity, contact=contact, **options)
+    sleeper_guide(run, bodies[SLEEPER], upright=False)
+    bed_enter(run, bed)
+    return run, bodies
+
+
+def bed_stand(
+    recipe: BedRecipe, bed: Bed, contact: SphereContact, time: float, threads: int | None = None
+) -> Stand:
+    """Let a bed go without its load for ``time`` [s]; warnings of its step are left to the run."""
+    run, bodies = bed_begin(recipe, bed, contact, threads=threads)
+    used = mobilised(run, recipe, contact.friction)
+    before, energy = bodies[SLEEPER].displacement[:, 2].mean(), run.energy()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)
+        run.advance(time)
+    return Stand(
+        contact.friction, time, len(used), float(np.median(used)) if len(used) else 0.0,
+        at_limit=float((used > NEARLY).sum() / max(len(used), 1)),
+        sinking=float(before - bodies[SLEEPER].displacement[:, 2].mean()),
+        slid=run.energy().friction, elastic=energy.elastic + energy.contact,
+    )  # fmt: skip
+
+
+def bed_judge(
+    recipe: BedRecipe, bed: Bed, path: Path, contact: SphereContact, time: float, creep: float,
+    threads: int | None = None,
+) -> Stand:  # fmt: skip
+    """How the bed in the file ``path`` stands, which keeps the answer; ``creep``: the most allowed.
+
+    Raises `NotConverged` for a bed that creeps more.
+    """
+    key = f"friction {contact.friction:g}, {time:g} s"
+    if key not in bed.stands:
+        stand = bed_stand(recipe, bed, contact, time, threads)
+        bed = replace(bed, stands={**bed.stands, key: asdict(stand)})
+        bed_write(path, recipe, bed)
+    stand = Stand(**bed.stands[key])
+    if not stand.creep <= creep:
+        raise NotConverged(
+            f"the bed creeps: {stand.told()} ({creep:g} asked)", where=str(path),
+            remedy="prepare it with less friction than the run has (track.prepared_friction), or "
+            "allow more (track.creep)",
+        )  # fmt: skip
+    return stand

@@ -1,0 +1,86 @@
+"""What is told of several packings: peaks that are none of noise, what they share, intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from qdem_fem.track_figures import BANDWIDTH, acceleration_spectrum
+from validation.track_packings import (
+    interval,
+    packings_text,
+    peaks_shared,
+    peaks_standing_out,
+    scatter,
+)
+from validation.track_rolling import LEAD, rolling_text
+
+
+def test_noise_has_the_scatter_that_is_asked_of_a_peak() -> None:
+    """Of white accelerations over 0.24 s the level scatters by 4.34 dB/sqrt(b T), whose double is
+    the prominence asked for; a tone in it stands out at its frequency."""
+    time = np.arange(2400) / 1e4
+    random, spread, told = np.random.default_rng(5), [], []
+    for _ in range(20):
+        noise = random.standard_normal(len(time))
+        bumps = np.cumsum(np.cumsum(noise)) / 1e8
+        frequency, size = acceleration_spectrum(time, bumps)
+        inner = (frequency > 200) & (frequency < 900)
+        spread.append(np.std(20 * np.log10(size[inner])))
+        tone = bumps - 0.6 * np.cos(2 * np.pi * 400 * time) / (2 * np.pi * 400) ** 2
+        frequency, size = acceleration_spectrum(time, tone)
+        told.append(peaks_standing_out(frequency, size, scatter(0.24)))
+    assert 2 * np.mean(spread) == pytest.approx(scatter(0.24), rel=0.3)
+    assert all(min(abs(f - 400) for f in one) < BANDWIDTH / 2 for one in told)
+    assert peaks_shared(told) == pytest.approx([400.0], abs=BANDWIDTH / 4)
+
+
+def test_peaks_are_shared_by_all_or_not_told() -> None:
+    assert peaks_shared([[100.0, 300.0], [305.0, 700.0], [295.0]]) == [300.0]
+    assert peaks_shared([[100.0], []]) == []
+    assert peaks_standing_out(np.arange(5.0), np.array([1.0, 1.0, 1.3, 1.0, 1.0]), 3.0) == []
+
+
+def test_interval_is_students() -> None:
+    """Of 1, 2, 3: 2 +- 4.303/sqrt(3); of one, none."""
+    mean, half = interval([1.0, 2.0, 3.0])
+    assert (mean, half) == pytest.approx((2.0, 4.3027 / np.sqrt(3)), rel=1e-4)
+    assert interval([1.0])[0] == 1.0
+    assert np.isnan(interval([1.0])[1])
+
+
+def test_tables_tell_every_run() -> None:
+    run = {
+        "seed": 2, "friction": 0.577, "bogie": {"lead": LEAD}, "bed": {"creep": 2.5e-4},
+        "points": {"B1": {"passages": 2 * [{"greatest": 3e-6, "end": 1e-6}],
+                          "lateral_over_vertical": 0.5}},
+        "energy": {"relative_imbalance": 1e-5}, "cost": {"cpu_s": 700.0}, "prominence": 4.0,
+        "peaks": {"load": [395.0], "S2": [100.0, 400.0], "B2": [44.0]},
+    }  # fmt: skip
+    shifted = {"load": [395.0], "S2": [404.0], "B2": []}
+    other = run | {"seed": 3, "peaks": shifted, "cost": {"cpu_s": 900.0}}
+    record = {
+        "command": "c",
+        "machine": "m",
+        "started": "2026-11-23T00",
+        "runs": {"a": run, "b": other},
+    }
+    text = packings_text(record)
+    assert "| S2 | 100, 400 | 404 | 402 |" in text
+    assert "| peak of S2 near 400 Hz | 402 Hz; the load has one at 395 Hz |" in text
+    assert "| peak of S2 near 100 Hz | none that all share |" in text
+    assert "| lateral motion larger than vertical | B1 0.5 |" in text
+    assert "| processor time [s] | 700 | 900 | 800 |" in text
+    assert "| settlement of B1, first axle, greatest [µm] | 3 | 3 | 3 | ± 0 |" in text
+    assert "| S2 | 100, 400 |  |" in packings_text(record | {"runs": {"a": run}})
+    level = {
+        "contact": [1.0] * 5,
+        "contact_all": 2.0,
+        "seat": [3.0] * 5,
+        "seat_all": [4.0, 5.0, 6.0],
+    }
+    keys = ("receptance_peaks", "force_peaks", "seat_peaks", "both_peaks")
+    found = rolling_text(
+        record | {"load": 5e4, "levels": {"x": level}} | {key: [7.0] for key in keys}
+    )
+    assert "| | on the seat | 3 | 3 | 3 | 3 | 3 | 4 | 5 | 6 |" in found
