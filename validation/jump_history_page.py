@@ -30,7 +30,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "jump-history.md"
 CASES: tuple[tuple[Kind, int, tuple[int, ...]], ...] = (
     (COARSE, 500, (2, 5, 10)),
     (COARSE, 2800, (2, 5, 10, 20)),
-    (CONFINED, 270, (2, 5)),
+    (CONFINED, 500, (2, 5, 10)),
 )
 """Ensemble, last cycle, numbers of equal jumps."""
 FIRST_CYCLE, KAPPA = 0.15, 0.1

@@ -31,8 +31,8 @@ CASES: tuple[tuple[Kind, int, int], ...] = (
     (COARSE, 280, 2800),
     (COARSE, 560, 2800),
     (COARSE, 1400, 2800),
-    (CONFINED, 50, 270),
-    (CONFINED, 100, 270),
+    (CONFINED, 50, 500),
+    (CONFINED, 100, 500),
 )
 """Ensemble, last cycle fitted, cycle predicted."""
 COMPUTED, FAR = 2000, 1_000_000

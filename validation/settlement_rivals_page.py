@@ -245,7 +245,7 @@ def paper_scale(last: int) -> dict[str, str]:
     truth = settlement_of(rows, last)
     return {
         "PAPER_BARS": table_bars(sides_compared(rows, CONFINED, EnsembleRecord()), methods, last),
-        "PAPER_WAY": table_on_the_way(rows, "2 jumps, by history", last),
+        "PAPER_WAY": table_on_the_way(rows, "2 jumps, by history, profile", last),
         "PAPER_RUNS": "; ".join(f"{name} ({count} of {planned})" for name, count in made.items()),
         "PAPER_MEAN": f"{1e6 * truth.mean:.0f}",
         "PAPER_TOTAL": f"{1e6 * settlement_total(rows, last):.0f}",

@@ -23,6 +23,7 @@ COLOURS = {
     "procedure": "#0072B2", "nothing moved": "#E69F00", "law": "#56B4E9", "tolerance": "#0072B2",
     "softer": "#D55E00", "longer step": "#009E73", "frequency": "#CC79A7", "density": "#000000",
     "fewer grains": "#999999", "h = 0": "#999999", "history": "#882255",
+    "history, profile": "#CC6677",
 }  # fmt: skip
 """One a family."""
 TICKS = (2, 5, 10, 20, 50, 100)

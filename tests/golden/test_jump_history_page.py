@@ -55,7 +55,7 @@ def test_a_logarithm_is_met_by_every_way_but_nothing() -> None:
 def test_sentences_of_the_page(found: list[Forecasts]) -> None:
     """Long jumps of the coarse bed: half the last window's error, bias at most a tenth; one slope
     of all cycles scatters least and settles too little on each; on the quiet bed history is as
-    good as the last window within 2 %, and twice as good where a moved bed settles more."""
+    good as the last window within 4 %, and twice as good where a moved bed settles more."""
     for jumps in (2, 5, 10, 20):
         of = {way: errors(found, way, "coarse", jumps, 2800) for way in WAYS}
         assert abs(of["history"].mean()) < 0.1
@@ -72,4 +72,4 @@ def test_sentences_of_the_page(found: list[Forecasts]) -> None:
             if one.moved:
                 assert rms(one.error) > 1.5 * rms(history)
             elif one.kind.name == "confined":
-                assert rms(history) < rms(one.error) + 0.02
+                assert rms(history) < rms(one.error) + 0.04
