@@ -36,6 +36,18 @@ def test_small_entries_are_no_zeros(scale: float) -> None:
     assert not forces_insufficient(friction_problem(w, np.array([-1, 0.3, -1, 0]), 0.3, 2))
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+@pytest.mark.parametrize("light", [1e-9, 1e-10, 1e-11])
+def test_a_light_body_between_heavy_ones_has_a_mass(light: float, mu: float) -> None:
+    """1, m, 1 in a row that close: normal forces stop them as one, ``W_NN`` is regular."""
+    mass = np.array([1.0, light, 1.0])
+    apart = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
+    normal = (apart / mass) @ apart.T
+    w = np.kron(normal, np.eye(2))
+    problem = friction_problem(w, np.kron(apart @ [1.0, 0.3, -0.7], [1.0, 0.4]), mu, 2)
+    assert not forces_insufficient(problem)
+
+
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10**6), dim=st.sampled_from([2, 3]), contacts=st.integers(1, 12))
 def test_no_proof_where_all_can_be_stopped(seed: int, dim: int, contacts: int) -> None:
