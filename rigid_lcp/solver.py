@@ -139,8 +139,9 @@ def solve_auto(
         return trial.solution(
             "no solution",
             "no forces within the cones of friction keep all contacts from approaching (proved by"
-            " a linear programme)\n  -> use impulses: a velocity-level time step, or look for"
-            " contacts that bear on no mass",
+            " a linear programme)\n  -> look for bodies held between others that can not give way"
+            " (a press), or contacts that bear on no mass; where r are forces, use impulses: a"
+            " velocity-level time step",
         )
     if not trial.best.solved and trial.gives_energy:
         return trial.solution(message=ENERGY_GIVEN.format(trial.best.residual))

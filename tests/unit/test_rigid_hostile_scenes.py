@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, box
-from rigid_lcp.errors import Overlapping, RigidError, SceneError, ShapeError, UsageError
+from rigid_lcp.errors import (
+    NotConverged,
+    Overlapping,
+    RigidError,
+    SceneError,
+    ShapeError,
+    UsageError,
+)
 
 BLOCK = Polygon.rectangle(0.2, 0.1)
 
@@ -73,6 +80,16 @@ def test_bodies_that_are_none_are_named(given):
 def test_scenes_that_are_none_are_named(given):
     with pytest.raises(SceneError):
         Scene(**given)
+
+
+def test_a_press_that_does_not_give_way_is_told():
+    """Impulses can not part what two fixed bodies squeeze, and the user has them already."""
+    scene = Scene()
+    scene.add(HalfSpace([0, 1]))
+    scene.add(BLOCK, density=2700, position=(0, 0.05))
+    scene.add(BLOCK, fixed=True, velocity=(0, -1), position=(0, 0.1505))
+    with pytest.raises(NotConverged, match="bodies held between others that can not give way"):
+        Simulation(scene).advance(0.01)
 
 
 @pytest.mark.parametrize(
