@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.contacts import ContactForces
-from rigid_lcp.errors import ShapeError
+from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.motion import Motion
 from rigid_lcp.scene_input import number_in, whole_in
@@ -33,6 +33,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+DUST = 100
+"""Parts of a grain of the start, on average, beyond which grains break without end: without a size
+effect parts under the stress that broke the whole break as well, and their number doubles."""
+
+
 @dataclass(frozen=True)
 class Breakage:
     """When grains break in a run."""
@@ -43,7 +48,8 @@ class Breakage:
     every: int = 20
     """Steps between judgements."""
     smallest: float = 0.0
-    """Volume (2D: area) below which grains do not break [m^3, m^2]."""
+    """Volume (2D: area) below which grains do not break [m^3, m^2]; with zero a run ends with a
+    `SceneError` where grains turn to `DUST`."""
     modulus: float | None = None
     """Weibull's modulus of the size effect, `rigid_lcp.strength.weibull_strength`; None: none."""
     reference_volume: float | None = None
@@ -128,6 +134,18 @@ def breaks(
         if line is not None:
             found.append((int(k), line))
     return found
+
+
+def refuse_dust(breakage: Breakage, movable: int, broken: int, time: float) -> None:
+    """Raise `SceneError` where ``broken`` breaks have made ``movable`` grains, `DUST` of each, at a
+    ``time`` [s], and no smallest volume will end it."""
+    whole = movable - broken
+    if breakage.smallest == 0.0 and movable > DUST * whole:
+        raise SceneError(
+            f"{whole} grains have broken into {movable} parts, which go on to break",
+            where=f"breakage at {time:.6g} s",
+            remedy="give a smallest volume that breaks, or a greater strength",
+        )
 
 
 def scene_broken(scene: Scene, motion: Motion, body: int, line: Break) -> Scene | None:

@@ -11,7 +11,7 @@ from math import ceil, nan
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.breakage import Breakage, Broken, breaks, scene_broken
+from rigid_lcp.breakage import Breakage, Broken, breaks, refuse_dust, scene_broken
 from rigid_lcp.contacts import ContactForces
 from rigid_lcp.errors import NotConverged, Overlapping
 from rigid_lcp.fragmentation import broken_scene
@@ -99,7 +99,8 @@ class Simulation:
         Less than a billionth of a step is none: sums of times differ by so much.
 
         Raises `NotConverged` where a step's forces are not found; the state before it is kept.
-        `UsageError` for a negative time, `SceneError` for loads that are none.
+        `UsageError` for a negative time, `SceneError` for loads that are none, or for grains that
+        break without end.
         """
         seconds = seconds_given(seconds, "the time to go on")
         if seconds <= NO_STEP * self.step:
@@ -206,6 +207,9 @@ class Simulation:
                 if scene_now is not None:
                     part = self._go_on_broken(scene_now, body)
                     self.broken.append(Broken(self.time, body, part, line.tension, line.strength))
+            if found:
+                grains = int(self.world.movable.sum())
+                refuse_dust(self.breakage, grains, len(self.broken), self.time)
 
     def _integrate(self, seconds: float) -> None:
         self.motion, self.contacts = runge_kutta_advance(

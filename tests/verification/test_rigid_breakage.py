@@ -58,6 +58,19 @@ def test_a_pressed_diamond_breaks_at_its_strength(share):
         assert run.broken[0].tension == pytest.approx(tension_of(load), rel=1e-6)
 
 
+def test_grains_that_turn_to_dust_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Far above the strength every part breaks again: told, unless a smallest volume ends it."""
+    monkeypatch.setattr("rigid_lcp.breakage.DUST", 4)
+    with pytest.raises(
+        SceneError, match=r"2 grains have broken into .* parts, which go on to break"
+    ):
+        press(5e3, 10.0).advance(0.02)
+    run = press(5e3, 10.0)
+    run.breakage = Breakage(10.0, every=1, smallest=4e-3)
+    run.advance(5e-3)
+    assert len(run.broken) > 1
+
+
 def test_parts_are_the_whole_and_do_not_burst():
     """Split through both contacts: halves of the mass, at the whole's velocity, touching and not
     overlapping; the next steps bring in no energy but the work of plate and weight."""
