@@ -63,7 +63,6 @@ def stone_3d(random: Generator, diameter: float, corners: int) -> Any:
     """
     from rigid_lcp.shapes_3d import Polyhedron
 
-    corners = max(corners, 4)
     points = random.normal(size=(corners, 3))
     for _ in range(20):
         points /= np.linalg.norm(points, axis=1)[:, None]

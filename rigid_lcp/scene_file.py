@@ -122,7 +122,7 @@ def _override(data: dict[str, Any], override: str) -> None:
         )
     try:
         parsed = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         parsed = value
     here: Any = data
     *tables, last = key.strip().split(".")

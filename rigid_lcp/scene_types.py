@@ -228,6 +228,9 @@ class SceneTables(Table):
         for i, body in enumerate(self.body):
             if body.inertia is not None and (self.dimensions == 3 or body.fixed):
                 raise ValueError(f"body.{i}.inertia: for bodies that move, in 2 dimensions")
+        for i, grains in enumerate(self.grains):
+            if self.dimensions == 3 and grains.corners[0] < 4:
+                raise ValueError(f"grains.{i}.corners: a polyhedron has at least 4")
         if self.run.method == "acceleration" and (self.wear or self.strength):
             raise ValueError("run.method: nothing wears or breaks at acceleration level")
         if self.strength and (self.strength.modulus is None) != (

@@ -139,6 +139,23 @@ def test_a_load_on_nobody_is_refused(tmp_path: Path) -> None:
         scene_read(written(tmp_path, text))
 
 
+def test_stones_in_space_have_four_corners(tmp_path: Path) -> None:
+    """Those asked for with three had four, and nobody was told."""
+    text = """
+    dimensions = 3
+    run.duration = 0.1
+    [[grains]]
+    count = 1
+    size = [0.1, 0.1]
+    corners = [3, 6]
+    density = 1.0
+    region_low = [0, 0, 0]
+    region_high = [1, 1, 1]
+    """
+    with pytest.raises(SceneError, match=r"grains.0.corners: a polyhedron has at least 4"):
+        scene_read(written(tmp_path, text))
+
+
 @pytest.mark.parametrize("override", ["run.step", "=3", "body.7.density=1"])
 def test_bad_overrides_are_usage_errors(tmp_path: Path, override: str) -> None:
     with pytest.raises(UsageError):
