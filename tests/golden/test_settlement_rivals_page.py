@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from validation.same_packing import interval
+from validation.settlement_bars import bias, error_of, error_of_profile, gained_time
 from validation.settlement_rivals import METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
 from validation.settlement_rivals_page import PAGE, page
@@ -66,8 +67,8 @@ def test_sentences_about_moving(rows: list[Row]) -> None:
 
 
 def test_sentences_about_history(rows: list[Row]) -> None:
-    """Next to no attempt fails, two jumps cost two fifths, the mean errs by at most 2 %; behind the
-    seating cycle beds go on as full runs do."""
+    """Next to no attempt fails, two jumps cost two fifths, the mean errs by less than a tenth;
+    behind the seating cycle beds go on as full runs do."""
     lost = {
         family: sum(
             len(row["lost"])
@@ -83,28 +84,31 @@ def test_sentences_about_history(rows: list[Row]) -> None:
     for jumps in (5, 2):
         found = judged(rows, f"{jumps} jumps, by history", LAST, "settlement")
         assert found is not None
-        assert abs(found.mean) < 0.025
-        assert found.half > 0.3
+        assert abs(found.mean) < 0.1
+        assert found.half > 0.25
     twice = finished(rows, "step x 2", LAST)
     assert 0.35 < cost(history) / cost(twice) < 0.45
 
 
 def test_sentences_about_the_paper_scale() -> None:
-    """Packing 2: far behind after the first jump, right at the end; fitted laws miss it by half."""
-    rows = record_read(RECORD_PAPER)
-    truth = {
-        seed: {
-            cycle: float(np.mean([row["settlement"][cycle] for row in reference(rows, LAST)
-                                  if row["seed"] == seed]))
-            for cycle in ("280", "500")
-        }
-        for seed in (1, 2)
-    }  # fmt: skip
-    runs = {row["seed"]: row for row in finished(rows, "2 jumps, by history", LAST)}
-    assert all(row["computed"] == 70 and not row["lost"] for row in runs.values())
-    error = {c: runs[2]["settlement"][c] - truth[2][c] for c in ("280", "500")}
-    assert error["280"] < -40e-6 < 0 < error["500"] < 10e-6
-    assert 0 < runs[1]["settlement"]["500"] - truth[1]["500"] < 10e-6
+    """Two jumps by history: mean, coordination and profile within the bars at four times the gained
+    time; packing 2 is far behind after the first jump and not after the second; no attempt
+    fails; fitted laws miss that packing by half."""
+    rows, name = record_read(RECORD_PAPER), "2 jumps, by history, profile"
+    runs = finished(rows, name, LAST)
+    assert all(row["computed"] == 70 and not row["lost"] for row in runs)
+    assert bias(rows, name, LAST) < 1
+    assert gained_time(rows, name, LAST) > 400
+    assert error_of("coordination")(rows, name, LAST) < 3
+    assert error_of_profile(rows, name, LAST) < 2
+    truth = [row["settlement"] for row in reference(rows, LAST) if row["seed"] == 2]
+    for row in runs:
+        if row["seed"] == 2:
+            before, after = (
+                row["settlement"][cycle] - float(np.mean([one[cycle] for one in truth]))
+                for cycle in ("280", "500")
+            )
+            assert before < -40e-6 < 0 < after < 40e-6
     found = judged(rows, "law log, 20 cycles", LAST, "settlement")
     assert found is not None
     assert found.error[found.seeds.index(2)] < -0.4
