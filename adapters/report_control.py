@@ -24,6 +24,7 @@ def control(record: Record) -> str:
         check = check if decision["action"] == "jump" else {}
         limits = [(name, inf if value is None else value) for name, value in decision["limits"]]
         others = ", ".join(f"{name} {value:.0f}" for name, value in limits if value < 1e6)
+        moved = "moved" if "moved" in decision else "gain"  # the same before they were told apart
         bound = "" if decision["bound"] is None else plain(decision["bound"], "d")
         rows.append(
             (
@@ -33,7 +34,7 @@ def control(record: Record) -> str:
                 plain(decision["window"], "d"),
                 bound,
                 micrometres(decision["gain"]) if decision["jump"] else "",
-                micrometres(decision["moved"]) if decision["jump"] else "",
+                micrometres(decision[moved]) if decision["jump"] else "",
                 micrometres(decision["half_width"]) if decision["jump"] else "",
                 per_cent(check["error"], "+.2f") if check else "",
                 plain(check["deviation"], "+.1f") if check else "",
@@ -48,8 +49,8 @@ def control(record: Record) -> str:
         "sides of the jump; above twice the tolerance the jump is taken back. Jumps taken back: "
         f"{sum(not check['accepted'] for check in checks.values())}."
     )
-    held = [check for check in checks.values() if check["accepted"]]
-    if held:
+    held = [check for check in checks.values() if check["accepted"] and "kappa" in check]
+    if held:  # runs of before this was told apart have none
         definition += paragraph(
             f"Behind its {len(held)} jumps the bed settled by "
             f"{micrometres(sum(check['reseated'] for check in held))} µm more because it was moved "

@@ -218,3 +218,20 @@ def test_jump_that_fails_is_halved(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     rows = run(tmp_path, 120)
     assert lengths[1] == lengths[0] // 2
     assert int(rows[-1]["cycle"]) == 120
+
+
+def test_report_of_a_run_by_an_earlier_version(tmp_path: Path) -> None:
+    """Events that do not say what jumps moved, and what more the bed settled, are told as they are."""
+    run(tmp_path, 120)
+    path = tmp_path / "run" / "events.jsonl"
+    lines = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        event = json.loads(line)
+        for name in ("moved", "made_good", "kappa", "reseated"):
+            event.pop(name, None)
+        lines.append(json.dumps(event) + "\n")
+    path.write_text("".join(lines), encoding="utf-8")
+    report_write(tmp_path / "run")
+    text = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert "Jump control" in text
+    assert "because it was moved (in the" not in text
