@@ -221,7 +221,7 @@ def test_jump_that_fails_is_halved(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_report_of_a_run_by_an_earlier_version(tmp_path: Path) -> None:
-    """Events that do not say what jumps moved, nor what more the bed settled, are told as before."""
+    """Events that do not say what jumps moved, nor what more a bed settled, are told as before."""
     run(tmp_path, 120)
     path = tmp_path / "run" / "events.jsonl"
     lines = []
