@@ -29,8 +29,8 @@ from validation.relaxation_reading import (
     values,
 )
 from validation.relaxation_runs import Row, record_read
-from validation.same_packing import interval
 from validation.same_packing_page import table
+from validation.student import interval
 
 PAGE = Path(__file__).parents[1] / "docs" / "relaxation.md"
 TEXT = Path(__file__).with_suffix(".md")

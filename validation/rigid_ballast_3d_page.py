@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from adapters.run_folder import write_atomically
 from validation.rigid_ballast_3d import SAMPLES
+from validation.student import interval
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "rigid-ballast-3d.md"
@@ -49,15 +49,6 @@ AGAIN = """
 `python -m validation.rigid_ballast_3d --run` goes on where the record stops;
 `python -m validation.rigid_ballast_3d` writes this page from it.
 """
-
-
-def interval(values: Sequence[float]) -> tuple[float, float]:
-    """Mean and half width of its 95 % confidence interval (nan for one value)."""
-    found = np.asarray(values, dtype=float)
-    if len(found) < 2:
-        return float(found.mean()), float("nan")
-    half = student.ppf(0.975, len(found) - 1) * found.std(ddof=1) / len(found) ** 0.5
-    return float(found.mean()), float(half)
 
 
 def by_step(lines: Sequence[Data]) -> dict[float, list[Data]]:

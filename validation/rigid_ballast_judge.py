@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from validation.rigid_ballast_measures import mean_with_interval
+from validation.student import interval
 
 Floats = NDArray[np.float64]
 Row = dict[str, Any]
@@ -129,7 +129,7 @@ def limits_of(rows: Sequence[Row]) -> Limits:
         finest[method] = best[-1]
     ends = {m: last_settlement(runs_of(rows, finest[m])) for m in ("rigid", "soft")}
     both = sorted(ends["rigid"].keys() & ends["soft"].keys())
-    apart = mean_with_interval([ends["rigid"][s] - ends["soft"][s] for s in both])
+    apart = interval([ends["rigid"][s] - ends["soft"][s] for s in both])
     return Limits(finest["rigid"], finest["soft"], ends, *apart)
 
 
@@ -150,13 +150,13 @@ def summaries(rows: Sequence[Row], limits: Limits) -> list[Summary]:
             mine = [runs[seed] for seed in seeds]
             settled = [row["settlement"][-1] for row in mine]
             scale = abs(float(np.mean([reference[s] for s in seeds])))
-            off, wide = mean_with_interval([runs[s]["settlement"][-1] - reference[s]
+            off, wide = interval([runs[s]["settlement"][-1] - reference[s]
                                             for s in seeds])  # fmt: skip
             costs = {seed: row["cpu_s"] for seed, row in zip(seeds, mine, strict=True)}
             found.append(Summary(
-                name, method, mine[0]["level"], len(seeds), *mean_with_interval(settled),
+                name, method, mine[0]["level"], len(seeds), *interval(settled),
                 float(np.median(settled)), np.mean([row["settlement"] for row in mine], axis=0),
-                off / scale, wide / scale, *mean_with_interval(list(costs.values())), costs,
+                off / scale, wide / scale, *interval(list(costs.values())), costs,
                 float(np.mean([row["step_s"] for row in mine])),
                 float(np.median([row["deflection"] for row in mine])),
                 np.mean([row["dissipated"] for row in mine], axis=0),
@@ -178,7 +178,7 @@ def cheapest(found: Sequence[Summary], method: str, most: float, shown: bool) ->
 def cost_ratio(soft: Summary, rigid: Summary) -> tuple[float, float, float]:
     """Cost of soft over that of rigid grains on the same beds: geometric mean and 95 % interval."""
     both = sorted(soft.costs.keys() & rigid.costs.keys())
-    mean, half = mean_with_interval([np.log(soft.costs[s] / rigid.costs[s]) for s in both])
+    mean, half = interval([np.log(soft.costs[s] / rigid.costs[s]) for s in both])
     return float(np.exp(mean)), float(np.exp(mean - half)), float(np.exp(mean + half))
 
 

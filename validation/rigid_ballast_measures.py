@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 Floats = NDArray[np.float64]
 
@@ -27,15 +26,6 @@ def settlement_law(settlement: Floats, kind: str) -> tuple[float, float, float]:
     (a, b), *_ = np.linalg.lstsq(matrix, settlement, rcond=None)
     off = settlement - matrix @ np.array([a, b])
     return float(a), float(b), float(np.sqrt(np.mean(off**2)))
-
-
-def mean_with_interval(values: Sequence[float], confidence: float = 0.95) -> tuple[float, float]:
-    """Mean of independent values and the half width of its confidence interval (Student)."""
-    sample = np.asarray(values, dtype=float)
-    if len(sample) < 2:
-        return float(sample.mean()), float("inf")
-    width = student.ppf(0.5 + 0.5 * confidence, len(sample) - 1)
-    return float(sample.mean()), float(width * sample.std(ddof=1) / np.sqrt(len(sample)))
 
 
 def fabric_of(contacts: dict[str, Any], stones: int, friction: float) -> dict[str, float]:

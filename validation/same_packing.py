@@ -211,14 +211,3 @@ def _edit(way: Way, folder: Path) -> None:
 def differences(figures: Sequence[float], others: Sequence[float]) -> FloatArray:
     """Differences of two ways bed by bed, shape (beds,)."""
     return np.subtract(figures, others)
-
-
-def interval(values: FloatArray, level: float = 0.95) -> tuple[float, float]:
-    """Mean, and half the width of Student's interval of it; nan for a single value."""
-    from scipy.stats import t as student
-
-    count = len(values)
-    if count < 2:
-        return float(np.mean(values)), float("nan")
-    error = float(np.std(values, ddof=1)) / np.sqrt(count)
-    return float(np.mean(values)), float(student.ppf(0.5 + level / 2, count - 1)) * error

@@ -14,7 +14,7 @@ import numpy as np
 
 from adapters.run_folder import write_atomically
 from validation.page_text import page_filled
-from validation.same_packing import CYCLES, SEEDS, WAYS, interval
+from validation.same_packing import CYCLES, SEEDS, WAYS
 from validation.same_packing_reading import (
     ENGINES,
     FIGURES,
@@ -32,6 +32,7 @@ from validation.same_packing_reading import (
     told,
 )
 from validation.same_packing_runs import Row, record_read
+from validation.student import interval
 from validation.tangential_rules import (
     LOOPS,
     force_incremental,

@@ -8,8 +8,9 @@ from itertools import combinations
 import numpy as np
 
 from adapters.state import FloatArray
-from validation.same_packing import WAYS, differences, interval
+from validation.same_packing import WAYS, differences
 from validation.same_packing_runs import Row
+from validation.student import interval
 
 ENGINES = ("liggghts", "lammps", "yade")
 TITLES = {"liggghts": "LIGGGHTS", "lammps": "LAMMPS", "yade": "YADE"}

@@ -13,7 +13,6 @@ import numpy as np
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.page_text import page_filled, table
-from validation.same_packing import interval
 from validation.settlement_bars import (
     settlement_of,
     settlement_total,
@@ -47,6 +46,7 @@ from validation.settlement_rivals_reading import (
 )
 from validation.settlement_rivals_reference import LAWS, law_name
 from validation.settlement_rivals_runs import LAST, MEMBERS, RECORD_PAPER, SEEDS, record_read
+from validation.student import interval
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "settlement-rivals.md"

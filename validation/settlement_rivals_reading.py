@@ -9,10 +9,10 @@ import numpy as np
 
 from adapters.laws import law_named
 from adapters.state import FloatArray
-from validation.same_packing import interval
 from validation.settlement_ensemble_reading import nested, student
 from validation.settlement_rivals import FEWER, GRAINS, Row
 from validation.settlement_rivals_budget import EVERY, JUMPED
+from validation.student import interval
 
 HALF = 10
 """Cycle ends over which the settlement of the budget is averaged, the last of `AFTER`."""

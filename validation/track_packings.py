@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 from scipy.signal import find_peaks
-from scipy.stats import t as student
 
 from qdem_fem.mesh_checks import FloatArray
 from qdem_fem.output import table_read, write_whole
@@ -37,14 +36,13 @@ from qdem_fem.track_figures import (
     mobility,
 )
 from qdem_fem.track_scene import TrackPrepared
+from validation.student import interval
 
 ROOT = Path(__file__).parents[1]
 PACKINGS = ROOT / "validation" / "results" / "track-packings.json"
 PICTURE = ROOT / "docs" / "qdem-track-packings.png"
 APART = 8.0
 """Of the frequencies kept in the record [Hz]."""
-MANY = 15
-"""Peaks beyond which their places say nothing: grains of a bed that gives way answer everywhere."""
 
 
 def scatter(duration: float) -> float:
@@ -70,15 +68,6 @@ def peaks_shared(each: Sequence[Sequence[float]], within: float = BANDWIDTH / 2)
         if len(near) == len(each) and all(abs(f - peak) <= within for f in near):
             found.append(float(np.mean(near)))
     return found
-
-
-def interval(values: Sequence[float]) -> tuple[float, float]:
-    """Mean, and half of Student's 95 % interval of it; not a number for one value."""
-    count = len(values)
-    if count < 2:
-        return float(values[0]), float("nan")
-    half = student.ppf(0.975, count - 1) * np.std(values, ddof=1) / np.sqrt(count)
-    return float(np.mean(values)), float(half)
 
 
 def curves(prepared: TrackPrepared, folder: Path) -> dict[str, tuple[FloatArray, FloatArray]]:
@@ -192,8 +181,6 @@ def packings_text(record: dict[str, Any]) -> str:
         row("creep of the bed without the load", [run["bed"]["creep"] for run in runs], ".1e")
 
     def told(found: Sequence[float]) -> str:
-        if len(found) > MANY:
-            return f"{len(found)} of them"
         return ", ".join(f"{one:.0f}" for one in found) or "none"
 
     lines += [

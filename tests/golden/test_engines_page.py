@@ -7,10 +7,11 @@ import re
 import numpy as np
 import pytest
 
-from validation.same_packing import SEEDS, WAYS, interval
+from validation.same_packing import SEEDS, WAYS
 from validation.same_packing_page import PAGE, failures, loop_energies, page
 from validation.same_packing_reading import ENGINES, PAIRS, by_way, paired, real
 from validation.same_packing_runs import Row, plan, record_read
+from validation.student import interval
 from validation.yade_page import yade_read
 
 

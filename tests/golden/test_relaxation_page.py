@@ -22,7 +22,7 @@ from validation.relaxation_reading import (
 )
 from validation.relaxation_runs import Row, key, record_read
 from validation.relaxation_ways import WAYS, own, rough
-from validation.same_packing import interval
+from validation.student import interval
 
 
 @pytest.fixture(scope="module")

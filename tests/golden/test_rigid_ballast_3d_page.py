@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from validation.rigid_ballast_3d import SAMPLES, STEPS, Data, Study, record_read
-from validation.rigid_ballast_3d_page import PAGE, by_step, differences, interval, page
+from validation.rigid_ballast_3d_page import PAGE, by_step, differences, page
 
 
 def line(sample: int, step: float, end: float, why: str = "") -> Data:
@@ -33,14 +32,6 @@ def test_record_has_every_step_of_every_sample() -> None:
 
 def test_record_is_of_the_bed_as_it_is_now() -> None:
     assert {each["stones"] for each in record_read()} == {Study().stones}
-
-
-def test_interval_is_students() -> None:
-    """Of 1, 2, 3: mean 2, t(0.975, 2) = 4.3027 times 1 / sqrt(3)."""
-    mean, half = interval([1.0, 2.0, 3.0])
-    assert mean == 2.0
-    assert half == pytest.approx(4.30265 / 3**0.5, rel=1e-5)
-    assert np.isnan(interval([1.0])[1])
 
 
 def test_differences_are_taken_sample_by_sample() -> None:

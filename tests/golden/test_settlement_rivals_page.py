@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from validation.same_packing import interval
 from validation.settlement_bars import bias, error_of, error_of_profile, gained_time
 from validation.settlement_rivals import METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
@@ -24,6 +23,7 @@ from validation.settlement_rivals_reading import (
 )
 from validation.settlement_rivals_reference import LAWS, law_name
 from validation.settlement_rivals_runs import LAST, RECORD_PAPER, key, record_read
+from validation.student import interval
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ from validation.rigid_ballast_measures import (
     Floats,
     dissipated,
     fabric_of,
-    mean_with_interval,
     settlement_law,
 )
 
@@ -22,14 +21,6 @@ def test_law_finds_its_own_coefficients(kind: str) -> None:
     a, b, error = settlement_law(settlement, kind)
     assert (a, b) == pytest.approx((1e-3, 2e-4), rel=1e-10)
     assert error < 1e-15
-
-
-def test_interval_is_students() -> None:
-    """1, 2, 3: mean 2, t(0.975, 2) = 4.3027, s = 1, so 4.3027 / sqrt(3)."""
-    mean, half = mean_with_interval([1.0, 2.0, 3.0])
-    assert mean == pytest.approx(2.0)
-    assert half == pytest.approx(4.30265 / np.sqrt(3), rel=1e-5)
-    assert mean_with_interval([1.0])[1] == float("inf")
 
 
 def test_fabric_of_a_column() -> None:

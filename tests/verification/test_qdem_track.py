@@ -25,7 +25,13 @@ from qdem_fem.scene_run import run_dynamic
 from qdem_fem.sleeper_mesh import SleeperShape
 from qdem_fem.track_bed import Bed, BedRecipe, bed_read, bed_write, grains_of
 from qdem_fem.track_bodies import TrackBox, grains_nodes, lattice_loose, sleeper_slice
-from qdem_fem.track_figures import acceleration_spectrum, differences, mobility, peaks_of
+from qdem_fem.track_figures import (
+    acceleration_spectrum,
+    accelerations,
+    mobility,
+    peaks_of,
+    velocities,
+)
 from qdem_fem.track_load import RISE, bogie_series
 from qdem_fem.track_scene import TrackPrepared
 from qdem_fem.track_table import BogieTable, TrackTable
@@ -207,8 +213,10 @@ def test_the_load_of_a_bogie_is_that_of_its_axles_and_begins_and_ends_at_rest() 
 
 def test_accelerations_and_spectra_of_known_motions() -> None:
     time = np.arange(4001) * 1e-4
-    when, velocity, acceleration = differences(time, 3.0 * time**2)
+    when, velocity = velocities(time, 3.0 * time**2)
     assert velocity == pytest.approx(6.0 * when, rel=1e-9)
+    when, acceleration = accelerations(time, 3.0 * time**2)
+    assert when == pytest.approx(time[1:-1])
     assert acceleration == pytest.approx(6.0, rel=1e-6)
     swing = 1e-3 * np.sin(2 * np.pi * 320.0 * time) * np.sin(np.pi * time / 0.4) ** 2
     frequency, size = acceleration_spectrum(time, swing)
@@ -220,6 +228,28 @@ def test_accelerations_and_spectra_of_known_motions() -> None:
     frequency, ratio = mobility(time, 2e-6 * swing, TimeSeries(time, force))
     at = np.argmin(np.abs(frequency - 320.0))  # V = 2 pi f 2e-6 F
     assert ratio[at] == pytest.approx(2 * np.pi * 320.0 * 2e-6, rel=0.02)
+
+
+@pytest.mark.parametrize("samples", [4000, 4001, 4002, 4003])
+@pytest.mark.parametrize("interval", [1e-4, 9.9989e-5, 3e-5])
+def test_mobility_of_a_grain_that_drops_off(samples: int, interval: float) -> None:
+    """A grain that drops by s from one sample to the next has |V| = s at all frequencies, up to the
+    highest; sampled in one interval, it is put right as motion smooth between samples is, so it
+    comes out s / sinc(f dt).  Of the blow J, half-way between samples are J/2, J, J/2:
+    |F| = J (1 + cos(2 pi f dt)).  (Central differences have a zero at the highest frequency, and
+    smoothing spread what it was divided by over all others.)"""
+    from qdem_fem.scene_series import TimeSeries
+
+    time = interval * np.arange(samples)
+    middle, slip, impulse = samples // 2, 2e-5, 3.0
+    force = np.zeros((samples, 3))
+    force[middle - 1 : middle + 1, 2] = impulse / interval  # one sample half-way between them
+    drop = np.where(np.arange(samples) < samples - 1, 0.0, slip)  # in the last interval
+    frequency, ratio = mobility(time, drop, TimeSeries(time, force))
+    assert frequency[-1] > 1000.0 - 1 / (samples * interval) - 1e-6
+    blow = impulse * (1 + np.cos(2 * np.pi * frequency * interval))
+    exact = slip / np.sinc(frequency * interval) / blow
+    assert ratio[5:] == pytest.approx(exact[5:], rel=1e-2)  # 20 Hz see a curved blow
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ import pytest
 
 from qdem_fem.track_figures import BANDWIDTH, acceleration_spectrum
 from validation.track_packings import (
-    interval,
     packings_text,
     peaks_shared,
     peaks_standing_out,
@@ -39,14 +38,6 @@ def test_peaks_are_shared_by_all_or_not_told() -> None:
     assert peaks_shared([[100.0, 300.0], [305.0, 700.0], [295.0]]) == [300.0]
     assert peaks_shared([[100.0], []]) == []
     assert peaks_standing_out(np.arange(5.0), np.array([1.0, 1.0, 1.3, 1.0, 1.0]), 3.0) == []
-
-
-def test_interval_is_students() -> None:
-    """Of 1, 2, 3: 2 +- 4.303/sqrt(3); of one, none."""
-    mean, half = interval([1.0, 2.0, 3.0])
-    assert (mean, half) == pytest.approx((2.0, 4.3027 / np.sqrt(3)), rel=1e-4)
-    assert interval([1.0])[0] == 1.0
-    assert np.isnan(interval([1.0])[1])
 
 
 def test_tables_tell_every_run() -> None:

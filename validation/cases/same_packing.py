@@ -18,19 +18,13 @@ import numpy as np
 from adapters.overlaps import neighbours
 from validation.case import Check
 from validation.cases.engines import engines_present
-from validation.same_packing import (
-    SEEDS,
-    WAYS,
-    Figures,
-    bed_scene,
-    interval,
-    rained,
-)
+from validation.same_packing import SEEDS, WAYS, Figures, bed_scene, rained
 from validation.same_packing import (
     run as run_way,
 )
 from validation.same_packing_reading import FIGURES, JUDGED, LEVEL, by_way, paired
 from validation.same_packing_runs import Row, plan, row_of
+from validation.student import interval
 
 QUICK_CYCLES = 5
 
