@@ -42,7 +42,7 @@ AGAIN = """
 * residual: scale-free natural map of the impulses in a step; asked for: 1e-6.
 * overlap: the greatest of any two bodies at the end of any step, over the mean diameter of a stone.
 * energy gained in a step: the most that kinetic and potential energy grew beyond the work of the
-  load, over the work of the load in the first cycle.  With friction a body that comes to rest
+  load, over the work of the load in all cycles.  With friction a body that comes to rest
   within a step may gain `m (h f/m)^2 / 8`, f its load; what the forces lack of an exact solution
   adds to it.
 
@@ -128,7 +128,7 @@ def _answer(runs: dict[float, list[Data]], step: float, cycles: int) -> str:
 
 def _quality(mine: Sequence[Data], step: float) -> str:
     size = np.mean([line["size"] for line in mine])
-    gained = max(line["gain"] / line["work"][0] for line in mine)
+    gained = max(line["gain"] / sum(line["work"]) for line in mine)
     return (
         f"| {1e3 * step:g} ms | {np.median([line['residual_median'] for line in mine]):.1e} | "
         f"{max(line['residual_99'] for line in mine):.1e} | "

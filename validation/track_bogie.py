@@ -68,6 +68,7 @@ def run_facts(prepared: TrackPrepared, folder: Path) -> dict[str, Any]:
         points[name] = {
             "passages": settlement_at(rows["time"], -z, ends),
             "final": facts[name]["settlement"],
+            "lateral_greatest": float(np.abs(y).max()),
             "lateral_over_vertical": float(np.abs(y).max() / np.abs(z).max()),
         }
     scene = manifest["scene"]

@@ -3,11 +3,13 @@
     trackbed qdem scenes/track-small.toml --run-folder rough-1
     trackbed qdem scenes/track-small.toml --set track.seed=2 --set track.bed=bed-2.npz \
         --run-folder rough-2                                             (and so on)
-    python -m validation.track_packings rough-1 rough-2 rough-3
+    python -m validation.track_packings rough-1 rough-2 rough-3 [--other high-1 high-2 high-3]
 
-Writes ``validation/results/track-packings.json`` and ``docs/qdem-track-packings.png``.  A peak is a
-maximum of a spectrum, smoothed over 20 Hz, that stands out by twice the scatter of such a spectrum
-of noise; packings share it where each has one within 10 Hz.
+``--other``: the same packings at another friction (``--set contact.friction=1.73``), to be compared
+one by one.  Writes ``validation/results/track-packings.json`` and
+``docs/qdem-track-packings.png``.  A peak is a maximum of a spectrum, smoothed over 20 Hz, that
+stands out by twice the scatter of such a spectrum of noise; packings share it where each has one
+within 10 Hz.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import argparse
 import json
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -146,8 +149,32 @@ def beside_paper(runs: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
+def frictions_text(runs: Sequence[dict[str, Any]], other: Sequence[dict[str, Any]]) -> str:
+    """What another friction changes, packing by packing."""
+    low, high = runs[0]["friction"], other[0]["friction"]
+    lines = [
+        f"| quantity [µm] | friction {low:g} | {high:g} | difference | 95 % | less in |",
+        "|---|---|---|---|---|---|",
+    ]
+    measures: dict[str, Callable[[dict[str, Any]], float]] = {
+        "settlement of {}, greatest": lambda point: max(p["greatest"] for p in point["passages"]),
+        "settlement of {} behind both axles": lambda point: point["passages"][-1]["end"],
+        "lateral motion of {}, greatest": lambda point: point["lateral_greatest"],
+    }
+    for (what, told), name in product(measures.items(), runs[0]["points"]):
+        before, after = (
+            1e6 * np.array([told(run["points"][name]) for run in those]) for those in (runs, other)
+        )
+        mean, half = interval(after - before)
+        lines.append(
+            f"| {what.format(name)} | {before.mean():.3g} | {after.mean():.3g} | {mean:+.3g} | "
+            f"± {half:.2g} | {(after < before).sum()} of {len(after)} |"
+        )
+    return "\n".join([*lines, ""])
+
+
 def packings_text(record: dict[str, Any]) -> str:
-    """Means over packings, a row a quantity."""
+    """Means over packings, a row a quantity; below, what another friction changes."""
     runs = list(record["runs"].values())
     first = runs[0]
     count = len(runs)
@@ -195,6 +222,9 @@ def packings_text(record: dict[str, Any]) -> str:
         shared = told(peaks_shared(each)) if count > 1 else ""
         lines.append(f"| {name} | {' | '.join(told(one) for one in each)} | {shared} |")
     lines += ["", "A peak is near where it is within a tenth:", "", *beside_paper(runs)]
+    if other := list(record.get("other", {}).values()):
+        lines += ["", "The same packings and load at another friction:", ""]
+        lines.append(frictions_text(runs, other))
     return "\n".join([*lines, ""])
 
 
@@ -222,13 +252,21 @@ def main() -> None:
     """Read the runs, write the record and the picture."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument("run", type=Path, nargs="+")
-    runs: list[Path] = parser.parse_args().run
-    record = {
-        "command": "python -m validation.track_packings " + " ".join(path.name for path in runs),
+    parser.add_argument("--other", type=Path, nargs="+", default=[])
+    arguments = parser.parse_args()
+    runs, other = arguments.run, arguments.other
+    words = [path.name for path in runs] + ["--other"] * bool(other) + [p.name for p in other]
+    record: dict[str, Any] = {
+        "command": "python -m validation.track_packings " + " ".join(words),
         "machine": machine(),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "runs": {path.name: packing_facts(path) for path in runs},
     }
+    if other:
+        record["other"] = {path.name: packing_facts(path) for path in other}
+        here, there = ([run["seed"] for run in record[key].values()] for key in ("runs", "other"))
+        if here != there:
+            parser.error(f"packings are compared one by one: seeds {here} and {there} differ")
     write_whole(PACKINGS, json.dumps(record, indent=1) + "\n")
     picture(PICTURE, record)
 

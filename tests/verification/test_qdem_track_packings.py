@@ -44,7 +44,7 @@ def test_tables_tell_every_run() -> None:
     run = {
         "seed": 2, "friction": 0.577, "bogie": {"lead": LEAD}, "bed": {"creep": 2.5e-4},
         "points": {"B1": {"passages": 2 * [{"greatest": 3e-6, "end": 1e-6}],
-                          "lateral_over_vertical": 0.5}},
+                          "lateral_greatest": 1.5e-6, "lateral_over_vertical": 0.5}},
         "energy": {"relative_imbalance": 1e-5}, "cost": {"cpu_s": 700.0}, "prominence": 4.0,
         "peaks": {"load": [395.0], "S2": [100.0, 400.0], "B2": [44.0]},
     }  # fmt: skip
@@ -64,6 +64,13 @@ def test_tables_tell_every_run() -> None:
     assert "| processor time [s] | 700 | 900 | 800 |" in text
     assert "| settlement of B1, first axle, greatest [µm] | 3 | 3 | 3 | ± 0 |" in text
     assert "| S2 | 100, 400 |  |" in packings_text(record | {"runs": {"a": run}})
+    assert "another friction" not in text
+    less = {"passages": 2 * [{"greatest": 2e-6, "end": 0.0}], "lateral_greatest": 1e-6}
+    held = {"a": run | {"friction": 1.73, "points": {"B1": less}}}
+    pair = packings_text(record | {"runs": {"a": run}, "other": held})
+    assert "| quantity [µm] | friction 0.577 | 1.73 | difference | 95 % | less in |" in pair
+    assert "| settlement of B1, greatest | 3 | 2 | -1 | ± nan | 1 of 1 |" in pair
+    assert "| lateral motion of B1, greatest | 1.5 | 1 | -0.5 |" in pair
     level = {
         "contact": [1.0] * 5,
         "contact_all": 2.0,
