@@ -80,9 +80,8 @@ def page(lines: Sequence[Data]) -> str:
     cycles = max(len(line["settlement"]) for line in lines)
     parts = [
         HEAD,
-        f"{first['stones']} stones, {len({line['sample'] for line in lines})} samples of "
-        f"{SAMPLES} so far, "
-        f"{cycles} cycles.  Machine: {first['machine']}; commit {first['commit'] or 'unknown'}.\n",
+        f"{first['stones']} stones, {len({line['sample'] for line in lines})} of {SAMPLES} "
+        f"samples, {cycles} cycles.  Machine: {first['machine']}; commit {first['commit'] or 'unknown'}.\n",
         "![settlement against cycles, and difference against cost](rigid-ballast-3d.png)\n",
         "![force chains under the block](rigid-ballast-3d-chains.png)\n",
         "Force chains in `scenes/sleeper-3d.toml` under the block, seen from the side: width by "
@@ -172,7 +171,7 @@ def _verdict(runs: dict[float, list[Data]]) -> str:
 def plot_write(lines: Sequence[Data], path: Path = PLOT) -> None:
     """Settlement against cycles, and difference from the finest step against cost."""
     from matplotlib.figure import Figure
-    from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     runs = {step: mine for step, mine in by_step(lines).items() if mine}
     figure = Figure(figsize=(9.0, 3.9), layout="constrained")
@@ -199,7 +198,7 @@ def plot_write(lines: Sequence[Data], path: Path = PLOT) -> None:
         xlabel="CPU time a cycle [s], one thread",
         ylabel=f"difference from {1e3 * min(runs):g} ms [mm]",
     )  # fmt: skip
-    left.yaxis.set_major_formatter(ScalarFormatter())
+    left.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     left.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     left.yaxis.set_minor_formatter(NullFormatter())
     left.set_title("each sample (thin) and their mean", fontsize=10, loc="left")
