@@ -81,7 +81,8 @@ def page(lines: Sequence[Data]) -> str:
     parts = [
         HEAD,
         f"{first['stones']} stones, {len({line['sample'] for line in lines})} of {SAMPLES} "
-        f"samples, {cycles} cycles.  Machine: {first['machine']}; commit {first['commit'] or 'unknown'}.\n",
+        f"samples, {cycles} cycles.  Machine: {first['machine']}; "
+        f"commit {first['commit'] or 'unknown'}.\n",
         "![settlement against cycles, and difference against cost](rigid-ballast-3d.png)\n",
         "![force chains under the block](rigid-ballast-3d-chains.png)\n",
         "Force chains in `scenes/sleeper-3d.toml` under the block, seen from the side: width by "
