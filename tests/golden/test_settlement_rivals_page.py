@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import f as fisher
 
-from validation.settlement_bars import bias, error_of, error_of_profile, gained_time
+from validation.settlement_bars import bias, error_of, error_of_profile, gained_time, spread
 from validation.settlement_rivals import METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
 from validation.settlement_rivals_page import PAGE, page
@@ -47,6 +48,24 @@ def test_record_holds_what_the_study_names(rows: list[Row]) -> None:
     assert rivals <= {method.name for method in METHODS}
     assert {row["method"] for row in rows if row["part"] == "budget"} <= {p.name for p in PARTS}
     assert all(row["last"] == LAST for row in rows if row["part"] != "budget")
+
+
+def test_what_six_runs_can_tell_at_paper_scale() -> None:
+    """Spread and deflection miss their bars by less than six runs can show.
+
+    F(n - 1, n - 1) of the squared ratio of two spreads; 1.3 is beyond its 95 % where n is forty.
+    """
+    rows, way = record_read(RECORD_PAPER), "2 jumps, by history, profile"
+    assert len(finished(rows, way, LAST)) == len(reference(rows, LAST)) == 6
+    ratio = spread(rows, way, LAST)
+    assert ratio == pytest.approx(1.4, abs=0.05)
+    assert fisher.sf(ratio**2, 5, 5) == pytest.approx(0.25, abs=0.03)
+    assert fisher.ppf(0.95, 34, 34) > 1.3**2 > fisher.ppf(0.95, 44, 44)
+    found = judged(rows, way, LAST, "deflection")
+    assert found is not None
+    assert 100 * found.error == pytest.approx([-0.2, 1.2, 5.9], abs=0.05)
+    assert 100 * found.mean == pytest.approx(2.3, abs=0.05)
+    assert 100 * found.half == pytest.approx(8.0, abs=0.3)
 
 
 def test_sentences_about_moving(rows: list[Row]) -> None:
