@@ -43,7 +43,8 @@ counts it); there is no proof: read ``status`` and ``residual``.
 
 Cost: hundreds of sweeps or some factorisations; the interior point takes some 20 a path.  In 3D
 their fill grows fast: where one costs as much as a hundred sweeps (3D packings above some 3,000
-contacts), thousands of sweeps go first.
+contacts), thousands of sweeps go first, then a few proximal points, and a path of the interior
+point without its tail (`dear_path`).
 """
 
 from __future__ import annotations
@@ -59,7 +60,13 @@ from rigid_lcp.frictionless import frictionless
 from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
 from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
 from rigid_lcp.smoothed_path import smoothed_path
-from rigid_lcp.solver_cold import CONVEX_CONTACTS, convex_start
+from rigid_lcp.solver_cold import (
+    BENT_USEFUL,
+    CONVEX_CONTACTS,
+    CONVEX_STEPS,
+    NEWTON_PATIENCE,
+    convex_start,
+)
 from rigid_lcp.solver_trial import ENDLESS, FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
 from rigid_lcp.solver_turns import by_turns, from_path, turns_from_paths
 from rigid_lcp.solver_warm import deep, yielding
@@ -81,8 +88,8 @@ in motion; where there are more contacts, news need more sweeps to get through t
 FIRST_SWEEPS = 1000
 """What is spent where the first try was too short."""
 LAST_SWEEPS = 2000
-DEAR_SWEEPS = 6000
-"""What is spent before a factorisation that is dear."""
+DEAR_SWEEPS, DEAR_STEPS = 6000, 40
+"""What is spent before a factorisation that is dear; steps of a path of such ones."""
 FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
 """What the paths of the interior point may cost in all before no further one is begun: so many
 times what was spent before them, or so many flops (some seconds) if that is more."""
@@ -151,11 +158,27 @@ def attempts(
             return trial
     if trial.best.residual <= accept and not small:
         return trial
+    if cold and trial.dear and not small and dear_path(trial):
+        return trial
     if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
         return trial
     if paths and not (by_friction and friction_steps(trial)):
         fallback_paths(trial, accept)
     return trial
+
+
+def dear_path(trial: Trial) -> bool:
+    """Where factorisations are dear: a path of the interior point and a few steps of Newton, which
+    end many static beds in 30 factorisations or not at all."""
+    found = trial.keep(
+        interior_point(
+            trial.problem, None, max(HAND_OVER, trial.tolerance), PATHS[0][0],
+            linear=trial.linear, iterations=min(DEAR_STEPS, trial.affordable),
+        )
+    )  # fmt: skip
+    if found.residual <= BENT_USEFUL:
+        trial.newton(found.r, CONVEX_STEPS + 1, found.method, NEWTON_PATIENCE)
+    return trial.best.solved
 
 
 def friction_steps(trial: Trial) -> bool:

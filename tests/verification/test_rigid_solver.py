@@ -20,7 +20,7 @@ from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.problem_files import read_problem
 from rigid_lcp.solver import solve_auto
 from rigid_lcp.solver_cold import CONVEX_STEPS
-from rigid_lcp.solver_order import friction_steps
+from rigid_lcp.solver_order import DEAR_STEPS, dear_path, friction_steps
 from rigid_lcp.solver_trial import Trial
 from validation.rigid_packings import packing
 
@@ -212,6 +212,22 @@ def random_problem(contacts: int, rank: int, friction: float, seed: int) -> Fric
     g = np.random.default_rng(seed)
     b = g.standard_normal((3 * contacts, rank))
     return friction_problem(b @ b.T, g.standard_normal(3 * contacts), friction, 3)
+
+
+def test_a_path_of_dear_factorisations_ends_a_static_bed_or_stops(monkeypatch):
+    """From nothing to round-off in so few factorisations; where it comes to nothing, no tail.
+
+    The bed that led to it (1,500 spheres) is in docs/rigid-solvers.md; it takes 6 s.
+    """
+    problem = packing(60, 3, seed=3, friction=0.5)
+    trial = Trial(problem, None, 1e-12)
+    assert dear_path(trial)
+    assert problem.residual(trial.best.r) <= 1e-12
+    assert trial.work["factorisations"] <= DEAR_STEPS + CONVEX_STEPS + 1
+    monkeypatch.setattr("rigid_lcp.solver_order.DEAR_STEPS", 3)
+    trial = Trial(problem, None, 1e-12)
+    assert not dear_path(trial)
+    assert trial.work["factorisations"] <= 5
 
 
 def test_where_a_proof_is_at_hand_no_path_is_tried():
