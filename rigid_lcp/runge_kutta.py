@@ -230,11 +230,18 @@ def _travel_limit(world: World, motion: Motion) -> float:
 
 
 def lasting_keys(first: Rate, last: Rate) -> tuple[Ints, Ints]:
-    """Keys of contacts that press at the first and last stage; of those that stick at both."""
+    """Keys of contacts that press at the first and last stage; of those that stick at both.
+
+    Contacts that took the place of others on the way (`successors`) have no first stage.
+    """
     pressed, stuck = [], []
     for rate in (first, last):
         normal, tangential = rate.force[:, 0], np.linalg.norm(rate.force[:, 1:], axis=1)
         below = tangential < rate.contacts.friction * normal * (1 - 1e-9)
         pressed.append(rate.contacts.key[normal > 0])
         stuck.append(rate.contacts.key[(normal > 0) & below])
-    return np.intersect1d(pressed[0], pressed[1]), np.intersect1d(stuck[0], stuck[1])
+    new = np.setdiff1d(last.contacts.key, first.contacts.key)
+    return (
+        np.intersect1d(np.union1d(pressed[0], new), pressed[1]),
+        np.intersect1d(np.union1d(stuck[0], new), stuck[1]),
+    )
