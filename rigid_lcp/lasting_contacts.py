@@ -158,11 +158,19 @@ def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, bo
     return motion_with_rates(motion, rates), True
 
 
-def share_until_rest(world: World, after: Motion, lasting: Lasting) -> float:
-    """Share of the step after which the first sliding contact came to rest; 1 if none did."""
+def share_until_rest(
+    world: World, motion: Motion, after: Motion, h: float, lasting: Lasting
+) -> float:
+    """Share of a step of ``h`` [s], from ``motion`` to ``after``, at which a first sliding contact
+    came to rest; 1 if none did.
+
+    Those that have opened since are looked at too: near Painleve's limit friction that went on
+    beyond rest would throw the bodies apart.
+    """
     if not lasting.sliding.any():
         return 1.0
-    found = world.contacts(after, DRIFT * world.length)
+    reach = travel(world, motion, h) + travel(world, after, h) + DRIFT * world.length
+    found = world.contacts(after, reach)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     there &= lasting.sliding & (lasting.contacts.friction > 0)
     if not there.any():

@@ -273,6 +273,26 @@ def test_nothing_jumps_over_another() -> None:
     assert run.velocities[0, 1] == pytest.approx(100)
 
 
+@pytest.mark.parametrize("below", [1e-6, 1e-2])
+def test_just_below_painleves_limit_the_tip_stops_at_once(below: float) -> None:
+    """Forces of 1/below times the weight stop the tip in far less than a step, whatever its length.
+
+    In the limit an impulse p along n and mu p against the slip: with W of a slender rod of mass 1,
+    ``p = v / (mu W_tt - |W_nt|) = 0.3 v`` at tan(lean) = 2, mu = 4/3.  Friction that went on in its
+    direction beyond rest threw the rod off with up to 4e8 times its energy; and a step that went
+    on where the rod would have turned met states without forces, which it does not come to.
+    """
+    limit = sliding_rod_limit(sliding_rod(1.0, method="acceleration"))
+    runs = [sliding_rod((1 - below) * limit, method="acceleration", step=h) for h in (1e-2, 1e-3)]
+    for run in runs:
+        energy = run.energy
+        run.advance(1e-2)
+        assert run.energy < energy
+        # g t of the fall, and the turn of the rod by w t = 0.02
+        np.testing.assert_allclose(run.velocities[0], [-0.6, 0.3], atol=0.03)
+    np.testing.assert_allclose(runs[0].velocities, runs[1].velocities, atol=1e-6)
+
+
 def test_painleve() -> None:
     """Below its limit the sliding rod has forces; above it none, and impulses go on."""
     limit = sliding_rod_limit(sliding_rod(1.0, method="acceleration"))
