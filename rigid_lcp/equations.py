@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from rigid_lcp.contacts import Contacts, contact_frames
-from rigid_lcp.edge_normals import edge_acceleration
+from rigid_lcp.edge_normals import edge_acceleration, edge_normal_rate
 from rigid_lcp.friction_problem import BodySpace
 from rigid_lcp.motion import Motion
 
@@ -95,9 +95,13 @@ def inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
         curved b:  n . (c_a'' - c_b'') + |tangential part of c_a' - c_b'|^2 / |c_a - c_b|
         flat b:    n . (c_a'' - c_b'') + 2 (w_b x n) . (c_a' - c_b')
 
-    where in the second c_b is the point of body b at c_a.  Tangential, while the contact lasts
-    (gap and gap rate zero): ``t . (c_a'' - c_b'')`` with c_b at the contact point of a flat b.
-    In 3D, at edges, see `rigid_lcp.edge_normals`.
+    where in the second c_b is the point of body b at c_a.  Tangential, as the contact point c goes
+    on with ``c' = c_a' - R_a n'`` over both surfaces (a ball rolls) and not with either of them:
+
+        t . (w_a x (c' - v_a) - w_b x (c' - v_b))
+
+    In 3D, at edges, see `rigid_lcp.edge_normals`; crossing edges that slide along each other are
+    taken to slide along b's, which matters to no force: friction then has the velocity's direction.
     """
     frames = contact_frames(contacts.normal)
     n = contacts.normal
@@ -116,25 +120,32 @@ def inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
     turning = _turned(_spin_of(contacts.body_b, motion), n)
     normal = (n * (pull_a - _centripetal(contacts.body_b, motion, carrier_b))).sum(axis=1)
     normal += np.where(flat, 2 * (turning * moving).sum(axis=1), curved)
-    under = np.where(flat[:, None], face, carrier_b)
-    pull = pull_a - _centripetal(contacts.body_b, motion, under)
+    normal_rate = np.where(
+        flat[:, None], turning, along / np.where(flat | (apart <= 0), 1.0, apart)[:, None]
+    )
+    edges = np.flatnonzero(np.any(contacts.edge_b != 0, axis=1))
+    if len(edges):
+        normal[edges], normal_rate[edges] = _across_edges(contacts[edges], motion)
+    point_rate = _point_velocities(contacts, motion, contacts.body_a, carrier_a)
+    point_rate -= contacts.radius_a[:, None] * normal_rate
+    pull = _turned(
+        _spin_of(contacts.body_a, motion), point_rate - motion.velocity[contacts.body_a]
+    ) - _turned(_spin_of(contacts.body_b, motion), point_rate - motion.velocity[contacts.body_b])
     result = np.einsum("cij,cj->ci", frames, pull)
     result[:, 0] = normal
-    if motion.dim == 3:
-        edges = np.flatnonzero(np.any(contacts.edge_b != 0, axis=1))
-        result[edges, 0] = _across_edges(contacts[edges], motion)
     return result
 
 
-def _across_edges(contacts: Contacts, motion: Motion) -> Floats:
-    """Normal part for contacts at an edge of b, (nc,)."""
+def _across_edges(contacts: Contacts, motion: Motion) -> tuple[Floats, Floats]:
+    """Normal part (nc,) and ``n'`` (nc, 3) for contacts at an edge of b."""
     a, b = contacts.body_a, contacts.body_b
     carrier = contacts.point + contacts.radius_a[:, None] * contacts.normal
     foot = contacts.point - contacts.gap[:, None] * contacts.normal
     velocity = _point_velocities(contacts, motion, a, carrier)
     velocity -= _point_velocities(contacts, motion, b, foot)
     pull = _centripetal(a, motion, carrier) - _centripetal(b, motion, foot)
-    return edge_acceleration(contacts, _spin_of(a, motion), _spin_of(b, motion), velocity, pull)
+    turns = _spin_of(a, motion), _spin_of(b, motion), velocity
+    return edge_acceleration(contacts, *turns, pull), edge_normal_rate(contacts, *turns)
 
 
 def _spin_of(bodies: Ints, motion: Motion) -> Floats:

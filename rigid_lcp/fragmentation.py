@@ -200,15 +200,15 @@ def _parts_2d(body: Body, point: ArrayLike, direction: ArrayLike) -> tuple[Body,
 
     angle = float(body.angle[0])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    world = body.shape.vertices @ turn.T + body.position
+    # about the body's own place: far from the origin its corners would lose digits, and it mass
     parts, _ = fragment(
-        world, point, direction, density=body.mass / body.shape.area,
-        velocity=body.velocity, spin=float(body.spin[0]),
+        body.shape.vertices @ turn.T, _numbers(point, "point") - body.position, direction,
+        density=body.mass / body.shape.area, velocity=body.velocity, spin=float(body.spin[0]),
     )  # fmt: skip
     made = [
         replace(
             body, shape=Polygon(each.vertices), mass=each.mass, inertia=each.inertia,
-            position=each.position, angle=np.zeros(1), velocity=each.velocity,
+            position=body.position + each.position, angle=np.zeros(1), velocity=each.velocity,
         )
         for each in parts
     ]  # fmt: skip

@@ -78,12 +78,35 @@ def contacts_again(
         return lasting.contacts, lasting.slip
     found = world.contacts(motion, travel(world, motion, h) + 10 * TOUCH * world.length)
     rows, there = contact_rows(found.key, lasting.contacts.key)
-    contacts, slip = found[rows[there]], lasting.slip[there]
+    now, before = rows[there], np.flatnonzero(there)
+    if not there.all():
+        taken, lost = successors(found, lasting.contacts, there, DRIFT * world.length)
+        now, before = np.concatenate([now, taken]), np.concatenate([before, lost])
+    contacts = found[now]
+    slip = slip_carried(lasting, before, contacts)
     if motion.dim == 3:  # the direction turns with the velocity, until that has reversed
-        slip = slip_carried(lasting, there, contacts)
-        now = relative_velocity(contacts, motion)[:, 1:]
-        slip = np.where(((now * slip).sum(axis=1) > 0)[:, None], now, slip)
+        now_slip = relative_velocity(contacts, motion)[:, 1:]
+        slip = np.where(((now_slip * slip).sum(axis=1) > 0)[:, None], now_slip, slip)
     return contacts, slip
+
+
+def successors(
+    found: Contacts, contacts: Contacts, there: Bools, within: float
+) -> tuple[Ints, Ints]:
+    """Rows of ``found`` that bear what ``contacts`` not ``there`` any more bore, and rows of those.
+
+    Where a corner slides off a face, the corner of that face comes to bear on the other: new
+    contacts of the same two bodies, with gaps ``within`` [m].  Their forces go on as they were.
+    """
+    new = np.flatnonzero((found.gap <= within) & ~np.isin(found.key, contacts.key))
+    lost = np.flatnonzero(~there)
+    pairs = [
+        np.sort(np.column_stack([each.body_a, each.body_b])[rows], axis=1)
+        for each, rows in ((found, new), (contacts, lost))
+    ]
+    same = (pairs[0][:, None] == pairs[1][None]).all(axis=2)
+    takes = same.any(axis=1)
+    return new[takes], lost[np.argmax(same[takes], axis=1)]
 
 
 def travel(world: World, motion: Motion, h: float) -> Floats:
@@ -94,13 +117,15 @@ def travel(world: World, motion: Motion, h: float) -> Floats:
     )
 
 
-def slip_carried(lasting: Lasting, rows: Bools, contacts: Contacts) -> Floats:
+def slip_carried(lasting: Lasting, rows: Bools | Ints, contacts: Contacts) -> Floats:
     """Slips of the lasting contacts ``rows`` in the tangents of the same ``contacts`` now.
 
-    The tangents of a contact jump where its normal passes the axis they are made from.
+    The tangents of a contact jump where its normal passes the axis they are made from, and where
+    its two bodies have changed places.
     """
     then = contact_tangents(lasting.contacts.normal[rows])
     vector = np.einsum("cij,ci->cj", then, lasting.slip[rows])
+    vector[contacts.body_a != lasting.contacts.body_a[rows]] *= -1.0
     return np.einsum("cij,cj->ci", contact_tangents(contacts.normal), vector)
 
 
@@ -133,11 +158,19 @@ def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, bo
     return motion_with_rates(motion, rates), True
 
 
-def share_until_rest(world: World, after: Motion, lasting: Lasting) -> float:
-    """Share of the step after which the first sliding contact came to rest; 1 if none did."""
+def share_until_rest(
+    world: World, motion: Motion, after: Motion, h: float, lasting: Lasting
+) -> float:
+    """Share of a step of ``h`` [s], from ``motion`` to ``after``, at which a first sliding contact
+    came to rest; 1 if none did.
+
+    Those that have opened since are looked at too: near Painleve's limit friction that went on
+    beyond rest would throw the bodies apart.
+    """
     if not lasting.sliding.any():
         return 1.0
-    found = world.contacts(after, DRIFT * world.length)
+    reach = travel(world, motion, h) + travel(world, after, h) + DRIFT * world.length
+    found = world.contacts(after, reach)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     there &= lasting.sliding & (lasting.contacts.friction > 0)
     if not there.any():

@@ -119,8 +119,10 @@ def impulses_in_turn(bodies: BodySpace, closing: Closing, solve: Solve) -> Impul
     """Impulses of all rounds.
 
     At restitution 1 the velocities at the midpoint, on which an impulse works, are then opposite
-    before and after it, and its work is none.
+    before and after it, and its work is none: before are those of the start of the step with the
+    impulses of earlier rounds, and not yet what loads and turning add within the step.
     """
+    within = closing.offset[:, 0] - closing.before
     least = ROUND_OFF * float(np.abs(closing.offset).max(initial=0.0))
     now = replace(closing, slow=max(closing.slow, least))
     impulse = np.zeros_like(now.offset)
@@ -142,5 +144,5 @@ def impulses_in_turn(bodies: BodySpace, closing: Closing, solve: Solve) -> Impul
         if last:
             break
         closed = np.where(bounce, np.minimum(now.gap, 0.0), now.gap)
-        now = replace(now, gap=closed, offset=velocity, before=velocity[:, 0] - 2.0 * now.turning)
+        now = replace(now, gap=closed, offset=velocity, before=velocity[:, 0] - within)
     return Impulses(impulse, velocity, worst, message)

@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from rigid_lcp.acceleration_forces import forces_found
 from rigid_lcp.contacts import ContactForces, Contacts
 from rigid_lcp.equations import body_space, contact_offset
-from rigid_lcp.errors import NotConverged, Overlapping
+from rigid_lcp.errors import NoSolution, NotConverged, Overlapping
 from rigid_lcp.lasting_contacts import (
     OVERLAP,
     Lasting,
@@ -60,6 +60,8 @@ MOST_STEPS = 10_000_000
 """Steps that one call may take: what moves too fast for its size would never end."""
 LOCATED = 8
 """Times that the end of one step is located; then it is halved as in section 9."""
+NO_FORCES = 1e-6
+"""Step, as a share of the longest one, at which a state without finite forces is taken for one."""
 TRAVEL = 0.25
 """Way a body may go in one step, in sizes of the smallest body: nothing jumps over another."""
 
@@ -80,7 +82,8 @@ class Pace:
     halved: int = 0
     """Steps taken back because bodies overlapped."""
     shortened: int = 0
-    """Steps taken back because a sliding contact came to rest within them."""
+    """Steps taken back because a sliding contact came to rest within them, bodies went too far, or
+    a stage had no forces."""
     collisions: int = 0
     worst_residual: float = 0.0
     steps_above: int = 0
@@ -125,11 +128,19 @@ def runge_kutta_advance(
         tried, located = pace.step, 0
         while True:
             h = min(tried, end - time, _travel_limit(world, motion))
-            rates, after = runge_kutta_step(world, motion, time, h, lasting, loads, tolerance)
+            try:
+                rates, after = runge_kutta_step(world, motion, time, h, lasting, loads, tolerance)
+            except NoSolution:  # of a stage, perhaps, that the motion does not come to
+                if h < NO_FORCES * pace.longest:
+                    raise
+                tried = h / 2
+                pace.shortened += 1
+                continue
             first, last = rates[0], rates[-1]
             pressed, stuck = lasting_keys(first, last)
             overlap = overlap_beyond(world, after, pressed)
-            stop = share_until_rest(world, after, lasting)
+            stop = share_until_rest(world, motion, after, h, lasting)
+            far = _travel_limit(world, after)
             if overlap > OVERLAP * world.length:
                 share = None
                 if pace.locating and located < LOCATED:
@@ -140,6 +151,9 @@ def runge_kutta_advance(
                 pace.halved += 1
             elif stop < 1.0:
                 tried = h * stop
+                pace.shortened += 1
+            elif far < 0.5 * h:  # by even acceleration the way is half of what the end's speed has
+                tried = min(0.5, np.sqrt(2 * far / h)) * h
                 pace.shortened += 1
             else:
                 break
@@ -230,11 +244,18 @@ def _travel_limit(world: World, motion: Motion) -> float:
 
 
 def lasting_keys(first: Rate, last: Rate) -> tuple[Ints, Ints]:
-    """Keys of contacts that press at the first and last stage; of those that stick at both."""
+    """Keys of contacts that press at the first and last stage; of those that stick at both.
+
+    Contacts that took the place of others on the way (`successors`) have no first stage.
+    """
     pressed, stuck = [], []
     for rate in (first, last):
         normal, tangential = rate.force[:, 0], np.linalg.norm(rate.force[:, 1:], axis=1)
         below = tangential < rate.contacts.friction * normal * (1 - 1e-9)
         pressed.append(rate.contacts.key[normal > 0])
         stuck.append(rate.contacts.key[(normal > 0) & below])
-    return np.intersect1d(pressed[0], pressed[1]), np.intersect1d(stuck[0], stuck[1])
+    new = np.setdiff1d(last.contacts.key, first.contacts.key)
+    return (
+        np.intersect1d(np.union1d(pressed[0], new), pressed[1]),
+        np.intersect1d(np.union1d(stuck[0], new), stuck[1]),
+    )

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
+from rigid_lcp.contacts import Contacts, contact_frames
 from rigid_lcp.detection_3d import detect_3d, shapes_3d
 from rigid_lcp.equations import inertial_acceleration, relative_velocity
 from rigid_lcp.motion import Motion, motion_displaced
@@ -14,6 +16,8 @@ from rigid_lcp.rotations import quaternion_of_rotation, quaternion_product, rota
 from rigid_lcp.shapes_2d import HalfSpace
 from rigid_lcp.shapes_3d import Sphere
 from tests.rigid_solids import CUBE, UPRIGHT, contacts, near_pair
+
+Floats = NDArray[np.float64]
 
 
 @settings(max_examples=40, deadline=None)
@@ -123,3 +127,56 @@ def test_inertial_terms_at_edges(seed: int, form: str) -> None:
     assert second == pytest.approx(exact, abs=1e-5, rel=1e-5)
     rate = relative_velocity(found, motion)[0, 0]
     assert (gaps[2] - gaps[0]) / (2 * h) == pytest.approx(rate, abs=1e-5)
+
+
+ON_EDGE = quaternion_of_rotation([np.pi / 4, 0.0, 0.0])
+TOUCHING = {  # shapes of a and b, how they are turned, where a is; b is at the origin
+    "ball on face": (Sphere(0.4), CUBE, UPRIGHT, UPRIGHT, [0.1, -0.2, 0.9]),
+    "ball on ball": (Sphere(0.4), Sphere(0.7), UPRIGHT, UPRIGHT, [0.3, -0.4, 1.0]),
+    "ball on edge": (Sphere(0.4), CUBE, UPRIGHT, ON_EDGE, [0.1, 0.1, 1.1]),
+    "ball on corner": (Sphere(0.4), CUBE, UPRIGHT, UPRIGHT, [0.7, 0.8, 0.75]),
+    "ball on plane": (Sphere(0.4), HalfSpace([0.1, 0.2, 1.0]), UPRIGHT, UPRIGHT, [0.0, 0, 0.42]),
+    "corner on face": (
+        CUBE, CUBE, quaternion_of_rotation([0.7, 0.4, 0.0]), UPRIGHT, [0.1, -0.2, 1.32],
+    ),
+    "edge on edge": (
+        CUBE, CUBE, quaternion_product(quaternion_of_rotation([0, 0, 1.1])[None], ON_EDGE[None])[0],
+        ON_EDGE, [0.1, -0.2, 2**0.5],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", TOUCHING)
+@pytest.mark.parametrize("seed", range(3))
+def test_tangential_inertial_terms(form: str, seed: int) -> None:
+    """b^T of eq. 24 in space: how the velocity at a contact that sticks or rolls changes by itself.
+
+    The contact point of a ball goes on over both surfaces, which themselves turn: with spin about
+    the normal, or on a turning face, the material that touches next has another velocity.
+    """
+    upper, lower, turn, under, start = TOUCHING[form]
+    shapes, turns = [upper, lower], np.array([turn, under])
+    place = np.array([start, [0.0, 0, 0]])
+    found = contacts(shapes, place, turns, margin=1.0)
+    first = int(np.argmin(found.gap))
+    key, side = found.key[first], int(found.body_a[first] == 1)
+    place[0] += (2 * side - 1) * found.gap[first] * found.normal[first]
+    rates = np.random.default_rng(seed).normal(size=(2, 6))
+    if isinstance(lower, HalfSpace):
+        rates[1] = 0.0
+
+    def velocity(t: float) -> tuple[Contacts, Floats]:
+        there = motion_displaced(Motion(place, turns, rates[:, :3], rates[:, 3:]), t * rates)
+        found = contacts(shapes, there.position, there.angle, margin=1.0)
+        found = found[found.key == key]
+        along = relative_velocity(found, there)
+        return found, np.einsum("ci,cij->j", along, contact_frames(found.normal))
+
+    rates[0, :3] += (2 * side - 1) * velocity(0.0)[1]  # no slip
+    touch, slip = velocity(0.0)
+    np.testing.assert_allclose(slip, 0, atol=1e-14)
+    h = 1e-5
+    change = (velocity(h)[1] - velocity(-h)[1]) / (2 * h)
+    exact = inertial_acceleration(touch, Motion(place, turns, rates[:, :3], rates[:, 3:]))[0]
+    # truncation h^2 / 6 times third derivatives of up to 1e3; round-off 1e-16 / h
+    np.testing.assert_allclose(exact[1:], contact_frames(touch.normal)[0, 1:] @ change, atol=1e-6)

@@ -11,8 +11,10 @@ from scipy.integrate import solve_ivp
 
 from rigid_lcp.errors import NoSolution, NotConverged
 from rigid_lcp.lasting_contacts import first_fall
+from rigid_lcp.motion import Motion
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
+from rigid_lcp.shapes_3d import box
 from rigid_lcp.simulation import Simulation
 from rigid_lcp.simulation_input import Method
 from validation.rigid_integration_scenes import falling_box
@@ -113,6 +115,51 @@ def test_both_methods_have_one_limit_with_impacts() -> None:
     errors = [np.abs(end("time-stepping", step) - exact).max() for step in (8e-3, 2e-3, 5e-4)]
     assert errors[2] < 2e-3
     assert errors[2] < 0.15 * errors[0]  # 1/16 at first order; where a step begins is chance
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_block_that_slides_past_an_edge_lands_on_nothing(dim: int) -> None:
+    """Where its rear corner leaves the block below, that block's corner bears on from then on.
+
+    Constant deceleration mu g, no collision, no step taken back.
+    """
+    scene = Scene(dim)
+    blocks = {
+        2: (Polygon.rectangle(1.0, 0.2), Polygon.rectangle(0.4, 0.1)),
+        3: (box(1.0, 0.5, 0.2), box(0.4, 0.3, 0.1)),
+    }
+    below, above = blocks[dim]
+    along, up = np.eye(dim)[0], np.eye(dim)[-1]
+    scene.add(below, fixed=True, position=0.1 * up, friction=0.2)
+    scene.add(above, density=1000, position=0.25 * along + 0.25 * up, velocity=along, friction=0.2)
+    run = Simulation(scene, "acceleration", step=0.01)
+    run.advance(0.2)  # 0.16 m; its front leaves the block below after 51 ms
+    wanted = (0.25 + 0.2 - 0.1 * G * 0.2**2) * along + 0.25 * up
+    np.testing.assert_allclose(run.positions[1], wanted, atol=1e-14)
+    assert (run.pace.collisions, run.pace.accepted) == (0, 20)
+
+
+def test_blocks_that_are_pushed_slide_past_an_edge() -> None:
+    """The same on a block that pushes another: the collision that was seen at the edge once parted
+    these two, and they met again every 0.3 us for ever."""
+    scene = Scene(2)
+    scene.add(HalfSpace((0, 1)), friction=0.3)
+    for width, height, density, place, mu in (
+        (0.4, 0.3, 1000, (0, 0.15), 0.3), (0.3, 0.2, 1500, (0.35, 0.1), 0.25),
+        (0.2, 0.1, 800, (-0.05, 0.35), 0.2),
+    ):  # fmt: skip
+        scene.add(Polygon.rectangle(width, height), density=density, position=place, friction=mu)
+
+    def push(time: float, motion: Motion) -> Floats:
+        return np.array([[0, 0, 0], [900 + 700 * np.sin(9 * time), 0, 0], [0, 0, 0], [0, 0, 0]])
+
+    run = Simulation(scene, "acceleration", step=0.01, loads=push)
+    run.advance(0.4)
+    assert (run.pace.collisions, run.pace.accepted) == (0, 40)
+    # the lower two grip each other, which shifts weight between grounds of friction 0.25 and 0.3
+    gained = np.array([120.0, 90.0, 16.0]) @ run.velocities[1:, 0]
+    pushed, weight = 360 + 700 / 9 * (1 - np.cos(3.6)), 226 * G * 0.4
+    assert pushed - 0.3 * weight < gained < pushed - 0.25 * weight
 
 
 def test_sliding_stops_where_it_should() -> None:
@@ -224,6 +271,26 @@ def test_nothing_jumps_over_another() -> None:
     run = Simulation(scene, "acceleration", step=0.1)
     run.advance(0.1)
     assert run.velocities[0, 1] == pytest.approx(100)
+
+
+@pytest.mark.parametrize("below", [1e-6, 1e-2])
+def test_just_below_painleves_limit_the_tip_stops_at_once(below: float) -> None:
+    """Forces of 1/below times the weight stop the tip in far less than a step, whatever its length.
+
+    In the limit an impulse p along n and mu p against the slip: with W of a slender rod of mass 1,
+    ``p = v / (mu W_tt - |W_nt|) = 0.3 v`` at tan(lean) = 2, mu = 4/3.  Friction that went on in its
+    direction beyond rest threw the rod off with up to 4e8 times its energy; and a step that went
+    on where the rod would have turned met states without forces, which it does not come to.
+    """
+    limit = sliding_rod_limit(sliding_rod(1.0, method="acceleration"))
+    runs = [sliding_rod((1 - below) * limit, method="acceleration", step=h) for h in (1e-2, 1e-3)]
+    for run in runs:
+        energy = run.energy
+        run.advance(1e-2)
+        assert run.energy < energy
+        # g t of the fall, and the turn of the rod by w t = 0.02
+        np.testing.assert_allclose(run.velocities[0], [-0.6, 0.3], atol=0.03)
+    np.testing.assert_allclose(runs[0].velocities, runs[1].velocities, atol=1e-6)
 
 
 def test_painleve() -> None:

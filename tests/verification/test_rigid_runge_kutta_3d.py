@@ -106,6 +106,34 @@ def test_a_sphere_rolls_down_with_five_sevenths(azimuth: float) -> None:
     assert np.allclose(run.positions[0] - radius * normal, way * slope, atol=1e-12)
 
 
+@pytest.mark.parametrize("method", ["acceleration", "time-stepping"])
+def test_a_sphere_rolls_in_circles_on_a_turntable(method: Method) -> None:
+    """``v' = 2/7 W z x v`` on a table that turns by W, whatever its spin about z (Milne 1948).
+
+    Nothing but b^T of eq. 24 bends its way.
+    """
+    radius, turning, h = 0.1, 3.0, 5e-3
+    v0, x0 = np.array([0.2, 0.5, 0.0]), np.array([0.3, 0.0, radius])
+    slip = np.cross([0.0, 0.0, turning], x0) - v0
+    spin = [slip[1] / radius, -slip[0] / radius, 0.7]  # w x (0, 0, -R) = slip: it rolls
+    scene = Scene(3)
+    scene.add(
+        box(4.0, 4.0, 0.2), fixed=True, position=(0, 0, -0.1), spin=(0, 0, turning), friction=0.9
+    )
+    scene.add(Sphere(radius), density=DENSITY, position=x0, velocity=v0, spin=spin, friction=0.9)
+    run = Simulation(scene, method, step=h)
+    run.advance(0.2)
+    rate = 2 / 7 * turning
+    angle = rate * 0.2
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    # time stepping: of second order, (W h)^2 = 2e-4 of what changed; fourth order: to round-off
+    off = 1e-12 if method == "acceleration" else 2e-5
+    np.testing.assert_allclose(run.velocities[1, :2], turn @ v0[:2], atol=off)
+    friction = np.linalg.norm(run.contacts.tangential_force[0])
+    mass = DENSITY * Sphere(radius).volume
+    assert friction == pytest.approx(mass * rate * np.linalg.norm(v0), rel=max(off, 1e-10) * 10)
+
+
 # --- a block that slides and turns on an incline ---
 
 

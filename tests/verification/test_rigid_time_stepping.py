@@ -92,6 +92,19 @@ def test_energy_of_many_bounces() -> None:
     assert abs(run.energy / energy - 1) < 1e-13 * bounces
 
 
+def test_balls_that_bounce_upon_each_other_keep_their_energy() -> None:
+    """Three in a column, e = 1, under gravity: where a step holds more than one collision, the
+    later ones do not reverse what gravity gives in all of the step (once 0.25 % of the energy)."""
+    scene = Scene(2)
+    scene.add(HalfSpace((0, 1)), restitution=1)
+    for height in (0.15, 0.38, 0.61):
+        scene.add(Disc(0.1), density=1e3, position=(0, height), restitution=1)
+    run = Simulation(scene, step=2e-3)
+    begin = run.energy
+    run.advance(1.7)
+    assert run.energy == pytest.approx(begin, rel=1e-12)
+
+
 def test_energy_never_grows_without_friction() -> None:
     """Boxes and discs that fall into a heap: no step adds energy but by overlaps removed."""
     scene = Scene(2)
