@@ -127,9 +127,6 @@ class Simulation(ConditionedBodies):
         self._assembly: Assembly | None = None
         self._lists: tuple[kernel.Loads, kernel.Constraints] | None = None
         self._critical: CriticalStep | None = None
-        self.counts_viscous = False
-        """Whether the march counts what viscosity takes, at two more evaluations of the forces
-        every so many steps (`qdem_fem.march.looks_next`)."""
         self.warned = nan
         """The critical step of which a warning was given [s]."""
         for body in self.bodies:
