@@ -122,8 +122,8 @@ class Assembly:
         """A field of the state by the user's numbers, (n, 3), as the kernel has it."""
         return np.asarray(flat).reshape(-1, 4)[self.place[nodes], :3].astype(float)
 
-    def _write(self, flat: Any, values: Floats) -> None:
-        flat.reshape(-1, 4)[self.place, :3] = values
+    def _write(self, flat: Any, values: Floats, nodes: slice = EVERY) -> None:
+        flat.reshape(-1, 4)[self.place[nodes], :3] = values
 
     def field(self, name: str, nodes: slice = EVERY) -> Floats:
         """``displacement`` [m] or ``velocity`` [m/s] of all nodes, or of some, (n, 3)."""
@@ -136,12 +136,13 @@ class Assembly:
         }
         return to_world[name](own, nodes)
 
-    def field_set(self, name: str, values: Floats) -> None:
-        """Set a field of all nodes, (n, 3); nodes that follow others take their master's."""
+    def field_set(self, name: str, values: Floats, nodes: slice = EVERY) -> None:
+        """Set a field of all nodes, or of some, (n, 3); what follows others takes its master's."""
         if self.frames is None:
-            self._write(getattr(self.state, name), values)
+            self._write(getattr(self.state, name), values, nodes)
         else:
-            fields = {each: self.field(each) for each in FIELDS} | {name: values}
+            fields = {each: self.field(each) for each in FIELDS}
+            fields[name][nodes] = values
             self._fields_frame(**fields)
 
     def _fields_frame(self, displacement: Floats, velocity: Floats) -> None:

@@ -156,9 +156,9 @@ class CudaAssembly(Assembly):
     def _read(self, flat: Any, nodes: slice = EVERY) -> Floats:
         return flat.copy_to_host().reshape(-1, 4)[self.place[nodes], :3].astype(float)
 
-    def _write(self, flat: Any, values: Floats) -> None:
-        rows = np.zeros((self.n_nodes, 4), self.dtype)
-        rows[self.place, :3] = values
+    def _write(self, flat: Any, values: Floats, nodes: slice = EVERY) -> None:
+        rows = flat.copy_to_host().reshape(-1, 4)
+        rows[self.place[nodes], :3] = values
         flat.copy_to_device(rows.ravel())
 
     def kernel_run(
