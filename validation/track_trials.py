@@ -19,9 +19,10 @@ from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.scene_run import run_dynamic
 from qdem_fem.simulation import Simulation
-from qdem_fem.track_bed import bed_prepare, bodies_of_bed, grains_of
+from qdem_fem.track_bed import bed_prepare
 from qdem_fem.track_bodies import grains_nodes
 from qdem_fem.track_figures import track_facts
+from qdem_fem.track_recipe import bodies_of_bed, grains_of
 from qdem_fem.track_scene import TrackPrepared
 from validation.case import Check
 

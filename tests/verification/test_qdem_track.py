@@ -22,7 +22,7 @@ from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.scene_run import run_dynamic
 from qdem_fem.sleeper_mesh import SleeperShape
-from qdem_fem.track_bed import Bed, BedRecipe, bed_read, bed_write, grains_of
+from qdem_fem.track_bed import Bed, bed_read, bed_write
 from qdem_fem.track_bodies import TrackBox, grains_nodes, lattice_loose, sleeper_slice
 from qdem_fem.track_figures import (
     acceleration_spectrum,
@@ -32,6 +32,7 @@ from qdem_fem.track_figures import (
     velocities,
 )
 from qdem_fem.track_load import RISE, bogie_series
+from qdem_fem.track_recipe import BedRecipe, grains_of
 from qdem_fem.track_scene import TrackPrepared
 from qdem_fem.track_table import BogieTable, TrackTable
 from validation import track_page
