@@ -122,8 +122,8 @@ class Assembly:
         """A field of the state by the user's numbers, (n, 3), as the kernel has it."""
         return np.asarray(flat).reshape(-1, 4)[self.place[nodes], :3].astype(float)
 
-    def _write(self, flat: Any, values: Floats) -> None:
-        flat.reshape(-1, 4)[self.place, :3] = values
+    def _write(self, flat: Any, values: Floats, nodes: slice = EVERY) -> None:
+        flat.reshape(-1, 4)[self.place[nodes], :3] = values
 
     def field(self, name: str, nodes: slice = EVERY) -> Floats:
         """``displacement`` [m] or ``velocity`` [m/s] of all nodes, or of some, (n, 3)."""
@@ -136,12 +136,13 @@ class Assembly:
         }
         return to_world[name](own, nodes)
 
-    def field_set(self, name: str, values: Floats) -> None:
-        """Set a field of all nodes, (n, 3); nodes that follow others take their master's."""
+    def field_set(self, name: str, values: Floats, nodes: slice = EVERY) -> None:
+        """Set a field of all nodes, or of some, (n, 3); what follows others takes its master's."""
         if self.frames is None:
-            self._write(getattr(self.state, name), values)
+            self._write(getattr(self.state, name), values, nodes)
         else:
-            fields = {each: self.field(each) for each in FIELDS} | {name: values}
+            fields = {each: self.field(each) for each in FIELDS}
+            fields[name][nodes] = values
             self._fields_frame(**fields)
 
     def _fields_frame(self, displacement: Floats, velocity: Floats) -> None:
@@ -309,7 +310,7 @@ class Assembly:
         self._write(scratch.velocity, velocity)
         before = self._read(scratch.velocity)
         self.kernel_run(
-            scratch, 1, 1.0, loads, NO_CONSTRAINTS, NO_PROBES, table, gravity, np.zeros(2)
+            scratch, 1, 1.0, loads, NO_CONSTRAINTS, NO_PROBES, table, gravity, np.zeros(3)
         )
         scratch.forces[:] = 0.0
         return self._read(scratch.velocity) - before
@@ -322,22 +323,18 @@ class Assembly:
         return self._scratch
 
     def viscous_power(self) -> float:
-        """What viscosity takes now [W]: ``-v.(f(u, v) - f(u, 0))``, v half a step behind.
+        """What viscosity takes now [W], of velocities as they are: ``-f_D(u, v).v``.
 
         In the frames of the bodies: viscous forces take nothing from the motion of a frame.
         """
-        speed, taken = self._read(self.state.velocity), 0.0
-        for given, sign in ((self.state.velocity, -1.0), (0.0, 1.0)):
-            self.scratch.displacement[:] = self.state.displacement
-            self.scratch.velocity[:] = given
-            self.kernel_run(
-                self.scratch, 1, 1.0, NO_LOADS, NO_CONSTRAINTS, NO_PROBES, np.ones((2, 1)), None,
-                np.zeros(2),
-            )  # fmt: skip
-            faster = self._read(self.scratch.velocity) - (speed if sign < 0 else 0.0)
-            taken += sign * float(np.einsum("n,nc,nc->", self.mass, faster, speed))
+        work = np.zeros(3)
+        for name in FIELDS:
+            getattr(self.scratch, name)[:] = getattr(self.state, name)
+        self.kernel_run(
+            self.scratch, 1, 1.0, NO_LOADS, NO_CONSTRAINTS, NO_PROBES, np.ones((2, 1)), None, work
+        )
         self.scratch.forces[:] = 0.0
-        return taken
+        return float(work[2])
 
     def hold(self, values: Floats, held: kernel.Constraints) -> Floats:
         """``values`` (n, 3) without their parts along held components and roller normals."""

@@ -80,7 +80,7 @@ class Body:
     @cached_property
     def surface(self) -> Integers:
         """Nodes of the outward surface triangles, (k, 3)."""
-        return surface_faces(self.elements)
+        return surface_faces(self.elements, self.name)
 
     @cached_property
     def gradients(self) -> tuple[Floats, Floats]:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT = 2
+FORMAT = 3
 DIGEST = 64
 """Letters of a SHA-256 in hexadecimal."""
 FUNCTION = "a function, not compared"

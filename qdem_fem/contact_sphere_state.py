@@ -51,7 +51,8 @@ class SphereContacts(Contacts):
         poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
         self.one = pair_stiffness(normal, normal.max(initial=0.0))
         self.skin = float(SKIN * radius.min() if asked.skin is None else asked.skin)
-        self.reach = 2 * float(radius.max()) + self.skin
+        self.deep = float(radius.max())
+        self.reach = 2 * self.deep + self.skin
         size, walls = len(self.nodes), len(asked.planes)
         zero = np.zeros((size, 3))
         self.kernel = Contact(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem import kernel
+from qdem_fem.contact_inside import inside_check
 from qdem_fem.contact_kernel import TOO_DEEP
 from qdem_fem.contact_near import near_check, near_step
 from qdem_fem.contact_outside import Outside, outside_of
@@ -53,7 +54,8 @@ class ContactTouching:
 class Contacts(ABC):
     """Contact at the surface vertices of all bodies of a simulation, and what it remembers.
 
-    A model sets ``kernel``, the arrays that a step of it reads and writes, ``skin`` and ``reach``.
+    A model sets ``kernel``, the arrays that a step of it reads and writes, ``skin``, ``reach`` and
+    ``deep``.
     """
 
     kernel: Any
@@ -61,6 +63,8 @@ class Contacts(ABC):
     skin: float
     one: Floats
     """(c,) stiffness of one contact of each vertex [N/m]."""
+    deep: float
+    """Depth in another body beyond which a point of this one is not seen [m]."""
     reach: float
     """Way within which two vertices may be looked at as touching [m]."""
 
@@ -167,10 +171,12 @@ class Contacts(ABC):
             return
         self.forget()
         self.pairs_find()
-        state = self.run.assembly.state
+        state, moved = self.run.assembly.state, self.run.assembly.field("displacement")
         said = advance_of(self.kernel, None, state.displacement, state.velocity, 0.0)
         self.stale = False
         self.deep_check(said)
+        if np.isfinite(moved).all():
+            inside_check(self.run.bodies, moved, self.deep, self.when)
 
     def pairs_find(self) -> None:
         """Look for pairs anew; those that touch keep their springs."""
@@ -199,9 +205,8 @@ class Contacts(ABC):
 
     @property
     def where(self) -> str:
-        """The time, for messages."""
-        done = self.run.motion.steps_done
-        return f"t = {self.run.time:.6g} s, step {done}" if done else "contact.periodic.width"
+        """The time, or before the first step the key, for messages on the width."""
+        return self.when if self.run.steps_done else "contact.periodic.width"
 
     def window(
         self, steps: int, step: float, loads: kernel.Loads, held: kernel.Constraints,
@@ -218,12 +223,17 @@ class Contacts(ABC):
             self.pairs_find()
         return done, bad
 
+    @property
+    def when(self) -> str:
+        """The time, for messages; at the start without the step, which may ask for the contacts."""
+        done = self.run.steps_done
+        return f"t = {self.run.time if done else 0:.6g} s, step {done}"
+
     def deep_check(self, said: int) -> None:
         """Raise `ContactTooDeep` with the deepest contact where a step said so."""
         if said == TOO_DEEP:
             what, remedy = self.deepest_words()
-            where = f"t = {self.run.time:.6g} s, step {self.run.steps_done}"
-            raise ContactTooDeep(what, where=where, remedy=remedy)
+            raise ContactTooDeep(what, where=self.when, remedy=remedy)
 
     def node_named(self, node: int) -> str:
         """A node of all bodies by its number in its own."""

@@ -41,7 +41,7 @@ class SurfaceContacts(Contacts):
         self.depth = float(
             DEPTH * np.median(np.concatenate(edge)) if asked.depth is None else asked.depth
         )
-        self.skin = self.depth
+        self.skin = self.deep = self.depth
         # an image goes on beyond a side for as far as a point may, and then sees faces
         super().__init__(run, asked, outsides_of(run, asked, 2 * (self.depth + self.skin)))
         self.reach = 2 * (self.depth + self.skin)

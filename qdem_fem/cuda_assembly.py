@@ -156,9 +156,9 @@ class CudaAssembly(Assembly):
     def _read(self, flat: Any, nodes: slice = EVERY) -> Floats:
         return flat.copy_to_host().reshape(-1, 4)[self.place[nodes], :3].astype(float)
 
-    def _write(self, flat: Any, values: Floats) -> None:
-        rows = np.zeros((self.n_nodes, 4), self.dtype)
-        rows[self.place, :3] = values
+    def _write(self, flat: Any, values: Floats, nodes: slice = EVERY) -> None:
+        rows = flat.copy_to_host().reshape(-1, 4)
+        rows[self.place[nodes], :3] = values
         flat.copy_to_device(rows.ravel())
 
     def kernel_run(
@@ -184,6 +184,9 @@ class CudaAssembly(Assembly):
         record = cuda.to_device(np.zeros((max(taken, 1), max(len(probes.node_at), 1), 3)))
         accelerations = np.zeros(3) if gravity is None else np.ravel(gravity)
         status = cuda.to_device(np.array([0, steps], dtype=np.int32))
+        taken_by_viscosity = cuda.to_device(
+            np.zeros(self._rows.shape[1] if self.viscous else 1)  # an empty array had better not be
+        )
         half, dt = self.dtype.type(0.5), self.dtype.type(step)
         of_elements = (
             self._corners,
@@ -192,6 +195,7 @@ class CudaAssembly(Assembly):
             state.velocity,
             state.forces,
             status,
+            taken_by_viscosity,
         )
         of_nodes = (
             cuda.to_device(acted.first), cuda.to_device(acted.actions),
@@ -203,13 +207,14 @@ class CudaAssembly(Assembly):
         launch_forces = self._forces_kernel[self._element_blocks, cuda_step.BLOCK]
         launch_motion = motion[self._node_blocks, cuda_step.BLOCK]
         for k, sample in enumerate(samples.tolist()):
-            launch_forces(*of_elements, half, k)
+            launch_forces(*of_elements, half, dt, k)
             launch_motion(*of_nodes, k, sample)
 
         bad, done = status.copy_to_host().tolist()
         remembered = memory.copy_to_host()
         for total, kind in ((0, cuda_step.LOAD), (1, cuda_step.HELD)):
             work[total] += remembered[acted.of_kind(kind)[0], 0].sum()
+        work[2] += taken_by_viscosity.copy_to_host().sum()
         place, slot = acted.of_kind(cuda_step.HELD)
         held.previous[slot] = remembered[place, 1]
         if taken:

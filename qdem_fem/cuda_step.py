@@ -47,6 +47,7 @@ STRESS = {
 }
 element_gradient = cuda.jit(device=True)(stress.element_gradient)
 element_pulls = cuda.jit(device=True)(stress.element_pulls)
+matrix_product = cuda.jit(device=True)(stress.matrix_product)
 
 
 @cuda.jit(device=True)
@@ -69,7 +70,7 @@ def forces_add(forces: Any, at: Any, x: Any, y: Any, z: Any) -> None:
 
 
 def pulls_function(strain: Strain, viscous: bool) -> Any:
-    """The device function ``(h, w, g, rows, e, half) -> (pulls, J)`` of a strain measure.
+    """The device function ``(h, w, g, rows, e, half) -> (pulls, J, power)`` of a strain measure.
 
     The same composition as `qdem_fem.kernel.elastic_stress` and `qdem_fem.kernel.viscous_pulls`.
     """
@@ -79,7 +80,7 @@ def pulls_function(strain: Strain, viscous: bool) -> Any:
         @cuda.jit(device=True)
         def pulls_elastic(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
             p, jacobian = elastic(h, rows[9, e], rows[10, e], half)
-            return element_pulls(p, g), jacobian
+            return element_pulls(p, g), jacobian, half - half
 
         return pulls_elastic
 
@@ -99,12 +100,13 @@ def pulls_function(strain: Strain, viscous: bool) -> Any:
     @cuda.jit(device=True)
     def pulls_composed(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
         p, jacobian = elastic(h, rows[9, e], rows[10, e], half)
-        q = dashpot(h, element_gradient(w, g), rows[11, e], rows[12, e], half)
+        rate = element_gradient(w, g)
+        q = dashpot(h, rate, rows[11, e], rows[12, e], half)
         total = (
             p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3], p[4] + q[4], p[5] + q[5],
             p[6] + q[6], p[7] + q[7], p[8] + q[8],
         )  # fmt: skip
-        return element_pulls(total, g), jacobian
+        return element_pulls(total, g), jacobian, matrix_product(q, rate)
 
     return pulls_composed
 
@@ -117,13 +119,14 @@ def element_forces_kernel(strain: Strain, viscous: bool) -> Any:
     @cuda.jit
     def element_forces(
         corners: Any, rows: Any, displacement: Any, velocity: Any, forces: Any, status: Any,
-        half: Any, k: Any,
+        taken: Any, half: Any, step: Any, k: Any,
     ) -> None:  # fmt: skip
         """Add the forces of all elements to their nodes (eqs. 1-10) and count the bad ones.
 
         ``corners`` (4, m): 4 x node number; ``rows`` (11 or 13, m): gradients [1/m], then
-        stiffnesses and viscosities times volume; fields flat, four numbers a node; ``half``: 0.5
-        in their precision; ``k``: number of the step in its window.
+        stiffnesses and viscosities times volume; fields flat, four numbers a node; ``taken``
+        (m,) [J]: by viscosity, is added to; ``half``: 0.5 in the fields' precision; ``step`` [s];
+        ``k``: number of the step in its window.
         """
         e = cuda.grid(1)
         if e >= corners.shape[1] or k >= status[LIMIT]:
@@ -135,9 +138,11 @@ def element_forces_kernel(strain: Strain, viscous: bool) -> Any:
         )  # fmt: skip
         u = edges(displacement, n0, n1, n2, n3)
         w = edges(velocity, n0, n1, n2, n3) if viscous else u
-        f, jacobian = pulls_of(element_gradient(u, g), w, g, rows, e, half)
+        f, jacobian, power = pulls_of(element_gradient(u, g), w, g, rows, e, half)
         if not jacobian > half - half:  # NaN is bad too
             cuda.atomic.add(status, BAD, 1)
+        if viscous:
+            taken[e] += step * power
         forces_add(forces, n0, f[0] + f[3] + f[6], f[1] + f[4] + f[7], f[2] + f[5] + f[8])
         forces_add(forces, n1, -f[0], -f[1], -f[2])
         forces_add(forces, n2, -f[3], -f[4], -f[5])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.leapfrog import half_work, velocity_now
+from qdem_fem.leapfrog import half_work, velocity_now, viscous_half
 from qdem_fem.reference_forces import displacement_gradient, elastic_energy
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Energy:
     friction: float = 0.0
     """Work that sliders of contacts took since the start."""
     viscous: float = 0.0
-    """What viscosity took since the start, where `Simulation.counts_viscous`."""
+    """What viscosity took since the start."""
     absorbed: float = 0.0
     """What dashpots of absorbing faces took since the start."""
     foundation: float = 0.0
@@ -53,14 +53,15 @@ def energy_now(run: Simulation) -> Energy:
         for body in run.bodies
         if not body.rigid
     )  # fmt: skip
-    external = float(motion.work.sum()) + motion.gravity_work
+    external, viscous = float(motion.work[:2].sum()) + motion.gravity_work, float(motion.work[2])
     if motion.behind:
         external += float(half_work(run, run.assembly.field("velocity"), velocity).sum())
+        viscous += viscous_half(run)
         if run.rigid is not None:
             external += float(run.rigid.half_work().sum())
     touching = (0.0, 0.0) if run.contacts is None else run.contacts.energy()
     ground = ground_energies(run, velocity)
-    return Energy(kinetic, float(elastic), external, *touching, motion.viscous_work, *ground)
+    return Energy(kinetic, float(elastic), external, *touching, viscous, *ground)
 
 
 def ground_energies(run: Simulation, velocity: Floats) -> tuple[float, float]:

@@ -12,13 +12,17 @@ STORED = ("kinetic", "elastic", "contact", "friction", "viscous", "absorbed", "f
 
 
 def energy_facts(energy: dict[str, FloatArray]) -> dict[str, float]:
-    """Energies at the end [J], and the greatest of external less all others on the way."""
+    """Energies at the end [J], and the greatest of external less all others on the way.
+
+    That is also told over the greatest energy that was put in, or went from one form to another.
+    """
     names = [name for name in STORED if name in energy]
     stored = np.sum([energy[name] for name in names], axis=0)
     if "contact" in energy:  # overlap that the scene begins with is no work of its loads
         stored = stored - sum(energy[name][0] for name in ("contact", "elastic"))
     missing = energy["external"] - stored
-    greatest = float(max(np.abs(energy["external"]).max(), stored.max()))
+    passed = (float(np.abs(energy[name] - energy[name][0]).max()) for name in names)
+    greatest = max(float(np.abs(energy["external"]).max()), float(stored.max()), *passed)
     return {
         **{name: float(energy[name][-1]) for name in [*names, "external"]},
         "greatest_imbalance": float(np.abs(missing).max()),

@@ -86,6 +86,7 @@ STRESS = {
 }
 element_gradient = inlined(stress.element_gradient)
 element_pulls = inlined(stress.element_pulls)
+matrix_product = inlined(stress.matrix_product)
 
 
 def elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
@@ -96,15 +97,20 @@ def elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
 def viscous_pulls(
     law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
 ) -> Any:
-    """``(pulls, J)`` with viscosity, linear beside `Small`, else current (eq. 7)."""
+    """``(pulls, J, power)`` with viscosity, linear beside `Small`, else current (eq. 7).
+
+    The power is what viscosity takes of the motion [W].
+    """
     if isinstance(law, Finger):
         return stress.pulls_finger_viscous(
             h, w, g, lame_first, lame_second, first, second, law.half
         )
     viscous = stress.viscous_small if isinstance(law, Small) else stress.viscous_current
     p, jacobian = elastic_stress(law, h, lame_first, lame_second)
-    q = viscous(h, stress.element_gradient(w, g), first, second, law.half)
-    return stress.element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g), jacobian
+    rate = stress.element_gradient(w, g)
+    q = viscous(h, rate, first, second, law.half)
+    pulls = stress.element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g)
+    return pulls, jacobian, stress.matrix_product(q, rate)
 
 
 @overload(elastic_stress, strict=False, jit_options=INLINED)
@@ -131,8 +137,9 @@ def _viscous_pulls(
         second: Any,
     ) -> Any:  # fmt: skip
         p, jacobian = elastic(h, lame_first, lame_second, law.half)
-        q = viscous(h, element_gradient(w, g), first, second, law.half)
-        return element_pulls(add(p, q), g), jacobian
+        rate = element_gradient(w, g)
+        q = viscous(h, rate, first, second, law.half)
+        return element_pulls(add(p, q), g), jacobian, matrix_product(q, rate)
 
     return composed
 
@@ -150,15 +157,17 @@ def add(p: Any, q: Any) -> Any:
 def chunk_forces(
     law: Any, viscous: Any, corners: Any, rows: Any, first_block: int, stop_block: int,
     displacement: Any, velocity: Any, forces: Any, shift: int,
-) -> float:  # fmt: skip
+) -> tuple[float, float]:  # fmt: skip
     """Forces of the blocks of elements of one chunk (eqs. 1-10), added to its window.
 
     ``displacement`` [m], ``velocity`` [m/s], ``forces`` [N]: flat, four numbers a node.
-    Returns how many of its elements are inverted or not finite.
+    Returns how many of its elements are inverted or not finite, and the power that viscosity
+    takes [W].
     """
     stack_align()
     width = lane_count_of(rows)
     bad: Any = lanes_zero(rows)
+    taken: Any = lanes_zero(rows)
     for block in range(first_block, stop_block):
         at = block * block_size(viscous) * width
         g = (
@@ -174,13 +183,14 @@ def chunk_forces(
             pulls = element_pulls(p, g)
         else:
             rate = gather_edges(velocity, corners, block)
-            pulls, jacobian = viscous_pulls(
+            pulls, jacobian, power = viscous_pulls(
                 law, h, rate, g, first, second, lanes_load(rows, at + 11 * width),
                 lanes_load(rows, at + 12 * width),
             )  # fmt: skip
+            taken = taken + power
         bad = bad + lanes_not_positive(jacobian)
         scatter_pulls(forces, corners, block, shift, pulls, viscous)
-    return lanes_sum(bad)
+    return lanes_sum(bad), lanes_sum(taken)
 
 
 def lane_count_of(rows: Any) -> int:
@@ -378,21 +388,21 @@ def window_build(variant: str) -> Any:
 
         ``law``: one of `LAWS`; ``viscous``: True or None; ``table`` (steps + 1, series):
         amplitudes at the times of the steps; ``gravity`` (4 (steps + 1),) [m/s^2] or None;
-        ``work`` (2,) [J], of the loads and of prescribed motion, is added to.  Stops after a step
-        that met an inverted element or NaN.
+        ``work`` (3,) [J], of the loads, of prescribed motion and taken by viscosity, is added to.
+        Stops after a step that met an inverted element or NaN.
         """
         stamp = made_from  # noqa: F841  (makes it a part of the key)
         corners, rows, chunk_block, chunk_shift = layout[0], layout[1], layout[2], layout[3]
         piece_first, piece_stop, chunk_piece = layout[4], layout[5], layout[6]
         piece_window, window_shift = layout[7], layout[8]
         displacement, velocity, forces, inverse_mass = state[0], state[1], state[2], state[3]
-        bad = np.zeros(chunk_shift.size)
+        bad, taken = np.zeros(chunk_shift.size), np.zeros(chunk_shift.size)
         shared = chunk_piece[-1]
         for k in range(steps):
             loads_apply(loads, table[k], forces)
             work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
             for c in prange(chunk_shift.size):
-                bad[c] = chunk_forces(
+                bad[c], taken[c] = chunk_forces(
                     law, viscous, corners, rows, chunk_block[c], chunk_block[c + 1], displacement,
                     velocity, forces, chunk_shift[c],
                 )  # fmt: skip
@@ -410,6 +420,8 @@ def window_build(variant: str) -> Any:
                     displacement, velocity, step, gravity, k,
                 )  # fmt: skip
             work[1] += constraints_apply(held, table[k + 1], state, step)
+            if viscous is not None:
+                work[2] += step * taken.sum()
             work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
             probes_take(probes, k + 1, displacement)
             inverted = bad.sum()

@@ -46,7 +46,7 @@ def velocities_behind(run: Simulation) -> None:
         if run.absorbers is not None:
             change = change - run.absorbers.decelerations(velocity)
         behind = velocity - 0.5 * run.step * change
-        run.motion.work -= half_work(run, behind, velocity)
+        run.motion.work[:2] -= half_work(run, behind, velocity)
         if run.absorbers is not None:
             run.motion.absorbed -= run.absorbers.half_taken(behind, velocity)
         if run.rigid is not None:
@@ -54,6 +54,7 @@ def velocities_behind(run: Simulation) -> None:
         _, held = run.packed_lists()
         held.previous[:] = _by_place(run, behind)[held.node_at]
         run.assembly.field_set("velocity", behind)
+        run.motion.work[2] -= viscous_half(run)
         run.motion.behind = True
 
 
@@ -61,7 +62,8 @@ def velocities_level(run: Simulation) -> None:
     """Bring the velocities to the time of the displacements, if they are behind."""
     if run.motion.behind:
         behind, level = run.assembly.field("velocity"), velocity_now(run)
-        run.motion.work += half_work(run, behind, level)
+        run.motion.work[:2] += half_work(run, behind, level)
+        run.motion.work[2] += viscous_half(run)
         if run.absorbers is not None:
             run.motion.absorbed += run.absorbers.half_taken(behind, level)
         if run.rigid is not None:
@@ -102,6 +104,16 @@ def half_work(run: Simulation, behind: Floats, level: Floats) -> Floats:
         mass = 1 / inverse[held.node_at // 4]
         work[1] = mass @ (missing * mean)[held.node_at]
     return work
+
+
+def viscous_half(run: Simulation) -> float:
+    """What viscosity takes up to now beyond what the steps have counted [J]; velocities are behind.
+
+    A step counts ``dt f_D(u(k), v(k-1/2)) v(k-1/2)``, and the force does ``dt f_D (v(k-1/2) +
+    v(k+1/2))/2``.  As ``f_D`` is linear in v, their sums differ by a quarter of the first and the
+    last of them, in second order; the half step up to now is due besides.
+    """
+    return 0.75 * run.step * run.assembly.viscous_power() if run.viscous else 0.0
 
 
 def accelerations_free(run: Simulation, displacement: Floats, velocity: Floats) -> Floats:

@@ -25,10 +25,6 @@ Integers = NDArray[np.int64]
 WINDOW_STEPS = 4096
 GRAVITY_STEPS = 16
 """Steps over which the momentum is interpolated for the work of a gravity that changes."""
-VISCOUS_STEPS = 8, 256
-"""Fewest and most steps between two looks at the power that viscosity takes."""
-VISCOUS_DOUBT = 1e-6
-"""Work that two looks may leave in doubt, over all energy ever put in: `looks_next`."""
 GROWTH = 10.0
 """Kinetic energy over all energy ever put in, above which a motion is called unstable."""
 
@@ -62,15 +58,11 @@ def march(
     most = max(16, min(WINDOW_STEPS, assembly.window_work // max(1, len(assembly.elements))))
     if run.gravity is not None and run.gravity.varying is not None:
         most = GRAVITY_STEPS
-    if run.counts_viscous:
-        looks, power = VISCOUS_STEPS[0], run.assembly.viscous_power()
     end = motion.steps_done + steps
     window = (run.contacts or run.rigid or run.absorbers or assembly).window
     while motion.steps_done < end:
         assembly.frames_renew()
         count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
-        if run.counts_viscous:
-            count = min(count, looks)
         times = run.step * (motion.steps_done + np.arange(count + 1, dtype=float))
         probes = samples.probes(4 * assembly.place[nodes], motion.steps_done)
         gravity = run.gravity_at(times)
@@ -84,11 +76,6 @@ def march(
             motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
         if run.rigid is not None:
             run.rigid.follow()
-        if run.counts_viscous:
-            power, before_power = run.assembly.viscous_power(), power
-            half = 0.5 * run.step * done
-            motion.viscous_work += half * (before_power + power)
-            looks = looks_next(looks, half * abs(power - before_power), energy_put_in(run))
         motion_check(run, bad)
         if run.contacts is not None:
             run.contacts.step_check()
@@ -145,21 +132,9 @@ def energy_set(run: Simulation) -> float:
     return energy.kinetic + abs(energy.elastic) + energy.contact + energy.foundation
 
 
-def looks_next(looks: int, doubt: float, put_in: float) -> int:
-    """Steps to the next look at the power of viscosity, ``looks`` having been those to the last.
-
-    ``doubt``: half the difference of two looks times the time between them [J], which is what the
-    trapezoidal rule might err by at worst; ``put_in``: all energy ever put in [J].
-    """
-    least, most = VISCOUS_STEPS
-    if doubt > VISCOUS_DOUBT * put_in:
-        return max(least, looks // 2)
-    return min(most, 2 * looks) if doubt < VISCOUS_DOUBT / 4 * put_in else looks
-
-
 def energy_put_in(run: Simulation) -> float:
     """All energy that was ever put in [J]."""
-    return run.motion.put_in + abs(run.motion.work).sum() + abs(run.motion.gravity_work)
+    return run.motion.put_in + abs(run.motion.work[:2]).sum() + abs(run.motion.gravity_work)
 
 
 def moment(run: Simulation) -> tuple[Floats, Floats]:

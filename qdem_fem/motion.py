@@ -20,12 +20,10 @@ class Motion:
     """Time step that the march began with [s]; None before."""
     behind: bool = False
     """True while velocities are half a step behind; False: they are at the time itself."""
-    work: Floats = field(default_factory=lambda: np.zeros(2))
-    """Work of the loads and of prescribed motion since the start [J]."""
+    work: Floats = field(default_factory=lambda: np.zeros(3))
+    """Work of the loads and of prescribed motion, and what viscosity took, since the start [J]."""
     gravity_work: float = 0.0
     """Work of gravity since the start [J]."""
-    viscous_work: float = 0.0
-    """Energy that viscosity took since the start [J]; counted where the simulation asks for it."""
     absorbed: float = 0.0
     """Energy that absorbing faces took since the start [J]."""
     displacement_set: bool = False

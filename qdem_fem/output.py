@@ -152,13 +152,21 @@ def bodies_vtu_write(path: Path, bodies: Sequence[Any]) -> None:
         np.concatenate([body.elements + start for body, start in zip(bodies, first, strict=True)]),
         {
             "displacement": np.concatenate([body.displacement for body in bodies]),
-            "velocity": np.concatenate([body.velocity for body in bodies]),
+            "velocity": velocities_of(bodies),
         },
         {
             "von_mises": np.concatenate([body.von_mises() for body in bodies]),
             "body": number.astype(np.int64),
         },
     )
+
+
+def velocities_of(bodies: Sequence[Any]) -> Any:
+    """`Body.velocity` of bodies of one simulation or of none, one after the other, (n, 3) [m/s]."""
+    run = bodies[0]._simulation
+    if run is None:
+        return np.concatenate([body.velocity for body in bodies])
+    return run.velocities(bodies)
 
 
 def pvd_write(path: Path, files: Sequence[tuple[float, str]]) -> None:

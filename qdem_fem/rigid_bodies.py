@@ -119,7 +119,7 @@ class RigidBodies(RigidState):
         """Take the motion half a step on (``sign`` 1) or back (-1), with its account of work."""
         behind, now = self._ends()
         to = now if sign > 0 else behind
-        self.run.motion.work += sign * self.half_work()
+        self.run.motion.work[:2] += sign * self.half_work()
         self._every.velocity[:], self._every.spin[:] = to.velocity, to.spin
 
     def _ends(self) -> tuple[RigidNow, RigidNow]:

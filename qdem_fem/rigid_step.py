@@ -236,7 +236,7 @@ def rigid_advance(
 
     ``forces`` [N], ``displacement`` [m], ``velocity`` [m/s]: flat, of the kernel; ``table``
     (2, series): amplitudes now and at the end of the step; ``gravity`` (3 or more,) [m/s^2] or
-    None; ``work`` (2,) [J], of the loads and of prescribed motion, is added to.
+    None; ``work`` (3,) [J]: its first two, of the loads and of prescribed motion, are added to.
     """
     for b in range(c.inverse_mass.size):
         pull, twist = pulls_take(c, b, forces)

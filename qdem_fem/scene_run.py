@@ -117,7 +117,6 @@ def run_dynamic(
     goes_on = resume and folder.checkpoint.exists()
     if goes_on:
         run.restore(folder.checkpoint)
-    run.counts_viscous = prepared.scene.output.audit is not None and run.viscous
     probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
     plan = plan_of(prepared, float(run.step))
     rows, energies = _tables(folder.path, probes, energy_names(run))
@@ -280,7 +279,7 @@ def energy_names(run: Any) -> tuple[str, ...]:
     """Columns of energy.csv beside the time; of what the scene has and counts."""
     touching = () if run.contact is None else CONTACT_ENERGIES
     ground = ABSORBING_ENERGIES if run.conditions.absorbing else ()
-    return ENERGIES + touching + VISCOUS_ENERGY * run.counts_viscous + ground
+    return ENERGIES + touching + VISCOUS_ENERGY * run.viscous + ground
 
 
 def _tables(path: Path, probes: dict[str, Any], energies: tuple[str, ...]) -> tuple[Table, Table]:

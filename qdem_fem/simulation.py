@@ -127,9 +127,6 @@ class Simulation(ConditionedBodies):
         self._assembly: Assembly | None = None
         self._lists: tuple[kernel.Loads, kernel.Constraints] | None = None
         self._critical: CriticalStep | None = None
-        self.counts_viscous = False
-        """Whether the march counts what viscosity takes, at two more evaluations of the forces
-        every so many steps (`qdem_fem.march.looks_next`)."""
         self.warned = nan
         """The critical step of which a warning was given [s]."""
         for body in self.bodies:
@@ -269,6 +266,11 @@ class Simulation(ConditionedBodies):
         """Total force [N], (3,), that `fix`, `prescribe` or `roller` exerts on the body now."""
         return reaction(self, condition)
 
+    def velocities(self, bodies: Sequence[Body]) -> Floats:
+        """`Body.velocity` of some bodies, one after the other, computed once [m/s], (n, 3)."""
+        whole = velocity_now(self)
+        return np.concatenate([whole[self._own(body)] for body in bodies])
+
     def energy(self) -> Energy:
         """Energies now [J], see `Energy`."""
         return energy_now(self)
@@ -354,21 +356,21 @@ class Simulation(ConditionedBodies):
             if self._contacts is not None:
                 self._contacts.held_anew()
 
-    def _field_of(self, body: Body, name: str) -> Floats:
+    def _own(self, body: Body) -> slice:
         start = self._offset(body)
-        own = slice(start, start + len(body.nodes))
+        return slice(start, start + len(body.nodes))
+
+    def _field_of(self, body: Body, name: str) -> Floats:
+        own = self._own(body)
         return velocity_now(self)[own] if name == "velocity" else self.assembly.field(name, own)
 
     def _field_set(self, body: Body, name: str, values: Floats) -> None:
         if self._assembly is None:
             return
-        start = self._offset(body)
         velocities_level(self)
         if self.rigid is not None and body.rigid:
             self.rigid.field_set(body, name, values)
-        field = self.assembly.field(name)
-        field[start : start + len(body.nodes)] = values
-        self.assembly.field_set(name, field)
+        self.assembly.field_set(name, values, self._own(body))
         self.motion.displacement_set |= name == "displacement"
         self.motion.put_in = nan
         if self._contacts is not None and name == "displacement":

@@ -84,7 +84,7 @@ class StaticProblem:
         self.state.velocity[:] = 0.0
         _, bad = self.assembly.kernel_run(
             self.state, 1, 1.0, NO_LOADS, NO_CONSTRAINTS, NO_PROBES, np.ones((2, 1)), None,
-            np.zeros(2),
+            np.zeros(3),
         )  # fmt: skip
         self.state.forces[:] = 0.0
         return self.state.velocity + self.external, bad == 0 and bool(

@@ -254,13 +254,13 @@ def viscous_current(h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, h
 def pulls_finger_viscous(
     h: Nine, w: Nine, g: Nine, lame_first: Any, lame_second: Any, viscous_first: Any,
     viscous_second: Any, half: Any,
-) -> tuple[Nine, Any]:  # fmt: skip
+) -> tuple[Nine, Any, Any]:  # fmt: skip
     """`element_pulls` of `stress_finger` and `viscous_current` together, with less work.
 
     With ``c_a = cof(F) grad N_a``, which is ``J`` times the gradient in the current
     configuration: ``J L = sum_a w_a (x) c_a`` (eq. 5) and ``f_a = -V0 T c_a`` (eqs. 8-10).
-    ``w``: edges of the velocity [m/s], as the edges of `element_gradient`.  Returns the pulls
-    and ``J``.
+    ``w``: edges of the velocity [m/s], as the edges of `element_gradient`.  Returns the pulls,
+    ``J`` and the power that viscosity takes, ``V0 J T_D : D`` [W].
     """
     h0, h1, h2, h3, h4, h5, h6, h7, h8 = h
     one = half + half
@@ -298,8 +298,15 @@ def pulls_finger_viscous(
     exy = (h1 + h3) + (h0 * h3 + h1 * h4 + h2 * h5)
     exz = (h2 + h6) + (h0 * h6 + h1 * h7 + h2 * h8)
     eyz = (h5 + h7) + (h3 * h6 + h4 * h7 + h5 * h8)
-    pressure = lame_first * (exx + eyy + ezz) + viscous_first * inverse * (lxx + lyy + lzz)
+    flow = lxx + lyy + lzz
+    drag = viscous_first * inverse * flow
+    pressure = lame_first * (exx + eyy + ezz) + drag
     elastic, viscous = lame_second + lame_second, second + second
+    taken = (
+        drag * flow
+        + viscous * (lxx * lxx + lyy * lyy + lzz * lzz)
+        + second * (lxy * lxy + lxz * lxz + lyz * lyz)
+    )
     txx = pressure + elastic * exx + viscous * lxx
     tyy = pressure + elastic * eyy + viscous * lyy
     tzz = pressure + elastic * ezz + viscous * lzz
@@ -313,7 +320,15 @@ def pulls_finger_viscous(
         txx * cx + txy * cy + txz * cz, txy * cx + tyy * cy + tyz * cz,
         txz * cx + tyz * cy + tzz * cz,
     )  # fmt: skip
-    return pulls, jacobian
+    return pulls, jacobian, taken
+
+
+def matrix_product(p: Nine, d: Nine) -> Any:
+    """``P : Hdot``, the power of a stress [W/m^3] at a rate of the displacement gradient [1/s]."""
+    return (
+        p[0] * d[0] + p[1] * d[1] + p[2] * d[2] + p[3] * d[3] + p[4] * d[4] + p[5] * d[5]
+        + p[6] * d[6] + p[7] * d[7] + p[8] * d[8]
+    )  # fmt: skip
 
 
 def viscous_small(h: Nine, d: Nine, viscous_first: Any, viscous_second: Any, half: Any) -> Nine:

@@ -18,12 +18,12 @@ _SHOWN = 4
 _UIntArray = npt.NDArray[np.uint64]
 
 
-def surface_faces(elements: IntArray) -> IntArray:
+def surface_faces(elements: IntArray, where: str = "mesh") -> IntArray:
     """Triangles of the boundary (k, 3): faces of one element only, seen from outside.
 
     ``elements`` (m, 4) are right-handed, as `mesh_read` leaves them; (X1 - X0) x (X2 - X0) of a
     face (0, 1, 2) points outward.  The faces come sorted by their nodes, whatever the order of
-    the elements, and begin with their smallest node.
+    the elements, and begin with their smallest node.  ``where``: what a message calls the mesh.
 
     Raises `MeshError` naming the elements if three or more share a face, or if two lie on the
     same side of the face they share: the mesh overlaps itself, as it does around an element
@@ -43,7 +43,7 @@ def surface_faces(elements: IntArray) -> IntArray:
     clash[1:] |= same[1:] & same[:-1]
     if clash.any():
         at = np.flatnonzero(clash)[0]
-        _overlap_raise(_faces_corners(faces, np.array([at]))[0], elements)
+        _overlap_raise(_faces_corners(faces, np.array([at]))[0], elements, where)
     alone = np.flatnonzero(first & last)
     corners = _faces_corners(faces, alone)
     turned = reverse[alone]
@@ -109,7 +109,7 @@ def _faces_corners(faces: tuple[npt.NDArray[Any], ...], chosen: IntArray) -> Int
     return np.stack(columns, axis=1).astype(np.int64)
 
 
-def _overlap_raise(face: IntArray, elements: IntArray) -> None:
+def _overlap_raise(face: IntArray, elements: IntArray, where: str) -> None:
     owners = np.flatnonzero(np.isin(elements, face).sum(axis=1) == 3)
     shown = ", ".join(map(str, owners[:_SHOWN])) + (", ..." if len(owners) > _SHOWN else "")
     many = len(owners) > 2
@@ -118,7 +118,7 @@ def _overlap_raise(face: IntArray, elements: IntArray) -> None:
         if many
         else f"elements {shown} lie on the same side of the face of nodes {face.tolist()} "
         "that they share: they overlap",
-        where="mesh",
+        where=where,
         remedy="remove the elements that are one too many"
         if many
         else "one of them was turned inside out: mesh anew there, or move its nodes back",

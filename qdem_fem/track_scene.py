@@ -26,14 +26,9 @@ from qdem_fem.scene_checks import Prepared, Step, output_faults
 from qdem_fem.scene_file import Problem, SceneText
 from qdem_fem.scene_series import TimeSeries, WrongSeries
 from qdem_fem.sleeper_mesh import SleeperShape
-from qdem_fem.track_bed import (
-    SLEEPER,
-    Bed,
-    BedRecipe,
-    bed_prepare,
-    names_of,
-)
+from qdem_fem.track_bed import Bed, bed_prepare
 from qdem_fem.track_bodies import TrackBox
+from qdem_fem.track_recipe import SLEEPER, BedRecipe, names_of
 from qdem_fem.track_table import TrackTable, loads_of, track_faults
 
 BELOW = 0.1

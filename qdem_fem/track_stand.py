@@ -20,16 +20,8 @@ from qdem_fem.contact_spheres import SphereContact, pair_stiffness
 from qdem_fem.errors import NotConverged, StepWarning
 from qdem_fem.mesh_checks import FloatArray
 from qdem_fem.simulation import Simulation
-from qdem_fem.track_bed import (
-    SLEEPER,
-    Bed,
-    BedRecipe,
-    bed_enter,
-    bed_write,
-    bodies_of_bed,
-    grains_of,
-    sleeper_guide,
-)
+from qdem_fem.track_bed import Bed, bed_enter, bed_write, sleeper_guide
+from qdem_fem.track_recipe import SLEEPER, BedRecipe, bodies_of_bed, grains_of
 
 NEARLY = 0.99
 """Of Coulomb's limit, what counts as being there."""

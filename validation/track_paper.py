@@ -30,16 +30,8 @@ from qdem_fem.output import write_whole
 from qdem_fem.run_folder import machine
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.simulation import Simulation
-from qdem_fem.track_bed import (
-    ROUGH,
-    SLEEPER,
-    Bed,
-    BedRecipe,
-    bodies_of_bed,
-    grains_of,
-    nodes_begin,
-    sleeper_guide,
-)
+from qdem_fem.track_bed import ROUGH, Bed, nodes_begin, sleeper_guide
+from qdem_fem.track_recipe import SLEEPER, BedRecipe, bodies_of_bed, grains_of
 from qdem_fem.track_scene import TrackPrepared
 from validation.track_split import split_counts
 

@@ -21,7 +21,8 @@ from qdem_fem.errors import NotConverged
 from qdem_fem.kinetic_damping import Rest, rest_find
 from qdem_fem.output import write_whole
 from qdem_fem.run_folder import machine
-from qdem_fem.track_bed import STAGES, Bed, grains_of, stage_run
+from qdem_fem.track_bed import STAGES, Bed, stage_run
+from qdem_fem.track_recipe import BedRecipe, grains_of
 from validation.track_trials import scene_at
 
 RECORD = Path(__file__).parent / "results" / "track-periodic.json"
@@ -30,7 +31,7 @@ LIMIT = 0.12
 WIDTH = 'contact.periodic={axis="y", width=0.42}'
 
 
-def last_stages(recipe: track_bed.BedRecipe, firm: Bed, each: bool) -> dict[str, Any]:
+def last_stages(recipe: BedRecipe, firm: Bed, each: bool) -> dict[str, Any]:
     """What the stages ``hard`` and ``rest`` come to from a firm bed."""
     found: dict[str, Any] = {}
 

@@ -48,7 +48,7 @@ def parts_of(run: Simulation, times: int) -> dict[str, float]:
     assembly, contacts = run.assembly, run.contacts
     assert contacts is not None
     state, held = assembly.state, run.packed_lists()[1]
-    nothing, work = np.ones((2, 1)), np.zeros(2)
+    nothing, work = np.ones((2, 1)), np.zeros(3)
     for name in ("displacement", "velocity"):
         getattr(assembly.scratch, name)[:] = getattr(state, name)
     still = assembly.scratch
@@ -59,7 +59,6 @@ def parts_of(run: Simulation, times: int) -> dict[str, float]:
         "contact": lambda: advance_of(
             contacts.kernel, None, state.displacement, state.velocity, 0.0
         ),
-        "a look at viscosity": assembly.viscous_power,
         "a search for pairs": contacts.pairs_find,
     }
     return {name: seconds(one, times)[1] for name, one in done.items()}
@@ -76,7 +75,6 @@ def main() -> None:
         prepared = scene_load(arguments.scene, [f"simulation.threads={threads}"])
         assert isinstance(prepared, TrackPrepared)
         runs[threads], _ = simulation_of(prepared)
-        runs[threads].counts_viscous = True
         runs[threads].advance(20 * runs[threads].step)  # the first steps compile
         if runs[threads].assembly.threads != threads:
             sys.exit("two threads are to be measured: NUMBA_NUM_THREADS=2")

@@ -29,7 +29,8 @@ from qdem_fem.mesh_checks import FloatArray, IntArray
 from qdem_fem.output import write_whole
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.surface import surface_faces
-from qdem_fem.track_bed import BedRecipe, bed_read, grains_of, meshes_of
+from qdem_fem.track_bed import bed_read
+from qdem_fem.track_recipe import BedRecipe, grains_of, meshes_of
 from qdem_fem.track_scene import TrackPrepared
 
 RECORD = Path(__file__).parent / "results" / "track-split.json"

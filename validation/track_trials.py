@@ -8,11 +8,9 @@ import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 
-from qdem_fem import march
 from qdem_fem.energy_account import energy_facts
 from qdem_fem.errors import StepWarning
 from qdem_fem.output import table_read
@@ -21,9 +19,10 @@ from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.scene_run import run_dynamic
 from qdem_fem.simulation import Simulation
-from qdem_fem.track_bed import bed_prepare, bodies_of_bed, grains_of
+from qdem_fem.track_bed import bed_prepare
 from qdem_fem.track_bodies import grains_nodes
 from qdem_fem.track_figures import track_facts
+from qdem_fem.track_recipe import bodies_of_bed, grains_of
 from qdem_fem.track_scene import TrackPrepared
 from validation.case import Check
 
@@ -64,8 +63,6 @@ SOFTER = (0.1, 0.01)
 FALL_STEPS = 3000
 HEAVIER = (1.2e-6, 1.5e-6, 2e-6)
 """Steps [s] that mass scaling brings every element to."""
-ACCOUNT_STEPS = (16, 256, 1024)
-"""Steps between two looks at what viscosity takes."""
 
 
 class Quiet:
@@ -186,18 +183,9 @@ def compared(name: str, one: TrackTrial, reference: TrackTrial) -> list[Check]:
 
 
 def speed_checks(folder: Path, reference: TrackTrial) -> list[Check]:
-    """What makes a run cheaper, and what it costs in error: fewer looks at viscosity, heavier small
-    elements, softer springs; and the step for any contacts, which near ones make longer."""
+    """What makes a run cheaper, and what it costs in error: heavier small elements, softer springs;
+    and the step for any contacts, which near ones make longer."""
     checks = compared("three contacts", trial(folder, "three", "contact.contacts=3"), reference)
-    for steps in ACCOUNT_STEPS:
-        with patch.object(march, "VISCOUS_STEPS", (steps, steps)):
-            one = trial(folder, f"account-{steps}")
-        checks += [
-            Check(f"account every {steps} steps: missing", one.energy["relative_imbalance"],
-                  "<= 0.001", one.energy["relative_imbalance"] <= 1e-3),
-            Check(f"account every {steps} steps: processor time over the reference's",
-                  one.cpu / reference.cpu, "reported", True),
-        ]  # fmt: skip
     for step in HEAVIER:
         one = trial(folder, f"heavier-{step}", f"simulation.mass_scaling={step}")
         checks += compared(f"mass scaling to {1e6 * step:g} µs", one, reference)

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 
 import qdem_fem as q
+from qdem_fem import simulation
+from qdem_fem.assembly import Assembly
 from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.output import bodies_vtu_write
 from validation.qdem_hard_meshes import delaunay_mesh
 
 YOUNG, POISSON, DENSITY = 1e6, 0.25, 1000.0
@@ -363,6 +368,30 @@ def test_state_can_be_set(field: str, after: bool) -> None:
     np.testing.assert_allclose(getattr(body, other), before, rtol=0, atol=1e-15)
     getattr(body, field)[:] = 99.0
     np.testing.assert_array_equal(getattr(body, field), values)
+
+
+def test_many_bodies_are_set_and_written_in_one_go(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Work on one body is that of its own nodes: of n bodies in turn it was of the order n^2."""
+    bodies = [stone(seed=seed) for seed in (1, 2, 3)]
+    run = q.Simulation(bodies, threads=1)
+    run.advance(3 * run.step)
+    for body in bodies:
+        body.velocity = random_field(body, 1e-3)
+    run.advance(2 * run.step)
+    asked = []
+    now = simulation.velocity_now
+    monkeypatch.setattr(simulation, "velocity_now", lambda run: asked.append(1) or now(run))
+    bodies_vtu_write(tmp_path / "a.vtu", bodies)
+    assert len(asked) == 1
+    read = meshio.read(tmp_path / "a.vtu").point_data["velocity"]
+    assert (read == np.concatenate([body.velocity for body in bodies])).all()
+    bodies[0].displacement = random_field(bodies[0], 1e-4)  # the first brings velocities level
+    monkeypatch.setattr(Assembly, "_read", None)  # what is not set is not read either
+    bodies[1].displacement = random_field(bodies[1], 1e-4)
+    monkeypatch.undo()
+    assert (bodies[1].displacement == random_field(bodies[1], 1e-4)).all()
 
 
 def test_state_set_before_the_simulation_is_its_start() -> None:

@@ -195,11 +195,15 @@ def test_viscous_stress_of_arrays(law: Strain) -> None:
         expected = reference_forces.stress_viscous(H, rate, -0.4, 0.6)
         # the velocity edges that go with the rate: Hdot = sum w_a (x) g_a
         w = tuple((rate @ np.linalg.inv(G)).transpose(0, 2, 1).reshape(-1, 9).T)
-        both, _ = stress.pulls_finger_viscous(h, w, g, 0.7, 1.3, -0.4, 0.6, 0.5)
+        both, _, power = stress.pulls_finger_viscous(h, w, g, 0.7, 1.3, -0.4, 0.6, 0.5)
         total = reference_forces.stress_finger(H, 0.7, 1.3) + expected
         pulls = (total @ G.transpose(0, 2, 1)).transpose(0, 2, 1)
         scale = np.linalg.cond(G)[:, None, None] * abs(pulls).max()
         assert (abs(np.stack(both, -1).reshape(-1, 3, 3) - pulls) < 1e-14 * scale).all()
+        # what viscosity takes is its stress times the rate, in the fused function too
+        taken = (expected * rate).sum(axis=(1, 2))
+        assert (abs(power - taken) < 1e-13 * scale[:, 0, 0] ** 2).all()
+        np.testing.assert_allclose(stress.matrix_product(found, d), taken, rtol=1e-11, atol=1e-9)
     np.testing.assert_allclose(np.stack(found, -1).reshape(-1, 3, 3), expected, atol=1e-13)
 
 

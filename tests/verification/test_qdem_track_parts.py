@@ -19,9 +19,10 @@ from qdem_fem.material import Material
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.sleeper_mesh import SleeperShape
 from qdem_fem.sleeper_modes import free_modes
-from qdem_fem.track_bed import Bed, grains_of, sleeper_guide
+from qdem_fem.track_bed import Bed, sleeper_guide
 from qdem_fem.track_bodies import TrackBox, grains_nodes
 from qdem_fem.track_layout import TrackLayout
+from qdem_fem.track_recipe import grains_of
 from qdem_fem.track_scene import TrackPrepared, track_enter
 from validation import track_periodic
 from validation.track_split import ghosts, shared_nodes

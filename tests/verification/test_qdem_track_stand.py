@@ -24,8 +24,9 @@ from qdem_fem.kinetic_damping import masses, rest_find
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
-from qdem_fem.track_bed import Bed, bed_read, bed_write, grains_of
+from qdem_fem.track_bed import Bed, bed_read, bed_write
 from qdem_fem.track_bodies import grains_nodes
+from qdem_fem.track_recipe import grains_of
 from qdem_fem.track_scene import TrackPrepared, contact_of
 from qdem_fem.track_stand import bed_begin, bed_judge, bed_stand
 from tests.verification.test_qdem_track import RADIUS, RECIPE, STIFFNESS, STONE

@@ -205,7 +205,7 @@ def stop_apart(speed: float, steps: int) -> float:
         velocity[np.argmax(body.nodes.sum(axis=1))] = speed
         assembly.field_set("velocity", velocity)
         done, bad = assembly.window(
-            steps, run.step, loads, held, NO_PROBES, np.ones((steps + 1, 1)), None, np.zeros(2)
+            steps, run.step, loads, held, NO_PROBES, np.ones((steps + 1, 1)), None, np.zeros(3)
         )
         results.append((done, bad, np.nan_to_num(assembly.field("displacement"))))
     (done, bad, u), (done2, bad2, u2) = results

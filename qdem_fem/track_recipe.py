@@ -1,0 +1,145 @@
+"""What a bed is made of: the recipe, and the bodies that follow from it.
+
+`qdem_fem.track_bed` prepares the bed; its file is that of one recipe.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.body import Body
+from qdem_fem.contact_spheres import ContactPlane, SphereContact
+from qdem_fem.grain_grading import Grading
+from qdem_fem.grain_set import GrainSet, grains_make
+from qdem_fem.material import Material
+from qdem_fem.periodic import PeriodicWidth
+from qdem_fem.sleeper_mesh import SleeperShape
+from qdem_fem.track_bodies import TrackBox
+from qdem_fem.track_layout import Part, TrackLayout
+
+if TYPE_CHECKING:
+    from qdem_fem.mesh import TetMesh
+
+Floats = NDArray[np.float64]
+
+SLEEPER = "sleeper"
+"""Name of the body."""
+
+
+@dataclass(frozen=True)
+class BedRecipe:
+    """Everything that the prepared bed depends on, SI."""
+
+    box: TrackBox
+    below: int
+    """Grains below the sleeper."""
+    beside: int
+    """Grains that fall into the cribs."""
+    seed: int
+    sizes: tuple[float, float]
+    """Least and greatest sieve size of the grains' meshes [m]."""
+    shape: SleeperShape
+    cells: tuple[int, int, int]
+    ballast: Material
+    sleeper: Material
+    radius: float
+    stiffness: tuple[float, float]
+    """k_n of ballast and sleeper [N/m]."""
+    friction: float
+    side_friction: float
+    """Of the walls at the sides; smooth ones are planes of symmetry."""
+    gravity: tuple[float, float, float]
+    softness: float
+    unbalanced: float
+    kinetic: float
+    loose: float
+    """Greatest shares of `Rest` that are equilibrium."""
+    patience: float
+    """Simulated time of a stage after which it is given up [s]."""
+    rigid: bool = True
+    """Whether grains are rigid until the last stage."""
+    periodic: bool = False
+    """Whether the track repeats along y, as in the paper, in place of walls there."""
+    part: Part = "slice"
+    shoulder: tuple[float, float] | None = None
+    """As in `TrackLayout`."""
+
+    @property
+    def layout(self) -> TrackLayout:
+        """Where sleeper and ballast lie."""
+        return TrackLayout(
+            self.part, self.box, self.shape, self.cells, self.radius, self.shoulder
+        )  # fmt: skip
+
+    def planes(self) -> tuple[ContactPlane, ...]:
+        """Ground and sides."""
+        length, width = self.box.length, self.box.width
+        ground = ContactPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        sides = [
+            ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+            ((length, 0.0, 0.0), (-1.0, 0.0, 0.0)),
+            ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            ((0.0, width, 0.0), (0.0, -1.0, 0.0)),
+        ]
+        if self.periodic:
+            sides = sides[:2]
+        return (ground, *(ContactPlane(*side, self.side_friction) for side in sides))
+
+    def contact(self, names: Sequence[str], softness: float = 1.0) -> SphereContact:
+        """Spheres of bodies with these names, their springs softer by a factor."""
+        ballast, sleeper = self.stiffness
+        each = {n: softness * (sleeper if n == SLEEPER else ballast) for n in names}
+        width = PeriodicWidth("y", self.box.width) if self.periodic else None
+        return SphereContact(self.radius, each, self.friction, self.planes(), periodic=width)
+
+    def told(self) -> str:
+        """The recipe as a text, equal for equal beds; that of a slice names no part."""
+        told = asdict(self)
+        if self.part == "slice":
+            del told["part"], told["shoulder"]
+        return json.dumps(told, sort_keys=True, default=np.ndarray.tolist)
+
+
+def grains_of(recipe: BedRecipe) -> GrainSet:
+    """The grains of a bed."""
+    return _grains_made(recipe.below + recipe.beside, recipe.seed, recipe.sizes)
+
+
+@lru_cache(maxsize=1)  # 30 ms a grain, and a run asks twice
+def _grains_made(count: int, seed: int, sizes: tuple[float, float]) -> GrainSet:
+    return grains_make(count, seed, None, Grading(np.array(sizes), np.array([0.0, 1.0])))
+
+
+def names_of(count: int, sleeper: bool) -> list[str]:
+    """Names of the bodies: ``grain-0`` and so on, and the sleeper."""
+    return [f"grain-{number}" for number in range(count)] + [SLEEPER] * sleeper
+
+
+def meshes_of(recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats]) -> list[TetMesh]:
+    """Meshes of bodies at their places: grains, and the sleeper where nodes are one more."""
+    meshes = [replace(grains.mesh(i), nodes=x) for i, x in enumerate(nodes[: len(grains)])]
+    if len(nodes) > len(grains):
+        meshes.append(replace(recipe.layout.sleeper(0.0), nodes=nodes[-1]))
+    return meshes
+
+
+def bodies_of_bed(
+    recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats], *, rigid: bool
+) -> dict[str, Body]:
+    """Bodies by name; of masses at their nodes where rigid, as deformable ones have them."""
+    sleeper = len(nodes) > recipe.below + recipe.beside
+    names = names_of(len(nodes) - sleeper, sleeper)
+    return {
+        name: Body(
+            mesh, recipe.sleeper if name == SLEEPER else recipe.ballast, name=name,
+            rigid="lumped" if rigid else False,
+        )
+        for name, mesh in zip(names, meshes_of(recipe, grains, nodes), strict=True)
+    }  # fmt: skip

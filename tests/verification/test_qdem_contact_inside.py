@@ -1,0 +1,62 @@
+"""Bodies that begin in each other: told where no contact sees it, accounted for where one does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import qdem_fem as q
+from qdem_fem.energy_account import energy_facts
+from qdem_fem.errors import ContactTooDeep
+from qdem_fem.mesh_generation import box_mesh
+
+SIDE = 0.03
+STONE = q.Material(30e9, 0.2, 2700.0)
+MODELS = {
+    "spheres": q.SphereContact(0.002, 1e6, 0.5),
+    "surface": q.SurfaceContact(1e10, 0.5, depth=0.002),
+    "overlaps": q.SurfaceContact(1e10, 0.5, depth=0.002, faces="overlaps"),
+}
+LOW = box_mesh((SIDE,) * 3, (2, 2, 2))
+
+
+def beside(model: str, size: float, corner: tuple[float, float, float]) -> q.Simulation:
+    """A cube of 3 cm at the origin, and one of ``size`` [m] with its least corner at ``corner``."""
+    other = box_mesh((size,) * 3, (1, 1, 1), origin=corner)
+    bodies = [q.Body(LOW, STONE, name="low"), q.Body(other, STONE, name="other")]
+    return q.Simulation(bodies, threads=1, contact=MODELS[model], step=1e-8)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("size", "corner"),
+    [
+        (0.03, (0.011, 0.009, 0.013)),  # a corner in the other
+        (0.01, (0.009, 0.011, 0.008)),  # swallowed
+        (0.05, (-0.01, -0.011, -0.009)),  # swallows: no point of it is in the other
+    ],
+)
+def test_bodies_deep_in_each_other_are_told(
+    model: str, size: float, corner: tuple[float, float, float]
+) -> None:
+    run = beside(model, size, corner)
+    with pytest.raises(ContactTooDeep, match=r"t = 0 s, step 0: (low|other) lies .* m below the"):
+        run.advance(1e-8)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_bodies_that_contact_parts_are_not(model: str) -> None:
+    """1 mm deep, within a sphere's radius and the greatest depth; and apart."""
+    for corner in ((0.002, 0.002, SIDE - 1e-3), (0.002, 0.002, SIDE + 0.01)):
+        run = beside(model, 0.02, corner)
+        run.advance(1e-8)
+        assert run.steps_done == 1
+
+
+def test_what_overlap_gives_is_what_the_account_is_measured_by() -> None:
+    """Springs that the scene begins with make motion: nothing was put in, and 1 % is missing."""
+    rows = {"kinetic": [0.0, 60, 99], "elastic": [0.0, 0, 0], "external": [0.0, 0, 0]}
+    rows |= {"contact": [100.0, 40, 0]}
+    facts = energy_facts({name: np.array(values) for name, values in rows.items()})
+    assert facts["greatest_imbalance"] == pytest.approx(1.0)
+    assert facts["relative_imbalance"] == pytest.approx(0.01)
