@@ -6,13 +6,15 @@ the settlement of a jump errs by, with no bed, no relaxation and no engine.  Sec
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
+from adapters import jump_slopes
 from adapters.jump_history import SEATING, Jumped, asked_gain
 from adapters.jump_rates import Stretch
 from adapters.laws import law_named
@@ -36,6 +38,17 @@ CASES: tuple[tuple[Kind, int, tuple[int, ...]], ...] = (
 FIRST_CYCLE, KAPPA = 0.15, 0.1
 """What a moved bed was made to settle more by, over what it was moved by: in the first cycle behind
 the jump, and times 1 / n in each later one."""
+
+CHOICES: dict[str, dict[str, float]] = {
+    "as chosen": {},
+    "kappa's scale / 2": {"RESEATING": jump_slopes.RESEATING / 2},
+    "x 2": {"RESEATING": jump_slopes.RESEATING * 2},
+    "drift / 2": {"DRIFT": jump_slopes.DRIFT / 2},
+    "drift x 2": {"DRIFT": jump_slopes.DRIFT * 2},
+}
+"""What is changed of `adapters.jump_slopes`, one at a time, to see what the choice is worth,"""
+CHOICES_JUMPS = 5
+"""with so many jumps."""
 
 Way = Callable[[Sequence[Stretch], int, Sequence[Jumped]], float]
 """Settlement [m] over a jump of h cycles behind the last of the stretches that were computed, and
@@ -170,6 +183,36 @@ def table_errors(found: Sequence[Forecasts], moved: bool) -> str:
     return table(head, lines)
 
 
+@contextmanager
+def chosen(choice: dict[str, float]) -> Iterator[None]:
+    """`adapters.jump_slopes` with other scales."""
+    before = {name: getattr(jump_slopes, name) for name in choice}
+    try:
+        for name, value in choice.items():
+            setattr(jump_slopes, name, value)
+        yield
+    finally:
+        for name, value in before.items():
+            setattr(jump_slopes, name, value)
+
+
+def table_choices(record: EnsembleRecord) -> str:
+    """What the scales of `CHOICES` are worth on beds that settle more behind a jump."""
+    lines = []
+    for kind, last, _ in CASES:
+        curves = curves_of(kind, last, record)
+        scale = float(np.mean([curve[last] - curve[kind.k_i] for curve in curves]))
+        lines.append([f"{kind.name} to {last:,}"])
+        for choice in CHOICES.values():
+            with chosen(choice):
+                errors = [
+                    jumped_error(one, kind.k_i, last, CHOICES_JUMPS, way_history, True) / scale
+                    for one in curves
+                ]
+            lines[-1].append(f"{100 * np.mean(errors):+.0f} ± {100 * np.std(errors, ddof=1):.0f}")
+    return table([f"run, {CHOICES_JUMPS} jumps", *(f"{name}, %" for name in CHOICES)], lines)
+
+
 def draw(found: Sequence[Forecasts], target: Path) -> None:
     """Root mean square error against the share of cycles computed, a panel an ensemble."""
     import matplotlib
@@ -195,11 +238,12 @@ def draw(found: Sequence[Forecasts], target: Path) -> None:
     plt.close(figure)
 
 
-def page(found: Sequence[Forecasts]) -> str:
+def page(found: Sequence[Forecasts], record: EnsembleRecord) -> str:
     """The page of a study."""
     parts = {
         "ERRORS": table_errors(found, False),
         "ERRORS_MOVED": table_errors(found, True),
+        "CHOICES": table_choices(record),
         "K": str(FIRST_WINDOW),
         "HEALING": str(HEALING),
         "FIRST_CYCLE": f"{FIRST_CYCLE:g}",
@@ -210,8 +254,9 @@ def page(found: Sequence[Forecasts]) -> str:
 
 def main() -> None:
     """Write page and picture."""
-    found = study(EnsembleRecord())
-    write_atomically(PAGE, page(found))
+    record = EnsembleRecord()
+    found = study(record)
+    write_atomically(PAGE, page(found, record))
     draw(found, PAGE.with_suffix(".png"))
 
 

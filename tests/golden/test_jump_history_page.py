@@ -38,7 +38,7 @@ def errors(
 
 def test_page_is_made_from_the_record(found: list[Forecasts]) -> None:
     """Made again, the page is the one that ships."""
-    assert page(found) == PAGE.read_text(encoding="utf-8")
+    assert page(found, EnsembleRecord()) == PAGE.read_text(encoding="utf-8")
     assert PAGE.with_suffix(".png").exists()
 
 
