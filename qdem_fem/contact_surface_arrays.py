@@ -74,6 +74,8 @@ class Near(NamedTuple):
     """(m, 2) pairs of edges"""
     edge_image: Any
     """(m, 3) from the second edge to its image [m]; (0,) where nothing is periodic"""
+    edge_free: Any
+    """(m,) way of all vertices from ``start`` up to which the edges can not touch [m]"""
     edge_weight: Any
     """(m,) [m^2]"""
     edge_start: Any

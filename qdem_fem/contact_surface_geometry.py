@@ -100,6 +100,23 @@ def less(a: Any, b: Any) -> Any:  # pragma: no cover
 
 
 @exact
+def segments_apart(w: Any, u: Any, v: Any) -> float:  # pragma: no cover
+    """Distance [m] of the segments ``w + s u`` and ``t v``, s and t from 0 to 1 (Ericson 2005)."""
+    uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
+    determinant = uu * vv - uv * uv
+    s = 0.0
+    if determinant > 0.0:
+        s = min(1.0, max(0.0, (uv * vw - vv * uw) / determinant))
+    t = (uv * s + vw) / vv
+    if t < 0.0:
+        t, s = 0.0, min(1.0, max(0.0, -uw / uu))
+    elif t > 1.0:
+        t, s = 1.0, min(1.0, max(0.0, (uv - uw) / uu))
+    d = less(w, less(scaled(t, v), scaled(s, u)))
+    return np.sqrt(dot(d, d))
+
+
+@exact
 def face_normal(position: Any, face: Any, f: int) -> Any:  # pragma: no cover
     """Unit normal of a face."""
     i, j, k = face[f, 0], face[f, 1], face[f, 2]

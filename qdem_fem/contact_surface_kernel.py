@@ -32,6 +32,7 @@ from qdem_fem.contact_surface_geometry import (
     face_normal,
     less,
     scaled,
+    segments_apart,
     velocity_of,
 )
 from qdem_fem.contact_surface_overlaps import overlaps_forces, wall_faces_forces
@@ -146,10 +147,15 @@ def points_forces(c: Any, velocity: Any, step: float, moved: float) -> float:  #
 
 
 @exact
-def edges_forces(c: Any, velocity: Any, step: float) -> None:  # pragma: no cover
-    """Forces of sharp edges across sharp edges of other bodies."""
+def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # pragma: no cover
+    """Forces of sharp edges across sharp edges of other bodies.
+
+    ``moved`` as of `points_forces`: edges that touch are no farther apart than the greatest depth.
+    """
     surface, near, x = c.surface, c.near, c.position
     for at in range(near.edges.shape[0]):
+        if moved < near.edge_free[at]:
+            continue
         a, b = near.edges[at, 0], near.edges[at, 1]
         i, j, k, m = surface.edge[a, 0], surface.edge[a, 1], surface.edge[b, 0], surface.edge[b, 1]
         u, v = minus(x, j, x, i), minus(x, m, x, k)
@@ -174,7 +180,9 @@ def edges_forces(c: Any, velocity: Any, step: float) -> None:  # pragma: no cove
                     g = -dot(w, n)
                     if g > c.depth:
                         g = -1.0
+        near.edge_free[at] = -1.0
         if g <= 0.0 and near.edge_weight[at] < 0.0:
+            near.edge_free[at] = 0.5 * (segments_apart(w, u, v) - c.depth) - moved
             continue
         one, two = (1.0 - s, s, 0.0), (1.0 - t, t, 0.0)
         nodes, under = (i, j, i), (k, m, k)
@@ -252,7 +260,7 @@ def surface_step_build(made_from: str) -> Any:
         c.account[0] = 0.0
         moved = np.sqrt(far)
         deepest = max(points_forces(c, velocity, step, moved), walls_forces(c, velocity, step))
-        edges_forces(c, velocity, step)
+        edges_forces(c, velocity, step, moved)
         if c.clipped:
             deepest = max(
                 deepest,

@@ -180,7 +180,8 @@ def near_of(
     count, pairs = len(point), len(edges)
     return Near(
         point, body, first, face, np.full(count, -1.0), np.full(count, -1.0), np.zeros((count, 3)),
-        image, edges, edge_image, np.full(pairs, -1.0), np.zeros(pairs), np.zeros((pairs, 3)),
+        image, edges, edge_image, np.full(pairs, -1.0), np.full(pairs, -1.0), np.zeros(pairs),
+        np.zeros((pairs, 3)),
     )  # fmt: skip
 
 

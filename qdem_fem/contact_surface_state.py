@@ -145,7 +145,7 @@ class SurfaceContacts(Contacts):
 
     def forget(self) -> None:
         """Let go of all springs."""
-        self.near.free[:] = -1.0
+        self.near.free[:] = self.near.edge_free[:] = -1.0
         overlaps, walls = self.kernel.overlaps, self.kernel.walls
         overlaps.free[:] = -1.0
         for weight in (self.near.weight, self.near.edge_weight, overlaps.area, walls.weight):

@@ -233,6 +233,34 @@ def test_overlaps_load_both_meshes_as_a_uniform_pressure(cells: tuple[int, int])
         assert expected.sum() == pytest.approx(SIDE**2, rel=1e-9)
 
 
+def test_edges_are_looked_at_before_they_touch() -> None:
+    """Two cubes thrown on each other's edges: to the bit as if all pairs were looked at.
+
+    Both come as fast, so that they near each other by twice the way of any vertex: the bound is
+    sharp.  Some pairs are left out in every step, and some touch.
+    """
+    runs = []
+    for every in (False, True):
+        bodies = on_edges()
+        moved = bodies[1].nodes + np.array([0.001, 0.002, 5e-5])
+        bodies[1] = q.Body((moved, bodies[1].elements), STONE)
+        run = touching(bodies, friction=0.3)
+        for body, speed in zip(bodies, (1.0, -1.0), strict=True):
+            body.velocity = np.tile([0.0, 0.0, speed], (len(moved), 1))
+        left_out = touched = 0
+        for _ in range(200):
+            if every:
+                run.contacts.near.edge_free[:] = -1.0
+            run.advance(run.step)
+            left_out += (run.contacts.near.edge_free > 0).sum()
+            touched += (run.contacts.near.edge_weight > 0).sum()
+        assert left_out > 0
+        assert touched > 0
+        runs.append(run)
+    for field in ("displacement", "velocity"):
+        assert np.array_equal(*(run.assembly.field(field) for run in runs))
+
+
 @FACES
 def test_collision_keeps_momentum_moment_and_energy(faces: str) -> None:
     """Cube on cube edge to edge at 0.2 m/s with friction; the bounds of rounding and of dt^2."""
