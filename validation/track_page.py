@@ -72,8 +72,7 @@ def small_text(record: dict[str, Any]) -> str:
         "|---|---|",
         f"| a step on one thread, the account within: wall, processor time | "
         f"{1e6 * wall['1']:.0f} µs, {1e6 * spent['1']:.0f} µs |",
-        f"| a step on two threads, other programs on the same two cores: wall time | "
-        f"{1e6 * wall['2']:.0f} µs |",
+        f"| a step on two threads: wall time | {1e6 * wall['2']:.0f} µs |",
         f"| the same bits on one thread and on two | {'yes' if record['same_bits'] else 'no'} |",
         f"| million elements a second, one thread | {record['elements'] / spent['1'] / 1e6:.3g} |",
         *(
