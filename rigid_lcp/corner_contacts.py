@@ -24,7 +24,7 @@ Ints = NDArray[np.int64]
 CORNER_EDGE, EDGE_CORNER, CORNERS = 3, 4, 5
 """Corner of a on an edge of b; corner of b on an edge of a; corner on corner."""
 PAIRS = 64
-"""Pairs of a corner and an edge kept for two bodies; four contacts of them are."""
+"""Pairs of a corner and an edge kept for two bodies; some contacts of them are."""
 PAIR_COLUMNS = 8
 """Row of a pair: distance, corner, edge, the end of the edge that is nearest (-1: neither), 1 if
 the corner is a's (-1: b's), vector from b's point to a's (3)."""

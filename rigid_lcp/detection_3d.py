@@ -1,7 +1,7 @@
 """Contacts in space: which pairs are near, and the point contacts of every pair (eq. 9).
 
-Polyhedra: corners on faces and crossing edges, else on edges and corners, at most four a pair
-(`rigid_lcp.solid_contacts`); spheres: the nearest point of the other body
+Polyhedra: corners on faces and crossing edges, else on edges and corners, of each pair the outer
+ones (`rigid_lcp.solid_contacts`); spheres: the nearest point of the other body
 (`rigid_lcp.sphere_contact`).
 """
 
@@ -18,10 +18,11 @@ from rigid_lcp.manifold_3d import (
     CORNER_FACE,
     EDGES,
     FACE_CORNER,
+    MOST,
     ROOM,
     TIE,
     add_candidate,
-    four_of,
+    outer_of,
 )
 from rigid_lcp.near_pairs import HALF_SPACE, bounding_boxes, near_pairs
 from rigid_lcp.placed_solids import (
@@ -112,8 +113,12 @@ def pair_contacts(
 
     A row of numbers: point (3), normal (3), gap, radii of curvature of a and b.
     """
-    bodies, numbers = np.empty((4 * len(pairs), 2), np.int64), np.empty((4 * len(pairs), 9))
-    key = np.empty(4 * len(pairs), np.int64)
+    room = MOST * len(pairs)
+    bodies, numbers, key = (
+        np.empty((room, 2), np.int64),
+        np.empty((room, 9)),
+        np.empty(room, np.int64),
+    )
     found = np.empty((ROOM, COLUMNS))
     c = 0
     for i, j in pairs:
@@ -163,7 +168,7 @@ def pair_contacts(
 def corners_on_plane(
     solids: Solids, body: int, plane: int, margin: float, size: float, found: Floats
 ) -> int:
-    """Corners of a polyhedron near a half-space, at most four; returns how many."""
+    """Corners of a polyhedron near a half-space, the outer ones; returns how many."""
     count = 0
     face = solids.first_face[plane]
     n, level, first = solids.normal[face], solids.offset[face], solids.first_vertex[body]
@@ -174,4 +179,4 @@ def corners_on_plane(
             count = add_candidate(
                 found, count, CORNER_FACE, v - first, 0, gap, n, 1.0, x, TIE * size
             )
-    return four_of(found, count, size)
+    return outer_of(found, count, size)

@@ -226,6 +226,13 @@ def _parts_3d(body: Body, point: ArrayLike, normal: ArrayLike) -> tuple[Body, Bo
     made = []
     for each in parts:
         shape = Polyhedron.of_corners(each.shape.vertices)  # as a run that goes on makes it again
+        try:
+            _ = shape.edges  # contacts want them
+        except ShapeError as error:
+            raise ShapeError(
+                "the plane leaves corners too near to one another, or to a face, to be told apart",
+                where="cut", remedy="move the plane a little",
+            ) from error  # fmt: skip
         mass, inertia = shape.mass_properties(density)
         made.append(replace(
             body, shape=shape, mass=mass, inertia=inertia, position=each.position,

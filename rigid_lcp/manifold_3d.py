@@ -1,4 +1,4 @@
-"""Point contacts of two polyhedra: corners on faces and crossing edges, at most four a pair.
+"""Point contacts of two polyhedra: corners on faces and crossing edges, the outer ones.
 
 Two faces upon each other share a polygon.  Its corners are corners of one body on the face of
 the other, or crossings of their edges; each is a contact with the normal and the gap of its own
@@ -31,6 +31,10 @@ CORNER_FACE, FACE_CORNER, EDGES = 0, 1, 2
 STEEP = 10.0
 """How much farther out [m] a contact must be for each metre of gap; faces that share contacts are
 tilted by less than its inverse, see `rigid_lcp.separation_3d.NEARLY`."""
+OUTSIDE = 1e-2
+"""Share of the reach by which a contact must lie outside of those kept to be kept as well."""
+MOST = 12
+"""Contacts kept of a pair."""
 ROOM = 256
 """Candidates looked at for one pair; there are a few dozen for grains of a hundred corners."""
 COLUMNS = 10
@@ -206,11 +210,56 @@ def farthest_along(
 
 
 @njit(cache=True)
-def four_of(found: Floats, count: int, size: float) -> int:
-    """Keep at most four candidates in the first rows of ``found``: returns how many.
+def outer_rows(found: Floats, count: int, size: float, kept: Ints, number: int) -> int:
+    """Add to the ``kept`` rows p, q, left, right (-1: none) those that their hull leaves out.
+
+    Edge by edge of the hull, the candidate farthest beyond it by more than `OUTSIDE`: as a stone
+    on a face of five corners may stand on any three of them.  Returns how many rows there are.
+    """
+    ring = np.empty(MOST, np.int64)
+    corners = 0
+    for row in (kept[0], kept[3], kept[1], kept[2]):  # anticlockwise about the normal
+        if row >= 0:
+            ring[corners] = row
+            corners += 1
+    normal = found[kept[0], 4:7]
+    least = OUTSIDE * size
+    added = True
+    while added and 2 < corners < MOST:  # every edge once a round: what is too much goes evenly
+        added, place = False, 0
+        while place < corners < MOST:
+            start, end = found[ring[place]], found[ring[(place + 1) % corners]]
+            u0, u1, u2 = end[7] - start[7], end[8] - start[8], end[9] - start[9]
+            o0, o1, o2 = cross(u0, u1, u2, normal[0], normal[1], normal[2])
+            length = np.sqrt(o0 * o0 + o1 * o1 + o2 * o2)
+            higher = max(start[3], end[3])
+            best, most = -1, least * length
+            for k in range(count):
+                worth = (
+                    o0 * (found[k, 7] - start[7])
+                    + o1 * (found[k, 8] - start[8])
+                    + o2 * (found[k, 9] - start[9])
+                    - STEEP * length * max(found[k, 3] - higher, 0.0)
+                )
+                if worth > most:
+                    best, most = k, worth + TIE * size * length
+            place += 1
+            if best < 0:
+                continue
+            for k in range(corners, place, -1):
+                ring[k] = ring[k - 1]
+            ring[place] = kept[number] = best
+            added, corners, number, place = True, corners + 1, number + 1, place + 1
+    return number
+
+
+@njit(cache=True)
+def outer_of(found: Floats, count: int, size: float) -> int:
+    """Keep the candidates that bear in the first rows of ``found``: returns how many.
 
     The farthest from the middle, the farthest from that, and on either side of the line through
-    both the farthest; the deepest of all takes the place of the nearest of them if it is deeper.
+    both the farthest; then what lies outside of these (`outer_rows`), at most `MOST` in all; the
+    deepest of all takes the place of the nearest of them if it is deeper.
     One that is higher by g must be `STEEP` g farther out to be taken: of a worn corner the ends
     that touch, not the one beside them.
     Lengths within `TIE` of each other count as equal: the first is taken.
@@ -229,11 +278,14 @@ def four_of(found: Floats, count: int, size: float) -> int:
     q = farthest_from(found, count, found[p, 7], found[p, 8], found[p, 9], tie)
     u0, u1, u2 = found[q, 7] - found[p, 7], found[q, 8] - found[p, 8], found[q, 9] - found[p, 9]
     d0, d1, d2 = cross(found[p, 4], found[p, 5], found[p, 6], u0, u1, u2)
-    left = farthest_along(found, count, p, d0, d1, d2, tie)
-    right = farthest_along(found, count, p, -d0, -d1, -d2, tie)
-    kept = np.empty((4, COLUMNS))
+    rows = np.empty(MOST + 4, np.int64)
+    rows[0], rows[1] = p, q
+    rows[2] = farthest_along(found, count, p, d0, d1, d2, tie)
+    rows[3] = farthest_along(found, count, p, -d0, -d1, -d2, tie)
+    all_rows = outer_rows(found, count, size, rows, 4)
+    kept = np.empty((all_rows, COLUMNS))
     number, nearest, least, lowest = 0, 0, np.inf, np.inf
-    for row in (p, q, left, right):
+    for row in rows[:all_rows]:
         if row < 0:
             continue
         squares = 0.0

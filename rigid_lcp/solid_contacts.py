@@ -19,8 +19,8 @@ from rigid_lcp.manifold_3d import (
     TIE,
     add_candidate,
     face_candidates,
-    four_of,
     least_gap,
+    outer_of,
 )
 from rigid_lcp.separation_3d import (
     NEARLY,
@@ -87,4 +87,4 @@ def solids_contacts(
     if apart > -TIE * size and least > apart + TIE * size:
         within = min(margin, least - TIE * size)
         count = corner_candidates(solids, a, b, near_a, near_b, within, size, towards, found, count)
-    return four_of(found, count, size)
+    return outer_of(found, count, size)

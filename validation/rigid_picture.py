@@ -142,25 +142,30 @@ def _success(axes: Any, rows: Sequence[Row]) -> None:
 
 
 def _cycle(axes: Any, rows: Sequence[Row]) -> None:
-    """The lists that contacts enter, event after event, until it cycles."""
+    """The lists that contacts leave and enter, event after event, until it cycles."""
     shown = report.trace(rows)
     if shown is None:
         axes.set_axis_off()
         return
     lists = ["NC", "C_F", "C+", "C-"]
     events = shown["events"][-LAST:]
-    contacts = list(dict.fromkeys(event[2] for event in events))
     first = shown["work"] - len(events)
-    for number, contact in enumerate(contacts):
-        mine = [(first + k, event) for k, event in enumerate(events) if event[2] == contact]
-        axes.plot(
-            [k for k, _ in mine], [lists.index(event[4]) for _, event in mine],
-            "o-", markersize=4, color=f"C{number % 10}", label=f"contact {contact}",
-        )  # fmt: skip
+    for place, (_, _, contact, origin, target, step, _) in enumerate(events, first):
+        low, high = lists.index(origin), lists.index(target)
+        colour = "#cc0000" if step == 0 else "#0b5394"
+        axes.annotate(
+            "", (place, high), (place, low), arrowprops={"arrowstyle": "->", "color": colour}
+        )
+        axes.plot(place, low, "o", markersize=4, color=colour)
+        axes.text(
+            place + 0.12, (low + high) / 2, f"{contact}", fontsize=8, color=colour, va="center"
+        )
+    axes.set_xlim(first - 0.5, shown["work"] + 0.2)
+    axes.set_ylim(-0.3, 3.3)
     axes.set_yticks(range(4), lists)
     axes.set(
         title=f"how it cycles: friction {shown['setting']['friction']:g}, order {shown['seed']}",
-        xlabel="change of lists", ylabel="list that the contact enters",
+        xlabel="change of lists; beside it the contact, red: a step of length zero",
+        ylabel="lists that it leaves and enters",
     )  # fmt: skip
-    axes.legend(fontsize=7)
     axes.grid(True, alpha=0.25)

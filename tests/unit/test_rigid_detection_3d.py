@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rigid_lcp.detection_3d import place_solids, shapes_3d
 from rigid_lcp.errors import SceneError
+from rigid_lcp.manifold_3d import MOST
 from rigid_lcp.near_pairs import bounding_boxes, near_pairs
 from rigid_lcp.placed_solids import MOST_EDGES
 from rigid_lcp.polyhedra import ballast_stone
@@ -58,16 +59,27 @@ def test_crossed_bars_share_a_square() -> None:
     assert np.allclose(sorted_points(found)[:, :2], wanted, atol=1e-15)
 
 
-def test_a_shared_octagon_keeps_its_extent() -> None:
-    """Cubes turned by 45 degrees share a regular octagon; four corners keep its diameter."""
+def test_a_shared_octagon_keeps_its_corners() -> None:
+    """Cubes turned by 45 degrees share a regular octagon, over all of which they may bear."""
     turned = quaternion_of_rotation([0.0, 0.0, np.pi / 4])
     found = contacts([CUBE, CUBE], [[0, 0, 0], [0, 0, 1.0]], [UPRIGHT, turned])
     radius = 0.5 / np.cos(np.pi / 8)
-    assert len(found) == 4
+    assert len(found) == 8
     assert np.allclose(np.linalg.norm(found.point[:, :2], axis=1), radius)
-    x, y = sorted_points(found)[[0, 1, 3, 2], :2].T
-    angle = np.unwrap(np.sort(np.arctan2(y, x)))
-    assert np.diff(angle, append=angle[0] + 2 * np.pi).max() < np.pi / 2 + 1e-9  # a square
+    angle = np.sort(np.arctan2(found.point[:, 1], found.point[:, 0]))
+    assert np.allclose(np.diff(angle), np.pi / 4)
+
+
+def test_many_corners_are_thinned_out_evenly() -> None:
+    """A face of 40 corners on a floor keeps `MOST`: none is more than 0.1 of the radius outside."""
+    around = 2 * np.pi * np.arange(40) / 40
+    ring = np.column_stack([np.cos(around), np.sin(around)])
+    drum = Polyhedron(np.vstack([np.column_stack([ring, np.full(40, z)]) for z in (0, 1)]))
+    found = contacts([drum, FLOOR], [[0, 0, 0.5], [0, 0, 0]])
+    assert len(found) == MOST
+    angle = np.sort(np.arctan2(found.point[:, 1], found.point[:, 0]))
+    widest = np.diff(angle, append=angle[0] + 2 * np.pi).max()
+    assert 1 - np.cos(widest / 2) < 0.1
 
 
 @settings(max_examples=30, deadline=None)

@@ -33,6 +33,29 @@ def test_box_at_rest_stays_and_weighs_what_it_should() -> None:
     assert run.contacts.normal_force.sum() == pytest.approx(weight, rel=1e-12)
 
 
+@pytest.mark.parametrize("corners", [5, 8])
+@pytest.mark.parametrize("below", ["floor", "block"])
+def test_a_leaning_prism_stands_on_all_of_its_face(corners: int, below: str) -> None:
+    """Its centre is over the face, a thirtieth from an edge: with four of the corners for all of
+    them it tips towards those left out, and creeps by 0.1 mm a second."""
+    around = 2 * np.pi * np.arange(corners) / corners
+    ring = np.column_stack([np.cos(around), np.sin(around), np.zeros(corners)])
+    for k in range(corners):
+        edge = (ring[k] + ring[(k + 1) % corners]) / 2
+        prism = Polyhedron(np.vstack([ring, ring + 2 * 0.97 * edge + [0.0, 0.0, 1.0]]))
+        scene = Scene(dim=3)
+        if below == "floor":
+            scene.add(FLOOR, friction=0.8)
+        else:
+            scene.add(box(6, 6, 1), fixed=True, position=[0, 0, -0.5], friction=0.8)
+        scene.add(prism, density=1000, friction=0.8)
+        run = Simulation(scene)
+        start = run.positions.copy()
+        run.advance(0.01)
+        assert np.abs(run.positions - start).max() < 1e-14
+        assert len(run.contacts) == corners
+
+
 # --- the threshold of sliding, in every direction ---
 
 

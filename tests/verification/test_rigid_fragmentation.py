@@ -171,6 +171,22 @@ def test_a_spinning_polyhedron_of_a_scene_keeps_its_motion():
     assert parts.mass.sum() == pytest.approx(world.mass.sum(), rel=1e-12)
 
 
+def test_a_plane_that_leaves_no_sound_parts_is_refused():
+    """2e-6 of the way below corners of a flat stone: parts without edges that could be told apart.
+    Once a run that broke worn stones ended there with a word about corners to be merged."""
+    from rigid_lcp.detection_3d import shapes_3d
+    from rigid_lcp.shapes_3d import Polyhedron
+
+    flat = Polyhedron(np.random.default_rng(2).normal(size=(8, 3)) * [1.0, 1.0, 0.02])
+    scene = Scene(dim=3)
+    scene.add(flat, density=2700, position=(0, 0, 0))
+    _, motion = world_of(scene)
+    with pytest.raises(ShapeError, match=r"told apart\n.*move the plane"):
+        broken_scene(scene, motion, 0, (1 - 2e-6) * flat.vertices[1], flat.vertices[1])
+    made = broken_scene(scene, motion, 0, 0.99 * flat.vertices[1], flat.vertices[1])
+    shapes_3d([each.shape for each in made.bodies], np.ones(2, dtype=bool))
+
+
 def test_bodies_that_can_not_break():
     scene = pile()
     scene.add(Disc(0.2), density=2700, position=(5, 0.2))

@@ -57,8 +57,8 @@ def test_block_that_slides_down_loses_k_times_work():
 
 
 def test_wear_that_is_seen_takes_mass_and_keeps_the_rest_moving():
-    """A fiftieth of the block goes, off its four lower corners alike: mass and inertia are those of
-    the worn shape, which slides on as a block of any mass does (v = a t); energy in balance."""
+    """A fiftieth of the block goes, off its four lower corners: mass and inertia are those of the
+    worn shape, which slides on as a block of any mass does (v = a t); energy in balance."""
     run = slope(step=1e-2, wear=Wear(1e-5, every=5))
     start = run.energy
     run.advance(0.5)
@@ -76,8 +76,13 @@ def test_wear_that_is_seen_takes_mass_and_keeps_the_rest_moving():
     assert run.worn.mass == pytest.approx(2700 * gone, rel=1e-10)
     # what friction took, what the crumbs took with them, what is left
     assert run.energy == pytest.approx(start - run.worn.work - run.worn.energy, abs=1e-9)
-    lost = run.worn.grains[1].lost
-    assert lost == pytest.approx(np.full(4, lost[0]), rel=0.35)  # the lower side presses harder
+    grain = run.worn.grains[1]
+    front, back = (grain.lost[sign * grain.normal[:, 0] > 0] for sign in (1, -1))
+    assert len(front) == len(back) == 2
+    assert min(front.min(), back.min()) > 0
+    # friction turns the block onto its front: mu m g h has half a length of 0.1, later 0.075, with
+    # the ends of chamfers to bear on; which of one side's corners does is the solver's choice
+    assert 1.15 / 0.85 < front.sum() / back.sum() < 1.2 / 0.8 * 1.1
 
 
 def test_crossing_edges_share_the_wear_and_become_chamfers():
