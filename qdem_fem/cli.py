@@ -124,14 +124,22 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
     from qdem_fem.scene_run import plan_of
     from qdem_fem.summary import bodies_facts, critical_step_of, mass_scaling_facts
 
-    run, bodies = simulation_of(prepared)
     outlook: dict[str, Any] = {
         "title": prepared.scene.title,
         "method": prepared.scene.simulation.method,
+        "left_out": prepared.scene.left_out(),
+    }
+    if "track" in prepared.text.data:
+        from qdem_fem.track_scene import TrackPrepared, bed_outlook
+
+        assert isinstance(prepared, TrackPrepared)
+        if bed := bed_outlook(prepared):  # what follows it is known when it stands
+            return outlook | {"bed": bed}
+    run, bodies = simulation_of(prepared)
+    outlook |= {
         "bodies": bodies_facts(bodies),
         "critical_step": critical_step_of(run),
         "mass_scaling": mass_scaling_facts(run),
-        "left_out": prepared.scene.left_out(),
     }
     if prepared.scene.simulation.method == "dynamic":
         plan = plan_of(prepared, float(run.step))
@@ -161,18 +169,8 @@ def _seconds_a_step(run: Any, most: int) -> float:
         steps *= 2
 
 
-def _print(content: dict[str, Any], as_json: bool) -> None:
-    """A summary on standard output, as JSON or as lines a reader takes in."""
-    if as_json:
-        print(json.dumps(content, indent=2, allow_nan=False))
-        return
-    for name, body in content["bodies"].items():
-        print(
-            f"{name}: {body['elements']} elements, {body['nodes']} nodes, smallest altitude "
-            f"{body['smallest_altitude']:.4g} m in element {body['thinnest_element']}, "
-            f"{body['flipped']} turned right-handed, {body['unused_nodes']} unused nodes"
-        )
-    critical = content["critical_step"]
+def _print_step(content: dict[str, Any], critical: dict[str, Any]) -> None:
+    """The critical step, and the one taken."""
     if critical["value"] is not None:
         print(f"critical step {critical['value']:.4g} s, governed by {critical['governor']}")
     if critical["remark"]:
@@ -182,7 +180,22 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
             f"{content['steps']} steps of {content['step']:.4g} s, "
             f"{100 * critical['share_used']:.1f} % of the critical one"
         )
-    if scaled := content["mass_scaling"]:
+
+
+def _print(content: dict[str, Any], as_json: bool) -> None:
+    """A summary on standard output, as JSON or as lines a reader takes in."""
+    if as_json:
+        print(json.dumps(content, indent=2, allow_nan=False))
+        return
+    for name, body in content.get("bodies", {}).items():
+        print(
+            f"{name}: {body['elements']} elements, {body['nodes']} nodes, smallest altitude "
+            f"{body['smallest_altitude']:.4g} m in element {body['thinnest_element']}, "
+            f"{body['flipped']} turned right-handed, {body['unused_nodes']} unused nodes"
+        )
+    if critical := content.get("critical_step"):
+        _print_step(content, critical)
+    if scaled := content.get("mass_scaling"):
         print(
             f"mass scaling adds {scaled['added_mass']:.4g} kg, "
             f"{100 * scaled['share']:.3g} % of the bodies' own mass"

@@ -96,6 +96,12 @@ def bed_prepare(
     return bed
 
 
+def stages_ahead(recipe: BedRecipe, path: Path) -> tuple[str, ...]:
+    """Stages of a preparation that the file ``path`` lacks; raises as `bed_prepare`."""
+    done = STAGES.index(bed_read(path, recipe).stage) + 1 if path.exists() else 0
+    return STAGES[done:]
+
+
 def stage_run(
     recipe: BedRecipe, grains: GrainSet, stage: str, before: Bed | None, threads: int | None,
     progress: Callable[[str, Rest], None] | None,

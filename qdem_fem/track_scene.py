@@ -26,7 +26,7 @@ from qdem_fem.scene_checks import Prepared, Step, output_faults
 from qdem_fem.scene_file import Problem, SceneText
 from qdem_fem.scene_series import TimeSeries, WrongSeries
 from qdem_fem.sleeper_mesh import SleeperShape
-from qdem_fem.track_bed import Bed, bed_prepare
+from qdem_fem.track_bed import Bed, bed_prepare, stages_ahead
 from qdem_fem.track_bodies import TrackBox
 from qdem_fem.track_recipe import SLEEPER, BedRecipe, names_of
 from qdem_fem.track_table import TrackTable, loads_of, track_faults
@@ -150,6 +150,18 @@ def contact_of(prepared: TrackPrepared) -> SphereContact:
     every = recipe.contact(names_of(recipe.below + recipe.beside, sleeper=True))
     contacts = every.contacts if table.contacts is None else table.contacts
     return replace(every, friction=table.friction, skin=table.skin, contacts=contacts)
+
+
+def bed_outlook(prepared: TrackPrepared) -> dict[str, Any]:
+    """What a run has to do before its bed stands; empty where that is in its file."""
+    ahead, recipe = stages_ahead(prepared.recipe, prepared.bed_file), prepared.recipe
+    if not ahead:
+        return {}
+    told = (
+        f"{recipe.below + recipe.beside} grains, to be prepared first (stages {', '.join(ahead)}), "
+        f"about a second of processor time a grain; kept in {prepared.bed_file}"
+    )
+    return {"grains": recipe.below + recipe.beside, "stages_ahead": list(ahead), "told": told}
 
 
 def track_enter(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,6 +36,7 @@ from qdem_fem.track_load import RISE, bogie_series
 from qdem_fem.track_recipe import BedRecipe, grains_of
 from qdem_fem.track_scene import TrackPrepared
 from qdem_fem.track_table import BogieTable, TrackTable
+from trackbed import main
 from validation import track_page
 from validation.track_bogie import passages, settlement_at
 from validation.track_trials import SCENE
@@ -270,6 +272,22 @@ def test_a_wrong_track_is_refused_with_a_sentence(
     path.write_text(SCENE.replace(*change), encoding="utf-8")
     with pytest.raises(SceneError, match=said.replace("{", r"\{").replace("...", r"\.\.\.")):
         scene_load(path)
+
+
+def test_a_dry_run_prepares_no_bed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It tells what comes first, within a second, and writes nothing."""
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    prepared = scene_load(path)
+    assert isinstance(prepared, TrackPrepared)
+    count = prepared.recipe.below + prepared.recipe.beside
+    assert main(["qdem", str(path), "--dry-run"]) == 0
+    told = capsys.readouterr().out
+    assert "to be prepared first (stages bed, crib, firm, hard, rest)" in told
+    assert f"the bed: {count} grains" in told
+    assert main(["qdem", str(path), "--dry-run", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["bed"]["grains"] == count
+    assert [file.name for file in tmp_path.iterdir()] == ["scene.toml"]
 
 
 def test_scene_of_the_small_track_is_sound() -> None:
