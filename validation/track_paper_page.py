@@ -1,6 +1,7 @@
 """The page on the paper's track, written from its record.
 
 python -m validation.track_paper scenes/track-paper.toml --work FOLDER    the record
+python -m validation.track_half RUN                                       that of half a sleeper
 python -m validation.track_paper_page                                     writes the page
 """
 
@@ -11,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from validation.page_text import page_filled, table
+from validation.track_half import RECORD as HALF
+from validation.track_half import half_text
 from validation.track_paper import RECORD
 from validation.track_periodic import LIMIT
 from validation.track_periodic import RECORD as REPEATED
@@ -27,8 +30,10 @@ LINK = 10e9
 """Bytes a second that a link between processes is taken to carry."""
 
 
-def page(record: dict[str, Any], repeated: dict[str, Any], lying: dict[str, Any]) -> str:
-    """The page for the record, that of a bed that repeats, and that of a split one at rest."""
+def page(
+    record: dict[str, Any], repeated: dict[str, Any], lying: dict[str, Any], half: dict[str, Any]
+) -> str:
+    """The page for the record, and those of a bed that repeats, a split one, half a sleeper."""
     marches = [record[name] for name in sorted(record) if name.startswith("march_")]
     one = marches[0]
     elements = one["elements_ballast"] + one["elements_sleeper"]
@@ -46,6 +51,8 @@ def page(record: dict[str, Any], repeated: dict[str, Any], lying: dict[str, Any]
         "met": f"{lying['split'][0]['vertices']} vertices", "passage": passage(one, elements),
         "split": table([], split(record["split"])).split("\n", 2)[2],
         "judged": judged(record["split"], one),
+        "half_command": half["command"], "half_date": half["started"][:10],
+        "half": half_text(half),
     })  # fmt: skip
 
 
@@ -145,7 +152,7 @@ def judged(counts: list[dict[str, Any]], one: dict[str, Any]) -> str:
 
 def records() -> list[dict[str, Any]]:
     """The committed records that `page` takes."""
-    paths = (RECORD, REPEATED, SPLIT)
+    paths = (RECORD, REPEATED, SPLIT, HALF)
     return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
 
 
