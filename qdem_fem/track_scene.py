@@ -159,7 +159,7 @@ def bed_outlook(prepared: TrackPrepared) -> dict[str, Any]:
         return {}
     told = (
         f"{recipe.below + recipe.beside} grains, to be prepared first (stages {', '.join(ahead)}), "
-        f"about a second of processor time a grain; kept in {prepared.bed_file}"
+        f"one or two seconds of processor time a grain; kept in {prepared.bed_file}"
     )
     return {"grains": recipe.below + recipe.beside, "stages_ahead": list(ahead), "told": told}
 

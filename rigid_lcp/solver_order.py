@@ -158,7 +158,7 @@ def attempts(
             return trial
     if trial.best.residual <= accept and not small:
         return trial
-    if cold and trial.dear and not small and dear_path(trial):
+    if cold and not small and trial.dear and dear_path(trial):
         return trial
     if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
         return trial

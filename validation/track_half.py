@@ -66,7 +66,7 @@ def half_text(record: dict[str, Any]) -> str:
     energy = run["energy"]
     rows += [
         ["missing in the account of energies", f"{energy['relative_imbalance']:.1e}"],
-        ["creep of the bed without the load", f"{run['bed'].get('creep', np.nan):.1e}"],
+        ["creep of the bed without the load", f"{run['bed']['creep']:.1e}"],
         ["friction, viscosity over the work of load and weight",
          ", ".join(f"{energy[key] / energy['external']:.3f}" for key in ("friction", "viscous"))],
         ["steps, of", f"{run['steps']:,}, {1e6 * run['step']:.3g} µs"],
