@@ -48,6 +48,22 @@ class Pairs(NamedTuple):
     """The walls that each sphere is near."""
 
 
+GOOD = 40
+"""Steps that a list should be good for: a look costs 10 to 12 of them, and where it is due less
+often, pairs that do not touch cost more than looks."""
+
+
+def skin_next(skin: float, lasted: int, least: float, most: float) -> float:
+    """Skin of the next list [m], from the steps that one of ``skin`` [m] was good for.
+
+    It is changed by a factor of two at most, within ``least`` and ``most`` [m]; forces do not
+    depend on it.  No steps: something else asked for the list, and the skin stays.
+    """
+    if lasted == 0:
+        return min(skin, most)
+    return float(np.clip(skin * np.clip(GOOD / lasted, 0.5, 2.0), least, most))
+
+
 @njit(cache=True)
 def cells_fill(position: Any, size: float) -> tuple[Any, Any, Any]:  # pragma: no cover
     """Cells (c, 3) of side ``size`` [m], first entry of every bucket, and spheres by bucket."""

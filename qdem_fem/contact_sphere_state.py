@@ -10,8 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import Contact, Planes, Spheres
-from qdem_fem.contact_search import NO_IMAGE, Pairs, pairs_of, pairs_renew, walls_near
-from qdem_fem.contact_spheres import SKIN, SphereContact, pair_stiffness, tangential_stiffness
+from qdem_fem.contact_search import NO_IMAGE, Pairs, pairs_of, pairs_renew, skin_next, walls_near
+from qdem_fem.contact_spheres import (
+    NEAR,
+    SKIN,
+    SphereContact, pair_stiffness,
+    tangential_stiffness,
+)
 from qdem_fem.contact_state import (
     Contacts,
     ContactTouching,
@@ -51,6 +56,9 @@ class SphereContacts(Contacts):
         poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
         self.one = pair_stiffness(normal, normal.max(initial=0.0))
         self.skin = float(SKIN * radius.min() if asked.skin is None else asked.skin)
+        free = asked.skin is None and asked.contacts != NEAR
+        self.skins = (self.skin, float(radius.min()) if free else self.skin)
+        """Least and greatest skin [m]."""
         self.deep = float(radius.max())
         self.reach = 2 * self.deep + self.skin
         size, walls = len(self.nodes), len(asked.planes)
@@ -87,13 +95,15 @@ class SphereContacts(Contacts):
         self.kernel.planes.force[:] = 0.0
 
     def lists_renew(self, position: Floats) -> None:
-        """Look for pairs around vertices at (c, 3) [m]."""
-        spheres = self.kernel.spheres
+        """Look for pairs around vertices at (c, 3) [m]; the skin follows how fast they move."""
+        spheres, (least, most) = self.kernel.spheres, self.skins
+        most = max(least, min(most, least + self.room / 2))
+        self.skin = skin_next(self.skin, self.lasted, least, most)
         pairs = pairs_renew(
             self.pairs, position, spheres.radius, spheres.body, self.skin, self.walls(position),
             self.asked.periodic,
         )  # fmt: skip
-        self.kernel = self.kernel._replace(pairs=pairs)
+        self.kernel = self.kernel._replace(pairs=pairs, half_skin=self.skin / 2)
 
     def walls(self, position: Floats) -> NDArray[np.bool_]:
         """Which vertices at (c, 3) [m] may touch which walls before pairs are looked for anew."""

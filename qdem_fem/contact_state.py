@@ -22,7 +22,7 @@ from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.contact_window import advance_of, window_run
 from qdem_fem.errors import ConditionError, ContactTooDeep, StepWarning
-from qdem_fem.periodic import extents_check, joined_check
+from qdem_fem.periodic import extents, extents_check, joined_check
 
 if TYPE_CHECKING:
     from qdem_fem.critical_step import CriticalStep
@@ -67,6 +67,8 @@ class Contacts(ABC):
     """Depth in another body beyond which a point of this one is not seen [m]."""
     reach: float
     """Way within which two vertices may be looked at as touching [m]."""
+    room: float = np.inf
+    """By how much that may be more for no body to meet its own image across the width [m]."""
 
     def __init__(
         self, run: Simulation, asked: SphereContact | SurfaceContact, outside: Sequence[Outside]
@@ -79,6 +81,8 @@ class Contacts(ABC):
         """(c,) vertices, in the numbers of all bodies"""
         self.first_vertex = np.concatenate([[0], np.cumsum([len(o.node) for o in outside])])
         """First vertex of every body, and the end, (bodies + 1,)."""
+        self.own = np.concatenate([o.own for o in outside])
+        """(c,) as in `Outside`"""
         self.reference = np.concatenate([o.reference for o in outside])
         self.place = run.assembly.place[self.nodes]
         self.force_at = 4 * self.place + run.assembly.packed.node_window[self.place]
@@ -89,6 +93,8 @@ class Contacts(ABC):
         self._near: float | None = None
         self.renewals = 0
         """Times that pairs were looked for."""
+        self.lasted = 0
+        """Steps since then."""
         self.warned = 0.0
         self.stale = True
         """Whether the user moved a body since the contacts were found."""
@@ -189,19 +195,21 @@ class Contacts(ABC):
         self._near = None
         self.kernel.start[:] = position
         self.renewals += 1
+        self.lasted = 0
 
     def images_check(self, position: Floats) -> None:
         """Raise `ConditionError` for a body that would touch its own image across the width."""
         if (side := self.asked.periodic) is None:
             return
-        cuts = zip(self.first_vertex[:-1], self.first_vertex[1:], self.outside, strict=True)
-        along = [position[low:high, side.number][o.own] for low, high, o in cuts]
-        slabs = [o.joined for o in self.outside]
-        for body, start, slab in zip(self.run.bodies, self.run.first_node, slabs, strict=False):
-            if not slab:
-                master = self.run.master[start : start + len(body.nodes)] - start
-                joined_check(body, master, side, self.where)
-        extents_check(self.run.bodies, along, slabs, self.reach, side, self.where)
+        run, slab = self.run, np.array([o.joined for o in self.outside])
+        fixed = np.flatnonzero(run.master != np.arange(len(run.master)))
+        for b in np.unique(np.searchsorted(run.first_node, fixed, side="right") - 1):
+            if not slab[b]:
+                nodes = slice(*run.first_node[b : b + 2])
+                master = run.master[nodes] - run.first_node[b]
+                joined_check(run.bodies[b], master, side, self.where)
+        size = extents(position[:, side.number], self.own, self.first_vertex)
+        self.room = extents_check(run.bodies, size, slab, self.reach, side, self.where)
 
     @property
     def where(self) -> str:
@@ -219,6 +227,7 @@ class Contacts(ABC):
         if said == TOO_DEEP and not bad:
             self.run.motion.steps_done += done
             self.deep_check(said)
+        self.lasted += done
         if said:
             self.pairs_find()
         return done, bad

@@ -131,34 +131,49 @@ def joined_check(body: Body, master: Integers, side: PeriodicWidth, where: str) 
         )
 
 
+def extents(along: Floats, own: NDArray[np.bool_], first: Integers) -> Floats:
+    """Extent of each body along an axis [m], (bodies,).
+
+    ``along`` (c,): coordinates of the vertices of all bodies [m]; ``own`` (c,): which of them
+    count; ``first`` (bodies + 1,): first vertex of each body, and the end.
+    """
+    low, high = np.where(own, along, np.inf), np.where(own, along, -np.inf)
+    each = np.flatnonzero(np.diff(first))
+    size = np.zeros(len(first) - 1)
+    size[each] = np.maximum.reduceat(high, first[each]) - np.minimum.reduceat(low, first[each])
+    return np.maximum(size, 0.0)
+
+
 def extents_check(
     bodies: Sequence[Body],
-    along: Sequence[Floats],
-    joined: Sequence[bool],
+    size: Floats,
+    joined: NDArray[np.bool_],
     reach: float,
     side: PeriodicWidth,
     where: str,
-) -> None:
+) -> float:
     """Raise `ConditionError` for a body that comes within ``reach`` [m] of its own image.
 
-    ``along``: coordinates of each body's vertices along the axis [m]; ``joined``: whether its faces
-    are; then it may be as wide as the width, and no wider.
+    ``size``: `extents` of the bodies along the axis [m]; ``joined``: whether a body's faces are;
+    then it may be as wide as the width, and no wider.  Returns by how much the reach could be more
+    [m].
     """
-    if side.width <= 2 * reach:
+    room = side.width / 2 - reach
+    if room <= 0:
         raise ConditionError(
             f"a width of {side.width:.4g} m is less than two reaches of a contact, of "
             f"{reach:.4g} m each",
             where=where,
             remedy="take a wider layer",
         )
-    for body, x, slab in zip(bodies, along, joined, strict=True):
-        size = float(np.ptp(x)) if len(x) else 0.0
-        most = side.width * (1 + NEAR) if slab else side.width - reach
-        if size >= most:
-            raise ConditionError(
-                f"{body.name} is {size:.4g} m long along {side.axis}: with a reach of contact of "
-                f"{reach:.4g} m it would touch its own image, {side.width:.4g} m from it",
-                where=where,
-                remedy="take a wider layer, or, for a deformable slab as wide as the layer, join "
-                "its faces by periodic",
-            )
+    left = np.where(joined, side.width * (1 + NEAR), side.width - reach) - size
+    if (left <= 0).any():
+        at = int(np.argmin(left))
+        raise ConditionError(
+            f"{bodies[at].name} is {size[at]:.4g} m long along {side.axis}: with a reach of contact "
+            f"of {reach:.4g} m it would touch its own image, {side.width:.4g} m from it",
+            where=where,
+            remedy="take a wider layer, or, for a deformable slab as wide as the layer, join "
+            "its faces by periodic",
+        )
+    return min(room, float(left[~joined].min(initial=np.inf)))

@@ -11,11 +11,16 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import qdem_fem as q
+from qdem_fem.contact_search import GOOD, skin_next
+from qdem_fem.contact_spheres import SKIN
 from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, SceneError, StepWarning
 from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.periodic import extents
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
 from validation.qdem_contact_trials import slope_gain
@@ -222,6 +227,65 @@ def test_history_survives_renewals_of_the_list() -> None:
         assert np.abs(run.contacts.touching().spring).max() > 1e-8
         assert (run.contacts.renewals > 10) == (skin < 1e-3)
     assert states[0] == states[1]
+
+
+def test_the_skin_follows_the_motion_and_changes_no_bit() -> None:
+    """Two that collide while both fly at 20 m/s: lists come to last longer, forces stay the same."""
+    states, runs = [], []
+    for skin in (None, SKIN * RADIUS):
+        run = two(gap=1e-6, shift=(0.004, 0.002), step=1.2e-6, contact={"skin": skin})
+        for body, own in zip(run.bodies, ((20.0, 0, 0), (20.3, -0.3, -0.2)), strict=True):
+            body.velocity = np.tile(np.array(own), (len(body.nodes), 1))
+        for _ in range(10):
+            run.advance(40 * run.step)
+        assert run.energy().friction > 0
+        states.append(state_of(run))
+        runs.append(run.contacts)
+    free, thin = runs
+    assert states[0] == states[1]
+    assert thin.skin == thin.skins[0] < free.skin <= RADIUS
+    assert 2 * free.renewals <= thin.renewals
+    assert free.kernel.half_skin == free.skin / 2
+
+
+@given(
+    st.floats(1e-6, 1e-2), st.integers(0, 10**6), st.floats(1e-6, 1e-3), st.floats(1e-6, 1e-2),
+    st.integers(1, 10**5),
+)  # fmt: skip
+def test_skin_next(skin: float, lasted: int, least: float, more: float, speed: int) -> None:
+    """Within its bounds and a factor of two; at a speed that stays, lists come to last `GOOD`."""
+    most = least + more
+    skin = float(np.clip(skin, least, most))
+    found = skin_next(skin, lasted, least, most)
+    assert least <= found <= most and skin / 2 <= found <= 2 * skin
+    for _ in range(40):  # steps that a list lasts: half the skin over the way of a step
+        way = least / (2 * speed)
+        skin = skin_next(skin, int(skin / 2 / way) + 1, least, most)
+    lasts = skin / 2 / way
+    at_bound = skin == least if lasts > GOOD else skin == most
+    assert at_bound or abs(lasts - GOOD) <= 2
+
+
+@given(st.lists(st.lists(st.tuples(st.floats(-1, 1), st.booleans()), max_size=6), min_size=1))
+def test_extents_are_those_of_each_body(bodies: Any) -> None:
+    """Against one body at a time; nothing of its own is no extent."""
+    along = np.array([x for body in bodies for x, _ in body])
+    own = np.array([o for body in bodies for _, o in body], bool)
+    first = np.concatenate([[0], np.cumsum([len(body) for body in bodies])])
+    each = [[x for x, o in body if o] for body in bodies]
+    expected = [max(x) - min(x) if x else 0.0 for x in each]
+    assert extents(along, own, first).tolist() == expected
+
+
+def test_a_skin_leaves_room_to_the_images_across_the_width() -> None:
+    """A cube of 30 mm in a width of 43: its reach is 12 mm and the skin, so 1 mm is left at most."""
+    run = two(gap=0.05, contact={"periodic": q.PeriodicWidth("y", 0.0436)}, step=1.2e-6)
+    thrown(run, (30.0, 0.0, 0.0))
+    for _ in range(40):
+        run.advance(10 * run.step)
+    c = run.contacts
+    assert c.renewals > 5 and c.skins[0] < c.skin
+    assert SIDE + 2 * RADIUS + c.skin < 0.0436
 
 
 def test_a_saved_run_goes_on_to_the_same_bits(tmp_path: Path) -> None:
