@@ -14,7 +14,8 @@ from qdem_fem.contact_search import NO_IMAGE, Pairs, pairs_of, pairs_renew, skin
 from qdem_fem.contact_spheres import (
     NEAR,
     SKIN,
-    SphereContact, pair_stiffness,
+    SphereContact,
+    pair_stiffness,
     tangential_stiffness,
 )
 from qdem_fem.contact_state import (

@@ -170,8 +170,8 @@ def extents_check(
     if (left <= 0).any():
         at = int(np.argmin(left))
         raise ConditionError(
-            f"{bodies[at].name} is {size[at]:.4g} m long along {side.axis}: with a reach of contact "
-            f"of {reach:.4g} m it would touch its own image, {side.width:.4g} m from it",
+            f"{bodies[at].name} is {size[at]:.4g} m long along {side.axis}: with a reach of "
+            f"contact of {reach:.4g} m it would touch its own image, {side.width:.4g} m from it",
             where=where,
             remedy="take a wider layer, or, for a deformable slab as wide as the layer, join "
             "its faces by periodic",

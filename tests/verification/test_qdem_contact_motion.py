@@ -230,7 +230,7 @@ def test_history_survives_renewals_of_the_list() -> None:
 
 
 def test_the_skin_follows_the_motion_and_changes_no_bit() -> None:
-    """Two that collide while both fly at 20 m/s: lists come to last longer, forces stay the same."""
+    """Two collide while both fly at 20 m/s: lists come to last longer, forces are the same."""
     states, runs = [], []
     for skin in (None, SKIN * RADIUS):
         run = two(gap=1e-6, shift=(0.004, 0.002), step=1.2e-6, contact={"skin": skin})
@@ -257,7 +257,8 @@ def test_skin_next(skin: float, lasted: int, least: float, more: float, speed: i
     most = least + more
     skin = float(np.clip(skin, least, most))
     found = skin_next(skin, lasted, least, most)
-    assert least <= found <= most and skin / 2 <= found <= 2 * skin
+    assert least <= found <= most
+    assert skin / 2 <= found <= 2 * skin
     for _ in range(40):  # steps that a list lasts: half the skin over the way of a step
         way = least / (2 * speed)
         skin = skin_next(skin, int(skin / 2 / way) + 1, least, most)
@@ -278,13 +279,14 @@ def test_extents_are_those_of_each_body(bodies: Any) -> None:
 
 
 def test_a_skin_leaves_room_to_the_images_across_the_width() -> None:
-    """A cube of 30 mm in a width of 43: its reach is 12 mm and the skin, so 1 mm is left at most."""
+    """A cube of 30 mm in a width of 43.6, a reach of 12 mm and the skin: 1.6 mm are left."""
     run = two(gap=0.05, contact={"periodic": q.PeriodicWidth("y", 0.0436)}, step=1.2e-6)
     thrown(run, (30.0, 0.0, 0.0))
     for _ in range(40):
         run.advance(10 * run.step)
     c = run.contacts
-    assert c.renewals > 5 and c.skins[0] < c.skin
+    assert c.renewals > 5
+    assert c.skins[0] < c.skin
     assert SIDE + 2 * RADIUS + c.skin < 0.0436
 
 
