@@ -258,43 +258,51 @@ def reactions_add(c: Any, low: int, high: int) -> None:  # pragma: no cover
                     c.force[j, k] -= pairs.pull[p, k]
 
 
-def advance(c: Any, displacement: Any, velocity: Any, step: float) -> int:  # pragma: no cover
-    """Contact at the new displacement; ``velocity`` times ``step`` [s] is the way to it.
+def advance_build(threads: bool) -> Any:
+    """A step of contact for one thread, or for as many as numba is set to."""
 
-    Writes forces, springs and losses of ``c``, a `Contact`.  ``step`` zero gives the forces of a
-    state that no step led to.  Returns `GO_ON`, `LOOK_ANEW` or `TOO_DEEP`.
-    """
-    # a parallel loop of numba takes arrays only: tuples are taken apart, and made anew within
-    (a0, a1, a2, a3, a4, a5, a6), pairs, (w0, w1, w2, w3, w4) = c[:3]
-    p0, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10 = pairs
-    friction, half_skin, start, position, force, slid = c[3:]
-    count = position.shape[0]
-    blocks = (count + BLOCK - 1) // BLOCK
-    far, deep = np.zeros(blocks), np.zeros(blocks)
-    for stage in range(3):  # all spheres pass one stage before any begins the next
-        for b in prange(blocks):
-            own = Contact(
-                Spheres(a0, a1, a2, a3, a4, a5, a6),
-                Pairs(p0, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10),
-                Planes(w0, w1, w2, w3, w4), friction, half_skin, start, position, force, slid,
-            )  # fmt: skip
-            low, high = b * BLOCK, min(count, (b + 1) * BLOCK)
-            if stage == 0:
-                far[b] = spheres_move(own, low, high, displacement)
-            elif stage == 1:
-                deep[b] = max(
-                    pairs_forces(own, low, high, velocity, step),
-                    planes_forces(own, low, high, velocity, step),
-                )
-            else:
-                reactions_add(own, low, high)
-    deepest, farthest = 0.0, 0.0
-    for b in range(blocks):
-        deepest, farthest = max(deepest, deep[b]), max(farthest, far[b])
-    if deepest >= DEEPEST:
-        return TOO_DEEP
-    return LOOK_ANEW if farthest > half_skin**2 else GO_ON
+    @njit(error_model="numpy", cache=True, parallel=threads)
+    def advance(c: Any, displacement: Any, velocity: Any, step: float) -> int:  # pragma: no cover
+        """Contact at the new displacement; ``velocity`` times ``step`` [s] is the way to it.
+
+        Writes forces, springs and losses of ``c``, a `Contact`.  ``step`` zero gives the forces
+        of a state that no step led to.  Returns `GO_ON`, `LOOK_ANEW` or `TOO_DEEP`.
+        """
+        stamp = threads  # noqa: F841  (makes it a part of the key: the two are one source)
+        # a parallel loop of numba takes arrays only: tuples are taken apart, and made anew within
+        (a0, a1, a2, a3, a4, a5, a6), pairs, (w0, w1, w2, w3, w4) = c[:3]
+        p0, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10 = pairs
+        friction, half_skin, start, position, force, slid = c[3:]
+        count, acting = position.shape[0], p7.shape[0]
+        blocks = (count + BLOCK - 1) // BLOCK
+        far, deep = np.zeros(blocks), np.zeros(blocks)
+        for stage in range(3):  # all spheres pass one stage before any begins the next
+            for b in prange(blocks):
+                own = Contact(
+                    Spheres(a0, a1, a2, a3, a4, a5, a6),
+                    Pairs(p0, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10),
+                    Planes(w0, w1, w2, w3, w4), friction, half_skin, start, position, force, slid,
+                )  # fmt: skip
+                size = count if stage == 0 else acting  # few act, or all: as many in every block
+                low, high = size * b // blocks, size * (b + 1) // blocks
+                if stage == 0:
+                    far[b] = spheres_move(own, low, high, displacement)
+                elif stage == 1:
+                    deep[b] = max(
+                        pairs_forces(own, low, high, velocity, step),
+                        planes_forces(own, low, high, velocity, step),
+                    )
+                else:
+                    reactions_add(own, low, high)
+        deepest, farthest = 0.0, 0.0
+        for b in range(blocks):
+            deepest, farthest = max(deepest, deep[b]), max(farthest, far[b])
+        if deepest >= DEEPEST:
+            return TOO_DEEP
+        return LOOK_ANEW if farthest > half_skin**2 else GO_ON
+
+    return advance
 
 
-advance_one: Any = njit(error_model="numpy", cache=True)(advance)
-advance_threads: Any = njit(error_model="numpy", cache=True, parallel=True)(advance)
+advance_one: Any = advance_build(threads=False)
+advance_threads: Any = advance_build(threads=True)

@@ -79,10 +79,14 @@ def stiffness_six(body: Integers, arm: Floats, stiffness: Floats, count: int) ->
     ``body`` (v,), ``arm`` (v, 3) [m]: of each spring, from its body's centre; ``stiffness`` (v,)
     [N/m]: in all directions.
     """
-    total = np.bincount(body, stiffness, count)
-    first, second = np.zeros((count, 3)), np.zeros((count, 3, 3))
-    np.add.at(first, body, stiffness[:, None] * arm)
-    np.add.at(second, body, stiffness[:, None, None] * arm[:, :, None] * arm[:, None, :])
+    def summed(each: Floats) -> Floats:
+        return np.asarray(np.bincount(body, each, count), dtype=float)
+
+    total, pulls = summed(stiffness), stiffness * arm.T
+    first = np.stack([summed(pull) for pull in pulls], axis=-1)
+    second = np.empty((count, 3, 3))
+    for i, j in np.ndindex(3, 3):  # bincount is ten times as fast as np.add.at on rows
+        second[:, i, j] = summed(pulls[i] * arm[:, j])
     spring = np.zeros((count, 6, 6))
     spring[:, :3, :3] = total[:, None, None] * np.eye(3)
     spring[:, 3:, :3] = cross_matrix(first)

@@ -100,6 +100,15 @@ class BodyTable(Table):
     """Six freedoms and no element work; with the inertia of the solid, or of masses at nodes."""
     regions: dict[str, Region] = Field(default_factory=dict)
     """Material keys that differ, by the name of an element set."""
+    velocity: Vector | None = None
+    """Of its centre of mass at the start [m/s]; at rest by default."""
+    spin: Vector | None = None
+    """Angular velocity about its centre of mass at the start [1/s]."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is in motion at the start."""
+        return self.velocity is not None or self.spin is not None
 
 
 class BoxNodes(Table):
@@ -305,7 +314,8 @@ class Scene(Table):
         return [text for absent, text in missing if absent]
 
     def _is_driven(self) -> bool:
-        return bool(self.load or self.pressure or self.prescribe or self.simulation.gravity)
+        driven = self.load or self.pressure or self.prescribe or self.simulation.gravity
+        return bool(driven) or any(body.moves for body in self.body)
 
     def parameters(self) -> dict[str, Any]:
         """Every effective value, defaults included, as JSON would hold it."""

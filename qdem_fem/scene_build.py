@@ -15,6 +15,7 @@ from qdem_fem.scene_nodes import NoNodes
 from qdem_fem.scene_series import TimeSeries
 
 if TYPE_CHECKING:
+    from qdem_fem.body import Body
     from qdem_fem.mesh import TetMesh
     from qdem_fem.scene_checks import Prepared
 
@@ -94,6 +95,11 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
             problems.append(Problem(step.key, error_told(error)))
     if table.method == "static" and scene.absorb:
         problems.append(Problem("absorb.0", "a static answer has no waves: fix these nodes"))
+    for number, moving in enumerate(scene.body):
+        try:
+            motion_begin(bodies[moving.name], moving)
+        except QdemError as error:
+            problems.append(Problem(f"body.{number}", error_told(error)))
     prepared.text.refuse(problems)
     try:
         run.packed_lists()  # rollers against prescribed motions, what holds rigid bodies
@@ -108,6 +114,19 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
             where = f"body.{list(bodies).index(where)}"
         prepared.text.refuse([Problem(where, error_told(error))])
     return run, bodies
+
+
+def motion_begin(body: Body, table: BodyTable) -> None:
+    """Give a body the motion at the start that its table names: ``v + omega x (x - centre)``."""
+    if not table.moves:
+        return
+    mass = body.material.density * body.gradients[1]
+    middle = body.nodes[body.elements].mean(axis=1)
+    arm = body.nodes - (np.broadcast_to(mass, len(middle)) @ middle) / mass.sum()
+    velocity, spin = (
+        np.zeros(3) if v is None else np.array(v) for v in (table.velocity, table.spin)
+    )
+    body.velocity = velocity + np.cross(spin, arm)
 
 
 def _argument(value: Any, method: str) -> Any:

@@ -105,6 +105,7 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
         found = list(_probes(output, names, meshes, probes))
         problems += found
     problems += output_faults(text)
+    problems += motion_faults(text)
     for _, contact in _tables(text, ContactTable):
         faults = contact_faults(contact, text.tables.get("simulation"), names)
         problems += [Problem(*fault) for fault in faults]
@@ -265,6 +266,20 @@ def output_faults(text: SceneText) -> Iterator[Problem]:
         elif duration / interval > most:
             what = f"too short: it would be met {duration / interval:.3g} times"
             yield Problem(f"output.{name}", what)
+
+
+def motion_faults(text: SceneText) -> Iterator[Problem]:
+    """Bodies said to move at the start of what has no motion, or to turn in what can not."""
+    simulation = text.tables.get("simulation")
+    if not isinstance(simulation, SimulationTable):
+        return
+    for key, body in _tables(text, BodyTable):
+        if simulation.method == "static" and body.moves:
+            name = "velocity" if body.velocity is not None else "spin"
+            yield Problem(f"{key}.{name}", 'a static answer has no motion: method = "dynamic"')
+        elif simulation.strain == "small" and body.spin is not None and not body.rigid:
+            what = 'a body that turns is strained by it under strain = "small": take "finger"'
+            yield Problem(f"{key}.spin", what)
 
 
 def _files(text: SceneText, folder: Path) -> Iterator[tuple[str, str]]:

@@ -80,7 +80,7 @@ def small_text(record: dict[str, Any]) -> str:
             for name, one in record["parts"].items()
         ),
         f"| one bogie, {record['duration']:g} s, by that | "
-        f"{steps * spent['1'] / 60:.0f} min of one core |",
+        f"{steps * spent['1'] / 60:.0f} min of one core, {steps * wall['2'] / 60:.0f} of two |",
         *(
             f"| preparation, stage {stage}: processor time, steps | {rest['cpu_s']:.0f} s, "
             f"{rest['steps']:,} |"

@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.errors import QdemError, SceneError, UsageError
+from qdem_fem.errors import LibraryMissing, QdemError, SceneError, UsageError
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.scene import Scene
 from qdem_fem.scene_build import simulation_of
@@ -401,9 +401,14 @@ def damaged(text: str, generator: random.Random) -> str:
 
 
 def loads_or_refuses(path: Path) -> bool:
-    """Whether a scene loads; one that does not is refused with an error that names the file."""
+    """Whether a scene loads; one that does not is refused with an error that names the file.
+
+    Damage may take the # from `device = "cuda"`: a sound scene, for another machine.
+    """
     try:
         simulation_of(scene_load(path))
+    except LibraryMissing:
+        return True
     except QdemError as error:
         if str(path) not in str(error):
             raise

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import types
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import (
@@ -178,6 +179,18 @@ def test_threads_give_the_same_bits() -> None:
                  (one.planes.spring, more.planes.spring)):  # fmt: skip
         assert np.array_equal(a, b)
     assert one.force.any()
+
+
+def test_one_thread_and_more_are_two_kernels_on_disk() -> None:
+    """numba files what it compiled by source and closure, not by options: equal keys would answer
+    two threads by the kernel of one, as they once did."""
+    keys = [
+        f._cache._index_key((types.int64,), f.targetctx.codegen())
+        for f in (advance_one, advance_threads)
+    ]
+    assert keys[0] != keys[1]
+    options = [f.targetoptions.get("parallel") for f in (advance_one, advance_threads)]
+    assert [bool(o) for o in options] == [False, True]
 
 
 def test_action_is_reaction_and_the_branch_takes_the_moment() -> None:
