@@ -1,5 +1,9 @@
 """Errors of the package: each says what happened, where, and what to do; each has an exit code."""
 
+from __future__ import annotations
+
+from typing import Self
+
 
 class RigidError(Exception):
     """Base of all errors a user can act on.
@@ -15,6 +19,10 @@ class RigidError(Exception):
         super().__init__(
             (f"{where}: " if where else "") + what + (f"\n  -> {remedy}" if remedy else "")
         )
+
+    def at(self, where: str) -> Self:
+        """The same error, told of another place."""
+        return type(self)(self.what, where=where, remedy=self.remedy)
 
 
 class UsageError(RigidError):

@@ -183,7 +183,7 @@ def broken_scene(
     Raises `ShapeError` for what can not be split: a disc, a fixed body, a sliver.
     """
     made = scene_at(scene, motion)
-    where = scene.bodies[body].name or f"body {body}"
+    where = scene.called(body)
     if not scene.bodies[body].movable or not hasattr(scene.bodies[body].shape, "vertices"):
         raise ShapeError(
             "only polygons and polyhedra that move can be split", where=where,

@@ -68,6 +68,10 @@ class Scene:
         )
         self.bodies: list[Body] = []
 
+    def called(self, body: int) -> str:
+        """Name of a body for messages; its number where it has none."""
+        return self.bodies[body].name or f"body {body}"
+
     def add(
         self, shape: Any, *, density: float | None = None, position: ArrayLike | None = None,
         angle: Any = None, velocity: ArrayLike | None = None, spin: Any = None,

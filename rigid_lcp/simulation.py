@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.breakage import Breakage, Broken, breaks, refuse_dust, scene_broken
 from rigid_lcp.contacts import ContactForces
-from rigid_lcp.errors import NotConverged, Overlapping
+from rigid_lcp.errors import NotConverged, Overlapping, ShapeError
 from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.motion import Motion
 from rigid_lcp.runge_kutta import Pace, runge_kutta_advance
@@ -195,7 +195,10 @@ class Simulation:
             wear_step(self.worn, self.wear, self.contacts, before, self.motion, h)
             cut = None
             if self.steps % self.wear.every == 0:
-                cut = scene_worn(self.world.scene, self.motion, self.worn)
+                try:
+                    cut = scene_worn(self.world.scene, self.motion, self.worn)
+                except ShapeError as error:
+                    raise error.at(f"{error.where} at {self.time:.6g} s") from error
             if cut is not None:
                 scene, self.worn = cut
                 self.world, self.motion = world_of(scene)
@@ -235,7 +238,7 @@ class Simulation:
         if len(found) and found.gap.min() < -OVERLAP_AT_START * self.world.length:
             worst = int(np.argmin(found.gap))
             pair = int(found.body_a[worst]), int(found.body_b[worst])
-            names = (self.world.scene.bodies[k].name or f"body {k}" for k in pair)
+            names = (self.world.scene.called(k) for k in pair)
             raise Overlapping(
                 f"they overlap by {-found.gap[worst]:.3g} m",
                 where=f"{' and '.join(names)} at the start",

@@ -26,6 +26,7 @@ from rigid_lcp.abrasion import friction_work, worn_stiffness, worn_volume
 from rigid_lcp.contacts import ContactForces, Contacts, contact_frames
 from rigid_lcp.detection_2d import FACE_BITS
 from rigid_lcp.equations import relative_velocity
+from rigid_lcp.errors import ShapeError
 from rigid_lcp.fragmentation import scene_at
 from rigid_lcp.motion import Motion
 from rigid_lcp.scene_input import number_in, whole_in
@@ -230,7 +231,10 @@ def scene_worn(
     changed = False
     for k in np.flatnonzero([part.any() for part in pending]):
         grain = state.grains[k]
-        made = None if grain is None else polygon_worn(grain, pending[k])
+        try:
+            made = None if grain is None else polygon_worn(grain, pending[k])
+        except ShapeError as error:
+            raise error.at(f"wear of {scene.called(k)}") from error
         if grain is None or made is None:
             continue
         grains[k], pending[k] = made

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.contacts import Contacts
+from rigid_lcp.errors import ShapeError
 from rigid_lcp.fragmentation import scene_at
 from rigid_lcp.motion import Motion
 from rigid_lcp.placed_solids import FEATURE_BITS, MOST_EDGES
@@ -125,7 +126,10 @@ def solids_scene_worn(
     worn = scene_at(scene, motion)
     made = replace(state, grains=list(state.grains))
     for k, grain in enumerate(state.grains):
-        cut = None if grain is None else polyhedron_worn(grain)
+        try:
+            cut = None if grain is None else polyhedron_worn(grain)
+        except ShapeError as error:
+            raise error.at(f"wear of {scene.called(k)}") from error
         if cut is None:
             continue
         made.grains[k], shift = cut

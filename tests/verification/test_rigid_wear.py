@@ -198,6 +198,8 @@ def test_corner_larger_than_its_edges():
     assert len(nearest) == len(left)
     with pytest.raises(ShapeError, match="cut more often"):
         corners_taken(SQUARE, np.array([0.6, 0.0, 0.0, 0.0]))
+    with pytest.raises(ShapeError, match=r"^wear of \S.* at 0\.\d+ s: .*\n.*cut more often"):
+        slope(step=1e-2, wear=Wear(1.0, every=5)).advance(0.5)
 
 
 def test_wear_too_small_to_cut_waits_at_its_corner():
