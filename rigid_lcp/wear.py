@@ -234,7 +234,7 @@ def scene_worn(
         try:
             made = None if grain is None else polygon_worn(grain, pending[k])
         except ShapeError as error:
-            raise error.at(f"wear of {scene.called(k)}") from error
+            raise error.at(f"wear of {scene.called(int(k))}") from error
         if grain is None or made is None:
             continue
         grains[k], pending[k] = made
