@@ -32,11 +32,18 @@ Arrays = dict[str, NDArray[Any]]
 FORMAT = 3
 DIGEST = 64
 """Letters of a SHA-256 in hexadecimal."""
+BESIDE = "beside "
+"""Before the names of arrays that are not the simulation's."""
 FUNCTION = "a function, not compared"
 
 
-def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
-    """Write the state of ``simulation`` to ``path``; a kill leaves the old file or the new one."""
+def checkpoint_write(
+    simulation: Simulation, path: str | Path, beside: Mapping[str, NDArray[Any]] | None = None
+) -> None:
+    """Write the state of ``simulation`` to ``path``; a kill leaves the old file or the new one.
+
+    ``beside``: other arrays to be kept with it.
+    """
     assembly, (_, held) = simulation.assembly, simulation.packed_lists()
     critical = simulation.elements_critical_step
     head = {
@@ -60,14 +67,16 @@ def checkpoint_write(simulation: Simulation, path: str | Path) -> None:
         arrays |= simulation.rigid.stored()
     if simulation.contacts is not None:
         arrays |= simulation.contacts.stored()
+    arrays |= {f"{BESIDE}{name}": array for name, array in (beside or {}).items()}
     stream = io.BytesIO()
     np.savez(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes them for its flags
     write_whole(Path(path), _sealed(stream.getvalue()))
 
 
-def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
+def checkpoint_read(simulation: Simulation, path: str | Path) -> Arrays:
     """Give ``simulation`` the state in ``path``; it then goes on as the one that was saved.
 
+    Returns what was saved beside it.
     ``simulation`` is made as the saved one was: same meshes, materials, options and conditions
     (of conditions that are functions, only that they are).  Raises `CheckpointError` naming what
     differs, or that the file is damaged; the simulation is then as it was.
@@ -94,6 +103,11 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> None:
     held.previous[:] = previous
     simulation._critical = critical
     simulation.motion = motion
+    return {
+        name.removeprefix(BESIDE): array
+        for name, array in arrays.items()
+        if name.startswith(BESIDE)
+    }
 
 
 def fingerprint(simulation: Simulation) -> dict[str, str]:

@@ -15,9 +15,9 @@ simulation is damped, so its loads should be constant.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,22 +122,53 @@ def stop(run: Simulation, bodies: NDArray[np.bool_]) -> None:
         run.rigid.stop(bodies[[body.rigid is not False for body in run.bodies]])
 
 
+@dataclass
+class Damping:
+    """How far a march with kinetic damping is: all that `rest_find` goes on from, to the bit."""
+
+    peak: Floats
+    """Kinetic energy of each body, or of all, since it was stopped, the greatest [J], (b,)."""
+    since: NDArray[np.int64]
+    """Looks since then, (b,)."""
+    first: int
+    """Steps done when it began."""
+    begun: float
+    """Time then [s]."""
+    peaks: int = 0
+
+    @classmethod
+    def begin(cls, run: Simulation) -> Damping:
+        """Of a simulation that is not damped yet."""
+        count = len(run.bodies)
+        return cls(np.zeros(count), np.zeros(count, int), run.steps_done, run.time)
+
+    def stored(self) -> dict[str, NDArray[Any]]:
+        """As arrays."""
+        return {name: np.asarray(value) for name, value in vars(self).items()}
+
+    @classmethod
+    def restored(cls, arrays: Mapping[str, NDArray[Any]]) -> Damping:
+        """What `stored` gave."""
+        single = {name: arrays[name].item() for name in ("first", "begun", "peaks")}
+        return cls(arrays["peak"], arrays["since"], **single)
+
+
 def rest_find(
     run: Simulation, unbalanced: float, kinetic: float, loose: float, most: float,
     progress: Callable[[Rest], None] | None = None, look: int = LOOK, each: bool = True,
+    damping: Damping | None = None, keep: Callable[[Damping], None] | None = None,
 ) -> Rest:  # fmt: skip
     """March with kinetic damping until the bodies are in equilibrium; they are at rest then.
 
     ``unbalanced``, ``kinetic`` and ``loose``: greatest shares of `Rest` that are equilibrium;
     ``most``: simulated time [s] after which `NotConverged` is raised, the state reached being
     kept; ``look``: steps between two looks at the motion, some per period of a grain on its
-    contacts; ``each``: bodies are stopped one by one.
+    contacts; ``each``: bodies are stopped one by one.  ``damping``: of a simulation that was
+    restored; ``keep`` is called with it behind every judgement, and is to save both.
     The account of energies knows nothing of what is taken at peaks.
     """
-    first, begun, peaks, looks = run.steps_done, run.time, 0, 0
-    peak = np.zeros(len(run.bodies))
-    since = np.zeros(len(run.bodies), int)
-    greatest = 0.0
+    state = Damping.begin(run) if damping is None else damping
+    greatest, looks = 0.0, 0
     every = np.ones(len(run.bodies), bool)
     while True:
         run.advance(look * run.step)
@@ -145,30 +176,33 @@ def rest_find(
         greatest, looks = max(greatest, float(now.sum())), looks + 1
         if not each:
             now = np.full_like(now, now.sum())
-        since = np.where(now > peak, 0, since + 1)
-        peak = np.maximum(peak, now)
-        past = since >= (WAIT if each else 1)
+        state.since = np.where(now > state.peak, 0, state.since + 1)
+        state.peak = np.maximum(state.peak, now)
+        past = state.since >= (WAIT if each else 1)
         if past.any():
             stop(run, past)
-            peaks += int(past.sum()) if each else 1
-            peak[past] = 0.0
-            since[past] = 0
+            state.peaks += int(past.sum()) if each else 1
+            state.peak[past] = 0.0
+            state.since[past] = 0
         if looks < CHECK:
             continue
-        rest = _judged(run, greatest, peaks, run.steps_done - first, run.time - begun)
+        done, time = run.steps_done - state.first, run.time - state.begun
+        rest = _judged(run, greatest, state.peaks, done, time)
         looks, greatest = 0, 0.0
         if progress is not None:
             progress(rest)
         if rest.unbalanced <= unbalanced and rest.kinetic <= kinetic and rest.loose <= loose:
             stop(run, every)
             return rest
+        if keep is not None:
+            keep(state)
         if rest.time > most:
             raise NotConverged(
                 f"no equilibrium after {rest.time:.4g} s: unbalanced force "
                 f"{rest.unbalanced:.3g} of the mean contact force ({unbalanced:g} asked), kinetic "
                 f"energy {rest.kinetic:.3g} of that of springs ({kinetic:g} asked), "
                 f"{rest.loose:.3g} of the bodies loose ({loose:g} asked)",
-                where=f"kinetic damping, {peaks} peaks",
+                where=f"kinetic damping, {state.peaks} peaks",
                 remedy="give it more time, or ask for less",
             )
 

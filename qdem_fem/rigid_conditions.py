@@ -51,7 +51,8 @@ def hold_of(
     size = float(np.sqrt(own.inertia[-1] / own.mass))
     rows = np.concatenate([np.tile(np.eye(3), (len(arm), 1, 1)), -cross_matrix(arm / size)], 2)
     rows = rows[np.arange(len(arm)), component]
-    _, stretch, motions = np.linalg.svd(np.concatenate([rows, np.zeros((6, 6))]))
+    triangle = np.linalg.qr(np.concatenate([rows, np.zeros((6, 6))]), mode="r")
+    _, stretch, motions = np.linalg.svd(triangle)
     loose = motions[stretch < LOOSE * max(float(stretch.max()), 1.0)]
     left = loose.T @ loose
     mask = np.diag(left) > 0.5

@@ -24,6 +24,7 @@ frictions.
 from __future__ import annotations
 
 import json
+import time
 import zipfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
@@ -35,9 +36,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.body import Body
-from qdem_fem.errors import CheckpointError
+from qdem_fem.checkpoint import checkpoint_read, checkpoint_write
+from qdem_fem.errors import CheckpointError, NotConverged
 from qdem_fem.grain_set import GrainSet
-from qdem_fem.kinetic_damping import Rest, rest_find
+from qdem_fem.kinetic_damping import Damping, Rest, rest_find
 from qdem_fem.output import write_whole
 from qdem_fem.track_bodies import GAP, grains_nodes
 from qdem_fem.track_recipe import SLEEPER, BedRecipe, bodies_of_bed, grains_of
@@ -48,6 +50,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 STAGES = ("bed", "crib", "firm", "hard", "rest")
+KEEP = 300.0
+"""Seconds between two times that a stage is saved."""
 ROUGH = (0.1, 1e-3, 0.02)
 """Unbalanced, kinetic and loose share that end the stages of softer springs."""
 
@@ -82,6 +86,8 @@ def bed_prepare(
 ) -> Bed:  # fmt: skip
     """The bed in the file ``path``; made there, stage after stage, where it is not yet.
 
+    A stage is saved every `KEEP` seconds in a file beside it, and where it finds no equilibrium:
+    a kill loses less, and more ``patience`` goes on from there.
     Raises `CheckpointError` for a file of another recipe, `NotConverged` where a stage finds no
     equilibrium.
     """
@@ -90,8 +96,10 @@ def bed_prepare(
     for number, stage in enumerate(STAGES):
         if bed is not None and STAGES.index(bed.stage) >= number:
             continue
-        bed = stage_run(recipe, grains, stage, bed, threads, progress)
+        part = path.with_suffix(".part.npz")
+        bed = stage_run(recipe, grains, stage, bed, threads, progress, part)
         bed_write(path, recipe, bed)
+        part.unlink(missing_ok=True)
     assert bed is not None
     return bed
 
@@ -103,12 +111,13 @@ def stages_ahead(recipe: BedRecipe, path: Path) -> tuple[str, ...]:
 
 
 def stage_run(
-    recipe: BedRecipe, grains: GrainSet, stage: str, before: Bed | None, threads: int | None,
-    progress: Callable[[str, Rest], None] | None,
+    recipe: BedRecipe, grains: GrainSet, stage: str, before: Bed | None,
+    threads: int | None, progress: Callable[[str, Rest], None] | None, part: Path | None = None,
 ) -> Bed:  # fmt: skip
-    """What a stage of `STAGES` leaves, from what the one before left; raises `NotConverged`."""
-    import time
+    """What a stage of `STAGES` leaves, from what the one before left, or from the file ``part``.
 
+    Raises `NotConverged`, and `CheckpointError` where the file is of something else.
+    """
     from qdem_fem.simulation import Simulation
 
     started = time.process_time()
@@ -129,13 +138,63 @@ def stage_run(
     )
     told = None if progress is None else (lambda rest: progress(stage, rest))
     together = recipe.periodic and stage in ("hard", "rest")  # as said above: a heap slides
-    rest = rest_find(run, *shares, recipe.patience, told, each=not together)
+    sitting = Sitting(run, part, started)
+    damping = sitting.go_on()
+    try:
+        rest = rest_find(
+            run, *shares, recipe.patience, told, each=not together, damping=damping,
+            keep=sitting.keep,
+        )  # fmt: skip
+    except NotConverged:
+        sitting.save()
+        raise
     rests = {} if before is None else dict(before.rests)
-    rests[stage] = {**asdict(rest), "step": run.step, "cpu_s": time.process_time() - started}
+    rests[stage] = {**asdict(rest), "step": run.step, "cpu_s": sitting.spent()}
     moved = run.assembly.field("displacement")
     assert run.contacts is not None
     springs = run.contacts.stored() if last else {}
     return Bed(stage, [body.nodes for body in run.bodies], moved, springs, rests)
+
+
+class Sitting:
+    """A stage that outlives its process: its state in the file ``part``, if any, now and then."""
+
+    def __init__(self, run: Simulation, part: Path | None, started: float) -> None:
+        self.run, self.part, self.started = run, part, started
+        self.before, self.saved = 0.0, time.monotonic()
+        self.damping: Damping | None = None
+
+    def spent(self) -> float:
+        """Processor time of the stage, all sittings together [s]."""
+        return self.before + time.process_time() - self.started
+
+    def go_on(self) -> Damping | None:
+        """Take the state in the file, where there is one; raises `CheckpointError`."""
+        if self.part is None or not self.part.exists():
+            return None
+        try:
+            arrays = checkpoint_read(self.run, self.part)
+            self.before = float(arrays.pop("cpu_s"))
+            return Damping.restored(arrays)
+        except (CheckpointError, KeyError) as error:
+            raise CheckpointError(
+                f"this stage can not go on from it ({error})", where=str(self.part),
+                remedy="remove it: the stage then begins anew",
+            ) from error  # fmt: skip
+
+    def keep(self, damping: Damping) -> None:
+        """Save it, `KEEP` seconds after the last time."""
+        self.damping = damping
+        if time.monotonic() - self.saved >= KEEP:
+            self.save()
+
+    def save(self) -> None:
+        """Write the file."""
+        if self.part is None or self.damping is None:
+            return
+        beside = {**self.damping.stored(), "cpu_s": np.array(self.spent())}
+        checkpoint_write(self.run, self.part, beside)
+        self.saved = time.monotonic()
 
 
 def nodes_begin(
@@ -196,14 +255,15 @@ def bed_read(path: Path, recipe: BedRecipe) -> Bed:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         head = json.loads(str(arrays.pop("head")))
+        there, here = json.loads(head["recipe"]), json.loads(recipe.told())
         counts, nodes = arrays.pop("counts"), arrays.pop("nodes")
         displacement = arrays.pop("displacement")
-        told, stage, rests = head["recipe"], head["stage"], head["rests"]
+        stage, rests = head["stage"], head["rests"]
         stands = head.get("stands", {})
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise CheckpointError(f"no bed ({error})", where=str(path), remedy=remedy) from error
-    if told != recipe.told():
-        there, here = json.loads(told), json.loads(recipe.told())
+    there.pop("patience", None)  # named once; what is at rest does not depend on it
+    if there != here:
         other = [name for name in here if there.get(name) != here[name]]
         raise CheckpointError(
             f"it holds a bed that was prepared otherwise: {', '.join(other)} differ",

@@ -100,8 +100,12 @@ class BedRecipe:
         return SphereContact(self.radius, each, self.friction, self.planes(), periodic=width)
 
     def told(self) -> str:
-        """The recipe as a text, equal for equal beds; that of a slice names no part."""
+        """The recipe as a text, equal for equal beds; that of a slice names no part.
+
+        ``patience`` is not in it: it is no part of what has come to rest.
+        """
         told = asdict(self)
+        del told["patience"]
         if self.part == "slice":
             del told["part"], told["shoulder"]
         return json.dumps(told, sort_keys=True, default=np.ndarray.tolist)

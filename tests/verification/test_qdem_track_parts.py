@@ -200,7 +200,7 @@ def test_hard_stages_of_a_periodic_bed_are_stopped_together(
 ) -> None:
     asked: list[bool] = []
 
-    def find(run: object, *shares: object, each: bool) -> Rest:
+    def find(run: object, *shares: object, each: bool, **_: object) -> Rest:
         asked.append(each)
         return Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
 
