@@ -145,9 +145,12 @@ def stage_run(
             run, *shares, recipe.patience, told, each=not together, damping=damping,
             keep=sitting.keep,
         )  # fmt: skip
-    except NotConverged:
+    except NotConverged as error:
         sitting.save()
-        raise
+        raise NotConverged(
+            error.what, where=f"stage {stage} of the bed, {error.where}",
+            remedy="with more track.patience it goes on from there; or ask for less",
+        ) from error  # fmt: skip
     rests = {} if before is None else dict(before.rests)
     rests[stage] = {**asdict(rest), "step": run.step, "cpu_s": sitting.spent()}
     moved = run.assembly.field("displacement")
@@ -177,8 +180,9 @@ class Sitting:
             self.before = float(arrays.pop("cpu_s"))
             return Damping.restored(arrays)
         except (CheckpointError, KeyError) as error:
+            what = error.what if isinstance(error, CheckpointError) else f"{error} is not in it"
             raise CheckpointError(
-                f"this stage can not go on from it ({error})", where=str(self.part),
+                f"a stage of the bed can not go on from it: {what}", where=str(self.part),
                 remedy="remove it: the stage then begins anew",
             ) from error  # fmt: skip
 
