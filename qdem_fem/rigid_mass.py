@@ -79,6 +79,7 @@ def stiffness_six(body: Integers, arm: Floats, stiffness: Floats, count: int) ->
     ``body`` (v,), ``arm`` (v, 3) [m]: of each spring, from its body's centre; ``stiffness`` (v,)
     [N/m]: in all directions.
     """
+
     def summed(each: Floats) -> Floats:
         return np.asarray(np.bincount(body, each, count), dtype=float)
 
