@@ -21,7 +21,8 @@ from qdem_fem.contact_search import Pairs
 BLOCK = 512
 """Spheres that one thread takes at a time."""
 GO_ON, LOOK_ANEW, TOO_DEEP = 0, 1, 2
-"""What a step says: go on; a vertex has left the skin; two spheres are too deep in each other."""
+"""What a step says: go on; a vertex has left the skin, so that its forces wait for new pairs; two
+spheres are too deep in each other."""
 DEEPEST = 1.0
 """Overlap over the smaller radius at which the model ends: a centre lies in the other sphere."""
 
@@ -266,7 +267,8 @@ def advance_build(threads: bool) -> Any:
         """Contact at the new displacement; ``velocity`` times ``step`` [s] is the way to it.
 
         Writes forces, springs and losses of ``c``, a `Contact`.  ``step`` zero gives the forces
-        of a state that no step led to.  Returns `GO_ON`, `LOOK_ANEW` or `TOO_DEEP`.
+        of a state that no step led to.  Returns `GO_ON`, `TOO_DEEP`, or `LOOK_ANEW` and has then
+        moved the spheres and nothing else: it is to be called again with new pairs.
         """
         stamp = threads  # noqa: F841  (makes it a part of the key: the two are one source)
         # a parallel loop of numba takes arrays only: tuples are taken apart, and made anew within
@@ -294,12 +296,9 @@ def advance_build(threads: bool) -> Any:
                     )
                 else:
                     reactions_add(own, low, high)
-        deepest, farthest = 0.0, 0.0
-        for b in range(blocks):
-            deepest, farthest = max(deepest, deep[b]), max(farthest, far[b])
-        if deepest >= DEEPEST:
-            return TOO_DEEP
-        return LOOK_ANEW if farthest > half_skin**2 else GO_ON
+            if stage == 0 and far.max() > half_skin**2:
+                return LOOK_ANEW
+        return TOO_DEEP if deep.max() >= DEEPEST else GO_ON
 
     return advance
 

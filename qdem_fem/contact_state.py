@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from qdem_fem import kernel
 from qdem_fem.contact_inside import inside_check
-from qdem_fem.contact_kernel import TOO_DEEP
+from qdem_fem.contact_kernel import LOOK_ANEW, TOO_DEEP
 from qdem_fem.contact_near import near_check, near_step
 from qdem_fem.contact_outside import Outside, outside_of
 from qdem_fem.contact_spheres import NEAR, ContactPlane, SphereContact
@@ -224,12 +224,14 @@ class Contacts(ABC):
         done, bad, said = window_run(
             self.run, self.kernel, steps, step, loads, held, probes, table, gravity, work
         )
+        self.lasted += done
+        if said == LOOK_ANEW:
+            self.pairs_find()
+            state = self.run.assembly.state
+            said = advance_of(self.kernel, None, state.displacement, state.velocity, step)
         if said == TOO_DEEP and not bad:
             self.run.motion.steps_done += done
             self.deep_check(said)
-        self.lasted += done
-        if said:
-            self.pairs_find()
         return done, bad
 
     @property

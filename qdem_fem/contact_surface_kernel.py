@@ -257,6 +257,8 @@ def surface_step_build(made_from: str) -> Any:
                 c.force[i, k] = 0.0
                 moved += (c.position[i, k] - c.start[i, k]) ** 2
             far = max(far, moved)
+        if far > c.half_skin**2:
+            return LOOK_ANEW
         c.account[0] = 0.0
         moved = np.sqrt(far)
         deepest = max(points_forces(c, velocity, step, moved), walls_forces(c, velocity, step))
@@ -267,9 +269,7 @@ def surface_step_build(made_from: str) -> Any:
                 overlaps_forces(c, velocity, step, moved),
                 wall_faces_forces(c, velocity, step),
             )
-        if deepest > c.depth:
-            return TOO_DEEP
-        return LOOK_ANEW if far > c.half_skin**2 else GO_ON
+        return TOO_DEEP if deepest > c.depth else GO_ON
 
     return surface_advance
 

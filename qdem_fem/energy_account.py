@@ -12,16 +12,16 @@ STORED = ("kinetic", "elastic", "contact", "friction", "viscous", "absorbed", "f
 
 
 def energy_facts(energy: dict[str, FloatArray]) -> dict[str, float]:
-    """Energies at the end [J], and the greatest of external less all others on the way.
+    """Energies at the end [J], and the greatest of external less what all others gained.
 
-    That is also told over the greatest energy that was put in, or went from one form to another.
+    That is also told over the greatest energy that was put in, or went from one form to another,
+    or was in motion.  What a scene begins with, overlap or motion, is no work of its loads.
     """
     names = [name for name in STORED if name in energy]
-    stored = np.sum([energy[name] for name in names], axis=0)
-    if "contact" in energy:  # overlap that the scene begins with is no work of its loads
-        stored = stored - sum(energy[name][0] for name in ("contact", "elastic"))
+    stored = np.sum([energy[name] - energy[name][0] for name in names], axis=0)
     missing = energy["external"] - stored
-    passed = (float(np.abs(energy[name] - energy[name][0]).max()) for name in names)
+    passed = [float(np.abs(energy[name] - energy[name][0]).max()) for name in names]
+    passed.append(float(energy["kinetic"].max()))
     greatest = max(float(np.abs(energy["external"]).max()), float(stored.max()), *passed)
     return {
         **{name: float(energy[name][-1]) for name in [*names, "external"]},

@@ -143,11 +143,6 @@ def test_kernel_is_its_twin(walls: bool) -> None:
         step = 0.01
         at += step * velocity
         said = advance_one(c, packed(at), packed(velocity), step)
-        expected = twin.step(c.spheres.reference + at, step * velocity)
-        assert c.force == pytest.approx(expected, abs=40 * 10 * EPS)
-        assert c.slid.sum() == pytest.approx(twin.slid, rel=1e-12)
-        stretched = np.linalg.norm(c.pairs.spring, axis=1)[c.pairs.touching > 0]
-        slipped, held = slipped + (stretched > 0.1).sum(), held + (stretched > 0).sum()
         if said == LOOK_ANEW:
             position = c.spheres.reference + at
             radius, body = c.spheres.radius, c.spheres.body
@@ -156,6 +151,12 @@ def test_kernel_is_its_twin(walls: bool) -> None:
             c = c._replace(pairs=pairs)
             c.start[:] = position
             renewed += 1
+            assert advance_one(c, packed(at), packed(velocity), step) == GO_ON
+        expected = twin.step(c.spheres.reference + at, step * velocity)
+        assert c.force == pytest.approx(expected, abs=40 * 10 * EPS)
+        assert c.slid.sum() == pytest.approx(twin.slid, rel=1e-12)
+        stretched = np.linalg.norm(c.pairs.spring, axis=1)[c.pairs.touching > 0]
+        slipped, held = slipped + (stretched > 0.1).sum(), held + (stretched > 0).sum()
     assert renewed >= 5
     assert held > 1000
     assert slipped > 100
@@ -222,7 +223,10 @@ def test_action_is_reaction_and_the_branch_takes_the_moment() -> None:
 
 
 def test_what_a_step_says() -> None:
-    """A vertex beyond half the skin asks for a list, a centre inside another sphere is too deep."""
+    """A vertex beyond half the skin asks for a list, before any force of the step is computed;
+
+    a centre inside another sphere is too deep.
+    """
     c = cloud(7, 2, False)
     c.spheres.body[:] = 0, 1
     c.spheres.radius[:] = 0.5
@@ -232,11 +236,15 @@ def test_what_a_step_says() -> None:
     )
     c.start[:] = c.spheres.reference
     still = np.zeros(8)
-    said = [
-        advance_one(c, packed(np.array([[way, 0, 0], [0, 0, 0]])), still, 1.0)
-        for way in (0.099, 0.101, 1.49, 1.51)
-    ]
-    assert said == [GO_ON, LOOK_ANEW, LOOK_ANEW, TOO_DEEP]
+
+    def said(way: float) -> int:
+        return int(advance_one(c, packed(np.array([[way, 0, 0], [0, 0, 0]])), still, 1.0))
+
+    assert [said(way) for way in (0.099, 0.101, 1.49, 1.51)] == [GO_ON] + 3 * [LOOK_ANEW]
+    assert not c.force.any()
+    c.start[0, 0] = 1.45
+    assert [said(way) for way in (1.49, 1.51)] == [GO_ON, TOO_DEEP]
+    assert c.force.any()
 
 
 def test_spheres_that_turn_as_one_strain_their_spring() -> None:
@@ -250,6 +258,7 @@ def test_spheres_that_turn_as_one_strain_their_spring() -> None:
     c.spheres.reference[:] = [[-0.48, 0, 0], [0.48, 0, 0]]
     c = c._replace(
         friction=np.inf,
+        half_skin=np.inf,
         pairs=pairs_renew(
             None, c.spheres.reference, c.spheres.radius, c.spheres.body, 1.0, NO_WALLS
         ),

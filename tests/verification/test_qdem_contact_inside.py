@@ -60,3 +60,13 @@ def test_what_overlap_gives_is_what_the_account_is_measured_by() -> None:
     facts = energy_facts({name: np.array(values) for name, values in rows.items()})
     assert facts["greatest_imbalance"] == pytest.approx(1.0)
     assert facts["relative_imbalance"] == pytest.approx(0.01)
+
+
+def test_motion_that_a_scene_begins_with_is_not_missing() -> None:
+    """`velocity` of a body is no work of loads; what is lost on the way is told over it."""
+    rows = {"kinetic": [400.0, 400.0, 396.0], "elastic": [0.0] * 3, "external": [0.0] * 3}
+    steady = energy_facts({name: np.array(values[:2]) for name, values in rows.items()})
+    assert steady["relative_imbalance"] == 0.0
+    assert energy_facts({name: np.array(values) for name, values in rows.items()})[
+        "relative_imbalance"
+    ] == pytest.approx(0.01)

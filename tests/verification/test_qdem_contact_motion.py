@@ -229,6 +229,23 @@ def test_history_survives_renewals_of_the_list() -> None:
     assert states[0] == states[1]
 
 
+def test_what_meets_in_the_step_that_outlives_the_list_is_not_missed() -> None:
+    """Both cubes go 20 um a step, 1 um apart beyond a skin of 0.1 mm: in the third step each is
+
+    past half the skin, and they overlap by 19 um.
+    """
+    states = []
+    for skin in (1e-4, 6e-3):
+        run = two(gap=101e-6, stiffness=1e6, step=1e-6, contact={"skin": skin})
+        for body, speed in zip(run.bodies, (20.0, -20.0), strict=True):
+            body.velocity = np.tile([0, 0, speed], (len(body.nodes), 1))
+        run.advance(3 * run.step)
+        assert run.energy().contact > 0
+        run.advance(7 * run.step)
+        states.append(state_of(run)[:4] + state_of(run)[6:])
+    assert states[0] == states[1]
+
+
 def test_the_skin_follows_the_motion_and_changes_no_bit() -> None:
     """Two collide while both fly at 20 m/s: lists come to last longer, forces are the same."""
     states, runs = [], []
