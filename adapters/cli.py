@@ -270,7 +270,12 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``fit``."""
     parser.add_argument(
         "paths", nargs="+", metavar="RUN|DUMP...|CSV", type=Path,
-        help="a run folder, dumps with a frame each cycle, or a CSV of cycle,settlement (m)",
+        help="a run folder, dumps with a frame each cycle, or a table (.csv, .tsv, .txt, .dat) of "
+        "cycle,settlement (m), also settlement [mm], strain [%%]; decimal commas beside ; or tabs",
+    )  # fmt: skip
+    parser.add_argument(
+        "--columns", nargs=2, metavar=("CYCLE", "SETTLEMENT"), default=(),
+        help="a table's columns, where they are called otherwise",
     )  # fmt: skip
     parser.add_argument(
         "--law", default="log", metavar="NAME",
@@ -315,7 +320,8 @@ def fit_command(arguments: argparse.Namespace) -> int:
             remedy="name a law for --error, such as --law log",
         )
     law = law_named("log" if auto else arguments.law)
-    series = series_read(arguments.paths, arguments.steps_per_cycle).since(arguments.from_cycle)
+    series = series_read(arguments.paths, arguments.steps_per_cycle, arguments.columns)
+    series = series.since(arguments.from_cycle)
     to_cycle = arguments.to_cycle
     if to_cycle is None:
         to_cycle = series.cycle.max(initial=0.0)
