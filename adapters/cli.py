@@ -289,6 +289,11 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
         "--from-cycle", type=float, default=0.0, metavar="N", help="leave earlier cycles out"
     )
     parser.add_argument(
+        "--load-change", type=float, metavar="N",
+        help="the load changed at cycle N: leave the cycles up to it out, and count from there, as "
+        "the law starts anew; --to-cycle counts on from the first one",
+    )  # fmt: skip
+    parser.add_argument(
         "--steps-per-cycle", type=float, metavar="N",
         help="dumps only: time steps of a cycle; default: each frame is the end of one",
     )  # fmt: skip
@@ -325,11 +330,14 @@ def fit_command(arguments: argparse.Namespace) -> int:
     to_cycle = arguments.to_cycle
     if to_cycle is None:
         to_cycle = series.cycle.max(initial=0.0)
+    ahead = to_cycle
+    if arguments.load_change is not None:
+        series, ahead = series.after(arguments.load_change), to_cycle - arguments.load_change
     try:
         if auto:
-            fitted = fit_auto(series, to_cycle, arguments.probability).to_json()
+            fitted = fit_auto(series, ahead, arguments.probability).to_json()
         else:
-            fitted = fit_series(series, law, to_cycle, arguments.probability).to_json()
+            fitted = fit_series(series, law, ahead, arguments.probability).to_json()
     except JumpRefused as refusal:
         if arguments.json:
             json_print(refusal.to_json(series.unit))

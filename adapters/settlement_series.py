@@ -29,6 +29,11 @@ class Series:
         rows = self.cycle >= cycle
         return Series(self.cycle[rows], self.settlement[rows], self.unit)
 
+    def after(self, cycle: float) -> Series:
+        """The rows behind ``cycle``, counted from there: a load that changed starts a law anew."""
+        rows = self.cycle > cycle
+        return Series(self.cycle[rows] - cycle, self.settlement[rows], self.unit)
+
 
 def series_read(
     paths: Sequence[Path], steps_per_cycle: float | None = None, columns: Sequence[str] = ()
