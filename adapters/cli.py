@@ -270,7 +270,12 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``fit``."""
     parser.add_argument(
         "paths", nargs="+", metavar="RUN|DUMP...|CSV", type=Path,
-        help="a run folder, dumps with a frame each cycle, or a CSV of cycle,settlement (m)",
+        help="a run folder, dumps with a frame each cycle, or a table (.csv, .tsv, .txt, .dat) of "
+        "cycle,settlement (m), also settlement [mm], strain [%%]; decimal commas beside ; or tabs",
+    )  # fmt: skip
+    parser.add_argument(
+        "--columns", nargs=2, metavar=("CYCLE", "SETTLEMENT"), default=(),
+        help="a table's columns, where they are called otherwise",
     )  # fmt: skip
     parser.add_argument(
         "--law", default="log", metavar="NAME",
@@ -283,6 +288,11 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--from-cycle", type=float, default=0.0, metavar="N", help="leave earlier cycles out"
     )
+    parser.add_argument(
+        "--load-change", type=float, metavar="N",
+        help="the load changed at cycle N: leave the cycles up to it out, and count from there, as "
+        "the law starts anew; --to-cycle counts on from the first one",
+    )  # fmt: skip
     parser.add_argument(
         "--steps-per-cycle", type=float, metavar="N",
         help="dumps only: time steps of a cycle; default: each frame is the end of one",
@@ -315,15 +325,19 @@ def fit_command(arguments: argparse.Namespace) -> int:
             remedy="name a law for --error, such as --law log",
         )
     law = law_named("log" if auto else arguments.law)
-    series = series_read(arguments.paths, arguments.steps_per_cycle).since(arguments.from_cycle)
+    series = series_read(arguments.paths, arguments.steps_per_cycle, arguments.columns)
+    series = series.since(arguments.from_cycle)
     to_cycle = arguments.to_cycle
     if to_cycle is None:
         to_cycle = series.cycle.max(initial=0.0)
+    ahead = to_cycle
+    if arguments.load_change is not None:
+        series, ahead = series.after(arguments.load_change), to_cycle - arguments.load_change
     try:
         if auto:
-            fitted = fit_auto(series, to_cycle, arguments.probability).to_json()
+            fitted = fit_auto(series, ahead, arguments.probability).to_json()
         else:
-            fitted = fit_series(series, law, to_cycle, arguments.probability).to_json()
+            fitted = fit_series(series, law, ahead, arguments.probability).to_json()
     except JumpRefused as refusal:
         if arguments.json:
             json_print(refusal.to_json(series.unit))

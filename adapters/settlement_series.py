@@ -1,12 +1,10 @@
-"""A settlement series, one value a cycle, read from a CSV file, a run folder or dumps."""
+"""A settlement series, one value a cycle, read from a table, a run folder or dumps."""
 
 from __future__ import annotations
 
-import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 
@@ -14,11 +12,6 @@ import numpy as np
 
 from adapters.errors import UsageError
 from adapters.state import FloatArray
-
-UNITS = ("m", "cm", "mm", "um")
-"""Units a header may give, as in ``settlement_mm``; without one it is m."""
-KINDS = ("computed", "healing", "jumped")
-"""What a row of a run's table may be; only computed ones are data for a law."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +29,19 @@ class Series:
         rows = self.cycle >= cycle
         return Series(self.cycle[rows], self.settlement[rows], self.unit)
 
+    def after(self, cycle: float) -> Series:
+        """The rows behind ``cycle``, counted from there: a load that changed starts a law anew."""
+        rows = self.cycle > cycle
+        return Series(self.cycle[rows] - cycle, self.settlement[rows], self.unit)
 
-def series_read(paths: Sequence[Path], steps_per_cycle: float | None = None) -> Series:
-    """The series of one CSV file, one run folder, or dumps with one frame a cycle end.
+
+def series_read(
+    paths: Sequence[Path], steps_per_cycle: float | None = None, columns: Sequence[str] = ()
+) -> Series:
+    """The series of one table, one run folder, or dumps with one frame a cycle end.
+
+    A table is a file named as in `settlement_table.SUFFIXES`, but for dumps of such names;
+    ``columns`` are its columns of cycles and settlement, where they have unusual names.
 
     Dumps may be one file of many frames or many files, taken in natural order of their names
     (``2.dump`` before ``10.dump``); a frame that repeats the time step before it is skipped.
@@ -48,69 +51,23 @@ def series_read(paths: Sequence[Path], steps_per_cycle: float | None = None) -> 
 
     Raises `UsageError` or `DumpError`, naming file, line and column.
     """
+    from adapters.settlement_table import series_of_table
+
     if not paths:
         raise UsageError("no series was named", remedy="give a CSV file, a run folder or dumps")
-    alone = len(paths) == 1
-    if alone and paths[0].is_dir():
-        return series_of_csv(paths[0] / "settlement.csv")
-    if alone and paths[0].suffix.lower() == ".csv":
-        return series_of_csv(paths[0])
-    for path in paths:
-        if path.is_dir() or path.suffix.lower() == ".csv":
-            raise UsageError(
-                "only dumps can be joined to one series",
-                where=str(path),
-                remedy="give one CSV file, or one run folder, or dumps",
-            )
-    return series_of_dumps(paths, steps_per_cycle)
-
-
-def series_of_csv(path: Path) -> Series:
-    """Columns ``cycle`` and ``settlement`` (m) or ``settlement_UNIT`` of a CSV file.
-
-    Rows may be in any order.  Of a column ``kind`` only rows ``computed`` are taken; other
-    columns and lines that begin with # are ignored.
-    """
-    try:
-        rows = list(_csv_rows(path))
-    except OSError as error:
-        raise UsageError(f"can not read the series ({error.strerror})", where=str(path)) from error
-    except (UnicodeDecodeError, csv.Error) as error:
+    tables = [path for path in paths if path.is_dir() or _is_table(path)]
+    if tables and len(paths) > 1:
         raise UsageError(
-            f"this is not a text file of comma-separated values ({error})",
-            where=str(path),
-            remedy="a dump must not be named .csv",
-        ) from error
-    if not rows:
-        raise UsageError("the file is empty", where=str(path), remedy=_REMEDY)
-    (header_line, header), *body = rows
-    columns, unit = _columns(header, f"{path}:{header_line}")
-    lines: dict[float, int] = {}
-    values: list[tuple[float, float]] = []
-    for line, cells in body:
-        where = f"{path}:{line}"
-        if len(cells) != len(header):
-            raise UsageError(
-                f"{len(cells)} cells under a header of {len(header)}", where=where, remedy=_REMEDY
-            )
-        if not _computed(cells, columns.get("kind"), where):
-            continue
-        cycle = _number(cells[columns["cycle"]], f"{where}, column cycle")
-        settlement_name = header[columns["settlement"]]
-        settlement = _number(cells[columns["settlement"]], f"{where}, column {settlement_name}")
-        if cycle < 0:
-            raise UsageError(f"cycle {cycle:g} is negative", where=f"{where}, column cycle")
-        if cycle in lines:
-            raise UsageError(
-                f"cycle {cycle:g} was given in line {lines[cycle]} already",
-                where=f"{where}, column cycle",
-            )
-        lines[cycle] = line
-        values.append((cycle, settlement))
-    if not values:
-        raise UsageError("there is no computed cycle in the table", where=str(path))
-    table = np.array(sorted(values))
-    return Series(table[:, 0], table[:, 1], unit)
+            "only dumps can be joined to one series",
+            where=str(tables[0]),
+            remedy="give one CSV file, or one run folder, or dumps",
+        )
+    if tables:
+        path = tables[0]
+        return series_of_table(path / "settlement.csv" if path.is_dir() else path, columns)
+    if columns:
+        raise UsageError("dumps have no columns of cycles and settlement", where=str(paths[0]))
+    return series_of_dumps(paths, steps_per_cycle)
 
 
 def series_of_dumps(paths: Sequence[Path], steps_per_cycle: float | None = None) -> Series:
@@ -151,66 +108,15 @@ def series_of_dumps(paths: Sequence[Path], steps_per_cycle: float | None = None)
     return Series(cycle, heights[0] - np.array(heights))
 
 
-_REMEDY = "the first line names the columns, such as cycle,settlement or cycle,settlement_mm"
+def _is_table(path: Path) -> bool:
+    """Whether a file is a table by its name, and not a dump by its first word."""
+    from adapters.settlement_table import SUFFIXES
 
-
-def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Line number and stripped cells of each row that is neither empty nor a comment."""
-    with path.open(encoding="utf-8-sig", newline="") as stream:
-        reader = csv.reader(stream, strict=True)
-        for row in reader:
-            cells = [cell.strip() for cell in row]
-            if any(cells) and not cells[0].startswith("#"):
-                yield reader.line_num, cells
-
-
-def _columns(header: list[str], where: str) -> tuple[dict[str, int], str]:
-    """Places of the columns cycle, settlement and, if there, kind; and the unit."""
-    names = [name.lower() for name in header]
-    spelled = {"settlement": "m"} | {f"settlement_{unit}": unit for unit in UNITS}
-    found: dict[str, int] = {}
-    unit = "m"
-    for place, name in enumerate(names):
-        column = "settlement" if name in spelled else name
-        if column not in ("cycle", "settlement", "kind"):
-            continue
-        if column in found:
-            raise UsageError(f"there are two columns {column}", where=where, remedy=_REMEDY)
-        found[column] = place
-        unit = spelled.get(name, unit)
-    for column, words in (("cycle", ["cycle"]), ("settlement", list(spelled))):
-        if column not in found:
-            near = [match for name in names for match in get_close_matches(name, words, n=1)]
-            raise UsageError(
-                f"there is no column {column} among {', '.join(header)}"
-                + (f"; did you mean {near[0]}?" if near else ""),
-                where=where,
-                remedy=f"{_REMEDY}; units are {', '.join(UNITS)}",
-            )
-    return found, unit
-
-
-def _computed(cells: list[str], place: int | None, where: str) -> bool:
-    """True for a row that the engine computed and that is no transient."""
-    if place is None or cells[place] == "computed":
-        return True
-    if cells[place] not in KINDS:
-        raise UsageError(
-            f"'{cells[place]}' is no kind of row",
-            where=f"{where}, column kind",
-            remedy=f"the kinds are {', '.join(KINDS)}",
-        )
-    return False
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        raise UsageError(f"'{text}' is not a number", where=where) from None
-    if not isfinite(number):
-        raise UsageError(f"{text} is not a finite number", where=where)
-    return number
+    suffix = path.suffix.lower()
+    if suffix == SUFFIXES[0] or suffix not in SUFFIXES or not path.is_file():
+        return suffix == SUFFIXES[0]
+    with path.open("rb") as stream:
+        return not stream.read(64).lstrip().startswith(b"ITEM:")
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:

@@ -232,6 +232,28 @@ def test_fit_prints_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert low < fitted["prediction"] < high
 
 
+def test_fit_starts_anew_where_the_load_changed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """3 ln N up to cycle 1000, then 5 ln of the cycles since: exact with the flag, and not without.
+
+    From cycle 1000 on, but counted from the first one, the same rows are another curve.
+    """
+    first, second = range(1, 1001, 37), range(1, 1001, 37)
+    rows = "".join(f"{n};{3 * math.log(n)!r}\n" for n in first)
+    rows += "".join(f"{1000 + n};{20 + 5 * math.log(n)!r}\n" for n in second)
+    series = tmp_path / "stages.txt"
+    series.write_text("N;settlement [mm]\n" + rows)
+    words = ["fit", str(series), "--law", "log", "--to-cycle", "11000", "--json"]
+    found = {}
+    for flag in ("--load-change", "--from-cycle"):
+        assert main([*words, flag, "1000"]) == 0
+        found[flag] = json.loads(capsys.readouterr().out)["prediction"]
+    expected = 20 + 5 * math.log(10000)
+    assert found["--load-change"] == pytest.approx(expected, rel=1e-9)
+    assert abs(found["--from-cycle"] - expected) > 10
+
+
 def test_fit_confidence_is_eq_15(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """k = (b - a)^2 / (2 eps^2) ln(2 / p), here of residuals +1 and -1 about a straight line.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,61 @@ def test_only_computed_rows_are_taken(tmp_path: Path) -> None:
     assert series.settlement.tolist() == [1e-5, 2e-5, 4e-5]
 
 
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("cycle;settlement_mm\n1;0,5\n20;0,75\n", "mm"),
+        ("Cycles (-);Settlement [mm];remark\n20;0.75;wet, cold\n1;0.5;\n", "mm"),
+        ("N\tSettlement, in µm\n1e0\t0.5\n2e1\t7.5e-1\n", "um"),
+        ("  cycle   settlement_cm \n  1   0.5 \n 20   0.75\n", "cm"),
+        ('"cycle","Axial strain (%)"\r\n1,0.5\r\n20,0.75\r\n', "%"),
+        ("cycle, strain\r1, 0.5\r20, 0.75\r", "1"),
+        ("1, 0.5\n20, 0.75\n", "m"),
+        ("20;0,75\n1;0,5\n", "m"),
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+@pytest.mark.parametrize("suffix", ["csv", "txt"])
+def test_tables_of_laboratories_are_read(
+    tmp_path: Path, text: str, unit: str, encoding: str, suffix: str
+) -> None:
+    """Separators, decimal commas, units in the header or none: the same two readings."""
+    path = tmp_path / f"series.{suffix}"
+    path.write_bytes(text.encode(encoding))
+    series = series_read([path])
+    assert (series.cycle.tolist(), series.settlement.tolist()) == ([1.0, 20.0], [0.5, 0.75])
+    assert series.unit == unit
+
+
+def test_columns_of_other_names_are_named(tmp_path: Path) -> None:
+    """With or without its unit; the usual names then say nothing; dumps have none."""
+    text = "Lastwechsel;Setzung [mm];Setzung rechts [mm];settlement\n1;0,5;9;8\n2;0,6;9;8\n"
+    path = written(tmp_path / "series.csv", text)
+    for name, expected in (("setzung", 0.5), ("Setzung [mm]", 0.5), ("Setzung rechts", 9.0)):
+        series = series_read([path], columns=("Lastwechsel", name))
+        assert (series.settlement[0], series.unit) == (expected, "mm")
+    with pytest.raises(UsageError, match=r"no column setzun among .*did you mean setzung\?"):
+        series_read([path], columns=("Lastwechsel", "setzun"))
+    dump = dumped(tmp_path / "dump.txt", {100: [1.0, 2.0], 200: [0.8, 2.0]})
+    assert series_read([dump]).settlement.tolist() == pytest.approx([0.0, 0.1])
+    with pytest.raises(UsageError, match="dumps have no columns"):
+        series_read([dump], columns=("cycle", "z"))
+
+
+def test_long_tables_are_read_fast(tmp_path: Path) -> None:
+    """200,000 readings within 0.65 s of processor time; 0.3 s here, 0.8 s row by row."""
+    cycle = np.arange(1.0, 200_001.0)
+    rows = "".join(f"{n:.0f},{n / 7:.9g}\n" for n in cycle)
+    path = written(tmp_path / "series.csv", "cycle,settlement_mm\n" + rows)
+    seconds = []
+    for _ in range(3):
+        start = time.process_time()
+        series = series_read([path])
+        seconds.append(time.process_time() - start)
+    assert min(seconds) < 0.65
+    np.testing.assert_allclose(series.settlement, cycle / 7, rtol=1e-8)
+
+
 @given(
     rows=st.dictionaries(
         st.floats(0, 1e7), st.floats(-1.0, 1.0, allow_subnormal=False), min_size=1, max_size=20
@@ -100,11 +156,13 @@ def test_any_file_is_read_or_refused_with_a_sentence(tmp_path: Path, content: st
         ("", "", "empty"),
         ("cycle,settlement\n", "", "no computed cycle"),
         ("cycle,settlement,kind\n1,0.0,jumped\n", "", "no computed cycle"),
-        ("1,0.5\n2,0.6\n", ":1", "no column cycle"),
-        ("cycles,settlement\n", ":1", "did you mean cycle?"),
+        ("1,0.5,7\n2,0.6,7\n", ":1", "no column cycle"),
+        ("cycel,settlement\n", ":1", "did you mean cycle?"),
         ("cycle,setlement\n", ":1", "did you mean settlement?"),
         ("cycle,settlement_inch\n", ":1", "no column settlement"),
-        ("cycle;settlement\n1;2\n", ":1", "no column cycle"),
+        ("Zyklus;Setzung [mm]\n1;2\n", ":1", "no column cycle"),
+        ("cycle;settlement\n1.000;0,5\n", ":2, column cycle", "'1.000' has a point"),
+        ('cycle,settlement\n"1,000",5\n', ":2, column cycle", "'1,000' is not a number"),
         ("cycle,settlement,settlement_mm\n", ":1", "two columns settlement"),
         ("cycle,settlement,cycle\n", ":1", "two columns cycle"),
         ("cycle,settlement\n1,0.0\n2\n", ":3", "1 cells under a header of 2"),
@@ -115,7 +173,7 @@ def test_any_file_is_read_or_refused_with_a_sentence(tmp_path: Path, content: st
         ("cycle,settlement\n\n\n-1,0.0\n", ":4, column cycle", "negative"),
         ("cycle,settlement\n5,0.0\n6,0.1\n5,0.2\n", ":4, column cycle", "given in line 2 already"),
         ("cycle,settlement,kind\n1,0,guessed\n", ":2, column kind", "'guessed' is no kind"),
-        ('cycle,settlement\n"1,0.5\n', "", "not a text file of comma-separated values"),
+        ('cycle,settlement\n"1,0.5\n', "", "no text table"),
     ],
 )
 def test_faulty_csv_names_file_line_and_column(
