@@ -98,18 +98,34 @@ class SphereContacts(Contacts):
     def lists_renew(self, position: Floats) -> None:
         """Look for pairs around vertices at (c, 3) [m]; the skin follows how fast they move."""
         spheres, (least, most) = self.kernel.spheres, self.skins
-        most = max(least, min(most, least + self.room / 2))
-        self.skin = skin_next(self.skin, self.lasted, least, most)
+        room = least + self.room / 2
+        self.skin = skin_next(self.skin, self.lasted, least, min(most, room))
+        skin = max(self.skin, min(self.parted(position), self.deep, room))
         pairs = pairs_renew(
-            self.pairs, position, spheres.radius, spheres.body, self.skin, self.walls(position),
-            self.asked.periodic,
+            self.pairs, position, spheres.radius, spheres.body, skin,
+            self.walls(position, skin), self.asked.periodic,
         )  # fmt: skip
         self.kernel = self.kernel._replace(pairs=pairs, half_skin=self.skin / 2)
 
-    def walls(self, position: Floats) -> NDArray[np.bool_]:
-        """Which vertices at (c, 3) [m] may touch which walls before pairs are looked for anew."""
+    def parted(self, position: Floats) -> float:
+        """By how much what touched in the last step is apart at (c, 3) [m].
+
+        A list has to hold it for one step more, in which its spring is let go.
+        """
+        radius, planes, ends = self.kernel.spheres.radius, self.kernel.planes, self._ends()
+        between = position[ends[:, 0]] - position[ends[:, 1]]
+        if self.asked.periodic is not None:
+            between -= self.pairs.image[self.pairs.touching.astype(bool)]
+        gaps = [np.linalg.norm(between, axis=1) - radius[ends].sum(axis=1)]
+        for point, normal, force in zip(planes.point, planes.normal, planes.force, strict=True):
+            held = force.any(axis=1)
+            gaps.append((position[held] - point) @ normal - radius[held])
+        return (1 + 1e-9) * float(np.concatenate(gaps).max(initial=0.0))
+
+    def walls(self, position: Floats, skin: float) -> NDArray[np.bool_]:
+        """Which vertices at (c, 3) [m] touch which walls, or may on a way of ``skin`` [m]."""
         radius, planes = self.kernel.spheres.radius, self.kernel.planes
-        return walls_near(position, radius, planes.point, planes.normal, self.skin)
+        return walls_near(position, radius, planes.point, planes.normal, skin)
 
     def deepest_words(self) -> tuple[str, str]:
         """The pair that overlaps most, and what to do."""
@@ -200,7 +216,7 @@ class SphereContacts(Contacts):
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take what `stored` gave."""
         given = {name: arrays[f"contact_{name}"] for name in PAIR_ARRAYS}
-        walls = self.walls(arrays["contact_start"])
+        walls = self.walls(arrays["contact_start"], self.skin)
         image = NO_IMAGE if self.asked.periodic is None else arrays["contact_image"].copy()
         pairs = pairs_of(given["first"].copy(), given["second"].copy(), walls, image)
         for name in ("touching", "spring", "pull"):
