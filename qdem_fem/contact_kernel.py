@@ -9,6 +9,7 @@ No fast mathematics here: a force and its reaction are the same number.
 from __future__ import annotations
 
 import hashlib
+from math import sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -111,11 +112,11 @@ def slider(
         across = sx * nx + sy * ny + sz * nz
         sx, sy, sz = sx - across * nx, sy - across * ny, sz - across * nz
         within = sx * sx + sy * sy + sz * sz
-        scale = np.sqrt(before / within) if within > 0.0 else 0.0
+        scale = sqrt(before / within) if within > 0.0 else 0.0
         sx, sy, sz = scale * sx, scale * sy, scale * sz
     across = wx * nx + wy * ny + wz * nz
     tx, ty, tz = sx + wx - across * nx, sy + wy - across * ny, sz + wz - across * nz
-    pull = stiffness * np.sqrt(tx * tx + ty * ty + tz * tz)
+    pull = stiffness * sqrt(tx * tx + ty * ty + tz * tz)
     if pull <= limit:
         return (tx, ty, tz), 0.0
     share = limit / pull

@@ -25,17 +25,27 @@ def contact_options_check(contact: Any, precision: str, device: str) -> None:
             where="simulation, contact",
             remedy="give a SphereContact or a SurfaceContact",
         )
-    if precision != "float64" or device != "cpu":
+    if precision != "float64":
         raise ConditionError(
-            "contact is computed in double precision on the processor",
+            "contact is computed in double precision",
             where="simulation, contact",
-            remedy='take precision="float64" and device="cpu"',
+            remedy='take precision="float64"',
+        )
+    if device != "cpu" and not isinstance(contact, SphereContact):
+        raise ConditionError(
+            "contact of surfaces is computed on the processor",
+            where="simulation, contact",
+            remedy='take device="cpu", or a SphereContact',
         )
 
 
 def contacts_of(run: Simulation, contact: Contact) -> Contacts:
     """What computes a contact; its kernels are loaded when a simulation first needs them."""
     if isinstance(contact, SphereContact):
+        if run.device != "cpu":
+            from qdem_fem.cuda_sphere_contacts import CudaSphereContacts
+
+            return CudaSphereContacts(run, contact)
         from qdem_fem.contact_sphere_state import SphereContacts
 
         return SphereContacts(run, contact)

@@ -177,10 +177,10 @@ class Contacts(ABC):
             return
         self.forget()
         self.pairs_find()
-        state, moved = self.run.assembly.state, self.run.assembly.field("displacement")
-        said = advance_of(self.kernel, None, state.displacement, state.velocity, 0.0)
+        said = self.step_now(0.0)
         self.stale = False
         self.deep_check(said)
+        moved = self.run.assembly.field("displacement")
         if np.isfinite(moved).all():
             inside_check(self.run.bodies, moved, self.deep, self.when)
 
@@ -221,18 +221,25 @@ class Contacts(ABC):
         probes: kernel.Probes, table: Floats, gravity: Floats | None, work: Floats,
     ) -> tuple[int, float]:  # fmt: skip
         """`Assembly.window` with contact; comes back early where pairs have to be looked for."""
-        done, bad, said = window_run(
-            self.run, self.kernel, steps, step, loads, held, probes, table, gravity, work
-        )
+        done, bad, said = self.march(steps, step, loads, held, probes, table, gravity, work)
         self.lasted += done
         if said == LOOK_ANEW:
             self.pairs_find()
-            state = self.run.assembly.state
-            said = advance_of(self.kernel, None, state.displacement, state.velocity, step)
+            said = self.step_now(step)
         if said == TOO_DEEP and not bad:
             self.run.motion.steps_done += done
             self.deep_check(said)
         return done, bad
+
+    def march(self, steps: int, step: float, *given: Any) -> tuple[int, float, int]:
+        """`qdem_fem.contact_window.window_run` of these contacts."""
+        return window_run(self.run, self.kernel, steps, step, *given)
+
+    def step_now(self, step: float) -> int:
+        """Contact at the displacement as it is, to which a ``step`` [s] led; what it says."""
+        state = self.run.assembly.state
+        moved, velocity = np.asarray(state.displacement), np.asarray(state.velocity)
+        return advance_of(self.kernel, None, moved, velocity, step)
 
     @property
     def when(self) -> str:

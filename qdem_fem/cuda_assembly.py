@@ -9,7 +9,7 @@ and the work of the few nodes with loads and constraints.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -20,6 +20,9 @@ from qdem_fem.body import Body
 from qdem_fem.errors import LibraryMissing
 from qdem_fem.lanes import lane_count
 from qdem_fem.reference_forces import Strain
+
+if TYPE_CHECKING:
+    from qdem_fem.cuda_contact import DeviceContact
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -172,8 +175,12 @@ class CudaAssembly(Assembly):
         table: Floats,
         gravity: Floats | None,
         work: Floats,
+        contact: DeviceContact | None = None,
     ) -> tuple[int, float]:
-        """Launch the steps and wait once, at the end; arguments as of `Assembly.kernel_run`."""
+        """Launch the steps and wait once, at the end; arguments as of `Assembly.kernel_run`.
+
+        ``contact``: of spheres, whose steps follow those of the bodies; its ``said`` is set.
+        """
         from qdem_fem import cuda_step
         from qdem_fem.cuda_step import cuda
 
@@ -183,7 +190,7 @@ class CudaAssembly(Assembly):
         memory = cuda.to_device(acted.memory)
         record = cuda.to_device(np.zeros((max(taken, 1), max(len(probes.node_at), 1), 3)))
         accelerations = np.zeros(3) if gravity is None else np.ravel(gravity)
-        status = cuda.to_device(np.array([0, steps], dtype=np.int32))
+        status = cuda.to_device(np.array([0, steps, 0, 0], dtype=np.int32))
         taken_by_viscosity = cuda.to_device(
             np.zeros(self._rows.shape[1] if self.viscous else 1)  # an empty array had better not be
         )
@@ -207,10 +214,16 @@ class CudaAssembly(Assembly):
         launch_forces = self._forces_kernel[self._element_blocks, cuda_step.BLOCK]
         launch_motion = motion[self._node_blocks, cuda_step.BLOCK]
         for k, sample in enumerate(samples.tolist()):
+            if contact is not None:
+                contact.launch_push(state.forces, status, k)
             launch_forces(*of_elements, half, dt, k)
             launch_motion(*of_nodes, k, sample)
+            if contact is not None:
+                contact.launch_step(state.displacement, state.velocity, status, step, k)
 
-        bad, done = status.copy_to_host().tolist()
+        bad, done = (told := status.copy_to_host().tolist())[:2]
+        if contact is not None:
+            contact.end(told)
         remembered = memory.copy_to_host()
         for total, kind in ((0, cuda_step.LOAD), (1, cuda_step.HELD)):
             work[total] += remembered[acted.of_kind(kind)[0], 0].sum()

@@ -36,8 +36,9 @@ LOAD, ROLLER, HELD, PROBE = range(4)
 """Kinds of actions on a node, in the order in which a step does them."""
 KIND, COMPONENT, SERIES, SLOT = range(4)
 """Columns of ``actions``."""
-BAD, LIMIT = range(2)
-"""Places of ``status``: elements found bad; steps to do, lowered to those done when one is."""
+BAD, LIMIT, ANEW, DEEP = range(4)
+"""Places of ``status``: elements found bad; steps to do, lowered to those done when one is; whether
+a vertex has left the skin of its pairs; whether two spheres are too deep in each other."""
 
 STRESS = {
     "finger": stress.stress_finger,

@@ -112,7 +112,7 @@ class Simulation(ConditionedBodies):
         numbers_check(step=step, safety=safety, threads=threads, mass_scaling=mass_scaling)
         bounds_check(safety=safety, threads=threads)
         contact_options_check(contact, precision, device)
-        self._assembly_class = assembly_class(device)
+        self.device, self._assembly_class = device, assembly_class(device)
         self.contact = contact
         rigid_options_check(self.bodies, precision, device)
         self._contacts: Contacts | None = None

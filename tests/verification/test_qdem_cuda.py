@@ -54,6 +54,27 @@ def test_twins_agree_in_special_cases(apart: dict[str, float], variant: str) -> 
     assert apart[variant] <= 1
 
 
+@pytest.mark.parametrize(
+    "variant",
+    [
+        "contact: walls, sliders, one list",
+        "contact: walls, sliders, many lists",
+        "contact: images across a width",
+        "contact: too deep",
+    ],
+)
+def test_contact_of_spheres_is_that_of_the_processor(apart: dict[str, float], variant: str) -> None:
+    """Places, forces, springs, losses and energies; lists made anew and stops in the same step."""
+    assert apart[variant] <= 1
+
+
+def test_surfaces_are_not_computed_on_a_gpu() -> None:
+    """Before a GPU is asked for."""
+    touch = q.SurfaceContact(1e12, 0.5)
+    with pytest.raises(ConditionError, match="contact of surfaces is computed on the processor"):
+        q.Simulation([q.Body(TETRAHEDRON, CONCRETE)], device="cuda", contact=touch)
+
+
 def test_every_variant_was_compared(apart: dict[str, float]) -> None:
     assert set(VARIANTS) < set(apart)
 

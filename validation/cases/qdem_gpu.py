@@ -27,6 +27,7 @@ from qdem_fem.assembly import NO_PROBES
 from qdem_fem.errors import LibraryMissing
 from qdem_fem.mesh_generation import box_mesh
 from validation.case import Check
+from validation.qdem_gpu_contact import contacts_compare
 from validation.qdem_race import FORCE, MATERIAL, SIZE
 
 Floats = NDArray[np.float64]
@@ -104,7 +105,7 @@ def twins_compare() -> dict[str, float]:
     found["periodic"] = twins_apart("finger", "float64", False, periodic_sides)
     found["inversion: steps, count and state"] = stop_apart(-80.0, 12)
     found["not a number: steps and count"] = stop_apart(np.nan, 12)
-    return found
+    return found | contacts_compare()
 
 
 Conditions = Callable[[q.Simulation, q.Body], None]

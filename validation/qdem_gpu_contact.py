@@ -1,0 +1,97 @@
+"""Contact of spheres on a GPU beside that on the processor: the same scenes, the same steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import qdem_fem as q
+from qdem_fem.contact_sphere_state import SphereContacts
+from qdem_fem.errors import ContactTooDeep
+from qdem_fem.mesh_generation import box_mesh
+
+SIDE, RADIUS = 0.03, 0.006
+STONE = q.Material(1e9, 0.2, 2700.0)
+STEPS = 15
+ROUND_OFF = 50.0
+"""Roundings of a step by which two orders of the same sums may differ, over the largest value."""
+
+
+def two_cubes(device: Any, periodic: bool = False, **contact: Any) -> q.Simulation:
+    """A cube that slides fast on another, which stands on a wall; or across a periodic side."""
+    apart = 2 * RADIUS - 2e-6
+    shift = np.array([0.004, 0.002, SIDE + np.sqrt(apart**2 - 0.004**2 - 0.002**2)])
+    touch: dict[str, Any] = {"planes": [q.ContactPlane((0, 0, -RADIUS + 1e-5), (0, 0, 1), 0.2)]}
+    if periodic:  # the upper cube meets the image of the lower one, a width ahead
+        touch = {"periodic": q.PeriodicWidth("y", 0.08)}
+        shift += (0, 0.08, 0)
+    bodies = [
+        q.Body(box_mesh((SIDE,) * 3, (1, 1, 1), "kuhn", tuple(origin)), STONE, name=name)
+        for name, origin in (("below", np.zeros(3)), ("above", shift))
+    ]
+    stiffness = {"below": 1e6, "above": 2e6}
+    run = q.Simulation(
+        bodies, threads=1, step=1.2e-6, device=device, gravity=(0.0, 0.0, -9.81),
+        contact=q.SphereContact(RADIUS, stiffness, 0.5, **(touch | contact)),
+    )  # fmt: skip
+    bodies[1].velocity = np.tile([0.5, -0.3, -0.2], (len(bodies[1].nodes), 1))
+    return run
+
+
+def state_of(run: q.Simulation) -> dict[str, Any]:
+    """What steps have changed, by name."""
+    contacts, energy = run.contacts, run.energy()
+    assert isinstance(contacts, SphereContacts)
+    kernel, touching = contacts.kernel, contacts.touching()
+    return {
+        "displacement": np.concatenate([body.displacement for body in run.bodies]),
+        "velocity": np.concatenate([body.velocity for body in run.bodies]),
+        "force": kernel.force, "spring": touching.spring, "pull": touching.force,
+        "wall spring": kernel.planes.spring, "slid": kernel.slid,
+        "energies": np.array([energy.contact, energy.friction, energy.kinetic, energy.elastic]),
+        "counts": np.array([contacts.renewals, len(touching.first), run.steps_done]),
+    }  # fmt: skip
+
+
+def contact_apart(skin: float, periodic: bool) -> float:
+    """Greatest difference after `STEPS` in marches of unequal length, over its bar."""
+    states = []
+    for device in ("cpu", "cuda"):
+        run = two_cubes(device, periodic, skin=skin)
+        for share in (0.35, 0.5, 0.15):
+            run.advance(round(share * STEPS) * run.step)
+        states.append(state_of(run))
+    one, other = states
+    if not np.array_equal(one["counts"], other["counts"]) or not one["energies"][:2].all():
+        return float("inf")
+    bar = ROUND_OFF * STEPS * float(np.finfo(float).eps)
+    return max(
+        float(abs(one[name] - other[name]).max() / abs(one[name]).max()) / bar
+        for name in one
+        if one[name].size and one[name].any()
+    )
+
+
+def too_deep_apart() -> float:
+    """Two that are driven into each other: both stop at the same step with the same words."""
+    said = []
+    for device in ("cpu", "cuda"):
+        run = two_cubes(device)
+        run.bodies[1].velocity = np.tile([0.0, 0.0, -400.0], (len(run.bodies[1].nodes), 1))
+        try:
+            run.advance(3 * STEPS * run.step)
+            return float("inf")
+        except ContactTooDeep as error:
+            said.append((str(error), run.steps_done))
+    return 0.0 if said[0] == said[1] else float("inf")
+
+
+def contacts_compare() -> dict[str, float]:
+    """Differences over their bars, by name."""
+    return {
+        "contact: walls, sliders, one list": contact_apart(6e-3, False),
+        "contact: walls, sliders, many lists": contact_apart(2e-6, False),
+        "contact: images across a width": contact_apart(1e-3, True),
+        "contact: too deep": too_deep_apart(),
+    }
