@@ -82,7 +82,7 @@ class Contact(NamedTuple):
     friction: Any
     """Coulomb's coefficient between bodies."""
     half_skin: Any
-    """Way of a vertex after which pairs are looked for anew [m]."""
+    """(c,) way of a vertex after which pairs are looked for anew [m]"""
     start: Any
     """(c, 3) positions when pairs were last looked for [m]"""
     position: Any
@@ -162,14 +162,14 @@ def _image_less(d: Any, image: Any, p: int) -> Any:
 
 @exact
 def spheres_move(c: Any, low: int, high: int, displacement: Any) -> float:  # pragma: no cover
-    """Positions of the spheres ``low`` to ``high``; their greatest square way [m^2]."""
+    """Positions of the spheres ``low`` to ``high``; square of way over half the skin, greatest."""
     far = 0.0
     for i in range(low, high):
         at, moved = c.spheres.place[i], 0.0
         for k in range(3):
             c.position[i, k] = c.spheres.reference[i, k] + displacement[at + k]
             moved += (c.position[i, k] - c.start[i, k]) ** 2
-        far = max(far, moved)
+        far = max(far, moved / c.half_skin[i] ** 2)
     return far
 
 
@@ -296,7 +296,7 @@ def advance_build(threads: bool) -> Any:
                     )
                 else:
                     reactions_add(own, low, high)
-            if stage == 0 and far.max() > half_skin**2:
+            if stage == 0 and far.max() > 1.0:
                 return LOOK_ANEW
         return TOO_DEEP if deep.max() >= DEEPEST else GO_ON
 

@@ -1,9 +1,9 @@
 """Which spheres may touch: a cell list, and the tangential history carried from list to list.
 
-A list holds all pairs of different bodies nearer than the sum of radii plus a skin; it is good
-until a vertex has moved half the skin.  Cells are hashed, so that memory goes with the number of
-spheres and not with the room they are in.  Pairs stand in the order of their two numbers: where
-the cells lie changes nothing.
+A list holds all pairs of different bodies nearer than the sum of radii plus the mean of their
+skins; it is good until a vertex has moved half of its skin.  Cells are hashed, so that memory goes
+with the number of spheres and not with the room they are in.  Pairs stand in the order of their
+two numbers: where the cells lie changes nothing.
 """
 
 from __future__ import annotations
@@ -49,19 +49,28 @@ class Pairs(NamedTuple):
 
 
 GOOD = 40
-"""Steps that a list should be good for: a look costs 10 to 12 of them, and where it is due less
+"""Steps that a list should be good for: a look costs 10 to 40 of them, and where it is due less
 often, pairs that do not touch cost more than looks."""
 
 
-def skin_next(skin: float, lasted: int, least: float, most: float) -> float:
-    """Skin of the next list [m], from the steps that one of ``skin`` [m] was good for.
+def skins_next(way: Floats, lasted: int, least: float, most: float) -> Floats:
+    """Skins of bodies [m], (b,), that at their present speed are good for `GOOD` steps.
 
-    It is changed by a factor of two at most, within ``least`` and ``most`` [m]; forces do not
-    depend on it.  No steps: something else asked for the list, and the skin stays.
+    ``way`` (b,) [m]: greatest of a body's vertices in the ``lasted`` steps of the list before.
+    Bodies at rest have the ``least`` skin and few pairs, whatever the others do.
     """
-    if lasted == 0:
-        return min(skin, most)
-    return float(np.clip(skin * np.clip(GOOD / lasted, 0.5, 2.0), least, most))
+    return np.clip(2 * GOOD / lasted * way, least, most)
+
+
+def ways_of(moved: Floats, first: Integers) -> Floats:
+    """Greatest way of the vertices of each body [m], (b,); ``moved`` (c, 3) [m].
+
+    ``first`` (b + 1,): first vertex of each body, and the end.
+    """
+    way = np.zeros(len(first) - 1)
+    each = np.flatnonzero(np.diff(first))
+    way[each] = np.maximum.reduceat(np.linalg.norm(moved, axis=1), first[each])
+    return way
 
 
 @njit(cache=True)
@@ -98,18 +107,18 @@ def cell_bucket(x: int, y: int, z: int, buckets: int) -> int:  # pragma: no cove
 
 @njit(cache=True)
 def pairs_near(
-    position: Any, radius: Any, body: Any, skin: float
+    position: Any, radius: Any, body: Any, skin: Any
 ) -> tuple[Any, Any]:  # pragma: no cover
     """Rows ``first`` (c + 1,) and ``second`` (p,) of all pairs nearer than their reach.
 
-    ``position`` (c, 3) [m], ``radius`` (c,) [m], ``body`` (c,); a pair is of two bodies.
+    ``position`` (c, 3) [m], ``radius``, ``skin`` (c,) [m], ``body`` (c,); a pair is of two bodies.
     """
     count = position.shape[0]
     first = np.zeros(count + 1, np.int64)
     second = np.empty(max(16, 4 * count), np.int64)
     if count == 0:
         return first, second[:0]
-    size = 2 * radius.max() + skin
+    size = 2 * radius.max() + skin.max()
     cell, start, order = cells_fill(position, size)
     buckets = start.size - 1
     found = 0
@@ -126,7 +135,7 @@ def pairs_near(
                     continue
                 if cell[j, 0] != x or cell[j, 1] != y or cell[j, 2] != z:
                     continue  # another cell of the same bucket
-                reach = radius[i] + radius[j] + skin
+                reach = radius[i] + radius[j] + 0.5 * (skin[i] + skin[j])
                 apart = 0.0
                 for c in range(3):
                     apart += (position[i, c] - position[j, c]) ** 2
@@ -147,7 +156,7 @@ def pairs_near(
 
 
 def pairs_periodic(
-    position: Floats, radius: Floats, body: Integers, skin: float, side: PeriodicWidth
+    position: Floats, radius: Floats, body: Integers, skin: Floats, side: PeriodicWidth
 ) -> tuple[Integers, Integers, Floats]:
     """As `pairs_near`, of spheres i and the nearest images of others j: also ``n W e`` (p, 3) [m].
 
@@ -158,13 +167,14 @@ def pairs_periodic(
     times = np.floor(position[:, axis] / width)
     wrapped = position.copy()
     wrapped[:, axis] -= times * width
-    ghost = np.flatnonzero(wrapped[:, axis] <= 2 * radius.max(initial=0.0) + skin)
+    reach = 2 * radius.max(initial=0.0) + skin.max(initial=0.0)
+    ghost = np.flatnonzero(wrapped[:, axis] <= reach)
     own = np.concatenate([np.arange(count), ghost])
     wrapped = wrapped[own]
     wrapped[count:, axis] += width
     times = times[own]
     times[count:] -= 1
-    first, second = pairs_near(wrapped, radius[own], body[own], skin)
+    first, second = pairs_near(wrapped, radius[own], body[own], skin[own])
     row = np.repeat(np.arange(len(own)), np.diff(first))
     once = row < count  # two that are both there a second time are a pair already
     one, other = row[once], second[once]
@@ -197,11 +207,11 @@ NO_IMAGE: Floats = np.zeros(0)
 
 
 def walls_near(
-    position: Floats, radius: Floats, point: Floats, normal: Floats, way: float
+    position: Floats, radius: Floats, point: Floats, normal: Floats, way: Floats
 ) -> NDArray[np.bool_]:
-    """Which spheres (c,) touch which walls (w,), or will on a ``way`` [m]; (c, w)."""
+    """Which spheres (c,) touch which walls (w,), or will on their ``way`` (c,) [m]; (c, w)."""
     apart = np.einsum("cwk,wk->cw", position[:, None] - point, normal)
-    return np.asarray(apart - radius[:, None] < way)
+    return np.asarray(apart < (radius + way)[:, None])
 
 
 def pairs_of(
@@ -226,7 +236,7 @@ def pairs_of(
 
 
 def pairs_renew(
-    old: Pairs | None, position: Floats, radius: Floats, body: Integers, skin: float,
+    old: Pairs | None, position: Floats, radius: Floats, body: Integers, skin: Floats,
     walls: NDArray[np.bool_], side: PeriodicWidth | None = None,
 ) -> Pairs:  # fmt: skip
     """The list for spheres at ``position`` (c, 3) [m], with the history of the ``old`` one."""

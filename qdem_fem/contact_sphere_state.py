@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import Contact, Planes, Spheres
-from qdem_fem.contact_search import NO_IMAGE, Pairs, pairs_of, pairs_renew, skin_next, walls_near
+from qdem_fem.contact_search import (
+    NO_IMAGE,
+    Pairs,
+    pairs_of,
+    pairs_renew,
+    skins_next,
+    walls_near,
+    ways_of,
+)
 from qdem_fem.contact_spheres import (
     NEAR,
     SKIN,
@@ -57,9 +65,10 @@ class SphereContacts(Contacts):
         poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
         self.one = pair_stiffness(normal, normal.max(initial=0.0))
         self.skin = float(SKIN * radius.min() if asked.skin is None else asked.skin)
-        free = asked.skin is None and asked.contacts != NEAR
-        self.skins = (self.skin, float(radius.min()) if free else self.skin)
-        """Least and greatest skin [m]."""
+        self.free = asked.skin is None and asked.contacts != NEAR
+        """Whether skins follow how fast bodies move."""
+        self.skins = np.full(len(run.bodies), self.skin)
+        """Of each body [m], (b,)."""
         self.deep = float(radius.max())
         self.reach = 2 * self.deep + self.skin
         size, walls = len(self.nodes), len(asked.planes)
@@ -78,8 +87,8 @@ class SphereContacts(Contacts):
                 *planes_arrays(asked.planes, asked.friction),
                 np.zeros((walls, size, 3)), np.zeros((walls, size, 3)),
             ),
-            float(asked.friction), self.skin / 2, zero + np.inf, zero.copy(), zero.copy(),
-            np.zeros(size),
+            float(asked.friction), np.full(size, self.skin / 2), zero + np.inf, zero.copy(),
+            zero.copy(), np.zeros(size),
         )  # fmt: skip
 
     @property
@@ -96,34 +105,43 @@ class SphereContacts(Contacts):
         self.kernel.planes.force[:] = 0.0
 
     def lists_renew(self, position: Floats) -> None:
-        """Look for pairs around vertices at (c, 3) [m]; the skin follows how fast they move."""
-        spheres, (least, most) = self.kernel.spheres, self.skins
-        room = least + self.room / 2
-        self.skin = skin_next(self.skin, self.lasted, least, min(most, room))
-        skin = max(self.skin, min(self.parted(position), self.deep, room))
+        """Look for pairs around vertices at (c, 3) [m]; skins follow how fast bodies move."""
+        spheres, room = self.kernel.spheres, self.skin + self.room / 2
+        if self.free and self.lasted:
+            way = ways_of(position - self.kernel.start, self.first_vertex)
+            most = max(self.skin, min(float(spheres.radius.min()), room))
+            self.skins = skins_next(way, self.lasted, self.skin, most)
+        elif not self.free:
+            self.skins[:] = self.skin
+        self.skins = np.maximum(self.skins, np.minimum(self.parted(position), min(self.deep, room)))
+        skin = self.skins[spheres.body]
         pairs = pairs_renew(
             self.pairs, position, spheres.radius, spheres.body, skin,
             self.walls(position, skin), self.asked.periodic,
         )  # fmt: skip
-        self.kernel = self.kernel._replace(pairs=pairs, half_skin=self.skin / 2)
+        self.kernel = self.kernel._replace(pairs=pairs, half_skin=skin / 2)
 
-    def parted(self, position: Floats) -> float:
-        """By how much what touched in the last step is apart at (c, 3) [m].
+    def parted(self, position: Floats) -> Floats:
+        """By how much what touched each body in the last step is apart at (c, 3) [m], (b,).
 
         A list has to hold it for one step more, in which its spring is let go.
         """
-        radius, planes, ends = self.kernel.spheres.radius, self.kernel.planes, self._ends()
+        spheres, planes, ends = self.kernel.spheres, self.kernel.planes, self._ends()
         between = position[ends[:, 0]] - position[ends[:, 1]]
         if self.asked.periodic is not None:
             between -= self.pairs.image[self.pairs.touching.astype(bool)]
-        gaps = [np.linalg.norm(between, axis=1) - radius[ends].sum(axis=1)]
+        apart = np.zeros(len(self.skins))
+        gap = np.linalg.norm(between, axis=1) - spheres.radius[ends].sum(axis=1)
+        for end in ends.T:
+            np.maximum.at(apart, spheres.body[end], gap)
         for point, normal, force in zip(planes.point, planes.normal, planes.force, strict=True):
             held = force.any(axis=1)
-            gaps.append((position[held] - point) @ normal - radius[held])
-        return (1 + 1e-9) * float(np.concatenate(gaps).max(initial=0.0))
+            gap = (position[held] - point) @ normal - spheres.radius[held]
+            np.maximum.at(apart, spheres.body[held], gap)
+        return (1 + 1e-9) * apart
 
-    def walls(self, position: Floats, skin: float) -> NDArray[np.bool_]:
-        """Which vertices at (c, 3) [m] touch which walls, or may on a way of ``skin`` [m]."""
+    def walls(self, position: Floats, skin: Floats) -> NDArray[np.bool_]:
+        """Which vertices at (c, 3) [m] touch which walls, or may on ways of ``skin`` (c,) [m]."""
         radius, planes = self.kernel.spheres.radius, self.kernel.planes
         return walls_near(position, radius, planes.point, planes.normal, skin)
 
@@ -216,12 +234,14 @@ class SphereContacts(Contacts):
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take what `stored` gave."""
         given = {name: arrays[f"contact_{name}"] for name in PAIR_ARRAYS}
-        walls = self.walls(arrays["contact_start"], self.skin)
+        self.skins[:] = self.skin
+        skin = self.skins[self.kernel.spheres.body]
+        walls = self.walls(arrays["contact_start"], skin)
         image = NO_IMAGE if self.asked.periodic is None else arrays["contact_image"].copy()
         pairs = pairs_of(given["first"].copy(), given["second"].copy(), walls, image)
         for name in ("touching", "spring", "pull"):
             getattr(pairs, name)[:] = given[name]
-        self.kernel = self.kernel._replace(pairs=pairs)
+        self.kernel = self.kernel._replace(pairs=pairs, half_skin=skin / 2)
         for name in CONTACT_ARRAYS:
             getattr(self.kernel, name)[:] = arrays[f"contact_{name}"]
         for name in PLANE_ARRAYS:

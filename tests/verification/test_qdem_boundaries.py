@@ -176,7 +176,7 @@ def test_goes_on_in_the_middle_of_a_crossing(model: str, tmp_path: Path) -> None
 def test_list_is_that_of_all_images() -> None:
     """Pairs and images of 300 spheres, some exactly at a side, against every image of every one."""
     random = np.random.default_rng(3)
-    side, skin = q.PeriodicWidth("z", 1.0), 0.02
+    side, skin = q.PeriodicWidth("z", 1.0), random.uniform(0.0, 0.04, 300)
     position = random.uniform(-3, 3, (300, 3)) * (0.3, 0.3, 1.0)
     position[:40, 2] = np.rint(position[:40, 2])
     position[40:50, 2] = -1e-17
@@ -187,15 +187,16 @@ def test_list_is_that_of_all_images() -> None:
     expected = {}
     for n in range(-7, 8):
         apart = np.linalg.norm(position[:, None] - position - n * side.way, axis=2)
-        near = (apart <= radius[:, None] + radius + skin) & (body[:, None] != body)
+        reach = radius[:, None] + radius + 0.5 * (skin[:, None] + skin)
+        near = (apart <= reach) & (body[:, None] != body)
         expected |= {(i, j): n * side.way for i, j in np.argwhere(np.triu(near, 1))}
     assert len(expected) > 250
     assert found.keys() == expected.keys()
     for key, way in expected.items():
         assert np.array_equal(found[key], way)
     inside = np.abs(position[:, 2] - 0.5) < 0.2  # nothing there can reach a side
-    alone = pairs_near(position[inside], radius[inside], body[inside], skin)
-    same = pairs_periodic(position[inside], radius[inside], body[inside], skin, side)
+    those = [a[inside] for a in (position, radius, body, skin)]
+    alone, same = pairs_near(*those), pairs_periodic(*those, side)
     for one, other in zip(alone, same[:2], strict=True):
         assert np.array_equal(one, other)
 

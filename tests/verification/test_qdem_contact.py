@@ -31,12 +31,14 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 EPS = float(np.finfo(float).eps)
 NO_WALLS = np.zeros((2, 0), bool)
+WIDE = np.full(2, 9.0)
+"""Skins of two spheres that see each other everywhere."""
 
 
-def pairs_twin(position: Floats, radius: Floats, body: Integers, skin: float) -> Integers:
+def pairs_twin(position: Floats, radius: Floats, body: Integers, skin: Floats) -> Integers:
     """All pairs i < j of two bodies within their reach, one by one, (p, 2)."""
     apart = np.linalg.norm(position[:, None] - position, axis=2)
-    near = apart <= radius[:, None] + radius + skin
+    near = apart <= radius[:, None] + radius + 0.5 * (skin[:, None] + skin)
     return np.argwhere(np.triu(near & (body[:, None] != body), 1))
 
 
@@ -63,7 +65,7 @@ class Twin:
         """Forces (c, 3) on the spheres."""
         spheres, planes = self.c.spheres, self.c.planes
         force = np.zeros_like(position)
-        for i, j in pairs_twin(position, spheres.radius, spheres.body, 1.0):
+        for i, j in pairs_twin(position, spheres.radius, spheres.body, np.ones(len(position))):
             apart = position[i] - position[j]
             overlap = spheres.radius[i] + spheres.radius[j] - np.linalg.norm(apart)
             k_n, k_t = (pair_stiffness(k[i], k[j]) for k in (spheres.normal, spheres.tangential))
@@ -107,19 +109,20 @@ def cloud(seed: int, count: int, walls: bool, skin: float = 0.2) -> Contact:
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     size = np.zeros((count, 3))
     point = ((reference @ across.T).min(axis=0) - 0.25)[:, None] * across
-    near = walls_near(reference, radius, point, across, skin)
+    skins = np.full(count, skin)
+    near = walls_near(reference, radius, point, across, skins)
     return Contact(
         Spheres(
             reference, 4 * np.arange(count), 4 * np.arange(count), body, radius, normal,
             tangential_stiffness(normal, 0.2),
         ),
-        pairs_renew(None, reference, radius, body, skin, near),
+        pairs_renew(None, reference, radius, body, skins, near),
         Planes(
             point, across,
             np.array([0.2, 0.7])[: 2 * walls],
             np.zeros((2 * walls, count, 3)), np.zeros((2 * walls, count, 3)),
         ),
-        0.4, skin / 2, reference.copy(), size.copy(), size.copy(), np.zeros(count),
+        0.4, skins / 2, reference.copy(), size.copy(), size.copy(), np.zeros(count),
     )  # fmt: skip
 
 
@@ -146,8 +149,9 @@ def test_kernel_is_its_twin(walls: bool) -> None:
         if said == LOOK_ANEW:
             position = c.spheres.reference + at
             radius, body = c.spheres.radius, c.spheres.body
-            near = walls_near(position, radius, c.planes.point, c.planes.normal, 0.2)
-            pairs = pairs_renew(c.pairs, position, radius, body, 0.2, near)
+            skins = 2 * c.half_skin
+            near = walls_near(position, radius, c.planes.point, c.planes.normal, skins)
+            pairs = pairs_renew(c.pairs, position, radius, body, skins, near)
             c = c._replace(pairs=pairs)
             c.start[:] = position
             renewed += 1
@@ -232,7 +236,7 @@ def test_what_a_step_says() -> None:
     c.spheres.radius[:] = 0.5
     c.spheres.reference[:] = [[0, 0, 0], [2.0, 0, 0]]
     c = c._replace(
-        pairs=pairs_renew(None, c.spheres.reference, c.spheres.radius, np.arange(2), 9.0, NO_WALLS)
+        pairs=pairs_renew(None, c.spheres.reference, c.spheres.radius, np.arange(2), WIDE, NO_WALLS)
     )
     c.start[:] = c.spheres.reference
     still = np.zeros(8)
@@ -258,9 +262,9 @@ def test_spheres_that_turn_as_one_strain_their_spring() -> None:
     c.spheres.reference[:] = [[-0.48, 0, 0], [0.48, 0, 0]]
     c = c._replace(
         friction=np.inf,
-        half_skin=np.inf,
+        half_skin=np.full(2, np.inf),
         pairs=pairs_renew(
-            None, c.spheres.reference, c.spheres.radius, c.spheres.body, 1.0, NO_WALLS
+            None, c.spheres.reference, c.spheres.radius, c.spheres.body, WIDE, NO_WALLS
         ),
     )
     at = c.spheres.reference
@@ -284,7 +288,7 @@ def test_list_is_complete_and_in_order(seed: int, count: int, scale: float) -> N
     random = np.random.default_rng(seed)
     position = random.uniform(-3, 3, (count, 3)) + 1e3 * random.integers(-1, 2, (count, 1))
     radius, body = random.uniform(0.1, 0.8, count), random.integers(0, 3, count)
-    skin = float(random.uniform(0, 0.3))
+    skin = random.uniform(0, 0.3, count)
     first, second = pairs_near(scale * position, scale * radius, body, scale * skin)
     found = np.column_stack([np.repeat(np.arange(count), np.diff(first)), second])
     expected = pairs_twin(scale * position, scale * radius, body, scale * skin)

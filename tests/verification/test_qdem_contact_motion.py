@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from qdem_fem.contact_search import GOOD, skin_next
+from qdem_fem.contact_search import GOOD, skins_next, ways_of
 from qdem_fem.contact_spheres import SKIN
 from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, SceneError, StepWarning
 from qdem_fem.mesh_generation import box_mesh
@@ -266,28 +266,43 @@ def test_the_skin_follows_the_motion_and_changes_no_bit() -> None:
         runs.append(run.contacts)
     free, thin = runs
     assert states[0] == states[1]
-    assert thin.skin == thin.skins[0] < free.skin <= RADIUS
+    assert (thin.skins == thin.skin).all()
+    assert free.skin == thin.skin < free.skins.min() <= free.skins.max() <= RADIUS
     assert 2 * free.renewals <= thin.renewals
-    assert free.kernel.half_skin == free.skin / 2
 
 
-@given(
-    st.floats(1e-6, 1e-2), st.integers(0, 10**6), st.floats(1e-6, 1e-3), st.floats(1e-6, 1e-2),
-    st.integers(1, 10**5),
-)  # fmt: skip
-def test_skin_next(skin: float, lasted: int, least: float, more: float, speed: int) -> None:
-    """Within its bounds and a factor of two; at a speed that stays, lists come to last `GOOD`."""
-    most = least + more
-    skin = float(np.clip(skin, least, most))
-    found = skin_next(skin, lasted, least, most)
-    assert least <= found <= most
-    assert skin / 2 <= found <= 2 * skin
-    for _ in range(40):  # steps that a list lasts: half the skin over the way of a step
-        way = least / (2 * speed)
-        skin = skin_next(skin, int(skin / 2 / way) + 1, least, most)
-    lasts = skin / 2 / way
-    at_bound = skin == least if lasts > GOOD else skin == most
-    assert at_bound or abs(lasts - GOOD) <= 2
+def test_a_body_at_rest_has_a_thin_skin_beside_a_fast_one() -> None:
+    """Of two cubes one flies past: its skin alone grows, and half of each is its vertices'."""
+    run = two(gap=0.05, step=1.2e-6)
+    thrown(run, (30.0, 0.0, 0.0))
+    for _ in range(10):
+        run.advance(40 * run.step)
+    c = run.contacts
+    assert c.renewals > 5
+    assert c.skins[0] == c.skin < 4 * c.skin < c.skins[1]
+    assert np.array_equal(c.kernel.half_skin, c.skins[c.kernel.spheres.body] / 2)
+
+
+@given(st.lists(st.floats(0, 1e-2), min_size=1), st.integers(1, 10**6), st.floats(1e-6, 1e-3))
+def test_skins_next(ways: list[float], lasted: int, least: float) -> None:
+    """Within their bounds; at speeds that stay, the next list is good for `GOOD` steps."""
+    most = 10 * least
+    skins = skins_next(np.array(ways), lasted, least, most)
+    assert (least <= skins).all()
+    assert (skins <= most).all()
+    speeds = np.array(ways) / lasted
+    good = skins >= 2 * GOOD * speeds * (1 - 1e-12)
+    assert (good | (skins == most)).all()
+
+
+@given(st.lists(st.integers(0, 4), min_size=1), st.integers(0, 2**32 - 1))
+def test_ways_are_those_of_each_body(counts: list[int], seed: int) -> None:
+    """Against one body at a time; a body without vertices goes nowhere."""
+    moved = np.random.default_rng(seed).normal(size=(sum(counts), 3))
+    first = np.concatenate([[0], np.cumsum(counts)])
+    each = np.split(moved, first[1:-1])
+    expected = [max((float(np.sqrt(m @ m)) for m in one), default=0.0) for one in each]
+    assert ways_of(moved, first) == pytest.approx(expected, rel=1e-15)
 
 
 @given(st.lists(st.lists(st.tuples(st.floats(-1, 1), st.booleans()), max_size=6), min_size=1))
@@ -309,8 +324,8 @@ def test_a_skin_leaves_room_to_the_images_across_the_width() -> None:
         run.advance(10 * run.step)
     c = run.contacts
     assert c.renewals > 5
-    assert c.skins[0] < c.skin
-    assert SIDE + 2 * RADIUS + c.skin < 0.0436
+    assert c.skin < c.skins.max()
+    assert SIDE + 2 * RADIUS + c.skins.max() < 0.0436
 
 
 def test_a_saved_run_goes_on_to_the_same_bits(tmp_path: Path) -> None:
