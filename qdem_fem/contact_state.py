@@ -182,7 +182,7 @@ class Contacts(ABC):
         self.deep_check(said)
         moved = self.run.assembly.field("displacement")
         if np.isfinite(moved).all():
-            inside_check(self.run.bodies, moved, self.deep, self.when)
+            inside_check(self.run.bodies, moved, self.deep, self.asked.periodic, self.when)
 
     def pairs_find(self) -> None:
         """Look for pairs anew; those that touch keep their springs."""

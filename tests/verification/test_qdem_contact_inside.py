@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,30 @@ def test_bodies_deep_in_each_other_are_told(
 ) -> None:
     run = beside(model, size, corner)
     with pytest.raises(ContactTooDeep, match=r"t = 0 s, step 0: (low|other) lies .* m below the"):
+        run.advance(1e-8)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    ("y", "said"),
+    [
+        (0.009, "m below the surface of (low|other), where"),
+        (0.309, "m below the surface of (low|other), where"),  # three widths ahead
+        (-0.02, "across the width, where"),  # half over a side
+        (-0.52, "across the width, where"),
+        (0.05, None),
+    ],
+)
+def test_images_across_a_width_are_looked_at(model: str, y: float, said: str | None) -> None:
+    """Cubes of 3 cm, the other's place taken any number of widths of 10 cm ahead or back."""
+    other = box_mesh((0.03,) * 3, (1, 1, 1), origin=(0.011, y, 0.013))
+    bodies = [q.Body(LOW, STONE, name="low"), q.Body(other, STONE, name="other")]
+    contact = replace(MODELS[model], periodic=q.PeriodicWidth("y", 0.1))
+    run = q.Simulation(bodies, threads=1, contact=contact, step=1e-8)
+    if said is None:
+        run.advance(1e-8)
+        return
+    with pytest.raises(ContactTooDeep, match=said):
         run.advance(1e-8)
 
 
