@@ -283,7 +283,7 @@ def test_a_dry_run_prepares_no_bed(tmp_path: Path, capsys: pytest.CaptureFixture
     count = prepared.recipe.below + prepared.recipe.beside
     assert main(["qdem", str(path), "--dry-run"]) == 0
     told = capsys.readouterr().out
-    assert "to be prepared first (stages bed, crib, firm, hard, rest)" in told
+    assert "to be prepared first (stages bed to rest)" in told
     assert f"the bed: {count} grains" in told
     assert main(["qdem", str(path), "--dry-run", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["bed"]["grains"] == count
