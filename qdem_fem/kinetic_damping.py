@@ -36,6 +36,9 @@ WAIT = 4
 topples while it trembles goes on."""
 CHECK = 25
 """Looks between two judgements of the state."""
+SLOW, SLIDE = 15, 5e-3
+"""Judgements without rest after which bodies are left twice as long, up to this time [s]: what
+slides comes to g t/2 between two stops, millimetres a second on hard springs."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +138,9 @@ class Damping:
     begun: float
     """Time then [s]."""
     peaks: int = 0
+    wait: int = WAIT
+    """Looks without a greater kinetic energy after which a body is stopped."""
+    judged: int = 0
 
     @classmethod
     def begin(cls, run: Simulation) -> Damping:
@@ -149,7 +155,8 @@ class Damping:
     @classmethod
     def restored(cls, arrays: Mapping[str, NDArray[Any]]) -> Damping:
         """What `stored` gave."""
-        single = {name: arrays[name].item() for name in ("first", "begun", "peaks")}
+        names = ("first", "begun", "peaks", "wait", "judged")
+        single = {name: arrays[name].item() for name in names}
         return cls(arrays["peak"], arrays["since"], **single)
 
 
@@ -178,7 +185,7 @@ def rest_find(
             now = np.full_like(now, now.sum())
         state.since = np.where(now > state.peak, 0, state.since + 1)
         state.peak = np.maximum(state.peak, now)
-        past = state.since >= (WAIT if each else 1)
+        past = state.since >= (state.wait if each else 1)
         if past.any():
             stop(run, past)
             state.peaks += int(past.sum()) if each else 1
@@ -189,6 +196,9 @@ def rest_find(
         done, time = run.steps_done - state.first, run.time - state.begun
         rest = _judged(run, greatest, state.peaks, done, time)
         looks, greatest = 0, 0.0
+        state.judged += 1
+        if state.judged % SLOW == 0:
+            state.wait = max(state.wait, min(2 * state.wait, int(SLIDE / (look * run.step))))
         if progress is not None:
             progress(rest)
         if rest.unbalanced <= unbalanced and rest.kinetic <= kinetic and rest.loose <= loose:

@@ -158,8 +158,9 @@ def bed_outlook(prepared: TrackPrepared) -> dict[str, Any]:
     if not ahead:
         return {}
     told = (
-        f"{recipe.below + recipe.beside} grains, to be prepared first (stages {ahead[0]} to {ahead[-1]}), "
-        f"half a second to two of processor time a grain; kept in {prepared.bed_file}"
+        f"{recipe.below + recipe.beside} grains, to be prepared first (stages {ahead[0]} to "
+        f"{ahead[-1]}), half a second to two of processor time a grain; kept in "
+        f"{prepared.bed_file}"
     )
     return {"grains": recipe.below + recipe.beside, "stages_ahead": list(ahead), "told": told}
 

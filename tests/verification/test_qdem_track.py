@@ -83,6 +83,27 @@ def test_no_equilibrium_in_time_is_told() -> None:
         kinetic_damping.rest_find(stacked(True), 1e-3, 1e-4, 0.0, 1e-3, look=1)
 
 
+@pytest.mark.parametrize(("share", "last"), [(0.02, 50), (0.5, kinetic_damping.WAIT)])
+def test_what_does_not_rest_is_left_longer_between_stops(
+    share: float, last: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Doubled again and again, up to the time in which a slide gathers way, of looks so long."""
+    run, waits = stacked(True), []
+    monkeypatch.setattr(kinetic_damping, "SLOW", 2)
+    monkeypatch.setattr(kinetic_damping, "CHECK", 2)
+    monkeypatch.setattr(kinetic_damping, "SLIDE", run.step / share)
+
+    def keep(state: kinetic_damping.Damping) -> None:
+        waits.append(state.wait)
+
+    with pytest.raises(NotConverged):
+        kinetic_damping.rest_find(run, 0.0, 0.0, 0.0, 39 * run.step, look=1, keep=keep)
+    first = kinetic_damping.WAIT
+    doubled = [min(first * 2 ** (n // 2), max(last, first)) for n in range(1, len(waits) + 1)]
+    assert waits == doubled
+    assert waits[-1] == last
+
+
 def test_spheres_that_bear_are_drawn_between_bodies(tmp_path: Path) -> None:
     # Both cubes are let down until they touch: four spheres on the ground, four pairs between.
     # Seen from the side, the middle of the gap is white but for spheres.
