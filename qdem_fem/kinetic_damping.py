@@ -155,9 +155,9 @@ class Damping:
     @classmethod
     def restored(cls, arrays: Mapping[str, NDArray[Any]]) -> Damping:
         """What `stored` gave."""
-        names = ("first", "begun", "peaks", "wait", "judged")
-        single = {name: arrays[name].item() for name in names}
-        return cls(arrays["peak"], arrays["since"], **single)
+        first, begun, peaks = (arrays[name].item() for name in ("first", "begun", "peaks"))
+        later = {name: arrays[name].item() for name in ("wait", "judged") if name in arrays}
+        return cls(arrays["peak"], arrays["since"], first, begun, peaks, **later)
 
 
 def rest_find(
