@@ -144,7 +144,7 @@ def prediction_band(
     by Student's t for the effective number of cycles.
 
     As in `fit_auto.outlook` it never reaches back beyond the last value by more than that reading's
-    own error: a bed that settles does not rise, however badly the law fits.
+    own error: a bed that has settled, and goes on by the law, does not rise, however badly it fits.
 
     The band does not hold for bursts (small beds) and collapse: rates that grow faster than in
     proportion to N.
@@ -164,9 +164,10 @@ def prediction_band(
     above = float(np.hypot(max(high - predicted, 0.0), noise))
     deviation, _, freedom = residual_noise(law, cycle, settlement)
     reading = float(stdtrit(freedom, (1 + probability) / 2)) * deviation
-    if predicted > 0:
+    moved = float(settlement[-1] - settlement[0])
+    if min(predicted, moved) > 0:
         below = min(below, predicted + reading)
-    elif predicted < 0:
+    elif max(predicted, moved) < 0:
         above = min(above, reading - predicted)
     return below, above
 
