@@ -9,7 +9,7 @@ import numpy as np
 from adapters.contact_law import OVERLAP_BOUND
 from adapters.errors import EngineFailed, NotCredible
 from adapters.overlaps import neighbours
-from adapters.sample import GRAVITY
+from adapters.sample import GRAVITY, sample_mass
 from adapters.scene import Scene
 from adapters.state import FloatArray, State
 from adapters.window import Window
@@ -136,6 +136,8 @@ def check_bounds(scene: Scene, figures: WindowFigures) -> None:
     remedy = f"the time step is {share:.3g} of the Rayleigh time; " + (
         "shorten it below 0.2" if share > 0.2 else "look at the scene's load and stiffness"
     )
+    if figures.force_error > FORCE_ERROR_BOUND:
+        remedy += f"; {heavier_piston(scene)}"
     bounds = (
         ("the greatest overlap over the smallest radius", figures.overlap_share, OVERLAP_BOUND),
         ("kinetic energy over weight times radius at a cycle end", figures.energy_share, 1.0),
@@ -145,6 +147,17 @@ def check_bounds(scene: Scene, figures: WindowFigures) -> None:
     for what, value, bound in bounds:
         if value > bound:  # nan, which stands for "not judged", passes
             raise NotCredible(f"{what} is {value:.3g}, above {bound:g}", remedy=remedy)
+
+
+def heavier_piston(scene: Scene) -> str:
+    """What to do with a piston that does not follow its load; a light one bounces."""
+    assert scene.loading is not None  # it would have no piston
+    radius = np.array([scene.sample.grain_radius.mean])
+    grains = scene.loading.piston_mass / sample_mass(radius, scene.material.grain.density)[0]
+    return (
+        f"the piston, as heavy as {grains:.2g} mean grains, does not follow its load: a heavier "
+        "one (loading.piston_mass), or a lower loading.frequency"
+    )
 
 
 RISE_FLOOR = 1e-3

@@ -143,9 +143,14 @@ def prediction_band(
     correlation; the fit is repeated on such series, and the scatter of its prediction is widened
     by Student's t for the effective number of cycles.
 
+    As in `fit_auto.outlook` it never reaches back beyond the last value by more than that reading's
+    own error: a bed that has settled, and goes on by the law, does not rise, however badly it fits.
+
     The band does not hold for bursts (small beds) and collapse: rates that grow faster than in
     proportion to N.
     """
+    from scipy.special import stdtrit
+
     last, parameters = float(cycle[-1]), law.fit(cycle, settlement)
     predicted = float(law.increment(parameters, last, to_cycle))
     distance, step = log(to_cycle / last), 1e-4
@@ -155,10 +160,36 @@ def prediction_band(
         slope * np.expm1(beta * distance) / beta for beta in (-probability, probability)
     )
     noise = fit_noise(law, cycle, settlement, to_cycle, probability)
-    return (
-        float(np.hypot(max(predicted - low, 0.0), noise)),
-        float(np.hypot(max(high - predicted, 0.0), noise)),
-    )
+    below = float(np.hypot(max(predicted - low, 0.0), noise))
+    above = float(np.hypot(max(high - predicted, 0.0), noise))
+    deviation, _, freedom = residual_noise(law, cycle, settlement)
+    reading = float(stdtrit(freedom, (1 + probability) / 2)) * deviation
+    moved = float(settlement[-1] - settlement[0])
+    if min(predicted, moved) > 0:
+        below = min(below, predicted + reading)
+    elif max(predicted, moved) < 0:
+        above = min(above, reading - predicted)
+    return below, above
+
+
+def residual_noise(
+    law: Law, cycle: FloatArray, settlement: FloatArray
+) -> tuple[float, float, float]:
+    """Deviation of a reading from ``law`` (unit of ``settlement``, shape (k,)), the correlation of
+    neighbours, and the degrees of freedom that these are known with; (0, 0, 1) for an exact fit,
+    and no finite deviation where the residuals have none.
+    """
+    parameters = law.fit(cycle, settlement)
+    residual = settlement - law.value(parameters, cycle)
+    square, count = float(residual @ residual), len(residual)
+    if square == 0 or not isfinite(square):
+        return square, 0.0, 1.0
+    # A fitted trend takes correlation out of the residuals; (2 + 4 rho) / k puts it back.
+    seen = max(float(residual[1:] @ residual[:-1]) / square, 0.0)
+    correlation = min(seen + (2 + 4 * seen) / count, 0.99)
+    effective = max(count * (1 - correlation) / (1 + correlation), 1.0 + len(parameters))
+    freedom = effective - len(parameters)
+    return sqrt(square / count * effective / freedom), correlation, freedom
 
 
 def fit_noise(
@@ -172,19 +203,11 @@ def fit_noise(
     """
     from scipy.special import stdtrit
 
-    parameters = law.fit(cycle, settlement)
+    deviation, correlation, freedom = residual_noise(law, cycle, settlement)
+    if deviation == 0 or not isfinite(deviation):
+        return deviation
+    parameters, count = law.fit(cycle, settlement), len(cycle)
     trend = law.value(parameters, cycle)
-    residual = settlement - trend
-    square, count = float(residual @ residual), len(residual)
-    if square == 0 or not isfinite(square):
-        return square
-    # A fitted trend takes correlation out of the residuals; (2 + 4 rho) / k puts it back.
-    seen = max(float(residual[1:] @ residual[:-1]) / square, 0.0)
-    correlation = min(seen + (2 + 4 * seen) / count, 0.99)
-    effective = max(count * (1 - correlation) / (1 + correlation), 1.0 + len(parameters))
-    freedom = effective - len(parameters)
-    deviation = sqrt(square / count * effective / freedom)
-
     step = -(-count // NOISE_ROWS)
     rows = slice((count - 1) % step, None, step)
     alike = correlation**step

@@ -8,7 +8,13 @@ from math import log
 import numpy as np
 
 from adapters.errors import NotConverged, UsageError
-from adapters.fit_candidates import ROWS_FEWEST, Candidates, candidates_of, thinned
+from adapters.fit_candidates import (
+    ROWS_FEWEST,
+    Candidates,
+    candidates_of,
+    constant_rate_gains,
+    thinned,
+)
 from adapters.fit_regime import (
     CERTAIN,
     EXPONENTS,
@@ -50,7 +56,9 @@ def outlook(
 
     *Band*, three independent parts added as squares, each side by itself:
 
-    - spread: from the (1 - P) / 2 to the (1 + P) / 2 quantile of all candidates;
+    - spread: from the (1 - P) / 2 to the (1 + P) / 2 quantile of all candidates; where the tail
+      says for certain that the total has no end, and a constant rate beside a logarithm fits no
+      worse than a power law, also to where that leads;
     - held-out block: the median's own error there, in proportion to the distance in ln N, as one
       standard deviation;
     - tail: error of the last reading and of the slope there; see `tail_error`.
@@ -82,6 +90,9 @@ def outlook(
         miss = held_out_error(candidates, log(to_cycle / cycle[-1]), probability)
         further = np.hypot(miss, tail)
         lowest, highest = candidates.spread(bounded, probability)
+        endless = np.where(unbounded, constant_rate_gains(few, means, to_cycle), np.nan)
+        lowest = np.fmin(lowest, np.fmin.reduce(endless))
+        highest = np.fmax(highest, np.fmax.reduce(endless))
         below = np.hypot(np.maximum(moved - lowest, 0.0), further)
         above = np.hypot(np.maximum(highest - moved, 0.0), further)
         low, high = last + moved - below, last + moved + above

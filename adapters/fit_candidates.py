@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from adapters.fit_regime import tail_rows
+from adapters.errors import UsageError
+from adapters.fit_regime import RESOLUTION, tail_rows
 from adapters.laws import law_named
 from adapters.state import FloatArray
 
@@ -98,6 +99,15 @@ def thinned(cycle: FloatArray, displacement: FloatArray) -> tuple[FloatArray, Fl
     return few, np.add.reduceat(displacement, start, axis=0) / count[:, None]
 
 
+def windows_of(cycle: FloatArray) -> list[tuple[float, slice]]:
+    """Decades and rows of the windows that differ from one another."""
+    found: dict[int, tuple[float, slice]] = {}
+    for decades in WINDOW_DECADES:
+        rows = tail_rows(cycle, decades) if np.isfinite(decades) else slice(0, None)
+        found.setdefault(rows.start, (decades, rows))
+    return list(found.values())
+
+
 def increments(
     cycle: FloatArray, displacement: FloatArray, to_cycle: float | FloatArray
 ) -> dict[tuple[str, float], FloatArray]:
@@ -106,18 +116,39 @@ def increments(
     To m cycles at once: shape (m, n).
     """
     found = {}
-    last, used = float(cycle[-1]), set()
-    for decades in WINDOW_DECADES:
-        rows = tail_rows(cycle, decades) if np.isfinite(decades) else slice(0, None)
-        if rows.start in used:
-            continue
-        used.add(rows.start)
+    last = float(cycle[-1])
+    for decades, rows in windows_of(cycle):
         for name in SLOW_LAWS:
             law = law_named(name)
             if len(cycle) - rows.start > law.minimum_cycles:
                 parameters = law.fit(cycle[rows], displacement[rows])
                 found[name, decades] = law.increment(parameters, last, to_cycle)
     return found
+
+
+def constant_rate_gains(cycle: FloatArray, displacement: FloatArray, to_cycle: float) -> FloatArray:
+    """Increments of a + b N beside a logarithm, a row a window, (w, n); nan where not believed.
+
+    Believed on a window where c + a ln N + b N misses the readings by no more than c + a N^b does,
+    to `RESOLUTION` of their range: both have a rate that falls slower than the logarithm's, and
+    only the first one's tends to a constant.
+    """
+    constant, power, last = law_named("log-linear"), law_named("power"), float(cycle[-1])
+    reading = (RESOLUTION * np.ptp(displacement, axis=0)) ** 2
+    found = [np.full(displacement.shape[1], np.nan)]
+    for _, rows in windows_of(cycle):
+        known, happened = cycle[rows], displacement[rows]
+        if len(known) <= constant.minimum_cycles:
+            continue
+        try:
+            parameters = constant.fit(known, happened)
+        except UsageError:  # ln N and N are one straight line there
+            continue
+        missed = np.square(happened - constant.value(parameters, known)).mean(axis=0)
+        rival = np.square(happened - power.value(power.fit(known, happened), known)).mean(axis=0)
+        believed = missed <= rival + reading
+        found.append(np.where(believed, constant.increment(parameters, last, to_cycle), np.nan))
+    return np.stack(found)
 
 
 def held_out_rows(cycle: FloatArray) -> int:

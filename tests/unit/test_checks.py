@@ -193,6 +193,8 @@ def test_bounds(name: str, bound: float, words: str, excess: float) -> None:
         check_bounds(SCENE, replace(still, **{name: bound * excess}))
     assert caught.value.exit_code == 6
     assert "of the Rayleigh time" in caught.value.remedy
+    # 10 g over 4/3 pi (3 mm)^3 at 2710 kg/m^3
+    assert ("as heavy as 33 mean grains" in caught.value.remedy) == (name == "force_error")
 
 
 @pytest.mark.parametrize("cycles", [3, 5])

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from adapters.errors import JumpRefused, UsageError
 from adapters.fit import Series, fit_auto, fit_series, regime_of
 from adapters.fit_auto import outlook
-from adapters.fit_candidates import candidates_of, held_out_rows, thinned
+from adapters.fit_candidates import candidates_of, constant_rate_gains, held_out_rows, thinned
 from adapters.fit_regime import independent, regimes_of, tail_rows
 from adapters.laws import law_named
 from adapters.state import FloatArray
@@ -105,6 +105,36 @@ def test_a_law_of_the_bank_is_continued(name: str) -> None:
     assert found.prediction == pytest.approx(truth[-1], rel=0.05)
     assert found.band[0] <= truth[-1] <= found.band[1]
     assert found.parameters[name] == pytest.approx(truth[-1], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [("log-linear", [1.0, 1.0, 3e-4]), ("hca", [0.0, 1.0, 3e-4, 5.0])],
+)
+def test_band_holds_a_constant_rate_that_the_tail_shows(name: str, parameters: list[float]) -> None:
+    """A quarter of the rate at cycle 1000 goes on for ever: 7 of 10 bands hold it at 1e4.
+
+    Of 10 that hold with 90 %, fewer than 7 do with a chance of 1 %.  Without `constant_rate_gains`
+    none does.
+    """
+    cycle, law, inside = np.unique(np.geomspace(1, 1000, 60).round()), law_named(name), 0
+    truth = law.value(np.array(parameters), np.append(cycle, 1e4))
+    for seed in range(10):
+        noise = 0.001 * np.random.default_rng(seed).standard_normal(len(cycle))
+        found = outlook(cycle, (truth[:-1] + np.ptp(truth[:-1]) * noise)[:, None], 1e4)
+        inside += bool(found.low[0] <= truth[-1] <= found.high[0])
+    assert inside >= 7
+
+
+def test_constant_rate_is_not_believed_of_a_power_law() -> None:
+    """The band of N^0.3 is what it is without: a + b N beside a logarithm fits it worse."""
+    cycle = np.geomspace(1, 1000, 40)
+    for exponent in (0.15, 0.3, 0.45):
+        gains = constant_rate_gains(cycle, cycle[:, None] ** exponent, 1e4)
+        assert np.isnan(gains).all()
+    ratchet = np.log(cycle) + 3e-4 * cycle
+    gains = constant_rate_gains(cycle, ratchet[:, None], 1e4)
+    assert np.nanmax(gains) == pytest.approx(np.log(10) + 2.7, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", ["ratcheting", "collapse"])
