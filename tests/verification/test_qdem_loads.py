@@ -212,6 +212,12 @@ def test_peaks_of_the_spectrum_are_at_multiples_of_speed_over_car_length() -> No
     assert abs(weak[0]) < 1e-9 * size.max()
 
 
+def flat_of(**changed: float) -> object:
+    """The load of the default train with one flat, of 60 kN for 2 ms but for what is changed."""
+    sizes = {"axle": 0, "peak": 60e3, "duration": 2e-3} | changed
+    return seat_forces(np.zeros(1), Train(), TRACK, [WheelFlat(**sizes)])  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("made", "word"),
     [
@@ -221,6 +227,9 @@ def test_peaks_of_the_spectrum_are_at_multiples_of_speed_over_car_length() -> No
         (lambda: Train(first_share=1.0), "share"),
         (lambda: Track(modulus=float("nan")), "modulus"),
         (lambda: seat_forces(np.zeros(1), Train(), TRACK, [WheelFlat(20, 1.0, 1.0)]), "axle 20"),
+        (lambda: flat_of(duration=2 * pi * 0.43 / 32 * 1.001), "a flat of 60000.0 N for"),
+        (lambda: flat_of(peak=float("nan")), "a flat of nan N"),
+        (lambda: flat_of(wheel_radius=float("inf")), "radius inf"),
         (lambda: train_record(Train(), TRACK, area=0.0), "area 0"),
         (lambda: train_record(Train(), TRACK, area=float("inf")), "area inf"),
         (lambda: train_record(Train(speed=1e-9), TRACK, area=1.0), "more speed or fewer cars"),
@@ -323,6 +332,21 @@ def test_command_writes_a_record(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(["train", "--cars", "1", "--out", str(path)]) == 0
     assert "10000 Hz" in capsys.readouterr().out
     assert load_record_read(path).pressure.max() > 1e5
+
+
+def test_command_gives_wheels_flats(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Over the sleeper the flat of axle 2 strikes with its peak times the seat's share; an axle
+    that is none, or half of one, is refused."""
+    paths = [tmp_path / "round.csv", tmp_path / "flat.csv"]
+    flat = ["--flat", "2", "60e3", "2e-3"]
+    for path, more in zip(paths, ([], flat), strict=True):
+        assert main(["train", "--cars", "1", *more, "--out", str(path)]) == 0
+    even, struck = (load_record_read(path).pressure for path in paths)
+    centre = 60e3 * seat_share(np.zeros(1), TRACK)[0] / (0.13 * 0.17)
+    assert (struck - even).max() == pytest.approx(centre, rel=0.01)
+    for axle in ("4", "0.5", "-1", "nan"):
+        assert main(["train", "--cars", "1", "--flat", axle, *flat[2:], "--out", str(path)]) == 3
+    assert "on axle nan" in capsys.readouterr().err
 
 
 def test_command_refuses_with_a_sentence(
