@@ -6,7 +6,7 @@ an infinite beam on a Winkler foundation (Zimmermann 1888; Hetenyi, Beams on Ela
 holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat` or
 a `qdem_fem.load_roughness.Roughness` names.
 
-    trackbed train --out train.csv
+    trackbed train --flat 0 60e3 2e-3 --out train.csv
 """
 
 from __future__ import annotations
@@ -163,21 +163,24 @@ def seat_forces(
     """Force on seat 1 and 2 [N], (k, 2), the first axle being over the sleeper at ``time`` 0.
 
     Added forces of flats act where their wheel is.  Raises `ConditionError` for a flat on an axle
-    that the train does not have, or of no size.
+    that the train does not have, of no size, or longer than a turn of its wheel.
     """
     total = np.zeros((len(time), 2))
     for axle in train.axles:
         share = seat_share(train.speed * time - axle, track)
         total += np.outer(share, train.wheel_loads)
     for flat in flats:
-        if not (0 <= flat.axle < 4 * train.cars and min(flat.duration, flat.wheel_radius) > 0):
-            raise ConditionError(
-                f"a flat of {flat.duration} s on axle {flat.axle}, radius {flat.wheel_radius} m",
-                where="train",
-                remedy=f"use an axle from 0 to {4 * train.cars - 1} and sizes above zero",
-            )
-        place = train.speed * time - train.axles[flat.axle]
         turn = 2 * pi * flat.wheel_radius
+        sound = isfinite(flat.peak) and 0 < flat.duration * train.speed <= turn < inf
+        if not (flat.axle in range(4 * int(train.cars)) and sound):
+            raise ConditionError(
+                f"a flat of {flat.peak} N for {flat.duration} s on axle {flat.axle}, radius "
+                f"{flat.wheel_radius} m",
+                where="train",
+                remedy=f"use an axle from 0 to {4 * train.cars - 1}, and a duration above zero and "
+                "no longer than a turn of the wheel",
+            )
+        place = train.speed * time - train.axles[int(flat.axle)]
         since = np.mod(place - flat.place, turn) / train.speed
         force = np.where(since < flat.duration, flat.peak * np.sin(pi * since / flat.duration), 0.0)
         total += (force * seat_share(place, track))[:, None]

@@ -115,8 +115,9 @@ def picture_energy(path: Path, energy: Mapping[str, FloatArray]) -> None:
     scale, unit = unit_of(max(float(np.abs(energy[n]).max(initial=0.0)) for n in names), "J")
     with figure_written(path, (7.2, 2.8)) as figure:
         panel = figure.subplots()
-        for name, colour in zip(names, _colours(), strict=False):
-            panel.plot(time, energy[name] / scale, color=colour, label=name)
+        for number, (name, colour) in enumerate(zip(names, _colours(), strict=False)):
+            line = "-" if number < len(COLOURS) else "-."
+            panel.plot(time, energy[name] / scale, color=colour, ls=line, label=name)
         total = (energy["kinetic"] + energy["elastic"]) / scale
         panel.plot(time, total, color="#111111", lw=0.9, ls="--", label="kinetic + elastic")
         panel.set(xlabel="time (s)", ylabel=f"energy ({unit})")

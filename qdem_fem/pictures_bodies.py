@@ -65,6 +65,7 @@ def picture_deformed(
     *,
     magnification: float | None = None,
     bearing: Bearing | None = None,
+    time: float | None = None,
     azimuth: float = -62.0,
     elevation: float = 24.0,
 ) -> float:
@@ -73,9 +74,9 @@ def picture_deformed(
     ``bodies`` are `qdem_fem.Body`.  By default displacements are magnified by a round factor that
     makes the greatest `SHOWN` of the bodies' size.  The undeformed edges of up to `OUTLINED` bodies
     are drawn thin.  The viewer stands at ``azimuth`` and ``elevation`` [degrees] as in matplotlib's
-    3-D axes.  ``bearing``: spheres of contact, drawn around their vertices as those are now.
-    Faces are sorted from back to front (painter's algorithm): those that pierce each other may
-    be drawn in the wrong order.
+    3-D axes.  ``time`` [s] is told where given.  ``bearing``: spheres of contact, drawn around
+    their vertices as those are now.  Faces are sorted from back to front (painter's algorithm):
+    those that pierce each other may be drawn in the wrong order.
     """
     if magnification is None:
         magnification = magnification_round(bodies)
@@ -96,7 +97,8 @@ def picture_deformed(
             _outline(panel, bodies, frame)
         _frame_draw(panel, frame)
         told = f"Displacement \N{MULTIPLICATION SIGN} {magnification:g}"
-        told += "\ngrey: spheres that bear" * (spheres is not None)
+        told += "" if time is None else f" at t = {time:.6g} s"
+        told += "\ngrey: spheres that bear" * (bearing is not None and len(bearing.nodes) > 0)
         panel.set(aspect="equal", title=told)
         panel.set_axis_off()
         panel.margins(0.03)

@@ -21,14 +21,15 @@ from qdem_fem.output import can_not_write, write_whole
 MANIFEST, RESULT, CHECKPOINT = "manifest.json", "result.json", "checkpoint.npz"
 OURS = (
     "scene.toml", "manifest.json", "result.json", "checkpoint.npz", "cost.json", "probes.csv",
-    "energy.csv", "fields.pvd", "fields_*.vtu", "report.html", "picture-*.png", ".*.partial",
+    "energy.csv", "fields.pvd", "fields_*.vtu", "report.html", "picture-*.png", "video.gif",
+    ".*.partial",
 )  # fmt: skip
 """Files of a run; what starts anew removes these and no other."""
 COMPARED = ("scene", "files")
 """Parts of the manifest that must be the same for a run to go on."""
 FREE = (
     "scene.title", "scene.simulation.threads", "scene.output.checkpoint_interval",
-    "scene.output.modes",
+    "scene.output.modes", "scene.output.video",
 )  # fmt: skip
 """Keys that may change: no number of the record depends on them."""
 

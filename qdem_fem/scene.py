@@ -260,6 +260,8 @@ class Output(Table):
     """Between VTU files [s]; by default only the end is written."""
     magnification: Positive | None = None
     """Of displacements in a PNG picture beside every VTU file; none when not given."""
+    video: Annotated[float, Field(gt=0, le=100)] | None = None
+    """Of those pictures, a second [1/s], in video.gif; none is made when not given."""
     checkpoint_interval: Interval = 300.0
     """Between checkpoints, by the clock on the wall [s]."""
     audit: Share | None = None

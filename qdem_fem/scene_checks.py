@@ -248,6 +248,8 @@ def output_faults(text: SceneText) -> Iterator[Problem]:
     output = text.tables.get("output", Output())
     if not isinstance(simulation, SimulationTable) or not isinstance(output, Output):
         return
+    if output.video is not None and output.magnification is None:
+        yield Problem("output.video", "there are no pictures to show: give magnification, too")
     duration = simulation.duration
     if simulation.method == "static":
         return
@@ -273,6 +275,7 @@ def motion_faults(text: SceneText) -> Iterator[Problem]:
     simulation = text.tables.get("simulation")
     if not isinstance(simulation, SimulationTable):
         return
+    joined = {table.body for _, table in _tables(text, Periodic)}
     for key, body in _tables(text, BodyTable):
         if simulation.method == "static" and body.moves:
             name = "velocity" if body.velocity is not None else "spin"
@@ -280,6 +283,10 @@ def motion_faults(text: SceneText) -> Iterator[Problem]:
         elif simulation.strain == "small" and body.spin is not None and not body.rigid:
             what = 'a body that turns is strained by it under strain = "small": take "finger"'
             yield Problem(f"{key}.spin", what)
+        elif body.spin is not None and body.name in joined:
+            yield Problem(
+                f"{key}.spin", "a body that [[periodic]] joins to its images can not turn"
+            )
 
 
 def _files(text: SceneText, folder: Path) -> Iterator[tuple[str, str]]:

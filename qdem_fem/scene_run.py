@@ -146,6 +146,12 @@ def run_dynamic(
                     f"stopped by {stop.name} at t = {run.time:.6g} s; the state is saved in "
                     f"{folder.checkpoint}\n  -> the same command with --resume goes on from there"
                 )
+    if output.video is not None:
+        from qdem_fem.pictures_video import video_write
+
+        files = [name for _, _, name in plan.field_files(plan.total)]
+        pictures = [folder.path / f"picture-{Path(name).stem}.png" for name in files]
+        video_write(folder.path / "video.gif", pictures, output.video)
     return done
 
 
@@ -255,6 +261,7 @@ class _Record:
                 picture_deformed(
                     target.with_name(f"picture-{target.stem}.png"), self.bodies,
                     magnification=self.magnification, bearing=spheres_bearing(self.run),
+                    time=files[-1][1],
                 )  # fmt: skip
             pvd_write(self.path / "fields.pvd", [(when, name) for _, when, name in files])
 

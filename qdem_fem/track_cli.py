@@ -31,6 +31,12 @@ def _register_train(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--speed", type=float, help="m/s")
     parser.add_argument("--axle-load", type=float, help="N")
     parser.add_argument("--first-share", type=float, help="of an axle load on rail seat 1")
+    parser.add_argument(
+        "--flat", type=float, nargs=3, action="append", default=[],
+        metavar=("AXLE", "PEAK", "DURATION"),
+        help="a flat on both wheels of an axle, counted from 0: force, N, for that time, s, at "
+        "every turn; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--modulus", type=float, help="of the track's foundation, N/m^2")
     parser.add_argument(
         "--roughness", choices=["smooth", "average"], help="of a rail that is not even"
@@ -60,7 +66,7 @@ def train_command(arguments: argparse.Namespace) -> int:
     from qdem_fem.errors import UsageError
     from qdem_fem.load_record import load_record_write
     from qdem_fem.load_roughness import Roughness
-    from qdem_fem.load_train import Track, Train, train_record
+    from qdem_fem.load_train import Track, Train, WheelFlat, train_record
 
     _refuse_no_folder(arguments.out)
     train = Train(**_given(arguments, "cars", "speed", "axle_load", "first_share"))
@@ -69,7 +75,8 @@ def train_command(arguments: argparse.Namespace) -> int:
         rough = Roughness(arguments.roughness, **_given(arguments, "seed"))
     elif arguments.seed is not None:
         raise UsageError("--seed is that of a roughness", remedy="give --roughness, too")
-    record = train_record(train, track, arguments.area, roughness=rough)
+    flats = [WheelFlat(axle, peak, duration) for axle, peak, duration in arguments.flat]
+    record = train_record(train, track, arguments.area, flats, roughness=rough)
     load_record_write(arguments.out, record)
     print(f"{arguments.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
     return 0

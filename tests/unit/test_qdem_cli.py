@@ -245,6 +245,20 @@ def test_killed_run_goes_on_to_the_same_bits(scene: Path) -> None:
     assert results(parts) == results(whole)
 
 
+def test_video_shows_the_pictures_of_a_run(scene: Path) -> None:
+    """A frame for every picture; without pictures it is refused, naming the key."""
+    from PIL import Image
+
+    asked = ["simulation.duration=0.001", "output.vtu_interval=0.0005", "output.video=5"]
+    sets = [word for one in asked for word in ("--set", one)]
+    with pytest.raises(SceneError, match=r"output\.video: there are no pictures to show"):
+        command(scene, "--no-pictures", *sets)
+    assert command(scene, "--no-pictures", *sets, "--set", "output.magnification=20") == 0
+    folder = scene.with_name("scene-run")
+    with Image.open(folder / "video.gif") as video:
+        assert video.n_frames == len(list(folder.glob("picture-fields_*.png"))) == 3
+
+
 def test_folder_is_never_lost_unasked(scene: Path) -> None:
     """Another scene, an unfinished or finished run, strange files: each refused in its words."""
     folder = scene.with_name("scene-run")

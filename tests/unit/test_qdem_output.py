@@ -238,3 +238,25 @@ def test_motionless_body_is_drawn(tmp_path: Path) -> None:
     one.displacement = np.zeros_like(one.nodes)
     one.von_mises = lambda: np.zeros(len(one.elements))
     assert picture_deformed(tmp_path / "a.png", [one]) == 1.0
+
+
+def test_video_holds_every_picture_at_its_scale(tmp_path: Path) -> None:
+    """Pictures of two sizes: as many frames of the larger one, the rest white, 0.1 s each."""
+    from PIL import Image
+
+    from qdem_fem.pictures_video import video_write
+
+    sizes = [(40, 30), (60, 30), (60, 50)]
+    paths = [tmp_path / f"{number}.png" for number in range(3)]
+    for path, size in zip(paths, sizes, strict=True):
+        Image.new("RGB", size, (0, 0, 200)).save(path)
+    video_write(tmp_path / "video.gif", paths, 10.0)
+    with Image.open(tmp_path / "video.gif") as video:
+        assert video.size == (60, 50)
+        assert video.n_frames == 3
+        assert video.info["duration"] == 100
+        video.seek(0)
+        first = np.asarray(video.convert("RGB"))
+    assert (first[20:, :40] == (0, 0, 200)).all()
+    assert (first[:20] == 255).all()
+    assert (first[:, 40:] == 255).all()

@@ -110,6 +110,20 @@ def test_motion_that_a_scene_can_not_have(
         loaded(tmp_path, None, None, *overrides, f"body.0.{key}=[1, 0, 0]")
 
 
+def test_a_body_joined_to_its_images_does_not_turn(tmp_path: Path) -> None:
+    """Its joined nodes share one velocity, and a spin gives them two."""
+    path = tmp_path / "scene.toml"
+    sides = '[[periodic]]\nbody = "brick"\nnodes_a.set = "y-min"\nnodes_b.set = "y-max"\n'
+    for spin in (False, True):
+        text = SCENE.replace("VELOCITY", "velocity = [1, 0, 0]")
+        path.write_text(text.replace("SPIN", "spin = [0, 0, 1]" * spin) + sides)
+        if not spin:
+            assert simulation_of(scene_load(path, []))[0].energy().kinetic > 0
+            continue
+        with pytest.raises(SceneError, match=r"body\.0\.spin: a body that \[\[periodic\]\] joins"):
+            scene_load(path, [])
+
+
 def test_the_key_file_names_both() -> None:
     """scenes/cantilever.toml explains every key."""
     text = Path("scenes/cantilever.toml").read_text()
