@@ -21,6 +21,10 @@ def _register_grains(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=1, help="default: %(default)s")
     for shape in ("sphericity", "roundness", "concavity"):
         parser.add_argument(f"--{shape}", type=float, help="of every grain, 0 to 1")
+    parser.add_argument(
+        "--sizes", type=float, nargs=2, metavar=("LEAST", "GREATEST"),
+        help="sieves, m, in place of EN 13450 31.5/50 A; 0.045 0.055: the paper's grains",
+    )  # fmt: skip
     parser.add_argument("--workers", type=int, default=1, help="processes (default: %(default)s)")
     parser.set_defaults(command=grains_command)
 
@@ -49,13 +53,21 @@ def _register_train(parser: argparse.ArgumentParser) -> None:
 
 
 def grains_command(arguments: argparse.Namespace) -> int:
-    """Make a set of random ballast grains, EN 13450 31.5/50 A, and save it."""
+    """Make random ballast grains, of EN 13450 31.5/50 A or between two sieves, and save them."""
+    import numpy as np
+
     from qdem_fem.grain_form import GrainRecipe
+    from qdem_fem.grain_grading import BALLAST, Grading
     from qdem_fem.grain_set import grains_make, grains_save
 
     _refuse_no_folder(arguments.out)
     recipe = GrainRecipe(**_given(arguments, "sphericity", "roundness", "concavity"))
-    grains = grains_make(arguments.count, arguments.seed, recipe, workers=arguments.workers)
+    grading = BALLAST
+    if arguments.sizes is not None:
+        grading = Grading(np.array(arguments.sizes), np.array([0.0, 1.0]))
+    grains = grains_make(
+        arguments.count, arguments.seed, recipe, grading, workers=arguments.workers
+    )
     grains_save(arguments.out, grains)
     print(f"{arguments.out}: {len(grains)} grains, {grains.tetrahedra.sum()} tetrahedra")
     return 0

@@ -366,12 +366,20 @@ def test_command_makes_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert len(grains_load(tmp_path / "g.npz")) == 3
 
 
+def test_command_makes_grains_between_two_sieves(tmp_path: Path) -> None:
+    out = tmp_path / "g.npz"
+    assert main(["grains", "--count", "4", "--sizes", "0.045", "0.055", "--out", str(out)]) == 0
+    sizes = grains_load(out).sizes
+    assert ((sizes >= 0.045) & (sizes <= 0.055)).all()
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
         (["--count", "-1"], "-1 grains"),
         (["--count", "2", "--seed", "-4"], "seed of 0 or more"),
         (["--sphericity", "nan"], "no grain has sphericity nan"),
+        (["--sizes", "0.05", "0.04"], "no grading curve"),
     ],
 )
 def test_command_refuses_with_a_sentence(
