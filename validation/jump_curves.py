@@ -38,6 +38,7 @@ CURVES: dict[str, Law] = {
     "ratcheting": lambda n: 1 * MICRO * n,
     "collapse": lambda n: 0.02 * MICRO * n**2.5,
     "rest": lambda n: np.zeros_like(n),
+    "drift": lambda n: 200 * MICRO * np.log1p(n) - 0.3 * MICRO * n,
 }
 """u(N) [m] of the mean of many beds."""
 

@@ -130,6 +130,7 @@ HARD = {
     "ratcheting": "constant rate",
     "log": "readings off by 20 µm, 20 times a cycle's gain at N = 100",
     "rest": "nothing moves",
+    "drift": "200 ln(1 + N) - 0.3 N µm: the rate drifts through zero at cycle 666",
     "hyperbolic": "no noise, to 100,000 cycles",
     "power": "tolerance 10⁻⁶",
 }

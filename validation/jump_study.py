@@ -87,6 +87,7 @@ def cases() -> Iterator[tuple[str, Case]]:
     yield "hard", Case("ratcheting", 0.35, 0.02, 2000, cycle_by_cycle=False)
     yield "hard", Case("log", 0.0, 0.02, 2000, jitter=2e-5)
     yield "hard", Case("rest", 0.0, 0.02, 2000)
+    yield "hard", Case("drift", 0.35, 0.02, 2000)
     yield "hard", Case("hyperbolic", 0.0, 0.02, 100_000)
     yield "hard", Case("power", 0.35, 1e-6, 600)
 
