@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem import contact_kernel
+from qdem_fem import contact_kernel, cuda_step
 from qdem_fem.contact_kernel import DEEPEST, GO_ON, LOOK_ANEW, TOO_DEEP, Contact
 from qdem_fem.cuda_step import ANEW, DEEP, LIMIT, cuda
 
@@ -164,7 +164,7 @@ def reactions_add(
 
 
 def device_array(array: Any) -> Any:
-    """An array on the GPU; one of no entries has a row there, as it had better not be empty."""
+    """An array on the GPU, with one row of zeros in place of none: it had better not be empty."""
     shape = tuple(max(length, 1) for length in array.shape)
     full = array if array.size else np.zeros(shape, array.dtype)
     return cuda.to_device(np.ascontiguousarray(full))
@@ -188,9 +188,7 @@ class DeviceContact:
 
     def grid(self, count: int) -> tuple[int, int]:
         """Blocks and threads of a launch for so many spheres."""
-        from qdem_fem.cuda_step import BLOCK
-
-        return max(1, -(-count // BLOCK)), BLOCK
+        return max(1, -(-count // cuda_step.BLOCK)), cuda_step.BLOCK
 
     def launch_push(self, forces: Any, status: Any, k: int) -> None:
         """Forces found in the step before reach the nodes."""

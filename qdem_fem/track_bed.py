@@ -100,12 +100,16 @@ def bed_prepare(
     for number, stage in enumerate(STAGES):
         if bed is not None and STAGES.index(bed.stage) >= number:
             continue
-        part = path.with_suffix(".part.npz")
-        bed = stage_run(recipe, grains, stage, bed, threads, progress, part)
+        bed = stage_run(recipe, grains, stage, bed, threads, progress, part_of(path, stage))
         bed_write(path, recipe, bed)
-        part.unlink(missing_ok=True)
+        part_of(path, stage).unlink(missing_ok=True)
     assert bed is not None
     return bed
+
+
+def part_of(path: Path, stage: str) -> Path:
+    """Where a stage of the bed in ``path`` is saved: a kill may leave that of one that is done."""
+    return path.with_suffix(f".{stage.replace(' ', '-').replace('/', '-of-')}.part.npz")
 
 
 def stages_ahead(recipe: BedRecipe, path: Path) -> tuple[str, ...]:

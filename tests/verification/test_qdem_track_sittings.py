@@ -16,7 +16,15 @@ from qdem_fem.kinetic_damping import Rest
 from qdem_fem.rigid_conditions import hold_of
 from qdem_fem.rigid_mass import RigidMass
 from qdem_fem.rigid_step import FREE, STILL
-from qdem_fem.track_bed import Bed, bed_read, bed_write, stage_run
+from qdem_fem.track_bed import (
+    STAGES,
+    Bed,
+    bed_prepare,
+    bed_read,
+    bed_write,
+    part_of,
+    stage_run,
+)
 from qdem_fem.track_recipe import BedRecipe, grains_of
 from validation.track_trials import scene_at
 
@@ -97,6 +105,21 @@ def test_a_stage_of_something_else_is_refused(tmp_path: Path) -> None:
         CheckpointError, match=r"bed\.part\.npz: a stage .* whole checkpoint.*\n  -> remove it"
     ):
         fallen(recipe, part)
+
+
+def test_what_a_kill_left_of_a_stage_that_is_done_is_not_read(
+    whole: Bed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between the bed's file and the removal of the part: the next stages begin all the same."""
+    recipe, path = recipe_at(tmp_path), tmp_path / "bed.npz"
+    bed_write(path, recipe, whole)
+    parts = {part_of(path, stage) for stage in STAGES}
+    assert len(parts) == len(STAGES)
+    part_of(path, "bed").write_bytes(b"left by a kill")
+    nothing = Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
+    monkeypatch.setattr(track_bed, "rest_find", lambda *given, **more: nothing)
+    assert bed_prepare(recipe, path, 1).stage == "rest"
+    assert not [part for part in parts - {part_of(path, "bed")} if part.exists()]
 
 
 def test_patience_is_no_part_of_a_bed(whole: Bed, tmp_path: Path) -> None:
