@@ -120,13 +120,10 @@ def motion_begin(body: Body, table: BodyTable) -> None:
     """Give a body the motion at the start that its table names: ``v + omega x (x - centre)``."""
     if not table.moves:
         return
-    mass = body.material.density * body.gradients[1]
-    middle = body.nodes[body.elements].mean(axis=1)
-    arm = body.nodes - (np.broadcast_to(mass, len(middle)) @ middle) / mass.sum()
     velocity, spin = (
         np.zeros(3) if v is None else np.array(v) for v in (table.velocity, table.spin)
     )
-    body.velocity = velocity + np.cross(spin, arm)
+    body.velocity = velocity + np.cross(spin, body.nodes - body.rigid_mass.centre)
 
 
 def _argument(value: Any, method: str) -> Any:
