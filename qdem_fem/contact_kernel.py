@@ -227,7 +227,8 @@ def planes_forces(
     """Add the forces of the walls on acting spheres near them; greatest overlap over radius."""
     planes, pairs, deepest = c.planes, c.pairs, 0.0
     for i in pairs.acting[low:high]:
-        for w in pairs.wall[pairs.wall_first[i] : pairs.wall_first[i + 1]]:
+        for entry in range(pairs.wall_first[i], pairs.wall_first[i + 1]):
+            w = pairs.wall[entry]
             n, spring, force = row(planes.normal, w), planes.spring[w], planes.force[w]
             d, radius = minus(c.position, i, planes.point, w), c.spheres.radius[i]
             overlap = radius - (d[0] * n[0] + d[1] * n[1] + d[2] * n[2])

@@ -1,9 +1,8 @@
 """Which spheres may touch: a cell list, and the tangential history carried from list to list.
 
 A list holds all pairs of different bodies nearer than the sum of radii plus a skin; it is good
-until a vertex has moved half the skin.  Cells are hashed, so that memory goes with the number of
-spheres and not with the room they are in.  Pairs stand in the order of their two numbers: where
-the cells lie changes nothing.
+until a vertex has moved half the skin.  Pairs stand in the order of their two numbers: how
+`qdem_fem.contact_cells` comes on them changes nothing.
 """
 
 from __future__ import annotations
@@ -13,6 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from qdem_fem.contact_cells import pairs_find, rows_sort
 
 if TYPE_CHECKING:
     from qdem_fem.periodic import PeriodicWidth
@@ -64,86 +65,16 @@ def skin_next(skin: float, lasted: int, least: float, most: float) -> float:
     return float(np.clip(skin * np.clip(GOOD / lasted, 0.5, 2.0), least, most))
 
 
-@njit(cache=True)
-def cells_fill(position: Any, size: float) -> tuple[Any, Any, Any]:  # pragma: no cover
-    """Cells (c, 3) of side ``size`` [m], first entry of every bucket, and spheres by bucket."""
-    count = position.shape[0]
-    buckets = 16
-    while buckets < 2 * count:
-        buckets *= 2
-    cell = np.empty((count, 3), np.int64)
-    start = np.zeros(buckets + 1, np.int64)
-    bucket = np.empty(count, np.int64)
-    for i in range(count):
-        for c in range(3):
-            cell[i, c] = np.int64(np.floor(position[i, c] / size))
-        bucket[i] = cell_bucket(cell[i, 0], cell[i, 1], cell[i, 2], buckets)
-        start[bucket[i] + 1] += 1
-    for b in range(buckets):
-        start[b + 1] += start[b]
-    at = start[:-1].copy()
-    order = np.empty(count, np.int64)
-    for i in range(count):
-        order[at[bucket[i]]] = i
-        at[bucket[i]] += 1
-    return cell, start, order
-
-
-@njit(cache=True)
-def cell_bucket(x: int, y: int, z: int, buckets: int) -> int:  # pragma: no cover
-    """Bucket of a cell; ``buckets`` is a power of two."""
-    mixed = x * 73856093 ^ y * 19349663 ^ z * 83492791
-    return (mixed ^ (mixed >> 17)) & (buckets - 1)
-
-
-@njit(cache=True)
 def pairs_near(
-    position: Any, radius: Any, body: Any, skin: float
-) -> tuple[Any, Any]:  # pragma: no cover
+    position: Floats, radius: Floats, body: Integers, skin: float
+) -> tuple[Integers, Integers]:
     """Rows ``first`` (c + 1,) and ``second`` (p,) of all pairs nearer than their reach.
 
     ``position`` (c, 3) [m], ``radius`` (c,) [m], ``body`` (c,); a pair is of two bodies.
     """
-    count = position.shape[0]
-    first = np.zeros(count + 1, np.int64)
-    second = np.empty(max(16, 4 * count), np.int64)
-    if count == 0:
-        return first, second[:0]
-    size = 2 * radius.max() + skin
-    cell, start, order = cells_fill(position, size)
-    buckets = start.size - 1
-    found = 0
-    for i in range(count):
-        row = found
-        for step in range(27):
-            x = cell[i, 0] + step // 9 - 1
-            y = cell[i, 1] + step // 3 % 3 - 1
-            z = cell[i, 2] + step % 3 - 1
-            b = cell_bucket(x, y, z, buckets)
-            for q in range(start[b], start[b + 1]):
-                j = order[q]
-                if j <= i or body[j] == body[i]:
-                    continue
-                if cell[j, 0] != x or cell[j, 1] != y or cell[j, 2] != z:
-                    continue  # another cell of the same bucket
-                reach = radius[i] + radius[j] + skin
-                apart = 0.0
-                for c in range(3):
-                    apart += (position[i, c] - position[j, c]) ** 2
-                if apart > reach * reach:
-                    continue
-                if found == second.size:
-                    longer = np.empty(2 * found, np.int64)
-                    longer[:found] = second
-                    second = longer
-                at = found  # rows are short: sort by insertion
-                while at > row and second[at - 1] > j:
-                    second[at] = second[at - 1]
-                    at -= 1
-                second[at] = j
-                found += 1
-        first[i + 1] = found
-    return first, second[:found].copy()
+    one, other = pairs_find(position, radius, body, skin)
+    first, order = rows_sort(one, other, len(position))
+    return first, other[order]
 
 
 def pairs_periodic(
@@ -164,17 +95,14 @@ def pairs_periodic(
     wrapped[count:, axis] += width
     times = times[own]
     times[count:] -= 1
-    first, second = pairs_near(wrapped, radius[own], body[own], skin)
-    row = np.repeat(np.arange(len(own)), np.diff(first))
-    once = row < count  # two that are both there a second time are a pair already
-    one, other = row[once], second[once]
+    one, other = pairs_find(wrapped, radius[own], body[own], skin)
+    once = one < count  # two that are both there a second time are a pair already
+    one, other = one[once], other[once]
     i, j, image = own[one], own[other], times[one] - times[other]
-    turned = i > j
-    image[turned] *= -1
+    image[i > j] *= -1
     i, j = np.minimum(i, j), np.maximum(i, j)
-    order = np.lexsort((j, i))
-    rows = np.concatenate([[0], np.cumsum(np.bincount(i, minlength=count))])
-    return rows, j[order], image[order, None] * side.way
+    first, order = rows_sort(i, j, count)
+    return first, j[order], image[order, None] * side.way
 
 
 @njit(cache=True)

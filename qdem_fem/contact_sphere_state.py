@@ -202,6 +202,13 @@ class SphereContacts(Contacts):
         self.refresh()
         return -np.asarray(self.kernel.planes.force[number].sum(axis=0))
 
+    def bodies_touching(self) -> tuple[Integers, Integers]:
+        """`Contacts.bodies_touching`"""
+        self.refresh()
+        body = self.kernel.spheres.body
+        pressed = (self.kernel.planes.force != 0).any(axis=(0, 2))
+        return body[self._ends()], body[pressed]
+
     def stored(self) -> dict[str, NDArray[Any]]:
         """Everything that the next step reads, to the bit."""
         self.refresh()

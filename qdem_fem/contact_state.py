@@ -133,6 +133,10 @@ class Contacts(ABC):
         """Force of the bodies on a wall [N], (3,)."""
 
     @abstractmethod
+    def bodies_touching(self) -> tuple[Integers, Integers]:
+        """Numbers of the bodies that touch each other (t, 2), and of those on a wall (w,)."""
+
+    @abstractmethod
     def stored(self) -> dict[str, NDArray[Any]]:
         """Everything that the next step reads, to the bit."""
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from qdem_fem.contact_search import NO_IMAGE
 from qdem_fem.contact_spheres import pair_stiffness, tangential_stiffness
-from qdem_fem.contact_state import Contacts, Floats, outsides_of, planes_arrays
+from qdem_fem.contact_state import Contacts, Floats, Integers, outsides_of, planes_arrays
 from qdem_fem.contact_surface import DEPTH, SurfaceContact, face_points, sharp_edges
 from qdem_fem.contact_surface_arrays import Near, Overlaps, Surface, SurfaceTouch, Walls
 from qdem_fem.contact_surface_search import (
@@ -241,6 +241,20 @@ class SurfaceContacts(Contacts):
         """Force of the bodies on a wall [N], (3,)."""
         self.refresh()
         return np.array(self.kernel.walls.force[number])
+
+    def bodies_touching(self) -> tuple[Integers, Integers]:
+        """`Contacts.bodies_touching`"""
+        self.refresh()
+        surface, near, overlaps = self.kernel.surface, self.near, self.kernel.overlaps
+        at = near.weight > 0
+        pairs = [
+            np.column_stack([surface.point_body[near.point[at]], near.body[at]]),
+            surface.edge_body[near.edges[near.edge_weight > 0]],
+            surface.face_body[overlaps.faces[overlaps.area > 0]],
+        ]
+        owner = np.concatenate([surface.point_body, surface.face_body])
+        pressed = (self.kernel.walls.weight > 0).any(axis=0)
+        return np.concatenate(pairs), owner[: len(pressed)][pressed]
 
     def stored(self) -> dict[str, NDArray[Any]]:
         """Everything that the next step reads, to the bit."""

@@ -7,7 +7,9 @@ rigid or not, which have no static answer in `qdem_fem.dynamic_relaxation`.
 
 The peak is that of all bodies together (``each=False``), or of each body by itself: grains in a
 bed strike at different times, and while one falls the sum of all grows, so that the others go on
-rattling; stopped one by one, each lands as if it did not bounce.
+rattling; stopped one by one, each lands as if it did not bounce.  Where they ``fall``, what is in
+the air is left alone, together with what it meets there (`grounded`): stopped at each collision on
+its way, a heap of loose grains sinks like snow.  Where springs throw bodies up, that loses time.
 
 What is at rest is said by two numbers (`Rest`), never by a number of steps.  Time goes on while a
 simulation is damped, so its loads should be constant.
@@ -21,6 +23,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from qdem_fem.errors import ConditionError, NotConverged
 
@@ -125,6 +129,26 @@ def stop(run: Simulation, bodies: NDArray[np.bool_]) -> None:
         run.rigid.stop(bodies[[body.rigid is not False for body in run.bodies]])
 
 
+def grounded(run: Simulation) -> NDArray[np.bool_]:
+    """Which bodies stand on a wall, or on one held against gravity, over any number of others (b,).
+
+    All of them without gravity: nothing falls there.
+    """
+    assert run.contacts is not None
+    gravity, count = run.gravity_at(np.array([run.time])), len(run.bodies)
+    if gravity is None:
+        return np.ones(count, bool)
+    pairs, walled = run.contacts.bodies_touching()
+    held = [one.nodes for one in run.conditions.held if gravity[0, list(one.components)].any()]
+    held += [one.nodes for one in run.conditions.rollers if one.normal @ gravity[0, :3]]
+    on = np.unique(np.concatenate([walled, *(bodies_of(run, nodes) for nodes in held)]))
+    one = np.concatenate([pairs[:, 0], on])
+    other = np.concatenate([pairs[:, 1], np.full(len(on), count)])  # the ground is one more
+    graph = coo_array((np.ones(len(one), bool), (one, other)), shape=(count + 1, count + 1))
+    label = connected_components(graph, directed=False)[1]
+    return np.asarray(label[:count] == label[count])
+
+
 @dataclass
 class Damping:
     """How far a march with kinetic damping is: all that `rest_find` goes on from, to the bit."""
@@ -133,6 +157,8 @@ class Damping:
     """Kinetic energy of each body, or of all, since it was stopped, the greatest [J], (b,)."""
     since: NDArray[np.int64]
     """Looks since then, (b,)."""
+    landed: NDArray[np.bool_]
+    """Which have been `grounded` since then, (b,)."""
     first: int
     """Steps done when it began."""
     begun: float
@@ -146,7 +172,9 @@ class Damping:
     def begin(cls, run: Simulation) -> Damping:
         """Of a simulation that is not damped yet."""
         count = len(run.bodies)
-        return cls(np.zeros(count), np.zeros(count, int), run.steps_done, run.time)
+        return cls(
+            np.zeros(count), np.zeros(count, int), np.zeros(count, bool), run.steps_done, run.time
+        )
 
     def stored(self) -> dict[str, NDArray[Any]]:
         """As arrays."""
@@ -157,21 +185,24 @@ class Damping:
         """What `stored` gave."""
         first, begun, peaks = (arrays[name].item() for name in ("first", "begun", "peaks"))
         later = {name: arrays[name].item() for name in ("wait", "judged") if name in arrays}
-        return cls(arrays["peak"], arrays["since"], first, begun, peaks, **later)
+        landed = arrays.get("landed", np.ones(len(arrays["peak"]), bool))
+        return cls(arrays["peak"], arrays["since"], landed, first, begun, peaks, **later)
 
 
 def rest_find(
     run: Simulation, unbalanced: float, kinetic: float, loose: float, most: float,
     progress: Callable[[Rest], None] | None = None, look: int = LOOK, each: bool = True,
     damping: Damping | None = None, keep: Callable[[Damping], None] | None = None,
+    fall: bool = False,
 ) -> Rest:  # fmt: skip
     """March with kinetic damping until the bodies are in equilibrium; they are at rest then.
 
     ``unbalanced``, ``kinetic`` and ``loose``: greatest shares of `Rest` that are equilibrium;
     ``most``: simulated time [s] after which `NotConverged` is raised, the state reached being
     kept; ``look``: steps between two looks at the motion, some per period of a grain on its
-    contacts; ``each``: bodies are stopped one by one.  ``damping``: of a simulation that was
-    restored; ``keep`` is called with it behind every judgement, and is to save both.
+    contacts; ``each``: bodies are stopped one by one, with ``fall`` only behind they have landed.
+    ``damping``: of a simulation that was restored; ``keep`` is called with it behind every
+    judgement, and is to save both.
     The account of energies knows nothing of what is taken at peaks.
     """
     state = Damping.begin(run) if damping is None else damping
@@ -183,9 +214,13 @@ def rest_find(
         greatest, looks = max(greatest, float(now.sum())), looks + 1
         if not each:
             now = np.full_like(now, now.sum())
-        state.since = np.where(now > state.peak, 0, state.since + 1)
+        more = now > state.peak
+        state.since = np.where(more, 0, state.since + 1)
         state.peak = np.maximum(state.peak, now)
         past = state.since >= (state.wait if each else 1)
+        if fall:
+            state.landed = grounded(run) | (state.landed & ~more)
+            past &= state.landed
         if past.any():
             stop(run, past)
             state.peaks += int(past.sum()) if each else 1

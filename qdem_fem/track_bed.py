@@ -54,6 +54,8 @@ Floats = NDArray[np.float64]
 FIRM = {f"firm {k}/8": k / 8 for k in range(7, 0, -1)}
 """Powers of ``softness`` by which the springs of these stages are softer."""
 STAGES = ("bed", "crib", *FIRM, "hard", "rest")
+FALLS = ("bed", "crib")
+"""Stages in which grains fall."""
 KEEP = 300.0
 """Seconds between two times that a stage is saved."""
 ROUGH = (0.1, 1e-3, 0.02)
@@ -151,7 +153,7 @@ def stage_run(
     try:
         rest = rest_find(
             run, *shares, recipe.patience, told, each=not together, damping=damping,
-            keep=sitting.keep,
+            keep=sitting.keep, fall=stage in FALLS,
         )  # fmt: skip
     except NotConverged as error:
         sitting.save()

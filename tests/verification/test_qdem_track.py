@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,6 +45,7 @@ from validation.track_trials import SCENE
 GRAVITY = (0.0, 0.0, -9.81)
 STONE = Material(1e8, 0.2, 2700.0, shear_viscosity=100.0)
 RADIUS, STIFFNESS = 0.01, 1e5
+GROUND = q.ContactPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 RECIPE = BedRecipe(
     box=TrackBox(0.2, 0.42), below=6, beside=2, seed=3, sizes=(0.026, 0.034),
     shape=SleeperShape(), cells=(2, 3, 2), ballast=STONE, sleeper=STONE, radius=0.012,
@@ -54,12 +56,11 @@ RECIPE = BedRecipe(
 
 def stacked(rigid: bool) -> q.Simulation:
     """Two cubes of 5 cm, one above the other, a little apart, above the ground."""
-    ground = q.ContactPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     bodies = [
         q.Body(box_mesh((0.05, 0.05, 0.05), (1, 1, 1), origin=(0.0, 0.0, z)), STONE, rigid=rigid)
         for z in (0.0101, 0.0803)
     ]
-    contact = q.SphereContact(RADIUS, STIFFNESS, 0.5, (ground,))
+    contact = q.SphereContact(RADIUS, STIFFNESS, 0.5, (GROUND,))
     return q.Simulation(bodies, gravity=GRAVITY, threads=1, contact=contact)
 
 
@@ -76,6 +77,57 @@ def test_cubes_come_to_rest_on_springs_that_bear_their_weight(rigid: bool, each:
     if rigid:
         overlap = RADIUS - (0.0101 + run.bodies[0].displacement[:, 2].mean())
         assert overlap == pytest.approx(weight.sum() / (8 * STIFFNESS), rel=2e-2)
+
+
+@pytest.mark.parametrize("surface", [False, True])
+def test_grounded_is_what_stands_on_the_ground_over_others(surface: bool) -> None:
+    """A cube that touches another is grounded with it: on the ground, or where gravity is held."""
+    contact: Any = q.SphereContact(RADIUS, STIFFNESS, 0.5, (GROUND,))
+    gap = 2 * RADIUS
+    if surface:
+        contact, gap = q.SurfaceContact(1e9, 0.5, depth=2e-3, planes=(GROUND,)), 0.0
+
+    def standing(bottom: float, apart: float, held: str = "", gravity: Any = GRAVITY) -> list[bool]:
+        bodies = [
+            q.Body(box_mesh((0.05,) * 3, (1, 1, 1), origin=(0, 0, z)), STONE, name=name, rigid=True)
+            for name, z in (("lower", bottom), ("upper", bottom + 0.05 + apart))
+        ]
+        run = q.Simulation(bodies, gravity=gravity, threads=1, contact=contact)
+        if held:
+            run.fix(bodies[1], np.arange(8), held)
+        return kinetic_damping.grounded(run).tolist()
+
+    on_ground = gap / 2 - 1e-4
+    assert standing(on_ground, gap - 1e-4) == [True, True]
+    assert standing(on_ground, gap + 1e-3) == [True, False]
+    assert standing(0.5, gap - 1e-4) == [False, False]
+    assert standing(0.5, gap - 1e-4, "xy") == [False, False]
+    assert standing(0.5, gap - 1e-4, "z") == [True, True]
+    assert standing(0.5, gap + 1e-3, gravity=None) == [True, True]  # nothing falls
+
+
+@pytest.mark.parametrize("fall", [True, False])
+def test_what_falls_is_not_stopped_in_the_air(fall: bool) -> None:
+    """A cube is thrown at another high above the ground: momentum p = p_0 + M g t, to round-off.
+
+    Without ``fall`` both are stopped behind their collision, and p is what gravity gave since.
+    """
+    bodies = [
+        q.Body(box_mesh((0.05,) * 3, (1, 1, 1), origin=(0, 0, z)), STONE, name=str(z), rigid=True)
+        for z in (1.0, 1.09)
+    ]
+    contact = q.SphereContact(RADIUS, STIFFNESS, 0.5, (GROUND,))
+    run = q.Simulation(bodies, gravity=GRAVITY, threads=1, contact=contact)
+    bodies[1].velocity = np.tile([0.0, 0.0, -1.0], (8, 1))
+    with pytest.raises(NotConverged):
+        kinetic_damping.rest_find(run, 0.0, 0.0, 0.0, 0.05, look=10, fall=fall)
+    downward = -sum(body.velocity[:, 2].mean() for body in bodies)
+    expected = 1.0 + 2 * 9.81 * run.time
+    assert run.time < 0.3  # both are still in the air
+    if fall:
+        assert downward == pytest.approx(expected, rel=1e-10)
+    else:
+        assert downward < 0.9 * expected
 
 
 def test_no_equilibrium_in_time_is_told() -> None:
