@@ -159,6 +159,8 @@ class Assembly:
         No BLAS here, in what is called between windows: its threads go on spinning for a while
         where the kernel's threads want to compute.
         """
+        if not len(self.elements):
+            return 0.0
         if self.frames is not None:
             speed = (self.field("velocity") ** 2).sum(axis=1)
             return 0.5 * float((self.mass * speed).sum())

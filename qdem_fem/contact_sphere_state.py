@@ -99,7 +99,10 @@ class SphereContacts(Contacts):
         """Look for pairs around vertices at (c, 3) [m]; the skin follows how fast they move."""
         spheres, (least, most) = self.kernel.spheres, self.skins
         room = least + self.room / 2
-        self.skin = skin_next(self.skin, self.lasted, least, min(most, room))
+        idle = len(self.pairs.second) - int(self.pairs.touching.sum())
+        self.skin = skin_next(
+            self.skin, self.lasted, idle, len(self.nodes), least, min(most, room)
+        )  # fmt: skip
         skin = max(self.skin, min(self.parted(position), self.deep, room))
         pairs = pairs_renew(
             self.pairs, position, spheres.radius, spheres.body, skin,
@@ -161,9 +164,9 @@ class SphereContacts(Contacts):
 
     def _ends(self, *, every: bool = False) -> Integers:
         """Vertices (p, 2) of the pairs that touch, or of all in the list."""
-        row = np.repeat(np.arange(len(self.nodes)), np.diff(self.pairs.first))
-        ends = np.column_stack([row, self.pairs.second])
-        return ends if every else ends[self.pairs.touching.astype(bool)]
+        first, second = self.pairs.first, self.pairs.second
+        at = np.arange(len(second)) if every else np.flatnonzero(self.pairs.touching)
+        return np.column_stack([np.searchsorted(first, at, side="right") - 1, second[at]])
 
     def touching(self) -> ContactTouching:
         """Pairs that touch now, by their nodes."""

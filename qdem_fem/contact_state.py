@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+CHECKED = 64
+"""Steps between two looks at whether the contacts there are allow the step: a look costs two."""
 SHORTER = 1 / 3
 """Share of the elements' critical step below which contact is remarked on."""
 
@@ -96,6 +98,8 @@ class Contacts(ABC):
         self.lasted = 0
         """Steps since then."""
         self.warned = 0.0
+        self.checked = -CHECKED
+        """Step at which the springs there were last made the step be looked at."""
         self.stale = True
         """Whether the user moved a body since the contacts were found."""
 
@@ -262,14 +266,17 @@ class Contacts(ABC):
         body = int(np.searchsorted(self.run.first_node, node, side="right")) - 1
         return f"node {node - self.run.first_node[body]} of {self.run.bodies[body].name}"
 
-    def step_check(self) -> None:
-        """Warn where the contacts there are now make the step too long.
+    def step_check(self, last: bool) -> None:
+        """Warn where the contacts there are now make the step too long; ``last``: of a march.
 
         Raises `Unstable` where those near now would, if the step was made for those near once.
         """
         if self.contacts == NEAR:
             near_check(self.run.step, self.near_step(), self.where)
             return
+        if not last and self.run.steps_done < self.checked + CHECKED:
+            return
+        self.checked = self.run.steps_done
         bound = self.stiffness_now()
         if bound <= max(self.allowed, self.warned):
             return

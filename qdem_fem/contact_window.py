@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from qdem_fem.simulation import Simulation
 
 SOURCES = "kernel.py", "stress.py", "lanes.py", "rigid_step.py", "absorbing_step.py"
+THREAD_SPHERES = 16_384
+"""Fewer spheres than this for each thread lose more at barriers than they gain."""
 WINDOW_ONE: Any = kernel.window_kernel(1)
 WINDOW_THREADS: Any = kernel.window_kernel(2)
 
@@ -224,6 +226,14 @@ def contact_window_build(made_from: str) -> Any:
 contact_window: Any = contact_window_build(sources_digest(*SOURCES, *SURFACE_SOURCES))
 
 
+def threads_of(run: Simulation, contact: Any) -> int:
+    """Threads that share a step: as many as the elements or the spheres are worth."""
+    if not isinstance(contact, Contact):
+        return run.assembly.threads
+    spheres = run.threads or len(contact.position) // THREAD_SPHERES
+    return max(run.assembly.threads, min(spheres, numba.get_num_threads()))
+
+
 def window_run(
     run: Simulation, contact: Any, steps: int, step: float, loads: kernel.Loads,
     held: kernel.Constraints, probes: kernel.Probes, table: Any, gravity: Any, work: Any,
@@ -235,11 +245,11 @@ def window_run(
     assembly = run.assembly
     rigid: Rigid | None = None if run.rigid is None else run.rigid.kernel_of(probes.node_at)
     absorber: Absorber | None = None if run.absorbers is None else run.absorbers.kernel
-    before = numba.get_num_threads()
-    numba.set_num_threads(assembly.threads)
+    before, threads = numba.get_num_threads(), threads_of(run, contact)
+    numba.set_num_threads(threads)
     try:
         done, bad, said = contact_window(
-            True if assembly.threads > 1 else None, assembly.law, assembly.viscous,
+            True if threads > 1 else None, assembly.law, assembly.viscous,
             assembly.packed.layout, assembly.state, loads, held, probes, table,
             assembly.gravity_packed(gravity), work, assembly.dtype.type(step), steps, contact,
             rigid, absorber,

@@ -60,27 +60,30 @@ def march(
         most = GRAVITY_STEPS
     end = motion.steps_done + steps
     window = (run.contacts or run.rigid or run.absorbers or assembly).window
-    while motion.steps_done < end:
-        assembly.frames_renew()
-        count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
-        times = run.step * (motion.steps_done + np.arange(count + 1, dtype=float))
-        probes = samples.probes(4 * assembly.place[nodes], motion.steps_done)
-        gravity = run.gravity_at(times)
-        before = moment(run) if gravity is not None else None
-        done, bad = window(
-            count, run.step, loads, held, probes, run.conditions.table(times), gravity, motion.work
-        )
-        motion.steps_done += done
-        if gravity is not None and before is not None and done:
-            after = moment(run)
-            motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
+    try:
+        while motion.steps_done < end:
+            assembly.frames_renew()
+            count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
+            times = run.step * (motion.steps_done + np.arange(count + 1, dtype=float))
+            probes = samples.probes(4 * assembly.place[nodes], motion.steps_done)
+            gravity = run.gravity_at(times)
+            before = moment(run) if gravity is not None else None
+            done, bad = window(
+                count, run.step, loads, held, probes, run.conditions.table(times), gravity,
+                motion.work,
+            )  # fmt: skip
+            motion.steps_done += done
+            if gravity is not None and before is not None and done:
+                after = moment(run)
+                motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
+            motion_check(run, bad)
+            if run.contacts is not None:
+                run.contacts.step_check(last=motion.steps_done == end)
+            if progress is not None:
+                progress(run.time)
+    finally:
         if run.rigid is not None:
             run.rigid.follow()
-        motion_check(run, bad)
-        if run.contacts is not None:
-            run.contacts.step_check()
-        if progress is not None:
-            progress(run.time)
     return samples
 
 
@@ -141,7 +144,7 @@ def moment(run: Simulation) -> tuple[Floats, Floats]:
     """``sum m u`` [kg m] and ``sum m v`` [kg m/s] half a step before, (3,) each."""
     mass, field = run.assembly.mass, run.assembly.field
     place, speed = np.zeros((2, 3))
-    if not all(body.rigid for body in run.bodies):
+    if len(run.assembly.elements):
         place, speed = (
             np.einsum("n,nc->c", mass, field(name)) for name in ("displacement", "velocity")
         )

@@ -1,12 +1,11 @@
-"""The paper's track: its grains fall, a step of it is timed, its memory and its split counted.
+"""The paper's track at rest: what its preparation cost, how it lies, what a step of it costs.
 
-    python -m validation.track_paper scenes/track-paper.toml --work FOLDER [--fall 240] [--steps 60]
+    trackbed qdem scenes/track-paper.toml     prepares the bed, in hours; stop it in the run
+    python -m validation.track_paper scenes/track-paper.toml [--steps 300] [--threads 1 2]
 
-In FOLDER are kept the grains, and where they are after each sitting of ``--fall`` processor seconds
-of the stage ``bed``: another call goes on from there.  Each time the sleeper is laid on what lies
-there and the cribs are filled, as the stage ``crib`` begins, and a march of the whole, deformable,
-is timed on that stage's springs with the step of Table 1's.  Writes
-``validation/results/track-paper.json``.
+Reads the bed in the scene's file, times a march from it and the march's parts, looks how long a
+list of pairs is good for while both rail seats bear an axle that was put on them at once, and
+counts what a split over processes would tell.  Writes ``validation/results/track-paper.json``.
 """
 
 from __future__ import annotations
@@ -14,187 +13,156 @@ from __future__ import annotations
 import argparse
 import json
 import resource
-import time
-from contextlib import suppress
-from dataclasses import asdict, replace
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from qdem_fem.grain_set import GrainSet, grains_load, grains_save
-from qdem_fem.kinetic_damping import Rest, rest_find
-from qdem_fem.mesh_checks import FloatArray
+from qdem_fem.contact_sphere_state import SphereContacts
+from qdem_fem.kinetic_damping import bodies_of
 from qdem_fem.output import write_whole
 from qdem_fem.run_folder import machine
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.simulation import Simulation
-from qdem_fem.track_bed import ROUGH, Bed, nodes_begin, sleeper_guide
-from qdem_fem.track_recipe import SLEEPER, BedRecipe, bodies_of_bed, grains_of
-from qdem_fem.track_scene import TrackPrepared
+from qdem_fem.track_bed import STAGES, Bed, bed_read
+from qdem_fem.track_recipe import SLEEPER, BedRecipe, grains_of
+from qdem_fem.track_scene import TrackPrepared, contact_of
+from qdem_fem.track_stand import bed_begin
+from validation.track_small import parts_of, seconds
 from validation.track_split import split_counts
 
 RECORD = Path(__file__).parent / "results" / "track-paper.json"
-WARM = 5
+WARM = 20
 """Steps before the clock starts."""
+MARCHES = 5
+AXLE = 50e3
+"""Force on each rail seat [N], of an axle of 100 kN."""
 
 
-class Spent(Exception):
-    """The processor time of a sitting is spent."""
+def shape_of(recipe: BedRecipe, bed: Bed) -> dict[str, float]:
+    """Measures of the ballast as it lies [m]: its height, and its length on top and at its foot.
 
-
-def grains_kept(recipe: BedRecipe, path: Path) -> GrainSet:
-    """The grains of the scene, made where the file is not there."""
-    if path.exists():
-        return grains_load(path)
-    grains = grains_of(recipe)
-    grains_save(path, grains)
-    return grains
-
-
-def fall(
-    recipe: BedRecipe, grains: GrainSet, path: Path, seconds: float, threads: int
-) -> dict[str, Any]:
-    """Go on with the stage ``bed`` for some processor time; what it came to, all sittings together.
-
-    The file ``path`` holds the nodes [m] and what is told.  A sitting begins at rest, and its
-    springs anew.
+    The height is that below which 95 of 100 vertices of the highest tenth lie, over the ground; on
+    top is within a grain, 50 mm, of it.
     """
-    told: dict[str, Any] = {"cpu_s": 0.0, "steps": 0, "time": 0.0}
-    nodes = nodes_begin(recipe, grains, "bed", None)
-    if path.exists():
-        with np.load(path) as file:
-            nodes = np.split(file["nodes"], np.cumsum([len(x) for x in nodes])[:-1])
-            told = json.loads(str(file["told"]))
-    if seconds <= 0:
-        return told
-    started = time.process_time()
-    bodies = bodies_of_bed(recipe, grains, nodes, rigid=True)
-    contact = replace(recipe.contact([*bodies], recipe.softness), contacts=1)
-    run = Simulation(
-        list(bodies.values()), gravity=recipe.gravity, contact=contact, threads=threads
-    )
-    begun, last = time.process_time(), None
-
-    def progress(rest: Rest) -> None:
-        nonlocal last
-        last = rest
-        print(f"fall: {asdict(rest)}, {time.process_time() - begun:.0f} s", flush=True)
-        if time.process_time() - started >= seconds:
-            raise Spent
-
-    with suppress(Spent):
-        last = rest_find(run, *ROUGH, recipe.patience, progress)
-    assert last is not None
-    marched = time.process_time() - begun
-    told |= {
-        "cpu_s": told["cpu_s"] + time.process_time() - started,
-        "steps": told["steps"] + last.steps, "time": told["time"] + last.time,
-        "step": run.step, "seconds_a_step": marched / last.steps,
-        "unbalanced": last.unbalanced, "kinetic": last.kinetic, "loose": last.loose,
-        "rest": all(
-            one <= bar
-            for one, bar in zip((last.unbalanced, last.kinetic, last.loose), ROUGH, strict=True)
-        ),
-    }  # fmt: skip
-    now = np.concatenate([body.nodes for body in run.bodies])
-    now += run.assembly.field("displacement")
-    with path.open("wb") as stream:
-        np.savez_compressed(stream, nodes=now, told=json.dumps(told))
-    return told
-
-
-def all_laid(recipe: BedRecipe, grains: GrainSet, path: Path) -> list[FloatArray]:
-    """Nodes of all bodies [m] as the stage ``crib`` begins on what has fallen so far."""
-    loose = nodes_begin(recipe, grains, "bed", None)
-    with np.load(path) as file:
-        every = file["nodes"]
-    fallen = np.split(every, np.cumsum([len(x) for x in loose])[:-1])
-    return nodes_begin(recipe, grains, "crib", Bed("bed", fallen, 0 * every, {}, {}))
-
-
-def step_timed(
-    recipe: BedRecipe, grains: GrainSet, nodes: list[FloatArray], steps: int, threads: int
-) -> dict[str, Any]:
-    """Processor time of a step of all bodies, deformable, the least of three marches; memory."""
-    started = time.process_time()
-    bodies = bodies_of_bed(recipe, grains, nodes, rigid=False)
-    hard, soft = (recipe.contact([*bodies], factor) for factor in (1.0, recipe.softness))
-    step = Simulation(list(bodies.values()), threads=1, contact=hard).step
-    bodies = bodies_of_bed(recipe, grains, nodes, rigid=False)
-    run = Simulation(
-        list(bodies.values()), gravity=recipe.gravity, threads=threads, contact=soft, step=step
-    )
-    sleeper_guide(run, bodies[SLEEPER], upright=False)
-    run.advance(WARM * step)
-    built = time.process_time() - started
-    spent, wall = [], []
-    for _ in range(3):
-        began, clock = time.process_time(), time.perf_counter()
-        run.advance(steps // 3 * step)
-        spent.append((time.process_time() - began) / (steps // 3))
-        wall.append((time.perf_counter() - clock) / (steps // 3))
-    elements = [len(body.elements) for body in run.bodies]
-    assert run.contacts is not None
+    grains = np.concatenate(bed.positions[:-1])
+    height = float(np.quantile(grains[:, 2], 0.995))
+    top = grains[grains[:, 2] > height - 0.05, 0]
+    ends = np.quantile(top, [0.01, 0.99])
     return {
-        "threads": threads, "built_cpu_s": built, "step": step, "seconds_a_step": min(spent),
-        "wall_a_step": min(wall), "elements_ballast": sum(elements[:-1]),
-        "elements_sleeper": elements[-1],
-        "nodes": sum(len(body.nodes) for body in run.bodies),
-        "vertices": len(run.contacts.nodes),
-        "mels": sum(elements) / min(spent) / 1e6,
-        "mels_wall": sum(elements) / min(wall) / 1e6,
+        "height": height + recipe.radius,
+        "top": float(ends[1] - ends[0]),
+        "foot": float(np.ptp(grains[:, 0])) + 2 * recipe.radius,
+        "below_sleeper": float(bed.positions[-1][:, 2].min()) - recipe.radius,
+    }
+
+
+def contacts_of(run: Simulation) -> dict[str, float]:
+    """Pairs in the list and of those that touch, and bodies touched by a body in the mean."""
+    assert isinstance(run.contacts, SphereContacts)
+    found = run.contacts.touching()
+    one, other = bodies_of(run, found.first), bodies_of(run, found.second)
+    pairs = np.unique(np.sort(np.column_stack([one, other]), axis=1), axis=0)
+    return {
+        "listed": len(run.contacts.pairs.second),
+        "touching": len(found.first),
+        "coordination": 2 * len(pairs) / len(run.bodies),
+        "deepest": float(found.overlap.max()),
+    }
+
+
+def step_timed(run: Simulation, steps: int) -> dict[str, Any]:
+    """What a step costs by the clock and the processor [s], medians of `MARCHES`; its parts."""
+    run.advance(WARM * run.step)
+    assert run.contacts is not None
+    searched = run.contacts.renewals
+    each = steps // MARCHES
+    found = [seconds(lambda: run.advance(each * run.step), 1) for _ in range(MARCHES)]
+    wall, spent = np.median(found, axis=0) / each
+    elements = len(run.assembly.elements)
+    return {
+        "step": run.step, "steps": steps, "wall_a_step": wall, "seconds_a_step": spent,
+        "mels": elements / spent / 1e6, "mels_wall": elements / wall / 1e6,
+        "searches": run.contacts.renewals - searched,
+        "parts": parts_of(run, max(3, each // 5)),
         "resident": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
     }  # fmt: skip
+
+
+def axle_put_on(run: Simulation, steps: int) -> dict[str, float]:
+    """Lists of pairs that were looked for, and how fast the sleeper came down [m/s].
+
+    Both seats bear an axle at once, from one step to the next: no train is as sudden.
+    """
+    sleeper = next(body for body in run.bodies if body.name == SLEEPER)
+    assert run.contacts is not None
+    for name, nodes in sleeper.mesh.node_sets.items():
+        if name.startswith("seat"):
+            run.load(sleeper, nodes, [0.0, 0.0, -AXLE])
+    searched, begun = run.contacts.renewals, run.time
+    before = sleeper.displacement[:, 2].mean()
+    run.advance(steps * run.step)
+    way = before - float(sleeper.displacement[:, 2].mean())
+    return {
+        "force": AXLE, "steps": steps, "searches": run.contacts.renewals - searched,
+        "way": way, "speed": way / (run.time - begun),
+    }  # fmt: skip
+
+
+def run_of(prepared: TrackPrepared, bed: Bed, threads: int) -> Simulation:
+    """The scene's simulation in its bed, without its load."""
+    table = prepared.scene.simulation
+    return bed_begin(
+        prepared.recipe, bed, contact_of(prepared), strain=table.strain, step=table.step,
+        safety=table.safety, threads=threads, mass_scaling=table.mass_scaling,
+    )[0]  # fmt: skip
 
 
 def main() -> None:
     """Measure and write the record."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument("scene", type=Path)
-    parser.add_argument("--work", type=Path, required=True)
-    parser.add_argument("--fall", type=float, default=240.0)
-    parser.add_argument("--steps", type=int, default=60)
-    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--steps", type=int, default=300)
+    parser.add_argument("--threads", type=int, nargs="+", default=[1])
     arguments = parser.parse_args()
     prepared = scene_load(arguments.scene)
     assert isinstance(prepared, TrackPrepared)
     recipe = prepared.recipe
-    started, cpu = datetime.now(UTC).isoformat(timespec="seconds"), time.process_time()
-    made = not (arguments.work / "grains.npz").exists()
-    grains = grains_kept(recipe, arguments.work / "grains.npz")
-    spent = time.process_time() - cpu
-    print(f"{len(grains)} grains, {spent:.0f} s", flush=True)
-    kept = arguments.work / "fall.npz"
-    fallen = fall(recipe, grains, kept, arguments.fall, arguments.threads)
-    nodes = all_laid(recipe, grains, kept)
-    print(json.dumps(fallen), flush=True)
-    timed = step_timed(recipe, grains, nodes, arguments.steps, arguments.threads)
-    print(json.dumps(timed), flush=True)
-    record = json.loads(RECORD.read_text(encoding="utf-8")) if RECORD.exists() else {}
-    record |= {
-        "command": f"python -m validation.track_paper scenes/{arguments.scene.name} "
-        f"--work FOLDER --fall {arguments.fall:g}",
-        "machine": machine(), "started": started, "fall": fallen,
-        "grains": len(grains), "cells": recipe.cells,
-        f"march_{arguments.threads}": timed, "heights": heights(recipe, nodes),
-        "split": split_counts(recipe, grains, nodes),
-    }  # fmt: skip
-    if made:
-        record["grains_cpu_s"] = spent
-    write_whole(RECORD, json.dumps(record, indent=1) + "\n")
-
-
-def heights(recipe: BedRecipe, nodes: list[FloatArray]) -> dict[str, float]:
-    """How high ballast lies under the sleeper: top, and 95 of 100 centres are below `most` [m]."""
-    centre = np.array([x.mean(axis=0) for x in nodes[: recipe.below]])
-    under = recipe.layout.under(centre)
-    return {
-        "top": float(nodes[-1][:, 2].min()) - recipe.radius,
-        "most": float(np.percentile(centre[under, 2], 95)),
-        "length": float(np.ptp(centre[:, 0])),
+    bed = bed_read(prepared.bed_file, recipe)
+    if bed.stage != STAGES[-1]:
+        sys.exit(f"{prepared.bed_file} is at stage {bed.stage}: `trackbed qdem` goes on from there")
+    record: dict[str, Any] = {
+        "command": f"python -m validation.track_paper scenes/{arguments.scene.name}",
+        "machine": machine(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+    made: list[Any] = []
+    record["grains_cpu_s"] = seconds(lambda: made.append(grains_of(recipe)), 1)[1]
+    record |= {
+        "grains": len(made[0]), "cells": recipe.cells, "rests": bed.rests, "stands": bed.stands,
+        "shape": shape_of(recipe, bed), "split": split_counts(recipe, made[0], bed.positions),
+        "marches": {},
+    }  # fmt: skip
+    for threads in arguments.threads:
+        begun: list[Simulation] = []
+        built = seconds(lambda: begun.append(run_of(prepared, bed, threads)), 1)[1]  # noqa: B023
+        run = begun[0]
+        if not record["marches"]:
+            elements = [len(body.elements) for body in run.bodies]
+            record |= {
+                "elements_ballast": sum(elements[:-1]), "elements_sleeper": elements[-1],
+                "nodes": sum(len(body.nodes) for body in run.bodies),
+                "vertices": len(run.contacts.nodes) if run.contacts else 0,
+                "contacts": contacts_of(run),
+            }  # fmt: skip
+        timed = {"threads": run.assembly.threads, "built_cpu_s": built}
+        record["marches"][str(threads)] = timed | step_timed(run, arguments.steps)
+        print(json.dumps(record["marches"][str(threads)]), flush=True)
+        if threads == arguments.threads[0]:
+            record["axle"] = axle_put_on(run, arguments.steps)
+    write_whole(RECORD, json.dumps(record, indent=1) + "\n")
 
 
 if __name__ == "__main__":

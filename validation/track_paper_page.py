@@ -1,8 +1,8 @@
 """The page on the paper's track, written from its record.
 
-python -m validation.track_paper scenes/track-paper.toml --work FOLDER    the record
-python -m validation.track_half RUN                                       that of half a sleeper
-python -m validation.track_paper_page                                     writes the page
+python -m validation.track_paper scenes/track-paper.toml    the record, from the prepared bed
+python -m validation.track_half RUN                         that of half a sleeper
+python -m validation.track_paper_page                       writes the page
 """
 
 from __future__ import annotations
@@ -34,15 +34,16 @@ def page(
     record: dict[str, Any], repeated: dict[str, Any], lying: dict[str, Any], half: dict[str, Any]
 ) -> str:
     """The page for the record, and those of a bed that repeats, a split one, half a sleeper."""
-    marches = [record[name] for name in sorted(record) if name.startswith("march_")]
+    marches = list(record["marches"].values())
     one = marches[0]
-    elements = one["elements_ballast"] + one["elements_sleeper"]
+    elements = record["elements_ballast"] + record["elements_sleeper"]
     return page_filled(WORDS.read_text(encoding="utf-8"), {
         "command": f"`{record['command']}`", "machine": record["machine"],
         "date": record["started"][:10], "cells": " x ".join(map(str, record["cells"])),
-        "grains": f"{record['grains']:,}", "ballast": f"{one['elements_ballast']:,}",
-        "sleeper": f"{one['elements_sleeper']:,}", "nodes": f"{one['nodes']:,}",
+        "grains": f"{record['grains']:,}", "ballast": f"{record['elements_ballast']:,}",
+        "sleeper": f"{record['elements_sleeper']:,}", "nodes": f"{record['nodes']:,}",
         "step": f"{1e6 * one['step']:.3f}", "prepared": prepared(record),
+        **lying_words(record), **axle_words(record),
         "threads": " | ".join(threads(m["threads"]) for m in marches),
         "rule": "|".join(["---"] * len(marches)), "steps": steps(marches),
         "limit": str(LIMIT), "loose": f"{repeated['one by one']['hard']['loose']:.2f}",
@@ -62,20 +63,50 @@ def threads(count: int) -> str:
 
 
 def prepared(record: dict[str, Any]) -> str:
-    """How far the bed is."""
-    fall, high = record["fall"], record["heights"]
-    state = "at rest by the bar of that stage" if fall["rest"] else "**not at rest**"
+    """What each stage of the bed took, and how near to equilibrium it left it."""
     rows = [
-        ("processor time of the grains", f"{record['grains_cpu_s']:.0f} s"),
-        ("processor time of the fall (stage `bed`, rigid grains)", f"{fall['cpu_s']:.0f} s"),
-        ("its steps, of", f"{fall['steps']:,}, {1e6 * fall['step']:.1f} µs"),
-        ("processor time of one, over all", f"{1e3 * fall['seconds_a_step']:.1f} ms"),
-        ("simulated", f"{fall['time']:.3f} s"),
-        ("unbalanced force, loose bodies", f"{fall['unbalanced']:.3g}, {fall['loose']:.3g}"),
-        ("highest grain where the sleeper is laid", f"{high['top']:.3f} m"),
-        ("95 of 100 centres there lie below", f"{high['most']:.3f} m"),
-    ]
-    return f"The bed is {state}.\n\n" + table(["what", "measured"], rows)
+        [f"`{stage}`", f"{rest['time']:.3g}", f"{1e6 * rest['step']:.3g}", f"{rest['steps']:,}",
+         f"{rest['cpu_s'] / 60:.0f}", f"{rest['unbalanced']:.3f}", f"{rest['kinetic']:.1e}",
+         f"{rest['loose']:.4f}"]
+        for stage, rest in record["rests"].items()
+    ]  # fmt: skip
+    head = ["stage", "simulated [s]", "step [µs]", "steps", "processor time [min]",
+            "unbalanced", "kinetic", "loose"]  # fmt: skip
+    total = sum(rest["cpu_s"] for rest in record["rests"].values())
+    (stand,) = record["stands"].values()
+    return table(head, rows) + (
+        f"\n\nIn all {total / 3600:.1f} h of a processor, and {record['grains_cpu_s']:.0f} s for the "
+        f"grains.  Let go for {1e3 * stand['time']:g} ms without a load, its sliders take "
+        f"{stand['slid'] / stand['elastic']:.1e} of the energy of its springs, the sleeper sinks by "
+        f"{1e6 * stand['sinking']:.2g} µm, and {100 * stand['at_limit']:.1g} % of the pairs that touch "
+        "are at Coulomb's limit."
+    )
+
+
+def lying_words(record: dict[str, Any]) -> dict[str, str]:
+    """How the ballast lies, and what touches."""
+    shape, contacts = record["shape"], record["contacts"]
+    return {
+        "foot": f"{shape['foot']:.2f}", "top": f"{shape['top']:.2f}",
+        "height": f"{shape['height']:.2f}", "below": f"{shape['below_sleeper']:.2f}",
+        "touching": f"{contacts['touching']:,}", "listed": f"{contacts['listed']:,}",
+        "vertices": f"{record['vertices']:,}",
+        "coordination": f"{contacts['coordination']:.1f}",
+        "deepest": f"{1e6 * contacts['deepest']:.0f}",
+    }  # fmt: skip
+
+
+def axle_words(record: dict[str, Any]) -> dict[str, str]:
+    """What a search for pairs costs, and how often one was due under an axle."""
+    axle, one = record["axle"], next(iter(record["marches"].values()))
+    search = one["parts"]["a search for pairs"] / one["seconds_a_step"]
+    return {
+        "axle_force": f"{axle['force'] / 1e3:g}", "axle_steps": f"{axle['steps']:,}",
+        "axle_searches": {0: "none", 1: "one"}.get(axle["searches"], str(axle["searches"])),
+        "axle_speed": f"{1e3 * axle['speed']:.2g}", "search_steps": f"{search:.1f}",
+        "search_due": f"{search / 0.3:.0f}",
+        "search_share": f"{100 * search * axle['searches'] / axle['steps']:.2g}",
+    }  # fmt: skip
 
 
 def periodic(repeated: dict[str, Any]) -> str:
@@ -98,13 +129,22 @@ def steps(marches: list[dict[str, Any]]) -> str:
     """Rows of what a step costs, a column a march."""
     rows = [
         ("processor time of a step", [f"{1e3 * m['seconds_a_step']:.1f} ms" for m in marches]),
-        ("wall time of it, machine shared", [f"{1e3 * m['wall_a_step']:.1f} ms" for m in marches]),
+        ("wall time of it", [f"{1e3 * m['wall_a_step']:.1f} ms" for m in marches]),
         ("million element-steps a processor second", [f"{m['mels']:.1f}" for m in marches]),
         ("million element-steps a second of wall", [f"{m['mels_wall']:.1f}" for m in marches]),
+        ("elements and motion, in processor time", [part(m, "elements and motion") for m in marches]),
+        ("contact", [part(m, "contact") for m in marches]),
+        ("a search for pairs, when one is due", [part(m, "a search for pairs") for m in marches]),
+        ("searches, of steps", [f"{m['searches']} of {m['steps']:,}" for m in marches]),
         ("memory, resident", [f"{m['resident'] / 1e9:.2f} GB" for m in marches]),
         ("processor time to build it", [f"{m['built_cpu_s']:.0f} s" for m in marches]),
     ]  # fmt: skip
     return "\n".join("| " + " | ".join([name, *cells]) + " |" for name, cells in rows)
+
+
+def part(march: dict[str, Any], name: str) -> str:
+    """A part of a step."""
+    return f"{1e3 * march['parts'][name]:.1f} ms"
 
 
 def passage(one: dict[str, Any], elements: int) -> str:

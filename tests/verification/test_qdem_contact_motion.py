@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from qdem_fem.contact_search import GOOD, skin_next
+from qdem_fem.contact_search import SEARCH, skin_next
 from qdem_fem.contact_spheres import SKIN
 from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, SceneError, StepWarning
 from qdem_fem.mesh_generation import box_mesh
@@ -272,22 +272,29 @@ def test_the_skin_follows_the_motion_and_changes_no_bit() -> None:
 
 
 @given(
-    st.floats(1e-6, 1e-2), st.integers(0, 10**6), st.floats(1e-6, 1e-3), st.floats(1e-6, 1e-2),
-    st.integers(1, 10**5),
+    st.floats(1e-6, 1e-2), st.integers(0, 10**6), st.integers(0, 10**6), st.floats(1e-6, 1e-3),
+    st.floats(1e-6, 1e-2), st.floats(1, 1e5), st.floats(0.1, 1e3),
 )  # fmt: skip
-def test_skin_next(skin: float, lasted: int, least: float, more: float, speed: int) -> None:
-    """Within its bounds and a factor of two; at a speed that stays, lists come to last `GOOD`."""
-    most = least + more
+def test_skin_next(
+    skin: float, lasted: int, idle: int, least: float, more: float, speed: float, dense: float
+) -> None:
+    """Within its bounds and a factor of two; at a speed that stays, the least of all costs.
+
+    A list of skin s is good for n = s/(2 v dt) steps and has ``dense`` s/least idle pairs a sphere:
+    a step costs SEARCH/n + dense s/least, least where s^2 = 2 v dt SEARCH least/dense.
+    """
+    most, spheres = least + more, 10**6
     skin = float(np.clip(skin, least, most))
-    found = skin_next(skin, lasted, least, most)
+    found = skin_next(skin, lasted, idle, spheres, least, most)
     assert least <= found <= most
     assert skin / 2 <= found <= 2 * skin
-    for _ in range(40):  # steps that a list lasts: half the skin over the way of a step
-        way = least / (2 * speed)
-        skin = skin_next(skin, int(skin / 2 / way) + 1, least, most)
-    lasts = skin / 2 / way
-    at_bound = skin == least if lasts > GOOD else skin == most
-    assert at_bound or abs(lasts - GOOD) <= 2
+    way = least / (2 * speed)
+    for _ in range(40):
+        pairs = int(dense * skin / least * spheres)
+        skin = skin_next(skin, int(skin / 2 / way) + 1, pairs, spheres, least, most)
+    best = np.clip(np.sqrt(2 * way * SEARCH * least / dense), least, most)
+    # a list lasts whole steps: one too many of n
+    assert skin == pytest.approx(best, rel=max(1e-6, 3 * way / best))
 
 
 @given(st.lists(st.lists(st.tuples(st.floats(-1, 1), st.booleans()), max_size=6), min_size=1))
