@@ -75,11 +75,11 @@ def prepared(record: dict[str, Any]) -> str:
     total = sum(rest["cpu_s"] for rest in record["rests"].values())
     (stand,) = record["stands"].values()
     return table(head, rows) + (
-        f"\n\nIn all {total / 3600:.1f} h of a processor, and {record['grains_cpu_s']:.0f} s for the "
-        f"grains.  Let go for {1e3 * stand['time']:g} ms without a load, its sliders take "
-        f"{stand['slid'] / stand['elastic']:.1e} of the energy of its springs, the sleeper sinks by "
-        f"{1e6 * stand['sinking']:.2g} µm, and {100 * stand['at_limit']:.1g} % of the pairs that touch "
-        "are at Coulomb's limit."
+        f"\n\nIn all {total / 3600:.1f} h of a processor, and {record['grains_cpu_s']:.0f} s for "
+        f"the grains.  Let go for {1e3 * stand['time']:g} ms without a load, its sliders take "
+        f"{stand['slid'] / stand['elastic']:.1e} of the energy of its springs, the sleeper sinks "
+        f"by {1e6 * stand['sinking']:.2g} µm, and {100 * stand['at_limit']:.1g} % of the pairs "
+        "that touch are at Coulomb's limit."
     )
 
 
@@ -92,7 +92,7 @@ def lying_words(record: dict[str, Any]) -> dict[str, str]:
         "touching": f"{contacts['touching']:,}", "listed": f"{contacts['listed']:,}",
         "vertices": f"{record['vertices']:,}",
         "coordination": f"{contacts['coordination']:.1f}",
-        "deepest": f"{1e6 * contacts['deepest']:.0f}",
+        "deepest": f"{1e6 * contacts['deepest']:.2g}",
     }  # fmt: skip
 
 
@@ -132,7 +132,7 @@ def steps(marches: list[dict[str, Any]]) -> str:
         ("wall time of it", [f"{1e3 * m['wall_a_step']:.1f} ms" for m in marches]),
         ("million element-steps a processor second", [f"{m['mels']:.1f}" for m in marches]),
         ("million element-steps a second of wall", [f"{m['mels_wall']:.1f}" for m in marches]),
-        ("elements and motion, in processor time", [part(m, "elements and motion") for m in marches]),
+        ("of it elements and motion", [part(m, "elements and motion") for m in marches]),
         ("contact", [part(m, "contact") for m in marches]),
         ("a search for pairs, when one is due", [part(m, "a search for pairs") for m in marches]),
         ("searches, of steps", [f"{m['searches']} of {m['steps']:,}" for m in marches]),
