@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 
@@ -11,20 +13,48 @@ STORED = ("kinetic", "elastic", "contact", "friction", "viscous", "absorbed", "f
 """Stored in the bodies or taken from them, where a run has it."""
 
 
-def energy_facts(energy: dict[str, FloatArray]) -> dict[str, float]:
-    """Energies at the end [J], and the greatest of external less what all others gained.
+class EnergyAccount:
+    """Energies of a run, taken row by row or many at a time: what is missing, and over what.
 
-    That is also told over the greatest energy that was put in, or went from one form to another,
-    or was in motion.  What a scene begins with, overlap or motion, is no work of its loads.
+    Missing is external work less what all others gained.  It is told over the greatest energy that
+    was put in, or went from one form to another, or was in motion.  What a scene begins with,
+    overlap or motion, is no work of its loads.
     """
-    names = [name for name in STORED if name in energy]
-    stored = np.sum([energy[name] - energy[name][0] for name in names], axis=0)
-    missing = energy["external"] - stored
-    passed = [float(np.abs(energy[name] - energy[name][0]).max()) for name in names]
-    passed.append(float(energy["kinetic"].max()))
-    greatest = max(float(np.abs(energy["external"]).max()), float(stored.max()), *passed)
+
+    def __init__(self) -> None:
+        self.first: dict[str, float] = {}
+        """The first row [J]."""
+        self.last: dict[str, float] = {}
+        """The last one [J]."""
+        self.missing = 0.0
+        """The most that was ever missing [J]."""
+        self.greatest = 0.0
+        """The greatest energy so far [J]."""
+
+    def take(self, energy: Mapping[str, FloatArray]) -> None:
+        """Take rows more: columns (k,) [J] by name; others than energies are passed by."""
+        names = [name for name in STORED if name in energy]
+        if not self.first:
+            self.first = {name: float(energy[name][0]) for name in names}
+        gained = [energy[name] - self.first[name] for name in names]
+        stored, external = np.sum(gained, axis=0), energy["external"]
+        self.missing = max(self.missing, float(np.abs(external - stored).max()))
+        seen = [*(np.abs(one) for one in gained), energy["kinetic"], np.abs(external), stored]
+        self.greatest = max(self.greatest, *(float(one.max()) for one in seen))
+        self.last = {name: float(energy[name][-1]) for name in [*names, "external"]}
+
+    @property
+    def relative(self) -> float:
+        """The most that was missing over the greatest energy [-]."""
+        return self.missing / self.greatest if self.greatest > 0 else 0.0
+
+
+def energy_facts(energy: Mapping[str, FloatArray]) -> dict[str, float]:
+    """Energies at the end [J], and what `EnergyAccount` says of all rows."""
+    account = EnergyAccount()
+    account.take(energy)
     return {
-        **{name: float(energy[name][-1]) for name in [*names, "external"]},
-        "greatest_imbalance": float(np.abs(missing).max()),
-        "relative_imbalance": float(np.abs(missing).max()) / greatest if greatest > 0 else 0.0,
+        **account.last,
+        "greatest_imbalance": account.missing,
+        "relative_imbalance": account.relative,
     }

@@ -29,7 +29,7 @@ COMPARED = ("scene", "files")
 """Parts of the manifest that must be the same for a run to go on."""
 FREE = (
     "scene.title", "scene.simulation.threads", "scene.output.checkpoint_interval",
-    "scene.output.modes", "scene.output.video",
+    "scene.output.audit", "scene.output.modes", "scene.output.video",
 )  # fmt: skip
 """Keys that may change: no number of the record depends on them."""
 

@@ -29,6 +29,9 @@ from qdem_fem.scene_types import (
     vector_or_table,
 )
 
+AUDIT = 1e-3
+"""Of `Output.audit`, where bodies touch."""
+
 
 class BoxMesh(Table):
     """A rectangular block with one corner at ``origin``, cut into tetrahedra."""
@@ -266,7 +269,8 @@ class Output(Table):
     """Between checkpoints, by the clock on the wall [s]."""
     audit: Share | None = None
     """Share of the greatest energy that may be missing in the account of energies, what viscosity
-    takes included; a run stops beyond it.  Not looked at when not given."""
+    takes included; a run stops beyond it.  By default `AUDIT` where bodies touch, and not looked
+    at where none do."""
     probes: dict[Name, Probe] = Field(default_factory=dict)
     modes: Annotated[int, Field(ge=0, le=20)] = 3
     """Number of modes sought in each probe's free motion."""
@@ -288,6 +292,12 @@ class Scene(Table):
     contact: ContactTable | None = None
     """Bodies touch; left out of the kernel when not given."""
     output: Output = Output()
+
+    @property
+    def audit(self) -> float | None:
+        """Share of the greatest energy that may be missing; None: not looked at."""
+        default = None if self.contact is None else AUDIT
+        return default if self.output.audit is None else self.output.audit
 
     def left_out(self) -> list[str]:
         """Physics that is not in this run, because the scene does not name it."""

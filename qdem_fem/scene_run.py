@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.energy_account import energy_facts
+from qdem_fem.energy_account import EnergyAccount
 from qdem_fem.errors import EnergyLost, Interrupted
 from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, write_whole
 from qdem_fem.run_folder import RunFolder
@@ -122,7 +122,7 @@ def run_dynamic(
     rows, energies = _tables(folder.path, probes, energy_names(run))
     output = prepared.scene.output
     record = _Record(
-        run, list(bodies.values()), plan, folder.path, rows, energies, output.audit,
+        run, list(bodies.values()), plan, folder.path, rows, energies, prepared.scene.audit,
         output.magnification,
     )  # fmt: skip
     if goes_on:
@@ -198,13 +198,14 @@ class _Record:
     """Of displacements in pictures beside the VTU files."""
     cost: dict[str, float] = field(default_factory=dict)
     """``cpu_s`` and ``wall_s`` of advancing so far [s]."""
+    account: EnergyAccount = field(default_factory=EnergyAccount)
 
     def begin(self, probes: dict[str, Any]) -> None:
         """First rows and fields, at t = 0."""
         self.rows.begin()
         self.energies.begin()
         self.rows.append(np.array([[0.0, *_probed(probes)]]))
-        self.energies.append(_energy_row(self.run, 0.0))
+        self.energy_take(0.0)
         self.write_fields()
 
     def go_on(self) -> None:
@@ -214,6 +215,7 @@ class _Record:
         self.rows.cut(now, done // plan.sampling + 1)
         at_end = done == plan.total and done % plan.energy > 0
         self.energies.cut(now, done // plan.energy + 1 + at_end)
+        self.account.take(table_read(self.energies.path))
         kept = {name for _, _, name in self.plan.field_files(self.run.steps_done)}
         for path in self.path.glob("fields_*.vtu"):
             if path.name not in kept:
@@ -232,21 +234,26 @@ class _Record:
         columns = [history[name][new] for name in probes]
         self.rows.append(np.column_stack([number * plan.step, *columns]))
         if run.steps_done % plan.energy == 0 or run.steps_done == plan.total:
-            self.energies.append(_energy_row(run, run.steps_done * plan.step))
+            self.energy_take(run.steps_done * plan.step)
             self.audit_hold()
         self.write_fields()
 
+    def energy_take(self, when: float) -> None:
+        """A row of energies at a time [s], into its file and the account."""
+        row = _energy_row(self.run, when)
+        self.energies.append(row)
+        self.account.take(dict(zip(energy_names(self.run), row[:, 1:].T, strict=True)))
+
     def audit_hold(self) -> None:
         """Raise `EnergyLost` where the account of energies so far does not close."""
-        if self.audit is None:
-            return
-        missing = energy_facts(table_read(self.energies.path))["relative_imbalance"]
-        if missing > self.audit:
+        missing = self.account.relative
+        if self.audit is not None and missing > self.audit:
             raise EnergyLost(
                 f"{missing:.2e} of the greatest energy is missing in the account; "
                 f"{self.audit:.2g} is allowed",
                 where=f"t = {self.run.time:.6g} s, step {self.run.steps_done}",
-                remedy="take a shorter step (simulation.safety), or look in energy.csv what grows",
+                remedy="take a shorter step (simulation.safety), look in energy.csv what grows, or "
+                "allow more (output.audit)",
             )
 
     def write_fields(self) -> None:

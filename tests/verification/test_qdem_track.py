@@ -14,6 +14,7 @@ from matplotlib import image
 import qdem_fem as q
 from qdem_fem import energies, kinetic_damping
 from qdem_fem.cli import Progress
+from qdem_fem.energy_account import EnergyAccount, energy_facts
 from qdem_fem.errors import CheckpointError, EnergyLost, NotConverged, SceneError
 from qdem_fem.load_train import Track, Train, seat_share
 from qdem_fem.material import Material
@@ -228,6 +229,47 @@ def test_a_run_whose_account_does_not_close_stops(
         pytest.raises(EnergyLost, match="missing in the account"),
     ):
         run_dynamic(prepared, run, bodies, folder, resume=False, progress=progress)  # type: ignore[arg-type]
+
+
+def test_account_of_energies_is_the_same_row_by_row() -> None:
+    """As `energy_facts` of all rows; a maximum that is past still counts."""
+    random = np.random.default_rng(3)
+    names = ("kinetic", "elastic", "contact", "friction", "external")
+    rows = {name: np.cumsum(random.normal(size=20)) ** 2 for name in names}
+    account = EnergyAccount()
+    for cuts in ((0, 1), (1, 4), (4, 20)):
+        account.take({name: one[slice(*cuts)] for name, one in rows.items()})
+    whole = energy_facts(rows)
+    assert account.relative == whole["relative_imbalance"]
+    assert account.missing == whole["greatest_imbalance"]
+    assert account.last == {name: whole[name] for name in names}
+
+
+@pytest.mark.parametrize(
+    ("text", "allowed"), [("", None), ("audit = 0.5", 0.5), ("[contact]", 1e-3)]
+)
+def test_where_bodies_touch_the_account_is_looked_at(
+    tmp_path: Path, text: str, allowed: float | None
+) -> None:
+    """By default there and only there."""
+    path = tmp_path / "scene.toml"
+    touch = 'model = "spheres"\nradius = 0.01\nnormal_stiffness = 1e6\nfriction = 0.5'
+    path.write_text(
+        f"""
+        [[body]]
+        name = "block"
+        mesh = {{ box = {{ size = [0.2, 0.1, 0.1], cells = [2, 1, 1] }} }}
+        material = {{ young = 1e8, poisson = 0.2, density = 2000.0 }}
+        [simulation]
+        duration = 0.01
+        gravity = [0, 0, -9.81]
+        [output]
+        {text}
+        """
+        + touch * (text == "[contact]"),
+        encoding="utf-8",
+    )
+    assert scene_load(path).scene.audit == allowed
 
 
 def test_loose_grains_touch_neither_each_other_nor_walls_nor_sleeper() -> None:
