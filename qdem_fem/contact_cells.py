@@ -17,8 +17,8 @@ from numba import njit
 
 PATCH = 3.0
 """Side of a patch over the greatest reach of two spheres."""
-SLACK = 1e-9
-"""By which boxes are larger than asked, over the reach, for the rounding of their edges."""
+SLACK, ROUNDING = 1e-9, 1e-15
+"""By which boxes are larger, over the reach and over where they are: their edges are rounded."""
 MOST_CELLS = 2.0**40
 """Of one body; in more than these its patches are larger."""
 
@@ -109,8 +109,9 @@ def boxes_around(
             i = order[q]
             way = half_reach(radius[i], skin)
             for c in range(3):
-                low[g, c] = min(low[g, c], position[i, c] - way)
-                high[g, c] = max(high[g, c], position[i, c] + way)
+                room = way + ROUNDING * abs(position[i, c])
+                low[g, c] = min(low[g, c], position[i, c] - room)
+                high[g, c] = max(high[g, c], position[i, c] + room)
     return low, high
 
 
@@ -130,7 +131,8 @@ def inside_take(
         way = half_reach(radius[i], skin)
         inside = True
         for c in range(3):
-            inside &= position[i, c] + way >= low[c] and position[i, c] - way <= high[c]
+            room = way + ROUNDING * abs(position[i, c])
+            inside &= position[i, c] + room >= low[c] and position[i, c] - room <= high[c]
         if inside:
             found[count] = i
             count += 1

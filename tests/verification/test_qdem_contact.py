@@ -291,6 +291,24 @@ def test_list_is_complete_and_in_order(seed: int, count: int, scale: float) -> N
     assert found.tolist() == expected.tolist()
 
 
+@pytest.mark.parametrize("far", [0.0, 1.0, 30.0, 1e9])
+def test_pairs_of_bodies_of_many_patches(far: float) -> None:
+    """Two bodies whose spheres fill the same room, some on each other, some far away.
+
+    Far as they are, cells of a body are more than can be counted: they are then larger.
+    """
+    random = np.random.default_rng(7)
+    position = random.uniform(-2, 2, (300, 3)) + far * random.integers(-2, 3, (300, 3))
+    position[250:] = position[:50]  # at the same places, of the other body
+    body = np.concatenate([random.integers(0, 2, 250), np.zeros(50, int)])
+    body[250:] = 1 - body[:50]
+    radius = random.uniform(0.05, 0.1, 300)
+    first, second = pairs_near(position, radius, body, 0.02)
+    found = np.column_stack([np.repeat(np.arange(300), np.diff(first)), second])
+    assert found.tolist() == pairs_twin(position, radius, body, 0.02).tolist()
+    assert len(found) >= 50
+
+
 # --- the slider ----------------------------------------------------------------------------------
 
 
