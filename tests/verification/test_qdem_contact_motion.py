@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import qdem_fem as q
+from qdem_fem import contact_window
 from qdem_fem.contact_search import SEARCH, skin_next
 from qdem_fem.contact_spheres import SKIN
 from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, SceneError, StepWarning
@@ -345,6 +346,44 @@ def test_threads_change_no_bit() -> None:
         run.advance(2 * run.step)
         run.assembly.threads = threads
         run.advance(40 * run.step)
+        states.append(state_of(run))
+    assert states[0] == states[1]
+
+
+def rigid_pair(threads: int | None) -> q.Simulation:
+    """Two rigid cubes that grind on each other."""
+    bodies = [
+        q.Body(box_mesh((SIDE,) * 3, (2, 2, 2), origin=origin), STONE, name=str(k), rigid=True)
+        for k, origin in enumerate(((0, 0, 0), (0.004, 0.002, SIDE + 2 * RADIUS - 2e-6)))
+    ]
+    contact = q.SphereContact(RADIUS, 1e6, 0.5)
+    run = q.Simulation(bodies, threads=threads, gravity=(0, 0, -9.81), contact=contact)
+    bodies[1].velocity = np.tile([0.5, -0.3, -0.2], (len(bodies[1].nodes), 1))
+    return run
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="numba has one thread only")
+def test_rigid_bodies_are_on_the_threads_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They have no elements that could be shared; by default as many as the spheres are worth."""
+    asked = {threads: rigid_pair(threads) for threads in (1, 2, None)}
+    for run in asked.values():
+        run.energy()  # finds the contacts
+    kernels = {threads: run.contacts.kernel for threads, run in asked.items()}
+    found = {n: contact_window.threads_of(asked[n], kernels[n]) for n in asked}
+    assert found == {1: 1, 2: 2, None: 1}
+    monkeypatch.setattr(contact_window, "THREAD_SPHERES", 20)
+    assert contact_window.threads_of(asked[None], kernels[None]) == 2
+    assert contact_window.threads_of(asked[2], None) == asked[2].assembly.threads == 1
+
+
+@pytest.mark.validate
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="numba has one thread only")
+def test_threads_change_no_bit_of_rigid_bodies() -> None:
+    """Compiling takes ten seconds."""
+    states = []
+    for threads in (1, 2):
+        run = rigid_pair(threads)
+        run.advance(200 * run.step)
         states.append(state_of(run))
     assert states[0] == states[1]
 
