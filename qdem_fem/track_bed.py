@@ -58,8 +58,9 @@ FALLS = ("bed", "crib")
 """Stages in which grains fall."""
 KEEP = 300.0
 """Seconds between two times that a stage is saved."""
-ROUGH = (0.1, 1e-3, 0.02)
-"""Unbalanced, kinetic and loose share that end the stages of softer springs."""
+ROUGH, FIRMER = (0.1, 1e-3, 0.02), (0.1, 0.1, 0.02)
+"""Unbalanced, kinetic and loose share that end stages in which grains fall, and those of stiffer
+springs: there a few of thousands of grains always roll, with most of the energy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,9 +144,9 @@ def stage_run(
     )
     if SLEEPER in bodies:
         sleeper_guide(run, bodies[SLEEPER], upright=stage == "crib")
-    shares = (
-        (recipe.unbalanced, recipe.kinetic, recipe.loose) if stage in ("hard", "rest") else ROUGH
-    )
+    shares = FIRMER if stage in FIRM else ROUGH
+    if stage in ("hard", "rest"):
+        shares = (recipe.unbalanced, recipe.kinetic, recipe.loose)
     told = None if progress is None else (lambda rest: progress(stage, rest))
     together = recipe.periodic and stage in ("hard", "rest")  # as said above: a heap slides
     sitting = Sitting(run, part, started)
