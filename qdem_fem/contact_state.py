@@ -22,7 +22,7 @@ from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.contact_window import advance_of, window_run
 from qdem_fem.errors import ConditionError, ContactTooDeep, StepWarning
-from qdem_fem.periodic import extents, extents_check, joined_check
+from qdem_fem.periodic import PeriodicWidth, extents, extents_check, joined_check
 
 if TYPE_CHECKING:
     from qdem_fem.critical_step import CriticalStep
@@ -107,7 +107,8 @@ class Contacts(ABC):
 
     @abstractmethod
     def lists_renew(self, position: Floats) -> None:
-        """Look for what may touch around vertices at (c, 3) [m]; what touches keeps its springs."""
+        """Look for what may touch around vertices at (c, 3) [m], where ways begin anew; what
+        touches keeps its springs."""
 
     @abstractmethod
     def stiffness_now(self) -> float:
@@ -186,16 +187,24 @@ class Contacts(ABC):
 
     def pairs_find(self) -> None:
         """Look for pairs anew; those that touch keep their springs."""
-        displacement = np.asarray(self.run.assembly.state.displacement)
-        position = self.reference + displacement[4 * self.place[:, None] + np.arange(3)]
-        if not np.isfinite(position).all():
+        position = self.positions()
+        if position is None:
             return  # what made it so is told by the march
         self.images_check(position)
         self.lists_renew(position)
         self._near = None
-        self.kernel.start[:] = position
         self.renewals += 1
         self.lasted = 0
+
+    def positions(self) -> Floats | None:
+        """Where the vertices are, (c, 3) [m]; None where one is not a number."""
+        displacement = np.asarray(self.run.assembly.state.displacement)
+        position = self.reference + displacement[4 * self.place[:, None] + np.arange(3)]
+        return position if np.isfinite(position).all() else None
+
+    def extents(self, position: Floats, side: PeriodicWidth) -> Floats:
+        """Extent of each body along the axis of a width [m], (bodies,)."""
+        return extents(position[:, side.number], self.own, self.first_vertex)
 
     def images_check(self, position: Floats) -> None:
         """Raise `ConditionError` for a body that would touch its own image across the width."""
@@ -208,7 +217,7 @@ class Contacts(ABC):
                 nodes = slice(*run.first_node[b : b + 2])
                 master = run.master[nodes] - run.first_node[b]
                 joined_check(run.bodies[b], master, side, self.where)
-        size = extents(position[:, side.number], self.own, self.first_vertex)
+        size = self.extents(position, side)
         self.room = extents_check(run.bodies, size, slab, self.reach, side, self.where)
 
     @property

@@ -167,6 +167,7 @@ class SurfaceContacts(Contacts):
             self.near, surface, position, self.firsts, reach, self.way, self.seams(position)
         )
         self.kernel = self.kernel._replace(near=near)
+        self.kernel.start[:] = position
 
     def seams(self, position: Floats) -> Floats:
         """Where along the width a body begins that is one with its images, (b,) [m]; else NaN."""

@@ -22,7 +22,7 @@ from qdem_fem.lanes import lane_count
 from qdem_fem.reference_forces import Strain
 
 if TYPE_CHECKING:
-    from qdem_fem.cuda_contact import DeviceContact
+    from qdem_fem.cuda_contact_state import DeviceContact
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
