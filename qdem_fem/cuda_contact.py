@@ -4,8 +4,8 @@ A step of contact is three launches behind those of the elements and the motion,
 positions, pairs, walls, reactions; one before them adds the forces found to the nodes.  A sphere's
 force is summed over its own row, then over the pairs in which it is the second, in their order, as
 on the processor: no atomics but where the forces reach the nodes.  A vertex that leaves the skin
-ends the window (`ANEW`) before any force of its step is computed; pairs are looked for, and that one
-step is computed then (`qdem_fem.cuda_contact_state`).  Contact is in double precision.
+ends the window (`ANEW`) before any force of its step is computed; pairs are looked for, and then
+that one step is computed (`qdem_fem.cuda_contact_state`).  Contact is in double precision.
 """
 
 from __future__ import annotations

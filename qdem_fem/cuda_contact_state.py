@@ -1,7 +1,7 @@
-"""What contact of spheres remembers on a GPU, the launches of a step, and the list made anew there.
+"""What contact of spheres remembers on a GPU, the launches of a step, and its lists made anew.
 
-Arrays are those of `qdem_fem.contact_kernel.Contact`, and stay on the GPU: neither a step nor a look
-for pairs moves one to the host, which reads counts and greatest values alone.
+Arrays are those of `qdem_fem.contact_kernel.Contact`, and stay on the GPU: neither a step nor a
+look for pairs moves one to the host, which reads counts and greatest values alone.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class DeviceContact:
             array.copy_to_device(np.zeros(tuple(array.shape), array.dtype))
 
     def fetch(self, c: Contact) -> Contact:
-        """``c`` with copies of what steps and looks for pairs have changed, not to be written to."""
+        """``c`` with copies, not to be written to, of what steps and looks for pairs change."""
         first, _, back_first, *_, wall_first, wall = self.on.pairs
         first, back_first, wall_first = (
             host_array(a, self.size + 1) for a in (first, back_first, wall_first)

@@ -1,9 +1,8 @@
-"""Sums of all numbers before each one, on a GPU: where the rows of a list begin, from their lengths.
+"""Sums of all numbers before each, on a GPU: where rows of a list begin, from their lengths.
 
 A thread adds a chunk of numbers one after the other; the sums of the chunks are summed in the same
-way, and a second pass goes through every chunk from what stands before it.  Whole numbers: no order
-changes them.  No memory shared by a block and no barrier, which would be quicker by a factor in what
-is a small part of a look for pairs, and slow in numba's simulator.
+way, and a second pass goes through every chunk from what stands before it.  No memory shared by a
+block and no barrier: a look for pairs reads more than this does, and seldom is there one.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Which spheres may touch, found on a GPU: the twin of `qdem_fem.contact_search`, a thread a sphere.
+"""Which spheres may touch, found on a GPU: the twin of `qdem_fem.contact_search`.
 
-Every sphere goes through the 27 cells about it twice: to count its row of pairs, and, when it is
-known where rows begin, to write it.  A row is sorted while it is written, and so is the list of the
-pairs in which a sphere is the second.  So all lists are the processor's, number by number, in
-whatever order a bucket was filled (`qdem_fem.cuda_cells`), and forces are summed in the same order.
+A thread goes with its sphere through the 27 cells about it twice: to count its row of pairs, and,
+when it is known where rows begin, to write it.  A row is sorted while it is written, and behind
+that the pairs in which a sphere is the second.  So all lists are the processor's, number by number,
+in whatever order a bucket was filled (`qdem_fem.cuda_cells`); so is the order of sums.
 
 The host reads three counts, to make arrays, and nothing else.
 """
@@ -21,6 +21,7 @@ from qdem_fem.cuda_cells import cell_bucket, cells_of, entries_of, zeros_put
 from qdem_fem.cuda_scan import sums_before
 from qdem_fem.cuda_step import cuda, grid
 from qdem_fem.periodic import PeriodicWidth
+
 
 @cache
 def rows_kernel(filling: bool) -> Any:
@@ -114,9 +115,7 @@ def backs_sort(back_first: Any, back_pair: Any) -> None:
 
 
 @cuda.jit(device=True)
-def wall_near(
-    position: Any, radius: Any, point: Any, normal: Any, way: Any, i: Any, w: Any
-) -> Any:
+def wall_near(position: Any, radius: Any, point: Any, normal: Any, way: Any, i: Any, w: Any) -> Any:
     """Whether sphere i touches wall w, or will on a ``way`` [m]."""
     apart = 0.0
     for c in range(3):
