@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import Contact, Planes, Spheres
+from qdem_fem.contact_outside import outsides_of
 from qdem_fem.contact_search import NO_IMAGE, Pairs, pairs_of, pairs_renew, skin_next, walls_near
 from qdem_fem.contact_spheres import (
     NEAR,
     SKIN,
     SphereContact,
     pair_stiffness,
+    planes_arrays,
     tangential_stiffness,
 )
 from qdem_fem.contact_state import (
@@ -23,8 +25,6 @@ from qdem_fem.contact_state import (
     ContactTouching,
     Floats,
     Integers,
-    outsides_of,
-    planes_arrays,
 )
 from qdem_fem.contact_step import network_bound
 
@@ -46,7 +46,7 @@ class SphereContacts(Contacts):
     def __init__(self, run: Simulation, asked: SphereContact) -> None:
         outside = [
             replace(o, node=o.node[o.own], reference=o.reference[o.own], own=o.own[o.own])
-            for o in outsides_of(run, asked, 0.0)
+            for o in outsides_of(run, asked.periodic, 0.0)
         ]
         super().__init__(run, asked, outside)
         counts = np.diff(self.first_vertex)

@@ -16,8 +16,8 @@ from qdem_fem import kernel
 from qdem_fem.contact_inside import inside_check
 from qdem_fem.contact_kernel import LOOK_ANEW, TOO_DEEP
 from qdem_fem.contact_near import near_check, near_step
-from qdem_fem.contact_outside import Outside, outside_of
-from qdem_fem.contact_spheres import NEAR, ContactPlane, SphereContact
+from qdem_fem.contact_outside import Outside
+from qdem_fem.contact_spheres import NEAR, SphereContact
 from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.contact_window import advance_of, window_run
@@ -312,25 +312,3 @@ class Contacts(ABC):
         np.add.at(flat[:, :3], self.place, self.kernel.force)
         flat *= np.asarray(assembly.state.inverse_mass, dtype=float)[:, None]
         return flat[assembly.place, :3]
-
-
-def outsides_of(
-    run: Simulation, asked: SphereContact | SurfaceContact, reach: float
-) -> list[Outside]:
-    """`outside_of` every body; of slabs, images of faces up to ``reach`` [m] beyond a side."""
-    found = []
-    for body, start in zip(run.bodies, run.first_node, strict=False):
-        master = run.master[start : start + len(body.nodes)] - start
-        found.append(outside_of(body.nodes, body.surface, master, asked.periodic, reach))
-    return found
-
-
-def planes_arrays(planes: Sequence[ContactPlane], friction: float) -> tuple[Floats, Floats, Floats]:
-    """Points (w, 3) [m], unit normals (w, 3) and frictions (w,) of walls."""
-    across = np.array([plane.normal for plane in planes], dtype=float).reshape(-1, 3)
-    own = [friction if plane.friction is None else plane.friction for plane in planes]
-    return (
-        np.array([plane.point for plane in planes], dtype=float).reshape(-1, 3),
-        across / np.linalg.norm(across, axis=1, keepdims=True),
-        np.array(own, dtype=float),
-    )

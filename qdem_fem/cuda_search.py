@@ -23,6 +23,17 @@ from qdem_fem.cuda_step import cuda, grid
 from qdem_fem.periodic import PeriodicWidth
 
 
+@cuda.jit(device=True)
+def square_apart(at: Any, e: Any, f: Any) -> Any:
+    """Square of the distance of entries e and f [m^2].
+
+    Fused by hand, here and for walls: a compiler is free to fuse one kernel in another way than the
+    next, and rows must be as long when they are written as when they were counted.
+    """
+    x, y, z = at[e, 0] - at[f, 0], at[e, 1] - at[f, 1], at[e, 2] - at[f, 2]
+    return cuda.fma(z, z, cuda.fma(y, y, x * x))
+
+
 @cache
 def rows_kernel(filling: bool) -> Any:
     """The kernel that goes through the cells: it counts pairs, or, ``filling``, writes them."""
@@ -61,10 +72,7 @@ def rows_kernel(filling: bool) -> Any:
                     if j <= i or body[j] == body[i]:
                         continue
                     reach = radius[i] + radius[j] + skin
-                    apart = 0.0
-                    for c in range(3):
-                        apart += (at[e, c] - at[f, c]) ** 2
-                    if apart > reach * reach:
+                    if square_apart(at, e, f) > reach * reach:
                         continue
                     if filling:
                         place = first[i] + found  # rows are short: sort by insertion
@@ -117,9 +125,9 @@ def backs_sort(back_first: Any, back_pair: Any) -> None:
 @cuda.jit(device=True)
 def wall_near(position: Any, radius: Any, point: Any, normal: Any, way: Any, i: Any, w: Any) -> Any:
     """Whether sphere i touches wall w, or will on a ``way`` [m]."""
-    apart = 0.0
-    for c in range(3):
-        apart += (position[i, c] - point[w, c]) * normal[w, c]
+    apart = (position[i, 0] - point[w, 0]) * normal[w, 0]
+    apart = cuda.fma(position[i, 1] - point[w, 1], normal[w, 1], apart)
+    apart = cuda.fma(position[i, 2] - point[w, 2], normal[w, 2], apart)
     return apart - radius[i] < way
 
 
