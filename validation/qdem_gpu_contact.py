@@ -91,11 +91,12 @@ def processor_idle(run: q.Simulation) -> Iterator[list[str]]:
         yield copies
 
 
-def contact_apart(moved: float = 0.0, **asked: Any) -> float:
+def contact_apart(moved: float = 0.0, restored: bool = False, **asked: Any) -> float:
     """Greatest difference after `STEPS` in marches of unequal length, over its bar.
 
-    ``asked``: of `two_cubes`; behind the first march the upper cube is set ``moved`` [m] higher.
-    The list has to be made in the same steps, and within a march no array comes to the host.
+    ``asked``: of `two_cubes`; behind the first march the upper cube is set ``moved`` [m] higher, or
+    springs are let go and ``restored`` from what was stored.  The list has to be made in the same
+    steps, and within a march no array comes to the host.
     """
     states = []
     for device in ("cpu", "cuda"):
@@ -104,6 +105,11 @@ def contact_apart(moved: float = 0.0, **asked: Any) -> float:
             run.advance(round(0.35 * STEPS) * run.step)
             if moved:
                 run.bodies[1].displacement += np.array([0.0, 0.0, moved])
+            if restored:
+                assert run.contacts is not None
+                kept = {name: array.copy() for name, array in run.contacts.stored().items()}
+                run.contacts.forget()
+                run.contacts.restore(kept)
             run.advance(round(0.15 * STEPS) * run.step)
             before = len(copies)
             run.advance(round(0.5 * STEPS) * run.step)
@@ -143,6 +149,8 @@ MARCHES: dict[str, dict[str, Any]] = {
     "a skin that follows the motion": {"velocity": (-300.0, 50.0, 1.0)},
     "parted by more than the skin": {"velocity": (3.0, -2.0, 1.0), "skin": 1e-7},
     "a body set elsewhere": {"skin": 2e-6, "moved": 1e-6},
+    "springs restored": {"skin": 2e-6, "restored": True},
+    "images restored": {"skin": 1e-3, "periodic": True, "restored": True},
     "a step for what is near": {"skin": 2e-4, "contacts": "near"},
 }
 """What `contact_apart` is asked, by name."""
