@@ -1,9 +1,9 @@
 """The bodies of a simulation on a GPU: state and element data stay there from window to window.
 
 `CudaAssembly` answers the calls of `qdem_fem.assembly.Assembly`; ``Simulation(..., device="cuda")``
-takes it in its place.  A window goes to the GPU as launches without a wait in between; what comes
-back at its end is how many steps were done, the count of bad elements, the samples of the probes
-and the work of the few nodes with loads and constraints.
+takes it in its place.  A window goes to the GPU as launches without a wait in between (with contact
+there are few); what comes back at its end is how many steps were done, the count of bad elements,
+the samples of the probes and the work of the few nodes with loads and constraints.
 """
 
 from __future__ import annotations
@@ -46,6 +46,12 @@ def gpu_require() -> None:
         where=where,
         remedy='compute with device="cpu", or where an NVIDIA GPU and its driver are at hand',
     )
+
+
+LOOK = 16
+"""Steps of contact between two looks of the host at whether the window has ended.  A list is good
+for some 40 steps where bodies move (`qdem_fem.contact_search.skin_next`), a window may be of
+thousands: those launched behind its end compute nothing, but each launch takes its time."""
 
 
 class NodeActions(NamedTuple):
@@ -179,7 +185,8 @@ class CudaAssembly(Assembly):
     ) -> tuple[int, float]:
         """Launch the steps and wait once, at the end; arguments as of `Assembly.kernel_run`.
 
-        ``contact``: of spheres, whose steps follow those of the bodies; its ``said`` is set.
+        ``contact``: of spheres, whose steps follow those of the bodies; its ``said`` is set.  Its
+        list may end the window early: then the host waits every `LOOK` steps.
         """
         from qdem_fem import cuda_step
         from qdem_fem.cuda_step import cuda
@@ -214,6 +221,8 @@ class CudaAssembly(Assembly):
         launch_forces = self._forces_kernel[self._element_blocks, cuda_step.BLOCK]
         launch_motion = motion[self._node_blocks, cuda_step.BLOCK]
         for k, sample in enumerate(samples.tolist()):
+            if contact is not None and k % LOOK == 0 and status[cuda_step.LIMIT] <= k:
+                break
             if contact is not None:
                 contact.launch_push(state.forces, status, k)
             launch_forces(*of_elements, half, dt, k)

@@ -127,6 +127,38 @@ def contact_apart(moved: float = 0.0, restored: bool = False, **asked: Any) -> f
     )
 
 
+def steps_launched(look: int) -> list[tuple[int, int]]:
+    """Steps done and launched in each window of contact of a march whose list lasts two steps.
+
+    The host looks every ``look`` steps whether a window has ended.
+    """
+    from qdem_fem import cuda_assembly
+    from qdem_fem.cuda_contact_state import DeviceContact
+
+    windows: list[tuple[int, int]] = []
+    push, run_window = DeviceContact.launch_push, cuda_assembly.CudaAssembly.kernel_run
+
+    def push_counted(*given: Any) -> None:
+        done, launched = windows[-1]
+        windows[-1] = done, launched + 1
+        push(*given)
+
+    def window_counted(*given: Any) -> tuple[int, float]:
+        windows.append((0, 0))
+        done, bad = run_window(*given)
+        windows[-1] = done, windows[-1][1]
+        return done, bad
+
+    with (
+        patch.object(cuda_assembly, "LOOK", look),
+        patch.object(DeviceContact, "launch_push", push_counted),
+        patch.object(cuda_assembly.CudaAssembly, "kernel_run", window_counted),
+    ):
+        run = two_cubes("cuda", skin=2e-6)
+        run.advance(STEPS * run.step)
+    return [window for window in windows if window[1]]  # others are of elements alone
+
+
 def too_deep_apart() -> float:
     """Two that are driven into each other: both stop at the same step with the same words."""
     said = []

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from validation.qdem_gpu_contact import STEPS, steps_launched
 from validation.qdem_gpu_search import (
     CLOUDS,
     Cloud,
@@ -113,6 +114,13 @@ def test_what_a_march_asks_is_the_processors(simulator: Executor, name: str) -> 
     np.testing.assert_array_equal(found.extents, expected.extents)
     assert found.extents[1] == 0  # a body without a vertex
     assert found.finite
+
+
+def test_steps_behind_the_end_of_a_window_are_not_launched(simulator: Executor) -> None:
+    """But those up to the host's next look; a list of two steps ends each window but the last."""
+    windows = simulator.submit(steps_launched, 3).result()
+    assert sum(done for done, _ in windows) == STEPS
+    assert windows[:-1] == [(2, 3)] * (STEPS // 2)
 
 
 def test_a_vertex_that_is_nowhere_is_seen(simulator: Executor) -> None:
