@@ -153,6 +153,25 @@ class CudaAssembly(Assembly):
         self._node_blocks = -(-self.n_nodes // cuda_step.BLOCK)
         self._forces_kernel = cuda_step.element_forces_kernel(strain, bool(self.viscous))
 
+        by_node = np.bincount(self.place, weights=self.mass, minlength=self.n_nodes)
+        self._mass = cuda.to_device(by_node)
+
+    def kinetic(self) -> float:
+        """`Assembly.kinetic`; fields stay on the GPU, where no body has a frame."""
+        return super().kinetic() if self.frames is not None else 0.5 * float(self._sums()[0])
+
+    def moment(self) -> tuple[Floats, Floats]:
+        """`Assembly.moment`; fields stay on the GPU, where no body has a frame."""
+        if self.frames is not None:
+            return super().moment()
+        found = self._sums()
+        return found[1:4], found[4:]
+
+    def _sums(self) -> Floats:
+        from qdem_fem.cuda_sums import motion_summed
+
+        return motion_summed(self.state.displacement, self.state.velocity, self._mass)
+
     def _state(self, inverse_mass: Floats) -> kernel.State:
         from qdem_fem.cuda_step import cuda
 

@@ -59,6 +59,8 @@ def state_of(run: q.Simulation) -> dict[str, Any]:
         "velocity": np.concatenate([body.velocity for body in run.bodies]),
         "force": kernel.force, "spring": touching.spring, "pull": touching.force,
         "wall spring": kernel.planes.spring, "slid": kernel.slid,
+        "sums": np.concatenate([[run.assembly.kinetic()], *run.assembly.moment()]),
+        "gravity": np.array([run.motion.gravity_work]),
         "energies": np.array([energy.contact, energy.friction, energy.kinetic, energy.elastic]),
         "counts": np.array([contacts.renewals, contacts.lasted, len(touching.first)]),
         "skin": np.array([contacts.skin, run.steps_done]),
@@ -69,24 +71,30 @@ def state_of(run: q.Simulation) -> dict[str, Any]:
 @contextmanager
 def processor_idle(run: q.Simulation) -> Iterator[list[str]]:
     """What steps on a GPU should leave alone: the processor's search and step raise, and copies of
-    all arrays to the host are listed."""
+    contact or of a field to the host are listed."""
     if run.device == "cpu":
         yield []
         return
+    from qdem_fem.cuda_assembly import CudaAssembly
     from qdem_fem.cuda_contact_state import DeviceContact
 
     copies: list[str] = []
-    fetch = DeviceContact.fetch
+    fetch, read = DeviceContact.fetch, CudaAssembly._read
 
-    def noted(self: Any, c: Any) -> Any:
-        copies.append("fetch")
-        return fetch(self, c)
+    def fetch_noted(*given: Any) -> Any:
+        copies.append("contact")
+        return fetch(*given)
+
+    def read_noted(*given: Any) -> Any:
+        copies.append("a field")
+        return read(*given)
 
     refused = AssertionError("the processor was asked")
     with (
         patch("qdem_fem.contact_sphere_state.pairs_renew", side_effect=refused),
         patch("qdem_fem.contact_state.advance_of", side_effect=refused),
-        patch.object(DeviceContact, "fetch", noted),
+        patch.object(DeviceContact, "fetch", fetch_noted),
+        patch.object(CudaAssembly, "_read", read_noted),
     ):
         yield copies
 
