@@ -191,6 +191,17 @@ def sums_before(values: Integers) -> Integers:
     return found
 
 
+def motion_summed(displacement: Floats, velocity: Floats, mass: Floats, parts: int) -> Floats:
+    """`qdem_fem.cuda_sums.motion_summed` of fields (n, 4) by so many threads on a GPU."""
+    from qdem_fem import cuda_sums
+    from qdem_fem.cuda_step import cuda
+
+    with patch.object(cuda_sums, "PARTS", parts):
+        return cuda_sums.motion_summed(
+            *(cuda.to_device(array.ravel()) for array in (displacement, velocity, mass))
+        )
+
+
 def simulator_begin() -> None:
     """Small blocks: in numba's simulator every thread of a block costs, at work or not."""
     from qdem_fem import cuda_step

@@ -20,6 +20,7 @@ from validation.qdem_gpu_search import (
     lists_gpu,
     lists_gpu_shuffled,
     lists_processor,
+    motion_summed,
     simulator_begin,
     sums_before,
     sums_gpu,
@@ -85,6 +86,16 @@ def test_a_list_differs_where_a_sphere_does() -> None:
     one, other = (lists_processor(cloud(seed, **CLOUDS["a cloud"]), seed) for seed in (0, 1))
     assert {"second", "back_pair", "touching", "spring", "pull", "wall"} <= {*differing(one, other)}
     assert one.touching.any()
+
+
+@pytest.mark.parametrize("parts", [1, 5, 64])
+def test_energy_and_momentum_are_summed(simulator: Executor, parts: int) -> None:
+    """Every p-th node by one thread, 23 nodes in all: to the rounding of as many terms."""
+    random = np.random.default_rng(parts)
+    (u, v), mass = random.uniform(1.0, 2.0, (2, 23, 4)), random.uniform(1.0, 2.0, 23)
+    expected = [(mass[:, None] * v[:, :3] ** 2).sum(), *mass @ u[:, :3], *mass @ v[:, :3]]
+    found = simulator.submit(motion_summed, u, v, mass, parts).result()
+    np.testing.assert_allclose(found, expected, rtol=3 * 23 * EPS)
 
 
 @pytest.mark.parametrize("count", [1, 63, 64, 65, 64 * 64 + 1])
