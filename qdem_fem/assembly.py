@@ -169,6 +169,13 @@ class Assembly:
             (self.mass * np.einsum("nc,nc->n", own, own, dtype=float)[self.place]).sum()
         )
 
+    def moment(self) -> tuple[Floats, Floats]:
+        """``sum m u`` [kg m] and ``sum m v`` [kg m/s] of the fields as they are, (3,) each."""
+        if not len(self.elements):
+            return np.zeros(3), np.zeros(3)
+        place, speed = (np.einsum("n,nc->c", self.mass, self.field(name)) for name in FIELDS)
+        return place, speed
+
     def _frames_choose(self, conditions: Conditions, gravity: bool) -> None:
         """Give frames to the bodies that are free, and take them from those that no longer are."""
         displacement, velocity = self.field("displacement"), self.field("velocity")

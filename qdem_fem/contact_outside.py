@@ -8,11 +8,15 @@ other, as images of the same nodes, so that what slides over the side stays on a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.periodic import PeriodicWidth, twins_joined
+
+if TYPE_CHECKING:
+    from qdem_fem.simulation import Simulation
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -68,3 +72,12 @@ def outside_of(
         node, nodes[node] + times[:, None] * side.way, np.searchsorted(vertex, every), len(face),
         (vertex < count) & ~np.isin(vertex, high), vertex >= count, True,
     )  # fmt: skip
+
+
+def outsides_of(run: Simulation, side: PeriodicWidth | None, reach: float) -> list[Outside]:
+    """`outside_of` every body; of slabs, images of faces up to ``reach`` [m] beyond a side."""
+    found = []
+    for body, start in zip(run.bodies, run.first_node, strict=False):
+        master = run.master[start : start + len(body.nodes)] - start
+        found.append(outside_of(body.nodes, body.surface, master, side, reach))
+    return found

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.contact_kernel import Contact, Planes, Spheres
+from qdem_fem.contact_outside import outsides_of
 from qdem_fem.contact_search import NO_IMAGE, Pairs, pairs_of, pairs_renew, skin_next, walls_near
 from qdem_fem.contact_spheres import (
     NEAR,
     SKIN,
     SphereContact,
     pair_stiffness,
+    planes_arrays,
     tangential_stiffness,
 )
 from qdem_fem.contact_state import (
@@ -23,14 +25,14 @@ from qdem_fem.contact_state import (
     ContactTouching,
     Floats,
     Integers,
-    outsides_of,
-    planes_arrays,
 )
 from qdem_fem.contact_step import network_bound
 
 if TYPE_CHECKING:
     from qdem_fem.simulation import Simulation
 
+PARTED = 1 + 1e-9
+"""By how much a list reaches farther than what has parted, for round-off."""
 PAIR_ARRAYS = ("first", "second", "touching", "spring", "pull")
 CONTACT_ARRAYS = ("start", "position", "force", "slid")
 PLANE_ARRAYS = ("spring", "force")
@@ -44,7 +46,7 @@ class SphereContacts(Contacts):
     def __init__(self, run: Simulation, asked: SphereContact) -> None:
         outside = [
             replace(o, node=o.node[o.own], reference=o.reference[o.own], own=o.own[o.own])
-            for o in outsides_of(run, asked, 0.0)
+            for o in outsides_of(run, asked.periodic, 0.0)
         ]
         super().__init__(run, asked, outside)
         counts = np.diff(self.first_vertex)
@@ -97,18 +99,26 @@ class SphereContacts(Contacts):
 
     def lists_renew(self, position: Floats) -> None:
         """Look for pairs around vertices at (c, 3) [m]; the skin follows how fast they move."""
-        spheres, (least, most) = self.kernel.spheres, self.skins
+        least, most = self.skins
         room = least + self.room / 2
-        idle = len(self.pairs.second) - int(self.pairs.touching.sum())
         self.skin = skin_next(
-            self.skin, self.lasted, idle, len(self.nodes), least, min(most, room)
+            self.skin, self.lasted, self.idle(), len(self.nodes), least, min(most, room)
         )  # fmt: skip
-        skin = max(self.skin, min(self.parted(position), self.deep, room))
+        self.pairs_look(position, max(self.skin, min(self.parted(position), self.deep, room)))
+
+    def idle(self) -> int:
+        """Pairs of the list that do not touch."""
+        return len(self.pairs.second) - int(self.pairs.touching.sum())
+
+    def pairs_look(self, position: Floats, skin: float) -> None:
+        """List the pairs within ``skin`` [m] of each other at (c, 3) [m]."""
+        spheres = self.kernel.spheres
         pairs = pairs_renew(
             self.pairs, position, spheres.radius, spheres.body, skin,
             self.walls(position, skin), self.asked.periodic,
         )  # fmt: skip
         self.kernel = self.kernel._replace(pairs=pairs, half_skin=self.skin / 2)
+        self.kernel.start[:] = position
 
     def parted(self, position: Floats) -> float:
         """By how much what touched in the last step is apart at (c, 3) [m].
@@ -123,7 +133,7 @@ class SphereContacts(Contacts):
         for point, normal, force in zip(planes.point, planes.normal, planes.force, strict=True):
             held = force.any(axis=1)
             gaps.append((position[held] - point) @ normal - radius[held])
-        return (1 + 1e-9) * float(np.concatenate(gaps).max(initial=0.0))
+        return PARTED * float(np.concatenate(gaps).max(initial=0.0))
 
     def walls(self, position: Floats, skin: float) -> NDArray[np.bool_]:
         """Which vertices at (c, 3) [m] touch which walls, or may on a way of ``skin`` [m]."""
@@ -225,15 +235,14 @@ class SphereContacts(Contacts):
 
     def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Take what `stored` gave."""
-        given = {name: arrays[f"contact_{name}"] for name in PAIR_ARRAYS}
-        walls = self.walls(arrays["contact_start"], self.skin)
+        given = {name: arrays[f"contact_{name}"].copy() for name in PAIR_ARRAYS + CONTACT_ARRAYS}
+        walls = self.walls(given["start"], self.skin)
         image = NO_IMAGE if self.asked.periodic is None else arrays["contact_image"].copy()
-        pairs = pairs_of(given["first"].copy(), given["second"].copy(), walls, image)
-        for name in ("touching", "spring", "pull"):
-            getattr(pairs, name)[:] = given[name]
-        self.kernel = self.kernel._replace(pairs=pairs)
-        for name in CONTACT_ARRAYS:
-            getattr(self.kernel, name)[:] = arrays[f"contact_{name}"]
-        for name in PLANE_ARRAYS:
-            getattr(self.kernel.planes, name)[:] = arrays[f"contact_plane_{name}"]
+        pairs = pairs_of(given["first"], given["second"], walls, image)
+        held = {name: arrays[f"contact_plane_{name}"].copy() for name in PLANE_ARRAYS}
+        self.kernel = self.kernel._replace(
+            pairs=pairs._replace(**{name: given[name] for name in PAIR_ARRAYS}),
+            planes=self.kernel.planes._replace(**held),
+            **{name: given[name] for name in CONTACT_ARRAYS},
+        )
         self.stale, self._near = False, None

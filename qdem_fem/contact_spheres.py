@@ -169,3 +169,14 @@ def planes_along_check(periodic: Any, planes: Sequence[ContactPlane]) -> None:
                 where=f"contact, plane.{number}",
                 remedy="a wall has to be parallel to the axis of the width",
             )
+
+
+def planes_arrays(planes: Sequence[ContactPlane], friction: float) -> tuple[Floats, Floats, Floats]:
+    """Points (w, 3) [m], unit normals (w, 3) and frictions (w,) of walls."""
+    across = np.array([plane.normal for plane in planes], dtype=float).reshape(-1, 3)
+    own = [friction if plane.friction is None else plane.friction for plane in planes]
+    return (
+        np.array([plane.point for plane in planes], dtype=float).reshape(-1, 3),
+        across / np.linalg.norm(across, axis=1, keepdims=True),
+        np.array(own, dtype=float),
+    )

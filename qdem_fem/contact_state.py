@@ -16,13 +16,13 @@ from qdem_fem import kernel
 from qdem_fem.contact_inside import inside_check
 from qdem_fem.contact_kernel import LOOK_ANEW, TOO_DEEP
 from qdem_fem.contact_near import near_check, near_step
-from qdem_fem.contact_outside import Outside, outside_of
-from qdem_fem.contact_spheres import NEAR, ContactPlane, SphereContact
+from qdem_fem.contact_outside import Outside
+from qdem_fem.contact_spheres import NEAR, SphereContact
 from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.contact_window import advance_of, window_run
 from qdem_fem.errors import ConditionError, ContactTooDeep, StepWarning
-from qdem_fem.periodic import extents, extents_check, joined_check
+from qdem_fem.periodic import PeriodicWidth, extents, extents_check, joined_check
 
 if TYPE_CHECKING:
     from qdem_fem.critical_step import CriticalStep
@@ -111,7 +111,8 @@ class Contacts(ABC):
 
     @abstractmethod
     def lists_renew(self, position: Floats) -> None:
-        """Look for what may touch around vertices at (c, 3) [m]; what touches keeps its springs."""
+        """Look for what may touch around vertices at (c, 3) [m], where ways begin anew; what
+        touches keeps its springs."""
 
     @abstractmethod
     def stiffness_now(self) -> float:
@@ -194,16 +195,24 @@ class Contacts(ABC):
 
     def pairs_find(self) -> None:
         """Look for pairs anew; those that touch keep their springs."""
-        displacement = np.asarray(self.run.assembly.state.displacement)
-        position = self.reference + displacement[4 * self.place[:, None] + np.arange(3)]
-        if not np.isfinite(position).all():
+        position = self.positions()
+        if position is None:
             return  # what made it so is told by the march
         self.images_check(position)
         self.lists_renew(position)
         self._near = None
-        self.kernel.start[:] = position
         self.renewals += 1
         self.lasted = 0
+
+    def positions(self) -> Floats | None:
+        """Where the vertices are, (c, 3) [m]; None where one is not a number."""
+        displacement = np.asarray(self.run.assembly.state.displacement)
+        position = self.reference + displacement[4 * self.place[:, None] + np.arange(3)]
+        return position if np.isfinite(position).all() else None
+
+    def extents(self, position: Floats, side: PeriodicWidth) -> Floats:
+        """Extent of each body along the axis of a width [m], (bodies,)."""
+        return extents(position[:, side.number], self.own, self.first_vertex)
 
     def images_check(self, position: Floats) -> None:
         """Raise `ConditionError` for a body that would touch its own image across the width."""
@@ -216,7 +225,7 @@ class Contacts(ABC):
                 nodes = slice(*run.first_node[b : b + 2])
                 master = run.master[nodes] - run.first_node[b]
                 joined_check(run.bodies[b], master, side, self.where)
-        size = extents(position[:, side.number], self.own, self.first_vertex)
+        size = self.extents(position, side)
         self.room = extents_check(run.bodies, size, slab, self.reach, side, self.where)
 
     @property
@@ -314,25 +323,3 @@ class Contacts(ABC):
         np.add.at(flat[:, :3], self.place, self.kernel.force)
         flat *= np.asarray(assembly.state.inverse_mass, dtype=float)[:, None]
         return flat[assembly.place, :3]
-
-
-def outsides_of(
-    run: Simulation, asked: SphereContact | SurfaceContact, reach: float
-) -> list[Outside]:
-    """`outside_of` every body; of slabs, images of faces up to ``reach`` [m] beyond a side."""
-    found = []
-    for body, start in zip(run.bodies, run.first_node, strict=False):
-        master = run.master[start : start + len(body.nodes)] - start
-        found.append(outside_of(body.nodes, body.surface, master, asked.periodic, reach))
-    return found
-
-
-def planes_arrays(planes: Sequence[ContactPlane], friction: float) -> tuple[Floats, Floats, Floats]:
-    """Points (w, 3) [m], unit normals (w, 3) and frictions (w,) of walls."""
-    across = np.array([plane.normal for plane in planes], dtype=float).reshape(-1, 3)
-    own = [friction if plane.friction is None else plane.friction for plane in planes]
-    return (
-        np.array([plane.point for plane in planes], dtype=float).reshape(-1, 3),
-        across / np.linalg.norm(across, axis=1, keepdims=True),
-        np.array(own, dtype=float),
-    )

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.contact_outside import outsides_of
 from qdem_fem.contact_search import NO_IMAGE
-from qdem_fem.contact_spheres import pair_stiffness, tangential_stiffness
-from qdem_fem.contact_state import Contacts, Floats, Integers, outsides_of, planes_arrays
+from qdem_fem.contact_spheres import pair_stiffness, planes_arrays, tangential_stiffness
+from qdem_fem.contact_state import Contacts, Floats, Integers
 from qdem_fem.contact_surface import DEPTH, SurfaceContact, face_points, sharp_edges
 from qdem_fem.contact_surface_arrays import Near, Overlaps, Surface, SurfaceTouch, Walls
 from qdem_fem.contact_surface_search import (
@@ -43,7 +44,7 @@ class SurfaceContacts(Contacts):
         )
         self.skin = self.deep = self.depth
         # an image goes on beyond a side for as far as a point may, and then sees faces
-        super().__init__(run, asked, outsides_of(run, asked, 2 * (self.depth + self.skin)))
+        super().__init__(run, asked, outsides_of(run, asked.periodic, 2 * (self.depth + self.skin)))
         self.reach = 2 * (self.depth + self.skin)
         counts, starts = np.diff(self.first_vertex), self.first_vertex
         self.clipped = asked.faces == "overlaps"
@@ -167,6 +168,7 @@ class SurfaceContacts(Contacts):
             self.near, surface, position, self.firsts, reach, self.way, self.seams(position)
         )
         self.kernel = self.kernel._replace(near=near)
+        self.kernel.start[:] = position
 
     def seams(self, position: Floats) -> Floats:
         """Where along the width a body begins that is one with its images, (b,) [m]; else NaN."""

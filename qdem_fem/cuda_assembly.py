@@ -1,9 +1,9 @@
 """The bodies of a simulation on a GPU: state and element data stay there from window to window.
 
 `CudaAssembly` answers the calls of `qdem_fem.assembly.Assembly`; ``Simulation(..., device="cuda")``
-takes it in its place.  A window goes to the GPU as launches without a wait in between; what comes
-back at its end is how many steps were done, the count of bad elements, the samples of the probes
-and the work of the few nodes with loads and constraints.
+takes it in its place.  A window goes to the GPU as launches without a wait in between (with contact
+there are few); what comes back at its end is how many steps were done, the count of bad elements,
+the samples of the probes and the work of the few nodes with loads and constraints.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from qdem_fem.lanes import lane_count
 from qdem_fem.reference_forces import Strain
 
 if TYPE_CHECKING:
-    from qdem_fem.cuda_contact import DeviceContact
+    from qdem_fem.cuda_contact_state import DeviceContact
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -46,6 +46,12 @@ def gpu_require() -> None:
         where=where,
         remedy='compute with device="cpu", or where an NVIDIA GPU and its driver are at hand',
     )
+
+
+LOOK = 16
+"""Steps of contact between two looks of the host at whether the window has ended.  A list is good
+for some 40 steps where bodies move (`qdem_fem.contact_search.skin_next`), a window may be of
+thousands: those launched behind its end compute nothing, but each launch takes its time."""
 
 
 class NodeActions(NamedTuple):
@@ -147,6 +153,25 @@ class CudaAssembly(Assembly):
         self._node_blocks = -(-self.n_nodes // cuda_step.BLOCK)
         self._forces_kernel = cuda_step.element_forces_kernel(strain, bool(self.viscous))
 
+        by_node = np.bincount(self.place, weights=self.mass, minlength=self.n_nodes)
+        self._mass = cuda.to_device(by_node)
+
+    def kinetic(self) -> float:
+        """`Assembly.kinetic`; fields stay on the GPU, where no body has a frame."""
+        return super().kinetic() if self.frames is not None else 0.5 * float(self._sums()[0])
+
+    def moment(self) -> tuple[Floats, Floats]:
+        """`Assembly.moment`; fields stay on the GPU, where no body has a frame."""
+        if self.frames is not None:
+            return super().moment()
+        found = self._sums()
+        return found[1:4], found[4:]
+
+    def _sums(self) -> Floats:
+        from qdem_fem.cuda_sums import motion_summed
+
+        return motion_summed(self.state.displacement, self.state.velocity, self._mass)
+
     def _state(self, inverse_mass: Floats) -> kernel.State:
         from qdem_fem.cuda_step import cuda
 
@@ -179,7 +204,8 @@ class CudaAssembly(Assembly):
     ) -> tuple[int, float]:
         """Launch the steps and wait once, at the end; arguments as of `Assembly.kernel_run`.
 
-        ``contact``: of spheres, whose steps follow those of the bodies; its ``said`` is set.
+        ``contact``: of spheres, whose steps follow those of the bodies; its ``said`` is set.  Its
+        list may end the window early: then the host waits every `LOOK` steps.
         """
         from qdem_fem import cuda_step
         from qdem_fem.cuda_step import cuda
@@ -214,6 +240,8 @@ class CudaAssembly(Assembly):
         launch_forces = self._forces_kernel[self._element_blocks, cuda_step.BLOCK]
         launch_motion = motion[self._node_blocks, cuda_step.BLOCK]
         for k, sample in enumerate(samples.tolist()):
+            if contact is not None and k % LOOK == 0 and status[cuda_step.LIMIT] <= k:
+                break
             if contact is not None:
                 contact.launch_push(state.forces, status, k)
             launch_forces(*of_elements, half, dt, k)

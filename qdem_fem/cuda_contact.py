@@ -4,8 +4,8 @@ A step of contact is three launches behind those of the elements and the motion,
 positions, pairs, walls, reactions; one before them adds the forces found to the nodes.  A sphere's
 force is summed over its own row, then over the pairs in which it is the second, in their order, as
 on the processor: no atomics but where the forces reach the nodes.  A vertex that leaves the skin
-ends the window (`ANEW`) before any force of its step is computed; the host looks for pairs, and
-computes that one step.  Contact is in double precision.
+ends the window (`ANEW`) before any force of its step is computed; pairs are looked for, and then
+that one step is computed (`qdem_fem.cuda_contact_state`).  Contact is in double precision.
 """
 
 from __future__ import annotations
@@ -14,10 +14,8 @@ from functools import cache
 from math import sqrt
 from typing import Any
 
-import numpy as np
-
-from qdem_fem import contact_kernel, cuda_step
-from qdem_fem.contact_kernel import DEEPEST, GO_ON, LOOK_ANEW, TOO_DEEP, Contact
+from qdem_fem import contact_kernel
+from qdem_fem.contact_kernel import DEEPEST
 from qdem_fem.cuda_step import ANEW, DEEP, LIMIT, cuda
 
 slider: Any = cuda.jit(device=True)(contact_kernel.slider.py_func)
@@ -161,81 +159,3 @@ def reactions_add(
         if touching[p] != 0:
             for c in range(3):
                 force[j, c] -= pull[p, c]
-
-
-def device_array(array: Any) -> Any:
-    """An array on the GPU, with one row of zeros in place of none: it had better not be empty."""
-    shape = tuple(max(length, 1) for length in array.shape)
-    full = array if array.size else np.zeros(shape, array.dtype)
-    return cuda.to_device(np.ascontiguousarray(full))
-
-
-class DeviceContact:
-    """The arrays of a `Contact` on the GPU, and the launches of a step."""
-
-    def __init__(self, c: Contact) -> None:
-        self.arrays = {
-            name: {field: device_array(array) for field, array in part._asdict().items()}
-            for name, part in (("spheres", c.spheres), ("pairs", c.pairs), ("planes", c.planes))
-        }
-        self.moving = {
-            name: device_array(getattr(c, name)) for name in ("start", "position", "force", "slid")
-        }
-        self.friction, self.half_skin = float(c.friction), float(c.half_skin)
-        self.periodic, self.walls = c.pairs.image.ndim > 1, len(c.planes.point) > 0
-        self.count, self.size = len(c.pairs.acting), len(c.position)
-        self.said = GO_ON
-
-    def grid(self, count: int) -> tuple[int, int]:
-        """Blocks and threads of a launch for so many spheres."""
-        return max(1, -(-count // cuda_step.BLOCK)), cuda_step.BLOCK
-
-    def launch_push(self, forces: Any, status: Any, k: int) -> None:
-        """Forces found in the step before reach the nodes."""
-        spheres, pairs = self.arrays["spheres"], self.arrays["pairs"]
-        forces_push[self.grid(self.count)](
-            self.count, pairs["acting"], spheres["place"], self.moving["force"], forces, status, k
-        )
-
-    def launch_step(
-        self, displacement: Any, velocity: Any, status: Any, step: float, k: int
-    ) -> None:
-        """Contact at the new displacement, as `qdem_fem.contact_kernel.advance_build`'s."""
-        s, p, w, m = (*self.arrays.values(), self.moving)
-        few = self.grid(self.count)
-        spheres_move[self.grid(self.size)](
-            s["reference"], s["place"], displacement, m["start"], self.half_skin, m["position"],
-            status, k,
-        )  # fmt: skip
-        pairs_forces_kernel(self.periodic)[few](
-            self.count, p["acting"], p["first"], p["second"], p["touching"], p["spring"],
-            p["pull"], p["image"], m["position"], s["radius"], s["normal"], s["tangential"],
-            s["place"], velocity, self.friction, m["force"], m["slid"], status, step, k,
-        )  # fmt: skip
-        if self.walls:
-            walls_forces[few](
-                self.count, p["acting"], p["wall_first"], p["wall"], w["point"], w["normal"],
-                w["friction"], w["spring"], w["force"], m["position"], s["radius"], s["normal"],
-                s["tangential"], s["place"], velocity, m["force"], m["slid"], status, step, k,
-            )  # fmt: skip
-        reactions_add[few](
-            self.count, p["acting"], p["back_first"], p["back_pair"], p["touching"], p["pull"],
-            m["force"], status, k,
-        )  # fmt: skip
-
-    def end(self, status: list[int]) -> None:
-        """What the last step of a window said, from its status."""
-        self.said = TOO_DEEP if status[DEEP] else LOOK_ANEW if status[ANEW] else GO_ON
-
-    def fetch(self, c: Contact) -> None:
-        """Write what steps have changed into the host's arrays."""
-        changed = [
-            (self.arrays["pairs"], c.pairs, ("touching", "spring", "pull")),
-            (self.arrays["planes"], c.planes, ("spring", "force")),
-            (self.moving, c, ("position", "force", "slid")),
-        ]
-        for there, here, names in changed:
-            for name in names:
-                array = getattr(here, name)
-                if array.size:
-                    array[:] = there[name].copy_to_host()

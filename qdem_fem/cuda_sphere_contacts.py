@@ -1,50 +1,99 @@
 """The contacts of spheres of a simulation on a GPU.
 
-Pairs are looked for on the processor, by its cell list, when a vertex has left the skin: on a bed
-at rest hardly ever.  From window to window of a march what contact remembers stays on the GPU,
-until the host asks for it.
+What contact remembers is on the GPU, from the first step to the last: pairs are looked for there,
+and the host reads counts, greatest values, and what the last step said.  Who asks for arrays has a
+copy of them as they are.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import Any
 
 from qdem_fem.contact_kernel import Contact
-from qdem_fem.contact_sphere_state import SphereContacts
-
-if TYPE_CHECKING:
-    from qdem_fem.cuda_contact import DeviceContact
+from qdem_fem.contact_sphere_state import PARTED, SphereContacts
+from qdem_fem.contact_state import Floats
+from qdem_fem.cuda_assembly import CudaAssembly
+from qdem_fem.cuda_contact_state import DeviceContact
+from qdem_fem.cuda_contact_sums import extents_of
+from qdem_fem.cuda_step import cuda
+from qdem_fem.periodic import PeriodicWidth
 
 
 class CudaSphereContacts(SphereContacts):
-    """`SphereContacts` whose steps are those of `qdem_fem.cuda_contact`."""
+    """`SphereContacts` whose steps and lists are those of `qdem_fem.cuda_contact_state`."""
 
     _host: Contact
-    _device: DeviceContact | None = None
+    _device: DeviceContact
+    _behind: bool
+    """Whether the GPU has gone on since the host had its copy."""
 
     @property
     def kernel(self) -> Contact:
-        """The arrays on the host, as the last step left them; who asks may change them."""
-        if self._device is not None:
-            self._device.fetch(self._host)
-            self._device = None
+        """The arrays as the last step left them: a copy on the host, not to be written to."""
+        if self._behind:
+            self._host, self._behind = self._device.fetch(self._host), False
         return self._host
 
     @kernel.setter
     def kernel(self, value: Contact) -> None:
-        self._host, self._device = value, None
+        self._host, self._behind = value, False
+        self._device = DeviceContact(value, self.asked.periodic)
+
+    @property
+    def changing(self) -> DeviceContact:
+        """The arrays on the GPU, about to be changed."""
+        self._behind = True
+        return self._device
+
+    @cached_property
+    def _constants(self) -> tuple[Any, Any, Any]:
+        """``inverse_mass``, ``own`` and ``first_vertex`` on the GPU."""
+        inverse_mass, own, first = (
+            cuda.to_device(a) for a in (self.inverse_mass, self.own, self.first_vertex)
+        )
+        return inverse_mass, own, first
+
+    def forget(self) -> None:
+        """Let go of all springs."""
+        self.changing.forget()
+
+    def positions(self) -> Any:
+        """`Contacts.positions`, on the GPU."""
+        return self.changing.positions(self.run.assembly.state.displacement)
+
+    def extents(self, position: Any, side: PeriodicWidth) -> Floats:
+        """`Contacts.extents` of positions on the GPU."""
+        found: Floats = extents_of(position, side.number, *self._constants[1:])
+        return found
+
+    def parted(self, position: Any) -> float:
+        """`SphereContacts.parted` of positions on the GPU."""
+        return PARTED * self._device.gap(position)
+
+    def idle(self) -> int:
+        """`SphereContacts.idle`"""
+        return self._device.idle()
+
+    def pairs_look(self, position: Any, skin: float) -> None:
+        """`SphereContacts.pairs_look` around positions on the GPU."""
+        self.changing.lists_renew(position, skin, self.skin / 2)
+
+    def step_now(self, step: float) -> int:
+        """`Contacts.step_now`"""
+        state = self.run.assembly.state
+        return self.changing.step_now(state.displacement, state.velocity, step)
+
+    def stiffness_now(self) -> float:
+        """`SphereContacts.stiffness_now`"""
+        return self._device.bound(self._constants[0])
 
     def march(self, steps: int, step: float, *given: Any) -> tuple[int, float, int]:
         """`Contacts.march` on the GPU."""
-        from qdem_fem.cuda_assembly import CudaAssembly
-        from qdem_fem.cuda_contact import DeviceContact
-
         assembly = self.run.assembly
         assert isinstance(assembly, CudaAssembly)
-        if self._device is None:
-            self._device = DeviceContact(self._host)
         loads, held, probes, table, gravity, work = given
         done, bad = assembly.kernel_run(
-            assembly.state, steps, step, loads, held, probes, table, gravity, work, self._device
+            assembly.state, steps, step, loads, held, probes, table, gravity, work, self.changing
         )
         return done, bad, self._device.said

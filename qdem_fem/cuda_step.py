@@ -40,6 +40,7 @@ BAD, LIMIT, ANEW, DEEP = range(4)
 """Places of ``status``: elements found bad; steps to do, lowered to those done when one is; whether
 a vertex has left the skin of its pairs; whether two spheres are too deep in each other."""
 
+
 STRESS = {
     "finger": stress.stress_finger,
     "small": stress.stress_small,
@@ -49,6 +50,11 @@ STRESS = {
 element_gradient = cuda.jit(device=True)(stress.element_gradient)
 element_pulls = cuda.jit(device=True)(stress.element_pulls)
 matrix_product = cuda.jit(device=True)(stress.matrix_product)
+
+
+def grid(count: int) -> tuple[int, int]:
+    """Blocks and threads of a launch for so many."""
+    return max(1, -(-count // BLOCK)), BLOCK
 
 
 @cuda.jit(device=True)

@@ -142,12 +142,7 @@ def energy_put_in(run: Simulation) -> float:
 
 def moment(run: Simulation) -> tuple[Floats, Floats]:
     """``sum m u`` [kg m] and ``sum m v`` [kg m/s] half a step before, (3,) each."""
-    mass, field = run.assembly.mass, run.assembly.field
-    place, speed = np.zeros((2, 3))
-    if len(run.assembly.elements):
-        place, speed = (
-            np.einsum("n,nc->c", mass, field(name)) for name in ("displacement", "velocity")
-        )
+    place, speed = run.assembly.moment()
     if run.rigid is not None:
         place, speed = (a + b for a, b in zip((place, speed), run.rigid.moment(), strict=True))
     return place, speed

@@ -107,7 +107,8 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
             held_check(run)
         if scene.contact is not None and scene.contact.periodic is not None:
             assert run.contacts is not None
-            run.contacts.images_check(run.contacts.reference)
+            if (position := run.contacts.positions()) is not None:
+                run.contacts.images_check(position)
     except ConditionError as error:
         where = error.where.replace("relax", "fix")
         if where in bodies:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -10,6 +13,7 @@ import qdem_fem as q
 from qdem_fem.contact_sphere_state import SphereContacts
 from qdem_fem.errors import ContactTooDeep
 from qdem_fem.mesh_generation import box_mesh
+from validation.qdem_gpu_search import searches_compare
 
 SIDE, RADIUS = 0.03, 0.006
 STONE = q.Material(1e9, 0.2, 2700.0)
@@ -18,7 +22,13 @@ ROUND_OFF = 50.0
 """Roundings of a step by which two orders of the same sums may differ, over the largest value."""
 
 
-def two_cubes(device: Any, periodic: bool = False, **contact: Any) -> q.Simulation:
+SLIDES = 0.5, -0.3, -0.2
+"""Velocity of the upper cube [m/s]."""
+
+
+def two_cubes(
+    device: Any, periodic: bool = False, velocity: Any = SLIDES, **contact: Any
+) -> q.Simulation:
     """A cube that slides fast on another, which stands on a wall; or across a periodic side."""
     apart = 2 * RADIUS - 2e-6
     shift = np.array([0.004, 0.002, SIDE + np.sqrt(apart**2 - 0.004**2 - 0.002**2)])
@@ -35,7 +45,7 @@ def two_cubes(device: Any, periodic: bool = False, **contact: Any) -> q.Simulati
         bodies, threads=1, step=1.2e-6, device=device, gravity=(0.0, 0.0, -9.81),
         contact=q.SphereContact(RADIUS, stiffness, 0.5, **(touch | contact)),
     )  # fmt: skip
-    bodies[1].velocity = np.tile([0.5, -0.3, -0.2], (len(bodies[1].nodes), 1))
+    bodies[1].velocity = np.tile(velocity, (len(bodies[1].nodes), 1))
     return run
 
 
@@ -49,18 +59,70 @@ def state_of(run: q.Simulation) -> dict[str, Any]:
         "velocity": np.concatenate([body.velocity for body in run.bodies]),
         "force": kernel.force, "spring": touching.spring, "pull": touching.force,
         "wall spring": kernel.planes.spring, "slid": kernel.slid,
+        "sums": np.concatenate([[run.assembly.kinetic()], *run.assembly.moment()]),
+        "gravity": np.array([run.motion.gravity_work]),
         "energies": np.array([energy.contact, energy.friction, energy.kinetic, energy.elastic]),
-        "counts": np.array([contacts.renewals, len(touching.first), run.steps_done]),
+        "counts": np.array([contacts.renewals, contacts.lasted, len(touching.first)]),
+        "skin": np.array([contacts.skin, run.steps_done]),
+        "bound": np.array([contacts.stiffness_now()]),
     }  # fmt: skip
 
 
-def contact_apart(skin: float, periodic: bool) -> float:
-    """Greatest difference after `STEPS` in marches of unequal length, over its bar."""
+@contextmanager
+def processor_idle(run: q.Simulation) -> Iterator[list[str]]:
+    """What steps on a GPU should leave alone: the processor's search and step raise, and copies of
+    contact or of a field to the host are listed."""
+    if run.device == "cpu":
+        yield []
+        return
+    from qdem_fem.cuda_assembly import CudaAssembly
+    from qdem_fem.cuda_contact_state import DeviceContact
+
+    copies: list[str] = []
+    fetch, read = DeviceContact.fetch, CudaAssembly._read
+
+    def fetch_noted(*given: Any) -> Any:
+        copies.append("contact")
+        return fetch(*given)
+
+    def read_noted(*given: Any) -> Any:
+        copies.append("a field")
+        return read(*given)
+
+    refused = AssertionError("the processor was asked")
+    with (
+        patch("qdem_fem.contact_sphere_state.pairs_renew", side_effect=refused),
+        patch("qdem_fem.contact_state.advance_of", side_effect=refused),
+        patch.object(DeviceContact, "fetch", fetch_noted),
+        patch.object(CudaAssembly, "_read", read_noted),
+    ):
+        yield copies
+
+
+def contact_apart(moved: float = 0.0, restored: bool = False, **asked: Any) -> float:
+    """Greatest difference after `STEPS` in marches of unequal length, over its bar.
+
+    ``asked``: of `two_cubes`; behind the first march the upper cube is set ``moved`` [m] higher, or
+    springs are let go and ``restored`` from what was stored.  The list has to be made in the same
+    steps, and within a march no array comes to the host.
+    """
     states = []
     for device in ("cpu", "cuda"):
-        run = two_cubes(device, periodic, skin=skin)
-        for share in (0.35, 0.5, 0.15):
-            run.advance(round(share * STEPS) * run.step)
+        run = two_cubes(device, **asked)
+        with processor_idle(run) as copies:
+            run.advance(round(0.35 * STEPS) * run.step)
+            if moved:
+                run.bodies[1].displacement += np.array([0.0, 0.0, moved])
+            if restored:
+                assert run.contacts is not None
+                kept = {name: array.copy() for name, array in run.contacts.stored().items()}
+                run.contacts.forget()
+                run.contacts.restore(kept)
+            run.advance(round(0.15 * STEPS) * run.step)
+            before = len(copies)
+            run.advance(round(0.5 * STEPS) * run.step)
+            if len(copies) > before:
+                return float("inf")
         states.append(state_of(run))
     one, other = states
     if not np.array_equal(one["counts"], other["counts"]) or not one["energies"][:2].all():
@@ -71,6 +133,38 @@ def contact_apart(skin: float, periodic: bool) -> float:
         for name in one
         if one[name].size and one[name].any()
     )
+
+
+def steps_launched(look: int) -> list[tuple[int, int]]:
+    """Steps done and launched in each window of contact of a march whose list lasts two steps.
+
+    The host looks every ``look`` steps whether a window has ended.
+    """
+    from qdem_fem import cuda_assembly
+    from qdem_fem.cuda_contact_state import DeviceContact
+
+    windows: list[tuple[int, int]] = []
+    push, run_window = DeviceContact.launch_push, cuda_assembly.CudaAssembly.kernel_run
+
+    def push_counted(*given: Any) -> None:
+        done, launched = windows[-1]
+        windows[-1] = done, launched + 1
+        push(*given)
+
+    def window_counted(*given: Any) -> tuple[int, float]:
+        windows.append((0, 0))
+        done, bad = run_window(*given)
+        windows[-1] = done, windows[-1][1]
+        return done, bad
+
+    with (
+        patch.object(cuda_assembly, "LOOK", look),
+        patch.object(DeviceContact, "launch_push", push_counted),
+        patch.object(cuda_assembly.CudaAssembly, "kernel_run", window_counted),
+    ):
+        run = two_cubes("cuda", skin=2e-6)
+        run.advance(STEPS * run.step)
+    return [window for window in windows if window[1]]  # others are of elements alone
 
 
 def too_deep_apart() -> float:
@@ -87,11 +181,22 @@ def too_deep_apart() -> float:
     return 0.0 if said[0] == said[1] else float("inf")
 
 
+MARCHES: dict[str, dict[str, Any]] = {
+    "walls, sliders, one list": {"skin": 6e-3},
+    "walls, sliders, many lists": {"skin": 2e-6},
+    "images across a width": {"skin": 1e-3, "periodic": True},
+    "images, many lists": {"skin": 2e-6, "periodic": True},
+    "a skin that follows the motion": {"velocity": (-300.0, 50.0, 1.0)},
+    "parted by more than the skin": {"velocity": (3.0, -2.0, 1.0), "skin": 1e-7},
+    "a body set elsewhere": {"skin": 2e-6, "moved": 1e-6},
+    "springs restored": {"skin": 2e-6, "restored": True},
+    "images restored": {"skin": 1e-3, "periodic": True, "restored": True},
+    "a step for what is near": {"skin": 2e-4, "contacts": "near"},
+}
+"""What `contact_apart` is asked, by name."""
+
+
 def contacts_compare() -> dict[str, float]:
     """Differences over their bars, by name."""
-    return {
-        "contact: walls, sliders, one list": contact_apart(6e-3, False),
-        "contact: walls, sliders, many lists": contact_apart(2e-6, False),
-        "contact: images across a width": contact_apart(1e-3, True),
-        "contact: too deep": too_deep_apart(),
-    }
+    found = {f"contact: {name}": contact_apart(**asked) for name, asked in MARCHES.items()}
+    return found | {"contact: too deep": too_deep_apart()} | searches_compare()

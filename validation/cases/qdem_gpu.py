@@ -28,6 +28,7 @@ from qdem_fem.errors import LibraryMissing
 from qdem_fem.mesh_generation import box_mesh
 from validation.case import Check
 from validation.qdem_gpu_contact import contacts_compare
+from validation.qdem_gpu_packing import packing_checks
 from validation.qdem_race import FORCE, MATERIAL, SIZE
 
 Floats = NDArray[np.float64]
@@ -53,7 +54,7 @@ TIP = 92.22e-6
 
 
 def run(quick: bool) -> list[Check]:
-    """Twins in the simulator; with a GPU also on it, speeds, bandwidth and the cantilever."""
+    """Twins in the simulator; with a GPU also on it, speeds, bandwidth, cantilever, packing."""
     checks = []
     for name, error in twins_in_simulator().items():
         checks.append(_at_most(f"GPU kernel in the simulator over CPU kernel: {name}", error, 1.0))
@@ -66,7 +67,8 @@ def run(quick: bool) -> list[Check]:
         return [*checks, Check(absent, 0.0, "finite", True)]
     for name, apart in twins_compare().items():
         checks.append(_at_most(f"GPU over CPU kernel: {name}", apart, 1.0))
-    return checks + speed_checks(quick) + [cantilever_check(quick)]
+    packing = packing_checks(8 if quick else 16)
+    return [*checks, *speed_checks(quick), cantilever_check(quick), *packing]
 
 
 def _at_most(name: str, value: float, bar: float) -> Check:
