@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from qdem_fem.load_record import RATE
 from qdem_fem.load_rolling import rolling_forces
 from qdem_fem.load_roughness import Roughness
-from qdem_fem.load_train import Track, Train, seat_share
+from qdem_fem.load_train import Track, Train, WheelFlat, flat_forces, seat_share
 from qdem_fem.mesh_checks import FloatArray
 from qdem_fem.scene_series import TimeSeries
 
@@ -17,14 +19,15 @@ RISE = 0.01
 
 def bogie_series(
     train: Train, track: Track, share: float, lead: float, rest: float, rate: float = RATE,
-    roughness: Roughness | None = None,
+    roughness: Roughness | None = None, flats: Sequence[WheelFlat] = (),
 ) -> TimeSeries:  # fmt: skip
     """Force on the seat of a slice while the first bogie of a train passes [N], (k, 3), down.
 
     The front axle begins ``lead`` [m] before the sleeper and the rear one ends as far behind it,
     then ``rest`` [s] of no load; at both ends the force grows and dies over `RISE` as half a
     cosine.  ``share``: of a seat's force, what the slice takes of it; ``roughness``: what rolling
-    adds to it, too.
+    adds to it, too; ``flats``: on both wheels of one of these two axles.  Raises `ConditionError`
+    as `flat_forces` and `rolling_forces`.
     """
     axles = train.axles[:2]
     end = (2 * lead + axles[1]) / train.speed
@@ -37,6 +40,8 @@ def bogie_series(
         force += rolling_forces(
             time - lead / train.speed, train.speed, axles, train.wheel_loads[:1], track, roughness
         )[:, 0]
+    if flats:
+        force += flat_forces(front, axles, train.speed, track, flats)
     return TimeSeries(time, down(share * force * (1 - np.cos(np.pi * ramp)) / 2))
 
 

@@ -18,12 +18,13 @@ from pydantic import Field
 
 from qdem_fem.contact_scene import ContactTable, PeriodicTable
 from qdem_fem.contact_spheres import SphereContact
+from qdem_fem.errors import ConditionError
 from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
 from qdem_fem.mesh_checks import FloatArray, IntArray
 from qdem_fem.scene import BodyTable, Scene
 from qdem_fem.scene_checks import Prepared, Step, output_faults
-from qdem_fem.scene_file import Problem, SceneText
+from qdem_fem.scene_file import Problem, SceneText, error_told
 from qdem_fem.scene_series import TimeSeries, WrongSeries
 from qdem_fem.sleeper_mesh import SleeperShape
 from qdem_fem.track_bed import Bed, bed_prepare, stages_ahead
@@ -78,6 +79,8 @@ def track_load(text: SceneText) -> TrackPrepared:
             loads = loads_of(track, text.path.parent)
         except WrongSeries as wrong:
             problems.append(wrong.problem)
+        except ConditionError as error:
+            problems.append(Problem("track.bogie", error_told(error)))
     text.refuse(problems + list(output_faults(text)))
     scene = TrackScene.model_validate(text.data)
     track = scene.track
