@@ -23,7 +23,7 @@ from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
 from qdem_fem.mesh_checks import FloatArray, IntArray
 from qdem_fem.scene import BodyTable, Scene
-from qdem_fem.scene_checks import Prepared, Step, output_faults
+from qdem_fem.scene_checks import Prepared, Step, files_named, output_faults
 from qdem_fem.scene_file import Problem, SceneText, error_told
 from qdem_fem.scene_series import TimeSeries, WrongSeries
 from qdem_fem.sleeper_mesh import SleeperShape
@@ -49,7 +49,12 @@ class TrackScene(Scene):
         viscous = any(m.shear_viscosity or m.bulk_viscosity for m in (track.ballast, track.sleeper))
         told = ["viscosity: the materials are elastic"] * (not viscous)
         missing = [text for text in super().left_out() if not text.startswith(("viscosity", "any"))]
-        return told + missing + ["rail, pads and all other sleepers: a force acts on the rail seat"]
+        missing += ["rail, pads and all other sleepers: a force acts on the rail seat"]
+        duration = self.simulation.duration or 0.0
+        if track.bogie is not None and track.bogie.passing > duration:
+            passing = f"it takes {track.bogie.passing:.4g} s, this run {duration:.4g} s"
+            missing.append(f"the end of the bogie's passing: {passing}")
+        return told + missing
 
 
 @dataclass(frozen=True)
@@ -87,8 +92,9 @@ def track_load(text: SceneText) -> TrackPrepared:
     bed_file = text.path.parent / track.bed
     steps = [Step("track", "load", SLEEPER, (np.zeros(0, np.int64), load)) for load in loads]
     return TrackPrepared(
-        scene, text, {}, steps, {}, {}, recipe=recipe_of(scene), bed_file=bed_file, loads=loads
-    )
+        scene, text, {}, steps, {}, dict(files_named(text, text.path.parent)),
+        recipe=recipe_of(scene), bed_file=bed_file, loads=loads,
+    )  # fmt: skip
 
 
 def _faults(text: SceneText) -> Iterator[Problem]:
@@ -109,12 +115,19 @@ def _faults(text: SceneText) -> Iterator[Problem]:
             yield Problem("contact.model", "a track has spheres of one radius, and its own planes")
         if not isinstance(contact.radius, float | None):
             yield Problem("contact.radius", "one number for all bodies of a track")
+        if isinstance(track, TrackTable) and isinstance(contact.radius, float):
+            needed = SleeperShape().width + 2 * contact.radius
+            if track.width <= needed:
+                what = f"the sleeper with its spheres is {needed:.4g} m wide, and grains lie beside"
+                yield Problem("track.width", what)
         if contact.periodic is not None and not _fits(contact.periodic, track):
             yield Problem("contact.periodic", "a track repeats along y by its width")
         if not isinstance(stiffness, dict) or sorted(stiffness) != sorted(names):
             yield Problem("contact.normal_stiffness", "give {ballast = ..., sleeper = ...}")
     if simulation is not None and (simulation.gravity is None or simulation.method == "static"):
         yield Problem("simulation.gravity", "a track is dynamic and needs gravity")
+    elif simulation is not None and not simulation.gravity[2] < 0:
+        yield Problem("simulation.gravity", "must point down, along -z, or no grain comes to rest")
     output = text.tables.get("output")
     if output is not None and output.probes:
         yield Problem("output.probes", "a track names its own points: B1 to B3, S1 to S3, sleeper")

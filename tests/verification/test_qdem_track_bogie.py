@@ -101,3 +101,89 @@ def test_a_flat_that_can_not_be_is_refused_by_its_key(tmp_path: Path, flat: str,
         load_of(tmp_path, f"flat = [{flat}]")
     assert "scene.toml:" in str(caught.value)
     assert "track.bogie" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("bogie", "said"),
+    [
+        # v 0.01 s = 0.32 m: nearer, the half-cosine would take a part of the first axle's load
+        ("lead = 0.319", "give a lead of 0.32 m or more"),
+        ("lead = 1.0, speed = 300.0", "give a lead of 3 m or more, or less speed"),
+        ("speed = 1e-9", "give more speed, less lead or less rest"),
+        ("lead = 1e12", "give more speed, less lead or less rest"),
+        ("rest = 1e15", "give more speed, less lead or less rest"),
+        ("roughness = { highest = 5001 }", "at most 5000 Hz"),
+        ("roughness = { highest = 1e15 }", "at most 5000 Hz"),
+        ("speed = 0.1, roughness = { highest = 5000 }", "or a lower highest frequency"),
+        ("roughness = { amplitude = 1e6 }", "leaves the rail"),
+    ],
+)
+def test_a_bogie_that_no_record_holds_is_refused_by_its_key(
+    tmp_path: Path, bogie: str, said: str
+) -> None:
+    """Before any array of that size is asked for."""
+    with pytest.raises(SceneError, match=said) as caught:
+        load_of(tmp_path, bogie)
+    assert "track.bogie: " in str(caught.value)
+    assert "scenes/track-small.toml" in str(caught.value)
+
+
+def test_a_bogie_as_near_as_may_be_has_all_of_its_load(tmp_path: Path) -> None:
+    """Over the sleeper the front axle's share is there to the last part of the half-cosine."""
+    time, force = load_of(tmp_path, f"lead = {RISE * SPEED + 1e-9}")
+    expected = SHARE * 50e3 * seat_share(np.array([0.0, -2.1]), Track()).sum()
+    assert np.interp(RISE, time, force) == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_run_that_ends_before_the_bogie_has_passed_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """(2 x 1 m + 2.1 m)/(32 m/s) = 0.128 s."""
+    load_of(tmp_path, "lead = 1.0")
+    words = ["qdem", str(tmp_path / "scene.toml"), "--dry-run"]
+    assert main(words) == 0
+    assert "bogie's passing: it takes 0.1281 s, this run 0.015 s" in capsys.readouterr().out
+    assert main([*words, "--set", "simulation.duration=0.13"]) == 0
+    assert "passing" not in capsys.readouterr().out
+
+
+def test_a_record_of_the_load_belongs_to_the_run(tmp_path: Path) -> None:
+    """Its digest is among the files, by which a resumed run knows that it goes on with the same."""
+    (tmp_path / "record.csv").write_text("time,p\n0,0\n0.004,700e3\n", encoding="utf-8")
+    path = tmp_path / "scene.toml"
+    pressure = SCENE[SCENE.index("pressure = {") :].split("\n")[0]
+    record = 'pressure = { csv = "record.csv", value = "p" }'
+    path.write_text(SCENE.replace(pressure, record), encoding="utf-8")
+    digests = [scene_load(path).files["record.csv"]]
+    (tmp_path / "record.csv").write_text("time,p\n0,0\n0.004,701e3\n", encoding="utf-8")
+    digests.append(scene_load(path).files["record.csv"])
+    assert len(set(digests)) == 2
+    path.write_text(SCENE.replace(pressure, record.replace('"p"', '"q"')), encoding="utf-8")
+    with pytest.raises(SceneError, match="there is no column 'q' in its first line"):
+        scene_load(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("track.width=0.264", "the sleeper with its spheres is 0.264 m wide"),
+        ("simulation.gravity=[0, 0, 9.81]", "must point down"),
+        ("simulation.gravity=[9.81, 0, 0]", "must point down"),
+    ],
+)
+def test_a_track_on_which_nothing_can_lie_is_refused(
+    tmp_path: Path, change: str, said: str
+) -> None:
+    with pytest.raises(SceneError, match=said):
+        load_of(tmp_path, "lead = 1.0", change)
+
+
+def test_no_room_beside_the_sleeper_is_told_before_grains_fall(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Grains of 70 mm between a sleeper of 240 mm and walls 300 mm apart; no file is begun."""
+    load_of(tmp_path, "lead = 1.0")
+    change = ["--set", "track.width=0.3", "--set", "track.below=2", "--set", "track.beside=1"]
+    assert main(["qdem", str(tmp_path / "scene.toml"), *change]) == 3
+    assert "track, beside the sleeper: grains up to 0.07" in capsys.readouterr().err
+    assert [file.name for file in tmp_path.iterdir()] == ["scene.toml"]
