@@ -103,7 +103,7 @@ def track_facts(path: Path, load: TimeSeries) -> dict[str, Any]:
         }
         if len(time) < LEAST:
             continue
-        if name in SENSORS:
+        if name != "sleeper":
             _, acceleration = accelerations(time, up)
             facts[name]["acceleration_greatest"] = float(np.abs(acceleration).max())
             facts[name]["peaks"] = peaks_of(*acceleration_spectrum(time, up))
@@ -141,6 +141,12 @@ def track_pictures(path: Path, load: TimeSeries) -> Iterator[tuple[Path, str]]:
         target, curves, quantity="spectrum", unit="m/s", against=FREQUENCY, logarithmic=True
     )
     yield target, f"Linear spectra of these, {smoothing(time)} (Figs. 9b, 10)."
+    target = path / "picture-track-grains.png"
+    curves = {g: acceleration_spectrum(time, moved[f"{g} z"]) for g in GRAINS}
+    pictures.picture_history(
+        target, curves, quantity="spectrum", unit="m/s", against=FREQUENCY, logarithmic=True
+    )
+    yield target, f"The same of grains, {smoothing(time)} (Fig. 11b)."
     target = path / "picture-track-mobility.png"
     curves = {g: mobility(time, moved[f"{g} z"], load) for g in GRAINS}
     pictures.picture_history(

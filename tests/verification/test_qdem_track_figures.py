@@ -178,8 +178,9 @@ def test_a_run_too_short_for_spectra_ends_with_the_rest(tmp_path: Path, count: i
     load = load_of(np.linspace(0, -1, count))
     facts = track_facts(tmp_path, load)
     assert facts["B2"]["settlement"] == pytest.approx(-1e-3 * ((count - 1) * STEP) ** 2)
+    assert ("peaks" in facts["S1"]) == ("peaks" in facts["B2"]) == (count >= LEAST)
     assert ("peaks" in facts["S1"]) == ("mobility_peaks" in facts["B1"]) == (count >= LEAST)
     told = dict(track_pictures(tmp_path, load))
-    assert len(told) == (5 if count >= LEAST else 2)
+    assert len(told) == (6 if count >= LEAST else 2)
     assert any("not smoothed" in caption for caption in told.values()) == (count >= LEAST)
     assert smoothing(np.linspace(0.0, 0.05, 9)) == "Parzen window of 20 Hz"
