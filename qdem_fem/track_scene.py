@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from qdem_fem.contact_scene import ContactTable, PeriodicTable
+from qdem_fem.contact_scene import ContactTable, PeriodicTable, contact_faults
 from qdem_fem.contact_spheres import SphereContact
 from qdem_fem.errors import ConditionError
 from qdem_fem.kinetic_damping import Rest
@@ -86,6 +86,9 @@ def track_load(text: SceneText) -> TrackPrepared:
             problems.append(wrong.problem)
         except ConditionError as error:
             problems.append(Problem("track.bogie", error_told(error)))
+        bed = (text.path.parent / track.bed).parent
+        if not bed.is_dir():  # or minutes of preparation would find no place
+            problems.append(Problem("track.bed", f"there is no folder {bed}"))
     text.refuse(problems + list(output_faults(text)))
     scene = TrackScene.model_validate(text.data)
     track = scene.track
@@ -101,7 +104,7 @@ def _faults(text: SceneText) -> Iterator[Problem]:
     """What tables of a track demand of one another."""
     track, contact = text.tables.get("track"), text.tables.get("contact")
     simulation = text.tables.get("simulation")
-    for name in ("body", "fix", "prescribe", "roller", "load", "pressure", "periodic"):
+    for name in ("body", "fix", "prescribe", "roller", "absorb", "load", "pressure", "periodic"):
         if name in text.data:
             yield Problem(name, "[track] makes the bodies and their conditions")
     if isinstance(track, TrackTable):
@@ -110,6 +113,8 @@ def _faults(text: SceneText) -> Iterator[Problem]:
         yield Problem("contact", "missing: a track needs it")
     if isinstance(contact, ContactTable):
         names = ("ballast", SLEEPER)
+        for fault in contact_faults(contact, simulation, names):
+            yield Problem(*fault)
         stiffness = contact.normal_stiffness
         if contact.model != "spheres" or contact.radius is None or contact.plane:
             yield Problem("contact.model", "a track has spheres of one radius, and its own planes")
@@ -200,7 +205,7 @@ def track_enter(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     )
     run, bodies = bed_begin(
         recipe, bed, contact, strain=table.strain, step=table.step, safety=table.safety,
-        threads=table.threads, mass_scaling=table.mass_scaling,
+        threads=table.threads, mass_scaling=table.mass_scaling, device=table.device,
     )  # fmt: skip
     sleeper = bodies[SLEEPER]
     sets = sleeper.mesh.node_sets

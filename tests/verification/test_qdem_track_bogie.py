@@ -1,4 +1,4 @@
-"""The bogie of a scene: its wheels' flats against the command's record, what it refuses."""
+"""Scenes of a track: flats of a bogie's wheels against the command's record, what is refused."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from qdem_fem import track_scene, track_stand
 from qdem_fem.errors import SceneError
 from qdem_fem.load_record import load_record_read
 from qdem_fem.load_train import QUIET, Track, Train, seat_share
@@ -169,13 +170,40 @@ def test_a_record_of_the_load_belongs_to_the_run(tmp_path: Path) -> None:
         ("track.width=0.264", "the sleeper with its spheres is 0.264 m wide"),
         ("simulation.gravity=[0, 0, 9.81]", "must point down"),
         ("simulation.gravity=[9.81, 0, 0]", "must point down"),
+        ("track.bed=none/bed.npz", "track.bed: there is no folder"),
+        ("contact.modulus=1e9", "contact.modulus: the model 'spheres' does not use it"),
+        ("simulation.precision=float32", "contact is computed in double precision"),
+        ("absorb=[{ body = 'sleeper', nodes = { set = 'top' } }]", "absorb: .track. makes the"),
     ],
 )
-def test_a_track_on_which_nothing_can_lie_is_refused(
+def test_a_track_that_can_not_be_as_asked_is_refused(
     tmp_path: Path, change: str, said: str
 ) -> None:
     with pytest.raises(SceneError, match=said):
         load_of(tmp_path, "lead = 1.0", change)
+
+
+def test_the_device_of_a_scene_is_that_of_its_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run on a processor that says it was on a GPU is none."""
+
+    class Begun(Exception):
+        """The options that a simulation would begin with."""
+
+    def begin(*_: object, **options: object) -> None:
+        raise Begun(options)
+
+    monkeypatch.setattr(track_scene, "bed_prepare", lambda *_: None)
+    monkeypatch.setattr(track_stand, "bed_judge", lambda *_: None)
+    monkeypatch.setattr(track_stand, "bed_begin", begin)
+    load_of(tmp_path, "lead = 1.0")
+    prepared = scene_load(tmp_path / "scene.toml", ("simulation.device=cuda",))
+    assert isinstance(prepared, TrackPrepared)
+    with pytest.raises(Begun) as caught:
+        track_scene.track_enter(prepared)
+    (options,) = caught.value.args
+    assert options["device"] == "cuda"
 
 
 def test_no_room_beside_the_sleeper_is_told_before_grains_fall(
