@@ -29,8 +29,8 @@ BANDWIDTH = 20.0
 FREQUENCY = "frequency (Hz)"
 HIGHEST = 1000.0
 """Frequency up to which the paper reads its spectra [Hz]."""
-LEAST = 6
-"""Samples of a record that has spectra: second differences leave four."""
+LEAST = 5
+"""Samples of a record that has spectra: with rest before them, second differences leave four."""
 
 
 def velocities(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -46,8 +46,15 @@ def accelerations(time: FloatArray, values: FloatArray) -> tuple[FloatArray, Flo
 
 def acceleration_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and smoothed linear spectrum [m/s] of the acceleration of a point that is
-    displaced by ``values`` [m]; up to `HIGHEST`."""
-    frequency, spectrum = fourier_spectrum(*accelerations(time, values))
+    displaced by ``values`` [m] from rest; up to `HIGHEST`.
+
+    Before the first sample it rests there.  Without that the blow is missing which gives it the
+    velocity v of the first interval, and v is left at all frequencies: of a grain that is let go
+    and rings, more below 400 Hz than all of its motion there.
+    """
+    begin = time[0] - _interval(time)
+    rested = np.concatenate([[begin], time]), np.concatenate([values[:1], values])
+    frequency, spectrum = fourier_spectrum(*accelerations(*rested))
     size = np.abs(spectrum) / np.sinc(frequency * _interval(time)) ** 2
     seen = frequency <= HIGHEST
     return frequency[seen], parzen_smoothed(frequency, size, BANDWIDTH)[seen]

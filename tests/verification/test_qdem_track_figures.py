@@ -18,6 +18,7 @@ from qdem_fem.track_figures import (
     GRAINS,
     LEAST,
     SENSORS,
+    acceleration_spectrum,
     means_between,
     mobility,
     peaks_of,
@@ -92,6 +93,19 @@ def test_smoothing_leaves_silence_silent() -> None:
     found, ratio = frequency_response(time, force, shaken)
     assert np.isnan(ratio[found > 400]).all()
     assert np.isfinite(ratio[found < 20]).all()
+
+
+def test_a_grain_that_rings_at_once_has_no_low_frequencies_of_its_own() -> None:
+    """Pushed aside by s it rings at 3.5 kHz and settles: |A| = 2 pi f s w0^2/|w0^2 - w^2 + 2i c w|,
+    from 100 to 400 Hz 2 pi f s to (f/3.5 kHz)^2 = 1.3 %; 20 Hz see the slope, 1 % at 100 Hz.  Its
+    velocity in the first interval is 25 times as much as that at 100 Hz."""
+    time = STEP * np.arange(4000)
+    ringing, decay, aside = 2 * np.pi * 3500.0, 100.0, 1e-9
+    moved = aside * (1 - np.exp(-decay * time) * np.cos(ringing * time))
+    frequency, size = acceleration_spectrum(time, moved)
+    seen = (frequency >= 100) & (frequency <= 400)
+    assert size[seen] == pytest.approx(2 * np.pi * frequency[seen] * aside, rel=0.025)
+    assert moved[1] / STEP > 20 * size[seen].min()
 
 
 def test_density_of_a_spectrum_is_scipys_and_holds_the_variance() -> None:
