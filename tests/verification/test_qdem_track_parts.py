@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 import qdem_fem as q
 from qdem_fem import track_bed, track_scene
+from qdem_fem.contact_spheres import SKIN
 from qdem_fem.errors import SceneError
 from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
@@ -236,7 +237,7 @@ def test_vertices_told_are_those_of_all_distances(width: float | None) -> None:
     away = every[:, None] - every[None]
     if width is not None:
         away[..., 1] -= width * np.round(away[..., 1] / width)
-    near = np.linalg.norm(away, axis=2) <= 2.1 * 0.012  # two radii and a skin of a tenth of one
+    near = np.linalg.norm(away, axis=2) <= (2 + SKIN) * 0.012
     told, heard = np.zeros((2, 4), int)
     for here in range(4):
         for there in set(range(4)) - {here}:
