@@ -56,7 +56,10 @@ def qdem_command(arguments: argparse.Namespace) -> int:
         _print(_outlook(prepared), arguments.json)
         return 0
     path = arguments.run_folder or arguments.scene.with_name(f"{arguments.scene.stem}-run")
-    _print(_run(prepared, path, arguments), arguments.json)
+    with warnings.catch_warnings():
+        warnings.showwarning = _warning_show
+        summary = _run(prepared, path, arguments)
+    _print(summary, arguments.json)
     return 0
 
 
@@ -87,8 +90,7 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
         if prepared.scene.simulation.method == "static":
             done = run_static(prepared, run, bodies, folder)
         else:
-            with Progress() as progress, warnings.catch_warnings():
-                warnings.showwarning = _warning_show
+            with Progress() as progress:
                 done = run_dynamic(prepared, run, bodies, folder, resume=goes_on, progress=progress)
         summary = summary_of(prepared, done, folder)
         more: Iterable[tuple[Path, str]] = ()

@@ -42,6 +42,8 @@ STEEL_MODULUS = 206e9 / (2 * (1 - 0.3**2))
 """E* of steel on steel [Pa]."""
 CHUNK = 128
 """Frequencies taken at once, for the memory."""
+MOST_WORK = 2e10
+"""Samples times frequencies of one rail: some minutes."""
 
 
 @dataclass(frozen=True)
@@ -198,11 +200,24 @@ def rolling_forces(
 
     At ``time`` 0 the first of the ``axles`` (b,), by their distance behind it [m], is over the
     sleeper; ``loads`` (r,) [N]: of a wheel on each rail.  Rails have nothing to do with each
-    other.  Axles stand to the nearest sample.  Raises `ConditionError` as `rolling_rail`.
+    other.  Axles stand to the nearest sample.  Raises `ConditionError` as `rolling_rail`, for a
+    roughness above half the rate of samples, which would be taken for another frequency, and for
+    waves so many that they would take hours.
     """
     rolling = Rolling() if rolling is None else rolling
     rate = (len(time) - 1) / (time[-1] - time[0])
     reach = (QUIET * track.elastic_length + track.spacing / 2) / speed
+    if not roughness.highest <= rate / 2 * (1 + 1e-9):
+        raise ConditionError(
+            f"roughness up to {roughness.highest:g} Hz in a record of {rate:g} Hz",
+            where="roughness", remedy=f"give a highest frequency of at most {rate / 2:g} Hz",
+        )  # fmt: skip
+    if not 2 * reach * roughness.highest * min(2 * reach * rate, len(time)) <= MOST_WORK:
+        raise ConditionError(
+            f"at {speed:g} m/s {2 * reach * roughness.highest:.3g} waves up to "
+            f"{roughness.highest:g} Hz pass the sleeper", where="roughness",
+            remedy="give more speed, or a lower highest frequency",
+        )  # fmt: skip
     later = np.rint(axles / speed * rate).astype(int)
     first = max(-int(later.max()), int(np.ceil((-reach - time[0]) * rate)))
     last = min(len(time) - 1, int((reach - time[0]) * rate))

@@ -162,28 +162,42 @@ def seat_forces(
 ) -> FloatArray:
     """Force on seat 1 and 2 [N], (k, 2), the first axle being over the sleeper at ``time`` 0.
 
-    Added forces of flats act where their wheel is.  Raises `ConditionError` for a flat on an axle
-    that the train does not have, of no size, or longer than a turn of its wheel.
+    Raises `ConditionError` as `flat_forces`.
     """
+    front = train.speed * time
     total = np.zeros((len(time), 2))
     for axle in train.axles:
-        share = seat_share(train.speed * time - axle, track)
-        total += np.outer(share, train.wheel_loads)
+        total += np.outer(seat_share(front - axle, track), train.wheel_loads)
+    if flats:
+        total += flat_forces(front, train.axles, train.speed, track, flats)[:, None]
+    return total
+
+
+def flat_forces(
+    front: FloatArray, axles: FloatArray, speed: float, track: Track, flats: Sequence[WheelFlat]
+) -> FloatArray:
+    """What flats add to the force on a rail seat [N], (k,), acting where their wheel is.
+
+    ``front`` (k,): how far the first axle is past the sleeper [m]; ``axles`` (b,): distance of each
+    behind the first [m].  Raises `ConditionError` for a flat on an axle that is not one of these,
+    of no size, or longer than a turn of its wheel.
+    """
+    total = np.zeros(len(front))
     for flat in flats:
         turn = 2 * pi * flat.wheel_radius
-        sound = isfinite(flat.peak) and 0 < flat.duration * train.speed <= turn < inf
-        if not (flat.axle in range(4 * int(train.cars)) and sound):
+        sound = isfinite(flat.peak) and 0 < flat.duration * speed <= turn < inf
+        if not (flat.axle in range(len(axles)) and sound):
             raise ConditionError(
                 f"a flat of {flat.peak} N for {flat.duration} s on axle {flat.axle}, radius "
                 f"{flat.wheel_radius} m",
                 where="train",
-                remedy=f"use an axle from 0 to {4 * train.cars - 1}, and a duration above zero and "
+                remedy=f"use an axle from 0 to {len(axles) - 1}, and a duration above zero and "
                 "no longer than a turn of the wheel",
             )
-        place = train.speed * time - train.axles[int(flat.axle)]
-        since = np.mod(place - flat.place, turn) / train.speed
+        place = front - axles[int(flat.axle)]
+        since = np.mod(place - flat.place, turn) / speed
         force = np.where(since < flat.duration, flat.peak * np.sin(pi * since / flat.duration), 0.0)
-        total += (force * seat_share(place, track))[:, None]
+        total += force * seat_share(place, track)
     return total
 
 

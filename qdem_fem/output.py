@@ -74,8 +74,9 @@ def vtu_write(
     """Write tetrahedra and their fields as a VTU file, binary, appended raw; atomically.
 
     ``nodes`` (n, 3) are reference coordinates [m], ``elements`` (m, 4).  Fields are (n,), (n, 3)
-    or (m,), (m, 3), of float64, float32 or int64, in SI units; ParaView's filter "Warp By Vector"
-    deforms the mesh by the displacement.  Raises `UsageError` for a field of another length.
+    or (m,), (m, 3), of float64, float32, int64 or uint8, in SI units; ParaView's filter "Warp
+    By Vector" deforms the mesh by the displacement.  Raises `UsageError` for a field of another
+    length.
     """
     for name, field, count in (
         *((name, field, len(nodes)) for name, field in point_data.items()),
@@ -137,15 +138,22 @@ def vtu_write(
     write_whole(path, parts())
 
 
-def bodies_vtu_write(path: Path, bodies: Sequence[Any]) -> None:
+def bodies_vtu_write(
+    path: Path, bodies: Sequence[Any], bearing: npt.NDArray[np.int64] | None = None
+) -> None:
     """Write all bodies of a simulation into one VTU file.
 
     Fields: displacement [m] and velocity [m/s] of nodes, von_mises [Pa] and body (its number from
-    0) of elements.  ``bodies`` are `qdem_fem.Body`.
+    0) of elements.  ``bodies`` are `qdem_fem.Body`.  ``bearing``: nodes, in the numbers of all
+    bodies, whose sphere bears a force; where given, a field bears of nodes is 1 there and 0 else.
     """
     counts = [len(body.nodes) for body in bodies]
     first = np.concatenate([[0], np.cumsum(counts)[:-1]])
     number = np.repeat(np.arange(len(bodies)), [len(body.elements) for body in bodies])
+    bears = {}
+    if bearing is not None:
+        bears["bears"] = np.zeros(sum(counts), np.uint8)
+        bears["bears"][bearing] = 1
     vtu_write(
         path,
         np.concatenate([body.nodes for body in bodies]),
@@ -153,6 +161,7 @@ def bodies_vtu_write(path: Path, bodies: Sequence[Any]) -> None:
         {
             "displacement": np.concatenate([body.displacement for body in bodies]),
             "velocity": velocities_of(bodies),
+            **bears,
         },
         {
             "von_mises": np.concatenate([body.von_mises() for body in bodies]),

@@ -23,13 +23,17 @@ SHOWN = 0.06
 """Greatest displacement in a picture, over the size of the bodies."""
 LIGHT = np.array([-0.25, -0.75, 0.6])
 """Direction the light comes from, in the frame right, away from the viewer, up."""
-HEIGHT, WIDTHS, BAR_WIDTH = 4.4, (2.8, 7.6), 1.6
+AZIMUTH, ELEVATION = -62.0, 24.0
+"""Where the viewer stands [degrees], as in matplotlib's 3-D axes."""
+HEIGHT, WIDTHS, BAR_WIDTH = 4.4, (2.9, 7.7), 1.8
 """Of the picture of bodies, least and greatest width, and what its colour bar takes [in]: a tall
 body in a wide frame would stand beside an empty half."""
 FEATURE = np.cos(np.radians(30))
 """Cosine of the angle between two faces above which their edge is no feature of the shape."""
 OUTLINED = 20
 """Most bodies whose undeformed edges are drawn: of a heap they would hide it."""
+SERIES_ROOM = 0.05
+"""Around all that moves in a series, over its size: for spheres, too."""
 DISC_CORNERS = 20
 """Of the polygon that a sphere is drawn as."""
 DISC_FACE, DISC_EDGE = (0.80, 0.77, 0.72, 0.55), (0.45, 0.42, 0.38, 0.7)
@@ -45,8 +49,21 @@ class Bearing(NamedTuple):
     """[m], (s,)."""
 
 
-def spheres_bearing(run: Simulation) -> Bearing | None:
-    """Which spheres of a simulation bear, on others or on a wall; None in other contact models."""
+class Extent(NamedTuple):
+    """What is drawn in a picture, or in all of a series."""
+
+    greatest: float
+    """Stress of a face of the surface [Pa], seen or hidden."""
+    low: FloatArray
+    """Least place to the right and up that a deformed or undeformed face reaches [m], (2,)."""
+    high: FloatArray
+    """Greatest one."""
+
+
+def spheres_bearing(run: Simulation, bears: npt.NDArray[np.bool_] | None = None) -> Bearing | None:
+    """Which spheres of a simulation bear, on others or on a wall; None in other contact models.
+
+    ``bears`` (n,): of all nodes, where that is known from before; by default as it is now."""
     contacts: Any = run.contacts
     if contacts is None:
         return None
@@ -54,9 +71,12 @@ def spheres_bearing(run: Simulation) -> Bearing | None:
 
     if not isinstance(contacts, SphereContacts):
         return None
-    contacts.refresh()
-    bears = np.asarray(contacts.kernel.force).any(axis=1)
-    return Bearing(contacts.nodes[bears], contacts.kernel.spheres.radius[bears])
+    if bears is None:
+        contacts.refresh()
+        some = np.asarray(contacts.kernel.force).any(axis=1)
+    else:
+        some = bears[contacts.nodes]
+    return Bearing(contacts.nodes[some], contacts.kernel.spheres.radius[some])
 
 
 def picture_deformed(
@@ -66,8 +86,9 @@ def picture_deformed(
     magnification: float | None = None,
     bearing: Bearing | None = None,
     time: float | None = None,
-    azimuth: float = -62.0,
-    elevation: float = 24.0,
+    series: Extent | None = None,
+    azimuth: float = AZIMUTH,
+    elevation: float = ELEVATION,
 ) -> float:
     """Draw the deformed surfaces of all bodies with their von Mises stress; the magnification.
 
@@ -75,24 +96,29 @@ def picture_deformed(
     makes the greatest `SHOWN` of the bodies' size.  The undeformed edges of up to `OUTLINED` bodies
     are drawn thin.  The viewer stands at ``azimuth`` and ``elevation`` [degrees] as in matplotlib's
     3-D axes.  ``time`` [s] is told where given.  ``bearing``: spheres of contact, drawn around
-    their vertices as those are now.  Faces are sorted from back to front (painter's algorithm):
-    those that pierce each other may be drawn in the wrong order.
+    their vertices as those are now.  Colours reach from zero to the greatest stress; the colour bar
+    says whether that is this picture's or, where ``series`` is given, that of all pictures, which
+    then have one frame, too.  Faces are sorted from back to front (painter's algorithm): those that
+    pierce each other may be drawn in the wrong order.
     """
     if magnification is None:
         magnification = magnification_round(bodies)
     frame = view_frame(azimuth, elevation)
-    corners, stress = _faces(bodies, magnification)
-    seen = corners @ frame.T
+    stress = faces_stress(bodies)
+    seen = faces_corners(bodies, magnification) @ frame.T
     spheres = None
     if bearing is not None:
         moved = [body.nodes + magnification * body.displacement for body in bodies]
         spheres = discs(np.concatenate(moved)[bearing.nodes] @ frame.T, bearing.radius)
-    across, _, up = np.ptp(seen.reshape(-1, 3), axis=0)
+    extent = series or Extent(float(stress.max()), *_reach(seen))
+    across, up = extent.high - extent.low
     wide = float(np.clip(HEIGHT * across / up + BAR_WIDTH, *WIDTHS))
-    unit, name = unit_of(float(stress.max(initial=0.0)), "Pa")
+    unit, name = unit_of(extent.greatest, "Pa")
+    whose = "this picture" if series is None else "all pictures of the run"
+    label = f"von Mises stress ({name})\nup to the greatest in {whose}"
     with figure_written(path, (wide, HEIGHT)) as figure:
         panel = figure.subplots()
-        _paint(panel, seen, stress / unit, f"von Mises stress ({name})", spheres)
+        _paint(panel, seen, stress / unit, extent.greatest / unit, label, spheres)
         if len(bodies) <= OUTLINED:
             _outline(panel, bodies, frame)
         _frame_draw(panel, frame)
@@ -103,8 +129,31 @@ def picture_deformed(
         panel.set_axis_off()
         panel.margins(0.03)
         panel.autoscale_view()
+        if series is not None:
+            room = SERIES_ROOM * (series.high - series.low).max()
+            (left, bottom), (right, top) = series.low - room, series.high + room
+            panel.set(xlim=(left, right), ylim=(bottom, top))
         _scale_bar(panel)
     return magnification
+
+
+def extent_of(bodies: Sequence[Any], magnification: float) -> Extent:
+    """Of a picture of these bodies, seen from `AZIMUTH` and `ELEVATION`."""
+    frame = view_frame(AZIMUTH, ELEVATION)
+    corners = [faces_corners(bodies, times) @ frame.T for times in (0.0, magnification)]
+    return Extent(float(faces_stress(bodies).max()), *_reach(np.concatenate(corners)))
+
+
+def extent_joined(extents: Sequence[Extent]) -> Extent:
+    """Of a series of pictures."""
+    greatest, low, high = zip(*extents, strict=True)
+    return Extent(max(greatest), np.min(low, axis=0), np.max(high, axis=0))
+
+
+def _reach(seen: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest place to the right and up (2,) of corners in the frame (k, 3, 3) [m]."""
+    places = seen.reshape(-1, 3)[:, [0, 2]]
+    return places.min(axis=0), places.max(axis=0)
 
 
 def view_frame(azimuth: float, elevation: float) -> FloatArray:
@@ -131,23 +180,29 @@ def nodal_average(elements: IntArray, values: FloatArray, count: int) -> FloatAr
     return np.asarray(total / np.maximum(np.bincount(elements.ravel(), minlength=count), 1))
 
 
-def _faces(bodies: Sequence[Any], magnification: float) -> tuple[FloatArray, FloatArray]:
-    """Corners (k, 3, 3) [m] of the deformed surface faces and their stress (k,) [Pa]."""
-    corners, stress = [], []
+def faces_corners(bodies: Sequence[Any], magnification: float) -> FloatArray:
+    """Corners of the deformed surface faces of all bodies [m], (k, 3, 3)."""
+    return np.concatenate(
+        [(body.nodes + magnification * body.displacement)[body.surface] for body in bodies]
+    )
+
+
+def faces_stress(bodies: Sequence[Any]) -> FloatArray:
+    """Von Mises stress of the surface faces of all bodies as it is drawn [Pa], (k,): the mean of
+    their nodes'."""
+    stress = []
     for body in bodies:
-        position = body.nodes + magnification * body.displacement
-        corners.append(position[body.surface])
         nodal = nodal_average(body.elements, body.von_mises(), len(body.nodes))
         stress.append(nodal[body.surface].mean(axis=1))
-    return np.concatenate(corners), np.concatenate(stress)
+    return np.concatenate(stress)
 
 
 def _paint(
-    panel: Axes, corners: FloatArray, values: FloatArray, label: str,
+    panel: Axes, corners: FloatArray, values: FloatArray, top: float, label: str,
     spheres: tuple[FloatArray, FloatArray] | None,
 ) -> None:  # fmt: skip
     """Faces towards the viewer, shaded, and spheres as `discs` gives them, from back to front;
-    ``corners`` (k, 3, 3) in the frame."""
+    ``corners`` (k, 3, 3) in the frame, colours of ``values`` (k,) from zero to ``top``."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import PolyCollection
@@ -157,7 +212,7 @@ def _paint(
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0, length, 1)[:, None]
     seen = np.flatnonzero(normal[:, 1] < 0)
-    scale = Normalize(0.0, float(values.max(initial=0.0)) or 1.0)
+    scale = Normalize(0.0, top or 1.0)
     colour = colormaps["viridis"](scale(values[seen]))
     light = np.clip(normal[seen] @ (LIGHT / np.linalg.norm(LIGHT)), 0, 1)
     colour[:, :3] *= (0.7 + 0.3 * light)[:, None]

@@ -37,6 +37,7 @@ from qdem_fem.scene_build import mesh_of
 from qdem_fem.scene_file import Problem, SceneText, did_you_mean, error_told, scene_read
 from qdem_fem.scene_nodes import NoNodes, nodes_named, unit_vector
 from qdem_fem.scene_series import WrongSeries, series_of
+from qdem_fem.scene_types import Table
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
@@ -111,7 +112,7 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
         problems += [Problem(*fault) for fault in faults]
     text.refuse(problems)
     scene = Scene.model_validate(text.data)
-    return Prepared(scene, text, meshes, conditions, probes, dict(_files(text, folder)))
+    return Prepared(scene, text, meshes, conditions, probes, dict(files_named(text, folder)))
 
 
 def _tables(text: SceneText, *kinds: Any) -> Iterator[tuple[str, Any]]:
@@ -289,8 +290,8 @@ def motion_faults(text: SceneText) -> Iterator[Problem]:
             )
 
 
-def _files(text: SceneText, folder: Path) -> Iterator[tuple[str, str]]:
-    """Files that the scene names and their SHA-256."""
+def files_named(text: SceneText, folder: Path) -> Iterator[tuple[str, str]]:
+    """Files that a sound scene names, and their SHA-256."""
     for name in sorted(_file_names(text)):
         digest = hashlib.sha256()
         with (folder / name).open("rb") as stream:
@@ -301,7 +302,7 @@ def _files(text: SceneText, folder: Path) -> Iterator[tuple[str, str]]:
 
 def _file_names(text: SceneText) -> set[str]:
     names = {body.mesh.file for _, body in _tables(text, BodyTable) if body.mesh.file}
-    for _, table in _tables(text, Condition):
+    for _, table in _tables(text, Table):
         for series in dict(table).values():
             if isinstance(series, SeriesTable) and series.csv:
                 names.add(series.csv)

@@ -20,6 +20,7 @@ from qdem_fem.scene_lines import key_lines
 from qdem_fem.scene_types import LEAST, NAME_PATTERN
 
 REMEDY = "correct these keys; scenes/cantilever.toml explains every key"
+TRACK_REMEDY = "correct these keys; scenes/track-small.toml explains those of a track"
 NAME_WORDS = "a name has 1 to 60 letters, digits and _ . + -"
 
 BOUNDS = {
@@ -78,7 +79,8 @@ class SceneText:
             entries.append((order.get(place, -1), line))
         head = "1 problem" if len(entries) == 1 else f"{len(entries)} problems"
         body = "\n".join([head, *(line for _, line in sorted(entries))])
-        raise SceneError(body, where=str(self.path), remedy=REMEDY)
+        remedy = TRACK_REMEDY if "track" in self.data else REMEDY
+        raise SceneError(body, where=str(self.path), remedy=remedy)
 
     def _place(self, key: str) -> str:
         """File and line of a key, or of the nearest table around it."""

@@ -146,12 +146,15 @@ def run_dynamic(
                     f"stopped by {stop.name} at t = {run.time:.6g} s; the state is saved in "
                     f"{folder.checkpoint}\n  -> the same command with --resume goes on from there"
                 )
-    if output.video is not None:
-        from qdem_fem.pictures_video import video_write
+    if output.magnification is not None:
+        from qdem_fem.pictures_series import series_draw
 
-        files = [name for _, _, name in plan.field_files(plan.total)]
-        pictures = [folder.path / f"picture-{Path(name).stem}.png" for name in files]
-        video_write(folder.path / "video.gif", pictures, output.video)
+        files = [(when, folder.path / name) for _, when, name in plan.field_files(plan.total)]
+        pictures = series_draw(run, list(bodies.values()), files, output.magnification)
+        if output.video is not None:
+            from qdem_fem.pictures_video import video_write
+
+            video_write(folder.path / "video.gif", pictures, output.video)
     return done
 
 
@@ -261,15 +264,12 @@ class _Record:
         files = self.plan.field_files(self.run.steps_done)
         if files and files[-1][0] == self.run.steps_done:
             target = self.path / files[-1][2]
-            bodies_vtu_write(target, self.bodies)
-            if self.magnification is not None:
-                from qdem_fem.pictures_bodies import picture_deformed, spheres_bearing
+            if self.magnification is None:
+                bodies_vtu_write(target, self.bodies)
+            else:
+                from qdem_fem.pictures_series import fields_draw
 
-                picture_deformed(
-                    target.with_name(f"picture-{target.stem}.png"), self.bodies,
-                    magnification=self.magnification, bearing=spheres_bearing(self.run),
-                    time=files[-1][1],
-                )  # fmt: skip
+                fields_draw(target, self.run, self.bodies, self.magnification, files[-1][1])
             pvd_write(self.path / "fields.pvd", [(when, name) for _, when, name in files])
 
 

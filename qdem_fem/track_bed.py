@@ -96,10 +96,12 @@ def bed_prepare(
     A stage is saved every `KEEP` seconds in a file beside it, and where it finds no equilibrium:
     a kill loses less, and more ``patience`` goes on from there.
     Raises `CheckpointError` for a file of another recipe, `NotConverged` where a stage finds no
-    equilibrium.
+    equilibrium, `MeshError` where grains have no room below or beside the sleeper.
     """
     bed = bed_read(path, recipe) if path.exists() else None
     grains = grains_of(recipe)
+    if bed is None:  # told before grains fall for hours
+        recipe.layout.grains_beside(grains_nodes(grains)[recipe.below :], 0.0, recipe.seed + 1)
     for number, stage in enumerate(STAGES):
         if bed is not None and STAGES.index(bed.stage) >= number:
             continue

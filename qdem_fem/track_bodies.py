@@ -40,14 +40,14 @@ class TrackBox:
 
 def lattice_loose(
     grains: Sequence[FloatArray], rooms: Sequence[Room], bottom: float, radius: float, seed: int,
-    share: Callable[[FloatArray], FloatArray] = np.ones_like,
+    share: Callable[[FloatArray], FloatArray] = np.ones_like, where: str = "track, box",
 ) -> list[FloatArray]:  # fmt: skip
     """Nodes of grains turned at random, in columns on a lattice; none touches another or a wall.
 
     ``grains``: nodes (n, 3) [m] of each about its centroid, ``radius`` [m] of their spheres, which
     stay within the ``rooms``.  Columns are filled from ``bottom`` [m] up, always that one next
     which is lowest over its ``share`` of the greatest height, a function of x (k,) [m] that is
-    above zero.  Raises `MeshError` for rooms too narrow for the largest grain.
+    above zero.  Raises `MeshError`, saying ``where``, for rooms too narrow for the largest grain.
     """
     random = np.random.default_rng(seed)
     turns = Rotation.random(len(grains), random_state=seed)
@@ -63,7 +63,7 @@ def lattice_loose(
     if not len(spots):
         raise MeshError(
             f"grains up to {cell.max():.3g} m wide, spheres included, do not fit in it",
-            where="track, box", remedy="give a greater box, or smaller grains",
+            where=where, remedy="give a greater box, or smaller grains",
         )  # fmt: skip
     height = bottom + 1e-3 * random.random(len(spots))
     shares = share(spots[:, 0])

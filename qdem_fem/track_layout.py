@@ -96,7 +96,9 @@ class TrackLayout:
     def grains_beside(
         self, grains: Sequence[FloatArray], bottom: float, seed: int
     ) -> list[FloatArray]:
-        """Loose grains from a height [m] on, beside the sleeper and beyond its ends; nodes."""
+        """Loose grains from a height [m] on, beside the sleeper and beyond its ends; nodes.
+
+        Raises `MeshError` where there is no room."""
         flat = inf if self.shoulder is None else self.shoulder[0]
         left, right, _, width = room = self._room(flat)
         start, end = max(self.span[0] - self.radius, left), min(self.span[1] + self.radius, right)
@@ -105,7 +107,8 @@ class TrackLayout:
             (start, end, 0.0, middle - reach + radius), (start, end, middle + reach - radius, width)
         ]  # fmt: skip
         rooms += [(left, start, *room[2:]), (end, right, *room[2:])]
-        return lattice_loose(grains, rooms, bottom, self.radius, seed)
+        where = "track, beside the sleeper"
+        return lattice_loose(grains, rooms, bottom, self.radius, seed, where=where)
 
     @property
     def _reach(self) -> float:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from qdem_fem.errors import ConditionError
 from qdem_fem.load_record import RATE
 from qdem_fem.load_rolling import rolling_forces
 from qdem_fem.load_roughness import Roughness
-from qdem_fem.load_train import Track, Train, seat_share
+from qdem_fem.load_train import LONGEST, Track, Train, WheelFlat, flat_forces, seat_share
 from qdem_fem.mesh_checks import FloatArray
 from qdem_fem.scene_series import TimeSeries
 
@@ -17,17 +20,31 @@ RISE = 0.01
 
 def bogie_series(
     train: Train, track: Track, share: float, lead: float, rest: float, rate: float = RATE,
-    roughness: Roughness | None = None,
+    roughness: Roughness | None = None, flats: Sequence[WheelFlat] = (),
 ) -> TimeSeries:  # fmt: skip
     """Force on the seat of a slice while the first bogie of a train passes [N], (k, 3), down.
 
     The front axle begins ``lead`` [m] before the sleeper and the rear one ends as far behind it,
     then ``rest`` [s] of no load; at both ends the force grows and dies over `RISE` as half a
     cosine.  ``share``: of a seat's force, what the slice takes of it; ``roughness``: what rolling
-    adds to it, too.
+    adds to it, too; ``flats``: on both wheels of one of these two axles.  Raises `ConditionError`
+    as `flat_forces` and `rolling_forces`, for a bogie so near and fast that it is over the sleeper
+    before its load has grown, and for one so slow or far that no record would hold it.
     """
     axles = train.axles[:2]
-    end = (2 * lead + axles[1]) / train.speed
+    end = passing_time(train, lead)
+    if lead < RISE * train.speed:
+        raise ConditionError(
+            f"from {lead:g} m before the sleeper it is there before its load has grown, within "
+            f"{RISE:g} s", where="bogie",
+            remedy=f"give a lead of {RISE * train.speed:.3g} m or more, or less speed",
+        )  # fmt: skip
+    if not (end + rest) * rate < LONGEST:
+        raise ConditionError(
+            f"it passes and rests for {end + rest:.3g} s, {(end + rest) * rate:.3g} samples",
+            where="bogie",
+            remedy=f"give more speed, less lead or less rest: at most {LONGEST} samples",
+        )
     time = np.arange(int(np.ceil((end + rest) * rate)) + 1) / rate
     front = train.speed * time - lead
     of_wheels = sum(seat_share(front - axle, track) for axle in axles)
@@ -37,7 +54,14 @@ def bogie_series(
         force += rolling_forces(
             time - lead / train.speed, train.speed, axles, train.wheel_loads[:1], track, roughness
         )[:, 0]
+    if flats:
+        force += flat_forces(front, axles, train.speed, track, flats)
     return TimeSeries(time, down(share * force * (1 - np.cos(np.pi * ramp)) / 2))
+
+
+def passing_time(train: Train, lead: float) -> float:
+    """From the front axle ``lead`` [m] before the sleeper to the rear one as far behind it [s]."""
+    return float(2 * lead + train.axles[1]) / train.speed
 
 
 def down(size: FloatArray) -> FloatArray:

@@ -16,14 +16,15 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from qdem_fem.contact_scene import ContactTable, PeriodicTable
+from qdem_fem.contact_scene import ContactTable, PeriodicTable, contact_faults
 from qdem_fem.contact_spheres import SphereContact
+from qdem_fem.errors import ConditionError
 from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
 from qdem_fem.mesh_checks import FloatArray, IntArray
 from qdem_fem.scene import BodyTable, Scene
-from qdem_fem.scene_checks import Prepared, Step, output_faults
-from qdem_fem.scene_file import Problem, SceneText
+from qdem_fem.scene_checks import Prepared, Step, files_named, output_faults
+from qdem_fem.scene_file import Problem, SceneText, error_told
 from qdem_fem.scene_series import TimeSeries, WrongSeries
 from qdem_fem.sleeper_mesh import SleeperShape
 from qdem_fem.track_bed import Bed, bed_prepare, stages_ahead
@@ -48,7 +49,12 @@ class TrackScene(Scene):
         viscous = any(m.shear_viscosity or m.bulk_viscosity for m in (track.ballast, track.sleeper))
         told = ["viscosity: the materials are elastic"] * (not viscous)
         missing = [text for text in super().left_out() if not text.startswith(("viscosity", "any"))]
-        return told + missing + ["rail, pads and all other sleepers: a force acts on the rail seat"]
+        missing += ["rail, pads and all other sleepers: a force acts on the rail seat"]
+        duration = self.simulation.duration or 0.0
+        if track.bogie is not None and track.bogie.passing > duration:
+            passing = f"it takes {track.bogie.passing:.4g} s, this run {duration:.4g} s"
+            missing.append(f"the end of the bogie's passing: {passing}")
+        return told + missing
 
 
 @dataclass(frozen=True)
@@ -78,21 +84,27 @@ def track_load(text: SceneText) -> TrackPrepared:
             loads = loads_of(track, text.path.parent)
         except WrongSeries as wrong:
             problems.append(wrong.problem)
+        except ConditionError as error:
+            problems.append(Problem("track.bogie", error_told(error)))
+        bed = (text.path.parent / track.bed).parent
+        if not bed.is_dir():  # or minutes of preparation would find no place
+            problems.append(Problem("track.bed", f"there is no folder {bed}"))
     text.refuse(problems + list(output_faults(text)))
     scene = TrackScene.model_validate(text.data)
     track = scene.track
     bed_file = text.path.parent / track.bed
     steps = [Step("track", "load", SLEEPER, (np.zeros(0, np.int64), load)) for load in loads]
     return TrackPrepared(
-        scene, text, {}, steps, {}, {}, recipe=recipe_of(scene), bed_file=bed_file, loads=loads
-    )
+        scene, text, {}, steps, {}, dict(files_named(text, text.path.parent)),
+        recipe=recipe_of(scene), bed_file=bed_file, loads=loads,
+    )  # fmt: skip
 
 
 def _faults(text: SceneText) -> Iterator[Problem]:
     """What tables of a track demand of one another."""
     track, contact = text.tables.get("track"), text.tables.get("contact")
     simulation = text.tables.get("simulation")
-    for name in ("body", "fix", "prescribe", "roller", "load", "pressure", "periodic"):
+    for name in ("body", "fix", "prescribe", "roller", "absorb", "load", "pressure", "periodic"):
         if name in text.data:
             yield Problem(name, "[track] makes the bodies and their conditions")
     if isinstance(track, TrackTable):
@@ -101,17 +113,26 @@ def _faults(text: SceneText) -> Iterator[Problem]:
         yield Problem("contact", "missing: a track needs it")
     if isinstance(contact, ContactTable):
         names = ("ballast", SLEEPER)
+        for fault in contact_faults(contact, simulation, names):
+            yield Problem(*fault)
         stiffness = contact.normal_stiffness
         if contact.model != "spheres" or contact.radius is None or contact.plane:
             yield Problem("contact.model", "a track has spheres of one radius, and its own planes")
         if not isinstance(contact.radius, float | None):
             yield Problem("contact.radius", "one number for all bodies of a track")
+        if isinstance(track, TrackTable) and isinstance(contact.radius, float):
+            needed = SleeperShape().width + 2 * contact.radius
+            if track.width <= needed:
+                what = f"the sleeper with its spheres is {needed:.4g} m wide, and grains lie beside"
+                yield Problem("track.width", what)
         if contact.periodic is not None and not _fits(contact.periodic, track):
             yield Problem("contact.periodic", "a track repeats along y by its width")
         if not isinstance(stiffness, dict) or sorted(stiffness) != sorted(names):
             yield Problem("contact.normal_stiffness", "give {ballast = ..., sleeper = ...}")
     if simulation is not None and (simulation.gravity is None or simulation.method == "static"):
         yield Problem("simulation.gravity", "a track is dynamic and needs gravity")
+    elif simulation is not None and not simulation.gravity[2] < 0:
+        yield Problem("simulation.gravity", "must point down, along -z, or no grain comes to rest")
     output = text.tables.get("output")
     if output is not None and output.probes:
         yield Problem("output.probes", "a track names its own points: B1 to B3, S1 to S3, sleeper")
@@ -184,7 +205,7 @@ def track_enter(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     )
     run, bodies = bed_begin(
         recipe, bed, contact, strain=table.strain, step=table.step, safety=table.safety,
-        threads=table.threads, mass_scaling=table.mass_scaling,
+        threads=table.threads, mass_scaling=table.mass_scaling, device=table.device,
     )  # fmt: skip
     sleeper = bodies[SLEEPER]
     sets = sleeper.mesh.node_sets

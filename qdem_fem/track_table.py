@@ -12,14 +12,14 @@ from typing import Annotated
 from pydantic import Field
 
 from qdem_fem.load_roughness import RailKind, Roughness, WheelKind
-from qdem_fem.load_train import Track, Train
+from qdem_fem.load_train import Track, Train, WheelFlat
 from qdem_fem.scene import MaterialTable, SeriesTable
 from qdem_fem.scene_file import Problem
 from qdem_fem.scene_series import TimeSeries, series_of
-from qdem_fem.scene_types import Cells, NonNegative, Positive, Share, Table, Text
+from qdem_fem.scene_types import Cells, NonNegative, Positive, Real, Share, Table, Text
 from qdem_fem.sleeper_mesh import SleeperShape
 from qdem_fem.track_layout import Part
-from qdem_fem.track_load import bogie_series, down
+from qdem_fem.track_load import bogie_series, down, passing_time
 
 LEAST_SHOULDER = 0.1
 """Ballast beyond a free end, at least [m]: room for a grain and what is between."""
@@ -36,6 +36,17 @@ class RoughnessTable(Table):
     """Frequency up to which there is any [Hz]."""
 
 
+class FlatTable(Table):
+    """On both wheels of an axle (`qdem_fem.load_train.WheelFlat`), as ``trackbed train --flat``."""
+
+    axle: Annotated[int, Field(ge=0)]
+    """0 in front, 1 behind."""
+    peak: Real
+    """Of the added force of one wheel on the rail [N]."""
+    duration: Positive
+    """[s]; the same at every turn of the wheel."""
+
+
 class BogieTable(Table):
     """The first bogie of a train (`qdem_fem.load_train`)."""
 
@@ -49,6 +60,18 @@ class BogieTable(Table):
     """Time without load at the end [s]."""
     roughness: RoughnessTable | None = None
     """What rolling adds; without it the load has next to nothing above 100 Hz."""
+    flat: Annotated[tuple[FlatTable, ...], Field(strict=False)] = ()
+    """Of wheels that are not round."""
+
+    @property
+    def train(self) -> Train:
+        """Whose first bogie it is."""
+        return Train(cars=1, axle_load=self.axle_load, speed=self.speed)
+
+    @property
+    def passing(self) -> float:
+        """Time from its beginning to the end of its load [s]."""
+        return passing_time(self.train, self.lead)
 
 
 class TrackTable(Table):
@@ -137,9 +160,11 @@ def loads_of(track: TrackTable, folder: Path) -> tuple[TimeSeries, ...]:
     share, seats = track.share or 1.0, 2 if track.part == "whole" else 1
     if track.bogie is not None:
         one = track.bogie
-        train = Train(cars=1, axle_load=one.axle_load, speed=one.speed)
         rough = None if one.roughness is None else Roughness(**one.roughness.model_dump())
-        series = bogie_series(train, Track(), share, one.lead, one.rest, roughness=rough)
+        flats = [WheelFlat(**flat.model_dump()) for flat in one.flat]
+        series = bogie_series(
+            one.train, Track(), share, one.lead, one.rest, roughness=rough, flats=flats
+        )
         return seats * (series,)
     found: list[TimeSeries] = []
     for name in ("pressure", "pressure_other")[:seats]:

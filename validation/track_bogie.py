@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from qdem_fem.errors import UsageError
 from qdem_fem.load_train import Train
 from qdem_fem.mesh_checks import FloatArray
 from qdem_fem.output import table_read, write_whole
@@ -42,7 +43,14 @@ def passages(bogie: BogieTable) -> tuple[FloatArray, FloatArray]:
 
 def settlement_at(time: FloatArray, down: FloatArray, ends: FloatArray) -> list[dict[str, float]]:
     """Greatest settlement within each passage, and that at its end [m], of a point that is ``down``
-    [m] below where it was at ``time`` [s]."""
+    [m] below where it was at ``time`` [s].
+
+    Raises `UsageError` for a record that ends before the last passage does."""
+    if time[-1] < ends[-1] - (time[-1] - time[0]) / (len(time) - 1):
+        raise UsageError(
+            f"the record ends at {time[-1]:.6g} s, the last passage of an axle at {ends[-1]:.6g} s",
+            where="settlement", remedy="take a run of a longer simulation.duration",
+        )  # fmt: skip
     found = []
     for begin, end in zip([0.0, *ends[:-1]], ends, strict=True):
         within = (time >= begin) & (time <= end)

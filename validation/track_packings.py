@@ -46,6 +46,8 @@ PACKINGS = ROOT / "validation" / "results" / "track-packings.json"
 PICTURE = ROOT / "docs" / "qdem-track-packings.png"
 APART = 8.0
 """Of the frequencies kept in the record [Hz]."""
+SILENT = 1e-9
+"""Share of the load's greatest amplitude below which it says nothing, as of mobility."""
 
 
 def scatter(duration: float) -> float:
@@ -57,10 +59,17 @@ def scatter(duration: float) -> float:
 
 
 def peaks_standing_out(frequency: FloatArray, size: FloatArray, least: float) -> list[float]:
-    """Frequencies of maxima of an amplitude (k,) with a prominence of ``least`` dB [Hz]."""
-    level = 20 * np.log10(np.maximum(size, size.max(initial=0.0) * 1e-12))
-    at, _ = find_peaks(level, prominence=least)
-    return [float(frequency[i]) for i in at]
+    """Frequencies of maxima of an amplitude (k,) with a prominence of ``least`` dB [Hz].
+
+    Where it is nan, as of a silent load, it is unknown: what it rises to beside that is no peak."""
+    known = np.isfinite(size)
+    level = 20 * np.log10(np.maximum(size, np.max(size[known], initial=0.0) * 1e-12))
+    found: list[float] = []
+    for part in np.split(np.arange(len(size)), np.flatnonzero(np.diff(known)) + 1):
+        if len(part) and known[part[0]]:
+            at, _ = find_peaks(level[part], prominence=least)
+            found += [float(frequency[i]) for i in part[at]]
+    return found
 
 
 def peaks_shared(each: Sequence[Sequence[float]], within: float = BANDWIDTH / 2) -> list[float]:
@@ -89,7 +98,16 @@ def curves(prepared: TrackPrepared, folder: Path) -> dict[str, tuple[FloatArray,
         )
     frequency, size = found["S2"]
     below = np.interp(frequency, *found["load"])
+    below = np.where(below <= SILENT * below.max(), np.nan, below)
     return found | {"S2 over load": (frequency, size / below)}
+
+
+def grain_acceleration(run: dict[str, Any], name: str) -> FloatArray:
+    """Smoothed spectrum of the vertical acceleration of a grain [m/s] (Fig. 11b), every `APART` Hz:
+    mobility times 2 pi f times load.  Nan where the load is silent."""
+    mobility = np.array(run["curves"][name])
+    size = 2 * np.pi * APART * np.arange(len(mobility)) * mobility * np.array(run["curves"]["load"])
+    return np.where(mobility > 0, size, np.nan)
 
 
 def packing_facts(folder: Path) -> dict[str, Any]:
@@ -109,7 +127,7 @@ def packing_facts(folder: Path) -> dict[str, Any]:
         "bogie": bogie,
         "bed": result.get("bed", {}),
         "prominence": least,
-        "peaks": {n: peaks_standing_out(f, np.nan_to_num(s), least) for n, (f, s) in found.items()},
+        "peaks": {n: peaks_standing_out(f, s, least) for n, (f, s) in found.items()},
         "curves": {
             name: [float(f"{one:.4g}") for one in np.interp(grid, frequency, np.nan_to_num(size))]
             for name, (frequency, size) in found.items()
@@ -140,13 +158,27 @@ def beside_paper(runs: Sequence[dict[str, Any]]) -> list[str]:
         "| lateral motion larger than vertical | "
         f"{means(lambda point: point['lateral_over_vertical'])} |",
     ]
-    for name, goal in (*(("S2", f) for f in (100, 200, 320, 400, 800)), ("B2", 45)):
-        peak, loads = near(shared[name], goal), near(shared["load"], goal)
-        here = "none that all share" if peak is None else f"{peak:.0f} Hz"
-        if peak is not None and loads is not None:
-            here += f"; the load has one at {loads:.0f} Hz"
-        lines.append(f"| peak of {name} near {goal} Hz | {here} |")
+    grain = peaks_shared([grain_peaks(run, "B2") for run in runs])
+    sought = [
+        ("acceleration of S2", shared["S2"], (100, 200, 400, 800)),
+        ("acceleration of B2", grain, (100, 200, 320, 400, 800)),
+        ("mobility of B2", shared["B2"], (45,)),
+    ]
+    for what, peaks, goals in sought:
+        for goal in goals:
+            peak, loads = near(peaks, goal), near(shared["load"], goal)
+            here = "none that all share" if peak is None else f"{peak:.0f} Hz"
+            if peak is not None and loads is not None:
+                here += f"; the load has one at {loads:.0f} Hz"
+            lines.append(f"| peak of the {what} near {goal} Hz | {here} |")
     return lines
+
+
+def grain_peaks(run: dict[str, Any], name: str) -> list[float]:
+    """Peaks of a grain's acceleration that stand out [Hz]."""
+    size = grain_acceleration(run, name)
+    frequency = APART * np.arange(len(size), dtype=np.float64)
+    return peaks_standing_out(frequency, size, run["prominence"])
 
 
 def frictions_text(runs: Sequence[dict[str, Any]], other: Sequence[dict[str, Any]]) -> str:
@@ -220,7 +252,14 @@ def packings_text(record: dict[str, Any]) -> str:
     for name in first["peaks"]:
         each = [run["peaks"][name] for run in runs]
         shared = told(peaks_shared(each)) if count > 1 else ""
-        lines.append(f"| {name} | {' | '.join(told(one) for one in each)} | {shared} |")
+        what = f"mobility of {name}" if name in GRAINS else name
+        lines.append(f"| {what} | {' | '.join(told(one) for one in each)} | {shared} |")
+    for name in (name for name in first["peaks"] if name in GRAINS):
+        each = [grain_peaks(run, name) for run in runs]
+        shared = told(peaks_shared(each)) if count > 1 else ""
+        lines.append(
+            f"| acceleration of {name} | {' | '.join(told(one) for one in each)} | {shared} |"
+        )
     lines += ["", "A peak is near where it is within a tenth:", "", *beside_paper(runs)]
     if other := list(record.get("other", {}).values()):
         lines += ["", "The same packings and load at another friction:", ""]

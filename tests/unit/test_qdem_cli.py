@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,8 @@ import meshio
 import numpy as np
 import pytest
 
-from qdem_fem import cli
-from qdem_fem.errors import Interrupted, SceneError, UsageError
+from qdem_fem import cli, scene_build
+from qdem_fem.errors import Interrupted, SceneError, StepWarning, UsageError
 from qdem_fem.output import table_read
 
 ROOT = Path(__file__).parents[2]
@@ -366,6 +367,25 @@ def test_mass_scaling_is_told(scene: Path, capsys: pytest.CaptureFixture[str]) -
     assert added["share"] > 1
     assert longer == pytest.approx(np.sqrt(1 + added["share"]), rel=1e-4)
     assert "Mass scaling added" in (folder / "report.html").read_text()
+
+
+def test_warnings_of_what_comes_before_the_run_are_sentences(
+    scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The bed of a track is prepared there: no file, line and code of ours on the way."""
+    make = scene_build.simulation_of
+
+    def made(prepared: Any) -> Any:
+        warnings.warn("the step is short", StepWarning, stacklevel=1)
+        return make(prepared)
+
+    monkeypatch.setattr(scene_build, "simulation_of", made)
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert command(scene, "--no-pictures", "--set", "simulation.duration=0.004") == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert "warning: the step is short" in lines
+    assert not [line for line in lines if ".py" in line]
 
 
 def test_progress_lines_go_to_standard_error(

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 import qdem_fem as q
 from qdem_fem import track_bed, track_scene
+from qdem_fem.contact_spheres import SKIN
 from qdem_fem.errors import SceneError
 from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
@@ -226,3 +227,23 @@ def test_what_processes_tell_each_other_is_counted() -> None:
     assert rolled.tolist() == [4, 4, 4]
     pair = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
     assert shared_nodes(pair, np.array([0, 1]), 2).tolist() == [3, 3]
+
+
+@pytest.mark.parametrize("width", [None, 0.2])
+def test_vertices_told_are_those_of_all_distances(width: float | None) -> None:
+    """Every pair of 800 vertices in a box cut in four along y, where it may repeat, one by one."""
+    every = np.random.default_rng(4).uniform(0.0, [0.3, 0.2, 0.2], (800, 3))
+    owner = np.searchsorted([0.06, 0.1, 0.15], every[:, 1])
+    away = every[:, None] - every[None]
+    if width is not None:
+        away[..., 1] -= width * np.round(away[..., 1] / width)
+    near = np.linalg.norm(away, axis=2) <= (2 + SKIN) * 0.012
+    told, heard = np.zeros((2, 4), int)
+    for here in range(4):
+        for there in set(range(4)) - {here}:
+            needed = near[np.ix_(owner == there, owner == here)].any(axis=1).sum()
+            told[there] += needed
+            heard[here] += needed
+    found = ghosts(0.012, width, every, owner, 4)
+    assert [one.tolist() for one in found] == [told.tolist(), heard.tolist()]
+    assert told.sum() > 100

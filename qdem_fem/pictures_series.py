@@ -1,0 +1,103 @@
+"""The pictures of a run, one beside each VTU file, drawn from these files on one colour scale.
+
+While a run goes on each picture has a scale of its own, as nobody knows yet what is to come; at
+the run's end all are drawn again.  So they can be compared, and are the same however often the run
+was interrupted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from qdem_fem.mesh_sources import file_read
+from qdem_fem.output import bodies_vtu_write
+from qdem_fem.pictures_bodies import (
+    extent_joined,
+    extent_of,
+    picture_deformed,
+    spheres_bearing,
+)
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a picture asks of a `qdem_fem.Body`, as it was when a file was written."""
+
+    nodes: FloatArray
+    """[m], (n, 3)"""
+    elements: IntArray
+    """(m, 4)"""
+    surface: IntArray
+    """(k, 3)"""
+    displacement: FloatArray
+    """[m], (n, 3)"""
+    stress: FloatArray
+    """[Pa], (m,)"""
+
+    def von_mises(self) -> FloatArray:
+        """Of the elements [Pa], (m,)."""
+        return self.stress
+
+
+def fields_draw(
+    path: Path, run: Any, bodies: Sequence[Any], magnification: float, time: float
+) -> None:
+    """Write the VTU file ``path`` of a simulation's bodies at ``time`` [s], with what its picture
+    needs beside their fields, and draw that, on a scale of its own."""
+    bearing = spheres_bearing(run)
+    bodies_vtu_write(path, bodies, None if bearing is None else bearing.nodes)
+    picture_deformed(
+        picture_beside(path), bodies, magnification=magnification, bearing=bearing, time=time
+    )
+
+
+def series_draw(
+    run: Any, bodies: Sequence[Any], files: Sequence[tuple[float, Path]], magnification: float
+) -> list[Path]:
+    """Draw the picture of each VTU file (time [s], path), all on one colour scale; their paths.
+
+    It reaches from zero to the greatest stress that is drawn in any of them, and all have one
+    frame, so that what does not move stays where it is.  ``bodies`` of the simulation ``run`` have
+    the meshes, files what moves.  Raises `MeshError` for a file that is not there or not whole.
+    """
+    series = extent_joined([extent_of(_shown(path, bodies)[0], magnification) for _, path in files])
+    drawn = []
+    for when, path in files:
+        shown, bears = _shown(path, bodies)
+        drawn.append(picture_beside(path))
+        picture_deformed(
+            drawn[-1], shown, magnification=magnification, bearing=spheres_bearing(run, bears),
+            time=when, series=series,
+        )  # fmt: skip
+    return drawn
+
+
+def picture_beside(path: Path) -> Path:
+    """The picture that belongs to a VTU file."""
+    return path.with_name(f"picture-{path.stem}.png")
+
+
+def _shown(path: Path, bodies: Sequence[Any]) -> tuple[list[Shown], npt.NDArray[np.bool_]]:
+    """Bodies as a VTU file holds them, and which of all their nodes bore (n,)."""
+    mesh = file_read(path, f"{path}, of which a picture is drawn")
+    moved, stress = mesh.point_data["displacement"], mesh.cell_data["von_mises"][0]
+    node = np.cumsum([0, *(len(body.nodes) for body in bodies)])
+    element = np.cumsum([0, *(len(body.elements) for body in bodies)])
+    shown = [
+        Shown(
+            body.nodes, body.elements, body.surface,
+            moved[node[i] : node[i + 1]], stress[element[i] : element[i + 1]],
+        )
+        for i, body in enumerate(bodies)
+    ]  # fmt: skip
+    bears = mesh.point_data.get("bears", np.zeros(len(moved)))
+    return shown, np.asarray(bears, bool)
