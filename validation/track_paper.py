@@ -1,7 +1,7 @@
 """The paper's track at rest: what its preparation cost, how it lies, what a step of it costs.
 
-    trackbed qdem scenes/track-paper.toml     prepares the bed, in hours; stop it in the run
-    python -m validation.track_paper scenes/track-paper.toml [--steps 300] [--threads 1 2]
+    trackbed qdem scenes/track.toml     prepares the bed, in hours; stop it in the run
+    python -m validation.track_paper scenes/track.toml [--steps 300] [--threads 1 2]
 
 Reads the bed in the scene's file, times a march from it and the march's parts, looks how long a
 list of pairs is good for while both rail seats bear an axle that was put on them at once, and

@@ -1,6 +1,6 @@
 """The page on the paper's track, written from its record.
 
-python -m validation.track_paper scenes/track-paper.toml    the record, from the prepared bed
+python -m validation.track_paper scenes/track.toml    the record, from the prepared bed
 python -m validation.track_half RUN                         that of half a sleeper
 python -m validation.track_paper_page                       writes the page
 """
@@ -78,7 +78,7 @@ def prepared(record: dict[str, Any]) -> str:
         f"\n\nIn all {total / 3600:.1f} h of a processor, and {record['grains_cpu_s']:.0f} s for "
         f"the grains.  Let go for {1e3 * stand['time']:g} ms without a load, its sliders take "
         f"{stand['slid'] / stand['elastic']:.1e} of the energy of its springs, the sleeper sinks "
-        f"by {1e6 * stand['sinking']:.2g} µm, and {100 * stand['at_limit']:.1g} % of the pairs "
+        f"by {1e6 * stand['sinking']:.2g} µm, and {100 * stand['at_limit']:.0f} % of the pairs "
         "that touch are at Coulomb's limit."
     )
 

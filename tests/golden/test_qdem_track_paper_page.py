@@ -4,12 +4,31 @@ from __future__ import annotations
 
 import pytest
 
+from qdem_fem.track_bed import STAGES
 from validation.track_paper_page import PAGE, page, records
 
 
 def test_page_is_the_records() -> None:
     """Byte for byte."""
     assert PAGE.read_text(encoding="utf-8") == page(*records())
+
+
+def test_sentences_about_the_whole() -> None:
+    """At rest by the scene's bars, the paper's measures within 10 %, no search; 30 % of a step."""
+    record = records()[0]
+    rest, (stand,) = record["rests"]["rest"], record["stands"].values()
+    assert list(record["rests"]) == list(STAGES)
+    assert rest["unbalanced"] <= 0.05
+    assert rest["kinetic"] <= 0.01
+    assert rest["loose"] <= 0.02
+    assert stand["slid"] <= 0.01 * stand["elastic"]
+    paper = {"foot": 4.6, "top": 3.0, "height": 0.4}
+    assert all(abs(record["shape"][name] / one - 1) < 0.1 for name, one in paper.items())
+    marches = record["marches"]
+    assert record["axle"]["searches"] == marches["1"]["searches"] == 0
+    assert marches["2"]["wall_a_step"] < 0.6 * marches["1"]["wall_a_step"]
+    search = marches["1"]["parts"]["a search for pairs"] / marches["1"]["seconds_a_step"]
+    assert search < 0.3 * record["axle"]["steps"]
 
 
 def test_sentences_about_half_a_sleeper() -> None:
