@@ -134,7 +134,10 @@ def walls_near(
     position: Floats, radius: Floats, point: Floats, normal: Floats, way: float
 ) -> NDArray[np.bool_]:
     """Which spheres (c,) touch which walls (w,), or will on a ``way`` [m]; (c, w)."""
-    near = [(position - p) @ n - radius < way for p, n in zip(point, normal, strict=True)]
+    near = [  # no BLAS between windows, as in `Assembly.kinetic`
+        np.einsum("ck,k->c", position - p, n) - radius < way
+        for p, n in zip(point, normal, strict=True)
+    ]
     return np.array(near, dtype=bool).reshape(-1, len(position)).T
 
 

@@ -132,7 +132,8 @@ class SphereContacts(Contacts):
         gaps = [np.linalg.norm(between, axis=1) - radius[ends].sum(axis=1)]
         for point, normal, force in zip(planes.point, planes.normal, planes.force, strict=True):
             held = force.any(axis=1)
-            gaps.append((position[held] - point) @ normal - radius[held])
+            along = np.einsum("ck,k->c", position[held] - point, normal)
+            gaps.append(along - radius[held])
         return PARTED * float(np.concatenate(gaps).max(initial=0.0))
 
     def walls(self, position: Floats, skin: float) -> NDArray[np.bool_]:

@@ -282,7 +282,8 @@ def test_folder_is_never_lost_unasked(scene: Path) -> None:
     (folder / "result.json").unlink()
     with pytest.raises(UsageError, match="is not finished"):
         command(scene, *quick)
-    rest = ("--set", "simulation.threads=2", "--set", "output.modes=1", "--resume")
+    free = ("simulation.threads=2", "output.modes=1", "output.audit=0.5")
+    rest = (*(word for key in free for word in ("--set", key)), "--resume")
     assert command(scene, *quick, *rest) == 0  # nothing of the record depends on these
     (folder / "result.json").unlink()
     lines = (folder / "probes.csv").read_text().splitlines(keepends=True)

@@ -176,9 +176,9 @@ def test_a_wrong_part_is_refused_with_a_sentence(
         scene_of(tmp_path, part, change)
 
 
-@pytest.mark.parametrize(("name", "grains"), [("half", 1200), ("paper", 5700)])
+@pytest.mark.parametrize(("name", "grains"), [("track-half", 1200), ("track", 5700)])
 def test_scenes_of_half_and_whole_sleepers_are_sound(name: str, grains: int) -> None:
-    prepared = scene_load(SCENES / f"track-{name}.toml")
+    prepared = scene_load(SCENES / f"{name}.toml")
     assert isinstance(prepared, TrackPrepared)
     recipe = prepared.recipe
     assert recipe.below + recipe.beside == grains
