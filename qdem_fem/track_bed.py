@@ -28,7 +28,7 @@ from __future__ import annotations
 import json
 import time
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
@@ -56,6 +56,9 @@ FIRM = {f"firm {k}/8": k / 8 for k in range(7, 0, -1)}
 STAGES = ("bed", "crib", *FIRM, "hard", "rest")
 FALLS = ("bed", "crib")
 """Stages in which grains fall."""
+SCATTER = 0.3
+"""Horizontal speed at which grains begin to fall, root mean square [m/s].  Grains that fall plumb
+onto each other and are stopped there stand as towers; poured ones do not."""
 KEEP = 300.0
 """Seconds between two times that a stage is saved."""
 ROUGH, FIRMER = (0.1, 1e-3, 0.02), (0.1, 0.1, 0.02)
@@ -141,6 +144,9 @@ def stage_run(
     contact = recipe.contact(list(bodies), softness)
     if not last and recipe.rigid:
         contact = replace(contact, contacts=1)
+    if stage in FALLS:
+        falling = slice(recipe.below) if stage == "bed" else slice(recipe.below, len(grains))
+        scatter(list(bodies.values())[falling], recipe.seed)
     run = Simulation(
         list(bodies.values()), gravity=recipe.gravity, threads=threads, contact=contact
     )
@@ -229,6 +235,14 @@ def nodes_begin(
     top = float(every[:, 2].max()) + radius + GAP
     beside = layout.grains_beside(loose[recipe.below :], top, recipe.seed + 1)
     return [*below, *beside, layout.sleeper(bottom).nodes]
+
+
+def scatter(grains: Sequence[Body], seed: int) -> None:
+    """Give each grain a horizontal velocity of its own, `SCATTER` on the average."""
+    random = np.random.default_rng([seed, len(grains)])
+    for grain in grains:
+        x, y = SCATTER / np.sqrt(2) * random.normal(size=2)
+        grain.velocity = np.tile([x, y, 0.0], (len(grain.nodes), 1))
 
 
 def sleeper_guide(run: Simulation, sleeper: Body, *, upright: bool) -> None:

@@ -16,6 +16,8 @@ from qdem_fem import energies, kinetic_damping
 from qdem_fem.cli import Progress
 from qdem_fem.energy_account import EnergyAccount, energy_facts
 from qdem_fem.errors import CheckpointError, EnergyLost, NotConverged, SceneError
+from qdem_fem.grain_grading import Grading
+from qdem_fem.grain_set import grains_make
 from qdem_fem.load_train import Track, Train, seat_share
 from qdem_fem.material import Material
 from qdem_fem.mesh_generation import box_mesh
@@ -25,7 +27,7 @@ from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.scene_run import run_dynamic
 from qdem_fem.sleeper_mesh import SleeperShape
-from qdem_fem.track_bed import Bed, bed_read, bed_write
+from qdem_fem.track_bed import Bed, bed_read, bed_write, scatter
 from qdem_fem.track_bodies import TrackBox, grains_nodes, lattice_loose, sleeper_slice
 from qdem_fem.track_figures import (
     acceleration_spectrum,
@@ -129,6 +131,26 @@ def test_what_falls_is_not_stopped_in_the_air(fall: bool) -> None:
         assert downward == pytest.approx(expected, rel=1e-10)
     else:
         assert downward < 0.9 * expected
+
+
+@pytest.mark.parametrize("scattered", [True, False])
+def test_grains_that_fall_in_a_column_do_not_stand_as_a_tower(scattered: bool) -> None:
+    """Eight of the paper's grains in one column of the lattice: plumb, some stand on each other,
+    four high; scattered, all lie on the ground."""
+    grains = grains_make(8, 1, None, Grading(np.array([0.022, 0.030]), np.array([0.0, 1.0])))
+    placed = lattice_loose(grains_nodes(grains), [(0.0, 0.09, 0.0, 0.09)], 0.0, 0.012, 1)
+    material = Material(30e9, 0.2, 2700.0)
+    bodies = [
+        q.Body(replace(grains.mesh(k), nodes=nodes), material, name=str(k), rigid="lumped")
+        for k, nodes in enumerate(placed)
+    ]
+    if scattered:
+        scatter(bodies, 1)
+    contact = q.SphereContact(0.012, 1.613e5, 0.577, (GROUND,), contacts=1)
+    run = q.Simulation(bodies, gravity=GRAVITY, threads=1, contact=contact)
+    kinetic_damping.rest_find(run, 0.3, 0.1, 0.2, 3.0, fall=True)
+    top = max(float((body.nodes + body.displacement)[:, 2].mean()) for body in bodies)
+    assert top < 0.05 if scattered else top > 0.1
 
 
 def test_no_equilibrium_in_time_is_told() -> None:
