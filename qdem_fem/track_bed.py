@@ -13,6 +13,7 @@ that is done in `STAGES`, each ended by kinetic damping (`qdem_fem.kinetic_dampi
 * ``hard``: with the springs asked for;
 * ``rest``: deformable bodies on the springs asked for, as the run has them.
 
+Grains fall with a horizontal velocity each, and are stopped only behind they have landed (`FALLS`).
 Bodies are stopped one by one, but in the last two stages of a bed that no wall holds along y all
 together: it slides as a whole, and hard contacts rattle so fast that each body has a peak every
 160 steps, 0.1 ms.  Stopped at each, the heap sinks by g times 0.1 ms/2, half a
@@ -238,7 +239,7 @@ def nodes_begin(
 
 
 def scatter(grains: Sequence[Body], seed: int) -> None:
-    """Give each grain a horizontal velocity of its own, `SCATTER` on the average."""
+    """Give each grain a horizontal velocity of its own, of root mean square `SCATTER`."""
     random = np.random.default_rng([seed, len(grains)])
     for grain in grains:
         x, y = SCATTER / np.sqrt(2) * random.normal(size=2)

@@ -134,7 +134,8 @@ def main() -> None:
     if bed.stage != STAGES[-1]:
         sys.exit(f"{prepared.bed_file} is at stage {bed.stage}: `trackbed qdem` goes on from there")
     record: dict[str, Any] = {
-        "command": f"python -m validation.track_paper scenes/{arguments.scene.name}",
+        "command": f"python -m validation.track_paper scenes/{arguments.scene.name} --steps "
+        f"{arguments.steps} --threads {' '.join(map(str, arguments.threads))}",
         "machine": machine(),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
     }
