@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Rigid = bool | Literal["lumped"]
+"""Whether a body is rigid, and with which inertia; `Body` says what each means."""
 
 
 class Body:
@@ -46,7 +48,7 @@ class Body:
         material: Material,
         name: str = "body",
         *,
-        rigid: bool | Literal["lumped"] = False,
+        rigid: Rigid = False,
     ) -> None:
         if not isinstance(name, str):
             raise ConditionError(f"{name!r} is no name", where="body", remedy="give a text")

@@ -11,7 +11,8 @@ directions:
 
 for any of the listed pairs that touch, and any directions.  The critical step with ``K + K_near``
 is found as that of the elements is, by Lanczos iterations.  It holds until the list is renewed, and
-is found anew then.
+is found anew then.  With rigid bodies, whose vertices have no mass of their own, it is that of the
+elements with `qdem_fem.contact_step.network_bound` of the springs near: lower, by no iterations.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.contact_step import network_bound, step_with_contact
 from qdem_fem.critical_step import critical_step_find
-from qdem_fem.errors import ConditionError, Unstable
+from qdem_fem.errors import Unstable
 
 if TYPE_CHECKING:
     from qdem_fem.contact_state import Contacts
@@ -31,17 +33,14 @@ Floats = NDArray[np.float64]
 
 
 def near_step(contacts: Contacts) -> float:
-    """Critical step [s] for any contacts there can be before pairs are looked for anew.
-
-    Raises `ConditionError` for rigid bodies, whose vertices have no mass of their own.
-    """
-    if contacts.run.rigid is not None:
-        raise ConditionError(
-            "contacts near a rigid body do not tell its step",
-            where="contact, contacts",
-            remedy="give a number of contacts",
-        )
+    """Critical step [s] for any contacts there can be before pairs are looked for anew."""
     ends, stiffness, wall = contacts.springs_near()
+    run = contacts.run
+    if run.rigid is not None:
+        inverse_mass, rigid = contacts.inverse_mass, contacts.rigid_bound
+        bound = network_bound(ends, stiffness, wall, inverse_mass, rigid)
+        elements = run.elements_critical_step.value
+        return step_with_contact(elements, bound, viscous=run.viscous)
 
     def springs(u: Floats) -> Floats:
         """``-M^-1 K_near u`` [m/s^2], (n, 3)."""
@@ -54,7 +53,7 @@ def near_step(contacts: Contacts) -> float:
         change[contacts.nodes] = pull * contacts.inverse_mass[:, None]
         return change
 
-    return critical_step_find(contacts.run, springs).value
+    return critical_step_find(run, springs).value
 
 
 def near_check(step: float, near: float, where: str) -> None:

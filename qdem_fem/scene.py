@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
+from qdem_fem.body import Rigid
 from qdem_fem.contact_scene import ContactTable
 from qdem_fem.scene_types import (
     Cells,
@@ -99,7 +100,7 @@ class BodyTable(Table):
     name: Name
     mesh: Mesh
     material: MaterialTable
-    rigid: bool | Literal["lumped"] = False
+    rigid: Rigid = False
     """Six freedoms and no element work; with the inertia of the solid, or of masses at nodes."""
     regions: dict[str, Region] = Field(default_factory=dict)
     """Material keys that differ, by the name of an element set."""

@@ -140,10 +140,11 @@ def stage_run(
     started = time.process_time()
     last = stage == STAGES[-1]
     nodes = nodes_begin(recipe, grains, stage, before)
-    bodies = bodies_of_bed(recipe, grains, nodes, rigid=recipe.rigid and not last)
+    rigid = recipe.rigid and not last
+    bodies = bodies_of_bed(recipe, grains, nodes, rigid="lumped" if rigid else False)
     softness = recipe.softness ** {**FIRM, "hard": 0, "rest": 0}.get(stage, 1)
     contact = recipe.contact(list(bodies), softness)
-    if not last and recipe.rigid:
+    if rigid:
         contact = replace(contact, contacts=1)
     if stage in FALLS:
         falling = slice(recipe.below) if stage == "bed" else slice(recipe.below, len(grains))
@@ -258,11 +259,13 @@ def bed_enter(run: Simulation, bed: Bed) -> None:
     """Put a simulation of a bed's bodies into the prepared state, springs included, at rest.
 
     Its friction, loads and conditions may be others than those it was prepared with: springs
-    beyond Coulomb's limit slip in the first step.
+    beyond Coulomb's limit slip in the first step.  Rigid bodies are to have the
+    shape that their nodes have there.
     """
     at = 0
     for body, nodes in zip(run.bodies, bed.nodes, strict=True):
-        body.displacement = bed.displacement[at : at + len(nodes)]
+        moved = bed.displacement[at : at + len(nodes)]
+        body.displacement = nodes + moved - body.nodes if body.rigid else moved
         at += len(nodes)
     if run.contacts is not None and bed.contact:
         run.contacts.restore({**bed.contact, "contact_slid": 0 * bed.contact["contact_slid"]})

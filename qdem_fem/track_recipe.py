@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.body import Body
+from qdem_fem.body import Body, Rigid
 from qdem_fem.contact_spheres import ContactPlane, SphereContact
 from qdem_fem.grain_grading import Grading
 from qdem_fem.grain_set import GrainSet, grains_make
@@ -135,15 +135,16 @@ def meshes_of(recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats]) -> l
 
 
 def bodies_of_bed(
-    recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats], *, rigid: bool
-) -> dict[str, Body]:
-    """Bodies by name; of masses at their nodes where rigid, as deformable ones have them."""
+    recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats], *, rigid: Rigid,
+    sleeper_rigid: Rigid | None = None,
+) -> dict[str, Body]:  # fmt: skip
+    """Bodies by name: grains ``rigid`` or not, the sleeper as they are if nothing else is said."""
     sleeper = len(nodes) > recipe.below + recipe.beside
     names = names_of(len(nodes) - sleeper, sleeper)
+    other = rigid if sleeper_rigid is None else sleeper_rigid
     return {
-        name: Body(
-            mesh, recipe.sleeper if name == SLEEPER else recipe.ballast, name=name,
-            rigid="lumped" if rigid else False,
-        )
+        name: Body(mesh, recipe.sleeper, name=name, rigid=other)
+        if name == SLEEPER
+        else Body(mesh, recipe.ballast, name=name, rigid=rigid)
         for name, mesh in zip(names, meshes_of(recipe, grains, nodes), strict=True)
-    }  # fmt: skip
+    }

@@ -49,6 +49,7 @@ class TrackScene(Scene):
         viscous = any(m.shear_viscosity or m.bulk_viscosity for m in (track.ballast, track.sleeper))
         told = ["viscosity: the materials are elastic"] * (not viscous)
         missing = [text for text in super().left_out() if not text.startswith(("viscosity", "any"))]
+        missing += ["deformation of grains, said to be rigid"] * bool(track.rigid)
         missing += ["rail, pads and all other sleepers: a force acts on the rail seat"]
         duration = self.simulation.duration or 0.0
         if track.bogie is not None and track.bogie.passing > duration:
@@ -133,6 +134,9 @@ def _faults(text: SceneText) -> Iterator[Problem]:
         yield Problem("simulation.gravity", "a track is dynamic and needs gravity")
     elif simulation is not None and not simulation.gravity[2] < 0:
         yield Problem("simulation.gravity", "must point down, along -z, or no grain comes to rest")
+    on_card = simulation is not None and simulation.device != "cpu"
+    if isinstance(track, TrackTable) and track.rigid and on_card:
+        yield Problem("track.rigid", "rigid grains are computed on the processor")
     output = text.tables.get("output")
     if output is not None and output.probes:
         yield Problem("output.probes", "a track names its own points: B1 to B3, S1 to S3, sleeper")
@@ -201,11 +205,13 @@ def track_enter(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     bed = bed_prepare(recipe, prepared.bed_file, table.threads, _Told())
     contact = contact_of(prepared)
     stand = bed_judge(
-        recipe, bed, prepared.bed_file, contact, track.stand, track.creep, table.threads
-    )
+        recipe, bed, prepared.bed_file, contact, track.stand, track.creep, table.threads,
+        track.rigid,
+    )  # fmt: skip
     run, bodies = bed_begin(
-        recipe, bed, contact, strain=table.strain, step=table.step, safety=table.safety,
-        threads=table.threads, mass_scaling=table.mass_scaling, device=table.device,
+        recipe, bed, contact, track.rigid, strain=table.strain, step=table.step,
+        safety=table.safety, threads=table.threads, mass_scaling=table.mass_scaling,
+        device=table.device,
     )  # fmt: skip
     sleeper = bodies[SLEEPER]
     sets = sleeper.mesh.node_sets

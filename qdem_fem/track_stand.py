@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.body import Body
+from qdem_fem.body import Body, Rigid
 from qdem_fem.contact_sphere_state import SphereContacts
 from qdem_fem.contact_spheres import SphereContact, pair_stiffness
 from qdem_fem.errors import NotConverged, StepWarning
@@ -78,10 +78,15 @@ def mobilised(run: Simulation, recipe: BedRecipe, friction: float) -> FloatArray
 
 
 def bed_begin(
-    recipe: BedRecipe, bed: Bed, contact: SphereContact, **options: Any
+    recipe: BedRecipe, bed: Bed, contact: SphereContact, rigid: Rigid = False, **options: Any
 ) -> tuple[Simulation, dict[str, Body]]:
-    """A simulation that begins in a prepared bed, and its bodies by name; ``options``: its own."""
-    bodies = bodies_of_bed(recipe, grains_of(recipe), bed.nodes, rigid=False)
+    """A simulation that begins in a prepared bed, and its bodies by name; ``options``: its own.
+
+    Where grains are ``rigid`` they keep the shape that they have at rest, and the sleeper its
+    strain: no force is another.
+    """
+    nodes = [*bed.positions[:-1], bed.nodes[-1]] if rigid else bed.nodes
+    bodies = bodies_of_bed(recipe, grains_of(recipe), nodes, rigid=rigid, sleeper_rigid=False)
     run = Simulation(list(bodies.values()), gravity=recipe.gravity, contact=contact, **options)
     sleeper_guide(run, bodies[SLEEPER], upright=False)
     bed_enter(run, bed)
@@ -89,10 +94,11 @@ def bed_begin(
 
 
 def bed_stand(
-    recipe: BedRecipe, bed: Bed, contact: SphereContact, time: float, threads: int | None = None
-) -> Stand:
+    recipe: BedRecipe, bed: Bed, contact: SphereContact, time: float,
+    threads: int | None = None, rigid: Rigid = False,
+) -> Stand:  # fmt: skip
     """Let a bed go without its load for ``time`` [s]; warnings of its step are left to the run."""
-    run, bodies = bed_begin(recipe, bed, contact, threads=threads)
+    run, bodies = bed_begin(recipe, bed, contact, rigid, threads=threads)
     used = mobilised(run, recipe, contact.friction)
     before, energy = bodies[SLEEPER].displacement[:, 2].mean(), run.energy()
     with warnings.catch_warnings():
@@ -108,15 +114,16 @@ def bed_stand(
 
 def bed_judge(
     recipe: BedRecipe, bed: Bed, path: Path, contact: SphereContact, time: float, creep: float,
-    threads: int | None = None,
+    threads: int | None = None, rigid: Rigid = False,
 ) -> Stand:  # fmt: skip
     """How the bed in the file ``path`` stands, which keeps the answer; ``creep``: the most allowed.
 
     Raises `NotConverged` for a bed that creeps more.
     """
-    key = f"friction {contact.friction:g}, {time:g} s"
+    kind = ", grains rigid" + (" (lumped)" if rigid == "lumped" else "") if rigid else ""
+    key = f"friction {contact.friction:g}, {time:g} s{kind}"
     if key not in bed.stands:
-        stand = bed_stand(recipe, bed, contact, time, threads)
+        stand = bed_stand(recipe, bed, contact, time, threads, rigid)
         bed = replace(bed, stands={**bed.stands, key: asdict(stand)})
         bed_write(path, recipe, bed)
     stand = Stand(**bed.stands[key])

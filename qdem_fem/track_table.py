@@ -11,6 +11,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from qdem_fem.body import Rigid
 from qdem_fem.load_roughness import RailKind, Roughness, WheelKind
 from qdem_fem.load_train import Track, Train, WheelFlat
 from qdem_fem.scene import MaterialTable, SeriesTable
@@ -105,6 +106,8 @@ class TrackTable(Table):
     """File of the prepared bed, made where it is not there; relative to the scene file."""
     prepared_friction: NonNegative | None = None
     """Friction that the bed is prepared with; by default that of the contact."""
+    rigid: Rigid = False
+    """Whether grains are rigid in the run, and with which inertia; the bed is the same."""
     softness: Share = 1e-4
     """Of the springs while grains fall, over those of the run."""
     unbalanced: Share = 0.05

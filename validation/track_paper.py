@@ -30,6 +30,7 @@ from qdem_fem.track_bed import STAGES, Bed, bed_read
 from qdem_fem.track_recipe import SLEEPER, BedRecipe, grains_of
 from qdem_fem.track_scene import TrackPrepared, contact_of
 from qdem_fem.track_stand import bed_begin
+from validation.track_lie import measures_of, solid_share, standing_alone
 from validation.track_small import parts_of, seconds
 from validation.track_split import split_counts
 
@@ -42,20 +43,19 @@ AXLE = 50e3
 
 
 def shape_of(recipe: BedRecipe, bed: Bed) -> dict[str, float]:
-    """Measures of the ballast as it lies [m]: its height, and its length on top and at its foot.
+    """How the ballast lies [m], how many grains stand alone, and the share of it that is solid.
 
-    The height is that below which 95 of 100 vertices of the highest tenth lie, over the ground; on
-    top is within a grain, 50 mm, of it.
+    The share is that of the ballast under the sleeper, two radii from its bottom and the ground.
     """
-    grains = np.concatenate(bed.positions[:-1])
-    height = float(np.quantile(grains[:, 2], 0.995))
-    top = grains[grains[:, 2] > height - 0.05, 0]
-    ends = np.quantile(top, [0.01, 0.99])
-    return {
-        "height": height + recipe.radius,
-        "top": float(ends[1] - ends[0]),
-        "foot": float(np.ptp(grains[:, 0])) + 2 * recipe.radius,
-        "below_sleeper": float(bed.positions[-1][:, 2].min()) - recipe.radius,
+    *grains, sleeper = bed.positions
+    period = recipe.layout.box.width if recipe.periodic else None
+    apart = 2 * recipe.radius
+    low, high = sleeper.min(axis=0), sleeper.max(axis=0)
+    under = np.array([[low[0], low[1], apart], [high[0], high[1], low[2] - recipe.radius - apart]])
+    return measures_of(grains, recipe.radius) | {
+        "below_sleeper": float(low[2]) - recipe.radius,
+        "alone": len(standing_alone(grains, period)),
+        "solid": solid_share(grains, recipe.radius, under, period),
     }
 
 

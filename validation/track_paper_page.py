@@ -92,6 +92,7 @@ def lying_words(record: dict[str, Any]) -> dict[str, str]:
         "touching": f"{contacts['touching']:,}", "listed": f"{contacts['listed']:,}",
         "vertices": f"{record['vertices']:,}",
         "coordination": f"{contacts['coordination']:.1f}",
+        "solid": f"{shape['solid']:.2f}", "alone": f"{shape['alone']}",
         "deepest": f"{1e6 * contacts['deepest']:.2g}",
     }  # fmt: skip
 

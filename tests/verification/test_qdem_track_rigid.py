@@ -1,0 +1,101 @@
+"""A track whose grains are rigid in the run: its first forces, and what it leaves out."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trackbed
+from qdem_fem.errors import SceneError, StepWarning
+from qdem_fem.scene_build import simulation_of
+from qdem_fem.scene_checks import scene_load
+from qdem_fem.track_bed import bed_prepare, bed_read
+from qdem_fem.track_scene import TrackPrepared, contact_of
+from qdem_fem.track_stand import bed_begin
+from validation.track_trials import SCENE, scene_at
+
+FEW = ("track.below=8", "track.beside=3", "track.unbalanced=0.5")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The scene of eleven grains beside its prepared bed."""
+    made = tmp_path_factory.mktemp("rigid")
+    prepared = scene_at(made, *FEW)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)  # of stages whose contacts are few
+        bed_prepare(prepared.recipe, prepared.bed_file, 1)
+    return made
+
+
+def prepared_in(folder: Path, *overrides: str) -> TrackPrepared:
+    return scene_at(folder, *FEW, *overrides)
+
+
+def test_rigid_grains_begin_with_the_forces_of_deformable_ones(folder: Path) -> None:
+    """To the bit: they lie where those lay.  The sleeper keeps its strain, grains have none."""
+    prepared = prepared_in(folder)
+    bed, contact = bed_read(prepared.bed_file, prepared.recipe), contact_of(prepared)
+    runs = [bed_begin(prepared.recipe, bed, contact, kind, threads=1)[0] for kind in (False, True)]
+    for run in runs:
+        assert run.contacts is not None
+        run.contacts.refresh()
+    soft, hard = runs
+    assert soft.contacts is not None
+    assert hard.contacts is not None
+    assert soft.contacts.kernel.force.any()
+    assert (soft.contacts.kernel.force == hard.contacts.kernel.force).all()
+    assert [bool(body.rigid) for body in hard.bodies] == [True] * 11 + [False]
+    assert (soft.bodies[-1].displacement == hard.bodies[-1].displacement).all()
+    assert hard.energy().contact == soft.energy().contact
+    assert 0 < hard.energy().elastic < soft.energy().elastic
+    assert hard.step > soft.step
+
+
+@pytest.mark.filterwarnings("ignore::qdem_fem.errors.StepWarning")
+def test_advice_on_a_track_is_checked_with_all_grains_rigid(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the advice none may be; the sleeper is then found to sink by too little, at most by what
+    was predicted: a share of the compliance that is left out is left out of the way too."""
+    scene, file = folder / "scene.toml", folder / "advice.json"
+    marks = [f"--set={one}" for one in (*FEW, "simulation.duration=0.006")]
+    assert trackbed.main(["advise", str(scene), "--check", "--json", str(file), *marks]) == 0
+    told = capsys.readouterr().out
+    assert "two runs, 11 bodies rigid in one" in told
+    found = json.loads(file.read_text(encoding="utf-8"))
+    assert not any(one["rigid"] for one in found["bodies"])
+    check = found["check"]
+    assert set(check["probes"]) == {"B1", "B2", "B3", "B2a", "S1", "S2", "S3", "sleeper"}
+    assert check["measured"] == max(check["probes"].values())
+    assert 0.3 < check["probes"]["sleeper"] < check["predicted"]
+    assert check["steps"][0] == check["steps"][1]
+
+
+@pytest.mark.filterwarnings("ignore::qdem_fem.errors.StepWarning")
+def test_a_run_of_rigid_grains_says_what_it_leaves_out_and_stands_for_itself(folder: Path) -> None:
+    """The bed is let go once for every kind of grain, and its file keeps all answers."""
+    kinds = {"false": "", "true": ", grains rigid", '"lumped"': ", grains rigid (lumped)"}
+    for kind in kinds:
+        prepared = prepared_in(folder, f"track.rigid={kind}", "track.stand=1e-5")
+        told = " ".join(prepared.scene.left_out())
+        assert ("deformation of grains" in told) == (kind != "false")
+        simulation_of(prepared)
+    stands = bed_read(prepared.bed_file, prepared.recipe).stands
+    keys = {f"friction 0.577, 1e-05 s{kind}" for kind in kinds.values()}
+    assert keys <= set(stands)
+    assert np.ptp([stands[key]["pairs"] for key in keys]) == 0
+
+
+def test_rigid_grains_are_refused_on_a_card(tmp_path: Path) -> None:
+    """Before anything is prepared."""
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    with pytest.raises(SceneError, match="rigid grains are computed on the processor"):
+        scene_load(path, ["track.rigid=true", 'simulation.device="cuda"'])
+    with pytest.raises(SceneError, match=r"track\.rigid"):
+        scene_load(path, ['track.rigid="hard"'])
