@@ -7,6 +7,7 @@ was interrupted.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from qdem_fem.errors import MeshError
 from qdem_fem.mesh_sources import file_read
 from qdem_fem.output import bodies_vtu_write
 from qdem_fem.pictures_bodies import (
@@ -67,11 +69,20 @@ def series_draw(
 
     It reaches from zero to the greatest stress that is drawn in any of them, and all have one
     frame, so that what does not move stays where it is.  ``bodies`` of the simulation ``run`` have
-    the meshes, files what moves.  Raises `MeshError` for a file that is not there or not whole.
+    the meshes, files what moves.  A file that is not there any more, or not whole, gets no picture
+    and a warning: a run is not lost for it.
     """
-    series = extent_joined([extent_of(_shown(path, bodies)[0], magnification) for _, path in files])
-    drawn = []
+    whole, extents = [], []
     for when, path in files:
+        try:
+            extents.append(extent_of(_shown(path, bodies)[0], magnification))
+            whole.append((when, path))
+        except MeshError as error:
+            warnings.warn(f"{error.where}: {error.what}; it gets none", stacklevel=2)
+    if not whole:
+        return []
+    series, drawn = extent_joined(extents), []
+    for when, path in whole:
         shown, bears = _shown(path, bodies)
         drawn.append(picture_beside(path))
         picture_deformed(

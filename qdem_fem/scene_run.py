@@ -151,7 +151,7 @@ def run_dynamic(
 
         files = [(when, folder.path / name) for _, when, name in plan.field_files(plan.total)]
         pictures = series_draw(run, list(bodies.values()), files, output.magnification)
-        if output.video is not None:
+        if output.video is not None and pictures:
             from qdem_fem.pictures_video import video_write
 
             video_write(folder.path / "video.gif", pictures, output.video)

@@ -43,7 +43,8 @@ AXLE = 50e3
 
 
 def shape_of(recipe: BedRecipe, bed: Bed) -> dict[str, float]:
-    """How the ballast lies [m], how many grains stand alone, and the share of it that is solid.
+    """How the ballast lies [m], how many grains stand alone, how many of them higher than the
+    sleeper's top, and the share of it that is solid.
 
     The share is that of the ballast under the sleeper, two radii from its bottom and the ground.
     """
@@ -52,9 +53,12 @@ def shape_of(recipe: BedRecipe, bed: Bed) -> dict[str, float]:
     apart = 2 * recipe.radius
     low, high = sleeper.min(axis=0), sleeper.max(axis=0)
     under = np.array([[low[0], low[1], apart], [high[0], high[1], low[2] - recipe.radius - apart]])
+    alone = standing_alone(grains, period)
+    on_it = [grains[i].mean(axis=0)[2] > high[2] for i in alone]
     return measures_of(grains, recipe.radius) | {
         "below_sleeper": float(low[2]) - recipe.radius,
-        "alone": len(standing_alone(grains, period)),
+        "alone": len(alone),
+        "alone_on_sleeper": int(np.sum(on_it)),
         "solid": solid_share(grains, recipe.radius, under, period),
     }
 

@@ -93,6 +93,7 @@ def lying_words(record: dict[str, Any]) -> dict[str, str]:
         "vertices": f"{record['vertices']:,}",
         "coordination": f"{contacts['coordination']:.1f}",
         "solid": f"{shape['solid']:.2f}", "alone": f"{shape['alone']}",
+        "on_it": f"{shape['alone_on_sleeper']}",
         "deepest": f"{1e6 * contacts['deepest']:.2g}",
     }  # fmt: skip
 

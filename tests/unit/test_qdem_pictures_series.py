@@ -16,7 +16,6 @@ from matplotlib import colormaps, image
 import qdem_fem as q
 from qdem_fem import pictures_series
 from qdem_fem.cli import Progress
-from qdem_fem.errors import MeshError
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.output import bodies_vtu_write
 from qdem_fem.pictures_series import picture_beside, series_draw
@@ -158,12 +157,16 @@ def test_pictures_of_an_interrupted_run_are_those_of_a_whole_one(
     assert (bears[0], max(bears)) == (4, 12)
 
 
-def test_a_file_that_is_gone_is_told(tmp_path: Path) -> None:
-    with pytest.raises(MeshError, match=r"fields_0\.vtu, of which a picture is drawn"):
-        series_draw(STILL, [block(0.0)], [(0.0, tmp_path / "fields_0.vtu")], 1.0)
-    (tmp_path / "fields_0.vtu").write_text("torn")
-    with pytest.raises(MeshError, match=r"fields_0\.vtu, of which a picture is drawn"):
-        series_draw(STILL, [block(0.0)], [(0.0, tmp_path / "fields_0.vtu")], 1.0)
+@pytest.mark.parametrize("torn", [False, True])
+def test_a_file_that_is_gone_is_told_and_the_others_are_drawn(tmp_path: Path, torn: bool) -> None:
+    if torn:
+        (tmp_path / "fields_0.vtu").write_text("torn")
+    bodies_vtu_write(tmp_path / "fields_1.vtu", [block(1.0)])
+    files = [(float(i), tmp_path / f"fields_{i}.vtu") for i in (0, 1)]
+    with pytest.warns(UserWarning, match=r"fields_0\.vtu, of which a picture is drawn"):
+        assert series_draw(STILL, [block(0.0)], files, 1.0) == [picture_beside(files[1][1])]
+    with pytest.warns(UserWarning, match=r"it gets none"):
+        assert series_draw(STILL, [block(0.0)], files[:1], 1.0) == []
 
 
 def test_a_series_without_any_stress_is_drawn(tmp_path: Path) -> None:
