@@ -126,6 +126,9 @@ def _faults(text: SceneText) -> Iterator[Problem]:
             if track.width <= needed:
                 what = f"the sleeper with its spheres is {needed:.4g} m wide, and grains lie beside"
                 yield Problem("track.width", what)
+            if track.sizes[0] < contact.radius:
+                what = f"{track.sizes[0]:.4g} m is smaller than the radius of a grain's spheres"
+                yield Problem("track.sizes", what)
         if contact.periodic is not None and not _fits(contact.periodic, track):
             yield Problem("contact.periodic", "a track repeats along y by its width")
         if not isinstance(stiffness, dict) or sorted(stiffness) != sorted(names):

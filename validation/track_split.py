@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from qdem_fem.contact_spheres import SKIN
@@ -64,7 +65,8 @@ def split_counts(
                 np.searchsorted(cuts, every[:, axis]),
             )  # fmt: skip
             load = np.bincount(owner, weight, parts)
-            told, heard = ghosts(recipe.radius, width, every, of_vertex, parts)
+            cut = body == len(centre)
+            told, heard = ghosts(recipe.radius, width, every, of_vertex, cut, parts)
             shared = shared_nodes(sleeper.elements, owner[len(centre) :], parts)
             counts.append({
                 "axis": name, "parts": parts, "busiest": float(load.max() / load.mean()),
@@ -75,29 +77,33 @@ def split_counts(
 
 
 def ghosts(
-    radius: float, width: float | None, every: FloatArray, owner: IntArray, parts: int
-) -> tuple[IntArray, IntArray]:
+    radius: float, width: float | None, every: FloatArray, owner: IntArray,
+    cut: NDArray[np.bool_], parts: int,
+) -> tuple[IntArray, IntArray]:  # fmt: skip
     """Positions of vertices (k, 3) [m] that each process sends and receives a step, (parts,) both.
 
-    ``owner`` (k,): the process that a vertex belongs to; ``radius`` of spheres [m]; ``width`` after
-    which all repeats along y [m], or None.
+    ``owner`` (k,): the process that a vertex belongs to; ``cut`` (k,): whether it is of the body
+    that several have a part of, whose vertices do not touch each other; ``radius`` of spheres [m];
+    ``width`` after which all repeats along y [m], or None.
     """
     reach = (2 + SKIN) * radius
     shifts = [0.0] if width is None else [-width, 0.0, width]
     told, heard = np.zeros((2, parts), np.int64)
-    trees = [cKDTree(every[owner == p]) for p in range(parts)]
+    mine = [[np.flatnonzero((owner == p) & (cut == part)) for part in (0, 1)] for p in range(parts)]
+    whole = [cKDTree(every[grains]) for grains, _ in mine]
+    both = [cKDTree(every[np.concatenate(each)]) for each in mine]
     for here in range(parts):
         for there in range(parts):
             if here == there:
                 continue
-            mine = np.flatnonzero(owner == there)
-            needed = np.zeros(len(mine), bool)
-            for shift in shifts:
-                moved = every[mine] + np.array([0.0, shift, 0.0])
-                away, _ = trees[here].query(moved, distance_upper_bound=reach)
-                needed |= np.isfinite(away)
-            told[there] += needed.sum()
-            heard[here] += needed.sum()
+            for of_it, tree in zip(mine[there], (both[here], whole[here]), strict=True):
+                needed = np.zeros(len(of_it), bool)
+                for shift in shifts:
+                    moved = every[of_it] + np.array([0.0, shift, 0.0])
+                    away, _ = tree.query(moved, distance_upper_bound=reach)
+                    needed |= np.isfinite(away)
+                told[there] += needed.sum()
+                heard[here] += needed.sum()
     return told, heard
 
 

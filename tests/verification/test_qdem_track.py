@@ -399,6 +399,7 @@ def test_mobility_of_a_grain_that_drops_off(samples: int, interval: float) -> No
         (("sleeper = 2.39e9", "concrete = 2.39e9"), "give {ballast = ..., sleeper = ...}"),
         (("below = 14", "bellow = 14"), "did you mean below"),
         (("gravity = [0, 0, -9.81]", ""), "needs gravity"),
+        (("share = 0.13", "share = 0.13\nsizes = [0.01, 0.03]"), "smaller than the radius of a"),
     ],
 )  # fmt: skip
 def test_a_wrong_track_is_refused_with_a_sentence(
