@@ -7,12 +7,14 @@ The words are in ``qdem_bodies_page.md`` beside this file; a test holds the page
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from adapters.run_folder import write_atomically
+from validation.advise_track import RECORD as TRACK
 from validation.parts_record import parts_read
 from validation.qdem_bodies import RECORD
 
@@ -22,8 +24,8 @@ PICTURE = PAGE.with_suffix(".png")
 Data = dict[str, Any]
 
 
-def page(parts: Data) -> str:
-    """The whole page in Markdown."""
+def page(parts: Data, track: Data) -> str:
+    """The whole page in Markdown, from its record and that of the small track."""
     rows = {name: part["rows"] for name, part in parts.items()}
     grains = [row for row in rows["inertia"] if row["body"].startswith("grain")]
     over = [row["predicted"] / row["measured"] for row in rows["advise"]]
@@ -57,7 +59,29 @@ def page(parts: Data) -> str:
             f"{r['deformable_s'] / r['rigid_s']:.1f}"
             for r in rows["cost"]
         ),
+        **track_words(track),
     )
+
+
+def track_read() -> Data:
+    """The record of the small track."""
+    record: Data = json.loads(TRACK.read_text(encoding="utf-8"))
+    return record
+
+
+def track_words(record: Data) -> dict[str, str]:
+    """What was advised of a track, and what two runs of it said."""
+    probes, (soft, hard) = record["check"]["probes"], record["check"]["cost"]
+    least, most = (f"{100 * record[f'error_{name}']:.0f}" for name in ("least", "greatest"))
+    return {
+        "track_command": record["command"], "track_machine": record["machine"],
+        "track_started": record["started"][:10], "track_grains": str(record["grains"]),
+        "track_duration": f"{record['duration']:g}",
+        "track_rigid": str(record["rigid"] or "none"), "track_errors": f"{least} to {most} %",
+        "track_names": " | ".join(probes), "track_rule": "---|" * (len(probes) - 1),
+        "track_values": " | ".join(f"{one:.2f}" for one in probes.values()),
+        "track_cost": f"{soft:.0f} s deformable, {hard:.0f} s rigid",
+    }  # fmt: skip
 
 
 def order(rows: list[Data], cells: int) -> float:
@@ -108,5 +132,5 @@ def picture(parts: Data, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    write_atomically(PAGE, page(parts_read(RECORD)))
+    write_atomically(PAGE, page(parts_read(RECORD), track_read()))
     picture(parts_read(RECORD), PICTURE)

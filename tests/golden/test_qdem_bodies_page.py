@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from validation.parts_record import parts_read
 from validation.qdem_bodies import RECORD
-from validation.qdem_bodies_page import PAGE, order, page
+from validation.qdem_bodies_page import PAGE, order, page, track_read
 
 
 def test_page_is_the_records() -> None:
     """Byte for byte."""
-    assert PAGE.read_text(encoding="utf-8") == page(parts_read(RECORD))
+    assert PAGE.read_text(encoding="utf-8") == page(parts_read(RECORD), track_read())
 
 
 def test_record_holds_what_the_page_says() -> None:
@@ -19,4 +19,8 @@ def test_record_holds_what_the_page_says() -> None:
     first, *_, last = parts["top"]["rows"]
     assert first["error"] / last["error"] > 0.5 * (first["step"] / last["step"]) ** 2
     assert all(row["measured"] < row["predicted"] for row in parts["advise"]["rows"])
+    track = track_read()
+    sleeper = track["check"]["probes"]["sleeper"]
+    assert 0.5 < sleeper < track["check"]["predicted"] == 1.0
+    assert track["error_least"] > 0.5
     assert all(row["rigid_s"] < row["deformable_s"] for row in parts["cost"]["rows"])
