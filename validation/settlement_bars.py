@@ -16,8 +16,8 @@ from validation.page_text import table
 from validation.settlement_ensemble import Kind
 from validation.settlement_ensemble_reading import Nested, nested
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import Row
-from validation.settlement_rivals_continuity import COLUMNS, share_continued
+from validation.settlement_rivals import HEALING, Row
+from validation.settlement_rivals_continuity import COLUMNS, share_continued, stays
 from validation.settlement_rivals_reading import (
     FIGURES,
     cost,
@@ -132,6 +132,17 @@ def continued(column: str, skipped: int = 0) -> Callable[[Sequence[Row], str, in
     return share
 
 
+def stayed(column: str, skipped: int) -> Callable[[Sequence[Row], str, int], float]:
+    """Share of all jumps behind which a column stays as before [%]."""
+
+    def share(rows: Sequence[Row], method: str, last: int) -> float:
+        jumps = [one for row in finished(rows, method, last) for one in row.get("sides", [])]
+        held = [stays(one, column, skipped) for one in jumps]
+        return 100 * float(np.mean(held)) if held else float("nan")
+
+    return share
+
+
 BARS = (
     Bar("bias over the total settlement", "%", 1.0, bias),
     Bar("bias over half the reference's interval", "", 1.0, bias_beside_interval),
@@ -140,6 +151,8 @@ BARS = (
     Bar("density profile", "%", 2.0, error_of_profile),
     Bar("elastic deflection", "%", 2.0, error_of("deflection")),
     Bar("gained time", "%", 400.0, gained_time, least=True),
+    Bar("rate behind healing stays", "%", 90.0, stayed(COLUMNS[0], HEALING), least=True),
+    Bar("rate behind healing goes on", "%", 90.0, continued(COLUMNS[0], HEALING), least=True),
     Bar("rate behind the first cycle goes on", "%", 90.0, continued(COLUMNS[0], 1), least=True),
     *(
         Bar(f"{words} goes on", "%", 90.0, continued(column), least=True)

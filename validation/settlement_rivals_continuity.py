@@ -90,6 +90,18 @@ def continues(sides: Row, others: Sequence[Row], column: str, skipped: int = 0) 
     return bool(abs(change_of(sides, column, skipped) - changes.mean()) <= bound)
 
 
+def stays(sides: Row, column: str, skipped: int) -> bool:
+    """Whether the mean behind a jump and ``skipped`` cycles is one that single cycles before it
+    have: within two of their standard deviations of their mean.
+
+    No full run is asked, and a bed need not slow down: what is called no shock, and less than
+    `continues`.
+    """
+    before, after = (np.array(sides[name][column], float) for name in ("before", "after"))
+    before = before[np.isfinite(before)]
+    return bool(abs(after[skipped:].mean() - before.mean()) <= 2 * before.std(ddof=1))
+
+
 def share_continued(
     pairs: Sequence[tuple[Row, Sequence[Row]]], column: str, skipped: int = 0
 ) -> float:

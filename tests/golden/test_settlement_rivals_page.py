@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 from scipy.stats import f as fisher
 
-from validation.settlement_bars import bias, error_of, error_of_profile, gained_time, spread
+from validation.settlement_bars import (
+    BARS,
+    bias,
+    error_of,
+    error_of_profile,
+    gained_time,
+    sides_compared,
+    spread,
+)
+from validation.settlement_ensemble import CONFINED
+from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
 from validation.settlement_rivals_page import PAGE, page
@@ -128,6 +138,10 @@ def test_sentences_about_the_paper_scale() -> None:
                 for cycle in ("280", "500")
             )
             assert before < -40e-6 < 0 < after < 40e-6
+    compared = sides_compared(rows, CONFINED, EnsembleRecord())
+    shares = {bar.words: bar.value(compared, name, LAST) for bar in BARS}
+    assert shares["rate behind healing stays"] == pytest.approx(100 * 11 / 12)
+    assert shares["rate behind healing goes on"] == pytest.approx(100 * 10 / 12)
     found = judged(rows, "law log, 20 cycles", LAST, "settlement")
     assert found is not None
     assert found.error[found.seeds.index(2)] < -0.4

@@ -39,6 +39,7 @@ from validation.settlement_rivals_continuity import (
     share_continued,
     sides_of,
     sides_without_jump,
+    stays,
 )
 from validation.settlement_rivals_reading import (
     FIGURES,
@@ -292,6 +293,23 @@ def test_a_bed_that_goes_on_is_seen_to_and_a_shock_is_not_passed() -> None:
     for column in COLUMNS:
         assert share_continued(same, column) == pytest.approx(0.95, abs=0.033)
         assert share_continued(shocked, column) < 0.1
+
+
+def test_what_stays_is_within_the_scatter_of_single_cycles() -> None:
+    """Means of ten and of five of one distribution part by 0.55 of its standard deviation s, 2 s
+    with Student's nine degrees of freedom in one case of two hundred; the shock is one of six s.
+    Cycles that are left out do not count."""
+    random = np.random.default_rng(3)
+    held: dict[float, list[bool]] = {shock: [] for shock in (0.0, 6.0)}
+    for shock, found in held.items():
+        for _ in range(400):
+            before, after = 1 + random.normal(size=(2, CYCLES))
+            after += np.where(np.arange(CYCLES) < 5, 50.0, shock)
+            one = {"before": {"settlement": before}, "after": {"settlement": after}}
+            found.append(stays(one, "settlement", 5))
+            assert not stays(one, "settlement", 0)
+    assert np.mean(held[0.0]) > 0.98
+    assert np.mean(held[6.0]) < 0.02
 
 
 def test_sides_of_a_run_are_its_table(tmp_path: Path) -> None:
