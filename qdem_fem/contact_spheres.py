@@ -88,8 +88,8 @@ class SphereContact:
     """Of the neighbour list [m], which changes no force; a tenth of the radius by default."""
     contacts: int | Literal["near"] = CONTACTS
     """Contacts of a vertex at once that the time step allows for; or ``"near"``: those within the
-    skin when the march begins (`qdem_fem.contact_near`), for deformable bodies that lie together.
-    A march that meets more stops."""
+    skin when the march begins (`qdem_fem.contact_near`), for bodies that lie together.  A march
+    that meets more stops."""
     periodic: PeriodicWidth | None = field(default=None, repr=False)
     """Bodies touch across the sides of this width; not at all by default."""
 

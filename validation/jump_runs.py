@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,6 +52,8 @@ class Study:
     seeds: int
     ways: tuple[Way, ...]
     record: Path
+    facts: Callable[[RunFolder, RunFolder], dict[str, Any]] | None = None
+    """What else is kept of a run, from its folder and that of the full run."""
 
     def scene(self, way: Way, seed: int) -> Scene:
         """The bed of a seed, run in that way."""
@@ -121,6 +123,7 @@ def run(study: Study, way: Way, seed: int, work: Path) -> dict[str, Any]:
         ],
         "decisions": [_last(event) for event in here.events() if event["event"] == DECISION],
         "checks": [_last(event) for event in here.events() if event["event"] == CHECK],
+        **({} if study.facts is None else study.facts(here, RunFolder(full.path / CONTROL.name))),
         "engine": next(e["version"] for e in home.events() if e["event"] == "engine"),
         "commit": commit(),
         "machine": machine(),

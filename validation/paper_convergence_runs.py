@@ -10,11 +10,25 @@ in Fig. 11 after k_i = 10 cycles.
 from __future__ import annotations
 
 from adapters.procedure import CONTROL, control_perturbed
+from adapters.report_record import track_read
+from adapters.residual import error_of_coordinates, error_of_displacement
+from adapters.run_folder import RunFolder
 from validation.jump_runs import RESULTS, Study, Way, go_on
 
 JUMPS = ((10, 10), (20, 10), (40, 10), (40, 5), (40, 20), (40, 40))
 """k and h."""
 STILL = 'procedure.move="still"'
+LAST = 150
+
+
+def facts(here: RunFolder, full: RunFolder) -> dict[str, float]:
+    """Fig. 12c: E_r (eq. 22) at the end, of coordinates and of displacements since cycle 0."""
+    mine, truth = track_read("", here), track_read("", full)
+    start, there = truth.start().position, truth.position(LAST)
+    return {
+        "coordinates": error_of_coordinates(there, mine.position(LAST)),
+        "displacement": error_of_displacement(start, there, mine.position(LAST)),
+    }
 
 
 def jumping(k: int, h: int, *settings: str) -> tuple[str, ...]:
@@ -27,7 +41,7 @@ STUDY = Study(
     settings=(),
     k_i=10,
     shared=10,
-    last=150,
+    last=LAST,
     seeds=1,
     ways=(
         Way("full", jumping(10, 10), CONTROL),
@@ -36,6 +50,7 @@ STUDY = Study(
         Way("k 20, h 10, nothing moved", jumping(20, 10, STILL)),
     ),
     record=RESULTS / "paper-convergence.jsonl",
+    facts=facts,
 )
 
 if __name__ == "__main__":

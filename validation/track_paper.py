@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 
 from qdem_fem.contact_sphere_state import SphereContacts
+from qdem_fem.contact_spheres import CONTACTS
+from qdem_fem.contact_step import allowed_bound, step_with_contact
 from qdem_fem.kinetic_damping import bodies_of
 from qdem_fem.output import write_whole
 from qdem_fem.run_folder import machine
@@ -115,6 +117,14 @@ def axle_put_on(run: Simulation, steps: int) -> dict[str, float]:
     }  # fmt: skip
 
 
+def step_any(run: Simulation) -> float:
+    """The step [s] that a run would take with room for `CONTACTS` contacts of every vertex."""
+    assert run.contacts is not None
+    bound = allowed_bound(run.contacts.one, run.contacts.inverse_mass, CONTACTS)
+    elements = run.elements_critical_step.value
+    return run.safety * step_with_contact(elements, bound, viscous=run.viscous)
+
+
 def run_of(prepared: TrackPrepared, bed: Bed, threads: int) -> Simulation:
     """The scene's simulation in its bed, without its load."""
     table = prepared.scene.simulation
@@ -160,7 +170,7 @@ def main() -> None:
                 "elements_ballast": sum(elements[:-1]), "elements_sleeper": elements[-1],
                 "nodes": sum(len(body.nodes) for body in run.bodies),
                 "vertices": len(run.contacts.nodes) if run.contacts else 0,
-                "contacts": contacts_of(run),
+                "contacts": contacts_of(run), "step_any": step_any(run),
             }  # fmt: skip
         timed = {"threads": run.assembly.threads, "built_cpu_s": built}
         record["marches"][str(threads)] = timed | step_timed(run, arguments.steps)
