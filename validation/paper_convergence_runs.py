@@ -2,9 +2,9 @@
 
     python -m validation.paper_convergence_runs --work FOLDER [--only WAY ...]
 
-Goes on where the record and FOLDER end, as `validation.jump_runs` does; some two CPU hours and a half.  The
-procedure is the project's (law log, smoothed move, smallest move, five healing cycles), begun as
-in Fig. 11 after k_i = 10 cycles.
+Goes on where the record and FOLDER end, as `validation.jump_runs` does; some two and a half CPU
+hours.  The procedure is the project's (law log, smoothed move, smallest move, five healing cycles),
+begun as in Fig. 11 after k_i = 10 cycles.
 """
 
 from __future__ import annotations
