@@ -42,7 +42,8 @@ CHECK = 25
 """Looks between two judgements of the state."""
 SLOW, SLIDE = 15, 5e-3
 """Judgements without rest after which bodies are left twice as long, up to this time [s]: what
-slides comes to g t/2 between two stops, millimetres a second on hard springs."""
+slides comes to g t/2 between two stops, millimetres a second on hard springs.  Every other
+judgement is of a stretch with the short `WAIT`: what trembles meanwhile would pass for loose."""
 
 
 @dataclass(frozen=True)
@@ -168,6 +169,11 @@ class Damping:
     """Looks without a greater kinetic energy after which a body is stopped."""
     judged: int = 0
 
+    @property
+    def waits(self) -> int:
+        """``wait``, and `WAIT` every other judgement."""
+        return WAIT if self.judged % 2 else self.wait
+
     @classmethod
     def begin(cls, run: Simulation) -> Damping:
         """Of a simulation that is not damped yet."""
@@ -217,7 +223,7 @@ def rest_find(
         more = now > state.peak
         state.since = np.where(more, 0, state.since + 1)
         state.peak = np.maximum(state.peak, now)
-        past = state.since >= (state.wait if each else 1)
+        past = state.since >= (state.waits if each else 1)
         if fall:
             state.landed = grounded(run) | (state.landed & ~more)
             past &= state.landed
