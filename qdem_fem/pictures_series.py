@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy.typing as npt
 from qdem_fem.errors import MeshError
 from qdem_fem.mesh_sources import file_read
 from qdem_fem.output import bodies_vtu_write
+from qdem_fem.periodic import PeriodicWidth
 from qdem_fem.pictures_bodies import (
     extent_joined,
     extent_of,
@@ -57,9 +58,14 @@ def fields_draw(
     needs beside their fields, and draw that, on a scale of its own."""
     bearing = spheres_bearing(run)
     bodies_vtu_write(path, bodies, None if bearing is None else bearing.nodes)
+    shown = [
+        Shown(body.nodes, body.elements, body.surface, body.displacement, body.von_mises())
+        for body in bodies
+    ]
     picture_deformed(
-        picture_beside(path), bodies, magnification=magnification, bearing=bearing, time=time
-    )
+        picture_beside(path), inside(shown, width_of(run)), magnification=magnification,
+        bearing=bearing, time=time,
+    )  # fmt: skip
 
 
 def series_draw(
@@ -72,10 +78,10 @@ def series_draw(
     the meshes, files what moves.  A file that is not there any more, or not whole, gets no picture
     and a warning: a run is not lost for it.
     """
-    whole, extents = [], []
+    width, whole, extents = width_of(run), [], []
     for when, path in files:
         try:
-            extents.append(extent_of(_shown(path, bodies)[0], magnification))
+            extents.append(extent_of(inside(_shown(path, bodies)[0], width), magnification))
             whole.append((when, path))
         except MeshError as error:
             warnings.warn(f"{error.where}: {error.what}; it gets none", stacklevel=2)
@@ -86,10 +92,28 @@ def series_draw(
         shown, bears = _shown(path, bodies)
         drawn.append(picture_beside(path))
         picture_deformed(
-            drawn[-1], shown, magnification=magnification, bearing=spheres_bearing(run, bears),
-            time=when, series=series,
+            drawn[-1], inside(shown, width), magnification=magnification,
+            bearing=spheres_bearing(run, bears), time=when, series=series,
         )  # fmt: skip
     return drawn
+
+
+def width_of(run: Any) -> PeriodicWidth | None:
+    """Across whose sides bodies of a simulation touch; None where it has none."""
+    return None if run.contacts is None else run.contacts.asked.periodic
+
+
+def inside(bodies: Sequence[Shown], width: PeriodicWidth | None) -> list[Shown]:
+    """Bodies as their images within half a periodic width of where the median of all began."""
+    if width is None:
+        return list(bodies)
+    began = np.array([body.nodes.mean(axis=0) for body in bodies])
+    moved = np.array([body.displacement.mean(axis=0) for body in bodies])
+    away = (began + moved - np.median(began, axis=0))[:, width.number] / width.width
+    return [
+        replace(body, nodes=body.nodes - images * width.way)
+        for body, images in zip(bodies, np.round(away), strict=True)
+    ]
 
 
 def picture_beside(path: Path) -> Path:

@@ -18,7 +18,8 @@ from qdem_fem import pictures_series
 from qdem_fem.cli import Progress
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.output import bodies_vtu_write
-from qdem_fem.pictures_series import picture_beside, series_draw
+from qdem_fem.periodic import PeriodicWidth
+from qdem_fem.pictures_series import Shown, inside, picture_beside, series_draw
 from qdem_fem.surface import surface_faces
 from trackbed import main
 
@@ -155,6 +156,24 @@ def test_pictures_of_an_interrupted_run_are_those_of_a_whole_one(
     ]
     assert drawn == 2 * bears
     assert (bears[0], max(bears)) == (4, 12)
+
+
+def test_bodies_that_left_a_periodic_width_are_drawn_as_their_images() -> None:
+    """Three of five lie inside of half a width of 1 m from the middle one; of 0.6 and -1.7 m the
+    images do, at -0.4 and 0.3; moves count, and along the other axes nothing is done."""
+    size = np.array([0.1, 0.1, 0.1])
+    bodies = []
+    for place, move in ((0.0, 0.0), (0.3, 0.1), (-0.4, 0.0), (0.2, 0.4), (-0.7, -1.0)):
+        mesh = box_mesh(tuple(size), (1, 1, 1), origin=tuple([3.0, place, 5.0] - size / 2))
+        moved = np.tile([0.0, move, 0.0], (8, 1))
+        faces = surface_faces(mesh.elements)
+        bodies.append(Shown(mesh.nodes, mesh.elements, faces, moved, np.zeros(len(mesh.elements))))
+    found = inside(bodies, PeriodicWidth("y", 1.0))
+    places = [(body.nodes + body.displacement).mean(axis=0) for body in found]
+    assert np.array(places) == pytest.approx(
+        np.array([[3.0, y, 5.0] for y in (0.0, 0.4, -0.4, -0.4, 0.3)])
+    )
+    assert all(one is other for one, other in zip(inside(bodies, None), bodies, strict=True))
 
 
 @pytest.mark.parametrize("torn", [False, True])
