@@ -43,7 +43,9 @@ CHECK = 25
 SLOW, SLIDE = 15, 5e-3
 """Judgements without rest after which bodies are left twice as long, up to this time [s]: what
 slides comes to g t/2 between two stops, millimetres a second on hard springs.  Every other
-judgement is of a stretch with the short `WAIT`: what trembles meanwhile would pass for loose."""
+judgement is of a stretch with the short `WAIT`: what trembles meanwhile would pass for loose.
+Bodies that are stopped all together are, behind as many, stopped one by one every other judgement:
+where some ring, out of step or fed by their sliders, the sum of all has no peak."""
 
 
 @dataclass(frozen=True)
@@ -169,6 +171,10 @@ class Damping:
     """Looks without a greater kinetic energy after which a body is stopped."""
     judged: int = 0
 
+    def alone(self, each: bool) -> bool:
+        """Whether bodies are stopped one by one until the next judgement."""
+        return each or (self.judged >= SLOW and self.judged % 2 == 1)
+
     @property
     def waits(self) -> int:
         """``wait``, and `WAIT` every other judgement."""
@@ -218,18 +224,19 @@ def rest_find(
         run.advance(look * run.step)
         now = kinetic_each(run)
         greatest, looks = max(greatest, float(now.sum())), looks + 1
-        if not each:
+        alone = state.alone(each)
+        if not alone:
             now = np.full_like(now, now.sum())
         more = now > state.peak
         state.since = np.where(more, 0, state.since + 1)
         state.peak = np.maximum(state.peak, now)
-        past = state.since >= (state.waits if each else 1)
+        past = state.since >= (state.waits if alone else 1)
         if fall:
             state.landed = grounded(run) | (state.landed & ~more)
             past &= state.landed
         if past.any():
             stop(run, past)
-            state.peaks += int(past.sum()) if each else 1
+            state.peaks += int(past.sum()) if alone else 1
             state.peak[past] = 0.0
             state.since[past] = 0
         if looks < CHECK:

@@ -153,6 +153,39 @@ def test_grains_that_fall_in_a_column_do_not_stand_as_a_tower(scattered: bool) -
     assert top < 0.05 if scattered else top > 0.1
 
 
+@pytest.mark.parametrize("slow", [2, 100])
+def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(
+    slow: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cube falls, so all together have no peak; the other rings on its springs with a third of
+    what bears it, and goes on for ever, unless bodies are stopped one by one now and then."""
+    monkeypatch.setattr(kinetic_damping, "SLOW", slow)
+    monkeypatch.setattr(kinetic_damping, "CHECK", 60)
+    mass, size = 2700.0 * 0.05**3, (0.05, 0.05, 0.05)
+    sunk, omega = mass * 9.81 / (8 * STIFFNESS), np.sqrt(8 * STIFFNESS / mass)
+    places = ((0.0, RADIUS - sunk), (0.2, 2.0))
+    bodies = [
+        q.Body(box_mesh(size, (1, 1, 1), origin=(x, 0.0, z)), STONE, rigid=True) for x, z in places
+    ]
+    contact = q.SphereContact(RADIUS, STIFFNESS, 0.5, (GROUND,))
+    run = q.Simulation(bodies, gravity=GRAVITY, threads=1, contact=contact)
+    bodies[0].velocity = np.tile([0.0, 0.0, sunk / 3 * omega], (8, 1))
+    rings = []
+
+    def keep(_state: kinetic_damping.Damping) -> None:
+        ring = kinetic_damping.kinetic_each(run)[0]
+        lift = bodies[0].displacement[:, 2].mean()
+        rings.append((ring + 4 * STIFFNESS * lift**2) / (mass * (sunk / 3 * omega) ** 2 / 2))
+
+    most = 3.5 * 60 * run.step
+    with pytest.raises(NotConverged):
+        kinetic_damping.rest_find(run, 0.0, 0.0, 0.0, most, look=1, each=False, keep=keep)
+    assert len(rings) == 4
+    stopped = slow == 2  # velocities half a step behind: omega dt/2 = 0.21 of the energy at most
+    assert rings[:3] == pytest.approx([1.0] * 3, abs=0.3)
+    assert rings[3] == pytest.approx(0.0 if stopped else 1.0, abs=0.01 if stopped else 0.3)
+
+
 def test_no_equilibrium_in_time_is_told() -> None:
     with pytest.raises(NotConverged, match=r"asked.*kinetic energy.*bodies loose"):
         kinetic_damping.rest_find(stacked(True), 1e-3, 1e-4, 0.0, 1e-3, look=1)
