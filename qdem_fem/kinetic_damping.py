@@ -44,9 +44,8 @@ SLOW, SLIDE = 15, 5e-3
 """Judgements without rest after which bodies are left twice as long, up to this time [s]: what
 slides comes to g t/2 between two stops, millimetres a second on hard springs.  Every other
 judgement is of a stretch with the short `WAIT`: what trembles meanwhile would pass for loose.
-Bodies that are stopped all together are, behind as many, stopped one by one every other judgement,
-but for one that has half of the energy, whose peaks are the sum's: where some ring, out of step or
-fed by their sliders, the sum of all has no peak."""
+Bodies that are stopped all together are, behind as many, stopped one by one every other judgement:
+where some ring, out of step or fed by their sliders, the sum of all has no peak."""
 
 
 @dataclass(frozen=True)
@@ -225,15 +224,13 @@ def rest_find(
         run.advance(look * run.step)
         now = kinetic_each(run)
         greatest, looks = max(greatest, float(now.sum())), looks + 1
-        alone, most_of_it = state.alone(each), now > now.sum() / 2
+        alone = state.alone(each)
         if not alone:
             now = np.full_like(now, now.sum())
         more = now > state.peak
         state.since = np.where(more, 0, state.since + 1)
         state.peak = np.maximum(state.peak, now)
         past = state.since >= (state.waits if alone else 1)
-        if alone and not each:
-            past &= ~most_of_it  # a sleeper swings slowly, and trembles as it does
         if fall:
             state.landed = grounded(run) | (state.landed & ~more)
             past &= state.landed

@@ -181,7 +181,6 @@ def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(
     with pytest.raises(NotConverged):
         kinetic_damping.rest_find(run, 0.0, 0.0, 0.0, most, look=1, each=False, keep=keep)
     assert len(rings) == 4
-    # Nobody stops what has most of the energy.
     assert bodies[1].velocity[:, 2] == pytest.approx(-9.81 * run.time, rel=1e-9)
     stopped = slow == 2  # velocities half a step behind: omega dt/2 = 0.05 of the energy at most
     assert rings[:3] == pytest.approx([1.0] * 3, abs=0.07)
