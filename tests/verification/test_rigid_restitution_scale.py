@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from rigid_lcp.acceleration_forces import forces_found
+from rigid_lcp.errors import NotConverged
+from rigid_lcp.friction_problem import BodySpace
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.shapes_3d import Sphere, box
@@ -74,6 +78,16 @@ def test_a_wedged_rod_bounces_or_stops(method: Method, friction: float, spin: fl
     assert run.spins[0] == pytest.approx(spin, abs=1e-3)
     assert run.energy <= energy * (1.0 + ROUND_OFF)
     assert run.worst_residual <= 1e-12
+
+
+def test_forces_without_bound_are_not_accepted() -> None:
+    """A wedged rod (mu = 2) whose ends approach faster than any of its motions: of 1e16 N any
+    residual is small, but nothing is stopped."""
+    rows = [[1.0, 0.0, -1.0], [0.0, 1.0, -1.0], [-1.0, 0.0, -1.0], [0.0, -1.0, -1.0]]
+    bodies = BodySpace(sp.csr_array(np.array(rows)), sp.csr_array(sp.eye_array(3)), 3)
+    offset, friction = np.array([-1.5, -1.0, -1.5, -1.0]), np.array([2.0, 2.0])
+    with pytest.raises(NotConverged, match="residual"):
+        forces_found(bodies, offset, friction, np.zeros((2, 1)), 1e-12, 9.81)
 
 
 def gas(dim: int, seed: int) -> Scene:
