@@ -19,20 +19,27 @@ With friction, Coulomb's law acts on the impulses.  ``newton``: eps on normal ve
 several contacts, or oblique ones, energy can grow then (Kane's paradox).  ``moreau``: eps on normal
 and tangential velocities (Moreau, Unilateral contact and dry friction in finite freedom dynamics,
 1988): ``E' - E <= 0`` for one eps; for contacts of different eps neither is proved.  So energy is
-watched, and eps scaled down where it would grow: at eps = 0 it can not.
+watched, and eps scaled down where it would grow: at eps = 0 it can not.  Nor need there be
+impulses at all that let three oblique contacts part at their eps (``newton``, or ``moreau`` with
+different eps): eps is scaled down there too, as at eps = 0 there always are.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rigid_lcp.collision_input import (
+    Energy,
+    Law,
+    check_choices,
+    moving_bodies,
+    numbers_of,
+    one_a_contact,
+)
 from rigid_lcp.cones import length
-from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import (
     MOST_FRICTION,
     BodySpace,
@@ -42,11 +49,8 @@ from rigid_lcp.friction_problem import (
     friction_solution,
 )
 from rigid_lcp.frictionless import frictionless
-from rigid_lcp.problem_input import check_factors, finite_numbers, in_range, one_number
 
 Floats = NDArray[np.float64]
-Law = Literal["newton", "moreau"]
-Energy = Literal["safe", "watched"]
 
 ROUNDS, ROUNDS_ROUGH = 500, 50
 """Rounds of a collision until the rest ends without restitution: without friction, where masses of
@@ -54,10 +58,12 @@ a factor of 1e3 that touch anywhere take some hundred; with it, where one in fiv
 end, and energy is lost anyway."""
 ROUND_OFF = 1e-12
 """Velocities this small against the largest of the collision are no approach; energies likewise."""
-WORK_ROUND_OFF = 1e-15
-"""Round-off of ``p W p`` beside its largest parts [-]."""
+FORCE_ROUND_OFF = 1e-15
+"""Round-off of ``W p``, and of ``p W p``, beside its largest parts [-]."""
 LEAST_TOLERANCE = 1e-16
 """The smallest residual that is asked for [-]."""
+ROUGH = 1e-6
+"""Impulses with a greater error (`round_error`) are none, and change no velocity [-]."""
 
 
 @dataclass(frozen=True)
@@ -71,12 +77,13 @@ class Collision:
     energy_change: float
     """Kinetic energy after less before [J]; with ``drive``, without the work of those walls."""
     residual: float
-    """Largest scale-free residual of the rounds [-]."""
+    """Largest error of the rounds (`round_error`) [-]."""
     status: Status
     rounds: int
     """Rounds until no contact approached."""
     restitution_scale: float
-    """Smallest factor eps had to be multiplied by for energy not to grow; 1 without friction."""
+    """Smallest factor eps had to be multiplied by for impulses to exist and energy not to grow; 1
+    without friction."""
     message: str = ""
 
     @property
@@ -103,7 +110,8 @@ def collide(
 
     ``velocity`` (ndof,) of the bodies [m/s, 1/s]; ``restitution`` eps and ``friction`` mu, (nc,) or
     one number, eps in [0, 1].  ``law``: what eps acts on with friction.  ``energy``: ``safe``
-    scales eps down until energy does not grow, ``watched`` says so in the message only.
+    scales eps down until there are impulses and energy does not grow, ``watched`` says so in the
+    message only.  A round whose impulses are not found changes no velocity.
     After ``max_rounds`` (None: 500, with friction 50) the rest is taken without restitution, which
     ends, costs energy also at eps = 1, and is said in the message.  ``still`` [m/s]: an approach
     not faster is none; ``rest_speed`` [m/s]: one not faster ends without a bounce, which cuts off
@@ -113,16 +121,16 @@ def collide(
     Contacts are those of J: also touching ones with v = 0 take part, as they pass impulses on.
     Raises `ProblemError` for malformed input, `UsageError` for a choice that there is not.
     """
-    dim, before = _moving(bodies, velocity)
+    dim, before = moving_bodies(bodies, velocity)
     nc = bodies.jacobian.shape[0] // dim
-    eps = _one_a_contact("restitution", restitution, 1.0, nc)
-    mu = _one_a_contact("friction", friction, MOST_FRICTION, nc)
+    eps = one_a_contact("restitution", restitution, 1.0, nc)
+    mu = one_a_contact("friction", friction, MOST_FRICTION, nc)
     if max_rounds is None:
         max_rounds = ROUNDS_ROUGH if mu.any() else ROUNDS
-    _check_choices(law, energy, tolerance, max_rounds, still, rest_speed)
+    check_choices(law, energy, tolerance, max_rounds, still, rest_speed)
     moved = np.zeros(nc * dim)
     if drive is not None:
-        moved = _numbers_of("drive", drive, nc * dim, "one number a row of J")
+        moved = numbers_of("drive", drive, nc * dim, "one number a row of J")
     first = bodies.jacobian @ before + moved
     none = max(still, ROUND_OFF * float(np.abs(first).max(initial=0.0)))
     after, impulse = before.copy(), np.zeros(nc * dim)
@@ -134,29 +142,34 @@ def collide(
         normal = now[::dim]
         if not (normal < -none).any():
             break
-        if rounds > max_rounds:
-            status = "not converged"
-            told.append(f"contacts still approach after {rounds} rounds")
-            break
         last = rounds == max_rounds
         taking = np.arange(nc) if last else np.flatnonzero(normal <= none)
         bounce = np.where((normal < -rest_speed) & (not last), eps, 0.0)
-        part, solution, used = collision_round(
+        part, solution, error, used = collision_round(
             bodies, now, taking, bounce, mu, dim, law, energy, tolerance
         )
+        worst, rounds, factor = max(worst, error), rounds + 1, min(factor, used)
+        if not solution.solved or error > ROUGH:
+            status = "not converged" if solution.solved else solution.status
+            told.append(
+                solution.message or f"impulses of {np.abs(part).max():.1g} N s were found, which"
+                f" leave velocities wrong by {error:.1g} of them"
+            )  # fmt: skip
+        if error > ROUGH:
+            break
         impulse += part
         after = after + bodies.inverse_mass @ (bodies.jacobian.T @ part)
-        worst, rounds, factor = max(worst, solution.residual), rounds + 1, min(factor, used)
-        if not solution.solved:
-            status = solution.status
-            told.append(solution.message)
-            break
+        if status != "solved" or last or not part.any():
+            break  # what approaches still does so within the tolerance
     # the work of the impulses at the mean velocity: no difference of large energies
     change = 0.5 * float(impulse @ (first + bodies.jacobian @ after + moved))
     if rounds > max_rounds and eps.any():
         told.insert(0, f"after {max_rounds} rounds the rest was taken without restitution")
     if factor < 1.0:
-        told.insert(0, f"restitution was scaled by {factor:.3g}, as energy would have grown")
+        told.insert(
+            0, f"restitution was scaled by {factor:.3g}, as energy would have grown, or no impulses"
+            " were found"
+        )  # fmt: skip
     if change > work_round_off(bodies, impulse, first):
         told.append(f"energy grew by {change:.3g} J\n  -> use energy='safe', or law='moreau'")
     return Collision(after, impulse, change, worst, status, rounds, factor, "; ".join(told))
@@ -165,8 +178,9 @@ def collide(
 def collision_round(
     bodies: BodySpace, velocity: Floats, taking: NDArray[np.int64], eps: Floats, mu: Floats,
     dim: int, law: Law, energy: Energy, tolerance: float,
-) -> tuple[Floats, FrictionSolution, float]:  # fmt: skip
-    """Impulses of one round on the contacts that take part; the solution; the factor of eps.
+) -> tuple[Floats, FrictionSolution, float, float]:  # fmt: skip
+    """Impulses of one round on the contacts that take part; the solution, its error; the factor of
+    eps.
 
     ``velocity`` (nc * dim,): of all contacts before it [m/s].
     """
@@ -182,16 +196,24 @@ def collision_round(
             excess[:, 1:] += used[:, None] * v.reshape(-1, dim)[:, 1:]
         problem = FrictionProblem(None, excess.ravel(), mu[taking], dim, part)
         solution = impulses_of(problem, tolerance)
-        p = solution.r
+        p, error = solution.r, round_error(problem, solution)
         if energy != "safe" or not (used.any() and problem.friction.any()):
             break  # without friction energy can not grow
         change = 0.5 * float(p @ (2.0 * v + part.product(p)))
-        if change <= work_round_off(part, p, v):
+        if error <= ROUGH and change <= work_round_off(part, p, v):
             break
         factor = 0.5 * factor if factor > 0.01 else 0.0
     impulse = np.zeros(bodies.jacobian.shape[0])
     impulse[rows] = p
-    return impulse, solution, factor
+    return impulse, solution, error, factor
+
+
+def round_error(problem: FrictionProblem, solution: FrictionSolution) -> float:
+    """Residual of a round's impulses, or the share of the velocities that they leave wrong, where
+    that is more than `ROUGH`: impulses without bound make any residual small [-]."""
+    speed = length(problem.offset)
+    left = max(solution.residual, FORCE_ROUND_OFF) * length(solution.r) / problem.rho
+    return left / speed if left > ROUGH * speed else solution.residual
 
 
 def work_round_off(bodies: BodySpace, impulse: Floats, velocity: Floats) -> float:
@@ -201,7 +223,7 @@ def work_round_off(bodies: BodySpace, impulse: Floats, velocity: Floats) -> floa
     A light body between heavy ones makes ``p W p`` a small difference of large numbers, each of
     the size ``p_c^2 W_cc``.
     """
-    own = WORK_ROUND_OFF * float(impulse**2 @ bodies.diagonal)
+    own = FORCE_ROUND_OFF * float(impulse**2 @ bodies.diagonal)
     return ROUND_OFF * float(np.abs(impulse) @ np.abs(velocity)) + own
 
 
@@ -236,66 +258,3 @@ def _impulses_at(problem: FrictionProblem, tolerance: float) -> FrictionSolution
         problem.bodies, problem.offset, problem.friction, problem.dim, tolerance=tolerance
     )
     return solution
-
-
-def _moving(bodies: BodySpace, velocity: ArrayLike) -> tuple[int, Floats]:
-    """2 or 3 dimensions, and the velocities of the bodies; refuses what is neither."""
-    if not isinstance(bodies, BodySpace):
-        raise ProblemError(
-            f"they are a {type(bodies).__name__}", where="bodies",
-            remedy="give a BodySpace: a collision needs J and M^-1 apart",
-        )  # fmt: skip
-    check_factors(bodies)
-    dim = 2 if bodies.body_size == 3 else 3
-    rows, freedoms = bodies.jacobian.shape
-    if rows % dim:
-        raise ProblemError(
-            f"jacobian has {rows} rows, which are not {dim} a contact", where="bodies",
-            remedy="give a contact 2 rows where a body has 3 freedoms, and 3 where it has 6",
-        )  # fmt: skip
-    before = _numbers_of("velocity", velocity, freedoms, "one number a freedom, as J has columns")
-    in_range(before, "velocity", least=0.0)
-    return dim, before
-
-
-def _numbers_of(name: str, values: ArrayLike, count: int, remedy: str) -> Floats:
-    array = finite_numbers(values, name).ravel()
-    if len(array) != count:
-        raise ProblemError(
-            f"{name} has {len(array)} numbers, not {count}", where=name, remedy=f"give {remedy}"
-        )
-    return array
-
-
-def _one_a_contact(name: str, values: ArrayLike, upper: float, nc: int) -> Floats:
-    array = finite_numbers(values, name)
-    if array.shape not in ((), (nc,)):
-        raise ProblemError(
-            f"{name} has shape {array.shape} for {nc} contacts", where=name,
-            remedy="give one number, or one a contact",
-        )  # fmt: skip
-    array = np.broadcast_to(array, (nc,)).copy()
-    bad = np.flatnonzero(~((array >= 0.0) & (array <= upper)))
-    if len(bad):
-        raise ProblemError(
-            f"{name} is {array[bad[0]]:g}", where=f"{name}, contact {bad[0]}",
-            remedy=f"give 0 to {upper:g}",
-        )  # fmt: skip
-    return array
-
-
-def _check_choices(
-    law: str, energy: str, tolerance: float, max_rounds: int, still: float, rest_speed: float
-) -> None:
-    for name, given, known in (("law", law, get_args(Law)), ("energy", energy, get_args(Energy))):
-        if given not in known:
-            raise UsageError(
-                f"{name} is {given!r}", where=name, remedy="give one of " + ", ".join(known)
-            )
-    one_number(tolerance, "tolerance")
-    one_number(still, "still", zero=True)
-    one_number(rest_speed, "rest_speed", zero=True)
-    if isinstance(max_rounds, bool) or not isinstance(max_rounds, Integral) or max_rounds < 0:
-        raise UsageError(
-            f"max_rounds is {max_rounds!r}", where="max_rounds", remedy="give a count of 0 or more"
-        )

@@ -17,7 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from rigid_lcp.body_matrix import diagonal_blocks, jacobian_blocks
 from rigid_lcp.cones import length, natural_map, natural_residual
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.problem_input import check_factors, finite_numbers, in_range, matrix_given
+from rigid_lcp.problem_input import (
+    check_factors,
+    finite_numbers,
+    in_range,
+    matrix_given,
+    numbers_by_contact,
+)
 from rigid_lcp.sparse_products import factors_product, row_forms, rows_product
 
 Floats = NDArray[np.float64]
@@ -253,7 +259,7 @@ def friction_problem(
     """
     if not isinstance(dim, int | np.integer) or dim not in (2, 3):
         raise ProblemError(f"dim is {dim!r}", where="dim", remedy="give 2 or 3")
-    q = finite_numbers(offset, "q").ravel()
+    q = numbers_by_contact(offset, "q", dim)
     in_range(q, "q", least=0.0)  # bodies may come to rest as slowly as they like
     if len(q) % dim:
         raise ProblemError(

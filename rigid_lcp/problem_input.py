@@ -57,6 +57,20 @@ def finite_numbers(values: ArrayLike, name: str, remedy: str = FROM_A_DIVISION) 
     return array
 
 
+def numbers_by_contact(values: ArrayLike, name: str, dim: int) -> Floats:
+    """``values`` (nc * dim,), (nc * dim, 1), (1, nc * dim) or (nc, dim) as (nc * dim,).
+
+    `ProblemError` for other shapes: (dim, nc) would be read in the wrong order.
+    """
+    array = finite_numbers(values, name)
+    if array.ndim > 1 and len(array) != 1 and array.shape[1:] not in ((dim,), (1,)):
+        raise ProblemError(
+            f"{name} has shape {array.shape} in {dim} dimensions", where=name,
+            remedy=f"give one number a row of W, or (nc, {dim}): a row a contact",
+        )  # fmt: skip
+    return array.ravel()
+
+
 def one_number(value: Any, name: str, *, zero: bool = False) -> float:
     """A number above zero, or also zero, as a float; `UsageError`, with ``name``, for all else."""
     try:
@@ -88,14 +102,14 @@ def matrix_given(matrix: Any, name: str = "W") -> sp.csr_array:
     """
     if hasattr(matrix, "matmat") and not sp.issparse(matrix):
         matrix = operator_written(matrix)
+    given = matrix if sp.issparse(matrix) else finite_numbers(matrix, name)
+    if given.ndim != 2:
+        raise ProblemError(
+            f"it has {given.ndim} dimensions, not 2", where=name,
+            remedy="give a square matrix; for no contacts numpy.zeros((0, 0))",
+        )  # fmt: skip
     if not sp.issparse(matrix):
-        dense = finite_numbers(matrix, name)
-        if dense.ndim != 2:
-            raise ProblemError(
-                f"it has {dense.ndim} dimensions, not 2", where=name,
-                remedy="give a square matrix; for no contacts numpy.zeros((0, 0))",
-            )  # fmt: skip
-        return sp.csr_array(dense)
+        return sp.csr_array(given)
     rows = sp.csr_array(matrix)
     w = sp.csr_array((finite_numbers(rows.data, name), rows.indices, rows.indptr), rows.shape)
     if not w.has_canonical_format:

@@ -31,7 +31,7 @@ from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.interior_point import interior_point
 from rigid_lcp.islands import islands, solve_islands
 from rigid_lcp.newton import newton
-from rigid_lcp.problem_input import finite_numbers, in_range, one_number
+from rigid_lcp.problem_input import in_range, numbers_by_contact, one_number
 from rigid_lcp.solver_order import PATHS, attempts, proved_insoluble
 from rigid_lcp.solver_trial import FEW_CONTACTS, HAND_OVER, Trial
 
@@ -194,7 +194,7 @@ def _methods() -> dict[str, Callable[..., FrictionSolution]]:
 
 
 def _start(start: ArrayLike, problem: FrictionProblem) -> Floats:
-    force = finite_numbers(start, "start").ravel()
+    force = numbers_by_contact(start, "start", problem.dim)
     if force.shape != problem.offset.shape:
         raise ProblemError(
             f"it has {len(force)} numbers and q has {len(problem.offset)}", where="start",

@@ -14,10 +14,12 @@ by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur
 spins freely keeps its energy (`rigid_lcp.gyroscopic.free_rotation`); with restitution 1 a bounce
 keeps it to round-off, of bodies that turn as well, and so does a row of balls that pass it on
 within the step (`rigid_lcp.passed_collisions`).  With friction a body that comes to rest within a
-step may gain up to ``m (h |f/m|)^2 / 8``.
+step may gain up to ``m (h |f/m|)^2 / 8``, and restitution is scaled down where it would make more,
+or where wedged bodies have no impulses that let them bounce (`rigid_lcp.restitution_scale`).
 
 What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart
-(`rigid_lcp.overlap_removal`).
+(`rigid_lcp.overlap_removal`).  That keeps momentum; the angular momentum of bodies that slide upon
+each other it changes, by a part of first order in h.
 
 Use it where forces do not exist (Painleve) or where events are too many to be met one by one; it
 is of first order in h where contacts open and close, of second order in between.
@@ -45,6 +47,12 @@ from rigid_lcp.passed_collisions import (
     contact_shift,
     hit_by_others,
     impulses_in_turn,
+)
+from rigid_lcp.restitution_scale import (
+    StepVelocities,
+    gains_energy,
+    restitution_halved,
+    restitution_left_out,
 )
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
@@ -95,9 +103,20 @@ def moreau_step(
     bodies = body_space(contacts, middle.position, world.columns, world.inverse_mass(middle))
     closing = closing_contacts(world, contacts, middle, free, h)
     solve = partial(impulses_judged, slow=closing.slow, tolerance=tolerance, accept=accept)
-    found = impulses_at_once(bodies, closing, solve, known_impulses(contacts, known, h))
-    if hit_by_others(closing, bouncing(closing), found, bodies.diagonal[:: motion.dim]).any():
-        found = impulses_in_turn(bodies, closing, solve)
+    found = impulses_of_step(bodies, closing, solve, known_impulses(contacts, known, h))
+    velocities = StepVelocities(
+        relative_velocity(contacts, middle), relative_velocity(contacts, free),
+        h * accelerations[world.movable],
+    )  # fmt: skip
+    while (bounce := bouncing(closing)).any():
+        if found.error > START_AGAIN:  # wedged bodies may have no impulses to bounce with
+            closing = restitution_left_out(closing)
+        else:
+            gains = gains_energy(bodies, closing, velocities, found, bounce)
+            if not gains.any():
+                break
+            closing = restitution_halved(closing, gains)
+        found = impulses_of_step(bodies, closing, solve, None)
     rates = free.rates
     rates[world.movable] += _velocities(bodies, found.impulse, world.size)
     end = world.drifted(motion_with_rates(middle, rates), 0.5 * h)
@@ -129,6 +148,18 @@ def closing_contacts(
         h=h,
         touching=OVERLAP * world.length,
     )
+
+
+def impulses_of_step(
+    bodies: BodySpace, closing: Closing, solve: Callable[..., tuple[FrictionSolution, float]],
+    start: Floats | None,
+) -> Impulses:  # fmt: skip
+    """Impulses of all contacts together, or in turn where collisions are passed on."""
+    found = impulses_at_once(bodies, closing, solve, start)
+    diagonal = bodies.diagonal[:: closing.offset.shape[1]]
+    if hit_by_others(closing, bouncing(closing), found, diagonal).any():
+        found = impulses_in_turn(bodies, closing, solve)
+    return found
 
 
 def impulses_at_once(

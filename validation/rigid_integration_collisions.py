@@ -14,7 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.collisions import Law, collide
+from rigid_lcp.collision_input import Law
+from rigid_lcp.collisions import collide
 from rigid_lcp.friction_problem import BodySpace
 from validation.rigid_hard_trials import Row
 

@@ -47,11 +47,21 @@ R = np.array([1.0, -0.25, 0.0, 0.0])
         (W * 1e200, Q, 0.5, 2, "W: its largest"),
         (W, Q * 1e200, 0.5, 2, "q: its largest"),
         ([], [], 0.5, 2, "1 dimensions"),
+        (sp.coo_array(Q), Q, 0.5, 2, "W: it has 1 dimensions"),
+        (np.eye(6), np.ones((2, 3)), 0.5, 2, r"q has shape \(2, 3\)"),
     ],
 )
 def test_what_can_not_be_computed_with_is_named(w, q, mu, dim, words):
     with pytest.raises(ProblemError, match=words):
         solve_friction(w, q, mu, dim)
+
+
+def test_a_start_by_components_is_not_read_by_contacts():
+    """(dim, nc) holds the right count of numbers in the wrong order; (nc, dim) is right."""
+    start = np.array([[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]])
+    assert solve_friction(np.eye(6), np.ones((3, 2)), 0.5, 2, start=start).solved
+    with pytest.raises(ProblemError, match=r"start has shape \(2, 3\)"):
+        solve_friction(np.eye(6), np.ones((3, 2)), 0.5, 2, start=start.T)
 
 
 def bodies_of(**changed: object) -> BodySpace:

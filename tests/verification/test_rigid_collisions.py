@@ -11,7 +11,8 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.collisions import Collision, Floats, Law, collide
+from rigid_lcp.collision_input import Law
+from rigid_lcp.collisions import Collision, Floats, collide
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import BodySpace
 from tests.rigid_networks import network_bodies
@@ -188,6 +189,49 @@ def test_energy_that_would_grow_is_said_and_prevented() -> None:
             assert safe.restitution_scale < 1.0
             assert "scaled" in safe.message
     assert grew > 0
+
+
+def wedged_rod() -> BodySpace:
+    """A rod from (-1, 1) to (1, -1) between walls at x = -1 and x = 1, M = 1.
+
+    A spin makes both ends approach.  Bouncing, they slide along the walls; friction then turns the
+    rod by ``2 mu p`` against the ``2 p`` of the walls: for mu > 1 no impulses let it bounce.
+    """
+    rows = [[1.0, 0.0, -1.0], [0.0, 1.0, -1.0], [-1.0, 0.0, -1.0], [0.0, -1.0, -1.0]]
+    return BodySpace(sp.csr_array(np.array(rows)), sp.csr_array(sp.eye_array(3)), 3)
+
+
+def test_impulses_that_do_not_exist_change_nothing() -> None:
+    """Newton's law, mu = 2: ``safe`` takes restitution back until there are impulses, and the rod
+    stops; ``watched`` says that there are none, and leaves the velocities.  Moreau's law has them,
+    u' = -eps u.  Below mu = 1 all is well: spin -eps."""
+    spin = [0.0, 0.0, 1.0]
+    safe = collide(wedged_rod(), spin, 0.5, 2.0, law="newton")
+    assert safe.solved
+    assert safe.velocity == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
+    assert safe.restitution_scale == 0.0
+    assert safe.energy_change == pytest.approx(-0.5)
+    assert "no impulses were found" in safe.message
+    watched = collide(wedged_rod(), spin, 0.5, 2.0, law="newton", energy="watched")
+    assert not watched.solved
+    assert watched.residual > 0.1
+    assert (watched.velocity == spin).all()
+    assert not watched.impulse.any()
+    for law, mu in (("moreau", 2.0), ("newton", 0.9)):
+        found = collide(wedged_rod(), spin, 0.5, mu, law=law)  # type: ignore[arg-type]
+        assert found.solved
+        assert found.restitution_scale == 1.0
+        assert found.velocity == pytest.approx([0.0, 0.0, -0.5], abs=1e-14)
+
+
+def test_what_approaches_within_the_tolerance_ends_the_rounds() -> None:
+    """A contact at rest beside others that slide at 1 m/s: 1e-10 m/s of approach is nothing to a
+    tolerance of 1e-3, so a round finds no impulses, and no further round would."""
+    rest = one_body([([0.0, 1.0], [0.0, -0.5])], 0.1)
+    found = collide(rest, [1.0, -1e-10, 0.0], 0.0, 0.5, tolerance=1e-3)
+    assert found.solved, found.message
+    assert found.rounds == 1
+    assert (found.impulse == 0.0).all()
 
 
 @pytest.mark.parametrize("law", ["newton", "moreau"])

@@ -1,0 +1,82 @@
+"""Restitution of a time step, scaled down where friction would let it make energy.
+
+Newton's restitution acts on normal velocities, whatever friction does beside it.  Where a rod comes
+down at a slant its normal impulse turns the slip round, friction then pushes along the first slip,
+and the rod leaves with more than it came with (Kane's paradox).  Wedged bodies may have no impulses
+at all that let them bounce.  Without restitution neither happens (`rigid_lcp.time_stepping`), so
+there it is halved, or left out.
+
+The work of the impulses p is ``p (u- + u+) / 2`` with the relative velocities u before and after
+the step.  Without restitution that is at most ``sum M (h f / M)^2 / 8`` of the bodies that touch
+each other: what loads f give within a step to bodies that come to rest in it.  So much is allowed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.friction_problem import BodySpace, FrictionProblem
+from rigid_lcp.islands import islands
+from rigid_lcp.passed_collisions import Closing, Impulses
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+LEAST = 0.01
+"""Smaller parts of a restitution are none [-]."""
+ROUND_OFF = 1e-12
+"""Work this small beside its parts is none [-]."""
+
+
+@dataclass(frozen=True)
+class StepVelocities:
+    """What a step starts from, for the work of its impulses."""
+
+    before: Floats
+    """Relative velocities at the start, (nc, dim) [m/s]."""
+    free: Floats
+    """At the end without impulses, (nc, dim) [m/s]."""
+    gained: Floats
+    """What loads give each movable body in the step, (nb, size) [m/s, 1/s]."""
+
+
+def gains_energy(
+    bodies: BodySpace, closing: Closing, velocities: StepVelocities, found: Impulses, bounce: Flags
+) -> Flags:
+    """Contacts (nc,) of the islands (`rigid_lcp.islands`) in which some ``bounce`` and whose
+    impulses make energy."""
+    gains = np.zeros(len(bounce), dtype=bool)
+    if not closing.friction.any():
+        return gains
+    impulse = found.impulse
+    after = velocities.free + bodies.product(impulse.ravel()).reshape(impulse.shape)
+    parts = 0.5 * (np.abs(impulse) * (np.abs(velocities.before) + np.abs(after))).sum(axis=1)
+    work = 0.5 * (impulse * (velocities.before + after)).sum(axis=1)
+    if not (work > ROUND_OFF * parts.sum()).any():
+        return gains
+    allowed = 0.125 * np.einsum(
+        "bi,bij,bj->b", velocities.gained, bodies.mass_blocks, velocities.gained
+    )
+    dim = impulse.shape[1]
+    problem = FrictionProblem(None, closing.offset.ravel(), closing.friction, dim, bodies)
+    first, body, _ = problem.body_jacobians
+    for island in islands(problem):
+        touched = np.unique(np.concatenate([body[first[c] : first[c + 1]] for c in island]))
+        most = allowed[touched].sum() + ROUND_OFF * parts[island].sum()
+        gains[island] = bounce[island].any() and work[island].sum() > most
+    return gains
+
+
+def restitution_halved(closing: Closing, where: Flags) -> Closing:
+    """The same contacts with half of their restitution ``where`` that is, or none of little."""
+    half = 0.5 * closing.restitution
+    half[half < LEAST] = 0.0
+    return replace(closing, restitution=np.where(where, half, closing.restitution))
+
+
+def restitution_left_out(closing: Closing) -> Closing:
+    """The same contacts without restitution."""
+    return replace(closing, restitution=np.zeros_like(closing.restitution))
