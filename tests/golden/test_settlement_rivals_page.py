@@ -86,7 +86,7 @@ def test_sentences_about_moving(rows: list[Row]) -> None:
 
 
 def test_sentences_about_history(rows: list[Row]) -> None:
-    """Next to no attempt fails, two jumps cost two fifths, the mean errs by less than a tenth;
+    """Next to no attempt fails, two jumps cost two fifths, the mean errs by 1 and 8 %;
     behind the seating cycle beds go on as full runs do."""
     lost = {
         family: sum(
@@ -100,10 +100,10 @@ def test_sentences_about_history(rows: list[Row]) -> None:
     law, history = (finished(rows, f"2 jumps{end}", LAST) for end in ("", ", by history"))
     assert len(history) == 5
     assert 0.35 < cost(history) / cost(law) < 0.45
-    for jumps in (5, 2):
+    for jumps, error in ((5, 0.01), (2, 0.08)):
         found = judged(rows, f"{jumps} jumps, by history", LAST, "settlement")
         assert found is not None
-        assert abs(found.mean) < 0.1
+        assert abs(found.mean) == pytest.approx(error, abs=0.005)
         assert found.half > 0.25
     twice = finished(rows, "step x 2", LAST)
     assert 0.35 < cost(history) / cost(twice) < 0.45
