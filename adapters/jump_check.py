@@ -154,7 +154,8 @@ def drift_of(drift: tuple[float, float], deviation: float) -> tuple[float, float
 
     S = max(0, S + d - `ALLOWANCE`), and the same of -d (Page's cumulative sum, 1954): windows that
     all lie a little to one side of their forecasts ring where none would alone, as behind a rate
-    that drifts.  From 0 a sum exceeds `CHANGED` - `ALLOWANCE` where one deviation exceeds `CHANGED`.
+    that drifts.  A sum from 0 exceeds `CHANGED` - `ALLOWANCE` where its one deviation exceeds
+    `CHANGED`.
     """
     up, down = drift
     return max(0.0, up + deviation - ALLOWANCE), max(0.0, down - deviation - ALLOWANCE)

@@ -7,6 +7,9 @@ import pytest
 from scipy.stats import f as fisher
 
 from validation.settlement_bars import bias, error_of, error_of_profile, gained_time, spread
+from validation.settlement_ensemble import CONFINED
+from validation.settlement_ensemble_reading import curves
+from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
 from validation.settlement_rivals_page import PAGE, page
@@ -66,6 +69,20 @@ def test_what_six_runs_can_tell_at_paper_scale() -> None:
     assert 100 * found.error == pytest.approx([-0.2, 1.2, 5.9], abs=0.05)
     assert 100 * found.mean == pytest.approx(2.3, abs=0.05)
     assert 100 * found.half == pytest.approx(8.0, abs=0.3)
+
+
+def test_how_far_members_part_over_the_jumps_at_paper_scale() -> None:
+    """2 to 14 um between the two members of a packing, from the ensemble's own tables."""
+    tables = curves(CONFINED, EnsembleRecord())
+    gains: dict[tuple[int, int], list[float]] = {}
+    for piece, curve in tables.items():
+        if piece.packing is not None:
+            for first, last in ((70, 260), (285, 475)):
+                gain = float(curve["settlement"][last - 1] - curve["settlement"][first - 1])
+                gains.setdefault((piece.seed, first), []).append(1e6 * gain)
+    apart = sorted(abs(one - other) for one, other in gains.values())
+    assert len(apart) == 6
+    assert (round(apart[0]), round(apart[-1])) == (2, 14)
 
 
 def test_sentences_about_moving(rows: list[Row]) -> None:
