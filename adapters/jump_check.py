@@ -29,6 +29,8 @@ ROLL_BACK = 2.0
 """Realised error over the tolerance from which a jump is taken back."""
 CHANGED = 3.5
 """Standard errors between a rate and its forecast from which the past is forgotten."""
+ALLOWANCE = 0.5
+"""Standard errors of each deviation that are left out where deviations of one sign are summed."""
 LEAST_ERROR = 0.01
 """Realised error over the tolerance below which it counts as this much."""
 
@@ -58,8 +60,10 @@ class Check:
     rate_observed: float
     deviation: float
     """Their difference in standard errors."""
+    drift: tuple[float, float]
+    """Deviations summed, upwards and downwards, see `drift_of`; standard errors."""
     changed: bool
-    """The rate is another than forecast, beyond noise."""
+    """The rate is another than forecast, beyond noise: in this window, or in all jumps together."""
     sources: tuple[tuple[int, int, float, float], ...] = ()
     """Of each stretch that ``expected`` rests on, the new one last: cycles done before it, its
     cycles, their long-run variance [m^2 a cycle], derivative of ``expected`` by its gain."""
@@ -84,7 +88,8 @@ def judge(
     before, both = forecast_of(rates_of(every[:-1])), forecast_of(rates_of(every))
     start, end = float(control.cycle), float(window.first_cycle)
     rate_expected, deviation = rate_beside(before, every[:-1], window)
-    changed = abs(deviation) > CHANGED
+    drift = drift_of(control.drift, deviation)
+    changed = max(drift) > CHANGED - ALLOWANCE
     if changed:
         expected = expected_by_two_rates(before, both, window, float(noises[-1]), start)
     else:
@@ -109,6 +114,7 @@ def judge(
         rate_expected=rate_expected,
         rate_observed=window.rate,
         deviation=deviation,
+        drift=drift,
         changed=changed,
         reseated=gained - decision.moved - healed,
         kappa=kappa,
@@ -141,6 +147,18 @@ def rate_beside(before: Forecast, past: Sequence[Stretch], window: Stretch) -> t
     error = sqrt(noise + float((known / student) @ (known / student)))
     difference = window.rate - expected
     return expected, difference / error if error > 0 else (inf if difference else 0.0)
+
+
+def drift_of(drift: tuple[float, float], deviation: float) -> tuple[float, float]:
+    """Sums of deviations upwards and downwards with one more of them; standard errors.
+
+    S = max(0, S + d - `ALLOWANCE`), and the same of -d (Page's cumulative sum, 1954): windows that
+    all lie a little to one side of their forecasts ring where none would alone, as behind a rate
+    that drifts.  A sum from 0 exceeds `CHANGED` - `ALLOWANCE` where its one deviation exceeds
+    `CHANGED`.
+    """
+    up, down = drift
+    return max(0.0, up + deviation - ALLOWANCE), max(0.0, down - deviation - ALLOWANCE)
 
 
 def expected_by_all(both: Forecast, start: float, end: float) -> Expected:
@@ -220,7 +238,7 @@ def accept(
     The next one may be longer by a step-size controller's factor (proportional and integral),
     0.9 (tol / e)^(0.7/2) (e_last / tol)^(0.4/2), between 1/5 and `GROWTH`, where e is what the
     realised error exceeds its own standard error by.  Where the rate changed, the past is
-    forgotten.
+    forgotten, and the next jump is at most half as long: what is left is one window.
     """
     landings, windows, behind = joined_by_jump(control, decision, settings, stretch)
     stretch = windows[-1]
@@ -245,8 +263,9 @@ def accept(
         curve_cycle=past[0] + cycles,
         curve_settlement=past[1] + curve,
         last_jump=decision.jump,
-        longest=decision.jump * min(max(factor, 0.2), GROWTH),
+        longest=decision.jump * min(max(factor, 0.2), 0.5 if check.changed else GROWTH),
         last_error=error,
+        drift=(0.0, 0.0) if check.changed else check.drift,
         attempts=0,
         window=len(stretch.gain),
     )

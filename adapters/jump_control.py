@@ -106,6 +106,8 @@ class Control:
     """Longest jump by the errors observed."""
     last_error: float = 1.0
     """Realised error of the last jump over its tolerance."""
+    drift: tuple[float, float] = (0.0, 0.0)
+    """What rates exceeded their forecasts by, summed upwards and downwards (`jump_check`)."""
     attempts: int = 0
     """Jumps from this state that were taken back."""
     window: int = FIRST_WINDOW

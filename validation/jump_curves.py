@@ -39,6 +39,12 @@ CURVES: dict[str, Law] = {
     "collapse": lambda n: 0.02 * MICRO * n**2.5,
     "rest": lambda n: np.zeros_like(n),
     "drift": lambda n: 200 * MICRO * np.log1p(n) - 0.3 * MICRO * n,
+    "early drift": lambda n: 200 * MICRO * (np.log1p(n) - n / 300),
+    "late drift": lambda n: 200 * MICRO * (np.log1p(n) - n / 1500),
+    "drift to rest": lambda n: (
+        200 * MICRO * (np.log1p(np.minimum(n, 666)) - np.minimum(n, 666) / 667)
+    ),
+    "waves": lambda n: 100 * MICRO * (np.log1p(n) + 0.8 * np.sin(1.5 * np.log1p(n))),
 }
 """u(N) [m] of the mean of many beds."""
 

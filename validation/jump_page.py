@@ -96,6 +96,14 @@ def bar_told(rows: Rows) -> str:
     )
 
 
+def again_told(rows: Rows) -> str:
+    """The setting with many more seeds."""
+    these = group(rows, "again")
+    inside = share(total(these, "mean_inside"), len(these))
+    within = share(total(these, "within"), total(these, "jumps"))
+    return f"{len(these)} seeds: bands hold the mean bed in {inside}, jumps within {within}."
+
+
 def tolerance_table(rows: Rows) -> str:
     """All laws together at every tolerance."""
     lines = []
@@ -131,6 +139,10 @@ HARD = {
     "log": "readings off by 20 µm, 20 times a cycle's gain at N = 100",
     "rest": "nothing moves",
     "drift": "200 ln(1 + N) - 0.3 N µm: the rate drifts through zero at cycle 666",
+    "early drift": "the same through zero at cycle 300",
+    "late drift": "at cycle 1500",
+    "drift to rest": "the same to zero at cycle 666, and stays there",
+    "waves": "100 ln(1 + N) + 80 sin(1.5 ln(1 + N)) µm: the slope swings about the logarithm's",
     "hyperbolic": "no noise, to 100,000 cycles",
     "power": "tolerance 10⁻⁶",
 }
@@ -282,6 +294,7 @@ def page(rows: Rows, runs: Rows) -> str:
         "healing": str(jump_study.HEALING),
         "noise": noise_table(rows),
         "bar": bar_told(rows),
+        "again": again_told(rows),
         "tolerances": tolerance_table(rows),
         "moved": moved_table(rows),
         "far": far_table(rows),

@@ -21,7 +21,7 @@ from validation.settlement_bars import (
 )
 from validation.settlement_ensemble import COARSE, CONFINED
 from validation.settlement_ensemble_page import short
-from validation.settlement_ensemble_reading import nested
+from validation.settlement_ensemble_reading import nested, student
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import K_I, METHODS, METHODS_OF, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS, PLACE, TWIN
@@ -180,8 +180,13 @@ def verdict(rows: Sequence[Row], last: int) -> str:
 
 
 def packings_needed(gained: FloatArray) -> int:
-    """Packings whose 95 % interval would be as wide as the mean: (2 s / mean)^2."""
-    return int(np.ceil((2 * gained.std(ddof=1) / gained.mean()) ** 2))
+    """Fewest packings n whose 95 % interval would leave out zero, should the mean and the standard
+    deviation s stay as they are: t(n - 1) s / sqrt(n) <= |mean|, Student's t."""
+    mean, deviation = abs(float(gained.mean())), float(gained.std(ddof=1))
+    count = 2
+    while student(count - 1) * deviation / count**0.5 > mean:
+        count += 1
+    return count
 
 
 def jumps_lost(rows: Sequence[Row], last: int, family: str = "procedure") -> str:

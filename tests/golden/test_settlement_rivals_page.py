@@ -16,6 +16,7 @@ from validation.settlement_bars import (
     spread,
 )
 from validation.settlement_ensemble import CONFINED
+from validation.settlement_ensemble_reading import curves
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
@@ -78,6 +79,20 @@ def test_what_six_runs_can_tell_at_paper_scale() -> None:
     assert 100 * found.half == pytest.approx(8.0, abs=0.3)
 
 
+def test_how_far_members_part_over_the_jumps_at_paper_scale() -> None:
+    """2 to 14 um between the two members of a packing, from the ensemble's own tables."""
+    tables = curves(CONFINED, EnsembleRecord())
+    gains: dict[tuple[int, int], list[float]] = {}
+    for piece, curve in tables.items():
+        if piece.packing is not None:
+            for first, last in ((70, 260), (285, 475)):
+                gain = float(curve["settlement"][last - 1] - curve["settlement"][first - 1])
+                gains.setdefault((piece.seed, first), []).append(1e6 * gain)
+    apart = sorted(abs(one - other) for one, other in gains.values())
+    assert len(apart) == 6
+    assert (round(apart[0]), round(apart[-1])) == (2, 14)
+
+
 def test_sentences_about_moving(rows: list[Row]) -> None:
     """Nothing moved settles too little, moving adds what lacks, and is not nearer for certain."""
     for jumps, least, most in ((5, 0.25, 0.45), (2, 0.45, 0.65)):
@@ -96,7 +111,7 @@ def test_sentences_about_moving(rows: list[Row]) -> None:
 
 
 def test_sentences_about_history(rows: list[Row]) -> None:
-    """Next to no attempt fails, two jumps cost two fifths, the mean errs by less than a tenth;
+    """Next to no attempt fails, two jumps cost two fifths, the mean errs by 1 and 8 %;
     behind the seating cycle beds go on as full runs do."""
     lost = {
         family: sum(
@@ -110,10 +125,10 @@ def test_sentences_about_history(rows: list[Row]) -> None:
     law, history = (finished(rows, f"2 jumps{end}", LAST) for end in ("", ", by history"))
     assert len(history) == 5
     assert 0.35 < cost(history) / cost(law) < 0.45
-    for jumps in (5, 2):
+    for jumps, error in ((5, 0.01), (2, 0.08)):
         found = judged(rows, f"{jumps} jumps, by history", LAST, "settlement")
         assert found is not None
-        assert abs(found.mean) < 0.1
+        assert abs(found.mean) == pytest.approx(error, abs=0.005)
         assert found.half > 0.25
     twice = finished(rows, "step x 2", LAST)
     assert 0.35 < cost(history) / cost(twice) < 0.45

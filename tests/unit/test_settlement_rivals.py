@@ -41,6 +41,7 @@ from validation.settlement_rivals_continuity import (
     sides_without_jump,
     stays,
 )
+from validation.settlement_rivals_page import packings_needed
 from validation.settlement_rivals_reading import (
     FIGURES,
     beside,
@@ -198,6 +199,15 @@ def test_nearer_is_told_from_sizes_of_errors() -> None:
     assert found is not None
     assert found.difference == pytest.approx([0.4])
     assert found.nearer == pytest.approx([0.2])
+
+
+def test_packings_that_could_tell_are_counted_by_student() -> None:
+    """Mean 1 and deviation 1 need t(n - 1) <= sqrt(n): n = 7, as 2.447 < 2.646 and 2.571 > 2.449.
+
+    Not (2 s / mean)^2 = 4, whose own interval is 1 +- 1.59.
+    """
+    assert packings_needed(np.array([0.0, 1.0, 2.0])) == 7
+    assert packings_needed(np.array([0.0, -1.0, -2.0])) == 7
 
 
 def test_fewer_grains_are_scaled_to_the_bed() -> None:

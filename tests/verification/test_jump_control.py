@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from adapters.jump_band import band_of
-from adapters.jump_check import accept, judge, reject
+from adapters.jump_check import ALLOWANCE, CHANGED, accept, drift_of, judge, reject
 from adapters.jump_control import (
     GROWTH,
     LONGEST_WINDOW,
@@ -295,6 +295,45 @@ def test_a_rate_that_changed_is_seen_and_the_past_forgotten() -> None:
     assert [one.first_cycle for one in forgotten.stretches] == [after.first_cycle + 5]
 
 
+def test_deviations_to_one_side_are_summed() -> None:
+    """Page's sum by hand: 1.7 + 2.0 + 2.2 less three times 0.5 is 4.4, above 3 at the third.
+
+    A single one rings above 3.5 as before; as many to either side never do.
+    """
+    bound = CHANGED - ALLOWANCE
+    drift = (0.0, 0.0)
+    for deviation, down in ((-1.7, 1.2), (-2.0, 2.7), (-2.2, 4.4)):
+        drift = drift_of(drift, deviation)
+        assert drift == pytest.approx((0.0, down))
+        assert (max(drift) > bound) == (deviation == -2.2)
+    assert max(drift_of((0.0, 0.0), 3.49)) < bound < max(drift_of((0.0, 0.0), 3.51))
+    drift = (0.0, 0.0)
+    for turn in range(20):
+        drift = drift_of(drift, (-1.0) ** turn * 3)
+        assert max(drift) < bound
+
+
+def test_a_sum_that_rings_forgets_the_past_and_begins_again() -> None:
+    """A rate 1.2 times the forecast: no change alone; with 2.9 summed before, one."""
+    control = known(of_law(50, 20, 0.0))
+    decision = decide(control, SETTINGS)
+    after = of_law(70 + decision.jump, 25, 0.0, rate=1.2e-6)
+    settlement = jumped(control, decision, after)
+    check = judge(control, decision, SETTINGS, after, settlement)
+    assert not check.changed
+    assert 0 < check.drift[0] == pytest.approx(check.deviation - ALLOWANCE)
+    kept = accept(control, decision, check, SETTINGS, after, settlement)
+    assert kept.drift == check.drift
+    assert len(kept.stretches) == 2
+    risen = replace(control, drift=(2.9, 0.0))
+    check = judge(risen, decision, SETTINGS, after, settlement)
+    assert check.changed
+    forgotten = accept(risen, decision, check, SETTINGS, after, settlement)
+    assert forgotten.drift == (0.0, 0.0)
+    assert [one.first_cycle for one in forgotten.stretches] == [after.first_cycle + 5]
+    assert forgotten.longest <= 0.5 * decision.jump < kept.longest
+
+
 def test_a_shock_behind_the_jump_counts_as_its_error() -> None:
     """The bed drops by 5 % of its total in the healing cycles: the realised error is that."""
     control = known(of_law(50, 20, 0.0))
@@ -369,6 +408,18 @@ def test_load_step_in_mid_run() -> None:
     near = [one.cycle for one in run.decisions if 550 < one.cycle < 1000]
     assert len(near) >= 4
     assert abs(run.settlement / run.truth - 1) < 0.1
+
+
+def test_a_rate_that_drifts_through_zero() -> None:
+    """200 ln(1 + N) - 0.3 N um turns at cycle 666: windows behind it lie to one side of forecasts.
+
+    No window alone tells; without their sum three jumps of four are within, and ends 20 % off.
+    """
+    runs = [play(Curve(CURVES["drift"], BURSTY, seed), 50, SETTINGS) for seed in range(1, 6)]
+    errors = np.concatenate([run.errors for run in runs])
+    assert np.mean(errors <= SETTINGS.tolerance) > 0.85
+    assert abs(np.mean([run.settlement / run.truth - 1 for run in runs])) < 0.1
+    assert any(check["changed"] and abs(check["deviation"]) < CHANGED for check in runs[0].checks)
 
 
 def test_collapse_is_refused() -> None:
