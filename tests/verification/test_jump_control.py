@@ -402,12 +402,16 @@ def test_a_moved_bed_that_settles_more() -> None:
 
 
 def test_load_step_in_mid_run() -> None:
-    """From cycle 600 on the bed settles anew, ten times as fast: it is seen and computed."""
-    run = play(Curve(CURVES["load step"], 0.2, 3), 50, SETTINGS)
-    assert run.taken_back or any(check["changed"] for check in run.checks)
-    near = [one.cycle for one in run.decisions if 550 < one.cycle < 1000]
-    assert len(near) >= 4
-    assert abs(run.settlement / run.truth - 1) < 0.1
+    """From cycle 600 on the bed settles anew, ten times as fast: it is seen and computed.  Bursts
+    part single runs by several per cent, so the error is that of eight."""
+    errors = []
+    for seed in range(1, 9):
+        run = play(Curve(CURVES["load step"], 0.2, seed), 50, SETTINGS)
+        assert run.taken_back or any(check["changed"] for check in run.checks)
+        near = [one.cycle for one in run.decisions if 550 < one.cycle < 1000]
+        assert len(near) >= 4
+        errors.append(run.settlement / run.truth - 1)
+    assert np.sqrt(np.mean(np.square(errors))) < 0.1
 
 
 def test_a_rate_that_drifts_through_zero() -> None:
