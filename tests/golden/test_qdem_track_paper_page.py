@@ -24,6 +24,8 @@ def test_sentences_about_the_whole() -> None:
     assert stand["slid"] <= 0.01 * stand["elastic"]
     paper = {"foot": 4.6, "top": 3.0, "height": 0.4}
     assert all(abs(record["shape"][name] / one - 1) < 0.1 for name, one in paper.items())
+    assert record["shape"]["alone"] == record["shape"]["alone_on_sleeper"] == 4  # no towers
+    assert 0.55 < record["shape"]["solid"] < 0.65
     marches = record["marches"]
     assert record["axle"]["searches"] == marches["1"]["searches"] == 0
     assert marches["2"]["wall_a_step"] < 0.6 * marches["1"]["wall_a_step"]
