@@ -46,11 +46,9 @@ def page(rows: Sequence[Row]) -> str:
     """The page of a record."""
     paths = paths_of(rows)
     errors = {name: errors_of(path, paths[FULL]) for name, path in paths.items()}
-    longest = max(JUMPED, key=lambda name: errors[name].gained)
     return page_filled(TEXT.read_text(encoding="utf-8"), {
         "LAST": str(STUDY.last), "K_I": str(STUDY.k_i),
         "WAYS": ways_table(paths, errors), "CLAIMS": claims_table(errors),
-        "LONGEST": longest, "LONGEST_GAIN": f"{100 * errors[longest].gained:.0f}",
         "MADE": "; ".join(dict.fromkeys(f"{row['engine']}, {row['machine']}" for row in rows)),
         "COMMITS": ", ".join(dict.fromkeys(row["commit"][:7] for row in rows)),
         "HOURS": f"{sum(path.cost for path in paths.values()) / 3600:.1f}",
@@ -84,7 +82,7 @@ def claims_table(errors: dict[str, Errors]) -> str:
 
     ranks = {words: rank_with_gain(errors, name) for name, words in FIGURES.items()}
     ranked = ", ".join(f"{rank:+.2f} ({words})" for words, rank in ranks.items())
-    best = max(errors, key=lambda name: errors[name].gained if name in JUMPED else -1.0)
+    best = max(JUMPED, key=lambda name: errors[name].gained)
     one = errors[best]
     lines = [
         ["11a", "the error falls as k grows, at h = 10", told(VARIED_K),
