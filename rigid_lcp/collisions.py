@@ -49,6 +49,7 @@ from rigid_lcp.friction_problem import (
     friction_solution,
 )
 from rigid_lcp.frictionless import frictionless
+from rigid_lcp.restitution_share import Share
 
 Floats = NDArray[np.float64]
 
@@ -187,9 +188,9 @@ def collision_round(
     rows = (dim * taking[:, None] + np.arange(dim)).ravel()
     part = bodies.of_contacts(taking)
     v = velocity[rows]
-    factor = 1.0
+    share = Share(1)
     while True:
-        used = factor * eps[taking]
+        used = share.now * eps[taking]
         excess = v.reshape(-1, dim).copy()
         excess[:, 0] += used * v[::dim]  # (1 + eps) v: eq. 35
         if law == "moreau":
@@ -200,12 +201,11 @@ def collision_round(
         if energy != "safe" or not (used.any() and problem.friction.any()):
             break  # without friction energy can not grow
         change = 0.5 * float(p @ (2.0 * v + part.product(p)))
-        if error <= ROUGH and change <= work_round_off(part, p, v):
+        if not share.next(np.array([error > ROUGH or change > work_round_off(part, p, v)])):
             break
-        factor = 0.5 * factor if factor > 0.01 else 0.0
     impulse = np.zeros(bodies.jacobian.shape[0])
     impulse[rows] = p
-    return impulse, solution, error, factor
+    return impulse, solution, error, float(share.now[0])
 
 
 def round_error(problem: FrictionProblem, solution: FrictionSolution) -> float:

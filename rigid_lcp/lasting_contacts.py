@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.acceleration_forces import ACCEPTED
-from rigid_lcp.collisions import collide
+from rigid_lcp.collisions import Collision, collide
 from rigid_lcp.contacts import Contacts, contact_rows, contact_tangents
 from rigid_lcp.equations import body_space, relative_velocity
 from rigid_lcp.errors import NotConverged
@@ -129,18 +129,18 @@ def slip_carried(lasting: Lasting, rows: Bools | Ints, contacts: Contacts) -> Fl
     return np.einsum("cij,cj->ci", contact_tangents(contacts.normal), vector)
 
 
-def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, bool]:
-    """Velocities after the collisions of touching bodies (eqs 32-36), and whether there were any.
+def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, Collision | None]:
+    """Velocities after the collisions of touching bodies (eqs 32-36), and what they were if any.
 
     `rigid_lcp.collisions.collide`, restitution on normal velocities, as time stepping has it, but
     scaled down where energy would grow.  Raises `NotConverged`.
     """
     contacts = world.contacts(motion, 0.5 * TOUCH * world.length)
     if len(contacts) == 0:
-        return motion, False
+        return motion, None
     scale, velocity = speed_scale(world, motion), relative_velocity(contacts, motion)
     if velocity[:, 0].min() >= -STILL * scale:
-        return motion, False
+        return motion, None
     bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     moving = motion.rates[world.movable].ravel()
     found = collide(
@@ -155,7 +155,7 @@ def collided(world: World, motion: Motion, tolerance: float) -> tuple[Motion, bo
         )  # fmt: skip
     rates = motion.rates
     rates[world.movable] = found.velocity.reshape(-1, world.size)
-    return motion_with_rates(motion, rates), True
+    return motion_with_rates(motion, rates), found
 
 
 def share_until_rest(

@@ -47,6 +47,7 @@ ROWS = (
     ("tolerance of the residual", "tolerance", "{:.2g}"),
     ("worst residual of any step", "residual_worst", "{:.2g}"),
     ("steps left above the tolerance", "steps_above", "{:,}"),
+    ("impacts with restitution scaled down", "steps_scaled", "{:,}"),
     ("processor time", "cpu_s", "{:.3g} s"),
     ("processor time a step", "cpu_a_step", "{:.3g} s"),
 )
@@ -80,7 +81,9 @@ def report_write(
         f"{summary['cpu_s']:.3g} s of processor time."
     )
     rows = "".join(
-        f"<tr><td>{name}</td><td>{form.format(summary[key])}</td></tr>" for name, key, form in ROWS
+        f"<tr><td>{name}</td><td>{form.format(summary[key])}</td></tr>"
+        for name, key, form in ROWS
+        if key in summary
     )
     absent = "".join(f"<li>{escape(text)}</li>" for text in summary["left_out"])
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"

@@ -1,10 +1,10 @@
-"""Restitution of a time step, scaled down where friction would let it make energy.
+"""Restitution scaled down where friction would let it make energy.
 
 Newton's restitution acts on normal velocities, whatever friction does beside it.  Where a rod comes
 down at a slant its normal impulse turns the slip round, friction then pushes along the first slip,
 and the rod leaves with more than it came with (Kane's paradox).  Wedged bodies may have no impulses
 at all that let them bounce.  Without restitution neither happens (`rigid_lcp.time_stepping`), so
-there it is halved, or left out.
+as much of it is kept as makes none (`rigid_lcp.restitution_share`).
 
 The work of the impulses p is ``p (u- + u+) / 2`` with the relative velocities u before and after
 the step.  Without restitution that is at most ``sum M (h f / M)^2 / 8`` of the bodies that touch
@@ -13,7 +13,7 @@ each other: what loads f give within a step to bodies that come to rest in it.  
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,6 @@ from rigid_lcp.passed_collisions import Closing, Impulses
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-LEAST = 0.01
-"""Smaller parts of a restitution are none [-]."""
 ROUND_OFF = 1e-12
 """Work this small beside its parts is none [-]."""
 
@@ -68,15 +66,3 @@ def gains_energy(
         most = allowed[touched].sum() + ROUND_OFF * parts[island].sum()
         gains[island] = bounce[island].any() and work[island].sum() > most
     return gains
-
-
-def restitution_halved(closing: Closing, where: Flags) -> Closing:
-    """The same contacts with half of their restitution ``where`` that is, or none of little."""
-    half = 0.5 * closing.restitution
-    half[half < LEAST] = 0.0
-    return replace(closing, restitution=np.where(where, half, closing.restitution))
-
-
-def restitution_left_out(closing: Closing) -> Closing:
-    """The same contacts without restitution."""
-    return replace(closing, restitution=np.zeros_like(closing.restitution))

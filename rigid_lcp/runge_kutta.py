@@ -85,6 +85,8 @@ class Pace:
     """Steps taken back because a sliding contact came to rest within them, bodies went too far, or
     a stage had no forces."""
     collisions: int = 0
+    scaled: int = 0
+    """Collisions whose restitution was scaled down (`rigid_lcp.restitution_scale`)."""
     worst_residual: float = 0.0
     steps_above: int = 0
     """Steps with a stage whose forces were found no better than the tolerance."""
@@ -122,8 +124,9 @@ def runge_kutta_advance(
             where=f"time {time:.9g} s", remedy="use method='time-stepping'",
         )  # fmt: skip
     while end - time > SHORTEST * pace.longest or forces is None:
-        motion, impulses = collided(world, motion, tolerance)
-        pace.collisions += impulses
+        motion, collision = collided(world, motion, tolerance)
+        pace.collisions += collision is not None
+        pace.scaled += collision is not None and collision.restitution_scale < 1.0
         lasting = lasting_contacts(world, motion)
         tried, located = pace.step, 0
         while True:

@@ -86,6 +86,9 @@ class Simulation:
         """Greatest residual of any step so far [-]."""
         self.steps_above = 0
         """Steps whose residual was above ``tolerance``."""
+        self.steps_scaled = 0
+        """Steps (at acceleration level collisions) with restitution scaled down, as friction would
+        have made energy by it, or no impulses let the bodies bounce."""
         self.contacts: ContactForces = contact_forces(
             self.world.contacts(self.motion, 0.0)[np.zeros(0, np.int64)],
             np.zeros((0, scene.dim)), None, 1.0,
@@ -184,6 +187,7 @@ class Simulation:
             self.world, self.motion, loads, h, self.contacts, self.tolerance, self.accept
         )
         self._judge(made.residual, made.message)
+        self.steps_scaled += made.scaled
         before, self.motion, self.contacts = self.motion, made.motion, made.contacts
         self.time += h
         self.steps += 1
@@ -222,6 +226,7 @@ class Simulation:
         self.steps = self.pace.accepted
         self.worst_residual = self.pace.worst_residual
         self.steps_above = self.pace.steps_above
+        self.steps_scaled = self.pace.scaled
 
     def _judge(self, residual: float, message: str) -> None:
         self.worst_residual = max(self.worst_residual, residual)

@@ -51,9 +51,8 @@ from rigid_lcp.passed_collisions import (
 from rigid_lcp.restitution_scale import (
     StepVelocities,
     gains_energy,
-    restitution_halved,
-    restitution_left_out,
 )
+from rigid_lcp.restitution_share import Share
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
 
@@ -78,6 +77,8 @@ class Step:
     """Error of the impulses (scale-free natural residual), see `forces_error` [-]."""
     message: str = ""
     """What the solver has to say of impulses that it did not find."""
+    scaled: bool = False
+    """Whether restitution was scaled down (`rigid_lcp.restitution_scale`)."""
 
 
 def moreau_step(
@@ -108,21 +109,20 @@ def moreau_step(
         relative_velocity(contacts, middle), relative_velocity(contacts, free),
         h * accelerations[world.movable],
     )  # fmt: skip
+    share, full = Share(len(contacts)), closing.restitution
     while (bounce := bouncing(closing)).any():
         if found.error > START_AGAIN:  # wedged bodies may have no impulses to bounce with
-            closing = restitution_left_out(closing)
-        else:
-            gains = gains_energy(bodies, closing, velocities, found, bounce)
-            if not gains.any():
-                break
-            closing = restitution_halved(closing, gains)
+            share.leave_out()
+        elif not share.next(gains_energy(bodies, closing, velocities, found, bounce)):
+            break
+        closing = replace(closing, restitution=share.now * full)
         found = impulses_of_step(bodies, closing, solve, None)
     rates = free.rates
     rates[world.movable] += _velocities(bodies, found.impulse, world.size)
     end = world.drifted(motion_with_rates(middle, rates), 0.5 * h)
     end = bodies_parted(world, motion, end, pull, h)
     forces = contact_forces(contacts, found.impulse, found.velocity, h)
-    return Step(end, forces, found.error, found.message)
+    return Step(end, forces, found.error, found.message, bool((share.now < 1.0).any()))
 
 
 def closing_contacts(

@@ -38,13 +38,15 @@ def test_a_rod_that_comes_down_at_a_slant_gains_nothing(method: Method, friction
     """Kane's paradox: by Newton's restitution alone it leaves with 5 % (mu = 0.3) or 14 % more.
 
     ``E' - E = p_T (u_T + u_T') / 2`` at restitution 1: friction makes energy where the normal
-    impulse turns the slip round.
+    impulse turns the slip round.  As much restitution is left as makes none, to 1/64: E', a
+    parabola of it from a rest to 1.2 E, rises by no more than 3 E, so that .95 E stays.
     """
     run = Simulation(tilted_rod(friction), method, step=0.01)
     energy = run.energy
     run.advance(1.0)
     assert run.velocities[0, 1] > 0.0
-    assert run.energy <= energy * (1.0 + ROUND_OFF)
+    assert 0.95 * energy <= run.energy <= energy * (1.0 + ROUND_OFF)
+    assert run.steps_scaled == 1
 
 
 def test_without_friction_restitution_stays_as_it_is() -> None:
