@@ -109,26 +109,28 @@ class Method:
     """Whether it begins with a rain of its own."""
     base: Kind = COARSE
     """The ensemble with whose packings it begins."""
+    window: int = FIRST_WINDOW
+    """Cycles fitted before each jump."""
 
     def kind(self, last: int) -> Kind:
         """The ensemble's scene as this method changes it, to cycle ``last``."""
-        k = FIRST_WINDOW if self.variant.jumps else 100
+        k = self.window if self.variant.jumps else 100
         keys = [*self.base.settings, f"procedure.total_cycles={last}", *self.settings]
         if not any(key.startswith("procedure.tolerance") for key in self.settings):
-            h = jump_length(self.jumps, last, self.base.k_i) if self.jumps else 0
+            h = jump_length(self.jumps, last, self.base.k_i, k) if self.jumps else 0
             keys += [f"procedure.k={k}", f"procedure.h={h}"]
         return replace(self.base, settings=tuple(keys))
 
 
-def jump_length(jumps: int, last: int, k_i: int = K_I) -> int:
+def jump_length(jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDOW) -> int:
     """Cycles h of each of equal ``jumps``: from k_i a window, then h, healing and a window each.
 
     ValueError where they do not end at cycle ``last``.
     """
-    block, rest = divmod(last - k_i - FIRST_WINDOW, jumps)
-    if rest or block <= HEALING + FIRST_WINDOW:
-        raise ValueError(f"{jumps} equal jumps from windows of {FIRST_WINDOW} miss cycle {last}")
-    return block - HEALING - FIRST_WINDOW
+    block, rest = divmod(last - k_i - window, jumps)
+    if rest or block <= HEALING + window:
+        raise ValueError(f"{jumps} equal jumps from windows of {window} miss cycle {last}")
+    return block - HEALING - window
 
 
 JUMPING = Variant()

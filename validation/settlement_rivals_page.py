@@ -45,7 +45,8 @@ from validation.settlement_rivals_reading import (
     settled,
 )
 from validation.settlement_rivals_reference import LAWS, law_name
-from validation.settlement_rivals_runs import LAST, MEMBERS, RECORD_PAPER, SEEDS, record_read
+from validation.settlement_rivals_runs import MEMBERS, SEEDS, record_read
+from validation.settlement_rivals_studies import STUDIES
 from validation.student import interval
 
 TEMPLATE = Path(__file__).with_suffix(".md")
@@ -242,7 +243,7 @@ def scatter(rows: Sequence[Row]) -> dict[str, str]:
 
 def paper_scale(last: int) -> dict[str, str]:
     """What the record at paper scale has so far: bars, runs of each method, the reference."""
-    rows = record_read(RECORD_PAPER)
+    rows = record_read(STUDIES["confined"].record)
     names = [method.name for method in METHODS_OF[CONFINED.name]]
     planned = CONFINED.packings * CONFINED.members
     made = {name: len(rows_of(rows, "rivals", name, last)) for name in names}
@@ -275,7 +276,7 @@ def table_on_the_way(rows: Sequence[Row], name: str, last: int) -> str:
     return table(["packing and member", *(f"cycle {c}" for c in cycles)], lines)
 
 
-def page(rows: Sequence[Row], last: int = LAST) -> str:
+def page(rows: Sequence[Row], last: int = STUDIES["coarse"].last) -> str:
     """The page of a record."""
     truth = reference(rows, last)
     compared = sides_compared(rows, COARSE, EnsembleRecord())
@@ -316,7 +317,7 @@ def main() -> None:
     """Write page and picture."""
     rows = record_read()
     write_atomically(PAGE, page(rows))
-    draw(rows, LAST, PAGE.with_suffix(".png"))
+    draw(rows, STUDIES["coarse"].last, PAGE.with_suffix(".png"))
 
 
 if __name__ == "__main__":

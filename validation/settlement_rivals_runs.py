@@ -1,13 +1,13 @@
 """Run the rivals of the settlement procedure on the coarse bed, and its error budget.
 
     python -m validation.settlement_rivals_runs --work FOLDER [--minutes M] [--last N]
-        [--kind coarse|confined] [--only rivals|budget|reference] [--methods NAME ...]
+        [--study coarse|confined|far|partial] [--only rivals|budget|reference] [--methods NAME ...]
     python -m validation.settlement_rivals_page      docs/settlement-rivals.md and its picture
 
-Writes a line to ``validation/results/settlement-rivals.jsonl`` (at paper scale, without budget, to
-``settlement-rivals-confined.jsonl``) as each run ends and goes on where that ends; after M minutes
-it begins no further run.  ``reference`` reads the ensemble, from another folder by ``--ensemble``,
-and needs no engine.  FOLDER may be thrown away.
+Writes a line to the record of the study (`validation.settlement_rivals_studies`) as each run ends
+and goes on where that ends; after M minutes it begins no further run.  The budget is that of the
+coarse bed.  ``reference`` reads the ensemble, from another folder by ``--ensemble``, and needs no
+engine.  FOLDER may be thrown away.
 """
 
 from __future__ import annotations
@@ -27,18 +27,14 @@ from adapters.engine import interruptible
 from adapters.provenance import commit, machine
 from adapters.run_folder import RunFolder
 from validation.move_study import rounded
-from validation.settlement_ensemble import COARSE, CONFINED, KINDS, Kind, Piece
+from validation.settlement_ensemble import COARSE, Kind, Piece
 from validation.settlement_ensemble_record import RECORD as ENSEMBLE
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import METHODS_OF, Method, Row, method_run
+from validation.settlement_rivals import Method, Row, method_run
 from validation.settlement_rivals_budget import EVERY, PARTS, PLACE, part_run
 from validation.settlement_rivals_reference import LAWS, law_name, law_row, reference_row
+from validation.settlement_rivals_studies import STUDIES, Study
 
-RECORD = Path(__file__).with_name("results") / "settlement-rivals.jsonl"
-RECORD_PAPER = RECORD.with_stem(f"{RECORD.stem}-{CONFINED.name}")
-"""At paper scale."""
-LAST = 500
-"""Cycle at which methods are compared: one whose state the ensemble keeps."""
 PARTS_OF_STUDY = ("reference", "rivals", "budget")
 MEMBERS = range(COARSE.members)
 SEEDS = range(1, COARSE.packings + 1)
@@ -48,7 +44,7 @@ Planned = tuple[Row, Callable[[], Row]]
 """What a run is, and what fills its row."""
 
 
-def record_read(path: Path = RECORD) -> list[Row]:
+def record_read(path: Path = STUDIES["coarse"].record) -> list[Row]:
     """Rows of the record; a line cut off by a kill is left out."""
     if not path.exists():
         return []
@@ -70,11 +66,10 @@ def rival_row(
     return row
 
 
-def plan_rivals(work: Path, kind: Kind, record: EnsembleRecord, last: int) -> Iterator[Planned]:
-    """Every method on every packing; at paper scale, of fewer packings, as every member too."""
-    members = range(1 if kind == COARSE else kind.members)
-    for method, member in product(METHODS_OF[kind.name], members):
-        for seed in range(1, kind.packings + 1):
+def plan_rivals(work: Path, study: Study, record: EnsembleRecord, last: int) -> Iterator[Planned]:
+    """Every method on every packing, as every member of the study."""
+    for method, member in product(study.methods, range(study.members)):
+        for seed in range(1, study.kind.packings + 1):
             head = {"part": "rivals", "method": method.name, "seed": seed, "member": member}
             folder = work / f"{method.name.replace(' ', '-').replace('/', '-')}-{seed}-{member}"
             filled = partial(rival_row, method, seed, member, last, record, folder)
@@ -129,22 +124,20 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--work", type=Path, required=True, help="folder for the engine's files")
     parser.add_argument("--minutes", type=float, default=np.inf, help="begin no run after these")
-    parser.add_argument("--last", type=int, default=LAST, help="cycle to compare at")
-    parser.add_argument("--kind", choices=METHODS_OF, default=COARSE.name, help="of ensemble")
+    parser.add_argument("--last", type=int, help="cycle to compare at (default: the study's)")
+    parser.add_argument("--study", choices=STUDIES, default=COARSE.name)
     parser.add_argument("--only", nargs="+", choices=PARTS_OF_STUDY, default=PARTS_OF_STUDY)
     parser.add_argument("--methods", nargs="+", help="only these")
-    parser.add_argument("--record", type=Path, help="default: that of the kind")
+    parser.add_argument("--record", type=Path, help="default: that of the study")
     parser.add_argument("--ensemble", type=Path, default=ENSEMBLE, help="the ensemble's record")
     given = parser.parse_args(words)
-    record, kind = EnsembleRecord(given.ensemble), KINDS[given.kind]
-    path = given.record or RECORD
-    if given.record is None and kind != COARSE:
-        path = RECORD_PAPER
+    record, study = EnsembleRecord(given.ensemble), STUDIES[given.study]
+    path, last = given.record or study.record, given.last or study.last
     with interruptible(), RunFolder(given.work).locked():
         plans = {
-            "reference": plan_reference(kind, record, given.last),
-            "rivals": plan_rivals(given.work, kind, record, given.last),
-            "budget": plan_budget(given.work, record) if kind == COARSE else iter(()),
+            "reference": plan_reference(study.kind, record, last),
+            "rivals": plan_rivals(given.work, study, record, last),
+            "budget": plan_budget(given.work, record) if given.study == COARSE.name else iter(()),
         }
         for part in given.only:
             go_on(plans[part], path, given.minutes, given.methods)

@@ -34,8 +34,11 @@ from validation.settlement_rivals_reading import (
     settled,
 )
 from validation.settlement_rivals_reference import LAWS, law_name
-from validation.settlement_rivals_runs import LAST, RECORD_PAPER, key, record_read
+from validation.settlement_rivals_runs import key, record_read
+from validation.settlement_rivals_studies import STUDIES
 from validation.student import interval
+
+PAPER, LAST = STUDIES["confined"], STUDIES["coarse"].last
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +69,7 @@ def test_what_six_runs_can_tell_at_paper_scale() -> None:
 
     F(n - 1, n - 1) of the squared ratio of two spreads; 1.3 is beyond its 95 % where n is forty.
     """
-    rows, way = record_read(RECORD_PAPER), "2 jumps, by history, profile"
+    rows, way = record_read(PAPER.record), "2 jumps, by history, profile"
     assert len(finished(rows, way, LAST)) == len(reference(rows, LAST)) == 6
     ratio = spread(rows, way, LAST)
     assert ratio == pytest.approx(1.4, abs=0.05)
@@ -138,7 +141,7 @@ def test_sentences_about_the_paper_scale() -> None:
     """Two jumps by history: mean, coordination and profile within the bars at four times the gained
     time; packing 2 is far behind after the first jump and not after the second; no attempt
     fails; fitted laws miss that packing by half."""
-    rows, name = record_read(RECORD_PAPER), "2 jumps, by history, profile"
+    rows, name = record_read(PAPER.record), "2 jumps, by history, profile"
     runs = finished(rows, name, LAST)
     assert all(row["computed"] == 70 and not row["lost"] for row in runs)
     assert bias(rows, name, LAST) < 1
