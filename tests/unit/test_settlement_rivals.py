@@ -83,9 +83,9 @@ def test_methods_at_paper_scale_are_its_scene_and_gain_what_the_issue_asks() -> 
 
 
 def test_jumps_of_the_other_studies_gain_what_the_issue_asks() -> None:
-    """One cycle in twenty to 10,000 on the coarse bed; a gained time of 300 % where the piston
-    covers a part, its last block of cycles computed whole."""
-    for name, least in (("far", 20.0), ("partial", 4.0)):
+    """One cycle in twenty to 10,000 on the coarse bed; where the piston covers a part gained times
+    of 300 % and of the paper's 120 %, the last block of cycles computed whole."""
+    for name, least in (("far", {19: 20.0}), ("partial", {1: 4.0, 3: 2.2})):
         study = STUDIES[name]
         for method in study.methods:
             procedure = method.kind(study.last).scene(1).procedure
@@ -96,7 +96,7 @@ def test_jumps_of_the_other_studies_gain_what_the_issue_asks() -> None:
             behind = HEALING + method.window
             computed = method.window + method.jumps * behind
             assert behind >= BLOCK
-            assert (study.last - study.kind.k_i) / computed >= least
+            assert (study.last - study.kind.k_i) / computed >= least[method.jumps]
             assert study.kind.k_i + computed + method.jumps * procedure.h[0] == study.last
 
 
