@@ -51,6 +51,8 @@ def page(rows: Sequence[Row]) -> str:
         "WAYS": ways_table(paths, errors), "CLAIMS": claims_table(errors),
         "MADE": "; ".join(dict.fromkeys(f"{row['engine']}, {row['machine']}" for row in rows)),
         "COMMITS": ", ".join(dict.fromkeys(row["commit"][:7] for row in rows)),
+        "MEMBER": f"{100 * abs(errors[MEMBER].settlement):.1f} %",
+        "MEMBER_E": f"{100 * errors[MEMBER].coordinates:.2f} %",
         "HOURS": f"{sum(path.cost for path in paths.values()) / 3600:.1f}",
     })  # fmt: skip
 

@@ -7,7 +7,18 @@ from typing import Any
 import pytest
 
 from validation.jump_runs import record_read
-from validation.paper_convergence import FULL, STILL, errors_of, paths_of
+from validation.paper_convergence import (
+    FULL,
+    JUMPED,
+    MEMBER,
+    STILL,
+    VARIED_H,
+    VARIED_K,
+    errors_of,
+    falls,
+    name_of,
+    paths_of,
+)
 from validation.paper_convergence_page import PAGE, page
 from validation.paper_convergence_runs import STUDY
 
@@ -37,3 +48,21 @@ def test_every_way_comes_to_the_last_cycle_by_computing_or_jumping(
         assert path.cycle[-1] == STUDY.last
         assert (path.settlement[: shared.sum()] == full.settlement[shared]).all()
     assert paths[STILL].computed < full.computed == STUDY.last
+
+
+def test_what_the_page_says_in_short_is_so(rows: list[dict[str, Any]]) -> None:
+    """A full run parts from itself by more than any way misses; and what comes at 180 %."""
+    paths = paths_of(rows)
+    errors = {name: errors_of(path, paths[FULL]) for name, path in paths.items()}
+    member = abs(errors[MEMBER].settlement)
+    assert max(abs(errors[name].settlement) for name in JUMPED) < member
+    for varied in (VARIED_K, VARIED_H[::-1]):
+        assert not falls([errors[name_of(k, h)].settlement for k, h in varied])
+    most = errors[max(JUMPED, key=lambda name: errors[name].gained)]
+    assert 1.6 < most.gained < 2.0
+    assert abs(most.coordination) < 0.12
+    assert most.coordinates < 0.01
+    assert abs(most.settlement) > 0.005
+    assert member / 0.005 == pytest.approx(16, abs=1)
+    assert errors[STILL].settlement < 0
+    assert errors[STILL].coordinates < 1.01 * min(errors[name].coordinates for name in JUMPED)

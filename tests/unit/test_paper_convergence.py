@@ -69,7 +69,7 @@ def test_claims_are_judged_by_their_rules() -> None:
     assert rank_with_gain(errors, "settlement") == pytest.approx(1.0)
     lines = claims_table(errors).splitlines()[2:]
     assert [line.split(" | ")[-1] for line in lines[:3]] == ["yes |"] * 3
-    assert "at 400 % (k 10, h 40): 40.0 %" in lines[3]
+    assert "at 500 % (k 10, h 50): 50.0 %" in lines[3]
     assert lines[3].endswith("in part |")
     assert falls([3, -2, 1])
     assert not falls([1, -2, 0.5])
