@@ -197,7 +197,7 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
             height = window.position[bed.healing :, :, 2]
             checks.check_rise(run.scene, height, (target - before.position)[:, 2])
         else:
-            target, piston_height = settled_by(gain, before, target, piston_height)
+            target, piston_height = settled_by(gain, before, target)
         with run.clock.part("relax"):
             position, record = relaxed(run, before, target, piston_height)
         after = before.moved(
@@ -250,13 +250,13 @@ def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, Flo
     return before, before.position + field_, before.piston_height + drop
 
 
-def settled_by(
-    gain: float, before: State, target: FloatArray, piston_height: float
-) -> tuple[FloatArray, float]:
+def settled_by(gain: float, before: State, target: FloatArray) -> tuple[FloatArray, float]:
     """Estimated positions (n, 3) and piston height whose mean grain has settled by ``gain``, in m.
 
-    What lacks is a uniform vertical strain, zero at the lowest grain; the piston is never placed
-    above where it is.
+    What lacks is a uniform vertical strain, zero at the lowest grain.  The piston goes down as a
+    bed does that is strained evenly by the whole gain, and is never placed above where it is: the
+    law of its own heights in the window is the law that the gain stands for, and in a long jump
+    from a short window its noise would press the piston into the grains by a part of a radius.
     """
     lacking = before.position[:, 2].mean() - target[:, 2].mean() - gain
     height = before.position[:, 2] - before.position[:, 2].min()
@@ -264,8 +264,7 @@ def settled_by(
     target = target.copy()
     target[:, 2] += lacking * height / mean if height.any() else lacking
     above = before.piston_height - float(before.position[:, 2].min())
-    piston_height += float(lacking) * above / mean
-    return target, min(piston_height, before.piston_height)
+    return target, before.piston_height - max(gain, 0.0) * above / mean
 
 
 def relaxed(
