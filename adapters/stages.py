@@ -254,9 +254,9 @@ def settled_by(gain: float, before: State, target: FloatArray) -> tuple[FloatArr
     """Estimated positions (n, 3) and piston height whose mean grain has settled by ``gain``, in m.
 
     What lacks is a uniform vertical strain, zero at the lowest grain.  The piston goes down as a
-    bed does that is strained evenly by the whole gain, and is never placed above where it is: the
-    law of its own heights in the window is the law that the gain stands for, and in a long jump
-    from a short window its noise would press the piston into the grains by a part of a radius.
+    bed does that is strained evenly by the whole gain, and is never placed above where it is.  A
+    law of its own heights in the window is left aside as that of the grains is: in a long jump from
+    a short window its noise would press the piston into the grains by a part of a radius.
     """
     lacking = before.position[:, 2].mean() - target[:, 2].mean() - gain
     height = before.position[:, 2] - before.position[:, 2].min()
