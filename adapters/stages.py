@@ -16,6 +16,7 @@ import numpy as np
 
 from adapters import checks
 from adapters.engine import Engine, EngineRun, EngineStart
+from adapters.errors import NotConverged
 from adapters.laws import law_named
 from adapters.moves import move_named
 from adapters.overlaps import neighbours
@@ -134,8 +135,7 @@ def prepare(run: Run) -> Bed:
         outcome = run.folder.outcome(name)
     assert outcome is not None
     state = state_load(run.folder.path / name / "state.npz")
-    under = np.hypot(state.position[:, 0], state.position[:, 1]) - state.radius < scene.piston_reach
-    top = float((state.position[:, 2] + state.radius)[under].max())
+    top = top_under(state.position, state.radius, scene.piston_reach)
     restart = run.folder.path / name / "end.restart"
     return Bed(0, EngineStart(restart, state.time_step, 0, top, first=True))
 
@@ -199,7 +199,12 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
         else:
             target, piston_height = settled_by(gain, before, target)
         with run.clock.part("relax"):
-            position, record = relaxed(run, before, target, piston_height)
+            try:
+                position, record = relaxed(run, before, target, piston_height)
+            except NotConverged:
+                if gain is None or piston_height >= before.piston_height:
+                    raise
+                position, record, piston_height = relaxed_below(run, before, target)
         after = before.moved(
             position,
             velocity=np.zeros_like(target),
@@ -226,6 +231,15 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
         moved=moved,
     )
     return Bed(bed.cycle + h, start, bed.window, bed.healing)
+
+
+def top_under(position: FloatArray, radius: FloatArray, reach: float) -> float:
+    """Highest place [m] of grains under a piston of radius ``reach`` [m].
+
+    ``position`` (n, 3) and ``radius`` (n,) in metres.
+    """
+    under = np.hypot(position[:, 0], position[:, 1]) - radius < reach
+    return float((position[:, 2] + radius)[under].max())
 
 
 def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, FloatArray, float]:
@@ -288,6 +302,18 @@ def relaxed(
         walls_after=scene.container.walls(piston_height, scene.piston_reach),
     )
     return relaxation.position, relaxation.record()
+
+
+def relaxed_below(
+    run: Run, before: State, target: FloatArray
+) -> tuple[FloatArray, dict[str, Any], float]:
+    """As `relaxed` with the piston where it was; then its height on top of the bed [m].
+
+    Where grains have no room under a piston that went down: the bed settles below one that waits.
+    """
+    position, record = relaxed(run, before, target, before.piston_height)
+    top = top_under(position, before.radius, run.scene.piston_reach)
+    return position, record | {"piston": "on the bed"}, min(top, before.piston_height)
 
 
 def settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, Any]]:

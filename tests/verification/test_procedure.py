@@ -6,6 +6,7 @@ import csv
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from adapters.engine_fake import SETTLEMENT
 from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder
-from adapters.state import FloatArray, State
+from adapters.state import FloatArray, State, state_load
 from adapters.window import Window, window_load
 from scenes import scene_path
 
@@ -165,6 +166,34 @@ def test_a_jump_that_lifts_the_bed_is_no_jump(
     assert len(failed) == 4
     metres_a_cycle = 1e-9
     settle(tmp_path / "little")
+
+
+def test_piston_waits_where_grains_have_no_room_below_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A given settlement with no room under a piston that goes down: the bed is relaxed under the
+    old one, settles by its gain all the same, and the piston comes to lie on it."""
+    real = stages.relaxed
+
+    def jammed(
+        run: stages.Run, before: State, target: FloatArray, piston_height: float
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        if piston_height < before.piston_height:
+            raise NotConverged("made to fail")
+        return real(run, before, target, piston_height)
+
+    monkeypatch.setattr(stages, "relaxed", jammed)
+    settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=90")
+    folder = RunFolder(tmp_path / "run")
+    outcome = folder.outcome("jump_000040_1")
+    assert outcome is not None
+    assert outcome.notes["relaxation"]["piston"] == "on the bed"
+    jump = folder.path / "jump_000040_1"
+    estimated, relaxed = (state_load(jump / f"{name}.npz") for name in ("estimated", "relaxed"))
+    assert relaxed.position[:, 2].mean() == pytest.approx(estimated.position[:, 2].mean(), abs=1e-8)
+    before = window_load(folder.path / "window_000020" / "states.npz").state(-1)
+    top = float((relaxed.position[:, 2] + relaxed.radius).max())
+    assert relaxed.piston_height == min(top, before.piston_height)
 
 
 def test_jump_that_keeps_failing_ends_the_run(
