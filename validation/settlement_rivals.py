@@ -111,13 +111,16 @@ class Method:
     """The ensemble with whose packings it begins."""
     window: int = FIRST_WINDOW
     """Cycles fitted before each jump."""
+    growing: bool = False
+    """Whether jumps have the same ratio of cycles, not their number."""
 
     def kind(self, last: int) -> Kind:
         """The ensemble's scene as this method changes it, to cycle ``last``."""
         k = self.window if self.variant.jumps else 100
         keys = [*self.base.settings, f"procedure.total_cycles={last}", *self.settings]
         if not any(key.startswith("procedure.tolerance") for key in self.settings):
-            h = jump_length(self.jumps, last, self.base.k_i, k) if self.jumps else 0
+            lengths = jump_lengths if self.growing else jump_length
+            h = lengths(self.jumps, last, self.base.k_i, k) if self.jumps else 0
             keys += [f"procedure.k={k}", f"procedure.h={h}"]
         return replace(self.base, settings=tuple(keys))
 
@@ -133,8 +136,25 @@ def jump_length(jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDO
     return block - HEALING - window
 
 
+def jump_lengths(jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDOW) -> list[int]:
+    """Cycles h of each of so many jumps to ``last``, N after over N before the same for all.
+
+    By the logarithm each settles the bed by the same.  ValueError where the first is none.
+    """
+    ends = np.rint(np.geomspace(k_i + window, last, jumps + 1)).astype(int)
+    lengths = np.diff(ends) - HEALING - window
+    if lengths[0] < 1:
+        raise ValueError(f"{jumps} growing jumps to cycle {last} begin with one of no cycle")
+    return [int(h) for h in lengths]
+
+
 JUMPING = Variant()
 STILL = ('procedure.move="still"',)
+
+
+def growing(method: Method) -> Method:
+    """The same number of jumps, each longer than the one before."""
+    return replace(method, name=method.name.replace("jumps", "growing jumps", 1), growing=True)
 
 
 def jumping(jumps: int) -> tuple[Method, Method]:

@@ -1,0 +1,53 @@
+"""Jumps to 10,000 cycles beside the reference: the table, from made-up runs."""
+
+from __future__ import annotations
+
+import pytest
+
+from validation.settlement_far_jumps import HEAD, STUDY, table_jumps
+from validation.settlement_rivals import STATE, Row
+from validation.settlement_rivals_budget import EVERY
+
+
+def made_up(part: str, method: str, seed: int, member: int, settled: float, cpu_s: float) -> Row:
+    """A run that settled so far [m] at such a cost, every figure of its state 1."""
+    return {
+        "part": part, "method": method, "seed": seed, "member": member, "last": STUDY.last,
+        "settlement": {str(STUDY.last): settled}, "state": dict.fromkeys(STATE, 1.0),
+        "computed": 500, "cpu_s": cpu_s, "refused": "",
+    }  # fmt: skip
+
+
+def cells(text: str, name: str) -> dict[str, str]:
+    """The line of a way, by the head of its column."""
+    (line,) = [line for line in text.splitlines() if line.startswith(f"| {name} ")]
+    return dict(zip(HEAD, (cell.strip() for cell in line.strip("|").split("|")), strict=True))
+
+
+def runs(settled: float) -> list[Row]:
+    """A way on five packings that scatter by 100 um."""
+    name = STUDY.methods[0].name
+    scatter = (-1e-4, 0.0, 1e-4, 0.0, 0.0)
+    return [made_up("rivals", name, k + 1, 0, settled + off, 50.0) for k, off in enumerate(scatter)]
+
+
+def test_without_the_reference_nothing_is_judged() -> None:
+    found = cells(table_jumps(runs(1e-3)), STUDY.methods[0].name)
+    assert found["settlement since kᵢ, µm"] == "1,000"
+    assert found["cheaper by"] == found[HEAD[5]] == "-"
+
+
+def test_error_is_told_in_half_intervals_of_the_reference() -> None:
+    """Two members of five packings, each 10 um off their packing's mean: the pooled variance within
+    is 2 (10 um)^2, and half of the interval of the mean t(5) sqrt(2 / 2 / 5) 10 um = 11.5 um."""
+    truth = [
+        made_up("reference", EVERY, seed, member, 1e-3 + (1e-5 if member else -1e-5), 1000.0)
+        for seed in range(1, 6)
+        for member in range(2)
+    ]
+    text = table_jumps([*truth, *runs(1.023e-3)])
+    assert cells(text, "every cycle (the reference)")["settlement since kᵢ, µm"] == "1,000 ± 11"
+    found = cells(text, STUDY.methods[0].name)
+    assert float(found["cheaper by"]) == pytest.approx(20.0)
+    assert float(found[HEAD[5]]) == pytest.approx(2.0, abs=0.01)
+    assert found["coordination number"] == "+0 ± 0 %"
