@@ -1,7 +1,8 @@
 """A run whose windows and jumps have given lengths k and h, as in Fig. 10 of Karrech et al. (2007).
 
-A jump that fails is tried again shorter; what the mean grain settles by is its law's or, where the
-scene says so, that of all cycles computed (`adapters.jump_history`).
+What the mean grain settles by is its law's or, where the scene says so, that of all cycles
+computed (`adapters.jump_history`).  A jump that fails is tried again: shorter, or over the same
+cycles with a share of the move, whose rest the next jump is asked for.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
 
 RETRIES = 3
-"""How often a failed jump is tried again, each time half as long."""
+"""How often a failed jump is tried again, by its law each time half as long."""
+SHARES = (1.0, 0.5, 0.25, 0.0)
+"""Of the move, by history, in each of the tries: the bed has no room for more."""
 
 
 def settle_fixed(run: Run, bed: Bed) -> Bed:
@@ -40,10 +43,11 @@ def settle_fixed(run: Run, bed: Bed) -> Bed:
 
 
 def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
-    """A jump of ``h`` cycles and the window after it; a failed jump is tried again, half as long.
+    """A jump of ``h`` cycles and the window after it; a failed jump is tried again.
 
-    Where the jump and its retries failed: `compute_on` if the run may compute what it can not jump,
-    else raises `NotCredible`.
+    By its law half as long.  By history with one of `SHARES` of the move: what lacks is known to
+    the next jump, which makes it good.  Where the jump and its retries failed: `compute_on` if the
+    run may compute what it can not jump, else raises `NotCredible`.
     """
     p = run.scene.procedure
     assert p is not None
@@ -54,7 +58,9 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
         if not why:
             try:
                 with disk_full_named(run.folder.path):
-                    moved = stages.jump(run, bed, h, attempt, history_gain(run, bed, h))
+                    gain = history_gain(run, bed, h)
+                    share = 1.0 if gain is None else SHARES[attempt - 1]
+                    moved = stages.jump(run, bed, h, attempt, gain, share)
                     cycles = p.healing_cycles + p.window_cycles
                     return stages.compute(run, moved, cycles, p.healing_cycles)
             except (EngineFailed, NotCredible, NotConverged) as error:
@@ -63,7 +69,8 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                 why = str(error)
                 run.folder.give_up(name, why)
                 run.progress.say(f"the jump of {h} cycles from {bed.cycle} failed: {why}")
-        h = h // 2 if h > 1 else h
+        if p.settlement == "law":
+            h = h // 2 if h > 1 else h
     failed = f"the jump from cycle {bed.cycle} failed {RETRIES + 1} times, the last time: {why}"
     if run.cycle_by_cycle:
         run.progress.say(f"{failed}; computing on")

@@ -181,10 +181,13 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
     return Bed(outcome.last_cycle, start, name, healing)
 
 
-def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) -> Bed:
+def jump(
+    run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None, share: float = 1.0
+) -> Bed:
     """Estimate the bed ``h`` cycles on (eqs 16, 17), relax it (eq. 29), hand it back at rest.
 
-    ``gain``: settlement of the mean grain [m] where that is not to be the scene's law's.
+    ``gain``: settlement of the mean grain [m] where that is not to be the scene's law's; the bed is
+    moved by a ``share`` of what is estimated then.
     """
     name = f"jump_{bed.cycle:06d}_{attempt}"
     folder = run.folder.path / name
@@ -198,6 +201,8 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
             checks.check_rise(run.scene, height, (target - before.position)[:, 2])
         else:
             target, piston_height = settled_by(gain, before, target)
+            target = before.position + share * (target - before.position)
+            piston_height = before.piston_height + share * (piston_height - before.piston_height)
         with run.clock.part("relax"):
             try:
                 position, record = relaxed(run, before, target, piston_height)
@@ -216,7 +221,7 @@ def jump(run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None) ->
         state_save(after, folder / "relaxed.npz")
         notes = {"h": h, "attempt": attempt, "relaxation": record}
         if gain is not None:
-            notes["gain"] = gain
+            notes |= {"gain": share * gain, "asked": gain}
         rows = [_row(run, after, "jumped")] if h else []
         cost = run.clock.lap()
         folder = _finish(

@@ -20,7 +20,7 @@ from adapters.errors import SceneError, TrackbedError
 from adapters.procedure import CONTROL, settle
 from adapters.progress import Progress
 from adapters.report_history import cost_total
-from adapters.run_folder import RunFolder
+from adapters.run_folder import Outcome, RunFolder
 from adapters.sample import GRAVITY, relative_density_profile
 from adapters.scene import Scene
 from adapters.stages import Run, Variant
@@ -267,7 +267,7 @@ def reached(run: Run, k_i: int) -> Row:
     """Figures of a run as far as it has come, and what they cost behind cycle k_i.
 
     ``settlement``, ``state``, ``profile`` as `figures_of`; ``sides`` of jumps; ``computed`` cycles,
-    ``cost`` CPU time [s] by purpose, ``lost`` why stages were given up.
+    ``cost`` CPU time [s] by purpose, ``lost`` why stages were given up, ``moved`` as `moved_of`.
     """
     first = run.folder.outcome("window_000000")
     assert first is not None
@@ -288,6 +288,7 @@ def reached(run: Run, k_i: int) -> Row:
         "cost": cost,
         "cpu_s": cost_total(cost),
         "sides": sides_of(run),
+        "moved": moved_of(run.folder.outcomes()),
         "lost": [why for name in run.folder.stage_names() if (why := run.folder.failure(name))],
     }
     if len(names) == 1:
@@ -298,6 +299,12 @@ def reached(run: Run, k_i: int) -> Row:
     height = preparation.notes["density_height"]
     layers = profile(run.scene, height, last.position[-1], last.radius)
     return row | figures_of(found, k_i) | {"profile": layers}
+
+
+def moved_of(outcomes: Sequence[Outcome]) -> list[list[float]]:
+    """Of each jump by history: settlement that was asked for, and that the bed had room for [m]."""
+    notes = [one.notes for one in outcomes if one.stage == "jump"]
+    return [[note["asked"], note["gain"]] for note in notes if "asked" in note]
 
 
 def figures_of(found: Mapping[int, Mapping[str, float]], k_i: int) -> Row:

@@ -46,6 +46,6 @@ STUDIES = {
         CONFINED, 500, METHODS_OF["confined"],
         CONFINED.members, RESULTS / "settlement-rivals-confined.jsonl",
     ),
-    "far": Study(COARSE, COARSE.last, FAR, 1, RESULTS / "settlement-rivals-far.jsonl"),
+    "far": Study(COARSE, COARSE.last, FAR, 2, RESULTS / "settlement-rivals-far.jsonl"),
     "partial": Study(PARTIAL, PARTIAL.last, PARTLY, 1, RESULTS / "settlement-rivals-partial.jsonl"),
 }  # fmt: skip

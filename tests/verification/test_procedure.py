@@ -127,12 +127,12 @@ def test_failed_jump_is_tried_again_half_as_long(
     real = stages.jump
 
     def fail_twice(
-        run: stages.Run, bed: stages.Bed, h: int, attempt: int, gain: float | None
+        run: stages.Run, bed: stages.Bed, h: int, attempt: int, gain: float | None, share: float
     ) -> stages.Bed:
         lengths.append(h)
         if attempt <= 2:
             raise NotConverged("made to fail")
-        return real(run, bed, h, attempt, gain)
+        return real(run, bed, h, attempt, gain, share)
 
     monkeypatch.setattr(stages, "jump", fail_twice)
     rows = settle(tmp_path / "run", "procedure.total_cycles=90")
@@ -194,6 +194,33 @@ def test_piston_waits_where_grains_have_no_room_below_it(
     before = window_load(folder.path / "window_000020" / "states.npz").state(-1)
     top = float((relaxed.position[:, 2] + relaxed.radius).max())
     assert relaxed.piston_height == min(top, before.piston_height)
+
+
+def test_what_a_bed_has_no_room_for_is_made_good_by_the_next_jump(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """u = a ln(1 + N) and two jumps by history of 20 cycles, of which the first may move by no more
+    than 6 um: a ln(61 / 41) = 7.9 um is halved.  The next is asked for a ln(106 / 86) and for that
+    half; a is told to 2 % from N in place of 1 + N."""
+    real = stages.relaxed
+
+    def tight(
+        run: stages.Run, before: State, target: FloatArray, piston_height: float
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        if before.cycle == 40 and (before.position - target)[:, 2].mean() > 6e-6:
+            raise NotConverged("made to fail")
+        return real(run, before, target, piston_height)
+
+    monkeypatch.setattr(stages, "relaxed", tight)
+    rows = settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=130")
+    jumps = [one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump"]
+    (first, asked), (second, owed) = ((one.notes["gain"], one.notes["asked"]) for one in jumps)
+    assert [one.last_cycle - one.first_cycle for one in jumps] == [20, 20]
+    assert asked == pytest.approx(SETTLEMENT * np.log(61 / 41), rel=0.02)
+    assert first == asked / 2
+    assert second == owed == pytest.approx(first + SETTLEMENT * np.log(106 / 86), rel=0.02)
+    end = float(rows[-1]["settlement"])
+    assert end == pytest.approx(SETTLEMENT * np.log(131), rel=0.01)
 
 
 def test_jump_that_keeps_failing_ends_the_run(
