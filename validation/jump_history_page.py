@@ -115,20 +115,19 @@ def stretch(curve: FloatArray, first: int, last: int) -> Stretch:
 
 
 def jumped_error(
-    curve: FloatArray, k_i: int, last: int, jumps: int, way: Way, moved: bool = False
+    curve: FloatArray, k_i: int, lengths: Sequence[int], way: Way, moved: bool = False
 ) -> float:
-    """Settlement by equal jumps less that of the ``curve`` [m].
+    """Settlement by jumps of ``lengths`` h less that of the ``curve`` [m].
 
     Windows and healing are its own; where the bed is ``moved`` they settle more by `FIRST_CYCLE`
     and `KAPPA`.
     """
-    h = jump_length(jumps, last, k_i)
     end = k_i + FIRST_WINDOW
     known = [stretch(curve, round(SEATING * k_i), k_i), stretch(curve, k_i, end)]
     since = np.arange(1, HEALING + FIRST_WINDOW + 1)
     more = moved * np.where(since == 1, FIRST_CYCLE, KAPPA / since)
     settled, made = float(curve[end]), list[Jumped]()
-    for _ in range(jumps):
+    for h in lengths:
         gain, before, behind = way(known, h, made), end, end + h
         end = behind + len(since)
         path = curve[behind : end + 1] + gain * np.append(0.0, np.cumsum(more))
@@ -159,7 +158,8 @@ def study(record: EnsembleRecord) -> list[Forecasts]:
         curves = curves_of(kind, last, record)
         scale = float(np.mean([curve[last] - curve[kind.k_i] for curve in curves]))
         for jumps, (name, way), moved in product(numbers, WAYS.items(), (False, True)):
-            errors = [jumped_error(one, kind.k_i, last, jumps, way, moved) for one in curves]
+            lengths = jumps * [jump_length(jumps, last, kind.k_i)]
+            errors = [jumped_error(one, kind.k_i, lengths, way, moved) for one in curves]
             found.append(Forecasts(kind, last, jumps, name, moved, np.array(errors) / scale))
     return found
 
@@ -202,11 +202,12 @@ def table_choices(record: EnsembleRecord) -> str:
     for kind, last, _ in CASES:
         curves = curves_of(kind, last, record)
         scale = float(np.mean([curve[last] - curve[kind.k_i] for curve in curves]))
+        lengths = CHOICES_JUMPS * [jump_length(CHOICES_JUMPS, last, kind.k_i)]
         lines.append([f"{kind.name} to {last:,}"])
         for choice in CHOICES.values():
             with chosen(choice):
                 errors = [
-                    jumped_error(one, kind.k_i, last, CHOICES_JUMPS, way_history, True) / scale
+                    jumped_error(one, kind.k_i, lengths, way_history, True) / scale
                     for one in curves
                 ]
             lines[-1].append(f"{100 * np.mean(errors):+.0f} ± {100 * np.std(errors, ddof=1):.0f}")

@@ -1,4 +1,4 @@
-"""Jumps to 10,000 cycles of the coarse bed beside the ensemble: a table of docs/settlement-far.md.
+"""Jumps to 10,000 cycles of the coarse bed beside the ensemble: tables of docs/settlement-far.md.
 
 `validation.settlement_rivals_runs --study far` makes the record.
 """
@@ -9,9 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from validation.jump_history_page import WAYS, curves_of, jumped_error
 from validation.page_text import table
 from validation.settlement_bars import bias_beside_interval, settlement_of, spread
-from validation.settlement_rivals import K_I, Row
+from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals import FIRST_WINDOW, HEALING, K_I, Row, jump_lengths
 from validation.settlement_rivals_reading import FIGURES, cost, finished, judged, reference
 from validation.settlement_rivals_reference import LAWS, law_name
 from validation.settlement_rivals_studies import STUDIES
@@ -19,6 +21,8 @@ from validation.settlement_rivals_studies import STUDIES
 STUDY = STUDIES["far"]
 CHEAPER = 20.0
 """What the jumps are asked to save: full cost over theirs."""
+NUMBERS = (5, 8, 13, 20)
+"""Of growing jumps whose forecasts are tried on the curves of full runs."""
 HEAD = ("way to the last cycle", "packings", "cycles computed", "cheaper by",
         "settlement since kᵢ, µm", "error over half the reference's interval",
         "spread over the reference's", "coordination number", "elastic deflection")  # fmt: skip
@@ -58,3 +62,45 @@ def line_of(rows: Sequence[Row], name: str, last: int, mine: Sequence[Row]) -> l
         f"{bias_beside_interval(rows, name, last):.2f}", f"{spread(rows, name, last):.1f}",
         *(f"{100 * one.mean:+.0f} ± {100 * one.half:.0f} %" if one else "-" for one in errors),
     ]  # fmt: skip
+
+
+def short_of(rows: Sequence[Row], last: int = STUDY.last) -> str:
+    """How often beds had no room for what jumps by history asked, in a sentence."""
+    mine = [row for method in STUDY.methods for row in finished(rows, method.name, last)]
+    moved = [pair for row in mine for pair in row.get("moved", ())]
+    short = sum(got < asked for asked, got in moved)
+    tries = sum(len(row["lost"]) for row in mine if row.get("moved"))
+    return (
+        f"Of {len(moved)} jumps by history {short} found no room for the whole move, after "
+        f"{tries} failed tries in all; what lacked was asked of the next."
+    )
+
+
+def table_forecasts(record: EnsembleRecord, last: int = STUDY.last) -> str:
+    """What forecasts of growing jumps err by on the reference's own curves; no bed is moved."""
+    curves = curves_of(STUDY.kind, last, record)
+    settled = float(np.mean([curve[last] - curve[K_I] for curve in curves]))
+    lines = []
+    for jumps in NUMBERS:
+        lengths = jump_lengths(jumps, last)
+        computed = FIRST_WINDOW + jumps * (HEALING + FIRST_WINDOW)
+        lines.append([str(jumps), f"{computed:,}"])
+        for way in WAYS.values():
+            errors = [jumped_error(curve, K_I, lengths, way) / settled for curve in curves]
+            mean, scatter = np.mean(errors), np.std(errors, ddof=1)
+            lines[-1].append(f"{100 * mean:+.0f} ± {100 * scatter:.0f}")
+    return table(["jumps", "cycles computed", *(f"{name}, %" for name in WAYS)], lines)
+
+
+def table_noise(record: EnsembleRecord, last: int = STUDY.last) -> str:
+    """What a window sees of the slope: the bed's gain in it, beside its scatter over all runs."""
+    curves = np.array(curves_of(STUDY.kind, last, record))
+    slope = float((curves[:, last] - curves[:, K_I]).mean() / np.log(last / K_I))
+    lines = []
+    for first in (120, 200, 500, 1000, 2000, 5000, last - FIRST_WINDOW):
+        gain = curves[:, first + FIRST_WINDOW] - curves[:, first]
+        told, noise = slope * np.log1p(FIRST_WINDOW / first), float(gain.std(ddof=1))
+        cells = (f"{1e6 * told:.1f}", f"{1e6 * noise:.1f}", f"{told / noise:.2f}")
+        lines.append([f"{first:,}", *cells])
+    head = ["a window from cycle", "the mean slope gains in it, µm", "its gain scatters by, µm"]
+    return table([*head, "the one over the other"], lines)

@@ -1,7 +1,8 @@
 """Make docs/settlement-far.md and its picture: ``python -m validation.settlement_far_page``.
 
 The prediction of a law with its band, far beyond the cycles that it was fitted to: tested on full
-runs of the ensemble, and made to 1e6 cycles where nothing can test it.  Seconds.
+runs of the ensemble, and made to 1e6 cycles where nothing can test it.  Beside it jumps that leave
+a bed behind, from the record of the study ``far``.  Seconds.
 """
 
 from __future__ import annotations
@@ -21,16 +22,25 @@ from validation.jump_history_page import curves_of
 from validation.page_text import page_filled, table
 from validation.settlement_ensemble import COARSE, CONFINED, Kind
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import BLOCK
+from validation.settlement_far_jumps import (
+    STUDY,
+    short_of,
+    table_forecasts,
+    table_jumps,
+    table_noise,
+)
+from validation.settlement_rivals import BLOCK, FIRST_WINDOW
+from validation.settlement_rivals_runs import record_read
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "settlement-far.md"
 CASES: tuple[tuple[Kind, int, int], ...] = (
     (COARSE, 100, 1000),
     (COARSE, 200, 2000),
-    (COARSE, 280, 2800),
-    (COARSE, 560, 2800),
-    (COARSE, 1400, 2800),
+    (COARSE, 1000, 10_000),
+    (COARSE, 200, 10_000),
+    (COARSE, 500, 10_000),
+    (COARSE, 2000, 10_000),
     (CONFINED, 50, 500),
     (CONFINED, 100, 500),
 )
@@ -158,6 +168,10 @@ def page(found: Sequence[Foretold], record: EnsembleRecord) -> str:
     coarse = np.concatenate([one.covered for one in found if one.kind == COARSE])
     parts = {"TESTS": table_tests(found), "FAR": table_far(curves), "BLOCK": str(BLOCK)}
     parts["COMPUTED_TEXT"] = f"{COMPUTED:,}"
+    rows = record_read(STUDY.record)
+    parts |= {"JUMPS": table_jumps(rows), "SHORT": short_of(rows), "K": str(FIRST_WINDOW)}
+    parts |= {"NOISE": table_noise(record), "FORECASTS": table_forecasts(record)}
+    parts["RUNS"] = str(len(curves_of(COARSE, COARSE.last, record)))
     parts["COVERED"] = f"{int(coarse.sum())} of {len(coarse)}"
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)
 

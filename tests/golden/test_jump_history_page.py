@@ -47,9 +47,9 @@ def test_a_logarithm_is_met_by_every_way_but_nothing() -> None:
     cycle = np.arange(501.0)
     curve = 1e-4 * np.log(np.maximum(cycle, 1))
     for way in (way_window, way_one_slope, way_history):
-        assert abs(jumped_error(curve, 100, 500, 2, way)) < 1e-9
+        assert abs(jumped_error(curve, 100, [165, 165], way)) < 1e-9
     gained = curve[285] - curve[120] + curve[475] - curve[310]
-    assert jumped_error(curve, 100, 500, 2, way_nothing) == pytest.approx(-gained)
+    assert jumped_error(curve, 100, [165, 165], way_nothing) == pytest.approx(-gained)
 
 
 def test_sentences_of_the_page(found: list[Forecasts]) -> None:
