@@ -4,9 +4,9 @@ A bed under a piston settles in layers by
 
     u(s) = u_piston s^p,    s = (z - z_lowest) / (z_piston - z_lowest),
 
-p = 1 a uniform strain.  Full runs at paper scale sink their piston by 4 to 5 times what the mean
-grain settles, p about 3: walls carry a part of the load, and what is near the piston moves most.
-p is that by which piston and mean grain have gone down in all cycles computed so far.
+p = 1 a uniform strain.  Full runs at paper scale sink their piston by nearly five times what the
+mean grain settles, p near 4 (docs/jump-history.md): what is near the piston moves most.  p is that
+by which piston and mean grain have gone down in all cycles computed so far.
 """
 
 from __future__ import annotations

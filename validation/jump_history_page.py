@@ -20,6 +20,7 @@ from adapters.jump_rates import Stretch
 from adapters.laws import law_named
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
+from validation.jump_history_layers import table_layers
 from validation.page_text import page_filled, table
 from validation.settlement_ensemble import COARSE, CONFINED, Kind, Piece
 from validation.settlement_ensemble_record import EnsembleRecord
@@ -245,6 +246,7 @@ def page(found: Sequence[Forecasts], record: EnsembleRecord) -> str:
         "ERRORS": table_errors(found, False),
         "ERRORS_MOVED": table_errors(found, True),
         "CHOICES": table_choices(record),
+        "LAYERS": table_layers(record),
         "K": str(FIRST_WINDOW),
         "HEALING": str(HEALING),
         "FIRST_CYCLE": f"{FIRST_CYCLE:g}",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from adapters.state import FloatArray
+from validation.jump_history_layers import BETWEEN, LAYERS, compacted
 from validation.jump_history_page import (
     PAGE,
     WAYS,
@@ -18,6 +19,7 @@ from validation.jump_history_page import (
     way_one_slope,
     way_window,
 )
+from validation.settlement_ensemble import CONFINED
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals_reading import rms
 
@@ -73,3 +75,18 @@ def test_sentences_of_the_page(found: list[Forecasts]) -> None:
                 assert rms(one.error) > 1.5 * rms(history)
             elif one.kind.name == "confined":
                 assert rms(history) < rms(one.error) + 0.04
+
+
+def test_sentences_about_layers() -> None:
+    """Paper scale: layers 2 to 4 of 6 take less than 2/3 of a uniform strain's, the piston sinks by
+    more than twice as much; the coarse bed's piston by no more than a half further."""
+    even = (2 * np.arange(LAYERS) + 1) / LAYERS
+    for case in BETWEEN:
+        found = compacted(*case, EnsembleRecord())
+        assert found.layers.argmax() == LAYERS - 1
+        if found.kind == CONFINED:
+            assert (found.layers[1:4] < even[1:4] / 1.5).all()
+            assert found.ratio.mean() > 4
+            assert found.exponent == pytest.approx(4, abs=0.5)
+        else:
+            assert 2 < found.ratio.mean() < 3
