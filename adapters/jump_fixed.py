@@ -61,6 +61,11 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                     gain = history_gain(run, bed, h)
                     share = 1.0 if gain is None else SHARES[attempt - 1]
                     moved = stages.jump(run, bed, h, attempt, gain, share)
+                    if gain and share < 1:
+                        run.progress.say(
+                            f"the bed had room for {100 * share:.0f} % of the {1e6 * gain:.3g} um "
+                            "that the jump was to move it by; the rest is asked of the next"
+                        )
                     cycles = p.healing_cycles + p.window_cycles
                     return stages.compute(run, moved, cycles, p.healing_cycles)
             except (EngineFailed, NotCredible, NotConverged) as error:

@@ -137,6 +137,20 @@ def penetration(record: Record, numbers: Numbers, figures: Figures) -> str:
         )
         if measures
         else paragraph("The scene asks for no relaxation."),
+        owed(record),
+    )
+
+
+def owed(record: Record) -> str:
+    """What jumps by history asked for and the bed had no room for, where anything is left of it."""
+    notes = [jump.notes for _, jump in record.run.jumps if "asked" in jump.notes]
+    left = notes[-1]["asked"] - notes[-1]["gain"] if notes else 0.0
+    if not left > 0:
+        return ""
+    return paragraph(
+        f"<strong>The bed has settled {micrometres(left)} µm less than its jumps were to move it:"
+        "</strong> there was no room for more without overlaps. The settlement foretold is that "
+        "much greater; shorter jumps, or more of them, leave the bed the cycles to make room."
     )
 
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,9 +24,12 @@ CHEAPER = 20.0
 """What the jumps are asked to save: full cost over theirs."""
 NUMBERS = (5, 8, 13, 20)
 """Of growing jumps whose forecasts are tried on the curves of full runs."""
-HEAD = ("way to the last cycle", "packings", "cycles computed", "cheaper by",
+ROOM = (0.0, 3e-5, 6e-5, 1e-4, 2e-4, np.inf)
+"""Settlements asked of a jump between which they are counted [m]."""
+HEAD = ("way to the last cycle", "runs", "cycles computed", "cheaper by",
         "settlement since kᵢ, µm", "error over half the reference's interval",
-        "spread over the reference's", "coordination number", "elastic deflection")  # fmt: skip
+        "with what is owed, µm", "error over half the interval", "spread over the reference's",
+        "coordination number", "elastic deflection")  # fmt: skip
 
 
 def table_jumps(rows: Sequence[Row], last: int = STUDY.last) -> str:
@@ -38,8 +42,9 @@ def table_jumps(rows: Sequence[Row], last: int = STUDY.last) -> str:
     if truth:
         found, full = settlement_of(rows, last), f"{last - K_I:,}"
         settled = f"{1e6 * found.mean:,.0f} ± {1e6 * found.half_given:,.0f}"
-        packings = str(len({row["seed"] for row in truth}))
-        lines.append(["every cycle (the reference)", packings, full, "1", settled, *4 * ["-"]])
+        lines.append(
+            ["every cycle (the reference)", str(len(truth)), full, "1", settled, *6 * ["-"]]
+        )
     ways = [*(method.name for method in STUDY.methods), *(law_name(*one) for one in LAWS)]
     for name in ways:
         mine = finished(rows, name, last)
@@ -48,18 +53,31 @@ def table_jumps(rows: Sequence[Row], last: int = STUDY.last) -> str:
     return table(HEAD, lines)
 
 
+def owed(row: Row) -> float:
+    """What the last jump of a run was to move it by and did not [m]: debts of earlier ones too."""
+    asked, moved = row["moved"][-1] if row.get("moved") else (0.0, 0.0)
+    return float(asked - moved)
+
+
 def line_of(rows: Sequence[Row], name: str, last: int, mine: Sequence[Row]) -> list[str]:
     """A way's line; ``mine``: its runs that came to ``last``."""
     truth = reference(rows, last)
     settled = 1e6 * float(np.mean([FIGURES["settlement"].value(row) for row in mine]))
     computed = float(np.mean([row["computed"] for row in mine]))
-    line = [name, str(len({row["seed"] for row in mine})), f"{computed:,.0f}"]
+    line = [name, str(len(mine)), f"{computed:,.0f}"]
     if not truth:
-        return [*line, "-", f"{settled:,.0f}", *4 * ["-"]]
+        return [*line, "-", f"{settled:,.0f}", *6 * ["-"]]
+    foretold = ["-", "-"]
+    if any(row.get("moved") for row in mine):
+        known = settlement_of(rows, last)
+        with_owed = settled + 1e6 * float(np.mean([owed(row) for row in mine]))
+        error = abs(1e-6 * with_owed - known.mean) / known.half_given
+        foretold = [f"{with_owed:,.0f}", f"{error:.2f}"]
     errors = [judged(rows, name, last, key) for key in ("coordination", "deflection")]
     return [
         *line, f"{cost(truth) / cost(mine):.1f}", f"{settled:,.0f}",
-        f"{bias_beside_interval(rows, name, last):.2f}", f"{spread(rows, name, last):.1f}",
+        f"{bias_beside_interval(rows, name, last):.2f}", *foretold,
+        f"{spread(rows, name, last):.1f}",
         *(f"{100 * one.mean:+.0f} ± {100 * one.half:.0f} %" if one else "-" for one in errors),
     ]  # fmt: skip
 
@@ -74,6 +92,19 @@ def short_of(rows: Sequence[Row], last: int = STUDY.last) -> str:
         f"Of {len(moved)} jumps by history {short} found no room for the whole move, after "
         f"{tries} failed tries in all; what lacked was asked of the next."
     )
+
+
+def table_room(rows: Sequence[Row], last: int = STUDY.last) -> str:
+    """How many moves beds had room for, by what was asked."""
+    mine = [row for method in STUDY.methods for row in finished(rows, method.name, last)]
+    moved = np.array([pair for row in mine for pair in row.get("moved", ())]).reshape(-1, 2)
+    lines = []
+    for low, high in pairwise(ROOM):
+        asked = moved[(moved[:, 0] > low) & (moved[:, 0] <= high)]
+        words = f"{1e6 * low:.0f} to {1e6 * high:.0f}" if high < np.inf else f"over {1e6 * low:.0f}"
+        whole = int((asked[:, 0] == asked[:, 1]).sum())
+        lines.append([words, str(len(asked)), str(whole)])
+    return table(["asked of a jump, µm", "jumps", "room for all of it"], lines)
 
 
 def table_forecasts(record: EnsembleRecord, last: int = STUDY.last) -> str:

@@ -28,6 +28,7 @@ from validation.settlement_far_jumps import (
     table_forecasts,
     table_jumps,
     table_noise,
+    table_room,
 )
 from validation.settlement_rivals import BLOCK, FIRST_WINDOW
 from validation.settlement_rivals_runs import record_read
@@ -169,7 +170,12 @@ def page(found: Sequence[Foretold], record: EnsembleRecord) -> str:
     parts = {"TESTS": table_tests(found), "FAR": table_far(curves), "BLOCK": str(BLOCK)}
     parts["COMPUTED_TEXT"] = f"{COMPUTED:,}"
     rows = record_read(STUDY.record)
-    parts |= {"JUMPS": table_jumps(rows), "SHORT": short_of(rows), "K": str(FIRST_WINDOW)}
+    parts |= {
+        "JUMPS": table_jumps(rows),
+        "SHORT": short_of(rows),
+        "ROOM": table_room(rows),
+        "K": str(FIRST_WINDOW),
+    }
     parts |= {"NOISE": table_noise(record), "FORECASTS": table_forecasts(record)}
     parts["RUNS"] = str(len(curves_of(COARSE, COARSE.last, record)))
     parts["COVERED"] = f"{int(coarse.sum())} of {len(coarse)}"

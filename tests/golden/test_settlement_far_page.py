@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from validation.settlement_bars import bias_beside_interval, settlement_of, spread
 from validation.settlement_ensemble import COARSE, CONFINED
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_far_jumps import STUDY, owed
 from validation.settlement_far_page import PAGE, Foretold, page, study
+from validation.settlement_rivals_reading import cost, finished, judged, reference
+from validation.settlement_rivals_reference import LAWS, law_name
+from validation.settlement_rivals_runs import record_read
 
 
 @pytest.fixture(scope="module")
@@ -22,16 +27,38 @@ def test_page_is_made_from_the_record(found: list[Foretold]) -> None:
 
 
 def test_sentences_of_the_page(found: list[Foretold]) -> None:
-    """To ten times the cycles: median errors from a quarter to a half; the logarithm's median is no
-    greater than the laws'; bands have eight runs in ten, five in six of the confined bed's."""
+    """To ten times the cycles: median errors from a quarter to a half; the logarithm's median is
+    about the laws' or less; bands have seven runs in ten, five in six of the confined bed's."""
     for one in found:
         if one.kind == COARSE and one.to == 10 * one.fitted:
             by_laws, by_log = (
                 np.abs(one.error(each)) for each in (one.outlook.prediction, one.logarithm)
             )
             assert 0.2 < np.median(by_laws) < 0.5
-            assert np.median(by_log) < np.median(by_laws)
+            assert np.median(by_log) < 1.15 * np.median(by_laws)
             assert by_log.max() < 0.7
-    assert min(one.covered.mean() for one in found if one.kind == COARSE) >= 0.8
+    assert min(one.covered.mean() for one in found if one.kind == COARSE) >= 0.7
     confined = [one.covered.mean() for one in found if one.kind == CONFINED]
     assert confined == pytest.approx([5 / 6] * len(confined))
+
+
+def test_sentences_about_jumps() -> None:
+    """27 times cheaper; foretold inside the interval, settled outside by twice its half; state as
+    the reference's; laws scatter six times as much and more."""
+    rows, name = record_read(STUDY.record), "13 growing jumps, by history, profile"
+    last = STUDY.last
+    mine, truth = finished(rows, name, last), settlement_of(rows, last)
+    assert len(mine) == 10
+    assert all(row["computed"] == 345 for row in mine)
+    assert cost(reference(rows, last)) / cost(mine) > 27
+    found = np.mean([row["settlement"][str(last)] for row in mine])
+    foretold = found + np.mean([owed(row) for row in mine])
+    assert (truth.mean - found) / truth.half_given == pytest.approx(2.0, abs=0.05)
+    assert (truth.mean - foretold) / truth.half_given == pytest.approx(0.7, abs=0.05)
+    for figure in ("coordination", "deflection"):
+        errors = judged(rows, name, last, figure)
+        assert errors is not None
+        assert abs(errors.mean) < errors.half
+    for law, cycles in LAWS:
+        assert spread(rows, law_name(law, cycles), last) > 5.5
+        assert bias_beside_interval(rows, law_name(law, cycles), last) > 1

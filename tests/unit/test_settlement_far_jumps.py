@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from validation.settlement_far_jumps import HEAD, STUDY, table_jumps
+from validation.settlement_far_jumps import HEAD, STUDY, owed, short_of, table_jumps, table_room
 from validation.settlement_rivals import STATE, Row
 from validation.settlement_rivals_budget import EVERY
 
@@ -14,7 +14,7 @@ def made_up(part: str, method: str, seed: int, member: int, settled: float, cpu_
     return {
         "part": part, "method": method, "seed": seed, "member": member, "last": STUDY.last,
         "settlement": {str(STUDY.last): settled}, "state": dict.fromkeys(STATE, 1.0),
-        "computed": 500, "cpu_s": cpu_s, "refused": "",
+        "computed": 500, "cpu_s": cpu_s, "refused": "", "lost": [],
     }  # fmt: skip
 
 
@@ -48,6 +48,22 @@ def test_error_is_told_in_half_intervals_of_the_reference() -> None:
     text = table_jumps([*truth, *runs(1.023e-3)])
     assert cells(text, "every cycle (the reference)")["settlement since kᵢ, µm"] == "1,000 ± 11"
     found = cells(text, STUDY.methods[0].name)
+    assert found["with what is owed, µm"] == "-"
     assert float(found["cheaper by"]) == pytest.approx(20.0)
     assert float(found[HEAD[5]]) == pytest.approx(2.0, abs=0.01)
     assert found["coordination number"] == "+0 ± 0 %"
+
+
+def test_what_is_owed_at_the_end_is_foretold() -> None:
+    """Each run moved 30 of the last 70 um: the mean foretold is 40 um more; 0 with nothing owed."""
+    rows = [row | {"moved": [[9e-5, 1e-5], [7e-5, 3e-5]]} for row in runs(1e-3)]
+    assert [owed(row) for row in rows] == pytest.approx([4e-5] * 5)
+    truth = [
+        made_up("reference", EVERY, seed, member, 1e-3 + (1e-5 if member else -1e-5), 1000.0)
+        for seed in range(1, 6)
+        for member in range(2)
+    ]
+    assert cells(table_jumps([*truth, *rows]), STUDY.methods[0].name)[HEAD[6]] == "1,040"
+    assert short_of(rows).startswith("Of 10 jumps by history 10 found no room")
+    assert owed(runs(1e-3)[0]) == 0
+    assert "| 60 to 100 | 10 | 0 |" in table_room(rows)
