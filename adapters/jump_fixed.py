@@ -14,7 +14,7 @@ import numpy as np
 
 from adapters import stages
 from adapters.errors import EngineFailed, NotConverged, NotCredible
-from adapters.jump_history import Jumped, asked_gain, seated_from
+from adapters.jump_history import SEATING, Jumped, asked_gain
 from adapters.jump_run import stretches_of
 from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
@@ -112,7 +112,7 @@ def history_gain(run: Run, bed: Bed, h: int) -> float | None:
     assert p is not None
     if p.settlement == "law" or h == 0:
         return None
-    begin, outcomes = seated_from(p.k_i), run.folder.outcomes()
+    begin, outcomes = max(1, round(SEATING * p.k_i)), run.folder.outcomes()
     known = stretches_of(outcomes, begin, bed.cycle, left_out=1)
     return asked_gain(known, h, jumps_of(outcomes, bed.cycle))
 

@@ -21,11 +21,6 @@ SEATING = 0.2
 """Share of the first k_i cycles that is another process: the rained bed takes the load."""
 
 
-def seated_from(k_i: int) -> int:
-    """First cycle that tells how a bed settles: behind its `SEATING`."""
-    return max(1, round(SEATING * k_i))
-
-
 @dataclass(frozen=True, eq=False)
 class Jumped:
     """A jump that was made, with the window behind it."""

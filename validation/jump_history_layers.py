@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adapters.jump_strain import strain_exponent
 from adapters.state import FloatArray
 from validation.page_text import table
 from validation.settlement_ensemble import COARSE, CONFINED, Kind, Piece
@@ -38,14 +37,11 @@ class Compacted:
     """Settlement of each layer over the mean of all grains, bottom first, shape (`LAYERS`,)."""
     ratio: FloatArray
     """What the piston sank by over what the mean grain settled, of each run, shape (r,)."""
-    exponent: float
-    """p that the mean ratio has for the heights of the first run's grains."""
 
 
 def compacted(kind: Kind, first: int, last: int, record: EnsembleRecord) -> Compacted:
     """Layers and pistons of all members that have come to cycle ``last``."""
     settled, mean, ratio = list[list[float]](), list[float](), list[float]()
-    share = np.empty(0)
     for piece in kind.runs():
         _, position = record.states(piece.name)
         if not isinstance(piece, Piece) or piece.packing is None or last not in position:
@@ -55,7 +51,6 @@ def compacted(kind: Kind, first: int, last: int, record: EnsembleRecord) -> Comp
         layer = np.minimum((LAYERS * above).astype(int), LAYERS - 1)
         settled.append([float(drop[layer == each].mean()) for each in range(LAYERS)])
         mean.append(float(drop.mean()))
-        share = share if len(share) else above
         columns = columns_by_cycle(piece, record)
         sunk, gained = (
             mean_of(columns, last, name) - mean_of(columns, first + BLOCK, name)
@@ -63,9 +58,7 @@ def compacted(kind: Kind, first: int, last: int, record: EnsembleRecord) -> Comp
         )
         ratio.append(-sunk / gained)
     layers = np.mean(settled, axis=0) / np.mean(mean)
-    return Compacted(
-        kind, first, last, layers, np.array(ratio), strain_exponent(share, float(np.mean(ratio)))
-    )
+    return Compacted(kind, first, last, layers, np.array(ratio))
 
 
 def table_layers(record: EnsembleRecord) -> str:
@@ -76,8 +69,8 @@ def table_layers(record: EnsembleRecord) -> str:
         scatter = f"{one.ratio.mean():.1f} ± {one.ratio.std(ddof=1):.1f}"
         cells = [f"{value:.2f}" for value in one.layers]
         name = f"{one.kind.name}, {one.first:,} to {one.last:,}"
-        lines.append([name, *cells, scatter, f"{one.exponent:.1f}"])
+        lines.append([name, *cells, scatter])
     even = [f"{(2 * each + 1) / LAYERS:.2f}" for each in range(LAYERS)]
-    lines.append(["uniform strain", *even, "2.0", "1"])
+    lines.append(["uniform strain", *even, "2.0"])
     head = ["run", "lowest layer", *(str(each) for each in range(2, LAYERS)), "highest"]
-    return table([*head, "piston over mean grain", "p"], lines)
+    return table([*head, "piston over mean grain"], lines)
