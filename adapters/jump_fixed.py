@@ -60,8 +60,9 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                 with disk_full_named(run.folder.path):
                     gain = history_gain(run, bed, h)
                     share = 1.0 if gain is None else SHARES[attempt - 1]
+                    new = run.folder.outcome(name) is None
                     moved = stages.jump(run, bed, h, attempt, gain, share)
-                    if gain and share < 1:
+                    if new and gain and share < 1:
                         run.progress.say(
                             f"the bed had room for {100 * share:.0f} % of the {1e6 * gain:.3g} um "
                             "that the jump was to move it by; the rest is asked of the next"
