@@ -134,11 +134,13 @@ def missing(record: EnsembleRecord) -> str:
         members = sum(
             kept is None or kept.cycle < piece.last for piece, kept in stands if piece.packing
         )
+        every = kind.packings * kind.members
+        parts = (
+            (packings, f"{packings} of {kind.packings} packings to cycle {kind.k_i}"),
+            (members, f"{members} of {every} members to cycle {kind.last:,}"),
+        )
         if packings or members:
-            words.append(
-                f"{kind.name}: {packings} of {kind.packings} packings to cycle {kind.k_i}, "
-                f"{members} of {kind.packings * kind.members} members to cycle {kind.last:,}"
-            )
+            words.append(f"{kind.name}: " + ", ".join(text for count, text in parts if count))
     return "; ".join(words) + "." if words else "nothing."
 
 

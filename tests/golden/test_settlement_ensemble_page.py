@@ -92,3 +92,21 @@ def test_states_are_those_of_the_table(piece: Piece) -> None:
         walls = scene.container.walls(table["piston_height"][row], scene.piston_reach)
         pairs = int((neighbours(position, radius, walls).second >= 0).sum())
         assert 2 * pairs / len(radius) == pytest.approx(table["coordination_number"][row], rel=1e-6)
+
+
+def test_sentences_about_the_piston_that_stands_on_few_grains() -> None:
+    """Packing 2 of the partial bed: soft to cycle 40, a millimetre down to 54, then firm."""
+
+    def column(packing: int, name: str) -> dict[int, float]:
+        tables = [RECORD.table(f"partial-{packing}{member}") for member in ("", "-0")]
+        pairs = [zip(table["cycle"], table[name], strict=True) for table in tables]
+        return {int(cycle): float(value) for pair in pairs for cycle, value in pair}
+
+    soft, firm, third = (column(packing, "piston_stiffness") for packing in (2, 1, 3))
+    assert all(soft[cycle] < firm[cycle] / 10 for cycle in range(2, 41))
+    assert all(column(2, "elastic_deflection")[cycle] > 9.9e-5 for cycle in range(1, 44))
+    assert column(2, "force_error")[38] > 0.25
+    height = column(2, "piston_height")
+    assert height[38] - height[54] > 1e-3
+    last = [np.mean([one[cycle] for cycle in range(61, 101)]) for one in (soft, firm, third)]
+    assert max(last) < 1.1 * min(last)
