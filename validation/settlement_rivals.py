@@ -175,9 +175,10 @@ def remembering(jumps: int, move: str = "") -> Method:
     return Method(f"{jumps} jumps, by history{moved}", f"history{moved}", keys, JUMPING, jumps)
 
 
-def softer(factor: int) -> Method:
+def softer(factor: int, base: Kind = COARSE) -> Method:
     """Young's modulus of the grains over ``factor``, and the longer time step that goes with it."""
-    return Method(f"E/{factor}", "softer", (f"material.grain.young={1e9 / factor!r}",))
+    young = base.scene(1).material.grain.young / factor
+    return Method(f"E/{factor}", "softer", (f"material.grain.young={young!r}",))
 
 
 def longer(share: float) -> Method:
@@ -219,6 +220,7 @@ METHODS_OF: dict[str, tuple[Method, ...]] = {
             *jumping(2), longer(0.4), *jumping(5), remembering(2), remembering(2, "profile"),
             remembering(5), longer(0.6),
             Method("tolerance 0.02", "tolerance", ("procedure.tolerance=0.02",), JUMPING),
+            softer(10, CONFINED),
         )
     ),
 }  # fmt: skip

@@ -94,6 +94,8 @@ def plan_reference(kind: Kind, record: EnsembleRecord, last: int) -> Iterator[Pl
         head = {"part": "reference", "method": EVERY, "seed": seed, "member": member}
         yield head | {"last": last}, partial(reference_row, piece, last, record)
         for law, cycles in LAWS:
+            if kind.k_i + cycles >= last:  # nothing would be left to predict
+                continue
             head = {"part": "law", "method": law_name(law, cycles), "seed": seed}
             filled = partial(law_row, law, cycles, piece, last, record)
             yield head | {"member": member, "last": last}, filled
