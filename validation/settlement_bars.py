@@ -160,6 +160,14 @@ BARS = (
     ),
 )
 """Either of the first two is enough."""
+PARTLY = (
+    Bar("bias over the total settlement", "%", 4.0, bias),
+    Bar("gained time", "%", 300.0, gained_time, least=True),
+    *(bar for bar in BARS if bar.value is error_of_profile or "coordination number" in bar.words),
+    *(bar for bar in BARS if "rate behind" in bar.words or bar.words.endswith("goes on")),
+)
+"""Under a piston that covers a part: asked of the first two; of the others what is asked of the
+confined bed."""
 
 
 def told(bar: Bar, value: float) -> str:
@@ -170,12 +178,14 @@ def told(bar: Bar, value: float) -> str:
     return f"**{text}**" if bar.met(value) else text
 
 
-def table_bars(rows: Sequence[Row], methods: Sequence[str], last: int) -> str:
+def table_bars(
+    rows: Sequence[Row], methods: Sequence[str], last: int, bars: Sequence[Bar] = BARS
+) -> str:
     """A line a method, a column a bar."""
-    asked = ["bar", *(f"{'≥' if bar.least else '≤'} {bar.bound:g} {bar.unit}" for bar in BARS)]
+    asked = ["bar", *(f"{'≥' if bar.least else '≤'} {bar.bound:g} {bar.unit}" for bar in bars)]
     lines = [
-        [name, *(told(bar, bar.value(rows, name, last)) for bar in BARS)]
+        [name, *(told(bar, bar.value(rows, name, last)) for bar in bars)]
         for name in methods
         if finished(rows, name, last)
     ]
-    return table(["way", *(bar.words for bar in BARS)], [asked, *lines])
+    return table(["way", *(bar.words for bar in bars)], [asked, *lines])

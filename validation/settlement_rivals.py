@@ -221,6 +221,7 @@ METHODS_OF: dict[str, tuple[Method, ...]] = {
             remembering(5), longer(0.6),
             Method("tolerance 0.02", "tolerance", ("procedure.tolerance=0.02",), JUMPING),
             softer(10, CONFINED),
+            replace(growing(remembering(5, "profile")), window=10),
         )
     ),
 }  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from validation.settlement_rivals import METHODS, Row
+from validation.settlement_rivals import METHODS, Method, Row
 from validation.settlement_rivals_reading import (
     FIGURES,
     chaos,
@@ -35,8 +35,14 @@ INTERVAL_FROM = 3
 PANELS = ("settlement", "coordination", "deflection")
 
 
-def draw(rows: Sequence[Row], last: int, target: Path) -> None:
-    """Errors in per cent of the reference's mean; the band is what one full run a packing has."""
+def draw(
+    rows: Sequence[Row], last: int, target: Path, methods: Sequence[Method] = METHODS,
+    ticks: Sequence[int] = TICKS,
+) -> None:  # fmt: skip
+    """Errors in per cent of the reference's mean; the band is what one full run a packing has.
+
+    ``methods``: all of the study, numbered in this order; ``ticks`` of CPU time [s].
+    """
     import matplotlib
 
     matplotlib.use("Agg")
@@ -47,45 +53,46 @@ def draw(rows: Sequence[Row], last: int, target: Path) -> None:
         band = 100 * chaos(rows, last, key)
         axis.axhspan(-band, band, color="0.88")
         axis.axhline(0, color="0.5", lw=0.8)
-        for name, family in shown():
+        for number, (name, family) in enumerate(shown(methods), 1):
             found = judged(rows, name, last, key)
             if found is not None:
                 half = 100 * found.half if len(found.error) >= INTERVAL_FROM else 0.0
-                point(axis, rows, name, family, last, 100 * found.mean, half)
+                point(axis, rows, f"{number}  {name}", family, last, (100 * found.mean, half))
         axis.set_ylabel(f"error of the {FIGURES[key].words} [%]")
         if max(map(abs, axis.get_ylim())) > LINEAR:
             axis.set_yscale("symlog", linthresh=LINEAR)
     axis = axes.flat[3]
     axis.axhline(100 * profile_chaos(rows, last), color="0.5", ls="--", lw=0.8)
-    for name, family in shown():
+    for number, (name, family) in enumerate(shown(methods), 1):
         errors = profile_error(rows, name, last)
         if len(errors):
-            point(axis, rows, name, family, last, 100 * float(errors.mean()), 0.0)
+            at = 100 * float(errors.mean()), 0.0
+            point(axis, rows, f"{number}  {name}", family, last, at)
     axis.set_ylabel("error of the density profile, rms over layers [%]")
     for axis in axes.flat:
         axis.axvline(cost(reference(rows, last)), color="0.5", lw=0.8, ls=":")
         axis.set(xscale="log", xlabel=f"CPU s to cycle {last} (dotted: every cycle)")
-        axis.set_xticks(TICKS, map(str, TICKS))
+        axis.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
         axis.minorticks_off()
     legend(figure, axes)
     figure.savefig(target, dpi=80)
     plt.close(figure)
 
 
-def shown() -> list[tuple[str, str]]:
-    """Names and families of all methods."""
+def shown(methods: Sequence[Method] = METHODS) -> list[tuple[str, str]]:
+    """Names and families of all methods, laws the last."""
     laws = [(law_name(law, cycles), "law") for law, cycles in LAWS]
-    return [*((method.name, method.family) for method in METHODS), *laws]
+    return [*((method.name, method.family) for method in methods), *laws]
 
 
 def point(
-    axis: Any, rows: Sequence[Row], name: str, family: str, last: int, error: float, half: float
+    axis: Any, rows: Sequence[Row], label: str, family: str, last: int, at: tuple[float, float]
 ) -> None:
-    """A method in a panel by its number, its interval over packings as a bar."""
-    at, number = cost(finished(rows, name, last)), [name for name, _ in shown()].index(name) + 1
-    label = f"{number}  {name}"
-    axis.errorbar(at, error, half, fmt="o", ms=4, lw=0.7, color=COLOURS[family], label=label)
-    axis.annotate(str(number), (at, error), fontsize=8, xytext=(3, 3), textcoords="offset points")
+    """A method in a panel by its number, with which the label begins: error and half interval."""
+    number, _, name = label.partition("  ")
+    where, (error, half) = cost(finished(rows, name, last)), at
+    axis.errorbar(where, error, half, fmt="o", ms=4, lw=0.7, color=COLOURS[family], label=label)
+    axis.annotate(number, (where, error), fontsize=8, xytext=(3, 3), textcoords="offset points")
 
 
 def legend(figure: Any, axes: Any) -> None:
