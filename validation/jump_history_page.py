@@ -6,27 +6,32 @@ the settlement of a jump errs by, with no bed, no relaxation and no engine.  Sec
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 from adapters import jump_slopes
-from adapters.jump_history import SEATING, Jumped, asked_gain
-from adapters.jump_rates import Stretch
-from adapters.laws import law_named
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
+from validation.jump_forecasts import (
+    FIRST_CYCLE,
+    KAPPA,
+    WAYS,
+    curves_of,
+    jumped_error,
+    way_history,
+)
 from validation.jump_history_layers import table_layers
+from validation.jump_history_schedules import table_schedules
 from validation.page_text import page_filled, table
-from validation.settlement_ensemble import COARSE, CONFINED, Kind, Piece
+from validation.settlement_ensemble import COARSE, CONFINED, Kind
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import FIRST_WINDOW, HEALING, jump_length
 from validation.settlement_rivals_reading import rms
-from validation.settlement_rivals_reference import columns_by_cycle
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "jump-history.md"
@@ -36,10 +41,6 @@ CASES: tuple[tuple[Kind, int, tuple[int, ...]], ...] = (
     (CONFINED, 500, (2, 5, 10)),
 )
 """Ensemble, last cycle, numbers of equal jumps."""
-FIRST_CYCLE, KAPPA = 0.15, 0.1
-"""What a moved bed was made to settle more by, over what it was moved by: in the first cycle behind
-the jump, and times 1 / n in each later one."""
-
 CHOICES: dict[str, dict[str, float]] = {
     "as chosen": {},
     "kappa's scale / 2": {"RESEATING": jump_slopes.RESEATING / 2},
@@ -50,43 +51,6 @@ CHOICES: dict[str, dict[str, float]] = {
 """What is changed of `adapters.jump_slopes`, one at a time, to see what the choice is worth,"""
 CHOICES_JUMPS = 5
 """with so many jumps."""
-
-Way = Callable[[Sequence[Stretch], int, Sequence[Jumped]], float]
-"""Settlement [m] over a jump of h cycles behind the last of the stretches that were computed, and
-the jumps between them."""
-
-
-def way_nothing(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
-    """The null hypothesis."""
-    return 0.0
-
-
-def way_window(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
-    """The logarithm fitted to the last window, as the procedure does with every grain."""
-    law, computed = law_named("log"), known[-1]
-    last = computed.part(max(len(computed.gain) - FIRST_WINDOW, 0), len(computed.gain))
-    cycle = last.first_cycle + np.arange(len(last.gain) + 1.0)
-    path = np.append(0.0, np.cumsum(last.gain))
-    return float(law.increment(law.fit(cycle, path), cycle[-1], cycle[-1] + h))
-
-
-def way_one_slope(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
-    """One slope du / d ln N for all cycles computed."""
-    span = sum(np.log(one.last_cycle / one.first_cycle) for one in known)
-    return float(sum(one.gain.sum() for one in known) / span * np.log1p(h / known[-1].last_cycle))
-
-
-def way_history(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
-    """`adapters.jump_history`."""
-    return asked_gain(known, h, jumps)
-
-
-WAYS: dict[str, Way] = {
-    "nothing": way_nothing,
-    "log, last window": way_window,
-    "one slope of all cycles": way_one_slope,
-    "history": way_history,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,49 +71,6 @@ class Forecasts:
         """Share of the cycles behind k_i that is computed."""
         cycles = FIRST_WINDOW + self.jumps * (HEALING + FIRST_WINDOW)
         return cycles / (self.last - self.kind.k_i)
-
-
-def stretch(curve: FloatArray, first: int, last: int) -> Stretch:
-    """Cycles behind ``first`` to ``last`` of a settlement ``curve`` [m] by cycle, 0 first."""
-    gain = np.diff(curve[first : last + 1])
-    return Stretch(first, gain, np.zeros(len(gain)), np.zeros(len(gain)))
-
-
-def jumped_error(
-    curve: FloatArray, k_i: int, lengths: Sequence[int], way: Way, moved: bool = False
-) -> float:
-    """Settlement by jumps of ``lengths`` h less that of the ``curve`` [m].
-
-    Windows and healing are its own; where the bed is ``moved`` they settle more by `FIRST_CYCLE`
-    and `KAPPA`.
-    """
-    end = k_i + FIRST_WINDOW
-    known = [stretch(curve, round(SEATING * k_i), k_i), stretch(curve, k_i, end)]
-    since = np.arange(1, HEALING + FIRST_WINDOW + 1)
-    more = moved * np.where(since == 1, FIRST_CYCLE, KAPPA / since)
-    settled, made = float(curve[end]), list[Jumped]()
-    for h in lengths:
-        gain, before, behind = way(known, h, made), end, end + h
-        end = behind + len(since)
-        path = curve[behind : end + 1] + gain * np.append(0.0, np.cumsum(more))
-        window = stretch(path, 0, len(since))
-        known.append(replace(window.part(1, len(since)), first_cycle=behind + 1))
-        ends = settled + np.array([0.0, gain, gain + window.gain.sum()])
-        made.append(Jumped(np.array([before, behind, end]), ends))
-        settled = float(ends[2])
-    return settled - float(curve[end])
-
-
-def curves_of(kind: Kind, last: int, record: EnsembleRecord) -> list[FloatArray]:
-    """Settlement [m] by cycle, from 0 on, of all members that have come to ``last``."""
-    curves = []
-    for piece in kind.runs():
-        kept = record.kept(piece.name)
-        if isinstance(piece, Piece) and piece.packing and kept and kept.cycle >= last:
-            found = columns_by_cycle(piece, record)
-            path = [found[cycle]["settlement"] for cycle in range(1, last + 1)]
-            curves.append(np.append(0.0, path))
-    return curves
 
 
 def study(record: EnsembleRecord) -> list[Forecasts]:
@@ -246,6 +167,7 @@ def page(found: Sequence[Forecasts], record: EnsembleRecord) -> str:
         "ERRORS": table_errors(found, False),
         "ERRORS_MOVED": table_errors(found, True),
         "CHOICES": table_choices(record),
+        "SCHEDULES": table_schedules(record),
         "LAYERS": table_layers(record),
         "K": str(FIRST_WINDOW),
         "HEALING": str(HEALING),

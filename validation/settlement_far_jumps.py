@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from validation.jump_history_page import WAYS, curves_of, jumped_error
+from validation.jump_forecasts import WAYS, curves_of, jumped_error
 from validation.page_text import table
 from validation.settlement_bars import bias_beside_interval, settlement_of, spread
 from validation.settlement_ensemble_record import EnsembleRecord

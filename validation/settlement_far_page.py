@@ -18,7 +18,7 @@ from adapters.fit_regime import COLLAPSE, RATCHETING
 from adapters.laws import law_named
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
-from validation.jump_history_page import curves_of
+from validation.jump_forecasts import curves_of
 from validation.page_text import page_filled, table
 from validation.settlement_ensemble import COARSE, CONFINED, Kind
 from validation.settlement_ensemble_record import EnsembleRecord

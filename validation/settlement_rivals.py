@@ -136,15 +136,17 @@ def jump_length(jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDO
     return block - HEALING - window
 
 
-def jump_lengths(jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDOW) -> list[int]:
-    """Cycles h of each of so many jumps to ``last``, N after over N before the same for all.
-
-    By the logarithm each settles the bed by the same.  ValueError where the first is none.
+def jump_lengths(
+    jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDOW, growing: bool = True
+) -> list[int]:
+    """Cycles h of each of so many jumps to ``last``: ends evenly spaced in ln N, so that each
+    settles the bed by the same by the logarithm, or in N.  ValueError where the first is none.
     """
-    ends = np.rint(np.geomspace(k_i + window, last, jumps + 1)).astype(int)
+    spaced = np.geomspace if growing else np.linspace
+    ends = np.rint(spaced(k_i + window, last, jumps + 1)).astype(int)
     lengths = np.diff(ends) - HEALING - window
     if lengths[0] < 1:
-        raise ValueError(f"{jumps} growing jumps to cycle {last} begin with one of no cycle")
+        raise ValueError(f"{jumps} jumps to cycle {last} begin with one of no cycle")
     return [int(h) for h in lengths]
 
 

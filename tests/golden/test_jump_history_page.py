@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 from adapters.state import FloatArray
-from validation.jump_history_layers import BETWEEN, LAYERS, compacted
-from validation.jump_history_page import (
-    PAGE,
+from validation.jump_forecasts import (
     WAYS,
-    Forecasts,
+    curves_of,
     jumped_error,
-    page,
-    study,
     way_history,
     way_nothing,
     way_one_slope,
     way_window,
 )
+from validation.jump_history_layers import BETWEEN, LAYERS, compacted
+from validation.jump_history_page import PAGE, Forecasts, page, study
+from validation.jump_history_schedules import SCHEDULED, SCHEDULES
 from validation.settlement_ensemble import CONFINED
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals import jump_lengths
 from validation.settlement_rivals_reading import rms
 
 
@@ -89,3 +91,28 @@ def test_sentences_about_layers() -> None:
             assert found.ratio.mean() > 4
         else:
             assert 2 < found.ratio.mean() < 3
+
+
+def test_sentences_about_growing_jumps() -> None:
+    """Paper scale: growing jumps err no more than equal ones, on moved beds by a third to two
+    thirds as much; coarse: neither is better, by the median of all schedules."""
+    record, ratios = EnsembleRecord(), dict[str, list[float]]()
+    for kind, last in SCHEDULED:
+        curves = curves_of(kind, last, record)
+        for (jumps, window), moved in product(SCHEDULES, (False, True)):
+            one, other = (
+                rms(np.array([
+                    jumped_error(
+                        curve, kind.k_i, jump_lengths(jumps, last, kind.k_i, window, growing),
+                        way_history, moved, window,
+                    )
+                    for curve in curves
+                ]))
+                for growing in (False, True)
+            )  # fmt: skip
+            ratios.setdefault(f"{kind.name}{', moved' if moved else ''}", []).append(other / one)
+    assert max(ratios["confined"]) < 1.05
+    assert 0.25 < min(ratios["confined, moved"]) < max(ratios["confined, moved"]) < 0.67
+    coarse = [*ratios["coarse"], *ratios["coarse, moved"]]
+    assert min(coarse) < 1 < max(coarse)
+    assert 0.85 < np.median(coarse) < 1.15
