@@ -12,7 +12,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from adapters.errors import SceneError, UsageError
-from adapters.scene import Scene, flat_keys
+from adapters.jump_schedule import jump_lengths
+from adapters.scene import Procedure, Scene, flat_keys
 from adapters.scene_checks import (
     ALTERNATIVES,
     JUMP_KEYS,
@@ -60,10 +61,13 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     loading = data.get("loading")
     if isinstance(loading, dict) and isinstance(loading.get("series"), str):
         loading["series"] = str(path.parent.absolute() / loading["series"])
+    problems = list(_schedule_spelled_out(data))
     try:
-        return Scene.model_validate(data)
+        scene = Scene.model_validate(data)
     except ValidationError as error:
-        problems = _problems(data, error.errors(include_url=False))
+        problems += _problems(data, error.errors(include_url=False))
+    if not problems:
+        return scene
     raise SceneError(_report(problems, places, path), where=str(path), remedy=REMEDY)
 
 
@@ -160,6 +164,39 @@ def _override(data: dict[str, Any], override: str) -> str:
         for other in JUMP_KEYS:
             table.pop(other.rpartition(".")[2], None)
     return key
+
+
+def _schedule_spelled_out(data: dict[str, Any]) -> Iterator[Problem]:
+    """Put the cycles of each jump in place of a procedure.h such as ``"5 growing"``.
+
+    What can not be so is told, and stands as one jump while the other keys are looked at.
+    """
+    procedure = data.get("procedure")
+    words = procedure.get("h") if isinstance(procedure, dict) else None
+    if not isinstance(procedure, dict) or not isinstance(words, str):
+        return
+    procedure["h"] = [1]
+    found = re.fullmatch(r"\s*([1-9]\d{0,3}) growing( jumps?)?\s*", words)
+    if found is None:
+        yield Problem(
+            "procedure.h", f'must be cycles, a list of them, or as "5 growing", not {words!r:.60}'
+        )
+        return
+    defaults = {"healing_cycles": Procedure.model_fields["healing_cycles"].default}
+    numbers = [
+        (defaults | procedure).get(key) for key in ("total_cycles", "k_i", "k", "healing_cycles")
+    ]
+    if any(type(number) is not int or number < 0 for number in numbers):
+        return  # these keys have problems of their own
+    last, k_i, window, healing = (int(number or 0) for number in numbers)
+    try:
+        procedure["h"] = jump_lengths(int(found[1]), last, max(k_i, 1), window, healing)
+    except ValueError:
+        yield Problem(
+            "procedure.h",
+            f"{found[1]} growing jumps from cycle {k_i + window} to {last} leave the first no "
+            f"cycle beside {healing} of healing and {window} of its window: fewer, or a shorter k",
+        )
 
 
 def _problems(data: dict[str, Any], errors: Sequence[ErrorDetails]) -> list[Problem]:

@@ -6,11 +6,12 @@ from itertools import product
 
 import numpy as np
 
+from adapters.jump_schedule import jump_lengths
 from validation.jump_forecasts import curves_of, jumped_error, way_history
 from validation.page_text import table
 from validation.settlement_ensemble import COARSE, CONFINED
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import HEALING, jump_lengths
+from validation.settlement_rivals import HEALING
 from validation.settlement_rivals_reading import rms
 
 SCHEDULED = ((COARSE, 500), (COARSE, 2800), (CONFINED, 500))
@@ -30,7 +31,7 @@ def table_schedules(record: EnsembleRecord) -> str:
             share = f"{100 * computed / (last - kind.k_i):.0f}"
             lines.append([f"{kind.name} to {last:,}", str(jumps), str(window), share])
             for growing, moved in product((False, True), repeat=2):
-                lengths = jump_lengths(jumps, last, kind.k_i, window, growing)
+                lengths = jump_lengths(jumps, last, kind.k_i, window, HEALING, growing)
                 error = np.array(
                     [jumped_error(one, kind.k_i, lengths, way_history, moved, window)
                      for one in curves]

@@ -10,11 +10,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from adapters.jump_schedule import jump_lengths
 from validation.jump_forecasts import WAYS, curves_of, jumped_error
 from validation.page_text import table
 from validation.settlement_bars import bias_beside_interval, settlement_of, spread
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import FIRST_WINDOW, HEALING, K_I, Row, jump_lengths
+from validation.settlement_rivals import FIRST_WINDOW, HEALING, K_I, Row
 from validation.settlement_rivals_reading import FIGURES, cost, finished, judged, reference
 from validation.settlement_rivals_reference import LAWS, law_name
 from validation.settlement_rivals_studies import STUDIES
@@ -113,7 +114,7 @@ def table_forecasts(record: EnsembleRecord, last: int = STUDY.last) -> str:
     settled = float(np.mean([curve[last] - curve[K_I] for curve in curves]))
     lines = []
     for jumps in NUMBERS:
-        lengths = jump_lengths(jumps, last)
+        lengths = jump_lengths(jumps, last, K_I, FIRST_WINDOW, HEALING)
         computed = FIRST_WINDOW + jumps * (HEALING + FIRST_WINDOW)
         lines.append([str(jumps), f"{computed:,}"])
         for way in WAYS.values():

@@ -17,6 +17,7 @@ import numpy as np
 from adapters.engine import EngineStart
 from adapters.engine_liggghts import LiggghtsEngine
 from adapters.errors import SceneError, TrackbedError
+from adapters.jump_schedule import jump_lengths
 from adapters.procedure import CONTROL, settle
 from adapters.progress import Progress
 from adapters.report_history import cost_total
@@ -119,8 +120,11 @@ class Method:
         k = self.window if self.variant.jumps else 100
         keys = [*self.base.settings, f"procedure.total_cycles={last}", *self.settings]
         if not any(key.startswith("procedure.tolerance") for key in self.settings):
-            lengths = jump_lengths if self.growing else jump_length
-            h = lengths(self.jumps, last, self.base.k_i, k) if self.jumps else 0
+            h: int | list[int] = 0
+            if self.growing:
+                h = jump_lengths(self.jumps, last, self.base.k_i, k, HEALING)
+            elif self.jumps:
+                h = jump_length(self.jumps, last, self.base.k_i, k)
             keys += [f"procedure.k={k}", f"procedure.h={h}"]
         return replace(self.base, settings=tuple(keys))
 
@@ -134,20 +138,6 @@ def jump_length(jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDO
     if rest or block <= HEALING + window:
         raise ValueError(f"{jumps} equal jumps from windows of {window} miss cycle {last}")
     return block - HEALING - window
-
-
-def jump_lengths(
-    jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDOW, growing: bool = True
-) -> list[int]:
-    """Cycles h of each of so many jumps to ``last``: ends evenly spaced in ln N, so that each
-    settles the bed by the same by the logarithm, or in N.  ValueError where the first is none.
-    """
-    spaced = np.geomspace if growing else np.linspace
-    ends = np.rint(spaced(k_i + window, last, jumps + 1)).astype(int)
-    lengths = np.diff(ends) - HEALING - window
-    if lengths[0] < 1:
-        raise ValueError(f"{jumps} jumps to cycle {last} begin with one of no cycle")
-    return [int(h) for h in lengths]
 
 
 JUMPING = Variant()

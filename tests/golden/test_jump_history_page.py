@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from adapters.jump_schedule import jump_lengths
 from adapters.state import FloatArray
 from validation.jump_forecasts import (
     WAYS,
@@ -22,7 +23,7 @@ from validation.jump_history_page import PAGE, Forecasts, page, study
 from validation.jump_history_schedules import SCHEDULED, SCHEDULES
 from validation.settlement_ensemble import CONFINED
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import jump_lengths
+from validation.settlement_rivals import HEALING
 from validation.settlement_rivals_reading import rms
 
 
@@ -102,13 +103,11 @@ def test_sentences_about_growing_jumps() -> None:
         for (jumps, window), moved in product(SCHEDULES, (False, True)):
             one, other = (
                 rms(np.array([
-                    jumped_error(
-                        curve, kind.k_i, jump_lengths(jumps, last, kind.k_i, window, growing),
-                        way_history, moved, window,
-                    )
+                    jumped_error(curve, kind.k_i, lengths, way_history, moved, window)
                     for curve in curves
                 ]))
                 for growing in (False, True)
+                for lengths in [jump_lengths(jumps, last, kind.k_i, window, HEALING, growing)]
             )  # fmt: skip
             ratios.setdefault(f"{kind.name}{', moved' if moved else ''}", []).append(other / one)
     assert max(ratios["confined"]) < 1.05

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from adapters.engine import engine_named
 from adapters.engine_names import ENGINES, REAL_ENGINES
 from adapters.errors import SceneError, TrackbedError, UsageError
+from adapters.jump_schedule import jump_lengths
 from adapters.load_series import load_series_read
 from adapters.scene import Engine, Loading, Scene
 from adapters.scene_file import key_lines, scene_load
@@ -222,6 +223,20 @@ def test_schedule_of_jumps(tmp_path: Path) -> None:
     assert procedure.h == (0,)
 
 
+def test_growing_jumps_are_spelled_out(tmp_path: Path) -> None:
+    """h = "3 growing": the lengths of `jump_lengths`, which a manifest keeps as numbers."""
+    keys = ["procedure.k_i=40", "procedure.k=10", "procedure.total_cycles=500"]
+    for words in ('"3 growing"', "3 growing", '"3 growing jumps"'):
+        procedure = scene_load(write(tmp_path, KARRECH), [*keys, f"procedure.h={words}"]).procedure
+        assert procedure is not None
+        assert procedure.h == tuple(jump_lengths(3, 500, 40, 10, procedure.healing_cycles))
+    text, _ = with_value(KARRECH, "procedure.h", 'h = "2 growing"')
+    wrong, _ = with_value(text, "procedure.k", "k = 1")
+    message = refusal(tmp_path, wrong)  # what is wrong with the other keys is told, and only that
+    assert "procedure.k: " in message
+    assert "procedure.h: " not in message
+
+
 def test_scene_survives_json(tmp_path: Path) -> None:
     """What a manifest stores gives back the same scene."""
     scene = scene_load(write(tmp_path, KARRECH))
@@ -296,6 +311,9 @@ REFUSED = [
     ("procedure.h", "h = -1", "at least 0"),
     ("procedure.h", "h = []", "at least 1 item"),
     ("procedure.h", "h = [20, 2.5]", "integer"),
+    ("procedure.h", 'h = "five growing"', 'as "5 growing"'),
+    ("procedure.h", 'h = "0 growing"', 'as "5 growing"'),
+    ("procedure.h", 'h = "900 growing"', "leave the first no cycle"),
     ("procedure.healing_cycles", "healing_cycles = -1", "at least 0"),
     ("procedure.law", 'law = "lug"', "did you mean log?"),
     ("procedure.move", 'move = "shrink"', "did you mean shrunk?"),

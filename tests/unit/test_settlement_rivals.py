@@ -31,7 +31,6 @@ from validation.settlement_rivals import (
     deck_extend,
     figures_of,
     jump_length,
-    jump_lengths,
     masses_scaled,
 )
 from validation.settlement_rivals_budget import EVERY, PLACE, TWIN
@@ -119,18 +118,6 @@ def test_no_law_is_fitted_to_cycles_that_there_are_not() -> None:
     laws = {head["method"] for head, _ in plan if head["part"] == "law"}
     assert laws == {law_name(law, cycles) for law, cycles in LAWS if cycles < 80}
     assert len(laws) == 2
-
-
-@pytest.mark.parametrize("jumps", [1, 5, 13])
-def test_growing_jumps_have_one_ratio(jumps: int) -> None:
-    """Ends of jumps with the window behind each: N_i = N_0 q^i, rounded to cycles."""
-    lengths = np.array(jump_lengths(jumps, 10_000))
-    ends = K_I + FIRST_WINDOW + np.cumsum(np.append(0, lengths + HEALING + FIRST_WINDOW))
-    assert ends[-1] == 10_000
-    ratio = (10_000 / ends[0]) ** (1 / jumps)
-    assert np.abs(ends - ends[0] * ratio ** np.arange(jumps + 1)).max() <= 0.5
-    with pytest.raises(ValueError, match="no cycle"):
-        jump_lengths(40, 10_000)
 
 
 def test_methods_are_scenes_of_their_own() -> None:
