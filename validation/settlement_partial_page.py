@@ -1,0 +1,212 @@
+"""Fig. 13, docs/settlement-partial.md: ``python -m validation.settlement_partial_page``.
+
+The bed under a piston that covers a part of it: Fig. 13 of Karrech et al. (2007) beside full runs
+of three packings, from the ensemble and from the record of the study ``partial``
+(`validation.settlement_rivals_runs`).  Seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adapters.run_folder import write_atomically
+from validation.page_text import page_filled, table
+from validation.settlement_bars import PARTLY, gained_time, settlement_total, sides_compared
+from validation.settlement_bars import table_bars as bars_table
+from validation.settlement_ensemble import CONFINED, PARTIAL, Kind
+from validation.settlement_ensemble_page import short
+from validation.settlement_ensemble_picture import COLOURS
+from validation.settlement_ensemble_reading import (
+    at_cycle,
+    column_mean,
+    column_since,
+    curves,
+)
+from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals import Row
+from validation.settlement_rivals_reading import (
+    FIGURES,
+    finished,
+    means_by_seed,
+    reference,
+)
+from validation.settlement_rivals_reference import LAWS, law_name
+from validation.settlement_rivals_runs import record_read
+from validation.settlement_rivals_studies import STUDIES
+from validation.student import interval
+
+TEMPLATE = Path(__file__).with_suffix(".md")
+PAGE = Path(__file__).parents[1] / "docs" / "settlement-partial.md"
+STUDY = STUDIES["partial"]
+PAPER_GAINED, PAPER_ERROR = 120.0, 8.0
+"""Gained time and error of the settlement that the paper tells of Fig. 13d [%]."""
+NAMES = (*(method.name for method in STUDY.methods), *(law_name(*law) for law in LAWS))
+SAME_RANGE = 0.05
+"""Coordination numbers that differ by no larger part are in the same range."""
+
+
+def way(name: str) -> str:
+    """A method's name with one jump in the singular."""
+    return name.replace("1 jumps", "1 jump")
+
+
+def errors(rows: Sequence[Row], name: str, last: int = STUDY.last) -> dict[int, float]:
+    """Settlement behind k_i less the packing's full run, over the mean total settlement [%]."""
+    figure, total = FIGURES["settlement"], settlement_total(rows, last)
+    truth = means_by_seed(reference(rows, last), figure)
+    mine = means_by_seed(finished(rows, name, last), figure)
+    return {seed: 100 * (value - truth[seed]) / total for seed, value in mine.items()}
+
+
+def coordination_errors(rows: Sequence[Row], name: str, last: int = STUDY.last) -> list[float]:
+    """Coordination number over the packing's full run's, less one [%]; none of a law."""
+    figure = FIGURES["coordination"]
+    mine = [row for row in finished(rows, name, last) if "coordination_number" in _state(row)]
+    truth = means_by_seed(reference(rows, last), figure)
+    return [100 * (value / truth[seed] - 1) for seed, value in means_by_seed(mine, figure).items()]
+
+
+def _state(row: Row) -> dict[str, Any]:
+    return row.get("state") or {}
+
+
+def slope(kind: Kind, record: EnsembleRecord, first: int, last: int) -> float:
+    """Settlement a unit of ln N between two cycles, mean over all runs that came there [m]."""
+    gains = [
+        (curve["settlement"][last - 1] - curve["settlement"][first - 1]) / np.log(last / first)
+        for piece, curve in curves(kind, record).items()
+        if piece.member is not None and curve["cycle"][-1] >= last
+    ]
+    return float(np.mean(gains))
+
+
+def coordination(kind: Kind, record: EnsembleRecord, cycle: int) -> float:
+    """Mean coordination number of the ensemble over the ten cycles up to one."""
+    found = at_cycle(kind, curves(kind, record), column_mean("coordination_number"), cycle)
+    assert found is not None
+    return found.mean
+
+
+def table_claims(rows: Sequence[Row], record: EnsembleRecord) -> str:
+    """What the paper says of Fig. 13, and what came, by a stated rule."""
+    last, k_i = STUDY.last, CONFINED.k_i
+    partly, confined = (coordination(kind, record, last) for kind in (PARTIAL, CONFINED))
+    steep = [1e6 * slope(kind, record, k_i, last) for kind in (PARTIAL, CONFINED)]
+    near = min(
+        (name for name in NAMES if "jump" in name and finished(rows, name, last)),
+        key=lambda name: abs(gained_time(rows, name, last) - PAPER_GAINED),
+    )
+    found = list(errors(rows, near).values())
+    gained, off = gained_time(rows, near, last), float(np.mean(found))
+    contacts = float(np.mean(coordination_errors(rows, near)))
+    lines = [
+        ["13a", "the coordination number stays in the range of the confined bed",
+         f"{partly:.2f} beside {confined:.2f} at cycle {last}",
+         "yes" if abs(partly / confined - 1) <= SAME_RANGE else "no"],
+        ["13b", "the slope of the settlement is higher than the confined bed's",
+         f"{steep[0]:.0f} beside {steep[1]:.0f} µm a unit of ln N, cycles {k_i} to {last}",
+         "yes" if steep[0] > steep[1] else "no"],
+        ["13d", f"the settlement errs by {PAPER_ERROR:g} % at a gained time of {PAPER_GAINED:g} %",
+         f"by {abs(off):.0f} % in the mean of {len(found)} packings, "
+         f"{min(map(abs, found)):.0f} to {max(map(abs, found)):.0f} % in each, at {gained:.0f} % "
+         f"({way(near)}); coordination number by {abs(contacts):.1f} %",
+         "yes" if abs(off) <= PAPER_ERROR else "no"],
+    ]  # fmt: skip
+    return table(["figure", "the paper says", "here", "holds"], lines)
+
+
+def table_packings(rows: Sequence[Row], last: int = STUDY.last) -> str:
+    """Settlement behind k_i of each packing [um], and what errors come to over the total."""
+    figure = FIGURES["settlement"]
+    truth = means_by_seed(reference(rows, last), figure)
+    head = ["way", "cycles computed", "gained time", *(f"packing {seed}, µm" for seed in truth),
+            "error over the total settlement"]  # fmt: skip
+    whole = str(last - STUDY.kind.k_i)
+    lines = [["every cycle", whole, "0 %", *(f"{1e6 * one:.1f}" for one in truth.values()), "-"]]
+    for name in NAMES:
+        mine = finished(rows, name, last)
+        if not mine:
+            continue
+        values = means_by_seed(mine, figure)
+        mean, half = interval(list(errors(rows, name).values()))
+        lines.append([
+            way(name), f"{np.mean([row['computed'] for row in mine]):.0f}",
+            f"{gained_time(rows, name, last):.0f} %",
+            *(f"{1e6 * values[seed]:.1f}" if seed in values else "-" for seed in truth),
+            f"{mean:+.1f} ± {half:.0f} %" if half == half else f"{mean:+.1f} %",
+        ])  # fmt: skip
+    return table(head, lines)
+
+
+def page(rows: Sequence[Row], record: EnsembleRecord) -> str:
+    """The page of a record."""
+    last = STUDY.last
+    begun = at_cycle(PARTIAL, curves(PARTIAL, record), column_since("settlement", 1.0), last)
+    assert begun is not None
+    compared = sides_compared(rows, PARTIAL, record)
+    text = bars_table(compared, NAMES, last, PARTLY)
+    return page_filled(TEMPLATE.read_text(encoding="utf-8"), {
+        "CLAIMS": table_claims(rows, record), "PACKINGS": table_packings(rows),
+        "BARS": way(text), "LAST": str(last), "K_I": str(STUDY.kind.k_i),
+        "TOTAL": f"{1e6 * settlement_total(rows, last):.0f}", "MEAN": f"{1e6 * begun.mean:.0f}",
+        "ENGINES": ", ".join(dict.fromkeys(row["engine"] for row in rows if row.get("engine"))),
+        "MACHINES": "; ".join(dict.fromkeys(row["machine"] for row in rows)),
+        "COMMITS": ", ".join(dict.fromkeys(short(row["commit"]) for row in rows)),
+        "HOURS": f"{sum(row['cpu_s'] for row in rows if row['part'] == 'rivals') / 3600:.1f}",
+    })  # fmt: skip
+
+
+def draw(rows: Sequence[Row], record: EnsembleRecord, target: Path) -> None:
+    """Fig. 13: coordination number and settlement against cycles, errors against gained time."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(2, 2, figsize=(9.5, 6.4), layout="constrained")
+    panels = (("coordination_number", 1.0, "coordination number"),
+              ("settlement", 1e6, "settlement since the rain [µm]"))  # fmt: skip
+    for axis, (column, factor, words), letter in zip(axes[0], panels, "ab", strict=True):
+        for piece, curve in curves(PARTIAL, record).items():
+            if piece.member == 0:
+                axis.plot(curve["cycle"], factor * curve[column], color=COLOURS[piece.seed - 1],
+                          lw=1, label=f"packing {piece.seed}")  # fmt: skip
+        for curve in curves(CONFINED, record).values():
+            upto = curve["cycle"] <= STUDY.last
+            axis.plot(curve["cycle"][upto], factor * curve[column][upto], color="0.8", lw=0.7,
+                      zorder=0)  # fmt: skip
+        axis.set(title=f"Fig. 13{letter} (grey: confined)", xlabel="load cycle", ylabel=words)
+        axis.legend(frameon=False, fontsize=8)
+    for axis, found, words, letter in (
+        (axes[1, 0], coordination_errors, "coordination number", "c"),
+        (axes[1, 1], lambda *of: list(errors(*of).values()), "settlement, over the total", "d"),
+    ):
+        for name in NAMES:
+            values = found(rows, name)
+            if values:
+                gained = gained_time(rows, name, STUDY.last)
+                (line,) = axis.plot([gained], [abs(np.mean(values))], "o", label=way(name))
+                axis.plot([gained] * len(values), np.abs(values), ".", color=line.get_color())
+        axis.set(
+            title=f"Fig. 13{letter}", xlabel="gained time [%]", ylabel=f"error of the {words} [%]"
+        )
+        axis.set_ylim(bottom=0)
+    axes[1, 1].plot([PAPER_GAINED], [PAPER_ERROR], "k*", ms=11, label="the paper (one run)")
+    axes[1, 1].legend(frameon=False, fontsize=7)
+    figure.savefig(target, dpi=90, metadata={"Software": None})
+    plt.close(figure)
+
+
+def main() -> None:
+    """Write page and picture."""
+    rows, record = record_read(STUDY.record), EnsembleRecord()
+    write_atomically(PAGE, page(rows, record))
+    draw(rows, record, PAGE.with_suffix(".png"))
+
+
+if __name__ == "__main__":
+    main()
