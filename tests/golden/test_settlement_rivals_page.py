@@ -174,6 +174,30 @@ def test_sentences_about_the_paper_scale() -> None:
     assert found.error[found.seeds.index(2)] < -0.4
 
 
+def test_sentences_about_growing_jumps() -> None:
+    """Five growing jumps, six members: every bar of state and cost; rates stay in 26 of 30."""
+    rows, name = record_read(PAPER.record), "5 growing jumps, by history, profile"
+    runs = finished(rows, name, LAST)
+    assert len(runs) == 6
+    assert all(row["computed"] == 85 and not row["lost"] for row in runs)
+    compared = sides_compared(rows, CONFINED, EnsembleRecord())
+    found = {bar.words: bar.value(compared, name, LAST) for bar in BARS}
+    assert all(bar.met(found[bar.words]) for bar in BARS[1:7])
+    assert found["rate behind healing stays"] == pytest.approx(100 * 26 / 30)
+    assert found["rate behind healing goes on"] == pytest.approx(100 * 21 / 30)
+    for figure, least, most in (("settlement", -20, 6), ("deflection", -4, 2)):
+        errors = judged(rows, name, LAST, figure)
+        assert errors is not None
+        assert (round(100 * errors.error.min()), round(100 * errors.error.max())) == (least, most)
+    law, still = (
+        judged(rows, f"2 jumps{end}", LAST, "settlement") for end in ("", ", nothing moved")
+    )
+    assert law is not None
+    assert still is not None
+    assert 100 * law.error == pytest.approx([12, 94], abs=0.5)
+    assert still.error.max() < -0.49
+
+
 def test_sentences_about_rivals(rows: list[Row]) -> None:
     """Fitted laws are cheaper and miss by more; softer grains answer otherwise to a load."""
     moved = judged(rows, "5 jumps", LAST, "settlement")
