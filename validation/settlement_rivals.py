@@ -214,6 +214,7 @@ METHODS_OF: dict[str, tuple[Method, ...]] = {
             Method("tolerance 0.02", "tolerance", ("procedure.tolerance=0.02",), JUMPING),
             softer(10, CONFINED),
             replace(growing(remembering(5, "profile")), window=10),
+            replace(growing(remembering(3, "profile")), window=18),
         )
     ),
 }  # fmt: skip

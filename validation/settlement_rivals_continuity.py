@@ -31,7 +31,8 @@ PROBABILITY = 0.95
 def sides_of(run: Run) -> list[Row]:
     """Of every jump that stands: cycles ``first`` to ``last``, `COLUMNS` ``before`` and ``after``.
 
-    Settlement is that of each cycle, in the first one behind the jump since the jump's own end.
+    Settlement is that of each cycle, in the first one behind the jump since the jump's own end; a
+    jump of no cycle ends with the cycle before it.
     """
     outcomes = run.folder.outcomes()
     found = []
@@ -39,10 +40,13 @@ def sides_of(run: Run) -> list[Row]:
         if jump.stage != "jump":
             continue
         sides: Row = {"first": jump.first_cycle, "last": jump.last_cycle}
-        for name, outcome, start in (("before", before, np.nan), ("after", after, jump.rows)):
+        for name, outcome, start in (
+            ("before", before, []),
+            ("after", after, jump.rows or before.rows),
+        ):
             table = cycles_of(run, f"window_{outcome.first_cycle:06d}", slice(None))
             path = np.array(table["settlement"])
-            zero = start[0]["settlement"] if isinstance(start, list) else np.nan
+            zero = start[-1]["settlement"] if start else np.nan
             table["settlement"] = np.diff(path, prepend=zero).tolist()
             part = slice(-CYCLES, None) if name == "before" else slice(CYCLES)
             sides[name] = {column: table[column][part] for column in COLUMNS}
