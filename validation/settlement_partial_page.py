@@ -15,7 +15,14 @@ import numpy as np
 
 from adapters.run_folder import write_atomically
 from validation.page_text import page_filled, table
-from validation.settlement_bars import PARTLY, gained_time, settlement_total, sides_compared
+from validation.settlement_bars import (
+    PARTLY,
+    gained_time,
+    runs_by_packing,
+    settlement_of,
+    settlement_total,
+    sides_compared,
+)
 from validation.settlement_bars import table_bars as bars_table
 from validation.settlement_ensemble import CONFINED, PARTIAL, Kind
 from validation.settlement_ensemble_page import short
@@ -27,6 +34,7 @@ from validation.settlement_ensemble_reading import (
     curves,
 )
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_partial_bearing import table_bearing
 from validation.settlement_rivals import Row
 from validation.settlement_rivals_reading import (
     FIGURES,
@@ -111,7 +119,7 @@ def table_claims(rows: Sequence[Row], record: EnsembleRecord) -> str:
          f"{steep[0]:.0f} beside {steep[1]:.0f} µm a unit of ln N, cycles {k_i} to {last}",
          "yes" if steep[0] > steep[1] else "no"],
         ["13d", f"the settlement errs by {PAPER_ERROR:g} % at a gained time of {PAPER_GAINED:g} %",
-         f"by {abs(off):.0f} % in the mean of {len(found)} packings, "
+         f"by {abs(off):.1f} % in the mean of {len(found)} packings, "
          f"{min(map(abs, found)):.0f} to {max(map(abs, found)):.0f} % in each, at {gained:.0f} % "
          f"({way(near)}); coordination number by {abs(contacts):.1f} %",
          "yes" if abs(off) <= PAPER_ERROR else "no"],
@@ -142,6 +150,12 @@ def table_packings(rows: Sequence[Row], last: int = STUDY.last) -> str:
     return table(head, lines)
 
 
+def members_apart(rows: Sequence[Row], last: int = STUDY.last) -> list[float]:
+    """By how much the full runs of each packing part in settlement [m]."""
+    found = runs_by_packing(reference(rows, last), "settlement")
+    return [float(np.ptp(runs)) for runs in found.values()]
+
+
 def page(rows: Sequence[Row], record: EnsembleRecord) -> str:
     """The page of a record."""
     last = STUDY.last
@@ -151,7 +165,10 @@ def page(rows: Sequence[Row], record: EnsembleRecord) -> str:
     text = bars_table(compared, NAMES, last, PARTLY)
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), {
         "CLAIMS": table_claims(rows, record), "PACKINGS": table_packings(rows),
-        "BARS": way(text), "LAST": str(last), "K_I": str(STUDY.kind.k_i),
+        "BARS": way(text), "BEARING": table_bearing(record), "LAST": str(last),
+        "K_I": str(STUDY.kind.k_i),
+        "HALF": f"{1e6 * settlement_of(rows, last).half_given:.0f}",
+        "APART": ", ".join(f"{1e6 * one:.0f}" for one in members_apart(rows)),
         "TOTAL": f"{1e6 * settlement_total(rows, last):.0f}", "MEAN": f"{1e6 * begun.mean:.0f}",
         "ENGINES": ", ".join(dict.fromkeys(row["engine"] for row in rows if row.get("engine"))),
         "MACHINES": "; ".join(dict.fromkeys(row["machine"] for row in rows)),
@@ -172,9 +189,10 @@ def draw(rows: Sequence[Row], record: EnsembleRecord, target: Path) -> None:
               ("settlement", 1e6, "settlement since the rain [µm]"))  # fmt: skip
     for axis, (column, factor, words), letter in zip(axes[0], panels, "ab", strict=True):
         for piece, curve in curves(PARTIAL, record).items():
-            if piece.member == 0:
+            if piece.member is not None:
+                label = f"packing {piece.seed}" if piece.member == 0 else None
                 axis.plot(curve["cycle"], factor * curve[column], color=COLOURS[piece.seed - 1],
-                          lw=1, label=f"packing {piece.seed}")  # fmt: skip
+                          lw=1 / (1 + piece.member), label=label)  # fmt: skip
         for curve in curves(CONFINED, record).values():
             upto = curve["cycle"] <= STUDY.last
             axis.plot(curve["cycle"][upto], factor * curve[column][upto], color="0.8", lw=0.7,

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
 from validation.settlement_bars import settlement_total
+from validation.settlement_ensemble import PARTIAL
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_partial_bearing import bearing, gaps_to_disc, near
 from validation.settlement_partial_page import (
     NAMES,
     PAGE,
@@ -42,25 +46,40 @@ def test_record_holds_what_the_study_names(rows: list[Row]) -> None:
 
 def test_errors_are_those_of_the_settlement_over_the_total(rows: list[Row]) -> None:
     """By hand: settlement behind k_i of a run less its packing's full runs', over what all do."""
-    truth = {
-        seed: np.mean(
-            [row["settlement"][str(LAST)] for row in reference(rows, LAST) if row["seed"] == seed]
-        )
-        for seed in (1, 2, 3)
-    }
+    truth = means_by_hand(reference(rows, LAST))
     begun = np.mean([row["begun"] for row in reference(rows, LAST)])
     total = float(begun + np.mean(list(truth.values())))
     assert settlement_total(rows, LAST) == pytest.approx(total, rel=1e-12)
     for name in NAMES:
-        found = finished(rows, name, LAST)
-        by_hand = {
-            seed: 100
-            * (
-                np.mean([row["settlement"][str(LAST)] for row in found if row["seed"] == seed])
-                - one
-            )
-            / total
-            for seed, one in truth.items()
-            if found
-        }
+        mine = means_by_hand(finished(rows, name, LAST))
+        by_hand = {seed: 100 * (value - truth[seed]) / total for seed, value in mine.items()}
         assert errors(rows, name) == pytest.approx(by_hand, rel=1e-9)
+
+
+def means_by_hand(rows: Sequence[Row]) -> dict[int, float]:
+    """Mean settlement [m] of the runs of each packing."""
+    found: dict[int, list[float]] = {}
+    for row in rows:
+        found.setdefault(row["seed"], []).append(row["settlement"][str(LAST)])
+    return {seed: float(np.mean(values)) for seed, values in found.items()}
+
+
+def test_gaps_to_a_disc_by_hand() -> None:
+    """A grain under the disc, one that reaches over its rim, one that overlaps it by 0.1 m."""
+    position = np.array([[0.5, 0.0, -1.2], [3.0, 0.0, -1.0], [0.0, 0.0, -0.9]])
+    under, beside = gaps_to_disc(position, np.ones(3), 0.0, 2.0)
+    assert under == pytest.approx([-0.1, 0.2], abs=1e-12)
+    assert beside == pytest.approx([np.sqrt(2) - 1], abs=1e-12)
+
+
+def test_sentences_about_what_the_piston_stands_on() -> None:
+    """No grain under the piston of packing 2 up to cycle 40, one or two at its rim; 18 and more
+    under every other piston and, from cycle 60 on, under that one."""
+    record = EnsembleRecord()
+    for piece in PARTIAL.runs():
+        for cycle, gaps in bearing(piece, record).items():
+            under, beside = near(gaps)
+            if piece.seed == 2 and 20 <= cycle <= 40:
+                assert (under, beside) in {(0, 1), (0, 2)}
+            elif cycle >= 20:
+                assert under >= 18

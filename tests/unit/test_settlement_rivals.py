@@ -361,29 +361,30 @@ def test_what_stays_is_within_the_scatter_of_single_cycles() -> None:
     assert np.mean(held[6.0]) < 0.02
 
 
+def run_of_small_bed(folder: Path, h: int, total_cycles: int) -> Run:
+    """A finished run of the small bed on the fake engine, from windows of 12 cycles."""
+    scene = folder / "scene.toml"
+    scene.write_text(small_bed(k=12, h=h, total_cycles=total_cycles))
+    run_scene(scene, folder / "run", progress=Progress(quiet=True))
+    quiet = Progress(quiet=True)
+    return Run(scene_load(scene, ()), RunFolder(folder / "run"), FakeEngine(), Variant(), quiet)
+
+
 def test_sides_of_a_jump_of_no_cycle(tmp_path: Path) -> None:
     """h = 0 leaves no row of its own: the first cycle behind it counts from the one before."""
-    scene = tmp_path / "scene.toml"
-    scene.write_text(small_bed(k=12, h=0, total_cycles=40))
-    run_scene(scene, tmp_path / "run", progress=Progress(quiet=True))
-    folder = RunFolder(tmp_path / "run")
-    run = Run(scene_load(scene, ()), folder, FakeEngine(), Variant(), Progress(quiet=True))
+    run = run_of_small_bed(tmp_path, h=0, total_cycles=40)
     one = sides_of(run)[0]
     assert one["first"] == one["last"] == 14
-    settled = [row["settlement"] for outcome in folder.outcomes() for row in outcome.rows]
+    settled = [row["settlement"] for outcome in run.folder.outcomes() for row in outcome.rows]
     assert one["after"]["settlement"][0] == pytest.approx(settled[14] - settled[13], rel=1e-6)
 
 
 def test_sides_of_a_run_are_its_table(tmp_path: Path) -> None:
     """Cycles before and behind both jumps, settlement cycle by cycle; a full run has the same."""
-    scene = tmp_path / "scene.toml"
-    scene.write_text(small_bed(k=12, h=8, total_cycles=60))
-    run_scene(scene, tmp_path / "run", progress=Progress(quiet=True))
-    folder = RunFolder(tmp_path / "run")
-    run = Run(scene_load(scene, ()), folder, FakeEngine(), Variant(), Progress(quiet=True))
+    run = run_of_small_bed(tmp_path, h=8, total_cycles=60)
     found = sides_of(run)
     assert [(one["first"], one["last"]) for one in found] == [(14, 22), (35, 43)]
-    with (folder.path / "settlement.csv").open() as stream:
+    with (run.folder.path / "settlement.csv").open() as stream:
         rows = {int(row["cycle"]): row for row in csv.DictReader(stream)}
     settled = {cycle: float(row["settlement"]) for cycle, row in rows.items()}
     for one in found:
