@@ -17,7 +17,7 @@ from validation.settlement_ensemble import Kind
 from validation.settlement_ensemble_reading import Nested, nested
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import HEALING, Row
-from validation.settlement_rivals_continuity import COLUMNS, share_continued, stays
+from validation.settlement_rivals_continuity import COLUMNS, continues, stays
 from validation.settlement_rivals_reading import (
     FIGURES,
     cost,
@@ -40,6 +40,8 @@ class Bar:
     """Of rows, method and last cycle; nan where the record does not tell."""
     least: bool = False
     """Whether the bound is the least that is asked, not the most."""
+    full: Callable[[Sequence[Row], str, int], float] | None = None
+    """The same of full runs between the same cycles."""
 
     def met(self, value: float) -> bool:
         """Whether a figure is what it is to be; nan is not."""
@@ -121,26 +123,50 @@ def sides_compared(rows: Sequence[Row], kind: Kind, record: EnsembleRecord) -> l
     return [compared(row) if "sides" in row else row for row in rows]
 
 
-def continued(column: str, skipped: int = 0) -> Callable[[Sequence[Row], str, int], float]:
-    """Share of all jumps behind which a column goes on as before [%]."""
+Share = Callable[[Sequence[Row], str, int], float]
+
+
+def shares(held: Callable[[Row, Sequence[Row]], bool]) -> tuple[Share, Share]:
+    """Share of all jumps for which something holds, and of full runs between the same cycles [%].
+
+    ``held``: of the sides of a jump, beside those of full runs.
+    """
+
+    def jumps_of(rows: Sequence[Row], method: str, last: int) -> list[Row]:
+        return [one for row in finished(rows, method, last) for one in row.get("sides", [])]
 
     def share(rows: Sequence[Row], method: str, last: int) -> float:
-        mine = finished(rows, method, last)
-        pairs = [(one, one["others"]) for row in mine for one in row.get("sides", [])]
-        return 100 * share_continued(pairs, column, skipped)
+        jumps = jumps_of(rows, method, last)
+        return percent([held(one, one["others"]) for one in jumps])
 
-    return share
+    def share_full(rows: Sequence[Row], method: str, last: int) -> float:
+        beside = [one["others"] for one in jumps_of(rows, method, last)]
+        return percent(
+            [
+                held(one, [*others[:place], *others[place + 1 :]])
+                for others in beside
+                for place, one in enumerate(others)
+            ]
+        )
+
+    return share, share_full
 
 
-def stayed(column: str, skipped: int) -> Callable[[Sequence[Row], str, int], float]:
-    """Share of all jumps behind which a column stays as before [%]."""
+def percent(held: Sequence[bool]) -> float:
+    """Share of what holds [%]; nan for none."""
+    return 100 * float(np.mean(held)) if len(held) else float("nan")
 
-    def share(rows: Sequence[Row], method: str, last: int) -> float:
-        jumps = [one for row in finished(rows, method, last) for one in row.get("sides", [])]
-        held = [stays(one, column, skipped) for one in jumps]
-        return 100 * float(np.mean(held)) if held else float("nan")
 
-    return share
+def bar_continues(words: str, column: str, skipped: int = 0) -> Bar:
+    """In nine jumps of ten a column goes on behind so many ``skipped`` cycles as full runs have."""
+    share, full = shares(lambda one, others: continues(one, others, column, skipped))
+    return Bar(words, "%", 90.0, share, least=True, full=full)
+
+
+def bar_stays(words: str, column: str, skipped: int) -> Bar:
+    """In nine jumps of ten a column stays, behind ``skipped`` cycles, as single cycles before."""
+    share, full = shares(lambda one, _: stays(one, column, skipped))
+    return Bar(words, "%", 90.0, share, least=True, full=full)
 
 
 BARS = (
@@ -151,11 +177,11 @@ BARS = (
     Bar("density profile", "%", 2.0, error_of_profile),
     Bar("elastic deflection", "%", 2.0, error_of("deflection")),
     Bar("gained time", "%", 400.0, gained_time, least=True),
-    Bar("rate behind healing stays", "%", 90.0, stayed(COLUMNS[0], HEALING), least=True),
-    Bar("rate behind healing goes on", "%", 90.0, continued(COLUMNS[0], HEALING), least=True),
-    Bar("rate behind the first cycle goes on", "%", 90.0, continued(COLUMNS[0], 1), least=True),
+    bar_stays("rate behind healing stays", COLUMNS[0], HEALING),
+    bar_continues("rate behind healing goes on", COLUMNS[0], HEALING),
+    bar_continues("rate behind the first cycle goes on", COLUMNS[0], 1),
     *(
-        Bar(f"{words} goes on", "%", 90.0, continued(column), least=True)
+        bar_continues(f"{words} goes on", column)
         for column, words in zip(COLUMNS, ("rate", "coordination", "stiffness"), strict=True)
     ),
 )
@@ -170,21 +196,27 @@ PARTLY = (
 confined bed."""
 
 
-def told(bar: Bar, value: float) -> str:
-    """A figure as it stands in a table, bold where it is what it is to be."""
+def told(bar: Bar, value: float, full: float = float("nan")) -> str:
+    """A figure as it stands in a table, bold where it is what it is to be; that of full runs."""
     if value != value:
         return "-"
     text = f"{value:.0f}" if bar.least else f"{value:.1f}"
-    return f"**{text}**" if bar.met(value) else text
+    text = f"**{text}**" if bar.met(value) else text
+    return f"{text} ({full:.0f})" if full == full else text
 
 
 def table_bars(
     rows: Sequence[Row], methods: Sequence[str], last: int, bars: Sequence[Bar] = BARS
 ) -> str:
-    """A line a method, a column a bar."""
+    """A line a method, a column a bar; in brackets full runs between the same cycles."""
     asked = ["bar", *(f"{'≥' if bar.least else '≤'} {bar.bound:g} {bar.unit}" for bar in bars)]
+
+    def told_of(name: str, bar: Bar) -> str:
+        values = [of(rows, name, last) for of in (bar.value, bar.full) if of]
+        return told(bar, *values)
+
     lines = [
-        [name, *(told(bar, bar.value(rows, name, last)) for bar in bars)]
+        [name, *(told_of(name, bar) for bar in bars)]
         for name in methods
         if finished(rows, name, last)
     ]

@@ -10,7 +10,6 @@ between the same cycles.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -31,23 +30,20 @@ PROBABILITY = 0.95
 def sides_of(run: Run) -> list[Row]:
     """Of every jump that stands: cycles ``first`` to ``last``, `COLUMNS` ``before`` and ``after``.
 
-    Settlement is that of each cycle, in the first one behind the jump since the jump's own end; a
-    jump of no cycle ends with the cycle before it.
+    Settlement is that of each cycle, in the first one of a window since the end of what came before
+    it; a jump of no cycle ends with the cycle before it.
     """
     outcomes = run.folder.outcomes()
     found = []
-    for (before, jump), (_, after) in zip(pairwise(outcomes), pairwise(outcomes[1:]), strict=False):
+    for place, jump in enumerate(outcomes[:-1]):
         if jump.stage != "jump":
             continue
         sides: Row = {"first": jump.first_cycle, "last": jump.last_cycle}
-        for name, outcome, start in (
-            ("before", before, []),
-            ("after", after, jump.rows or before.rows),
-        ):
-            table = cycles_of(run, f"window_{outcome.first_cycle:06d}", slice(None))
+        for name, at in (("before", place - 1), ("after", place + 1)):
+            table = cycles_of(run, f"window_{outcomes[at].first_cycle:06d}", slice(None))
+            ends = [one.rows[-1]["settlement"] for one in outcomes[:at] if one.rows]
             path = np.array(table["settlement"])
-            zero = start[-1]["settlement"] if start else np.nan
-            table["settlement"] = np.diff(path, prepend=zero).tolist()
+            table["settlement"] = np.diff(path, prepend=ends[-1] if ends else 0.0).tolist()
             part = slice(-CYCLES, None) if name == "before" else slice(CYCLES)
             sides[name] = {column: table[column][part] for column in COLUMNS}
         found.append(sides)
@@ -73,13 +69,14 @@ def change_of(sides: Row, column: str, skipped: int = 0) -> float:
     """Mean behind a jump, or behind so many ``skipped`` cycles more, less mean before it.
 
     Settlement a cycle is multiplied by the cycle's number, the slope of the logarithm: that a bed
-    slows down is no transient.
+    slows down is no transient.  A cycle that is not known (nan) is left out: records made before
+    November 2026 lack the first of a window.
     """
     before, after = (np.array(sides[name][column], float) for name in ("before", "after"))
     if column == "settlement":
         before = before * (sides["first"] - len(before) + 1 + np.arange(len(before)))
         after = after * (sides["last"] + 1 + np.arange(len(after)))
-    return float(after[skipped:].mean() - before.mean())
+    return float(np.nanmean(after[skipped:]) - np.nanmean(before))
 
 
 def continues(sides: Row, others: Sequence[Row], column: str, skipped: int = 0) -> bool:
@@ -104,12 +101,3 @@ def stays(sides: Row, column: str, skipped: int) -> bool:
     before, after = (np.array(sides[name][column], float) for name in ("before", "after"))
     before = before[np.isfinite(before)]
     return bool(abs(after[skipped:].mean() - before.mean()) <= 2 * before.std(ddof=1))
-
-
-def share_continued(
-    pairs: Sequence[tuple[Row, Sequence[Row]]], column: str, skipped: int = 0
-) -> float:
-    """Share of jumps, each with the sides of full runs, that `continues`; nan for none."""
-    if not pairs:
-        return float("nan")
-    return float(np.mean([continues(one, others, column, skipped) for one, others in pairs]))

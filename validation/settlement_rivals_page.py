@@ -23,7 +23,7 @@ from validation.settlement_ensemble import COARSE, CONFINED
 from validation.settlement_ensemble_page import short
 from validation.settlement_ensemble_reading import nested, student
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import K_I, METHODS, METHODS_OF, Row
+from validation.settlement_rivals import K_I, METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS, PLACE, TWIN
 from validation.settlement_rivals_picture import draw, shown
 from validation.settlement_rivals_reading import (
@@ -246,16 +246,20 @@ def scatter(rows: Sequence[Row]) -> dict[str, str]:
 
 def paper_scale(last: int) -> dict[str, str]:
     """What the record at paper scale has so far: bars, runs of each method, the reference."""
-    rows = record_read(STUDIES["confined"].record)
-    names = [method.name for method in METHODS_OF[CONFINED.name]]
-    planned = CONFINED.packings * CONFINED.members
-    made = {name: len(rows_of(rows, "rivals", name, last)) for name in names}
+    study = STUDIES["confined"]
+    rows = record_read(study.record)
+    names = [method.name for method in study.methods]
+    made = [
+        f"{method.name} ({len(rows_of(rows, 'rivals', method.name, last))} of "
+        f"{study.runs_of(method) * study.kind.packings})"
+        for method in study.methods
+    ]
     methods = [*names, *(law_name(law, cycles) for law, cycles in LAWS)]
     truth = settlement_of(rows, last)
     return {
         "PAPER_BARS": table_bars(sides_compared(rows, CONFINED, EnsembleRecord()), methods, last),
         "PAPER_WAY": table_on_the_way(rows, "2 jumps, by history, profile", last),
-        "PAPER_RUNS": "; ".join(f"{name} ({count} of {planned})" for name, count in made.items()),
+        "PAPER_RUNS": "; ".join(made),
         "PAPER_MEAN": f"{1e6 * truth.mean:.0f}",
         "PAPER_TOTAL": f"{1e6 * settlement_total(rows, last):.0f}",
         "PAPER_GIVEN": f"{1e6 * truth.half_given:.1f}",

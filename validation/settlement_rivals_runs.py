@@ -67,9 +67,10 @@ def rival_row(
 
 
 def plan_rivals(work: Path, study: Study, record: EnsembleRecord, last: int) -> Iterator[Planned]:
-    """Every method on every packing, as every member of the study."""
-    for method, member in product(study.methods, range(study.members)):
-        for seed in range(1, study.kind.packings + 1):
+    """Every method on every packing, the first run of all before any second."""
+    most, seeds = max(map(study.runs_of, study.methods)), range(1, study.kind.packings + 1)
+    for member, method, seed in product(range(most), study.methods, seeds):
+        if member < study.runs_of(method):
             head = {"part": "rivals", "method": method.name, "seed": seed, "member": member}
             folder = work / f"{method.name.replace(' ', '-').replace('/', '-')}-{seed}-{member}"
             filled = partial(rival_row, method, seed, member, last, record, folder)

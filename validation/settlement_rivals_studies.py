@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from validation.settlement_ensemble import COARSE, CONFINED, PARTIAL, Kind
@@ -22,6 +23,12 @@ class Study:
     members: int
     """Runs of each packing."""
     record: Path
+    more: Mapping[str, int] = field(default_factory=dict)
+    """Runs of each packing of a method that has more of them."""
+
+    def runs_of(self, method: Method) -> int:
+        """Runs of each packing of a method."""
+        return self.more.get(method.name, self.members)
 
 
 FAR = (
@@ -45,6 +52,7 @@ STUDIES = {
     "confined": Study(
         CONFINED, 500, METHODS_OF["confined"],
         CONFINED.members, RESULTS / "settlement-rivals-confined.jsonl",
+        {"5 growing jumps, by history, profile": 4},
     ),
     "far": Study(COARSE, COARSE.last, FAR, 2, RESULTS / "settlement-rivals-far.jsonl"),
     "partial": Study(PARTIAL, PARTIAL.last, PARTLY, 1, RESULTS / "settlement-rivals-partial.jsonl"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,8 @@ from validation.settlement_rivals_budget import EVERY, PLACE, TWIN
 from validation.settlement_rivals_continuity import (
     COLUMNS,
     CYCLES,
-    share_continued,
+    change_of,
+    continues,
     sides_of,
     sides_without_jump,
     stays,
@@ -340,8 +342,33 @@ def test_a_bed_that_goes_on_is_seen_to_and_a_shock_is_not_passed() -> None:
         for shock in (0.0, 4.0)
     )
     for column in COLUMNS:
-        assert share_continued(same, column) == pytest.approx(0.95, abs=0.033)
-        assert share_continued(shocked, column) < 0.1
+        went_on, stopped = (
+            np.mean([continues(one, others, column) for one, others in pairs])
+            for pairs in (same, shocked)
+        )
+        assert went_on == pytest.approx(0.95, abs=0.033)
+        assert stopped < 0.1
+
+
+def test_full_runs_beside_a_shocked_bed_go_on() -> None:
+    """In brackets: what full runs do between the same cycles, each beside the others.
+
+    Two hundred jumps beside six runs of a kind of their own: 95 % of 1,200, of which six share a
+    spread (3 standard errors of two hundred: 4.7 %).
+    """
+    jumps = [
+        sides(seed, 100, 500, 4.0)
+        | {"others": [sides(9999 + 6 * seed + n, 100, 500) for n in range(6)]}
+        for seed in range(200)
+    ]
+    rows = [made_up("rivals", "1 jumps", 1, 0, 1.0) | {"sides": jumps}]
+    bar = next(bar for bar in BARS if bar.words == "coordination goes on")
+    assert bar.full is not None
+    assert bar.value(rows, "1 jumps", LAST) < 10
+    assert bar.full(rows, "1 jumps", LAST) == pytest.approx(95, abs=4.7)
+    assert bar.full(rows, "none", LAST) != bar.full(rows, "none", LAST)
+    cell = table_bars(rows, ["1 jumps"], LAST, [bar]).splitlines()[-1]
+    assert re.fullmatch(r"\| 1 jumps \| \d \(9\d\) \|", cell)
 
 
 def test_what_stays_is_within_the_scatter_of_single_cycles() -> None:
@@ -361,13 +388,32 @@ def test_what_stays_is_within_the_scatter_of_single_cycles() -> None:
     assert np.mean(held[6.0]) < 0.02
 
 
-def run_of_small_bed(folder: Path, h: int, total_cycles: int) -> Run:
-    """A finished run of the small bed on the fake engine, from windows of 12 cycles."""
+def run_of_small_bed(folder: Path, h: int, total_cycles: int, k: int = 12) -> Run:
+    """A finished run of the small bed on the fake engine, from windows of ``k`` cycles."""
     scene = folder / "scene.toml"
-    scene.write_text(small_bed(k=12, h=h, total_cycles=total_cycles))
+    scene.write_text(small_bed(k=k, h=h, total_cycles=total_cycles))
     run_scene(scene, folder / "run", progress=Progress(quiet=True))
     quiet = Progress(quiet=True)
     return Run(scene_load(scene, ()), RunFolder(folder / "run"), FakeEngine(), Variant(), quiet)
+
+
+def test_sides_of_a_jump_behind_a_short_window(tmp_path: Path) -> None:
+    """The first cycle of a window of ten counts from the end of what came before it."""
+    run = run_of_small_bed(tmp_path, h=8, total_cycles=60, k=CYCLES)
+    settled = [row["settlement"] for outcome in run.folder.outcomes() for row in outcome.rows]
+    one = sides_of(run)[0]
+    gains = np.diff(settled[: one["first"]])[-CYCLES:]
+    assert one["before"]["settlement"] == pytest.approx(gains, rel=1e-6)
+
+
+def test_a_cycle_that_is_not_known_is_left_out() -> None:
+    """The change of a steady logarithm is nought, whether all ten cycles before it are known."""
+    number = np.arange(41.0, 51), np.arange(101.0, 111)
+    before, after = ((2e-6 / cycle).tolist() for cycle in number)
+    sides = {"first": 50, "last": 100, "after": {"settlement": after}}
+    for known in (before, [np.nan, *before[1:]]):
+        found = change_of(sides | {"before": {"settlement": known}}, "settlement", 5)
+        assert found == pytest.approx(0.0, abs=1e-18)
 
 
 def test_sides_of_a_jump_of_no_cycle(tmp_path: Path) -> None:
