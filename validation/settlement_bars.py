@@ -17,7 +17,7 @@ from validation.settlement_ensemble import Kind
 from validation.settlement_ensemble_reading import Nested, nested
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import HEALING, Row
-from validation.settlement_rivals_continuity import COLUMNS, continues, stays
+from validation.settlement_rivals_continuity import COLUMNS, change_of, continues, stays
 from validation.settlement_rivals_reading import (
     FIGURES,
     cost,
@@ -26,7 +26,7 @@ from validation.settlement_rivals_reading import (
     profile_error,
     reference,
 )
-from validation.settlement_rivals_reference import sides_of_reference
+from validation.settlement_rivals_reference import curves_of_reference, sides_of_reference
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def gained_time(rows: Sequence[Row], method: str, last: int) -> float:
 
 def sides_compared(rows: Sequence[Row], kind: Kind, record: EnsembleRecord) -> list[Row]:
     """Rows whose jumps have the sides of full runs beside their own, as ``others``."""
-    known = cache(partial(sides_of_reference, kind, record))
+    known = cache(partial(sides_of_reference, curves_of_reference(kind, record)))
 
     def compared(row: Row) -> Row:
         sides = [one | {"others": known(one["first"], one["last"])} for one in row["sides"]]
@@ -123,33 +123,9 @@ def sides_compared(rows: Sequence[Row], kind: Kind, record: EnsembleRecord) -> l
     return [compared(row) if "sides" in row else row for row in rows]
 
 
-Share = Callable[[Sequence[Row], str, int], float]
-
-
-def shares(held: Callable[[Row, Sequence[Row]], bool]) -> tuple[Share, Share]:
-    """Share of all jumps for which something holds, and of full runs between the same cycles [%].
-
-    ``held``: of the sides of a jump, beside those of full runs.
-    """
-
-    def jumps_of(rows: Sequence[Row], method: str, last: int) -> list[Row]:
-        return [one for row in finished(rows, method, last) for one in row.get("sides", [])]
-
-    def share(rows: Sequence[Row], method: str, last: int) -> float:
-        jumps = jumps_of(rows, method, last)
-        return percent([held(one, one["others"]) for one in jumps])
-
-    def share_full(rows: Sequence[Row], method: str, last: int) -> float:
-        beside = [one["others"] for one in jumps_of(rows, method, last)]
-        return percent(
-            [
-                held(one, [*others[:place], *others[place + 1 :]])
-                for others in beside
-                for place, one in enumerate(others)
-            ]
-        )
-
-    return share, share_full
+def jumps_of(rows: Sequence[Row], method: str, last: int) -> list[Row]:
+    """Sides of all jumps of a method, with ``others``: full runs between the same cycles."""
+    return [one for row in finished(rows, method, last) for one in row.get("sides", [])]
 
 
 def percent(held: Sequence[bool]) -> float:
@@ -158,15 +134,45 @@ def percent(held: Sequence[bool]) -> float:
 
 
 def bar_continues(words: str, column: str, skipped: int = 0) -> Bar:
-    """In nine jumps of ten a column goes on behind so many ``skipped`` cycles as full runs have."""
-    share, full = shares(lambda one, others: continues(one, others, column, skipped))
-    return Bar(words, "%", 90.0, share, least=True, full=full)
+    """In nine jumps of ten a column goes on behind so many ``skipped`` cycles as full runs have;
+    beside it each full run beside the others."""
+
+    def share(rows: Sequence[Row], method: str, last: int) -> float:
+        return percent(
+            [
+                continues(change_of(one, column, skipped), changes(one["others"]))
+                for one in jumps_of(rows, method, last)
+            ]
+        )
+
+    def share_full(rows: Sequence[Row], method: str, last: int) -> float:
+        known = [changes(one["others"]) for one in jumps_of(rows, method, last)]
+        return percent(
+            [
+                continues(change, np.delete(others, place))
+                for others in known
+                for place, change in enumerate(others)
+            ]
+        )
+
+    def changes(others: Sequence[Row]) -> FloatArray:
+        return np.array([change_of(one, column, skipped) for one in others])
+
+    return Bar(words, "%", 90.0, share, least=True, full=share_full)
 
 
 def bar_stays(words: str, column: str, skipped: int) -> Bar:
-    """In nine jumps of ten a column stays, behind ``skipped`` cycles, as single cycles before."""
-    share, full = shares(lambda one, _: stays(one, column, skipped))
-    return Bar(words, "%", 90.0, share, least=True, full=full)
+    """In nine jumps of ten a column stays, behind ``skipped`` cycles, as single cycles before;
+    beside it full runs."""
+
+    def share(rows: Sequence[Row], method: str, last: int) -> float:
+        return percent([stays(one, column, skipped) for one in jumps_of(rows, method, last)])
+
+    def share_full(rows: Sequence[Row], method: str, last: int) -> float:
+        full = [other for one in jumps_of(rows, method, last) for other in one["others"]]
+        return percent([stays(one, column, skipped) for one in full])
+
+    return Bar(words, "%", 90.0, share, least=True, full=share_full)
 
 
 BARS = (

@@ -9,7 +9,7 @@ between the same cycles.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -79,16 +79,15 @@ def change_of(sides: Row, column: str, skipped: int = 0) -> float:
     return float(np.nanmean(after[skipped:]) - np.nanmean(before))
 
 
-def continues(sides: Row, others: Sequence[Row], column: str, skipped: int = 0) -> bool:
+def continues(change: float, others: FloatArray) -> bool:
     """Whether the change over a jump is one that full runs have between the same cycles.
 
-    ``others``: their sides, n of them; the bound is Student's for one more of the same kind,
+    ``others``: their changes, shape (n,); the bound is Student's for one more of the same kind,
     t s sqrt(1 + 1/n), at `PROBABILITY`.
     """
-    changes = np.array([change_of(one, column, skipped) for one in others])
-    bound = stdtrit(len(changes) - 1, (1 + PROBABILITY) / 2) * changes.std(ddof=1)
-    bound *= np.sqrt(1 + 1 / len(changes))
-    return bool(abs(change_of(sides, column, skipped) - changes.mean()) <= bound)
+    bound = stdtrit(len(others) - 1, (1 + PROBABILITY) / 2) * others.std(ddof=1)
+    bound *= np.sqrt(1 + 1 / len(others))
+    return bool(abs(change - others.mean()) <= bound)
 
 
 def stays(sides: Row, column: str, skipped: int) -> bool:

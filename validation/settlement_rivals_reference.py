@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from adapters.fit_auto import outlook
 from adapters.laws import law_named
+from adapters.state import FloatArray
 from validation.settlement_ensemble import Kind, Piece
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import (
@@ -41,20 +43,26 @@ def columns_by_cycle(piece: Piece, record: EnsembleRecord) -> dict[int, dict[str
     }
 
 
+def curves_of_reference(kind: Kind, record: EnsembleRecord) -> list[dict[str, FloatArray]]:
+    """`COLUMNS` and ``cycle`` of every member as far as it came, its packing's before it."""
+    curves = []
+    for piece in kind.runs():
+        if piece.packing is None or record.kept(piece.name) is None:
+            continue
+        before, behind = (record.table(name) for name in (piece.packing.name, piece.name))
+        curves.append({name: np.append(before[name], behind[name]) for name in ("cycle", *COLUMNS)})
+    return curves
+
+
 def sides_of_reference(
-    kind: Kind, record: EnsembleRecord, first: int, last: int
+    curves: Sequence[dict[str, FloatArray]], first: int, last: int
 ) -> list[dict[str, Any]]:
     """What every member that came so far has on both sides of cycles ``first`` to ``last``."""
-    sides = []
-    for piece in kind.runs():
-        kept = record.kept(piece.name)
-        if piece.packing is None or kept is None or kept.cycle < last + CYCLES:
-            continue
-        found = columns_by_cycle(piece, record)
-        cycle = np.array(sorted(found), float)
-        columns = {name: np.array([found[int(c)][name] for c in cycle]) for name in COLUMNS}
-        sides.append(sides_without_jump(columns, cycle, first, last))
-    return sides
+    return [
+        sides_without_jump(curve, curve["cycle"], first, last)
+        for curve in curves
+        if curve["cycle"][-1] >= last + CYCLES
+    ]
 
 
 def engine_s(found: dict[int, dict[str, float]], k_i: int, last: int) -> float:

@@ -343,7 +343,15 @@ def test_a_bed_that_goes_on_is_seen_to_and_a_shock_is_not_passed() -> None:
     )
     for column in COLUMNS:
         went_on, stopped = (
-            np.mean([continues(one, others, column) for one, others in pairs])
+            np.mean(
+                [
+                    continues(
+                        change_of(one, column),
+                        np.array([change_of(other, column) for other in others]),
+                    )
+                    for one, others in pairs
+                ]
+            )
             for pairs in (same, shocked)
         )
         assert went_on == pytest.approx(0.95, abs=0.033)
