@@ -14,8 +14,9 @@ import numpy as np
 
 from adapters import stages
 from adapters.errors import EngineFailed, NotConverged, NotCredible
-from adapters.jump_history import SEATING, Jumped, asked_gain
+from adapters.jump_history import Jumped, asked_gain
 from adapters.jump_run import stretches_of
+from adapters.jump_seating import SEATING, hung_cycles, seat
 from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
 
@@ -26,15 +27,22 @@ SHARES = (1.0, 0.5, 0.25, 0.0)
 
 
 def settle_fixed(run: Run, bed: Bed) -> Bed:
-    """From the bed after k_i cycles to the end: k cycles and a jump of h, again and again."""
+    """From the bed after k_i cycles to the end: k cycles and a jump of h, again and again.
+
+    Where less is left than the shortest h, cycles are computed; where jumps waited for the piston,
+    the last is one of what is left, if it skips no fewer cycles than its healing costs.
+    """
     p = run.scene.procedure
     assert p is not None
     k = p.window_cycles
-    bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
+    if bed.cycle < p.total_cycles:
+        bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
     for number in range(p.total_cycles):
+        bed = seat(run, bed)
+        shortest = max(p.healing_cycles, 1) if hung_cycles(run, bed) else min(p.h or (0,))
         longest = p.total_cycles - bed.cycle - p.healing_cycles - k
         h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
-        if not run.variant.jumps or longest < min(p.h or (0,)):
+        if not run.variant.jumps or longest < shortest:
             break
         bed = jump_and_heal(run, bed, h)
     while bed.cycle < p.total_cycles:
@@ -108,14 +116,16 @@ def compute_on(run: Run, bed: Bed) -> Bed:
 
 
 def history_gain(run: Run, bed: Bed, h: int) -> float | None:
-    """Settlement over a jump [m] by all cycles computed but the first seating; None: by the law."""
+    """Settlement over a jump [m] by all cycles in which the bed carried the piston, but the first
+    of them; None: by the law."""
     p = run.scene.procedure
     assert p is not None
     if p.settlement == "law" or h == 0:
         return None
-    begin, outcomes = max(1, round(SEATING * p.k_i)), run.folder.outcomes()
+    begin, outcomes = hung_cycles(run, bed) + max(1, round(SEATING * p.k_i)), run.folder.outcomes()
     known = stretches_of(outcomes, begin, bed.cycle, left_out=1)
-    return asked_gain(known, h, jumps_of(outcomes, bed.cycle))
+    jumps = [one for one in jumps_of(outcomes, bed.cycle) if one.cycles[0] >= begin]
+    return asked_gain(known, h, jumps)
 
 
 def jumps_of(outcomes: Sequence[Outcome], end: int) -> list[Jumped]:

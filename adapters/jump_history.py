@@ -17,9 +17,6 @@ from adapters.jump_rates import Stretch
 from adapters.jump_slopes import Landing, slopes_of
 from adapters.state import FloatArray, IntArray
 
-SEATING = 0.2
-"""Share of the first k_i cycles that is another process: the rained bed takes the load."""
-
 
 @dataclass(frozen=True, eq=False)
 class Jumped:

@@ -7,7 +7,7 @@ decisions on the finished stages, and finds there what it would do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from math import isfinite, nan
 from typing import Any
 
@@ -19,6 +19,7 @@ from adapters.jump_check import accept, judge, reject
 from adapters.jump_control import Control, Decision, Settings, begin, decide, observe
 from adapters.jump_rates import Stretch
 from adapters.jump_record import CHECK, DECISION
+from adapters.jump_seating import hung_cycles
 from adapters.report_history import cost_total
 from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
@@ -39,6 +40,12 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
     rows = _rows(run, bed)
     control = begin(bed.cycle, float(rows[-1]["settlement"]))
     while (decision := decide(control, settings)).action != "end":
+        if (
+            decision.action == "jump"
+            and bed.cycle < (hung := hung_cycles(run, bed)) + procedure.k_i
+        ):
+            why = f"the piston hung on few grains until cycle {hung}"
+            decision = replace(decision, action="compute", jump=0, binding="seating", why=why)
         journal.write(DECISION, decision.cycle, decision.attempt, asdict(decision))
         if decision.action == "refuse":
             raise refused(run, decision)

@@ -19,6 +19,7 @@ from adapters.errors import (
 )
 from adapters.jump_fixed import settle_fixed
 from adapters.jump_run import settle_controlled
+from adapters.jump_seating import seat
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder, disk_full_named, write_atomically
 from adapters.scene import Scene, flat_keys
@@ -38,12 +39,13 @@ def control_perturbed(member: int) -> Variant:
 
 
 def settle(run: Run) -> Bed:
-    """The flow chart, Fig. 10: rain, k_i cycles, then k cycles and a jump of h until the end."""
+    """Fig. 10: rain, k_i cycles of a bed that carries its piston, then k cycles and a jump of h."""
     p = run.scene.procedure
     assert p is not None
     bed = stages.prepare(run)
     bed = stages.compute(run, bed, p.k_i)
     bed = replace(bed, start=replace(bed.start, perturbation=run.variant.perturbation))
+    bed = seat(run, bed)
     if p.tolerance is not None and run.variant.jumps and not run.variant.still:
         return settle_controlled(run, bed)
     return settle_fixed(run, bed)

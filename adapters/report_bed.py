@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 from adapters.checks import FORCE_ERROR_GOAL
+from adapters.jump_seating import HUNG, hung_until
 from adapters.report_error import COORDINATION_BAR, HEIGHT_BAR, PYTHON_BAR
 from adapters.report_html import (
     TIMES,
@@ -58,7 +59,7 @@ def structure(figures: Figures) -> str:
 def penetration(record: Record, numbers: Numbers, figures: Figures) -> str:
     """What the jumps did to the overlaps, and what each step of a jump adds to the error."""
     if not numbers.jumps:
-        return section("Jumps and relaxation", paragraph("No jump was made."))
+        return section("Jumps and relaxation", paragraph("No jump was made."), hung(record))
     measures = []
     for name, jump in record.run.jumps:
         relaxation = jump.notes["relaxation"]
@@ -138,6 +139,29 @@ def penetration(record: Record, numbers: Numbers, figures: Figures) -> str:
         if measures
         else paragraph("The scene asks for no relaxation."),
         owed(record),
+        hung(record),
+    )
+
+
+def hung(record: Record) -> str:
+    """Until when the piston hung on few grains, where it did."""
+    procedure = record.scene.procedure
+    if procedure is None:
+        return ""
+    last = hung_until(record.scene, record.run.outcomes, procedure.total_cycles)
+    if not last:
+        return ""
+    waits = procedure.seating == "waits"
+    return paragraph(
+        f"<strong>The piston hung on few grains until cycle {last}:</strong> it gave way by more "
+        f"than {HUNG:g} times what the mean field of Walton (1987) gives a bed of such grains. "
+        "When they let it go no cycle before tells"
+        + (
+            "; jumps waited until the bed had carried it for as long as the first cycles take."
+            if waits
+            else ", so a jump made by then may miss most of what the bed settles: "
+            '<code>procedure.seating = "waits"</code> computes on instead.'
+        )
     )
 
 

@@ -214,15 +214,16 @@ class Procedure(Table):
     """What a jump moves: a way of `adapters.moves`."""
     settlement: Literal["law", "history"] = "law"
     """What the mean grain settles by in a jump of h cycles: its law, or all cycles computed."""
+    seating: Literal["any", "waits"] = "any"
+    """Whether the k_i first cycles count from where the bed carries the piston."""
     relaxation: Literal["smallest-move", "karrech2007", "proximal", "none"] = "smallest-move"
     total_cycles: Count
     """Cycles computed and jumped at the end."""
 
     @model_serializer(mode="wrap")
     def _without_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Stored runs are older than the keys ``move``, ``tolerance`` and ``settlement``: at their
-        defaults they are left out."""
-        newer = {"move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
+        """Stored runs are older than these keys: at their defaults they are left out."""
+        newer = {"move": MOVE_DEFAULT, "tolerance": None, "settlement": "law", "seating": "any"}
         record: dict[str, Any] = whole(self)
         return {
             key: value for key, value in record.items() if key not in newer or value != newer[key]

@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from adapters.jump_history import SEATING, Jumped, asked_gain
+from adapters.jump_history import Jumped, asked_gain
 from adapters.jump_rates import Stretch
+from adapters.jump_seating import SEATING
 from adapters.laws import law_named
 from adapters.state import FloatArray
 from validation.settlement_ensemble import Kind, Piece

@@ -167,6 +167,12 @@ def remembering(jumps: int, move: str = "") -> Method:
     return Method(f"{jumps} jumps, by history{moved}", f"history{moved}", keys, JUMPING, jumps)
 
 
+def seated(method: Method) -> Method:
+    """The same, its k_i first cycles counted from where the bed carries the piston."""
+    keys = (*method.settings, 'procedure.seating="waits"')
+    return replace(method, name=f"{method.name}, seated", settings=keys)
+
+
 def softer(factor: int, base: Kind = COARSE) -> Method:
     """Young's modulus of the grains over ``factor``, and the longer time step that goes with it."""
     young = base.scene(1).material.grain.young / factor

@@ -2,6 +2,7 @@
 
     python -m validation.settlement_rivals_runs --work FOLDER [--minutes M] [--last N]
         [--study coarse|confined|far|partial] [--only rivals|budget|reference] [--methods NAME ...]
+        [--packings N ...]
     python -m validation.settlement_rivals_page      docs/settlement-rivals.md and its picture
 
 Writes a line to the record of the study (`validation.settlement_rivals_studies`) as each run ends
@@ -102,9 +103,17 @@ def plan_reference(kind: Kind, record: EnsembleRecord, last: int) -> Iterator[Pl
             yield head | {"member": member, "last": last}, filled
 
 
-def go_on(
-    plan: Iterator[Planned], path: Path, minutes: float, methods: Sequence[str] | None = None
-) -> None:
+def chosen(
+    plan: Iterator[Planned], methods: Sequence[str] | None, packings: Sequence[int] | None
+) -> Iterator[Planned]:
+    """Of a plan the runs of these methods on these packings; None: all."""
+    for head, fill in plan:
+        named = methods is None or head["method"] in methods
+        if named and (packings is None or head["seed"] in packings):
+            yield head, fill
+
+
+def go_on(plan: Iterator[Planned], path: Path, minutes: float) -> None:
     """Every run that the record lacks, a line each as it ends, until ``minutes`` are over."""
     began = time.monotonic()
     known = record_read(path)
@@ -112,7 +121,7 @@ def go_on(
     done = {key(row) for row in known}
     origin = {"commit": commit(), "machine": machine()}
     for head, fill in plan:
-        if key(head) in done or (methods and head["method"] not in methods):
+        if key(head) in done:
             continue
         if time.monotonic() - began > 60 * minutes:
             return
@@ -131,6 +140,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--study", choices=STUDIES, default=COARSE.name)
     parser.add_argument("--only", nargs="+", choices=PARTS_OF_STUDY, default=PARTS_OF_STUDY)
     parser.add_argument("--methods", nargs="+", help="only these")
+    parser.add_argument("--packings", nargs="+", type=int, help="only these")
     parser.add_argument("--record", type=Path, help="default: that of the study")
     parser.add_argument("--ensemble", type=Path, default=ENSEMBLE, help="the ensemble's record")
     given = parser.parse_args(words)
@@ -143,7 +153,7 @@ def main(words: Sequence[str] | None = None) -> None:
             "budget": plan_budget(given.work, record) if given.study == COARSE.name else iter(()),
         }
         for part in given.only:
-            go_on(plans[part], path, given.minutes, given.methods)
+            go_on(chosen(plans[part], given.methods, given.packings), path, given.minutes)
 
 
 if __name__ == "__main__":
