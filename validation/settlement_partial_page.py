@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from adapters.jump_seating import HUNG
 from adapters.run_folder import write_atomically
 from validation.page_text import page_filled, table
 from validation.settlement_bars import (
@@ -34,7 +35,7 @@ from validation.settlement_ensemble_reading import (
     curves,
 )
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_partial_bearing import table_bearing
+from validation.settlement_partial_bearing import table_bearing, table_seating
 from validation.settlement_rivals import Row
 from validation.settlement_rivals_reading import (
     FIGURES,
@@ -165,7 +166,8 @@ def page(rows: Sequence[Row], record: EnsembleRecord) -> str:
     text = bars_table(compared, NAMES, last, PARTLY)
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), {
         "CLAIMS": table_claims(rows, record), "PACKINGS": table_packings(rows),
-        "BARS": way(text), "BEARING": table_bearing(record), "LAST": str(last),
+        "BARS": way(text), "BEARING": table_bearing(record),
+        "SEATING": table_seating(record), "HUNG": f"{HUNG:g}", "LAST": str(last),
         "K_I": str(STUDY.kind.k_i),
         "HALF": f"{1e6 * settlement_of(rows, last).half_given:.0f}",
         "APART": ", ".join(f"{1e6 * one:.0f}" for one in members_apart(rows)),
