@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from adapters import jump_seating, procedure
+from adapters import jump_fixed, jump_seating, procedure
 from adapters.engine_fake import SETTLEMENT
+from adapters.jump_history import Jumped
+from adapters.jump_rates import Stretch
 from adapters.jump_seating import (
     CONSTRAINED,
     deflection_over_mean_field,
@@ -204,21 +207,29 @@ def test_history_begins_where_the_bed_carries_its_piston(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nothing of the cycles until 23 is known to the jump: those of 25 to 40 are, and the gain
-    a ln(76 / 41) follows, to the 2 % that ln N differs from ln(1 + N)."""
-    seen: list[int] = []
-    real = procedure.settle_fixed.__globals__["asked_gain"]
+    a ln(76 / 41) follows, to the 2 % that ln N differs from ln(1 + N).  Where the piston hangs
+    again, nothing is owed for jumps before."""
+    asked: list[tuple[int, int, list[int]]] = []
+    real = jump_fixed.asked_gain
 
-    def asked(known: Any, h: int, jumps: Any) -> float:
-        seen.extend([known[0].first_cycle, known[-1].last_cycle])
-        return float(real(known, h, jumps))
+    def gain(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
+        before = [int(one.cycles[0]) for one in jumps]
+        asked.append((known[0].first_cycle, known[-1].last_cycle, before))
+        return real(known, h, jumps)
 
-    monkeypatch.setitem(procedure.settle_fixed.__globals__, "asked_gain", asked)
-    keys = (*FIXED, WAITS, 'procedure.settlement="history"')
-    settle(tmp_path / "run", monkeypatch, (1, 23), *keys)
-    assert seen == [25, 40]
-    notes = RunFolder(tmp_path / "run").outcome("jump_000040_1")
-    assert notes is not None
-    assert notes.notes["gain"] == pytest.approx(SETTLEMENT * np.log(76 / 41), rel=0.02)
+    monkeypatch.setattr(jump_fixed, "asked_gain", gain)
+    history = (WAITS, 'procedure.settlement="history"')
+    settle(tmp_path / "run", monkeypatch, (1, 23), *FIXED, *history)
+    assert asked == [(25, 40, [])]
+    jump = RunFolder(tmp_path / "run").outcome("jump_000040_1")
+    assert jump is not None
+    assert jump.notes["gain"] == pytest.approx(SETTLEMENT * np.log(76 / 41), rel=0.02)
+    asked.clear()
+    keys = ("procedure.h=10", "procedure.healing_cycles=2", "procedure.total_cycles=99")
+    settle(tmp_path / "again", monkeypatch, (45, 47), *keys, *history)
+    assert [before for _, _, before in asked[:3]] == [[], [15], []]
+    assert asked[2][0] == 49
+    assert asked[3][2] == [asked[2][1]]
 
 
 def test_jumps_that_choose_themselves_wait_too(
