@@ -56,8 +56,8 @@ def deflection_over_mean_field(scene: Scene, rows: Sequence[dict[str, Any]]) -> 
     """Elastic deflection of each cycle over that of a bed of such grains, shape (c,).
 
     Strain from trough s_0 to peak s_1 of the load: the integral of ds / M(s), which is
-    (3/2) (s_1 / M(s_1) - s_0 / M(s_0)), as M goes as s^(1/3).  nan where no two grains touch.  Not
-    for a bed of one or two layers, whose contacts with floor and piston are not counted.
+    (3/2) (s_1 / M(s_1) - s_0 / M(s_0)), as M goes as s^(1/3).  nan where no two grains touch:
+    contacts with floor and piston are not counted.
     """
     assert scene.loading is not None
     grain = scene.material.grain
