@@ -16,7 +16,7 @@ from adapters import stages
 from adapters.errors import EngineFailed, NotConverged, NotCredible
 from adapters.jump_history import Jumped, asked_gain
 from adapters.jump_run import stretches_of
-from adapters.jump_seating import SEATING, hung_cycles, seat
+from adapters.jump_seating import SEATING, counted_from, seat, warn_if_hung
 from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
 
@@ -38,12 +38,15 @@ def settle_fixed(run: Run, bed: Bed) -> Bed:
     if bed.cycle < p.total_cycles:
         bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
     for number in range(p.total_cycles):
-        bed = seat(run, bed)
-        shortest = max(p.healing_cycles, 1) if hung_cycles(run, bed) else min(p.h or (0,))
+        if not run.variant.jumps:
+            break
+        bed = seat(run, bed, p.k_i + k)
+        shortest = max(p.healing_cycles, 1) if counted_from(run, bed) else min(p.h or (0,))
         longest = p.total_cycles - bed.cycle - p.healing_cycles - k
         h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
-        if not run.variant.jumps or longest < shortest:
+        if longest < shortest:
             break
+        warn_if_hung(run, bed)
         bed = jump_and_heal(run, bed, h)
     while bed.cycle < p.total_cycles:
         bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
@@ -122,7 +125,7 @@ def history_gain(run: Run, bed: Bed, h: int) -> float | None:
     assert p is not None
     if p.settlement == "law" or h == 0:
         return None
-    begin, outcomes = hung_cycles(run, bed) + max(1, round(SEATING * p.k_i)), run.folder.outcomes()
+    begin, outcomes = counted_from(run, bed) + max(1, round(SEATING * p.k_i)), run.folder.outcomes()
     known = stretches_of(outcomes, begin, bed.cycle, left_out=1)
     jumps = [one for one in jumps_of(outcomes, bed.cycle) if one.cycles[0] >= begin]
     return asked_gain(known, h, jumps)

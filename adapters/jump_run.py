@@ -7,7 +7,7 @@ decisions on the finished stages, and finds there what it would do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from math import isfinite, nan
 from typing import Any
 
@@ -19,7 +19,7 @@ from adapters.jump_check import accept, judge, reject
 from adapters.jump_control import Control, Decision, Settings, begin, decide, observe
 from adapters.jump_rates import Stretch
 from adapters.jump_record import CHECK, DECISION
-from adapters.jump_seating import hung_cycles
+from adapters.jump_seating import seat, warn_if_hung
 from adapters.report_history import cost_total
 from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
@@ -28,6 +28,7 @@ from adapters.stages import Bed, Run
 def settle_controlled(run: Run, bed: Bed) -> Bed:
     """From the bed after k_i cycles to the end: windows and jumps as the controller decides.
 
+    Where jumps wait for a piston that hangs, nothing of the cycles before is known to it behind.
     Raises `JumpRefused` where the bed ratchets or collapses, unless the run was asked to go on.
     """
     procedure = run.scene.procedure
@@ -39,13 +40,13 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
     journal = Journal(run)
     rows = _rows(run, bed)
     control = begin(bed.cycle, float(rows[-1]["settlement"]))
-    while (decision := decide(control, settings)).action != "end":
-        if (
-            decision.action == "jump"
-            and bed.cycle < (hung := hung_cycles(run, bed)) + procedure.k_i
-        ):
-            why = f"the piston hung on few grains until cycle {hung}"
-            decision = replace(decision, action="compute", jump=0, binding="seating", why=why)
+    while True:
+        if (seated := seat(run, bed, procedure.k_i)).cycle > bed.cycle:
+            bed = seated
+            control = begin(bed.cycle, float(_rows(run, bed)[-1]["settlement"]))
+        decision = decide(control, settings)
+        if decision.action == "end":
+            return bed
         journal.write(DECISION, decision.cycle, decision.attempt, asdict(decision))
         if decision.action == "refuse":
             raise refused(run, decision)
@@ -55,8 +56,8 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
             stretch = stretch_of(rows, control.settlement)
             control = observe(control, stretch, float(rows[-1]["settlement"]))
         else:
+            warn_if_hung(run, bed)
             bed, control = jump_and_check(run, bed, control, decision, settings, journal)
-    return bed
 
 
 def jump_and_check(

@@ -20,15 +20,16 @@ from adapters import stages
 from adapters.run_folder import Outcome
 from adapters.scene import Scene
 from adapters.stages import Bed, Run
-from adapters.state import FloatArray
+from adapters.state import FloatArray, IntArray
 
 SEATING = 0.2
 """Share of the first k_i cycles that is another process: the rained bed takes the load."""
 HUNG = 5.0
 """Elastic deflection over that of the mean field, above which the piston hangs.
 
-Ten packings of the reference ensemble have 0.7 to 2.2 in every cycle from the fifth on, the one
-whose piston hangs 17 to 35 (docs/settlement-partial.md).
+Ten packings of the reference ensemble have 0.6 to 2.2 in every cycle from the fifth on, the one
+whose piston hangs 10 to 40 (docs/settlement-partial.md); any bar from 3 to 10 tells the same ones,
+and moves the cycle at which it is carried by some.
 """
 CONSTRAINED = 9 / 5
 """M / K of smooth spheres under isotropic stress: the mean of n_z^4 over that of n_z^2 / 3."""
@@ -43,7 +44,9 @@ def modulus_constrained(
 
     ``young`` [Pa] and ``poisson`` of the grains, relative ``density`` phi and ``coordination``
     number Z, shape (c,), mean ``pressure`` p [Pa].  Every grain moves with the mean strain here:
-    right to a factor of two, no more; not for beds under their own weight alone.
+    right to a factor of two, no more; not for beds under their own weight alone.  Walton's p is the
+    mean stress: with the vertical one in its place, of which it is some two thirds in a confined
+    bed, M is too great by a seventh.
     """
     mu = young / (2 * (1 + poisson))
     lame = young * poisson / ((1 + poisson) * (1 - 2 * poisson))
@@ -55,27 +58,34 @@ def modulus_constrained(
 def deflection_over_mean_field(scene: Scene, rows: Sequence[dict[str, Any]]) -> FloatArray:
     """Elastic deflection of each cycle over that of a bed of such grains, shape (c,).
 
-    Strain from trough s_0 to peak s_1 of the load: the integral of ds / M(s), which is
-    (3/2) (s_1 / M(s_1) - s_0 / M(s_0)), as M goes as s^(1/3).  nan where no two grains touch:
-    contacts with floor and piston are not counted.
+    Strain from the stress s_0 at a cycle's end to the peak s_1: the integral of ds / M(s), which is
+    (3/2) (s_1 / M(s_1) - s_0 / M(s_0)), as M goes as s^(1/3).  nan where no two grains touch
+    (contacts with floor and piston are not counted) and where s_0 is the peak.
     """
-    assert scene.loading is not None
     grain = scene.material.grain
     names = ("relative_density", "coordination_number", "piston_height", "elastic_deflection")
     density, coordination, height, deflection = (
         np.array([row[name] for row in rows], float) for name in names
     )
-    stress = scene.stress_at(np.linspace(0, 1, 1001))
     strain = np.zeros(len(rows))
-    for sign, level in ((1, float(stress.max())), (-1, float(stress.min()))):
+    for sign, level in zip((-1, 1), stress_of_cycle(scene), strict=True):
         if level > 0:
             modulus = modulus_constrained(grain.young, grain.poisson, density, coordination, level)
             strain += sign * 1.5 * level / np.where(modulus > 0, modulus, np.nan)
-    return np.asarray(deflection / (strain * height))
+    return np.asarray(deflection / (np.where(strain > 0, strain, np.nan) * height))
 
 
-def hung_until(scene: Scene, outcomes: Sequence[Outcome], end: int) -> int:
-    """The last cycle computed up to ``end`` in which the piston hung; 0 where it did not.
+def stress_of_cycle(scene: Scene) -> tuple[float, float]:
+    """Stress of the load [Pa] at a cycle's end, and the greatest in it."""
+    loading = scene.loading
+    assert loading is not None
+    samples = loading.samples
+    peak = loading.stress_at(0.5) if samples is None else samples.stress.max()
+    return float(loading.stress_at(0.0)), float(peak)
+
+
+def cycles_hung(scene: Scene, outcomes: Sequence[Outcome]) -> IntArray:
+    """Computed cycles in which the piston hung, ascending.
 
     Left out are cycles in which a bed takes the load for the first time (`SEATING`), and healing
     ones: contacts that a jump has moved bear late.
@@ -83,40 +93,55 @@ def hung_until(scene: Scene, outcomes: Sequence[Outcome], end: int) -> int:
     assert scene.procedure is not None
     rows = [row for one in outcomes for row in one.rows if row["kind"] == "computed"]
     cycle = np.array([row["cycle"] for row in rows], int)
-    over = deflection_over_mean_field(scene, rows)
-    counts = (cycle > SEATING * scene.procedure.k_i) & (cycle <= end)
-    hung = cycle[(over > HUNG) & counts]
-    return int(hung.max(initial=0))
+    hung = deflection_over_mean_field(scene, rows) > HUNG
+    return cycle[hung & (cycle > SEATING * scene.procedure.k_i)]
 
 
-def hung_cycles(run: Run, bed: Bed) -> int:
-    """Cycles that the first k_i are counted from: 0 unless the run waits and its piston hung.
+def hung_until(run: Run, bed: Bed) -> int:
+    """The last cycle up to the bed's in which its piston hung; 0 where it did not.
 
     What the folder holds beyond the bed's cycle is not asked: a run that is resumed decides again
     as it did.
     """
+    hung = cycles_hung(run.scene, run.folder.outcomes())
+    return int(hung[hung <= bed.cycle].max(initial=0))
+
+
+def counted_from(run: Run, bed: Bed) -> int:
+    """Cycle from which the first k_i count: 0 unless the run waits and its piston hung."""
     assert run.scene.procedure is not None
-    waits = run.scene.procedure.seating == "waits"
-    return hung_until(run.scene, run.folder.outcomes(), bed.cycle) if waits else 0
+    return hung_until(run, bed) if run.scene.procedure.seating == "waits" else 0
 
 
-def seat(run: Run, bed: Bed) -> Bed:
-    """Windows until the bed has carried its piston for k_i cycles; the same bed where it has.
-
-    A run that does not wait says that its piston hangs, and goes on.
-    """
+def seat(run: Run, bed: Bed, cycles: int) -> Bed:
+    """Windows until the bed has carried its piston for so many ``cycles``, where the run waits."""
     p = run.scene.procedure
     assert p is not None
-    if p.seating == "any":
-        hung = hung_until(run.scene, run.folder.outcomes(), bed.cycle)
-        if run.variant.jumps and hung == bed.cycle:
-            run.progress.say(
-                f"warning: at cycle {hung} the piston hangs on few grains: it gives way by more "
-                f"than {HUNG:g} times what a bed of such grains does; "
-                'procedure.seating = "waits" computes on until the bed carries it'
-            )
-        return bed
-    while (hung := hung_cycles(run, bed)) and bed.cycle < min(hung + p.k_i, p.total_cycles):
+    while (hung := counted_from(run, bed)) and bed.cycle < min(hung + cycles, p.total_cycles):
         run.progress.say(f"the piston hung on few grains until cycle {hung}: computing on")
         bed = stages.compute(run, bed, min(p.window_cycles, p.total_cycles - bed.cycle))
     return bed
+
+
+def warn_if_hung(run: Run, bed: Bed) -> None:
+    """Before a jump of a run that does not wait: that its piston hangs, or did so shortly before.
+
+    Once: not where the jump, or a try of it, is in the folder.
+    """
+    p = run.scene.procedure
+    assert p is not None
+    if p.seating == "waits" or f"jump_{bed.cycle:06d}_1" in run.folder.stage_names():
+        return
+    hung = hung_until(run, bed)
+    if hung and bed.cycle < hung + p.k_i:
+        run.progress.say(
+            f"warning: the piston hung on few grains until cycle {hung}: it gave way by more than "
+            f"{HUNG:g} times what a bed of such grains does; a jump from cycle {bed.cycle} can not "
+            'tell when they let it go. procedure.seating = "waits" computes on instead'
+        )
+
+
+def spans(cycles: IntArray) -> str:
+    """Ascending cycles in words, such as ``1 to 43, 68 to 87``; empty for none."""
+    parts = np.split(cycles, np.flatnonzero(np.diff(cycles) > 1) + 1) if len(cycles) else []
+    return ", ".join(f"{part[0]} to {part[-1]}" for part in parts)

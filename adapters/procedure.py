@@ -19,7 +19,6 @@ from adapters.errors import (
 )
 from adapters.jump_fixed import settle_fixed
 from adapters.jump_run import settle_controlled
-from adapters.jump_seating import seat
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder, disk_full_named, write_atomically
 from adapters.scene import Scene, flat_keys
@@ -39,13 +38,12 @@ def control_perturbed(member: int) -> Variant:
 
 
 def settle(run: Run) -> Bed:
-    """Fig. 10: rain, k_i cycles of a bed that carries its piston, then k cycles and a jump of h."""
+    """The flow chart, Fig. 10: rain, k_i cycles, then k cycles and a jump of h until the end."""
     p = run.scene.procedure
     assert p is not None
     bed = stages.prepare(run)
     bed = stages.compute(run, bed, p.k_i)
     bed = replace(bed, start=replace(bed.start, perturbation=run.variant.perturbation))
-    bed = seat(run, bed)
     if p.tolerance is not None and run.variant.jumps and not run.variant.still:
         return settle_controlled(run, bed)
     return settle_fixed(run, bed)
@@ -135,10 +133,7 @@ def run_variant(
     else:
         here = RunFolder(folder.path / variant.name)
         here.path.mkdir(exist_ok=True)
-        assert scene.procedure is not None
-        first = 0 if variant.perturbation else scene.procedure.window_cycles
-        shared = scene.procedure.k_i + first
-        here.share_start(folder, shared)
+        here.share_start(folder, shared_cycles(folder, scene, variant))
         progress.say(variant.name.replace("_", " "))
     run = Run(scene, here, engine, variant, progress, cycle_by_cycle)
     if variant.name == "procedure":
@@ -150,6 +145,23 @@ def run_variant(
         settle(run)
     here.settlement_write()  # a run killed after its last stage may lack a row
     return here
+
+
+def shared_cycles(folder: RunFolder, scene: Scene, variant: Variant) -> int:
+    """Cycles up to which a variant's stages are those of the procedure in ``folder``.
+
+    Up to k_i where a grain is moved there; else the first window, and where jumps waited for the
+    piston all windows before the first jump.
+    """
+    p = scene.procedure
+    assert p is not None
+    if variant.perturbation:
+        return p.k_i
+    first = p.k_i + p.window_cycles
+    if p.seating == "any":
+        return first
+    jumps = (one.first_cycle for one in folder.outcomes() if one.stage == "jump")
+    return max(first, next(jumps, p.total_cycles))
 
 
 def scene_record(scene: Scene) -> dict[str, Any]:

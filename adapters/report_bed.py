@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 
 from adapters.checks import FORCE_ERROR_GOAL
-from adapters.jump_seating import HUNG, hung_until
+from adapters.jump_seating import HUNG, cycles_hung, spans
 from adapters.report_error import COORDINATION_BAR, HEIGHT_BAR, PYTHON_BAR
 from adapters.report_html import (
     TIMES,
@@ -144,24 +144,29 @@ def penetration(record: Record, numbers: Numbers, figures: Figures) -> str:
 
 
 def hung(record: Record) -> str:
-    """Until when the piston hung on few grains, where it did."""
+    """In which cycles the piston hung on few grains, and whether jumps were made then."""
     procedure = record.scene.procedure
-    if procedure is None:
+    if procedure is None or record.scene.loading is None:
         return ""
-    last = hung_until(record.scene, record.run.outcomes, procedure.total_cycles)
-    if not last:
+    cycles = cycles_hung(record.scene, record.run.outcomes)
+    if not len(cycles):
         return ""
-    waits = procedure.seating == "waits"
+    early = sum(
+        bool(((cycles <= jump.first_cycle) & (cycles > jump.first_cycle - procedure.k_i)).any())
+        for _, jump in record.run.jumps
+    )
+    behind = f"then or within k<sub>i</sub> = {procedure.k_i} cycles behind"
+    told = (
+        f"{early} of the {len(record.run.jumps)} jumps were made {behind}: when the grains let go "
+        "no cycle before tells, so they may miss most of what the bed settles. "
+        '<code>procedure.seating = "waits"</code> computes on instead.'
+        if early
+        else f"No jump was made {behind}."
+    )
     return paragraph(
-        f"<strong>The piston hung on few grains until cycle {last}:</strong> it gave way by more "
-        f"than {HUNG:g} times what the mean field of Walton (1987) gives a bed of such grains. "
-        "When they let it go no cycle before tells"
-        + (
-            "; jumps waited until the bed had carried it for as long as the first cycles take."
-            if waits
-            else ", so a jump made by then may miss most of what the bed settles: "
-            '<code>procedure.seating = "waits"</code> computes on instead.'
-        )
+        f"<strong>The piston hung on few grains in cycles {spans(cycles)}:</strong> it gave way by "
+        f"more than {HUNG:g} times what the mean field of Walton (1987) gives a bed of such "
+        f"grains. {told}"
     )
 
 

@@ -17,7 +17,7 @@ from validation.settlement_ensemble import Kind
 from validation.settlement_ensemble_reading import Nested, nested
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import HEALING, Row
-from validation.settlement_rivals_continuity import COLUMNS, change_of, continues, stays
+from validation.settlement_rivals_continuity import COLUMNS, change_of, continues, like, stays
 from validation.settlement_rivals_reading import (
     FIGURES,
     cost,
@@ -113,19 +113,28 @@ def gained_time(rows: Sequence[Row], method: str, last: int) -> float:
 
 
 def sides_compared(rows: Sequence[Row], kind: Kind, record: EnsembleRecord) -> list[Row]:
-    """Rows whose jumps have the sides of full runs beside their own, as ``others``."""
+    """Rows whose jumps have beside their own sides those of full runs, over as many cycles, as
+    ``others``."""
     known = cache(partial(sides_of_reference, curves_of_reference(kind, record)))
 
     def compared(row: Row) -> Row:
-        sides = [one | {"others": known(one["first"], one["last"])} for one in row["sides"]]
+        sides = [
+            one | {"others": [like(one, other) for other in known(one["first"], one["last"])]}
+            for one in row["sides"]
+        ]
         return row | {"sides": sides}
 
     return [compared(row) if "sides" in row else row for row in rows]
 
 
+FEWEST = 3
+"""Full runs beside a jump, fewer than which tell nothing of it: each is judged by the others."""
+
+
 def jumps_of(rows: Sequence[Row], method: str, last: int) -> list[Row]:
-    """Sides of all jumps of a method, with ``others``: full runs between the same cycles."""
-    return [one for row in finished(rows, method, last) for one in row.get("sides", [])]
+    """Sides of all jumps of a method that full runs are known to, as ``others``."""
+    jumps = [one for row in finished(rows, method, last) for one in row.get("sides", [])]
+    return [one for one in jumps if len(one["others"]) >= FEWEST]
 
 
 def percent(held: Sequence[bool]) -> float:

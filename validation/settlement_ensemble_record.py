@@ -156,6 +156,11 @@ class EnsembleRecord:
         values = np.array(rows, float).reshape(len(rows), len(COLUMNS))
         return dict(zip(COLUMNS, values.T, strict=True))
 
+    def since_rain(self, packing: str, member: str) -> dict[str, FloatArray]:
+        """Columns of a packing's table with those of a member behind."""
+        before, behind = self.table(packing), self.table(member)
+        return {name: np.append(before[name], behind[name]) for name in before}
+
     def restart(self, kept: Kept) -> bytes:
         """The engine's restart file; raises `UsageError` when it is not the table's."""
         path = self.path / kept.checkpoint.file

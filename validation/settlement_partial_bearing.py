@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.jump_seating import HUNG, deflection_over_mean_field
-from adapters.state import FloatArray, IntArray
+from adapters.jump_seating import HUNG, deflection_over_mean_field, spans
+from adapters.state import FloatArray
 from validation.page_text import table
 from validation.settlement_ensemble import PARTIAL, Piece
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals_reference import columns_by_cycle
 
 NEAR = 1e-5
 """Gap [m] up to which a grain counts as under the piston: the seated beds spring by as much."""
@@ -49,17 +50,8 @@ def near(gaps: tuple[FloatArray, FloatArray]) -> tuple[int, int]:
 
 def mean_field_ratios(piece: Piece, record: EnsembleRecord) -> FloatArray:
     """Elastic deflection of every cycle of a full run since the rain, over the mean field's."""
-    assert piece.packing is not None
-    tables = [record.table(one.name) for one in (piece.packing, piece)]
-    columns = [np.concatenate([one[name] for one in tables]) for name in tables[0]]
-    rows = [dict(zip(tables[0], row, strict=True)) for row in zip(*columns, strict=True)]
+    rows = list(columns_by_cycle(piece, record).values())
     return deflection_over_mean_field(piece.kind.scene(piece.seed), rows)
-
-
-def spans(cycles: IntArray) -> str:
-    """Ascending cycles in words, such as ``1 to 43, 68 to 87``; a dash for none."""
-    parts = np.split(cycles, np.flatnonzero(np.diff(cycles) > 1) + 1) if len(cycles) else []
-    return ", ".join(f"{part[0]} to {part[-1]}" for part in parts) or "-"
 
 
 def table_seating(record: EnsembleRecord) -> str:
@@ -71,7 +63,7 @@ def table_seating(record: EnsembleRecord) -> str:
             continue
         ratio = mean_field_ratios(piece, record)
         told = [f"{ratio[mark - 1]:.1f}" if mark <= len(ratio) else "-" for mark in marks]
-        hung = spans(np.flatnonzero(ratio > HUNG) + 1)
+        hung = spans(np.flatnonzero(ratio > HUNG) + 1) or "-"
         lines.append([f"{piece.seed}, {1 + (piece.member or 0)}", *told, hung])
     return table(["packing, run", *(f"cycle {mark}" for mark in marks), "hangs in cycles"], lines)
 

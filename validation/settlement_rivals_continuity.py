@@ -21,7 +21,7 @@ from validation.move_study_engine import cycles_of
 
 Row = dict[str, Any]
 CYCLES = 10
-"""On each side of a jump."""
+"""On each side of a jump, at most."""
 COLUMNS = ("settlement", "coordination_number", "piston_stiffness")
 """Settlement gained in each cycle [m], grains that touch a grain, N/m."""
 PROBABILITY = 0.95
@@ -30,6 +30,7 @@ PROBABILITY = 0.95
 def sides_of(run: Run) -> list[Row]:
     """Of every jump that stands: cycles ``first`` to ``last``, `COLUMNS` ``before`` and ``after``.
 
+    As many of `CYCLES` as the windows on both sides of it have.
     Settlement is that of each cycle, in the first one of a window since the end of what came before
     it; a jump of no cycle ends with the cycle before it.
     """
@@ -65,6 +66,21 @@ def sides_without_jump(
     return sides
 
 
+def like(sides: Row, other: Row) -> Row:
+    """The sides of a full run cut to the cycles that a jump's ``sides`` know: windows are short.
+
+    The last cycles before and the first behind; nan where the jump's own are.
+    """
+    cut: Row = {"first": other["first"], "last": other["last"]}
+    for name in ("before", "after"):
+        cut[name] = {}
+        for column in sides[name]:
+            mine, full = (np.array(one[name][column], float) for one in (sides, other))
+            full = full[-len(mine) :] if name == "before" else full[: len(mine)]
+            cut[name][column] = np.where(np.isfinite(mine), full, np.nan)
+    return cut
+
+
 def change_of(sides: Row, column: str, skipped: int = 0) -> float:
     """Mean behind a jump, or behind so many ``skipped`` cycles more, less mean before it.
 
@@ -82,8 +98,8 @@ def change_of(sides: Row, column: str, skipped: int = 0) -> float:
 def continues(change: float, others: FloatArray) -> bool:
     """Whether the change over a jump is one that full runs have between the same cycles.
 
-    ``others``: their changes, shape (n,); the bound is Student's for one more of the same kind,
-    t s sqrt(1 + 1/n), at `PROBABILITY`.
+    ``others``: their changes, shape (n,), two at least; the bound is Student's for one more of the
+    same kind, t s sqrt(1 + 1/n), at `PROBABILITY`.
     """
     bound = stdtrit(len(others) - 1, (1 + PROBABILITY) / 2) * others.std(ddof=1)
     bound *= np.sqrt(1 + 1 / len(others))

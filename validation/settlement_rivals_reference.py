@@ -36,15 +36,13 @@ def law_name(law: str, cycles: int) -> str:
 def columns_by_cycle(piece: Piece, record: EnsembleRecord) -> dict[int, dict[str, float]]:
     """Columns of the packing's cycles and the member's, by cycle."""
     assert piece.packing is not None
-    return {
-        int(row[0]): dict(zip(table, row, strict=True))
-        for table in (record.table(piece.packing.name), record.table(piece.name))
-        for row in zip(*table.values(), strict=True)
-    }
+    table = record.since_rain(piece.packing.name, piece.name)
+    rows = (dict(zip(table, row, strict=True)) for row in zip(*table.values(), strict=True))
+    return {int(row["cycle"]): row for row in rows}
 
 
 def curves_of_reference(kind: Kind, record: EnsembleRecord) -> list[dict[str, FloatArray]]:
-    """`COLUMNS` and ``cycle`` of every member as far as it came, its packing's before it."""
+    """Tables of all members as far as they came, their packings' before them."""
     curves = []
     for piece in kind.runs():
         if piece.packing is None or record.kept(piece.name) is None:

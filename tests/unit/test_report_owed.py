@@ -6,6 +6,7 @@ import re
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from adapters import report_bed
@@ -29,17 +30,26 @@ def test_only_what_is_left_at_the_end_is_told() -> None:
     assert ">40.0</data> µm less" in owed(record(whole, short))
 
 
-@pytest.mark.parametrize(("seating", "told"), [("any", "may miss most"), ("waits", "waited")])
+@pytest.mark.parametrize(
+    ("cycles", "jumps", "told"),
+    [
+        ([], [15], ""),
+        ([1, 2, 9], [15, 40], "cycles 1 to 2, 9 to 9:</strong>.* 1 of the 2 jumps were made then"),
+        ([1, 2, 9], [19, 40], "cycles 1 to 2, 9 to 9:</strong>.* No jump was made then"),
+        ([30], [15, 25], "cycles 30 to 30:</strong>.* No jump was made then"),
+    ],
+)
 def test_a_piston_that_hung_is_told(
-    monkeypatch: pytest.MonkeyPatch, seating: str, told: str
+    monkeypatch: pytest.MonkeyPatch, cycles: list[int], jumps: list[int], told: str
 ) -> None:
-    """Until which cycle, and what jumps did; nothing where it did not hang, or there is no load."""
-    scene = scene_load(scene_path("karrech-coarse"), [f'procedure.seating="{seating}"'])
-    run = SimpleNamespace(outcomes=[])
-    for last, words in ((0, ""), (7, f"until cycle 7:</strong>.*{told}")):
-        monkeypatch.setattr(report_bed, "hung_until", lambda *_, last=last: last)
-        found = hung(cast(Record, SimpleNamespace(scene=scene, run=run)))
-        assert re.search(words, found, re.DOTALL)
-        assert bool(found) == bool(last)
-    bare = SimpleNamespace(procedure=None)
+    """In which cycles, and how many jumps were made then or in the k_i = 10 cycles behind; nothing
+    where it did not hang, or there is no load."""
+    scene = scene_load(scene_path("karrech-coarse"), ["procedure.k_i=10"])
+    made = [("jump", Outcome("jump", first, first + 5, [], {})) for first in jumps]
+    run = SimpleNamespace(outcomes=[], jumps=made)
+    monkeypatch.setattr(report_bed, "cycles_hung", lambda *_: np.array(cycles, int))
+    found = hung(cast(Record, SimpleNamespace(scene=scene, run=run)))
+    assert re.search(told, found, re.DOTALL)
+    assert bool(found) == bool(cycles)
+    bare = SimpleNamespace(procedure=scene.procedure, loading=None)
     assert hung(cast(Record, SimpleNamespace(scene=bare, run=run))) == ""
