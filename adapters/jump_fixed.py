@@ -24,6 +24,8 @@ RETRIES = 3
 """How often a failed jump is tried again, by its law each time half as long."""
 SHARES = (1.0, 0.5, 0.25, 0.0)
 """Of the move, by history, in each of the tries: the bed has no room for more."""
+GROWTH = 2.0
+"""Of what a bed had room for, the most that the next jump by history tries to move it by."""
 
 
 def settle_fixed(run: Run, bed: Bed) -> Bed:
@@ -56,9 +58,10 @@ def settle_fixed(run: Run, bed: Bed) -> Bed:
 def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
     """A jump of ``h`` cycles and the window after it; a failed jump is tried again.
 
-    By its law half as long.  By history with one of `SHARES` of the move: what lacks is known to
-    the next jump, which makes it good.  Where the jump and its retries failed: `compute_on` if the
-    run may compute what it can not jump, else raises `NotCredible`.
+    By its law half as long.  By history with one of `SHARES` of the move, or of the room that jumps
+    before it found: what lacks is known to the next jump, which makes it good.  Where the jump and
+    its retries failed: `compute_on` if the run may compute what it can not jump, else raises
+    `NotCredible`.
     """
     p = run.scene.procedure
     assert p is not None
@@ -70,7 +73,10 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
             try:
                 with disk_full_named(run.folder.path):
                     gain = history_gain(run, bed, h)
-                    share = 1.0 if gain is None else SHARES[attempt - 1]
+                    share = 1.0
+                    if gain:
+                        room = room_known(run.folder.outcomes(), bed.cycle)
+                        share = SHARES[attempt - 1] * min(1.0, room / gain)
                     new = run.folder.outcome(name) is None
                     moved = stages.jump(run, bed, h, attempt, gain, share)
                     if new and gain and share < 1:
@@ -129,6 +135,25 @@ def history_gain(run: Run, bed: Bed, h: int) -> float | None:
     known = stretches_of(outcomes, begin, bed.cycle, left_out=1)
     jumps = [one for one in jumps_of(outcomes, bed.cycle) if one.cycles[0] >= begin]
     return asked_gain(known, h, jumps)
+
+
+def room_known(outcomes: Sequence[Outcome], end: int) -> float:
+    """What the next jump by history may try to move the mean grain by [m]; inf: all that is asked.
+
+    Debts grow behind a jump without room, and shares of them with them: a bed that settles by 30 um
+    a jump would be asked for a quarter of 500.  So a jump tries no more than `GROWTH` times what
+    the one before found room for, half of its smallest try where it found none.
+    """
+    room = np.inf
+    for one in outcomes:
+        if one.stage != "jump" or one.last_cycle > end or not one.notes.get("asked"):
+            continue
+        tried, got = min(room, one.notes["asked"]), one.notes["gain"]
+        if one.notes["attempt"] == 1:
+            room = max(room, GROWTH * got)
+        else:
+            room = GROWTH * got if got else tried * min(filter(None, SHARES)) / 2
+    return float(room)
 
 
 def jumps_of(outcomes: Sequence[Outcome], end: int) -> list[Jumped]:
