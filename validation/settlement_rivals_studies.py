@@ -41,14 +41,15 @@ class Study:
 
 FAR = (
     *map(growing, (remembering(13), remembering(13, "profile"), *jumping(13))),
-    replace(growing(remembering(31, "profile")), window=6),
+    *(replace(growing(remembering(jumps, "profile")), window=6) for jumps in (31, 40)),
     Method("tolerance 0.1", "tolerance", ("procedure.tolerance=0.1",), JUMPING),
 )
 """To 10,000 cycles of the coarse bed: 13 jumps compute 345 cycles of 9,900, one in 29, so that one
 in twenty is left when starts of the engine, relaxations and jumps that failed are counted.
 
-31 from windows of six cycles, which is as many cycles, ask a bed for less at a time.  By the
-logarithm the first of 13 equal jumps, 735 cycles, would settle as much as the next seven.
+31 from windows of six cycles, which is as many cycles, ask a bed for less at a time; 40 compute one
+cycle in 22, and 42 would begin with a jump of one cycle.  By the logarithm the first of 13 equal
+jumps, 735 cycles, would settle as much as the next seven.
 """
 PARTLY = tuple(
     replace(method, base=PARTIAL, window=5)

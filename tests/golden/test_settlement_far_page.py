@@ -42,23 +42,37 @@ def test_sentences_of_the_page(found: list[Foretold]) -> None:
     assert confined == pytest.approx([5 / 6] * len(confined))
 
 
-def test_sentences_about_jumps() -> None:
-    """27 times cheaper; foretold inside the interval, settled outside by twice its half; state as
-    the reference's; laws scatter six times as much and more."""
-    rows, name = record_read(STUDY.record), "13 growing jumps, by history, profile"
+@pytest.mark.parametrize(
+    ("jumps", "computed", "cheaper", "short", "foretold_short"),
+    [(13, 345, 27, 2.05, 0.16), (31, 347, 29, 1.71, 0.46), (40, 446, 23, 1.92, 0.31)],
+)
+def test_sentences_about_jumps(
+    jumps: int, computed: int, cheaper: int, short: float, foretold_short: float
+) -> None:
+    """23 to 30 times cheaper; foretold inside the interval, settled outside by twice its half;
+    state as the reference's."""
+    rows, name = record_read(STUDY.record), f"{jumps} growing jumps, by history, profile"
     last = STUDY.last
     mine, truth = finished(rows, name, last), settlement_of(rows, last)
     assert len(mine) == 10
-    assert all(row["computed"] == 345 for row in mine)
-    assert cost(reference(rows, last)) / cost(mine) > 27
+    assert all(row["computed"] == computed for row in mine)
+    assert cheaper < cost(reference(rows, last)) / cost(mine) < 30
     found = np.mean([row["settlement"][str(last)] for row in mine])
     foretold = found + np.mean([owed(row) for row in mine])
-    assert (truth.mean - found) / truth.half_given == pytest.approx(2.05, abs=0.05)
-    assert (truth.mean - foretold) / truth.half_given == pytest.approx(0.16, abs=0.05)
+    assert (truth.mean - found) / truth.half_given == pytest.approx(short, abs=0.05)
+    assert (truth.mean - foretold) / truth.half_given == pytest.approx(foretold_short, abs=0.05)
     for figure in ("coordination", "deflection"):
         errors = judged(rows, name, last, figure)
         assert errors is not None
         assert abs(errors.mean) < errors.half
+
+
+def test_sentences_about_laws_beside_jumps() -> None:
+    """They scatter six times as much as full runs and more, and are outside the interval; moves of
+    up to 30 um always found room."""
+    rows, last = record_read(STUDY.record), STUDY.last
+    moved = [pair for row in rows for pair in row.get("moved", ())]
+    assert all(asked == got for asked, got in moved if asked <= 3e-5)
     for law, cycles in LAWS:
         assert spread(rows, law_name(law, cycles), last) > 5.5
         assert bias_beside_interval(rows, law_name(law, cycles), last) > 1
