@@ -20,7 +20,7 @@ from validation.settlement_rivals import (
     mean_of,
     profile,
 )
-from validation.settlement_rivals_continuity import COLUMNS, CYCLES, sides_without_jump
+from validation.settlement_rivals_continuity import CYCLES, sides_without_jump
 
 LAWS = tuple(
     (law, cycles) for law in ("log", "auto") for cycles in (FIRST_WINDOW, 5 * FIRST_WINDOW)
@@ -43,13 +43,11 @@ def columns_by_cycle(piece: Piece, record: EnsembleRecord) -> dict[int, dict[str
 
 def curves_of_reference(kind: Kind, record: EnsembleRecord) -> list[dict[str, FloatArray]]:
     """Tables of all members as far as they came, their packings' before them."""
-    curves = []
-    for piece in kind.runs():
-        if piece.packing is None or record.kept(piece.name) is None:
-            continue
-        before, behind = (record.table(name) for name in (piece.packing.name, piece.name))
-        curves.append({name: np.append(before[name], behind[name]) for name in ("cycle", *COLUMNS)})
-    return curves
+    return [
+        record.since_rain(piece.packing.name, piece.name)
+        for piece in kind.runs()
+        if piece.packing is not None and record.kept(piece.name) is not None
+    ]
 
 
 def sides_of_reference(
