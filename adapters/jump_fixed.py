@@ -17,6 +17,7 @@ from adapters.errors import EngineFailed, NotConverged, NotCredible
 from adapters.jump_history import Jumped, asked_gain
 from adapters.jump_run import stretches_of
 from adapters.jump_seating import SEATING, counted_from, seat, warn_if_hung
+from adapters.relaxation_rearranged import ENOUGH
 from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
 
@@ -79,11 +80,8 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                         share = SHARES[attempt - 1] * min(1.0, room / gain)
                     new = run.folder.outcome(name) is None
                     moved = stages.jump(run, bed, h, attempt, gain, share)
-                    if new and gain and share < 1:
-                        run.progress.say(
-                            f"the bed had room for {100 * share:.0f} % of the {1e6 * gain:.3g} um "
-                            "that the jump was to move it by; the rest is asked of the next"
-                        )
+                    if new and gain:
+                        told(run, name, gain, share)
                     cycles = p.healing_cycles + p.window_cycles
                     return stages.compute(run, moved, cycles, p.healing_cycles)
             except (EngineFailed, NotCredible, NotConverged) as error:
@@ -104,6 +102,24 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
         remedy="more cycles k before the jump, a shorter h, or windows in its place: "
         "trackbed resume RUN --cycle-by-cycle; the cycles before it are kept",
     )
+
+
+def told(run: Run, name: str, asked: float, share: float) -> None:
+    """Say where a jump moved the bed by other than ``asked`` [m], a ``share`` of which it tried."""
+    jump = run.folder.outcome(name)
+    assert jump is not None
+    got, hops = jump.notes["gain"], jump.notes["relaxation"].get("hops")
+    of = f"of the {1e6 * asked:.3g} um that it was asked for"
+    if hops is not None:
+        run.progress.say(
+            f"grains changed places in {hops} hops: the jump moved the bed by {1e6 * got:.3g} "
+            f"{of}; the next makes good the rest"
+        )
+    elif share < 1:
+        run.progress.say(
+            f"the jump tried, and moved the bed by, {100 * share:.0f} % {of}: a jump, this one or "
+            "one before, found no room for more; the rest is asked of the next"
+        )
 
 
 def compute_on(run: Run, bed: Bed) -> Bed:
@@ -149,7 +165,7 @@ def room_known(outcomes: Sequence[Outcome], end: int) -> float:
         if one.stage != "jump" or one.last_cycle > end or not one.notes.get("asked"):
             continue
         tried, got = min(room, one.notes["asked"]), one.notes["gain"]
-        if one.notes["attempt"] == 1:
+        if one.notes["attempt"] == 1 and got >= ENOUGH * tried:
             room = max(room, GROWTH * got)
         else:
             room = GROWTH * got if got else tried * min(filter(None, SHARES)) / 2

@@ -74,7 +74,8 @@ class Relaxation:
 
     position: FloatArray
     """Centres [m], (n, 3)."""
-    method: Method
+    method: str
+    """One of `METHODS`, or ``rearranged``."""
     converged: bool
     before: Bed
     """Measures of the state before the jump."""
@@ -190,23 +191,10 @@ def relax(
         relaxed, converged, evaluations = energy_minimise(
             energy, position, ~held, length, tolerance * mean_weight, evaluations_max
         )
-    touching = scene.search(relaxed, 0.0)
-    move = np.linalg.norm(relaxed - position, axis=1)
-    result = Relaxation(
-        position=relaxed,
-        method=method,
-        converged=converged,
-        before=bed_measure(before.position, carried),
-        estimated=bed_measure(position, scene.search(position, 0.0)),
-        relaxed=bed_measure(relaxed, touching),
-        energy=_energy(scene, relaxed, touching, before, gravity),
-        residual_force=_residual_force(scene, touching, before, gravity),
-        residual_force_before=_residual_force(scene_before, carried, before, gravity),
-        evaluations=evaluations,
-        cpu_s=time.process_time() - started,
-        largest_move=float(move.max(initial=0.0)),
-        median_move=float(np.median(move)) if len(move) else 0.0,
-    )
+    result = relaxation_measured(
+        relaxed, position, before, scene_before, scene, gravity,
+        method, converged, evaluations, time.process_time() - started,
+    )  # fmt: skip
     if not converged:
         error = RelaxationNotConverged(
             f"relaxation '{method}' stopped after {evaluations} evaluations with overlaps up to "
@@ -216,6 +204,43 @@ def relax(
         error.best = result
         raise error
     return result
+
+
+def relaxation_measured(
+    relaxed: FloatArray,
+    estimate: FloatArray,
+    before: State,
+    scene_before: Surroundings,
+    scene: Surroundings,
+    gravity: float,
+    method: str,
+    converged: bool,
+    evaluations: int,
+    cpu_s: float,
+) -> Relaxation:
+    """What was changed from ``before`` by the ``estimate`` and to ``relaxed``, both (n, 3) [m].
+
+    ``scene_before`` and ``scene``: walls that the grains touched, and those that they touch now;
+    ``gravity`` [m/s^2]; the rest as in `Relaxation`.
+    """
+    touching = scene.search(relaxed, 0.0)
+    carried = scene_before.search(before.position, 0.0)
+    move = np.linalg.norm(relaxed - estimate, axis=1)
+    return Relaxation(
+        position=relaxed,
+        method=method,
+        converged=converged,
+        before=bed_measure(before.position, carried),
+        estimated=bed_measure(estimate, scene.search(estimate, 0.0)),
+        relaxed=bed_measure(relaxed, touching),
+        energy=_energy(scene, relaxed, touching, before, gravity),
+        residual_force=_residual_force(scene, touching, before, gravity),
+        residual_force_before=_residual_force(scene_before, carried, before, gravity),
+        evaluations=evaluations,
+        cpu_s=cpu_s,
+        largest_move=float(move.max(initial=0.0)),
+        median_move=float(np.median(move)) if len(move) else 0.0,
+    )
 
 
 def _refuse_bad_input(

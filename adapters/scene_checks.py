@@ -238,6 +238,17 @@ def _settlement(scene: _Values) -> Iterator[Problem]:
         yield Problem(key, "move 'still' moves nothing, so no settlement: leave one of them out")
 
 
+def _rearranged(scene: _Values) -> Iterator[Problem]:
+    if not scene.has_table("procedure") or scene.need("procedure.room") == "found":
+        return
+    if scene.need("procedure.settlement") == "law":
+        yield Problem(
+            "procedure.room",
+            "grains that change places settle by more or less than asked, which only the next jump "
+            'by history makes good: settlement = "history", or leave this out',
+        )
+
+
 def _launcher(scene: _Values) -> Iterator[Problem]:
     words = [Path(word).name for word in scene.get("engine.launcher") or ()]
     if scene.need("engine.name") == "yade" and set(words) & MPI_STARTERS:
@@ -347,6 +358,7 @@ CHECKS: tuple[Check, ...] = (
     _procedure,
     _jumps,
     _settlement,
+    _rearranged,
     _launcher,
     _law,
     _move,

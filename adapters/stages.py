@@ -16,16 +16,14 @@ import numpy as np
 
 from adapters import checks
 from adapters.engine import Engine, EngineRun, EngineStart
-from adapters.errors import NotConverged
+from adapters.jump_room import relaxed, room_for, top_under
 from adapters.laws import law_named
 from adapters.moves import move_named
 from adapters.overlaps import neighbours
 from adapters.progress import Progress
 from adapters.radii import radii_sample
-from adapters.relaxation import relax
 from adapters.run_folder import Outcome, RunFolder
 from adapters.sample import (
-    GRAVITY,
     SURFACE_SHARE,
     bed_height,
     relative_density,
@@ -204,12 +202,13 @@ def jump(
             target = before.position + share * (target - before.position)
             piston_height = before.piston_height + share * (piston_height - before.piston_height)
         with run.clock.part("relax"):
-            try:
-                position, record = relaxed(run, before, target, piston_height)
-            except NotConverged:
-                if gain is None or piston_height >= before.piston_height:
-                    raise
-                position, record, piston_height = relaxed_below(run, before, target)
+            if gain is None or piston_height >= before.piston_height:
+                position, record = relaxed(run.scene, before, target, piston_height)
+            else:
+                generator = np.random.default_rng([run.scene.sample.seed, bed.cycle, attempt])
+                position, record, piston_height = room_for(
+                    run.scene, before, target, piston_height, generator
+                )
         after = before.moved(
             position,
             velocity=np.zeros_like(target),
@@ -221,7 +220,8 @@ def jump(
         state_save(after, folder / "relaxed.npz")
         notes = {"h": h, "attempt": attempt, "relaxation": record}
         if gain is not None:
-            notes |= {"gain": share * gain, "asked": gain}
+            settled = float((before.position - position)[:, 2].mean())
+            notes |= {"gain": settled if "hops" in record else share * gain, "asked": gain}
         rows = [_row(run, after, "jumped")] if h else []
         cost = run.clock.lap()
         folder = _finish(
@@ -236,15 +236,6 @@ def jump(
         moved=moved,
     )
     return Bed(bed.cycle + h, start, bed.window, bed.healing)
-
-
-def top_under(position: FloatArray, radius: FloatArray, reach: float) -> float:
-    """Highest place [m] of grains under a piston of radius ``reach`` [m].
-
-    ``position`` (n, 3) and ``radius`` (n,) in metres.
-    """
-    under = np.hypot(position[:, 0], position[:, 1]) - radius < reach
-    return float((position[:, 2] + radius)[under].max())
 
 
 def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, FloatArray, float]:
@@ -284,41 +275,6 @@ def settled_by(gain: float, before: State, target: FloatArray) -> tuple[FloatArr
     target[:, 2] += lacking * height / mean if height.any() else lacking
     above = before.piston_height - float(before.position[:, 2].min())
     return target, before.piston_height - max(gain, 0.0) * above / mean
-
-
-def relaxed(
-    run: Run, before: State, target: FloatArray, piston_height: float
-) -> tuple[FloatArray, dict[str, Any]]:
-    """Relaxed positions of the ``target`` ones, (n, 3) in metres, and the relaxation's record.
-
-    Raises `RelaxationNotConverged`.
-    """
-    scene, procedure = run.scene, run.scene.procedure
-    assert procedure is not None
-    if procedure.relaxation == "none":
-        return target, {"method": "none"}
-    relaxation = relax(
-        target,
-        before,
-        scene.container.walls(before.piston_height, scene.piston_reach),
-        scene.stiffness,
-        method=procedure.relaxation,
-        gravity=GRAVITY,
-        walls_after=scene.container.walls(piston_height, scene.piston_reach),
-    )
-    return relaxation.position, relaxation.record()
-
-
-def relaxed_below(
-    run: Run, before: State, target: FloatArray
-) -> tuple[FloatArray, dict[str, Any], float]:
-    """As `relaxed` with the piston where it was; then its height on top of the bed [m].
-
-    Where grains have no room under a piston that went down: the bed settles below one that waits.
-    """
-    position, record = relaxed(run, before, target, before.piston_height)
-    top = top_under(position, before.radius, run.scene.piston_reach)
-    return position, record | {"piston": "on the bed"}, min(top, before.piston_height)
 
 
 def settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, Any]]:

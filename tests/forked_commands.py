@@ -47,7 +47,7 @@ def tell(**answer: object) -> None:
 
 def slow_down(seconds: float) -> None:
     """Have each part of a run tell that it begins, and sleep around its work."""
-    from adapters import stages
+    from adapters import jump_room, stages
     from adapters.engine_fake import FakeEngine
 
     def slowed(work: Callable[..., Any], part: str) -> Callable[..., Any]:
@@ -63,7 +63,7 @@ def slow_down(seconds: float) -> None:
     FakeEngine._prepare = staticmethod(slowed(FakeEngine._prepare, "preparation"))  # type: ignore[method-assign]
     FakeEngine._cycles = staticmethod(slowed(FakeEngine._cycles, "window"))  # type: ignore[method-assign]
     stages.estimate = slowed(stages.estimate, "jump")
-    stages.relax = slowed(stages.relax, "relaxation")  # type: ignore[assignment]
+    jump_room.relax = slowed(jump_room.relax, "relaxation")  # type: ignore[assignment]
 
 
 def count_operations(root: str, crash: int) -> None:

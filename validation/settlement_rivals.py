@@ -173,6 +173,12 @@ def seated(method: Method) -> Method:
     return replace(method, name=f"{method.name}, seated", settings=keys)
 
 
+def rearranging(method: Method) -> Method:
+    """The same, its grains changing places where a jump finds no room."""
+    keys = (*method.settings, 'procedure.room="rearranged"')
+    return replace(method, name=f"{method.name}, rearranged", settings=keys)
+
+
 def softer(factor: int, base: Kind = COARSE) -> Method:
     """Young's modulus of the grains over ``factor``, and the longer time step that goes with it."""
     young = base.scene(1).material.grain.young / factor

@@ -13,6 +13,7 @@ from validation.settlement_rivals import (
     Method,
     growing,
     jumping,
+    rearranging,
     remembering,
     seated,
 )
@@ -39,9 +40,13 @@ class Study:
         return self.more.get(method.name, self.members)
 
 
+SHORT_WINDOWS = tuple(
+    replace(growing(remembering(jumps, "profile")), window=6) for jumps in (31, 40)
+)
 FAR = (
     *map(growing, (remembering(13), remembering(13, "profile"), *jumping(13))),
-    *(replace(growing(remembering(jumps, "profile")), window=6) for jumps in (31, 40)),
+    *SHORT_WINDOWS,
+    *map(rearranging, SHORT_WINDOWS),
     Method("tolerance 0.1", "tolerance", ("procedure.tolerance=0.1",), JUMPING),
 )
 """To 10,000 cycles of the coarse bed: 13 jumps compute 345 cycles of 9,900, one in 29, so that one

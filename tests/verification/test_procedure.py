@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters import procedure, stages
+from adapters import jump_room, procedure, stages
 from adapters.engine_fake import SETTLEMENT
 from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
 from adapters.jump_fixed import room_known
 from adapters.progress import Progress
 from adapters.run_folder import Outcome, RunFolder
+from adapters.scene import Scene
 from adapters.state import FloatArray, State, state_load
 from adapters.window import Window, window_load
 from scenes import scene_path
@@ -174,16 +175,16 @@ def test_piston_waits_where_grains_have_no_room_below_it(
 ) -> None:
     """A given settlement with no room under a piston that goes down: the bed is relaxed under the
     old one, settles by its gain all the same, and the piston comes to lie on it."""
-    real = stages.relaxed
+    real = jump_room.relaxed
 
     def jammed(
-        run: stages.Run, before: State, target: FloatArray, piston_height: float
+        scene: Scene, before: State, target: FloatArray, piston_height: float
     ) -> tuple[FloatArray, dict[str, Any]]:
         if piston_height < before.piston_height:
             raise NotConverged("made to fail")
-        return real(run, before, target, piston_height)
+        return real(scene, before, target, piston_height)
 
-    monkeypatch.setattr(stages, "relaxed", jammed)
+    monkeypatch.setattr(jump_room, "relaxed", jammed)
     settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=90")
     folder = RunFolder(tmp_path / "run")
     outcome = folder.outcome("jump_000040_1")
@@ -203,16 +204,16 @@ def test_what_a_bed_has_no_room_for_is_made_good_by_the_next_jump(
     """u = a ln(1 + N) and jumps by history of 20 and 15 cycles, of which the first may move by no
     more than 6 um: a ln(61 / 41) = 7.9 um is halved.  The next is asked for a ln(101 / 86) and for
     that half; a is told to 2 % from N in place of 1 + N."""
-    real = stages.relaxed
+    real = jump_room.relaxed
 
     def tight(
-        run: stages.Run, before: State, target: FloatArray, piston_height: float
+        scene: Scene, before: State, target: FloatArray, piston_height: float
     ) -> tuple[FloatArray, dict[str, Any]]:
         if before.cycle == 40 and (before.position - target)[:, 2].mean() > 6e-6:
             raise NotConverged("made to fail")
-        return real(run, before, target, piston_height)
+        return real(scene, before, target, piston_height)
 
-    monkeypatch.setattr(stages, "relaxed", tight)
+    monkeypatch.setattr(jump_room, "relaxed", tight)
     keys = ('procedure.settlement="history"', "procedure.h=[20, 15]", "procedure.total_cycles=125")
     rows = settle(tmp_path / "run", *keys)
     jumps = [one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump"]
@@ -253,16 +254,16 @@ def test_a_jammed_bed_is_moved_by_what_it_has_room_for(
 ) -> None:
     """No move of more than 2 um has room, where 8, 4 and less are asked for: every jump but the
     first ones moves the bed, and by no less than half of that from then on."""
-    real = stages.relaxed
+    real = jump_room.relaxed
 
     def tight(
-        run: stages.Run, before: State, target: FloatArray, piston_height: float
+        scene: Scene, before: State, target: FloatArray, piston_height: float
     ) -> tuple[FloatArray, dict[str, Any]]:
         if (before.position - target)[:, 2].mean() > 2e-6:
             raise NotConverged("made to fail")
-        return real(run, before, target, piston_height)
+        return real(scene, before, target, piston_height)
 
-    monkeypatch.setattr(stages, "relaxed", tight)
+    monkeypatch.setattr(jump_room, "relaxed", tight)
     keys = ('procedure.settlement="history"', "procedure.h=20", "procedure.total_cycles=400")
     settle(tmp_path / "run", *keys)
     jumps = [one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump"]
