@@ -239,9 +239,9 @@ def _settlement(scene: _Values) -> Iterator[Problem]:
 
 
 def _rearranged(scene: _Values) -> Iterator[Problem]:
-    if not scene.has_table("procedure") or scene.need("procedure.room") == "found":
-        return
-    if scene.need("procedure.settlement") == "law":
+    if scene.get("procedure.room") not in (None, "found") and (
+        scene.get("procedure.settlement") in (None, "law")
+    ):
         yield Problem(
             "procedure.room",
             "grains that change places settle by more or less than asked, which only the next jump "

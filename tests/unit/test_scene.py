@@ -318,6 +318,8 @@ REFUSED = [
     ("procedure.law", 'law = "lug"', "did you mean log?"),
     ("procedure.move", 'move = "shrink"', "did you mean shrunk?"),
     ("procedure.settlement", 'settlement = "past"', "'law' or 'history'"),
+    ("procedure.room", 'room = "made"', "'found' or 'rearranged'"),
+    ("procedure.room", 'room = "rearranged"', 'settlement = "history", or leave this out'),
     ("procedure.relaxation", 'relaxation = "smallest move"', "did you mean smallest-move?"),
     ("procedure.total_cycles", "total_cycles = 1", "must exceed k_i ="),
     ("engine.name", 'name = "ligghts"', "did you mean liggghts?"),

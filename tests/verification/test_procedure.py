@@ -12,10 +12,13 @@ import numpy as np
 import pytest
 
 from adapters import jump_room, procedure, stages
+from adapters.contact_law import hertz_stiffness
+from adapters.container import Walls
 from adapters.engine_fake import SETTLEMENT
 from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
 from adapters.jump_fixed import room_known
 from adapters.progress import Progress
+from adapters.relaxation import Relaxation, relax
 from adapters.run_folder import Outcome, RunFolder
 from adapters.scene import Scene
 from adapters.state import FloatArray, State, state_load
@@ -242,11 +245,60 @@ def test_room_that_jumps_found() -> None:
         (jump(130, 500, 6.25, 1), 12.5),
         (jump(160, 2, 2, 1), 12.5),
         (jump(190, 0, 0, 1), 12.5),
+        (jump(220, 400, 40, 1), 80),  # grains changed places
+        (jump(250, 60, 65, 1), 130),
+        (jump(280, 200, 20, 1), 40),
     ]
     jumps = [one for one, _ in made]
     assert room_known([], 1000) == np.inf
     for one, room in made:
         assert 1e6 * room_known(jumps, one.last_cycle) == pytest.approx(room)
+
+
+def test_grains_that_change_places_settle_by_what_they_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No smallest move has room at the first jump, of a ln(61 / 41).  With ``room = "rearranged"``
+    grains change places, which settles the bed by a third more than asked: the jump is not tried
+    again, and the next, of a ln(101 / 86), is asked for that third less.  Without the key that way
+    is never called."""
+    real, called = jump_room.relaxed, []
+
+    def jammed(
+        scene: Scene, before: State, target: FloatArray, piston_height: float
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        if before.cycle == 40 and not np.array_equal(target, before.position):
+            raise NotConverged("made to fail")
+        return real(scene, before, target, piston_height)
+
+    def rearranged(
+        target: FloatArray, before: State, walls: Walls, after: Walls, *_: Any, gravity: float
+    ) -> tuple[Relaxation, int]:
+        called.append(float((before.position - target)[:, 2].mean()))
+        assert after.plane_point[-1, 2] < walls.plane_point[-1, 2]
+        position = before.position + 4 / 3 * (target - before.position)
+        measured = relax(
+            before.position, before, walls, hertz_stiffness(1e9, 0.25, 2e11, 0.3), gravity=gravity
+        )
+        return replace(measured, position=position, method="rearranged"), 7
+
+    monkeypatch.setattr(jump_room, "relaxed", jammed)
+    monkeypatch.setattr(jump_room, "rearrange", rearranged)
+    keys = ('procedure.settlement="history"', "procedure.h=[20, 15]", "procedure.total_cycles=125")
+    settle(tmp_path / "found", *keys)
+    assert not called
+    rows = settle(tmp_path / "run", *keys, 'procedure.room="rearranged"')
+    first, second = (o for o in RunFolder(tmp_path / "run").outcomes() if o.stage == "jump")
+    asked = SETTLEMENT * np.log(61 / 41)
+    assert called == [pytest.approx(asked, rel=0.02)]
+    assert (first.notes["attempt"], first.notes["relaxation"]["hops"]) == (1, 7)
+    assert first.notes["asked"] == pytest.approx(called[0])
+    assert first.notes["gain"] == pytest.approx(4 / 3 * called[0])
+    going_on = SETTLEMENT * np.log(101 / 86)
+    assert second.notes["asked"] == pytest.approx(
+        going_on - first.notes["asked"] / 3, abs=0.02 * going_on
+    )
+    assert float(rows[-1]["settlement"]) == pytest.approx(SETTLEMENT * np.log(126), rel=0.01)
 
 
 def test_a_jammed_bed_is_moved_by_what_it_has_room_for(
