@@ -1,12 +1,12 @@
 """Room for a jump where no move leaves any: grains change places, as they do in a full run.
 
 The smallest move keeps every grain among its neighbours, and a jammed bed has no room so.  A full
-run makes it: while the cycles double, its grains part from the mean profile by 0.3 radii (root
-mean square; coarse bed, 10 runs), ten times what the mean grain settles by.  Here the bed hops
-from one state of equilibrium to the next (basin hopping: Wales and Doye, J. Phys. Chem. A 101
-(1997) 5111; with what is kept only if its energy is lower).  A hop kicks every grain at random and
+run makes it: whenever its cycles double, its grains part from the mean profile by 0.3 to 0.4 radii
+(root mean square; coarse bed, 10 runs), ten times what the mean grain settles by.  Here the bed
+hops from one state of equilibrium to the next (basin hopping: Wales and Doye, J. Phys. Chem. A 101
+(1997) 5111, with a state kept only if its energy is lower).  A hop kicks every grain at random and
 lets the bed flow, without friction and under its weight, to the nearest minimum of the energy of
-eq. 29.  Each minimum is a bed in equilibrium without overlaps beyond those of before, if the piston
+eq. 29.  A minimum is a bed near equilibrium, without overlaps beyond those of before if the piston
 above it, which stands still meanwhile, is not too low.
 
 Contacts are those of a bed without friction, some four a grain and not three: under load, friction
@@ -28,8 +28,8 @@ from adapters.relaxation_surroundings import Surroundings
 from adapters.state import FloatArray, State
 
 KICK = 0.5
-"""Root mean square of a grain's first kick, in mean radii: what full runs do in eight times the
-cycles, as their moves add up like those of a random walk in ln N."""
+"""Root mean square of a grain's first kick, in mean radii: what full runs do while their cycles
+double twice."""
 KICK_GROWS, KICK_SHRINKS = 1.1, 0.9
 """Factors of the next kick behind a hop to a lower energy, and behind one to a higher."""
 HOPS_MAX = 30

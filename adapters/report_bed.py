@@ -139,6 +139,7 @@ def penetration(record: Record, numbers: Numbers, figures: Figures) -> str:
         if measures
         else paragraph("The scene asks for no relaxation."),
         owed(record),
+        changed_places(record),
         hung(record),
     )
 
@@ -179,7 +180,23 @@ def owed(record: Record) -> str:
     return paragraph(
         f"<strong>The bed has settled {micrometres(left)} µm less than its jumps were to move it:"
         "</strong> there was no room for more without overlaps. The settlement foretold is that "
-        "much greater; shorter jumps, or more of them, leave the bed the cycles to make room."
+        "much greater; shorter jumps, or more of them, leave the bed the cycles to make room, and "
+        'with <code>procedure.room = "rearranged"</code> grains change places.'
+    )
+
+
+def changed_places(record: Record) -> str:
+    """In how many jumps grains changed places, and what that leaves of the bed before."""
+    jumps = record.run.jumps
+    notes = [jump.notes for _, jump in jumps if "hops" in jump.notes.get("relaxation", {})]
+    if not notes:
+        return ""
+    asked, got = (micrometres(sum(note[name] for note in notes)) for name in ("asked", "gain"))
+    return paragraph(
+        f"<strong>In {len(notes)} of {len(jumps)} jumps grains changed places</strong>, "
+        f"as a move had no room among them; asked for {asked} µm in all, they settled {got}. Their "
+        "contacts are those of a bed without friction, more than before, until the first cycles "
+        "behind the jump have loaded them, and where single grains lie says nothing."
     )
 
 

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -25,8 +24,6 @@ CHEAPER = 20.0
 """What the jumps are asked to save: full cost over theirs."""
 NUMBERS = (5, 8, 13, 20)
 """Of growing jumps whose forecasts are tried on the curves of full runs."""
-ROOM = (0.0, 3e-5, 6e-5, 1e-4, 2e-4, np.inf)
-"""Settlements asked of a jump between which they are counted [m]."""
 HEAD = ("way to the last cycle", "runs", "cycles computed", "cheaper by",
         "settlement since kᵢ, µm", "error over half the reference's interval",
         "with what is owed, µm", "error over half the interval", "spread over the reference's",
@@ -81,31 +78,6 @@ def line_of(rows: Sequence[Row], name: str, last: int, mine: Sequence[Row]) -> l
         f"{spread(rows, name, last):.1f}",
         *(f"{100 * one.mean:+.0f} ± {100 * one.half:.0f} %" if one else "-" for one in errors),
     ]  # fmt: skip
-
-
-def short_of(rows: Sequence[Row], last: int = STUDY.last) -> str:
-    """How often beds had no room for what jumps by history asked, in a sentence."""
-    mine = [row for method in STUDY.methods for row in finished(rows, method.name, last)]
-    moved = [pair for row in mine for pair in row.get("moved", ())]
-    short = sum(got < asked for asked, got in moved)
-    tries = sum(len(row["lost"]) for row in mine if row.get("moved"))
-    return (
-        f"Of {len(moved)} jumps by history {short} found no room for the whole move, after "
-        f"{tries} failed tries in all; what lacked was asked of the next."
-    )
-
-
-def table_room(rows: Sequence[Row], last: int = STUDY.last) -> str:
-    """How many moves beds had room for, by what was asked."""
-    mine = [row for method in STUDY.methods for row in finished(rows, method.name, last)]
-    moved = np.array([pair for row in mine for pair in row.get("moved", ())]).reshape(-1, 2)
-    lines = []
-    for low, high in pairwise(ROOM):
-        asked = moved[(moved[:, 0] > low) & (moved[:, 0] <= high)]
-        words = f"{1e6 * low:.0f} to {1e6 * high:.0f}" if high < np.inf else f"over {1e6 * low:.0f}"
-        whole = int((asked[:, 0] == asked[:, 1]).sum())
-        lines.append([words, str(len(asked)), str(whole)])
-    return table(["asked of a jump, µm", "jumps", "room for all of it"], lines)
 
 
 def table_forecasts(record: EnsembleRecord, last: int = STUDY.last) -> str:

@@ -24,10 +24,15 @@ from validation.settlement_ensemble import COARSE, CONFINED, Kind
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_far_jumps import (
     STUDY,
-    short_of,
     table_forecasts,
     table_jumps,
     table_noise,
+)
+from validation.settlement_far_room import (
+    short_of,
+    table_behind,
+    table_changed,
+    table_parting,
     table_room,
 )
 from validation.settlement_rivals import BLOCK, FIRST_WINDOW
@@ -174,6 +179,9 @@ def page(found: Sequence[Foretold], record: EnsembleRecord) -> str:
         "JUMPS": table_jumps(rows),
         "SHORT": short_of(rows),
         "ROOM": table_room(rows),
+        "CHANGED": table_changed(rows),
+        "BEHIND": table_behind(rows),
+        "PARTING": table_parting(record),
         "K": str(FIRST_WINDOW),
     }
     parts |= {"NOISE": table_noise(record), "FORECASTS": table_forecasts(record)}

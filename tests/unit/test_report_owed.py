@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from adapters import report_bed
-from adapters.report_bed import hung, owed
+from adapters.report_bed import changed_places, hung, owed
 from adapters.report_record import Record
 from adapters.run_folder import Outcome
 from adapters.scene_file import scene_load
@@ -28,6 +28,20 @@ def test_only_what_is_left_at_the_end_is_told() -> None:
     short, whole = {"asked": 7e-5, "gain": 3e-5}, {"asked": 7e-5, "gain": 7e-5}
     assert owed(record()) == owed(record({})) == owed(record(short, whole)) == ""
     assert ">40.0</data> µm less" in owed(record(whole, short))
+
+
+def test_grains_that_changed_places_are_told() -> None:
+    """Two jumps of three, asked for 70 and 30 um, settled 80 and 10; none: nothing."""
+    other = {"asked": 7e-5, "gain": 7e-5, "relaxation": {}}
+    changed = [
+        {"asked": asked, "gain": gain, "relaxation": {"hops": 7}}
+        for asked, gain in ((7e-5, 8e-5), (3e-5, 1e-5))
+    ]
+    assert changed_places(record()) == changed_places(record(other, other)) == ""
+    found = changed_places(record(other, *changed))
+    assert "In 2 of 3 jumps" in found
+    assert ">100.0</data> µm in all, they settled <data" in found
+    assert ">90.0</data>. Their" in found
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from validation.settlement_far_jumps import HEAD, STUDY, owed, short_of, table_jumps, table_room
+from validation.settlement_far_jumps import HEAD, STUDY, owed, table_jumps
+from validation.settlement_far_room import short_of, table_room
 from validation.settlement_rivals import STATE, Row
 from validation.settlement_rivals_budget import EVERY
 
