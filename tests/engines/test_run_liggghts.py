@@ -14,11 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import decks
+from adapters import decks, jump_fixed, jump_room
 from adapters.engine import EngineStart
 from adapters.engine_liggghts import LiggghtsEngine
+from adapters.errors import NotConverged
 from adapters.procedure import run_scene
 from adapters.progress import Progress
+from adapters.relaxation_rearranged import OVERLAP_MAX
 from adapters.run_folder import RunFolder
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
@@ -296,3 +298,31 @@ def test_digests_are_those_of_the_shipped_decks(run: Path) -> None:
     copies = decks.deck_copy(run.parent, tuple(outcome.notes["decks"]))
     assert copies == outcome.notes["decks"]
     assert replace(outcome, notes={}).stage == "window"
+
+
+def test_engine_goes_on_from_grains_that_changed_places(
+    scene_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With no room for any smallest move grains change places: the engine takes the bed over, its
+    overlaps are those of before, the piston holds its load, and from the second cycle on contacts
+    are as many as before the jump, within what cycles scatter by."""
+
+    def jammed(*_: object) -> None:
+        raise NotConverged("made to fail")
+
+    monkeypatch.setattr(jump_room, "relaxed", jammed)
+    monkeypatch.setattr(jump_fixed, "history_gain", lambda *_: 40e-6)
+    history = ('procedure.settlement="history"', 'procedure.room="rearranged"', "procedure.h=30")
+    more = ("procedure.k_i=10", "procedure.total_cycles=50")
+    run_scene(scene_file, tmp_path / "run", overrides=(*TINY, *history, *more), progress=QUIET)
+    outcomes = RunFolder(tmp_path / "run").outcomes()
+    (place,) = [n for n, outcome in enumerate(outcomes) if outcome.stage == "jump"]
+    jump, behind = outcomes[place], outcomes[place + 1]
+    record = jump.notes["relaxation"]
+    assert record["method"] == "rearranged"
+    assert record["relaxed"]["max_penetration"] <= OVERLAP_MAX * record["before"]["max_penetration"]
+    assert 0 < jump.notes["gain"] < 10 * jump.notes["asked"]
+    before = [row["coordination_number"] for one in outcomes[:place] for row in one.rows][4:]
+    after = [row["coordination_number"] for row in behind.rows[1:]]
+    assert abs(np.mean(after) - np.mean(before)) < 3 * np.std(before, ddof=1)
+    assert behind.rows[-1]["force_error"] < 0.25
