@@ -201,7 +201,7 @@ BARS = (
     ),
 )
 """Either of the first two is enough."""
-PARTLY = (
+BARS_PARTIAL = (
     Bar("bias over the total settlement", "%", 4.0, bias),
     Bar("gained time", "%", 300.0, gained_time, least=True),
     *(bar for bar in BARS if bar.value is error_of_profile or "coordination number" in bar.words),

@@ -17,7 +17,7 @@ from adapters.jump_seating import HUNG
 from adapters.run_folder import write_atomically
 from validation.page_text import page_filled, table
 from validation.settlement_bars import (
-    PARTLY,
+    BARS_PARTIAL,
     gained_time,
     runs_by_packing,
     settlement_of,
@@ -163,7 +163,7 @@ def page(rows: Sequence[Row], record: EnsembleRecord) -> str:
     begun = at_cycle(PARTIAL, curves(PARTIAL, record), column_since("settlement", 1.0), last)
     assert begun is not None
     compared = sides_compared(rows, PARTIAL, record)
-    text = bars_table(compared, NAMES, last, PARTLY)
+    text = bars_table(compared, NAMES, last, BARS_PARTIAL)
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), {
         "CLAIMS": table_claims(rows, record), "PACKINGS": table_packings(rows),
         "BARS": way(text), "BEARING": table_bearing(record),
