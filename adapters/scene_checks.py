@@ -239,13 +239,20 @@ def _settlement(scene: _Values) -> Iterator[Problem]:
 
 
 def _rearranged(scene: _Values) -> Iterator[Problem]:
-    if scene.get("procedure.room") not in (None, "found") and (
-        scene.get("procedure.settlement") in (None, "law")
-    ):
+    key = "procedure.room"
+    if scene.get(key) in (None, "found"):
+        return
+    if scene.get("procedure.settlement") in (None, "law"):
         yield Problem(
-            "procedure.room",
+            key,
             "grains that change places settle by more or less than asked, which only the next jump "
             'by history makes good: settlement = "history", or leave this out',
+        )
+    if scene.get("loading.area_share") not in (None, 1):
+        yield Problem(
+            key,
+            "grains that change places flow without friction, up beside a piston on a part of the "
+            "section: leave this out",
         )
 
 

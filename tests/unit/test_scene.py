@@ -331,6 +331,14 @@ REFUSED = [
 ]
 
 
+def test_grains_do_not_change_places_under_a_part_of_the_section(tmp_path: Path) -> None:
+    """Without friction they would flow up beside such a piston."""
+    keys = ['procedure.room="rearranged"', 'procedure.settlement="history"']
+    message = refusal(tmp_path, scene_template("karrech-partial"), keys)
+    assert "flow without friction, up beside a piston" in message
+    assert scene_load(write(tmp_path, KARRECH), keys).procedure is not None
+
+
 @pytest.mark.parametrize(("key", "statement", "words"), REFUSED)
 def test_wrong_value_is_refused_with_its_place(
     tmp_path: Path, key: str, statement: str, words: str
