@@ -40,13 +40,15 @@ class Study:
         return self.more.get(method.name, self.members)
 
 
-SHORT_WINDOWS = tuple(
-    replace(growing(remembering(jumps, "profile")), window=6) for jumps in (31, 40)
+BY_PROFILE = (
+    growing(remembering(13, "profile")),
+    *(replace(growing(remembering(jumps, "profile")), window=6) for jumps in (31, 40)),
 )
 FAR = (
-    *map(growing, (remembering(13), remembering(13, "profile"), *jumping(13))),
-    *SHORT_WINDOWS,
-    *map(rearranging, SHORT_WINDOWS),
+    growing(remembering(13)),
+    *BY_PROFILE,
+    *map(rearranging, BY_PROFILE),
+    *map(growing, jumping(13)),
     Method("tolerance 0.1", "tolerance", ("procedure.tolerance=0.1",), JUMPING),
 )
 """To 10,000 cycles of the coarse bed: 13 jumps compute 345 cycles of 9,900, one in 29, so that one
