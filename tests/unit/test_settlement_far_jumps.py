@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+from typing import cast
+
+import numpy as np
 import pytest
 
+from adapters.state import FloatArray
+from validation.settlement_ensemble import COARSE
+from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_far_jumps import HEAD, STUDY, owed, table_jumps
-from validation.settlement_far_room import short_of, table_room
+from validation.settlement_far_room import (
+    REARRANGED,
+    short_of,
+    table_behind,
+    table_changed,
+    table_parting,
+    table_room,
+)
 from validation.settlement_rivals import STATE, Row
 from validation.settlement_rivals_budget import EVERY
 
@@ -68,3 +81,59 @@ def test_what_is_owed_at_the_end_is_foretold() -> None:
     assert short_of(rows).startswith("Of 10 jumps by history 10 found no room")
     assert owed(runs(1e-3)[0]) == 0
     assert "| 60 to 100 | 10 | 0 |" in table_room(rows)
+
+
+def jumped(hops: int | None, contacts: float) -> Row:
+    """Both sides of a jump: 2 contacts a grain before it, so many behind; n um in cycle n."""
+    after = {
+        "settlement": [1e-6 * n for n in range(1, 11)], "coordination_number": 10 * [contacts],
+        "piston_stiffness": 10 * [1e6],
+    }  # fmt: skip
+    before = {name: 10 * [2.0] for name in after}
+    return {"first": 10, "last": 20, "before": before, "after": after} | (
+        {} if hops is None else {"hops": hops}
+    )
+
+
+def test_grains_that_changed_places_are_told_apart_from_those_that_did_not() -> None:
+    """Each run: of 40 and 50 um a jump with 7 hops settles 20, one by the smallest move 50."""
+    row = made_up("rivals", REARRANGED[0], 1, 0, 1e-3, 50.0)
+    row |= {
+        "moved": [[4e-5, 2e-5], [5e-5, 5e-5]], "sides": [jumped(7, 3.0), jumped(None, 2.2)],
+        "cost": {"relax": 3.0},
+    }  # fmt: skip
+    rows = [row, row | {"member": 1}]
+    assert "| 4 | 2 | 80 | 40 | 50, 50, 50 | 7 | 3 |" in table_changed(rows)
+    changed, kept = (
+        [line for line in table_behind(rows).splitlines() if line.startswith(f"| {words}")]
+        for words in ("grains changed places", "smallest move")
+    )
+    assert "| +1.0 ± 0.0 | +2.0 ± 0.0 | +3.0 ± 0.0 | +5.0 ± 0.0 | +10.0 ± 0.0 |" in changed[0]
+    assert changed[1].count("+50.0 ± 0.0") == kept[1].count("+10.0 ± 0.0") == 5
+    assert "Of 0 jumps" in short_of(rows)
+    assert "| 30 to 60 | 0 | 0 |" in table_room(rows)
+
+
+def test_how_far_grains_part_does_not_count_an_even_strain() -> None:
+    """150 grains of 1 mm that a strain of 1 % moves part by nothing; moved by 1 mm in x and by that
+    strain while cycles double, by a radius, and by 1 / sqrt(log2 2.5) of it for 2.5 times."""
+    generator = np.random.default_rng(0)
+    start = generator.random((150, 3))
+
+    class Record:
+        def __init__(self, aside: float) -> None:
+            self.aside = aside
+
+        def states(self, name: str) -> tuple[FloatArray, dict[int, FloatArray]]:
+            del name
+            position = {}
+            for number, mark in enumerate(mark for mark in COARSE.marks if mark):
+                strained = start * [1.0, 1.0, 0.99**number]
+                position[mark] = strained + np.array([self.aside * number, 0.0, 0.0])
+            return np.full(150, 1e-3), position
+
+    still = table_parting(cast(EnsembleRecord, Record(0.0)))
+    assert still.count("| 0.00 | 0.00 ± 0.00 |") == 5
+    aside = table_parting(cast(EnsembleRecord, Record(1e-3)))
+    assert aside.count("| 1.00 | 1.00 ± 0.00 |") == 3
+    assert aside.count(f"| 1.00 | {1 / np.sqrt(np.log2(2.5)):.2f} ± 0.00 |") == 2
