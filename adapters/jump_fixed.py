@@ -17,7 +17,6 @@ from adapters.errors import EngineFailed, NotConverged, NotCredible
 from adapters.jump_history import Jumped, asked_gain
 from adapters.jump_run import stretches_of
 from adapters.jump_seating import SEATING, counted_from, seat, warn_if_hung
-from adapters.relaxation_rearranged import ENOUGH
 from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
 
@@ -75,9 +74,9 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                 with disk_full_named(run.folder.path):
                     gain = history_gain(run, bed, h)
                     share = 1.0
-                    if gain:
+                    if gain is not None:
                         room = room_known(run.folder.outcomes(), bed.cycle)
-                        share = SHARES[attempt - 1] * min(1.0, room / gain)
+                        share = SHARES[attempt - 1] * (min(1.0, room / gain) if gain else 1.0)
                     new = run.folder.outcome(name) is None
                     moved = stages.jump(run, bed, h, attempt, gain, share)
                     if new and gain:
@@ -105,21 +104,19 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
 
 
 def told(run: Run, name: str, asked: float, share: float) -> None:
-    """Say where a jump moved the bed by other than ``asked`` [m], a ``share`` of which it tried."""
+    """Say where a jump settled the bed by other than ``asked`` [m], a ``share`` of which it tried.
+
+    Smallest moves settle by what they try; grains that change places by some more or less.
+    """
     jump = run.folder.outcome(name)
     assert jump is not None
-    got, hops = jump.notes["gain"], jump.notes["relaxation"].get("hops")
-    of = f"of the {1e6 * asked:.3g} um that it was asked for"
-    if hops is not None:
-        run.progress.say(
-            f"grains changed places in {hops} hops: the jump moved the bed by {1e6 * got:.3g} "
-            f"{of}; the next makes good the rest"
-        )
+    settled = (
+        f"settles the bed by {1e6 * jump.notes['gain']:.3g} um where it owes {1e6 * asked:.3g}"
+    )
+    if "hops" in jump.notes["relaxation"]:
+        run.progress.say(f"the jump {settled}: grains changed places")
     elif share < 1:
-        run.progress.say(
-            f"the jump tried, and moved the bed by, {100 * share:.0f} % {of}: a jump, this one or "
-            "one before, found no room for more; the rest is asked of the next"
-        )
+        run.progress.say(f"the jump {settled}: no room for more was found, by it or the one before")
 
 
 def compute_on(run: Run, bed: Bed) -> Bed:
@@ -165,7 +162,7 @@ def room_known(outcomes: Sequence[Outcome], end: int) -> float:
         if one.stage != "jump" or one.last_cycle > end or not one.notes.get("asked"):
             continue
         tried, got = min(room, one.notes["asked"]), one.notes["gain"]
-        if one.notes["attempt"] == 1 and got >= ENOUGH * tried:
+        if one.notes["attempt"] == 1:
             room = max(room, GROWTH * got)
         else:
             room = GROWTH * got if got else tried * min(filter(None, SHARES)) / 2

@@ -19,24 +19,27 @@ def room_for(
     before: State,
     target: FloatArray,
     piston_height: float,
-    generator: np.random.Generator,
+    generator: np.random.Generator | None = None,
 ) -> tuple[FloatArray, dict[str, Any], float]:
     """Relaxed positions (n, 3), the relaxation's record, and the piston's height, in metres.
 
-    The smallest move under a piston that goes down to ``piston_height``; without room there, below
-    the piston where it was; without room there, either, and if ``procedure.room`` says so, grains
-    change places.  Raises `RelaxationNotConverged`.
+    By the scene's relaxation, under a piston at ``piston_height``.  With a ``generator``, and a
+    piston that goes down, in a bed without room so: below the piston where it was; without room
+    there, either, and if ``procedure.jammed`` says so, by grains that change places.  Raises
+    `RelaxationNotConverged`.
     """
     assert scene.procedure is not None
     try:
         return *relaxed(scene, before, target, piston_height), piston_height
     except NotConverged:
-        try:
-            return relaxed_below(scene, before, target)
-        except NotConverged:
-            if scene.procedure.room == "found":
-                raise
-            return relaxed_rearranged(scene, before, target, piston_height, generator)
+        if generator is None or piston_height >= before.piston_height:
+            raise
+    try:
+        return relaxed_below(scene, before, target)
+    except NotConverged:
+        if scene.procedure.jammed == "less":
+            raise
+    return relaxed_rearranged(scene, before, target, piston_height, generator)
 
 
 def relaxed(
@@ -81,19 +84,19 @@ def relaxed_rearranged(
     piston_height: float,
     generator: np.random.Generator,
 ) -> tuple[FloatArray, dict[str, Any], float]:
-    """As `room_for`, of grains that change places; the piston comes to lie on them."""
+    """Of grains that change places under the lowered piston; then its height on top of them [m]."""
     reach = scene.piston_reach
     relaxation, hops = rearrange(
         target,
         before,
         scene.container.walls(before.piston_height, reach),
-        scene.container.walls(piston_height, reach),
         scene.stiffness,
         generator,
+        walls_after=scene.container.walls(piston_height, reach),
         gravity=GRAVITY,
     )
     top = top_under(relaxation.position, before.radius, reach)
-    record = relaxation.record() | {"hops": hops}
+    record = relaxation.record() | {"piston": "on the bed", "hops": hops}
     return relaxation.position, record, min(top, before.piston_height)
 
 

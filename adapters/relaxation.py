@@ -153,48 +153,28 @@ def relax(
     a bed that friction holds: it flows, or loses its contacts.
     """
     started = time.process_time()
-    position = np.ascontiguousarray(position, float)
-    radius = np.ascontiguousarray(before.radius, float)
-    after = walls if walls_after is None else walls_after
-    bed_check(position, radius)
-    _refuse_bad_input(walls, after, method, len(radius), gravity, tolerance)
-    behind = behind_discs(before.position, walls)
-    scene_before = Surroundings(radius, walls, behind, stiffness)
-    scene = Surroundings(radius, after, behind, stiffness)
-    carried = scene_before.search(before.position, 0.0)
-    mean_weight = gravity * float(before.mass.mean())
+    bed = estimated(position, before, walls, walls_after, stiffness, gravity)
+    if method not in METHODS:
+        raise UsageError(f"there is no relaxation '{method}'", remedy=f"choose of {METHODS}")
+    if tolerance <= 0:
+        raise UsageError("a relaxation wants a tolerance above 0")
     if method == "smallest-move":
-        scale = _overlap_scale(scene, carried, overlap_cap, mean_weight)
         relaxed, converged, evaluations = _relax_by_move(
-            scene_before,
-            scene,
-            before.position,
-            position,
-            scale,
-            overlap_cap,
-            keep_height,
-            tolerance,
-            evaluations_max,
+            bed, overlap_cap, keep_height, tolerance, evaluations_max
         )
     else:
-        force, held, proximal = np.zeros_like(position), np.zeros(len(radius), bool), 0.0
+        held = np.zeros(len(bed.scene.radius), bool)
         if method == "proximal":
-            proximal = PROXIMAL_STIFFNESS
+            energy = bed.energy(np.zeros_like(bed.position), PROXIMAL_STIFFNESS)
         else:
-            force[:, 2] = -gravity * before.mass
+            force = bed.weight()
             force += 0.0 if external_force is None else external_force
-            held = _frontier(carried, len(radius), frontier)
-        energy = Energy(
-            radius, force, position, proximal, scene.rows, scene.search, scene.row_stiffness
+            energy = bed.energy(force)
+            held = _frontier(bed.carried, len(held), frontier)
+        relaxed, converged, evaluations, _ = energy_minimise(
+            energy, bed.position, ~held, bed.length, tolerance * bed.mean_weight, evaluations_max
         )
-        length = float(overlap_under_force(mean_weight, stiffness.grain, radius.mean() / 2))
-        relaxed, converged, evaluations = energy_minimise(
-            energy, position, ~held, length, tolerance * mean_weight, evaluations_max
-        )
-    result = relaxation_measured(
-        relaxed, position, before, scene_before, scene, gravity,
-        method, converged, evaluations, time.process_time() - started,
-    )  # fmt: skip
+    result = relaxation_measured(bed, relaxed, method, converged, evaluations, started)
     if not converged:
         error = RelaxationNotConverged(
             f"relaxation '{method}' stopped after {evaluations} evaluations with overlaps up to "
@@ -206,56 +186,104 @@ def relax(
     return result
 
 
-def relaxation_measured(
-    relaxed: FloatArray,
-    estimate: FloatArray,
+@dataclass(frozen=True)
+class Estimated:
+    """The bed that a jump estimates, the state it came from, and what both touch."""
+
+    position: FloatArray
+    """Estimated centres [m], (n, 3)."""
+    before: State
+    scene_before: Surroundings
+    scene: Surroundings
+    """The same with the piston where it is now."""
+    carried: Neighbours
+    """Contacts of ``before``."""
+    gravity: float
+    """Acceleration along -z [m/s^2]."""
+
+    @property
+    def mean_weight(self) -> float:
+        """Mean weight of a grain [N]."""
+        return self.gravity * float(self.before.mass.mean())
+
+    @property
+    def length(self) -> float:
+        """Overlap of two mean grains under the mean weight [m]."""
+        stiffness, radius = self.scene.stiffness.grain, self.scene.radius.mean()
+        return float(overlap_under_force(self.mean_weight, stiffness, radius / 2))
+
+    def weight(self) -> FloatArray:
+        """Weight of each grain [N], (n, 3)."""
+        force = np.zeros_like(self.position)
+        force[:, 2] = -self.gravity * self.before.mass
+        return force
+
+    def energy(self, force: FloatArray, proximal: float = 0.0) -> Energy:
+        """The functional of eq. 29 with a ``force`` (n, 3) [N] on the grains.
+
+        ``proximal`` [N/m] ties each to its estimate.
+        """
+        scene = self.scene
+        return Energy(
+            scene.radius, force, self.position, proximal, scene.rows, scene.search,
+            scene.row_stiffness,
+        )  # fmt: skip
+
+
+def estimated(
+    position: FloatArray,
     before: State,
-    scene_before: Surroundings,
-    scene: Surroundings,
+    walls: Walls,
+    walls_after: Walls | None,
+    stiffness: HertzStiffness,
     gravity: float,
-    method: str,
-    converged: bool,
-    evaluations: int,
-    cpu_s: float,
-) -> Relaxation:
-    """What was changed from ``before`` by the ``estimate`` and to ``relaxed``, both (n, 3) [m].
-
-    ``scene_before`` and ``scene``: walls that the grains touched, and those that they touch now;
-    ``gravity`` [m/s^2]; the rest as in `Relaxation`.
-    """
-    touching = scene.search(relaxed, 0.0)
-    carried = scene_before.search(before.position, 0.0)
-    move = np.linalg.norm(relaxed - estimate, axis=1)
-    return Relaxation(
-        position=relaxed,
-        method=method,
-        converged=converged,
-        before=bed_measure(before.position, carried),
-        estimated=bed_measure(estimate, scene.search(estimate, 0.0)),
-        relaxed=bed_measure(relaxed, touching),
-        energy=_energy(scene, relaxed, touching, before, gravity),
-        residual_force=_residual_force(scene, touching, before, gravity),
-        residual_force_before=_residual_force(scene_before, carried, before, gravity),
-        evaluations=evaluations,
-        cpu_s=cpu_s,
-        largest_move=float(move.max(initial=0.0)),
-        median_move=float(np.median(move)) if len(move) else 0.0,
-    )
-
-
-def _refuse_bad_input(
-    walls: Walls, after: Walls, method: str, grains: int, gravity: float, tolerance: float
-) -> None:
-    """Raise `UsageError` for what `relax` can do nothing with."""
+) -> Estimated:
+    """Arguments of `relax` taken together; raises `UsageError` for what is no bed."""
+    position = np.ascontiguousarray(position, float)
+    radius = np.ascontiguousarray(before.radius, float)
+    after = walls if walls_after is None else walls_after
+    bed_check(position, radius)
     if wall_names(after) != wall_names(walls):
         raise UsageError(
             f"the walls before, {wall_names(walls)}, are not those after, {wall_names(after)}",
             remedy="the same walls belong to both; a piston may only move",
         )
-    if method not in METHODS:
-        raise UsageError(f"there is no relaxation '{method}'", remedy=f"choose of {METHODS}")
-    if not (grains and gravity > 0 and tolerance > 0):
-        raise UsageError("a relaxation wants grains, gravity above 0 and a tolerance above 0")
+    if not (len(radius) and gravity > 0):
+        raise UsageError("a relaxation wants grains and gravity above 0")
+    behind = behind_discs(before.position, walls)
+    scene_before = Surroundings(radius, walls, behind, stiffness)
+    scene = Surroundings(radius, after, behind, stiffness)
+    carried = scene_before.search(before.position, 0.0)
+    return Estimated(position, before, scene_before, scene, carried, gravity)
+
+
+def relaxation_measured(
+    bed: Estimated,
+    relaxed: FloatArray,
+    method: str,
+    converged: bool,
+    evaluations: int,
+    started: float,
+) -> Relaxation:
+    """What a relaxation to ``relaxed`` (n, 3) [m] changed, ``started`` at a CPU time [s]."""
+    before, scene, gravity = bed.before, bed.scene, bed.gravity
+    touching = scene.search(relaxed, 0.0)
+    move = np.linalg.norm(relaxed - bed.position, axis=1)
+    return Relaxation(
+        position=relaxed,
+        method=method,
+        converged=converged,
+        before=bed_measure(before.position, bed.carried),
+        estimated=bed_measure(bed.position, scene.search(bed.position, 0.0)),
+        relaxed=bed_measure(relaxed, touching),
+        energy=_energy(scene, relaxed, touching, before, gravity),
+        residual_force=_residual_force(scene, touching, before, gravity),
+        residual_force_before=_residual_force(bed.scene_before, bed.carried, before, gravity),
+        evaluations=evaluations,
+        cpu_s=time.process_time() - started,
+        largest_move=float(move.max(initial=0.0)),
+        median_move=float(np.median(move)) if len(move) else 0.0,
+    )
 
 
 def relax_bare(
@@ -304,19 +332,17 @@ def equilibrium_overlap(
 
 
 def _relax_by_move(
-    before: Surroundings,
-    after: Surroundings,
-    position_before: FloatArray,
-    estimate: FloatArray,
-    scale: float,
+    bed: Estimated,
     overlap_cap: float,
     keep_height: bool,
     tolerance: float,
     evaluations_max: int,
 ) -> tuple[FloatArray, bool, int]:
     """`smallest_move` of grains sorted in space; centres [m], whether converged, evaluations."""
-    order = _spatial_order(position_before, before.radius)
-    before, after = before.taken(order), after.taken(order)
+    scale = _overlap_scale(bed, overlap_cap)
+    estimate, position_before = bed.position, bed.before.position
+    order = _spatial_order(position_before, bed.scene.radius)
+    before, after = bed.scene_before.taken(order), bed.scene.taken(order)
     network = before.search(position_before[order], GAP_FACTOR * scale)
     capped = network.overlap > overlap_cap
     moved = smallest_move(
@@ -350,14 +376,10 @@ def _frontier(
     return held
 
 
-def _overlap_scale(
-    scene: Surroundings, carried: Neighbours, overlap_cap: float, mean_weight: float
-) -> float:
+def _overlap_scale(bed: Estimated, overlap_cap: float) -> float:
     """Mean carried overlap [m]; without any, that of one grain's weight on another."""
-    overlap = carried.overlap[carried.overlap <= overlap_cap]
-    if len(overlap):
-        return float(overlap.mean())
-    return float(overlap_under_force(mean_weight, scene.stiffness.grain, scene.radius.mean() / 2))
+    overlap = bed.carried.overlap[bed.carried.overlap <= overlap_cap]
+    return float(overlap.mean()) if len(overlap) else bed.length
 
 
 def _spatial_order(position: FloatArray, radius: FloatArray) -> IntArray:

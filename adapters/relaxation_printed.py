@@ -78,8 +78,8 @@ def energy_minimise(
     length: float,
     force: float,
     evaluations_max: int,
-) -> tuple[FloatArray, bool, int]:
-    """Centres [m] (n, 3) of least energy, whether converged, and the evaluations.
+) -> tuple[FloatArray, bool, int, float]:
+    """Centres [m] (n, 3) of least energy, whether converged, the evaluations, the energy [J].
 
     Limited-memory BFGS from ``start`` over the ``free`` grains (n,), in units of ``length`` [m]
     and ``force`` [N]; converged when no component of force on a free grain exceeds ``force``.
@@ -105,5 +105,5 @@ def energy_minimise(
             "gtol": 1.0,
         },
     )
-    value(found.x)
-    return position, bool(np.abs(found.jac).max(initial=0.0) <= 1.0), rows.evaluations
+    least = value(found.x)[0] * force * length
+    return position, bool(np.abs(found.jac).max(initial=0.0) <= 1.0), rows.evaluations, least

@@ -181,7 +181,7 @@ def owed(record: Record) -> str:
         f"<strong>The bed has settled {micrometres(left)} µm less than its jumps were to move it:"
         "</strong> there was no room for more without overlaps. The settlement foretold is that "
         "much greater; shorter jumps, or more of them, leave the bed the cycles to make room, and "
-        'with <code>procedure.room = "rearranged"</code> grains change places.'
+        'with <code>procedure.jammed = "rearranged"</code> grains change places.'
     )
 
 

@@ -216,8 +216,8 @@ class Procedure(Table):
     """What the mean grain settles by in a jump of h cycles: its law, or all cycles computed."""
     seating: Literal["any", "waits"] = "any"
     """Whether the k_i first cycles count from where the bed carries the piston."""
-    room: Literal["found", "rearranged"] = "found"
-    """Whether grains change places where a move finds no room among them."""
+    jammed: Literal["less", "rearranged"] = "less"
+    """Where a jump by history finds no room: it moves the bed by less, or grains change places."""
     relaxation: Literal["smallest-move", "karrech2007", "proximal", "none"] = "smallest-move"
     total_cycles: Count
     """Cycles computed and jumped at the end."""
@@ -226,7 +226,7 @@ class Procedure(Table):
     def _without_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Stored runs are older than these keys: at their defaults they are left out."""
         newer = {"move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
-        newer |= {"seating": "any", "room": "found"}
+        newer |= {"seating": "any", "jammed": "less"}
         record: dict[str, Any] = whole(self)
         return {
             key: value for key, value in record.items() if key not in newer or value != newer[key]

@@ -238,16 +238,20 @@ def _settlement(scene: _Values) -> Iterator[Problem]:
         yield Problem(key, "move 'still' moves nothing, so no settlement: leave one of them out")
 
 
-def _rearranged(scene: _Values) -> Iterator[Problem]:
-    key = "procedure.room"
-    if scene.get(key) in (None, "found"):
+def _jammed(scene: _Values) -> Iterator[Problem]:
+    key = "procedure.jammed"
+    if scene.get(key) in (None, "less"):
         return
-    if scene.get("procedure.settlement") in (None, "law"):
+    if _present(scene, TOLERANCE_KEY):
+        yield Problem(key, "jumps with a tolerance move by what has room: leave this out")
+    elif scene.get("procedure.settlement") in (None, "law"):
         yield Problem(
             key,
             "grains that change places settle by more or less than asked, which only the next jump "
             'by history makes good: settlement = "history", or leave this out',
         )
+    if scene.get("procedure.relaxation") == "none":
+        yield Problem(key, "without a relaxation no jump ever finds no room: leave this out")
     if scene.get("loading.area_share") not in (None, 1):
         yield Problem(
             key,
@@ -365,7 +369,7 @@ CHECKS: tuple[Check, ...] = (
     _procedure,
     _jumps,
     _settlement,
-    _rearranged,
+    _jammed,
     _launcher,
     _law,
     _move,

@@ -16,7 +16,7 @@ import numpy as np
 
 from adapters import checks
 from adapters.engine import Engine, EngineRun, EngineStart
-from adapters.jump_room import relaxed, room_for, top_under
+from adapters.jump_room import room_for, top_under
 from adapters.laws import law_named
 from adapters.moves import move_named
 from adapters.overlaps import neighbours
@@ -202,13 +202,12 @@ def jump(
             target = before.position + share * (target - before.position)
             piston_height = before.piston_height + share * (piston_height - before.piston_height)
         with run.clock.part("relax"):
-            if gain is None or piston_height >= before.piston_height:
-                position, record = relaxed(run.scene, before, target, piston_height)
-            else:
+            generator = None
+            if gain is not None:
                 generator = np.random.default_rng([run.scene.sample.seed, bed.cycle, attempt])
-                position, record, piston_height = room_for(
-                    run.scene, before, target, piston_height, generator
-                )
+            position, record, piston_height = room_for(
+                run.scene, before, target, piston_height, generator
+            )
         after = before.moved(
             position,
             velocity=np.zeros_like(target),

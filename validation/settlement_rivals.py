@@ -175,7 +175,7 @@ def seated(method: Method) -> Method:
 
 def rearranging(method: Method) -> Method:
     """The same, its grains changing places where a jump finds no room."""
-    keys = (*method.settings, 'procedure.room="rearranged"')
+    keys = (*method.settings, 'procedure.jammed="rearranged"')
     return replace(method, name=f"{method.name}, rearranged", settings=keys)
 
 

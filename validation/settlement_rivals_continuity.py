@@ -29,7 +29,7 @@ PROBABILITY = 0.95
 
 def sides_of(run: Run) -> list[Row]:
     """Of every jump that stands: cycles ``first`` to ``last``, `COLUMNS` ``before`` and ``after``;
-    ``hops`` where its grains changed places.
+    ``hops``, and settlement ``asked`` for and its ``gain`` [m], where its grains changed places.
 
     As many of `CYCLES` as the windows on both sides of it have.
     Settlement is that of each cycle, in the first one of a window since the end of what came before
@@ -43,6 +43,7 @@ def sides_of(run: Run) -> list[Row]:
         sides: Row = {"first": jump.first_cycle, "last": jump.last_cycle}
         if "hops" in jump.notes["relaxation"]:
             sides["hops"] = jump.notes["relaxation"]["hops"]
+            sides |= {name: jump.notes[name] for name in ("asked", "gain")}
         for name, at in (("before", place - 1), ("after", place + 1)):
             table = cycles_of(run, f"window_{outcomes[at].first_cycle:06d}", slice(None))
             ends = [one.rows[-1]["settlement"] for one in outcomes[:at] if one.rows]

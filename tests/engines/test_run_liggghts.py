@@ -312,7 +312,7 @@ def test_engine_goes_on_from_grains_that_changed_places(
 
     monkeypatch.setattr(jump_room, "relaxed", jammed)
     monkeypatch.setattr(jump_fixed, "history_gain", lambda *_: 40e-6)
-    history = ('procedure.settlement="history"', 'procedure.room="rearranged"', "procedure.h=30")
+    history = ('procedure.settlement="history"', 'procedure.jammed="rearranged"', "procedure.h=30")
     more = ("procedure.k_i=10", "procedure.total_cycles=50")
     run_scene(scene_file, tmp_path / "run", overrides=(*TINY, *history, *more), progress=QUIET)
     outcomes = RunFolder(tmp_path / "run").outcomes()

@@ -318,8 +318,8 @@ REFUSED = [
     ("procedure.law", 'law = "lug"', "did you mean log?"),
     ("procedure.move", 'move = "shrink"', "did you mean shrunk?"),
     ("procedure.settlement", 'settlement = "past"', "'law' or 'history'"),
-    ("procedure.room", 'room = "made"', "'found' or 'rearranged'"),
-    ("procedure.room", 'room = "rearranged"', 'settlement = "history", or leave this out'),
+    ("procedure.jammed", 'room = "made"', "'found' or 'rearranged'"),
+    ("procedure.jammed", 'room = "rearranged"', 'settlement = "history", or leave this out'),
     ("procedure.relaxation", 'relaxation = "smallest move"', "did you mean smallest-move?"),
     ("procedure.total_cycles", "total_cycles = 1", "must exceed k_i ="),
     ("engine.name", 'name = "ligghts"', "did you mean liggghts?"),
@@ -333,7 +333,7 @@ REFUSED = [
 
 def test_grains_do_not_change_places_under_a_part_of_the_section(tmp_path: Path) -> None:
     """Without friction they would flow up beside such a piston."""
-    keys = ['procedure.room="rearranged"', 'procedure.settlement="history"']
+    keys = ['procedure.jammed="rearranged"', 'procedure.settlement="history"']
     message = refusal(tmp_path, scene_template("karrech-partial"), keys)
     assert "flow without friction, up beside a piston" in message
     assert scene_load(write(tmp_path, KARRECH), keys).procedure is not None
