@@ -172,16 +172,28 @@ def hung(record: Record) -> str:
 
 
 def owed(record: Record) -> str:
-    """What jumps by history asked for and the bed had no room for, where anything is left of it."""
+    """What jumps by history asked for and the bed did not settle by, where anything is left, and
+    what it settled too much."""
     notes = [jump.notes for _, jump in record.run.jumps if "asked" in jump.notes]
     left = notes[-1]["asked"] - notes[-1]["gain"] if notes else 0.0
-    if not left > 0:
+    if left == 0:
         return ""
+    if left < 0:
+        return paragraph(
+            f"<strong>The last jump settled the bed by {micrometres(-left)} µm more than asked:"
+            "</strong> grains changed places. The settlement foretold is that much smaller."
+        )
+    jammed = record.scene.procedure is not None and record.scene.procedure.jammed == "less"
+    places = (
+        ', and with <code>procedure.jammed = "rearranged"</code> grains change places'
+        if jammed
+        else ""
+    )
     return paragraph(
         f"<strong>The bed has settled {micrometres(left)} µm less than its jumps were to move it:"
-        "</strong> there was no room for more without overlaps. The settlement foretold is that "
-        "much greater; shorter jumps, or more of them, leave the bed the cycles to make room, and "
-        'with <code>procedure.jammed = "rearranged"</code> grains change places.'
+        "</strong> no room for more was found without overlaps. The settlement foretold is that "
+        "much greater; shorter jumps, or more of them, leave the bed the cycles to make room"
+        f"{places}."
     )
 
 
@@ -191,12 +203,13 @@ def changed_places(record: Record) -> str:
     notes = [jump.notes for _, jump in jumps if "hops" in jump.notes.get("relaxation", {})]
     if not notes:
         return ""
-    asked, got = (micrometres(sum(note[name] for note in notes)) for name in ("asked", "gain"))
+    settled = micrometres(sum(note["gain"] for note in notes))
     return paragraph(
-        f"<strong>In {len(notes)} of {len(jumps)} jumps grains changed places</strong>, "
-        f"as a move had no room among them; asked for {asked} µm in all, they settled {got}. Their "
-        "contacts are those of a bed without friction, more than before, until the first cycles "
-        "behind the jump have loaded them, and where single grains lie says nothing."
+        f"<strong>In {len(notes)} of {len(jumps)} jumps grains changed places</strong>, as a move "
+        f"had no room among them, and settled by {settled} µm in all. Their contacts are those of "
+        "a bed without friction, more than before, until the first cycles behind the jump have "
+        "loaded them, so what these jumps change of contacts and height is not judged; and where "
+        "single grains lie says nothing."
     )
 
 

@@ -244,10 +244,11 @@ def jump_figures(stage: str, jump: Outcome, own: History, full: History | None) 
         heights = {when: record[when]["mean_height"] for when in ("before", "estimated", "relaxed")}
         estimated = heights["before"] - heights["estimated"]
         change = heights["estimated"] - heights["relaxed"]
-        coordination = relative_error(
-            record["relaxed"]["coordination_number"], record["before"]["coordination_number"]
-        )
-        height = abs(change) / abs(estimated) if estimated else nan
+        if "hops" not in record:  # grains that change places keep neither, by design
+            coordination = relative_error(
+                record["relaxed"]["coordination_number"], record["before"]["coordination_number"]
+            )
+            height = abs(change) / abs(estimated) if estimated else nan
     healed = jump.last_cycle
     for cycle, kind in zip(own.cycle, own.kind, strict=True):
         if kind == "healing" and cycle == healed + 1:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -29,8 +29,8 @@ def short_of(rows: Sequence[Row], last: int = STUDY.last) -> str:
     short = sum(got < asked for asked, got in moved)
     tries = sum(len(row["lost"]) for row in mine if row.get("moved"))
     return (
-        f"Of {len(moved)} jumps by history {short} found no room for the whole move, after "
-        f"{tries} failed tries in all; what lacked was asked of the next."
+        f"Of {len(moved)} jumps by history whose grains keep their places {short} found no room "
+        f"for the whole move, after {tries} failed tries in all; what lacked was asked of the next."
     )
 
 
@@ -48,36 +48,29 @@ def table_room(rows: Sequence[Row], last: int = STUDY.last) -> str:
 
 
 def table_changed(rows: Sequence[Row], last: int = STUDY.last) -> str:
-    """What jumps whose grains changed places were asked for, and what they settled."""
+    """What jumps whose grains changed places settled by, and how long they looked."""
     lines = []
     for name in REARRANGED:
         mine = finished(rows, name, last)
-        pairs = [pair for row in mine for pair in changed_of(row)]
-        if not pairs:
+        sides = [side for row in mine for side in row["sides"] if "hops" in side]
+        if not sides:
             continue
-        moved, hops = np.array([pair[:2] for pair in pairs]), [pair[2] for pair in pairs]
-        share = moved[:, 1] / moved[:, 0]
+        share = np.array([side["gain"] / side["asked"] for side in sides])
+        hops = np.array([side["hops"] for side in sides])
         lines.append(
             [
-                name, str(sum(len(row["moved"]) for row in mine)), str(len(pairs)),
-                f"{1e6 * moved[:, 0].sum():,.0f}", f"{1e6 * moved[:, 1].sum():,.0f}",
+                name, str(sum(len(row["sides"]) for row in mine)), str(len(sides)),
+                f"{1e6 * np.mean([side['gain'] for side in sides]):.0f}",
                 ", ".join(f"{100 * np.quantile(share, q):.0f}" for q in (0.1, 0.5, 0.9)),
-                f"{np.median(hops):.0f}",
+                ", ".join(f"{np.quantile(hops, q):.0f}" for q in (0.1, 0.5, 0.9)),
+                f"{np.mean([len(row['lost']) for row in mine]):.1f}",
                 f"{np.mean([row['cost']['relax'] for row in mine]):.0f}",
             ]
         )  # fmt: skip
-    head = ("way", "jumps", "grains changed places in", "asked for in these, µm", "settled, µm",
-            "share in each, %: quantiles .1, .5, .9", "hops, median",
-            "relaxation a run, CPU s")  # fmt: skip
+    head = ("way", "jumps", "grains changed places in", "and settled by, µm, mean",
+            "over what was owed, %: quantiles .1, .5, .9", "hops: quantiles .1, .5, .9",
+            "failed tries a run", "relaxation a run, CPU s")  # fmt: skip
     return table(head, lines)
-
-
-def changed_of(row: Row) -> Iterator[tuple[float, float, int]]:
-    """Settlement asked for and reached [m], and hops, of a run's jumps whose grains changed
-    places."""
-    for side, (asked, got) in zip(row["sides"], row["moved"], strict=True):
-        if "hops" in side:
-            yield asked, got, side["hops"]
 
 
 def table_behind(rows: Sequence[Row], last: int = STUDY.last) -> str:

@@ -78,7 +78,9 @@ def test_what_is_owed_at_the_end_is_foretold() -> None:
         for member in range(2)
     ]
     assert cells(table_jumps([*truth, *rows]), STUDY.methods[0].name)[HEAD[6]] == "1,040"
-    assert short_of(rows).startswith("Of 10 jumps by history 10 found no room")
+    assert short_of(rows).startswith(
+        "Of 10 jumps by history whose grains keep their places 10 found no room"
+    )
     assert owed(runs(1e-3)[0]) == 0
     assert "| 60 to 100 | 10 | 0 |" in table_room(rows)
 
@@ -91,7 +93,7 @@ def jumped(hops: int | None, contacts: float) -> Row:
     }  # fmt: skip
     before = {name: 10 * [2.0] for name in after}
     return {"first": 10, "last": 20, "before": before, "after": after} | (
-        {} if hops is None else {"hops": hops}
+        {} if hops is None else {"hops": hops, "asked": 4e-5, "gain": 2e-5}
     )
 
 
@@ -103,7 +105,7 @@ def test_grains_that_changed_places_are_told_apart_from_those_that_did_not() -> 
         "cost": {"relax": 3.0},
     }  # fmt: skip
     rows = [row, row | {"member": 1}]
-    assert "| 4 | 2 | 80 | 40 | 50, 50, 50 | 7 | 3 |" in table_changed(rows)
+    assert "| 4 | 2 | 20 | 50, 50, 50 | 7, 7, 7 | 0.0 | 3 |" in table_changed(rows)
     changed, kept = (
         [line for line in table_behind(rows).splitlines() if line.startswith(f"| {words}")]
         for words in ("grains changed places", "smallest move")

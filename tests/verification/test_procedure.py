@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters import jump_room, procedure, stages
+from adapters import jump_fixed, jump_room, procedure, stages
 from adapters.contact_law import hertz_stiffness
 from adapters.container import Walls
 from adapters.engine_fake import SETTLEMENT
@@ -271,10 +271,10 @@ def test_grains_that_change_places_settle_by_what_they_do(
         return real(scene, before, target, piston_height)
 
     def rearranged(
-        target: FloatArray, before: State, walls: Walls, after: Walls, *_: Any, gravity: float
+        target: FloatArray, before: State, walls: Walls, *_: Any, walls_after: Walls, gravity: float
     ) -> tuple[Relaxation, int]:
         called.append(float((before.position - target)[:, 2].mean()))
-        assert after.plane_point[-1, 2] < walls.plane_point[-1, 2]
+        assert walls_after.plane_point[-1, 2] < walls.plane_point[-1, 2]
         position = before.position + 4 / 3 * (target - before.position)
         measured = relax(
             before.position, before, walls, hertz_stiffness(1e9, 0.25, 2e11, 0.3), gravity=gravity
@@ -298,6 +298,27 @@ def test_grains_that_change_places_settle_by_what_they_do(
         going_on - first.notes["asked"] / 3, abs=0.02 * going_on
     )
     assert float(rows[-1]["settlement"]) == pytest.approx(SETTLEMENT * np.log(126), rel=0.01)
+
+
+def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """History asks the first jump for nothing, and what its grains move beside one another has no
+    room: tried with less and less of that, the run goes on from where they were."""
+    real = jump_room.relaxed
+
+    def jammed(
+        scene: Scene, before: State, target: FloatArray, piston_height: float
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        if before.cycle == 40 and not np.array_equal(target, before.position):
+            raise NotConverged("made to fail")
+        return real(scene, before, target, piston_height)
+
+    monkeypatch.setattr(jump_room, "relaxed", jammed)
+    monkeypatch.setattr(jump_fixed, "history_gain", lambda *_: 0.0)
+    settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=90")
+    jump = next(one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump")
+    assert (jump.notes["attempt"], jump.notes["gain"]) == (4, 0.0)
 
 
 def test_a_jammed_bed_is_moved_by_what_it_has_room_for(
