@@ -1,6 +1,7 @@
 """Relaxation: bring the overlaps of an estimated configuration back to what a bed can carry.
 
 After a jump the estimated positions penetrate by up to millimetres and have lost most contacts.
+(Where a jammed bed has no room for them: `adapters.relaxation_rearranged`.)
 `relax` offers three methods behind one call and one result:
 
 ``smallest-move``   nearest positions in which the force network has its overlaps again, nothing

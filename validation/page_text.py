@@ -6,9 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 
 
 def page_filled(template: str, parts: Mapping[str, str]) -> str:
-    """A template whose marks ``{{NAME}}`` and ``<NAME>`` give way to the part of that name."""
+    """A template whose marks ``{{NAME}}`` and ``<NAME>`` give way to the part of that name.
+
+    ValueError where there is no such mark: a table would be made for no page.
+    """
     for name, part in parts.items():
-        template = template.replace("{{" + name + "}}", part).replace(f"<{name}>", part)
+        marks = ("{{" + name + "}}", f"<{name}>")
+        if not any(mark in template for mark in marks):
+            raise ValueError(f"the template has no mark for {name}")
+        for mark in marks:
+            template = template.replace(mark, part)
     return template
 
 

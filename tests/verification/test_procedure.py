@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ import numpy as np
 import pytest
 
 from adapters import jump_fixed, jump_room, procedure, stages
-from adapters.contact_law import hertz_stiffness
+from adapters.contact_law import HertzStiffness
 from adapters.container import Walls
 from adapters.engine_fake import SETTLEMENT
 from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
@@ -261,7 +263,8 @@ def test_grains_that_change_places_settle_by_what_they_do(
     grains change places, which settles the bed by a third more than asked: the jump is not tried
     again, and the next, of a ln(101 / 86), is asked for that third less.  Without the key that way
     is never called."""
-    real, called = jump_room.relaxed, []
+    real, drawn, said = jump_room.relaxed, [], io.StringIO()
+    called: list[float] = []
 
     def jammed(
         scene: Scene, before: State, target: FloatArray, piston_height: float
@@ -271,14 +274,14 @@ def test_grains_that_change_places_settle_by_what_they_do(
         return real(scene, before, target, piston_height)
 
     def rearranged(
-        target: FloatArray, before: State, walls: Walls, *_: Any, walls_after: Walls, gravity: float
-    ) -> tuple[Relaxation, int]:
+        target: FloatArray, before: State, walls: Walls, stiffness: HertzStiffness,
+        generator: np.random.Generator, *, walls_after: Walls, gravity: float,
+    ) -> tuple[Relaxation, int]:  # fmt: skip
+        drawn.append(generator.random())
         called.append(float((before.position - target)[:, 2].mean()))
         assert walls_after.plane_point[-1, 2] < walls.plane_point[-1, 2]
         position = before.position + 4 / 3 * (target - before.position)
-        measured = relax(
-            before.position, before, walls, hertz_stiffness(1e9, 0.25, 2e11, 0.3), gravity=gravity
-        )
+        measured = relax(before.position, before, walls, stiffness, gravity=gravity)
         return replace(measured, position=position, method="rearranged"), 7
 
     monkeypatch.setattr(jump_room, "relaxed", jammed)
@@ -286,7 +289,10 @@ def test_grains_that_change_places_settle_by_what_they_do(
     keys = ('procedure.settlement="history"', "procedure.h=[20, 15]", "procedure.total_cycles=125")
     settle(tmp_path / "found", *keys)
     assert not called
+    monkeypatch.setattr(QUIET, "quiet", False)
+    monkeypatch.setattr(QUIET, "stream", said)
     rows = settle(tmp_path / "run", *keys, 'procedure.jammed="rearranged"')
+    assert "um where it owes 7.87: grains changed places" in said.getvalue()
     first, second = (o for o in RunFolder(tmp_path / "run").outcomes() if o.stage == "jump")
     asked = SETTLEMENT * np.log(61 / 41)
     assert called == [pytest.approx(asked, rel=0.02)]
@@ -298,6 +304,11 @@ def test_grains_that_change_places_settle_by_what_they_do(
         going_on - first.notes["asked"] / 3, abs=0.02 * going_on
     )
     assert float(rows[-1]["settlement"]) == pytest.approx(SETTLEMENT * np.log(126), rel=0.01)
+    for stage in RunFolder(tmp_path / "run").stage_names():
+        if int(stage.split("_")[1]) >= 40:
+            shutil.rmtree(tmp_path / "run" / stage)
+    assert settle(tmp_path / "run", *keys, 'procedure.jammed="rearranged"') == rows
+    assert drawn[0] == drawn[1]  # killed and resumed, a run draws the same kicks
 
 
 def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
