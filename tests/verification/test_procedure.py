@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -256,6 +257,22 @@ def test_room_that_jumps_found() -> None:
         assert 1e6 * room_known(jumps, one.last_cycle) == pytest.approx(room)
 
 
+Relaxed = Callable[[Scene, State, FloatArray, float], tuple[FloatArray, dict[str, Any]]]
+
+
+def jammed_at_40(real: Relaxed) -> Relaxed:
+    """As `jump_room.relaxed`, but that at cycle 40 only the bed as it is has room."""
+
+    def relaxed(
+        scene: Scene, before: State, target: FloatArray, piston_height: float
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        if before.cycle == 40 and not np.array_equal(target, before.position):
+            raise NotConverged("made to fail")
+        return real(scene, before, target, piston_height)
+
+    return relaxed
+
+
 def test_grains_that_change_places_settle_by_what_they_do(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -263,15 +280,8 @@ def test_grains_that_change_places_settle_by_what_they_do(
     grains change places, which settles the bed by a third more than asked: the jump is not tried
     again, and the next, of a ln(101 / 86), is asked for that third less.  Without the key that way
     is never called."""
-    real, drawn, said = jump_room.relaxed, [], io.StringIO()
+    drawn, said = [], io.StringIO()
     called: list[float] = []
-
-    def jammed(
-        scene: Scene, before: State, target: FloatArray, piston_height: float
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        if before.cycle == 40 and not np.array_equal(target, before.position):
-            raise NotConverged("made to fail")
-        return real(scene, before, target, piston_height)
 
     def rearranged(
         target: FloatArray, before: State, walls: Walls, stiffness: HertzStiffness,
@@ -284,7 +294,7 @@ def test_grains_that_change_places_settle_by_what_they_do(
         measured = relax(before.position, before, walls, stiffness, gravity=gravity)
         return replace(measured, position=position, method="rearranged"), 7
 
-    monkeypatch.setattr(jump_room, "relaxed", jammed)
+    monkeypatch.setattr(jump_room, "relaxed", jammed_at_40(jump_room.relaxed))
     monkeypatch.setattr(jump_room, "rearrange", rearranged)
     keys = ('procedure.settlement="history"', "procedure.h=[20, 15]", "procedure.total_cycles=125")
     settle(tmp_path / "found", *keys)
@@ -315,16 +325,7 @@ def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
 ) -> None:
     """History asks the first jump for nothing, and what its grains move beside one another has no
     room: tried with less and less of that, the run goes on from where they were."""
-    real = jump_room.relaxed
-
-    def jammed(
-        scene: Scene, before: State, target: FloatArray, piston_height: float
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        if before.cycle == 40 and not np.array_equal(target, before.position):
-            raise NotConverged("made to fail")
-        return real(scene, before, target, piston_height)
-
-    monkeypatch.setattr(jump_room, "relaxed", jammed)
+    monkeypatch.setattr(jump_room, "relaxed", jammed_at_40(jump_room.relaxed))
     monkeypatch.setattr(jump_fixed, "history_gain", lambda *_: 0.0)
     settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=90")
     jump = next(one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump")

@@ -30,6 +30,7 @@ from adapters.relaxation_kernel import (
     rows_norm,
 )
 from adapters.state import Contacts, FloatArray, State
+from tests.deepest_overlap import deepest
 from validation.cases.relaxation import STIFFNESS, bed_made, jump, state_at_rest
 
 BOX = Container("box", size_x=0.1, size_y=0.1)
@@ -63,22 +64,6 @@ def column(count: int, overlap: FloatArray) -> Bed:
     x = np.full((count, 3), 0.05)
     x[:, 2] = 3e-3 + 6e-3 * np.arange(count) - np.cumsum(overlap)
     return state_at_rest(x, radius), BOX.walls()
-
-
-def deepest(position: FloatArray, radius: FloatArray, walls: Walls) -> float:
-    """Greatest overlap [m] over all pairs and walls, without any neighbour search."""
-    first, second = np.triu_indices(len(radius), 1)
-    reach = radius[first] + radius[second]
-    pairs = reach - pdist(position) if len(radius) > 1 else np.zeros(1)
-    side = [
-        radius - (position - point) @ normal
-        for point, normal in zip(walls.plane_point, walls.plane_normal, strict=True)
-    ]
-    cylinder = np.hypot(position[:, 0], position[:, 1]) + radius - walls.cylinder_radius
-    return float(max(pairs.max(), np.max(side), cylinder.max()))
-
-
-# --- kernels ---------------------------------------------------------------------------------
 
 
 def test_hertz_potential_is_that_of_eq_5(settled: Bed) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial.distance import pdist
 
 from adapters.contact_law import HertzStiffness
 from adapters.container import Container, Walls
@@ -16,6 +15,7 @@ from adapters.errors import UsageError
 from adapters.relaxation import RelaxationNotConverged, relax
 from adapters.relaxation_rearranged import ENOUGH, LEAST, MOST, OVERLAP_MAX, rearrange
 from adapters.state import FloatArray, State
+from tests.deepest_overlap import deepest
 from validation.cases.relaxation import STIFFNESS, state_at_rest
 from validation.settlement_ensemble import COARSE
 from validation.settlement_ensemble_record import RECORD
@@ -48,18 +48,6 @@ def strained(
 
 def stiffness_of(packing: int) -> HertzStiffness:
     return COARSE.scene(packing).stiffness
-
-
-def deepest(position: FloatArray, radius: FloatArray, walls: Walls) -> float:
-    """Greatest overlap [m] over all pairs and walls, without any neighbour search."""
-    first, second = np.triu_indices(len(radius), 1)
-    pairs = radius[first] + radius[second] - pdist(position)
-    planes = [
-        (radius - (position - point) @ normal).max()
-        for point, normal in zip(walls.plane_point, walls.plane_normal, strict=True)
-    ]
-    round_wall = np.hypot(position[:, 0], position[:, 1]) + radius - walls.cylinder_radius
-    return float(max(pairs.max(), round_wall.max(), *planes))
 
 
 def settled(before: State, position: FloatArray) -> float:
