@@ -120,7 +120,7 @@ PARTIAL = Kind(
     "partially confined, 10 Hz, as in the paper",
     "karrech-partial",
     (),
-    packings=3,
+    packings=5,
     members=2,
     k_i=20,
     last=100,
