@@ -94,13 +94,15 @@ def jumped_error(
     return settled - float(curve[end])
 
 
+def curve_of(piece: Piece, record: EnsembleRecord) -> FloatArray:
+    """Settlement [m] of a member by cycle, from 0 on."""
+    found = columns_by_cycle(piece, record)
+    return np.array([0.0, *(found[cycle]["settlement"] for cycle in range(1, max(found) + 1))])
+
+
 def curves_of(kind: Kind, last: int, record: EnsembleRecord) -> list[FloatArray]:
-    """Settlement [m] by cycle, from 0 on, of all members that have come to ``last``."""
-    curves = []
-    for piece in kind.runs():
-        kept = record.kept(piece.name)
-        if isinstance(piece, Piece) and piece.packing and kept and kept.cycle >= last:
-            found = columns_by_cycle(piece, record)
-            path = [found[cycle]["settlement"] for cycle in range(1, last + 1)]
-            curves.append(np.append(0.0, path))
-    return curves
+    """Settlement [m] by cycle, from 0 to ``last``, of all members that have come there."""
+    runs = ((piece, record.kept(piece.name)) for piece in kind.runs() if piece.packing)
+    return [
+        curve_of(piece, record)[: last + 1] for piece, kept in runs if kept and kept.cycle >= last
+    ]

@@ -54,6 +54,11 @@ def mean_field_ratios(piece: Piece, record: EnsembleRecord) -> FloatArray:
     return deflection_over_mean_field(piece.kind.scene(piece.seed), rows)
 
 
+def hung_first(piece: Piece, record: EnsembleRecord) -> int:
+    """The last cycle before the bed carries a full run's piston for the first time."""
+    return int(np.flatnonzero(mean_field_ratios(piece, record) <= HUNG)[0])
+
+
 def table_seating(record: EnsembleRecord) -> str:
     """Of every full run: elastic deflection over the mean field's, and where the piston hangs."""
     marks = (5, 20, 40, 60, 80, 100)

@@ -36,6 +36,7 @@ from validation.settlement_ensemble_reading import (
 )
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_partial_bearing import table_bearing, table_seating
+from validation.settlement_partial_waits import table_waits
 from validation.settlement_rivals import Row
 from validation.settlement_rivals_reading import (
     FIGURES,
@@ -167,10 +168,10 @@ def page(rows: Sequence[Row], record: EnsembleRecord) -> str:
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), {
         "CLAIMS": table_claims(rows, record), "PACKINGS": table_packings(rows),
         "BARS": way(text), "BEARING": table_bearing(record),
-        "SEATING": table_seating(record), "HUNG": f"{HUNG:g}", "LAST": str(last),
+        "SEATING": table_seating(record), "WAITS": table_waits(record), "HUNG": f"{HUNG:g}", "LAST": str(last),
         "K_I": str(STUDY.kind.k_i),
         "HALF": f"{1e6 * settlement_of(rows, last).half_given:.0f}",
-        "APART": ", ".join(f"{1e6 * one:.0f}" for one in members_apart(rows)),
+        "APART": ", ".join(f"{1e6 * one:.0f}" for one in members_apart(rows) if one),
         "TOTAL": f"{1e6 * settlement_total(rows, last):.0f}", "MEAN": f"{1e6 * begun.mean:.0f}",
         "ENGINES": ", ".join(dict.fromkeys(row["engine"] for row in rows if row.get("engine"))),
         "MACHINES": "; ".join(dict.fromkeys(row["machine"] for row in rows)),
