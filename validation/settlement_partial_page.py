@@ -153,9 +153,9 @@ def table_packings(rows: Sequence[Row], last: int = STUDY.last) -> str:
 
 
 def members_apart(rows: Sequence[Row], last: int = STUDY.last) -> list[float]:
-    """By how much the full runs of each packing part in settlement [m]."""
+    """By how much the full runs of each packing that has two part in settlement [m]."""
     found = runs_by_packing(reference(rows, last), "settlement")
-    return [float(np.ptp(runs)) for runs in found.values()]
+    return [float(np.ptp(runs)) for runs in found.values() if len(runs) > 1]
 
 
 def page(rows: Sequence[Row], record: EnsembleRecord) -> str:
@@ -168,10 +168,10 @@ def page(rows: Sequence[Row], record: EnsembleRecord) -> str:
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), {
         "CLAIMS": table_claims(rows, record), "PACKINGS": table_packings(rows),
         "BARS": way(text), "BEARING": table_bearing(record),
-        "SEATING": table_seating(record), "WAITS": table_waits(record), "HUNG": f"{HUNG:g}", "LAST": str(last),
-        "K_I": str(STUDY.kind.k_i),
+        "SEATING": table_seating(record), "WAITS": table_waits(record),
+        "HUNG": f"{HUNG:g}", "LAST": str(last), "K_I": str(STUDY.kind.k_i),
         "HALF": f"{1e6 * settlement_of(rows, last).half_given:.0f}",
-        "APART": ", ".join(f"{1e6 * one:.0f}" for one in members_apart(rows) if one),
+        "APART": ", ".join(f"{1e6 * one:.0f}" for one in members_apart(rows)),
         "TOTAL": f"{1e6 * settlement_total(rows, last):.0f}", "MEAN": f"{1e6 * begun.mean:.0f}",
         "ENGINES": ", ".join(dict.fromkeys(row["engine"] for row in rows if row.get("engine"))),
         "MACHINES": "; ".join(dict.fromkeys(row["machine"] for row in rows)),
