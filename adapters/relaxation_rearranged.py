@@ -8,8 +8,8 @@ hops from one state near equilibrium to the next (basin hopping: Wales and Doye,
 random and lets the bed flow, without friction and under its weight, towards a minimum of the energy
 of eq. 29.  The piston stands still meanwhile, where the jump lowered it to.
 
-The contacts are those of a bed without friction, some four a grain and not three; under load
-friction has them back at what they were within two cycles.
+The contacts are those of a bed without friction, more than before; from the first load on friction
+has them back at what they were.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ double twice."""
 KICK_GROWS, KICK_SHRINKS = 1.1, 0.9
 """Factors of the next kick after a hop that is kept, and after one that is not."""
 HOPS_MAX = 30
-"""Most hops; most of what they find, they find in the first twenty."""
+"""Most hops; on the coarse bed half of the jumps that find room do in 13 at most."""
 EVALUATIONS_OF_HOP = 600
 """Most evaluations of the energy in a hop: under its next load a bed moves on anyway."""
 ENOUGH = 0.9
