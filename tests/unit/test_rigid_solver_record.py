@@ -99,6 +99,24 @@ def test_fresh_is_by_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert found[0]["commit"] == "b"
 
 
+@pytest.mark.parametrize(
+    ("family", "method", "boxes", "made"),
+    [
+        ("other packings 3D", "Siconos 3D_NSGS", 125, True),
+        ("other packings 3D", "Siconos 3D_NSGS", 124, False),
+        ("other packings 3D", "Clarabel", 125, False),
+        ("other packings 3D", "rigid_lcp", 124, True),
+        ("unseen", "Siconos 3D_NSGS", 125, False),
+        ("stored", "Siconos 3D_NSGS", 124, True),
+    ],
+)
+def test_which_runs_are_made(family: str, method: str, boxes: int, made: bool) -> None:
+    """Siconos races on packings that no setting was chosen by from 500 contacts, 4 a box."""
+    problem = tower(boxes, 3)
+    named = NamedProblem("spheres", family, lambda: problem)
+    assert runs.raced(named, problem, method) is made
+
+
 def test_changed_problems_are_of_the_family() -> None:
     """Order, friction and q change by a seed; W keeps its eigenvalues, q its space."""
     problem = tower(3, 2)

@@ -15,6 +15,7 @@ from rigid_lcp.friction_problem import BodySpace, friction_problem
 from rigid_lcp.frictionless import Floats, face_solver, frictionless, lcp, normal_matrix
 from rigid_lcp.normal_sweeps import normal_sweeps
 from tests.rigid_networks import network, network_bodies, stored, tower
+from validation.rigid_packings import packing
 
 TOLERANCE = 1e-12
 
@@ -104,6 +105,16 @@ def test_inconsistent_is_said() -> None:
     found = lcp(np.zeros((1, 1)), [-1.0])
     assert not found.solved
     assert found.message
+
+
+def test_exchanges_do_not_go_round() -> None:
+    """A bed on which exchanges alone came back to the same sides: 36 of them, with sweeps three."""
+    made = packing(90, 2, seed=11)
+    assert made.bodies is not None
+    problem = friction_problem(made.bodies, made.offset, 0.0, 2)
+    found = frictionless(problem)
+    assert found.solved
+    assert found.work["exchanges"] <= 6
 
 
 def test_a_start_is_used() -> None:

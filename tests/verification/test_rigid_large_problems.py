@@ -55,6 +55,25 @@ def test_contacts_that_bear_are_named_in_the_order_of_the_sweep() -> None:
     assert carrying(force, last, visit).tolist() == [4, 2, 1]
 
 
+def test_a_swept_solution_is_exact() -> None:
+    """Sweeps that end at 1e-12 go on to round-off, at half their number more at the most; where less
+    is asked for they do not."""
+    problem = crystal(5)
+    assert problem.bodies is not None
+    found = solve_friction(problem.bodies, problem.offset, problem.friction, 3)
+    assert (found.method, found.residual < 5e-15) == ("gauss-seidel", True)
+    assert found.work["sweeps"] < 100
+    rough = solve_friction(problem.bodies, problem.offset, problem.friction, 3, tolerance=1e-9)
+    assert 1e-12 < rough.residual <= 1e-9
+
+
+def test_sweeps_that_creep_end_early() -> None:
+    """A tower gains nothing by sweeps: twelve tell, and that all contacts stick is tried."""
+    problem = tower(100, 3)
+    found = solve_friction(problem.bodies, problem.offset, problem.friction, 3)
+    assert (found.method, found.work["sweeps"]) == ("sticking", 12)
+
+
 @pytest.mark.parametrize("layers", [6])
 def test_a_warm_start_ends_at_the_last_digit(layers: int) -> None:
     """From forces that are wrong by a thousandth, to a residual of 1e-12."""
