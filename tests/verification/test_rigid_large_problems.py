@@ -56,8 +56,8 @@ def test_contacts_that_bear_are_named_in_the_order_of_the_sweep() -> None:
 
 
 def test_a_swept_solution_is_exact() -> None:
-    """Sweeps that end at 1e-12 go on to round-off, at half their number more at the most; where less
-    is asked for they do not."""
+    """Sweeps that end at 1e-12 go on to round-off, half their number more at the most; those that
+    end a rougher tolerance do not."""
     problem = crystal(5)
     assert problem.bodies is not None
     found = solve_friction(problem.bodies, problem.offset, problem.friction, 3)
