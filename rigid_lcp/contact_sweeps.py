@@ -132,9 +132,10 @@ def sweep_once(
 @njit(cache=True)
 def sweeps_until(
     blocks: SweepBlocks, state: Momentum, force: Floats, visit: Integers, backward: Integers,
-    symmetric: bool, momentum: bool, tolerance: float, sweeps: int,
+    symmetric: bool, momentum: bool, tolerance: float, sweeps: int, trial: int, useful: float,
 ) -> tuple[Floats, float, int]:  # fmt: skip
-    """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done in all.
+    """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done in all, or
+    ``trial`` of them left more than ``useful``.
 
     Returns the best forces of those looked at, their residual, and the contacts without an answer
     in the last sweep over all.
@@ -168,6 +169,8 @@ def sweeps_until(
         if residual < best_residual:
             best[:] = force
             best_residual = residual
+        if state.tally[0] >= trial and best_residual > useful:
+            break
         if momentum and residual > 0.0:
             enough = state.tally[3] * min(0.9, tolerance / residual)
     return best, best_residual, stuck

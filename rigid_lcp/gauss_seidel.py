@@ -53,6 +53,7 @@ def gauss_seidel(
     order: Order | Integers = "forward",
     sweeper: Sweeper | None = None,
     last: bool = False,
+    slow: tuple[int, float] = (0, np.inf),
 ) -> FrictionSolution:
     """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done.
 
@@ -62,8 +63,10 @@ def gauss_seidel(
     ``sweeper``: that of an earlier call for the same problem; the two options before are its own.
     The best point of those looked at is returned, or with ``last`` the one where the sweeps end: a
     self-stress that has to grow does so without a better residual, and sweeps that go on from the
-    best point lose the way made.  Raises `UsageError` for an order that is no
-    permutation.
+    best point lose the way made.  ``slow``: sweeps after which to give up if more than this
+    residual is left, looked at as often as the residual is.
+
+    Raises `UsageError` for an order that is no permutation.
     """
     contacts, dim = problem.contacts, problem.dim
     if sweeper is None:
@@ -71,7 +74,7 @@ def gauss_seidel(
         symmetric = isinstance(order, str) and order == "symmetric"
         sweeper = Sweeper(problem, visit, symmetric=symmetric, momentum=momentum)
     force = np.zeros((contacts, dim)) if start is None else np.array(start, dtype=float)
-    best, _, stuck = sweeper.sweep_until(force.reshape(contacts, dim), tolerance, sweeps)
+    best, _, stuck = sweeper.sweep_until(force.reshape(contacts, dim), tolerance, sweeps, slow)
     message = (
         f"{stuck} contacts have no solution while the others are held (Painleve, or no mass)"
         "\n  -> solve at velocity level, or use a method that changes all contacts at once"
@@ -113,7 +116,7 @@ class Sweeper:
         )  # fmt: skip
 
     def sweep_until(
-        self, force: Floats, tolerance: float, sweeps: int
+        self, force: Floats, tolerance: float, sweeps: int, slow: tuple[int, float] = (0, np.inf)
     ) -> tuple[Floats, float, int]:
         """Sweep from forces (nc, dim) from anywhere: best forces, their residual, and how many
         contacts have no answer."""
@@ -121,7 +124,7 @@ class Sweeper:
         self.state = self._at_rest(force)
         best, residual, stuck = sweeps_until(
             self.blocks, self.state, force, self.visit, self.visit_backward, self.symmetric,
-            self.momentum, tolerance, sweeps,
+            self.momentum, tolerance, sweeps, *slow,
         )  # fmt: skip
         return best, residual, stuck
 

@@ -64,6 +64,8 @@ FEW_METHODS = {
 """What is run on families of many problems, by the first word of their names: our default and its
 nearest rivals; all methods on the others."""
 RIVALS = ("Clarabel + Newton", "OSQP polished")
+NAMES = ("rigid_lcp", "Clarabel")
+"""Names of methods with which others begin too: asked for, they are meant alone."""
 ORIGIN = ("commit", "command", "machine", "started")
 
 
@@ -204,8 +206,8 @@ def race(
     """Make the runs that ``path`` has not, all methods of a problem after another; all rows.
 
     ``only_problems``: words, with commas, of which the name of the problem or of its family holds
-    one; ``only_methods``: how names of methods begin.  Both empty for all.  ``fresh``: what
-    another commit recorded is made again.
+    one; ``only_methods``: names of methods, or how some begin.  Both empty for all.
+    ``fresh``: what another commit recorded is made again.
     """
     origin = {key: value for key, value in provenance(command).items() if key in ORIGIN}
     rows = rows_read(path)
@@ -224,7 +226,10 @@ def race(
             continue
         problem = named.make()
         for method, runs in methods(problem, quick).items():
-            if some_methods and not any(method.startswith(word) for word in some_methods):
+            if some_methods and not any(
+                method == word if word in NAMES else method.startswith(word)
+                for word in some_methods
+            ):
                 continue
             if not raced(named, problem, method):
                 continue
@@ -275,7 +280,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--quick", action="store_true", help="small generated problems, no Siconos")
     parser.add_argument("--problems", default="", help="words in names of problems or families")
-    parser.add_argument("--methods", default="", help="how the names of methods begin")
+    parser.add_argument("--methods", default="", help="names of methods, or how some begin")
     parser.add_argument(
         "--fresh", action="store_true", help="make again what another commit recorded"
     )
