@@ -89,7 +89,8 @@ def test_sentences_about_grains_that_change_places(
     jumps: int, cheaper: float, even: float, short: float, foretold_short: float, scatter: float
 ) -> None:
     """20 to 30 times cheaper, 17 to 25 at equal cost a step, beds inside the interval; packing by
-    packing -431 to 333 um off, which tells the mean's error to 301 to 374 um; no shock behind a jump."""
+    packing -431 to 333 um off, which tells the mean's error to 301 to 374 um; no shock behind
+    a jump."""
     rows, last = record_read(STUDY.record), STUDY.last
     name = f"{jumps} growing jumps, by history, profile, rearranged"
     mine, truth = finished(rows, name, last), settlement_of(rows, last)
