@@ -21,7 +21,7 @@ BOUNDS = (0.25, 0.5, 1.0, 2.0, 4.0, inf)
 WAYS = ("median of the votes", "without the power law", "recent decades first", "no faster decade")
 """`adapters.fit_auto`; N^b has no vote, as it never slows down to a logarithm; windows of one
 decade, two and all weigh 3 : 2 : 1; no decade ahead brings more than the last one did."""
-ERROR_90_BAR = 0.2
+ERROR_90_BAR, LARGE = 0.2, 0.25
 Row = dict[str, Any]
 
 
@@ -55,6 +55,15 @@ def ways(said: Outlook, case: LawCase) -> dict[str, float]:
     }
 
 
+def large_errors(rows: Sequence[Row]) -> list[Row]:
+    """Cases that do not ratchet for certain and miss by more than `LARGE`, largest first."""
+    large = [row for row in rows if row["certain"] and abs(row["error"]) > LARGE]
+    return [
+        {key: row[key] for key in ("name", "cut", "error", "width")}
+        for row in sorted(large, key=lambda row: -abs(row["error"]))
+    ]
+
+
 def kept(rows: Sequence[Row], bound: float) -> list[Row]:
     """Cases that go ahead: no certain ratcheting, and a band no wider than the bound."""
     return [row for row in rows if row["certain"] and row["width"] <= bound]
@@ -66,7 +75,7 @@ def bound_rows(source: str, rows: Sequence[Row]) -> list[Row]:
     for bound, way in product(BOUNDS, WAYS):
         ahead = kept(rows, bound)
         row = {
-            "source": source,
+            "source": f"{source}, bound",
             "method": f"{way}, {bound:g}",
             "of": len(rows),
             **summary(one["ways"][way] for one in ahead),

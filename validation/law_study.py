@@ -24,7 +24,7 @@ from adapters.provenance import provenance
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.cases.jump_without_engine import data_folder
-from validation.law_bound import bound_rows, left_out, summary, ways
+from validation.law_bound import bound_rows, large_errors, left_out, summary, ways
 from validation.law_series import (
     OTHER_CUTS,
     REACH,
@@ -137,6 +137,7 @@ def auto_summary(rows: Sequence[Row]) -> Row:
         "error_90_without_one": [min(without), max(without)],
         "coverage": float(np.mean([row["inside"] for row in allowed])),
         "half_width": float(np.median([row["half_width"] for row in allowed])),
+        "large": large_errors(rows),
         "hindsight": summary(row["hindsight"] for row in allowed),
         "all": summary(row["error"] for row in rows),
         "regimes": {
