@@ -106,5 +106,7 @@ def left_out(rows: Sequence[Row]) -> Row:
 
 def _cost(rows: Sequence[Row], bound: float, way: str) -> tuple[bool, int, float]:
     ahead = kept(rows, bound)
+    if not ahead:
+        return True, len(rows), inf
     error_90 = summary(row["ways"][way] for row in ahead)["error_90"]
     return error_90 > ERROR_90_BAR, len(rows) - len(ahead), error_90

@@ -87,6 +87,7 @@ def test_unit_is_told_where_no_header_gives_it(tmp_path: Path) -> None:
     named = written(tmp_path / "named.csv", "N,eps_a\n1,0.5\n20,0.75\n")
     plain = written(tmp_path / "plain.csv", "N,settlement\n1,0.5\n20,0.75\n")
     percent = written(tmp_path / "percent.csv", "N,strain [%]\n1,0.5\n20,0.75\n")
+    assert series_read([bare]).unit == "unknown"
     assert series_read([bare], unit="1").unit == "1"
     assert series_read([named], columns=("N", "eps_a")).unit == "unknown"
     assert series_read([named], columns=("N", "eps_a"), unit="%").unit == "%"
