@@ -5,32 +5,31 @@ The page is ``jump_page.md`` beside this file, with tables and numbers of the tw
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from validation import jump_runs, jump_study
+from validation.jump_reading import (
+    BAR,
+    Rows,
+    band_of_record,
+    bursty,
+    group,
+    liggghts_error,
+    observed,
+    overspend,
+    settings_of,
+    settlement_of,
+    total,
+    within,
+)
 from validation.law_page import per_cent
 from validation.page_text import page_filled, table
 
 TEMPLATE = Path(__file__).with_name("jump_page.md")
 PAGE = Path(__file__).parents[1] / "docs" / "jump-control.md"
 PICTURE = PAGE.with_suffix(".png")
-
-Rows = Sequence[dict[str, Any]]
-
-
-def group(rows: Rows, name: str, **keys: Any) -> list[dict[str, Any]]:
-    """Rows of a group with these values."""
-    chosen = [row for row in rows if row["group"] == name]
-    return [row for row in chosen if all(row[key] == value for key, value in keys.items())]
-
-
-def total(rows: Rows, key: str) -> int:
-    """Sum of a column."""
-    return int(sum(row[key] for row in rows))
 
 
 def share(part: int, whole: int) -> str:
@@ -40,13 +39,13 @@ def share(part: int, whole: int) -> str:
 
 def cells(rows: Rows) -> list[str]:
     """Columns of a table of runs on curves."""
-    oracle = [row["computed"] / row["oracle"] for row in rows if row["oracle"]]
+    spent = overspend(rows)
     error = np.array([row["error"] for row in rows])
     return [
         share(total(rows, "within"), total(rows, "jumps")),
         str(total(rows, "taken_back")),
         f"{np.median([row['computed'] for row in rows]):,.0f}",
-        f"{np.median(oracle):.1f}" if oracle else "",
+        f"{spent:.1f}" if spent == spent else "",
         f"{100 * error.mean():+.1f} ± {100 * error.std():.1f} %",
         f"{total(rows, 'mean_inside')}, {total(rows, 'single_inside')} of {len(rows)}",
         per_cent(float(np.median([row["half_width"] for row in rows])), 0),
@@ -71,16 +70,11 @@ def noise_table(rows: Rows) -> str:
 
 def bar_told(rows: Rows) -> str:
     """Which settings miss the bar, and how often the bands hold."""
-    settings: dict[tuple[str, float, float], list[dict[str, Any]]] = {}
-    for row in rows:
-        if row["group"] in jump_study.BURSTS or (
-            row["group"] == "tolerances" and row["tolerance"] != 0.02  # those are above already
-        ):
-            settings.setdefault((row["law"], row["bursts"], row["tolerance"]), []).append(row)
+    settings = settings_of(rows)
     missed = [
         f"{law} (bursts {bursts:g}, tolerance {tolerance:g})"
         for (law, bursts, tolerance), these in settings.items()
-        if total(these, "within") < 0.9 * total(these, "jumps")
+        if within(these) < BAR
     ]
     every = [row for these in settings.values() for row in these]
     held = share(total(every, "within"), total(every, "jumps"))
@@ -202,27 +196,6 @@ def measured_table(rows: Rows) -> str:
     return table(head, lines)
 
 
-def settlement_of(run: dict[str, Any]) -> float:
-    """Settlement at the last cycle of a run of the record [m]."""
-    return float(run["rows"][-1][2])
-
-
-def liggghts_error(run: dict[str, Any], runs: Rows) -> float | None:
-    """Against the full run of the same seed; None where that is not there yet."""
-    full = [one for one in runs if one["way"] == "full" and one["seed"] == run["seed"]]
-    return settlement_of(run) / settlement_of(full[0]) - 1 if full else None
-
-
-def band_of_record(run: dict[str, Any]) -> Any:
-    """The band of a run with a tolerance; None for another."""
-    from adapters.jump_band import band_of
-
-    if not run["decisions"]:
-        return None
-    held = [check for check in run["checks"] if check["accepted"]]
-    return band_of(int(run["rows"][-1][0]), settlement_of(run), held)
-
-
 def liggghts_table(runs: Rows) -> str:
     """Every run of the coarse bed."""
     lines = []
@@ -256,10 +229,8 @@ def liggghts_table(runs: Rows) -> str:
 
 
 def observed_within(runs: Rows) -> str:
-    """Jumps that stand of runs by one tolerance, and how many erred by no more than that."""
-    tolerance = float(runs[0]["way"].split()[-1])
-    errors = [check["error"] for run in runs for check in run["checks"] if check["accepted"]]
-    return share(sum(abs(error) <= tolerance for error in errors), len(errors))
+    """The same in words."""
+    return share(*observed(runs))
 
 
 def liggghts_told(runs: Rows) -> str:
@@ -291,7 +262,7 @@ def page(rows: Rows, runs: Rows) -> str:
     """The page, with every mark ``{{name}}`` of the template replaced."""
     named = [row for name in jump_study.BURSTS for row in group(rows, name)]
     worst = max(named, key=lambda row: abs(row["error"]))
-    bursty = [row for row in group(rows, "measured") if row["run"].startswith("coarse")]
+    demo = bursty(rows)
     made = group(rows, "made")[0]
     widths = [np.median([r["half_width"] for r in group(rows, n)]) for n in jump_study.BURSTS]
     parts = {
@@ -317,9 +288,9 @@ def page(rows: Rows, runs: Rows) -> str:
         "widths": ", ".join(f"{100 * width:.0f} %" for width in widths),
         "bursty": (
             f"The demo's bed settles in bursts that few windows see: of its full run's jumps "
-            f"{share(total(bursty, 'within'), total(bursty, 'jumps'))} were within: the bar is "
+            f"{share(total(demo, 'within'), total(demo, 'jumps'))} were within: the bar is "
             "missed."
-            if bursty
+            if demo
             else "The demo's full run is not in this record."
         ),
         "machine": f"{made['machine']}; commit {made['commit']}; LIGGGHTS runs: commits "

@@ -121,12 +121,20 @@ def table_tests(found: Sequence[Foretold]) -> str:
     )  # fmt: skip
 
 
-def table_far(curves: FloatArray) -> str:
-    """Every run of ``curves`` (cycles, r) [m], and their mean, at `FAR` from `COMPUTED`."""
+def outlook_far(record: EnsembleRecord) -> tuple[FloatArray, Outlook]:
+    """Settlement [m] at `COMPUTED` of every coarse run and, last, of their mean, shape (r + 1,),
+    and what is foretold of them at `FAR`."""
+    curves = np.array(curves_of(COARSE, COMPUTED, record)).T
     every = np.column_stack([curves, curves.mean(axis=1)])
     seen = outlook(np.arange(1.0, COMPUTED + 1), every[1 : COMPUTED + 1], FAR)
-    names = [*(str(n) for n in range(1, curves.shape[1] + 1)), "mean of all"]
-    micro = (1e6 * np.array([every[COMPUTED], seen.low, seen.prediction, seen.high])).T
+    return every[COMPUTED], seen
+
+
+def table_far(record: EnsembleRecord) -> str:
+    """Every coarse run, and their mean, at `FAR` from `COMPUTED`."""
+    known, seen = outlook_far(record)
+    names = [*(str(n) for n in range(1, len(known))), "mean of all"]
+    micro = (1e6 * np.array([known, seen.low, seen.prediction, seen.high])).T
     lines = [
         [name, *(f"{value:,.0f}" for value in row), regime.name]
         for name, row, regime in zip(names, micro, seen.regime, strict=True)
@@ -170,9 +178,8 @@ def study(record: EnsembleRecord) -> list[Foretold]:
 
 def page(found: Sequence[Foretold], record: EnsembleRecord) -> str:
     """The page of a study."""
-    curves = np.array(curves_of(COARSE, COMPUTED, record)).T
     coarse = np.concatenate([one.covered for one in found if one.kind == COARSE])
-    parts = {"TESTS": table_tests(found), "FAR": table_far(curves), "BLOCK": str(BLOCK)}
+    parts = {"TESTS": table_tests(found), "FAR": table_far(record), "BLOCK": str(BLOCK)}
     parts["COMPUTED_TEXT"] = f"{COMPUTED:,}"
     rows = record_read(STUDY.record)
     parts |= {
