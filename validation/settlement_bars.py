@@ -220,11 +220,10 @@ def told(bar: Bar, value: float, full: float = float("nan")) -> str:
     return f"{text} ({full:.0f})" if full == full else text
 
 
-def lines_bars(
+def table_bars(
     rows: Sequence[Row], methods: Sequence[str], last: int, bars: Sequence[Bar] = BARS
-) -> list[list[str]]:
-    """Head, bars, and a line a method, a column a bar; in brackets full runs between the same
-    cycles."""
+) -> str:
+    """A line a method, a column a bar; in brackets full runs between the same cycles."""
     asked = ["bar", *(f"{'≥' if bar.least else '≤'} {bar.bound:g} {bar.unit}" for bar in bars)]
 
     def told_of(name: str, bar: Bar) -> str:
@@ -236,32 +235,4 @@ def lines_bars(
         for name in methods
         if finished(rows, name, last)
     ]
-    return [["way", *(bar.words for bar in bars)], asked, *lines]
-
-
-def table_bars(
-    rows: Sequence[Row], methods: Sequence[str], last: int, bars: Sequence[Bar] = BARS
-) -> str:
-    """The same as a table."""
-    head, *lines = lines_bars(rows, methods, last, bars)
-    return table(head, lines)
-
-
-def pareto(
-    rows: Sequence[Row], methods: Sequence[str], last: int
-) -> list[tuple[str, float, float]]:
-    """Ways that no other beats: name, gained time and bias over the total settlement [%].
-
-    Of two ways with equal figures neither beats the other.
-    """
-    found = [
-        (name, gained_time(rows, name, last), bias(rows, name, last))
-        for name in methods
-        if finished(rows, name, last)
-    ]
-    return sorted(
-        (one for one in found if not any(
-            other[1] >= one[1] and other[2] <= one[2] and other[1:] != one[1:] for other in found
-        )),
-        key=lambda one: one[1],
-    )  # fmt: skip
+    return table(["way", *(bar.words for bar in bars)], [asked, *lines])

@@ -11,12 +11,11 @@ from typing import Any
 from adapters.report_html import bullets, page, paragraph, picture, plain, section, table
 from adapters.run_folder import write_atomically
 from validation.case import Check, checks_told
-from validation.settlement_bars import pareto
-from validation.settlement_rivals_picture import draw, shown
-from validation.settlement_rivals_runs import record_read
+from validation.settlement_rivals_picture import draw
 from validation.settlement_rivals_studies import STUDIES
 from validation.settlement_study import SECTIONS, Section
 from validation.settlement_study_beds import chosen_told
+from validation.settlement_study_pareto import pareto_of
 
 HEAD = ("bar", "value", "asked", "", "page", "why it is missed")
 WORDS = frozenset({0, 3, 4, 5})
@@ -92,7 +91,6 @@ def said(check: Check) -> str:
 def work_precision(name: str) -> str:
     """Errors of a study's ways against their whole cost, and which of them no other beats."""
     study = STUDIES[name]
-    rows, ways = record_read(study.record), [way for way, _ in shown(study.methods)]
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"{name}.png"
         draw(name, target)
@@ -102,11 +100,10 @@ def work_precision(name: str) -> str:
             f"{escape(study.kind.title)}, to cycle {study.last:,}: errors against all CPU time "
             "behind k<sub>i</sub>. Grey, dashed: what chaos alone makes. Bars: 95 % over packings.",
         )
-    front = [
-        f"{escape(way)}: {bias:.1f} % at {gained:.0f} %"
-        for way, gained, bias in pareto(rows, ways, study.last)
-    ]
-    best = paragraph(
-        "Ways that no other beats, bias over the total settlement at a gained time of:"
+    best = table(
+        "Ways that no other beats in bias over the total settlement and gained time; laws leave no "
+        "bed",
+        ("way", "gained time, %", "bias, %"),
+        ([escape(cell) for cell in line] for line in pareto_of(name)),
     )
-    return drawn + best + bullets(front)
+    return drawn + best
