@@ -10,36 +10,28 @@ from pathlib import Path
 import numpy as np
 
 from validation import jump_runs, jump_study
+from validation.jump_liggghts import Rows, chaos_told, liggghts_table, liggghts_told, share
 from validation.jump_reading import (
     BAR,
-    Rows,
-    band_of_record,
     bursty,
     group,
-    liggghts_error,
-    observed,
-    overspend,
+    overspend_median,
     settings_of,
-    settlement_of,
     total,
     within,
 )
 from validation.law_page import per_cent
 from validation.page_text import page_filled, table
+from validation.settlement_ensemble_record import EnsembleRecord
 
 TEMPLATE = Path(__file__).with_name("jump_page.md")
 PAGE = Path(__file__).parents[1] / "docs" / "jump-control.md"
 PICTURE = PAGE.with_suffix(".png")
 
 
-def share(part: int, whole: int) -> str:
-    """12 of 13 (92 %)."""
-    return f"{part} of {whole} ({100 * part / whole:.0f} %)" if whole else "none"
-
-
 def cells(rows: Rows) -> list[str]:
     """Columns of a table of runs on curves."""
-    spent = overspend(rows)
+    spent = overspend_median(rows)
     error = np.array([row["error"] for row in rows])
     return [
         share(total(rows, "within"), total(rows, "jumps")),
@@ -196,68 +188,6 @@ def measured_table(rows: Rows) -> str:
     return table(head, lines)
 
 
-def liggghts_table(runs: Rows) -> str:
-    """Every run of the coarse bed."""
-    lines = []
-    for run in runs:
-        error, band = liggghts_error(run, runs), band_of_record(run)
-        full = [one for one in runs if one["way"] == "full" and one["seed"] == run["seed"]]
-        inside = ""
-        if band is not None and full:
-            truth = settlement_of(full[0])
-            inside = "yes" if band.low <= truth <= band.high else "**no**"
-        lost = sum(one["lost_cycles"] for one in run["lost"])
-        lines.append(
-            [
-                run["way"],
-                str(run["seed"]),
-                f"{run['computed'] + lost}",
-                f"{run['engine_s']:.0f}",
-                f"{1e6 * settlement_of(run):.0f}",
-                "" if error is None or run["way"] == "full" else f"{100 * error:+.1f} %",
-                "" if band is None else observed_within([run]),
-                "" if band is None else str(len(run["lost"])),
-                "" if band is None else f"{1e6 * band.low:.0f} to {1e6 * band.high:.0f}",
-                inside,
-            ]
-        )
-    head = [
-        "way", "seed", "cycles computed", "engine, CPU s", "settlement, µm", "error",
-        "observed within", "taken back", "band, µm", "full run inside",
-    ]  # fmt: skip
-    return table(head, lines)
-
-
-def observed_within(runs: Rows) -> str:
-    """The same in words."""
-    return share(*observed(runs))
-
-
-def liggghts_told(runs: Rows) -> str:
-    """What the runs say, and what is missing."""
-    said = []
-    for way in dict.fromkeys(run["way"] for run in runs if run["way"] != "full"):
-        these = [run for run in runs if run["way"] == way]
-        errors = [e for run in these if (e := liggghts_error(run, runs)) is not None]
-        lost = [sum(one["lost_cycles"] for one in run["lost"]) for run in these]
-        cycles = np.mean([run["computed"] for run in these]) + np.mean(lost)
-        held = ""
-        if way.startswith("tolerance"):
-            held = f"{observed_within(these)} of its jumps observed within, "
-        spread = f", error {100 * np.mean(errors):+.1f} % on the mean" if errors else ""
-        if len(errors) > 1:
-            spread += f", {100 * np.std(errors, ddof=1):.1f} % its scatter, "
-            spread += f"{100 * np.mean(np.abs(errors)):.1f} % without signs"
-        said.append(f"{way}: {held}{cycles:.0f} cycles computed{spread} ({len(these)} seeds)")
-    seeds = range(1, jump_runs.STUDY.seeds + 1)
-    wanted = {(way.name, seed) for way in jump_runs.STUDY.ways for seed in seeds}
-    missing = sorted(wanted - {(run["way"], run["seed"]) for run in runs})
-    text = ". ".join(said) + "." if said else ""
-    if missing:
-        text += " Not run yet: " + ", ".join(f"{way} seed {seed}" for way, seed in missing) + "."
-    return text
-
-
 def page(rows: Rows, runs: Rows) -> str:
     """The page, with every mark ``{{name}}`` of the template replaced."""
     named = [row for name in jump_study.BURSTS for row in group(rows, name)]
@@ -279,6 +209,7 @@ def page(rows: Rows, runs: Rows) -> str:
         "measured": measured_table(rows),
         "liggghts": liggghts_table(runs),
         "liggghts_told": liggghts_told(runs),
+        "liggghts_chaos": chaos_told(runs, EnsembleRecord()),
         "liggghts_k_i": str(jump_runs.STUDY.k_i),
         "liggghts_last": str(jump_runs.STUDY.last),
         "add_up": (

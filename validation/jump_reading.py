@@ -1,15 +1,14 @@
-"""What the records of jump control say: jumps within their tolerance, overspend, errors."""
+"""What the record of jump control on curves says: jumps within their tolerance, overspend."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from validation import jump_study
+from validation.jump_liggghts import Rows
 
-Rows = Sequence[dict[str, Any]]
 BAR = 0.9
 """Share of jumps that are to hold their tolerance."""
 
@@ -46,7 +45,7 @@ def within(rows: Rows) -> float:
     return total(rows, "within") / jumps if jumps else float("nan")
 
 
-def overspend(rows: Rows) -> float:
+def overspend_median(rows: Rows) -> float:
     """Cycles computed over the oracle's, median of the runs that have one; nan without any."""
     found = [row["computed"] / row["oracle"] for row in rows if row.get("oracle")]
     return float(np.median(found)) if found else float("nan")
@@ -55,31 +54,3 @@ def overspend(rows: Rows) -> float:
 def bursty(rows: Rows) -> list[dict[str, Any]]:
     """Runs on the curve of the demo's bed."""
     return [row for row in group(rows, "measured") if row["run"].startswith("coarse")]
-
-
-def observed(runs: Rows) -> tuple[int, int]:
-    """Jumps that stand of runs by one tolerance: how many erred by no more than that, and all."""
-    tolerance = float(runs[0]["way"].split()[-1])
-    errors = [check["error"] for run in runs for check in run["checks"] if check["accepted"]]
-    return sum(abs(error) <= tolerance for error in errors), len(errors)
-
-
-def settlement_of(run: dict[str, Any]) -> float:
-    """Settlement at the last cycle of a run of the record [m]."""
-    return float(run["rows"][-1][2])
-
-
-def liggghts_error(run: dict[str, Any], runs: Rows) -> float | None:
-    """Against the full run of the same seed; None where that is not there yet."""
-    full = [one for one in runs if one["way"] == "full" and one["seed"] == run["seed"]]
-    return settlement_of(run) / settlement_of(full[0]) - 1 if full else None
-
-
-def band_of_record(run: dict[str, Any]) -> Any:
-    """The band of a run with a tolerance; None for another."""
-    from adapters.jump_band import band_of
-
-    if not run["decisions"]:
-        return None
-    held = [check for check in run["checks"] if check["accepted"]]
-    return band_of(int(run["rows"][-1][0]), settlement_of(run), held)

@@ -195,9 +195,9 @@ def faster(factor: int) -> Method:
     return Method(f"{factor * 50} Hz", "frequency", (f"loading.frequency={factor * 50.0}",))
 
 
-def heavier(factor: int) -> Method:
+def heavier(factor: int, base: Kind = COARSE) -> Method:
     """Density scaling, the piston with the grains; `Changed` keeps the weights."""
-    scene = COARSE.scene(1)
+    scene = base.scene(1)
     assert scene.loading is not None
     keys = (
         f"material.grain.density={factor * scene.material.grain.density!r}",
@@ -221,10 +221,9 @@ METHODS_OF: dict[str, tuple[Method, ...]] = {
     CONFINED.name: tuple(
         replace(method, base=CONFINED)
         for method in (
-            *jumping(2), longer(0.4), *jumping(5), remembering(2), remembering(2, "profile"),
-            remembering(5), longer(0.6),
+            *jumping(2), longer(0.4), remembering(2, "profile"), softer(10, CONFINED),
+            softer(100, CONFINED), faster(2), heavier(10, CONFINED),
             Method("tolerance 0.02", "tolerance", ("procedure.tolerance=0.02",), JUMPING),
-            softer(10, CONFINED),
             replace(growing(remembering(5, "profile")), window=10),
             replace(growing(remembering(3, "profile")), window=18),
         )

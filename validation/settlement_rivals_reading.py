@@ -168,6 +168,20 @@ def cost(rows: Sequence[Row]) -> float:
     return float(np.mean([row["cpu_s"] for row in rows]))
 
 
+def cheaper_even(rows: Sequence[Row], truth: Sequence[Row]) -> float:
+    """Cost of the reference over that of ``rows``, had a time step cost the same in both [-].
+
+    The machine differs between sessions, and a run beside two others is slower: so every step of
+    ``truth`` is taken at what the engine spent on one in ``rows``.  Starts, relaxations and failed
+    tries count on their side alone.  A law's cycles are some of the reference's.
+    """
+    cycle = truth[0]["steps_per_cycle"]
+    full = float(np.mean([row["computed"] for row in truth])) * cycle
+    steps = [row["computed"] * row.get("steps_per_cycle", cycle) for row in rows]
+    a_step = sum(row["cost"]["engine"] for row in rows) / sum(steps)
+    return full * a_step / cost(rows)
+
+
 # --- the null hypothesis ---------------------------------------------------------------------
 
 
