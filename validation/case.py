@@ -46,7 +46,7 @@ class Check:
     @property
     def asked(self) -> str:
         """The bar with its unit behind the number; words alone where it has none."""
-        bound = re.match(r"[<>]?=? ?[^\s,]*\d(?=$|[\s,]\D)|.*\d$", self.bar)
+        bound = re.match(r"[<>=]=? ?[^\s,]*\d(?=$|[\s,]\D)|.*\d$", self.bar)
         return f"{bound[0]} {self.unit}".rstrip() + self.bar[bound.end() :] if bound else self.bar
 
     @property
