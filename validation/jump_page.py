@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from validation import jump_runs, jump_study
+from validation.jump_history_behind import TOLD, shares_told
 from validation.law_page import per_cent
 from validation.page_text import page_filled, table
 
@@ -303,6 +304,7 @@ def page(rows: Rows, runs: Rows) -> str:
         "again": again_told(rows),
         "tolerances": tolerance_table(rows),
         "moved": moved_table(rows),
+        **shares_told(*TOLD),
         "far": far_table(rows),
         "hard": hard_table(rows),
         "measured": measured_table(rows),
