@@ -192,13 +192,11 @@ def _unseen(found: dict[str, list[Row]]) -> list[str]:
 
 
 def _failures(rows: Sequence[Row]) -> str:
-    lines = [
-        f"| method | problems | {' | '.join(report.OUTCOMES)} |",
-        f"|---|---|{'---|' * len(report.OUTCOMES)}",
-    ]
-    for method in report.method_names(rows):
-        counted = report.outcomes(rows, method)
-        cells = " | ".join(str(counted[name] or "") for name in report.OUTCOMES)
+    counts = {method: report.outcomes(rows, method) for method in report.method_names(rows)}
+    ends = [name for name in report.OUTCOMES if any(each[name] for each in counts.values())]
+    lines = [f"| method | problems | {' | '.join(ends)} |", f"|---|---|{'---|' * len(ends)}"]
+    for method, counted in counts.items():
+        cells = " | ".join(str(counted[name] or "") for name in ends)
         lines.append(f"| {method} | {sum(counted.values())} | {cells} |")
     deaths = report.deaths(rows)
     if deaths:
