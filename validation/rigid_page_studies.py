@@ -91,22 +91,27 @@ def dantzig_table(rows: Sequence[Row]) -> str:
     if not beds:
         return ""
     lines = [
-        "| packing | contacts | friction | as in the paper | with reversal of the driven force |",
-        "|---|---|---|---|---|",
+        "| packing | contacts | friction | slide | as in the paper | with reversal of the driven "
+        "force |",
+        "|---|---|---|---|---|---|",
     ]
     for bed, contacts in beds.items():
         monotone, reversal = (
             report.dantzig_success(rows, method, bed) for method in ("dantzig", "dantzig, reversal")
         )
+        sliding = report.dantzig_sliding(rows, bed)
         for friction, (solved, orders) in monotone.items():
             other = reversal.get(friction, (0, 0))
             lines.append(
-                f"| {bed} | {contacts} | {friction:g} | {solved} of {orders} | "
+                f"| {bed} | {contacts} | {friction:g} | {sliding[friction]} | "
+                f"{solved} of {orders} | "
                 f"{other[0]} of {other[1]} |"
             )
     ends = report.dantzig_ends(rows)
     if ends:
-        told = ", ".join(f"{method}: {end} ({n})" for (method, end), n in sorted(ends.items()))
+        told = "; ".join(
+            f"{method}: {end}, {how} ({n})" for (method, end, how), n in sorted(ends.items())
+        )
         lines += ["", f"How the others ended: {told}."]
     shown = report.trace(rows)
     if shown is not None:

@@ -195,13 +195,22 @@ def dantzig_success(
     return found
 
 
-def dantzig_ends(rows: Iterable[Row]) -> Counter[tuple[str, str]]:
-    """How runs that did not solve ended: method, status."""
+def dantzig_ends(rows: Iterable[Row]) -> Counter[tuple[str, str, str]]:
+    """How runs that did not solve ended: method, status, and what happened."""
     return Counter(
-        (row["method"], row["why"] or "silent")
+        (row["method"], row["why"] or "silent", row["how"])
         for row in rows
         if row["case"] == "rigid-dantzig" and not row["ok"]
     )
+
+
+def dantzig_sliding(rows: Iterable[Row], bed: str) -> dict[float, int]:
+    """Of a packing, by friction: contacts that slide in the default solver's solution."""
+    return {
+        row["setting"]["friction"]: row["sliding"]
+        for row in rows
+        if row["case"] == "rigid-dantzig" and row["bed"] == bed
+    }
 
 
 def trace(rows: Iterable[Row]) -> Row | None:

@@ -48,7 +48,7 @@ def test_a_peer_that_raises_is_a_row() -> None:
 
 
 def test_the_limit_wrapped_in_another_error_is_out_of_time() -> None:
-    """Compiled code that the limit strikes in raises an error of its own, from that of the limit."""
+    """Compiled code in which the limit strikes raises an error of its own, caused by it."""
 
     def compiled(*_: float) -> peers.PeerRun:
         try:
