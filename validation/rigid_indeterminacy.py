@@ -27,6 +27,10 @@ Floats = NDArray[np.float64]
 
 LIMIT, RELAXATION, SPRINGS, LIGGGHTS = "direct limit", "relaxation", "springs", "LIGGGHTS"
 FROM_SPRINGS = "direct limit begun where the springs rest"
+ORDER_BAR = 1e-10
+"""Relative change of forces that another order, other numbers or another start may make [-]."""
+SLOW, SLOW_QUICK = 30_000, 10_000
+"""Steps of loading where contacts stick, in the full and in the quick form."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,10 @@ class Scene:
     def path_matters(self) -> bool:
         """Where there is friction springs keep what slid on the way: load them slowly."""
         return self.friction > 0
+
+    def loads_as_asked(self, ramp: int) -> bool:
+        """Whether errors of runs loaded in ``ramp`` steps are those to compare by stiffness."""
+        return ramp in (SLOW, SLOW_QUICK) if self.path_matters else ramp == 0
 
 
 SCENES = (
@@ -189,8 +197,9 @@ def settings(scene: Scene, quick: bool) -> list[tuple[float, int]]:
     if scene.mobilised:
         ramps = (0, 3_000, 30_000) if quick else (0, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000)
         return [(1e7, ramp) for ramp in ramps]
-    slow = 10_000 if quick else 30_000
-    return [(1e6, 0), *((k, slow) for k in stiffness)]
+    if quick:
+        return [(1e6, 0), *((k, SLOW_QUICK) for k in stiffness)]
+    return [(1e6, 0), (1e6, SLOW // 10), (1e6, 10 * SLOW), *((k, SLOW) for k in stiffness)]
 
 
 @dataclass(frozen=True)
