@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from validation.rigid_indeterminacy import (
+    DAMPED,
     FROM_SPRINGS,
     LIGGGHTS,
     LIMIT,
+    LOADINGS,
     ORDER_BAR,
     RELAXATION,
     SCENES,
-    SLOW,
     SPRINGS,
 )
 
@@ -54,20 +55,19 @@ def stiff_table(lines: Sequence[Data]) -> str:
 
 def loading_table(lines: Sequence[Data]) -> str:
     """Error at equal stiffness by the steps of loading, where contacts stick."""
-    ramps = (0, SLOW // 10, SLOW, 10 * SLOW)
     table = [
-        f"| scene | | at once | {' | '.join(f'{ramp:,} steps' for ramp in ramps[1:])} |",
+        f"| scene | | at once | {' | '.join(f'{ramp:,} steps' for ramp in LOADINGS[1:])} |",
         "|" + "---|" * 6,
     ]
     for scene in SCENES:
-        for method in (SPRINGS, LIGGGHTS):
+        for method in (SPRINGS, DAMPED, LIGGGHTS):
             error = {
                 line["ramp"]: line["error"]
                 for line in _of(lines, scene.name, method)
                 if line["stiffness"] == 1e6
             }
             if error and scene.path_matters and not scene.mobilised:
-                cells = [_number(error.get(ramp)) for ramp in ramps]
+                cells = [_number(error.get(ramp)) for ramp in LOADINGS]
                 table.append(f"| {scene.name} | {method} | {' | '.join(cells)} |")
     return "\n".join(table)
 

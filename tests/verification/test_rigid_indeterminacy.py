@@ -147,6 +147,9 @@ def test_what_slides_as_the_load_begins_stays():
             for ramp in (300, 3_000)
         ]  # fmt: skip
         assert error[0] / error[1] == pytest.approx(10.0, rel=0.1)
+        damped = springs_rest(grains, stiffness * grains.weight, 5.0, ramp=300, tolerance=1e-8,
+                              damping=1.4)  # fmt: skip
+        assert apart(grains, 5.0, damped.force) < max(1e-2 * error[0], 1 / stiffness)
     mine = {line["ramp"]: line["error"] for line in record_read()
             if line["scene"] == "disc in a groove, sticking" and line["method"] == "springs"
             and line["stiffness"] == 1e6}  # fmt: skip
