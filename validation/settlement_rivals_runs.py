@@ -32,7 +32,7 @@ from validation.settlement_ensemble import COARSE, Kind, Piece
 from validation.settlement_ensemble_record import RECORD as ENSEMBLE
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import Method, Row, method_run
-from validation.settlement_rivals_budget import EVERY, PARTS, PLACE, part_run
+from validation.settlement_rivals_budget import EVERY, JUMPS, PARTS, PLACE, part_run
 from validation.settlement_rivals_reference import LAWS, law_name, law_row, reference_row
 from validation.settlement_rivals_studies import STUDIES, Study
 
@@ -79,8 +79,9 @@ def plan_rivals(work: Path, study: Study, record: EnsembleRecord, last: int) -> 
 
 
 def plan_budget(work: Path, record: EnsembleRecord) -> Iterator[Planned]:
-    """Every part of a jump at every place, the first place of all packings before any second."""
-    for member, part, seed in product(MEMBERS, PARTS, SEEDS):
+    """Every part of a jump and every jump at every place, the first place of all packings before
+    any second."""
+    for member, part, seed in product(MEMBERS, (*PARTS, *JUMPS), SEEDS):
         head = {"part": "budget", "method": part.name, "seed": seed, "member": member}
         filled = partial(part_run, part, seed, member, record, work / "budget")
         yield head | {"last": PLACE}, filled
