@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from validation import jump_runs, jump_study
+from validation.jump_history_behind import TOLD, shares_told
 from validation.jump_liggghts import Rows, chaos_told, liggghts_table, liggghts_told, share
 from validation.jump_reading import (
     BAR,
@@ -204,6 +205,7 @@ def page(rows: Rows, runs: Rows) -> str:
         "again": again_told(rows),
         "tolerances": tolerance_table(rows),
         "moved": moved_table(rows),
+        **shares_told(*TOLD),
         "far": far_table(rows),
         "hard": hard_table(rows),
         "measured": measured_table(rows),

@@ -39,8 +39,8 @@ BURSTS = {"quiet": 0.1, "as the paper's bed": 0.35, "as the demo's bed": 1.0}
 as measured on full runs (0.3 to 0.6 at paper scale, 1.5 to 1.8 with 150 grains)."""
 TOLERANCES = (0.05, 0.02, 0.005)
 MOVED = ((0.15, 0.0), (0.15, 0.03), (0.15, 0.1))
-"""What moved beds settle more: in the first cycle, and times 1 / n later; .1 to .2 and .01 to .2 at
-paper scale, hardly more than the first cycle with 150 grains."""
+"""What moved beds settle more: in the first cycle, and times 1 / n later.  What they do on the
+engine tells `validation.jump_history_behind`."""
 SEEDS = 5
 SEEDS_AGAIN = 40
 """Of the setting whose bands held least often with `SEEDS`: chance, or a fault."""
