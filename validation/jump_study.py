@@ -28,7 +28,7 @@ from adapters.jump_forecast import forecast_of
 from adapters.jump_rates import rates_of
 from adapters.laws import law_named
 from adapters.provenance import commit, machine
-from validation.jump_curves import CURVES, Curve, Play, play, stretch_of
+from validation.jump_curves import CURVES, Curve, Measured, Play, play, stretch_of
 
 RECORD = Path(__file__).with_name("results") / "jump-control.jsonl"
 K_I, HEALING = 50, 5
@@ -97,7 +97,7 @@ def cases() -> Iterator[tuple[str, Case]]:
     yield "hard", Case("power", 0.35, 1e-6, 600)
 
 
-def oracle(curve: Curve, settings: Settings) -> int:
+def oracle(curve: Curve | Measured, settings: Settings) -> int:
     """Fewest cycles computed to the end by `forecast_of`, jump after jump, with the truth known."""
     bed, healing = curve.bed, settings.healing
     control = begin(K_I, float(bed.settlement(0, K_I)[-1]))
@@ -111,7 +111,8 @@ def oracle(curve: Curve, settings: Settings) -> int:
             forecast = forecast_of(rates_of(control.stretches))
             lengths = np.unique(np.geomspace(settings.shortest_jump, room, 200).round())
             gains = forecast.gain(control.cycle, control.cycle + lengths)
-            truth = curve.law(control.cycle + lengths) - curve.law(np.array([control.cycle + 0.0]))
+            ends = (control.cycle + lengths).astype(int)
+            truth = np.array([curve.mean(control.cycle, end) for end in ends])
             held = np.abs(gains - truth) <= settings.tolerance * np.abs(control.settlement + gains)
             if held.any():
                 best = int(np.flatnonzero(held)[-1])
