@@ -151,12 +151,12 @@ def test_sentences_about_nothing_moved_and_the_default_move() -> None:
 
 def test_sentences_about_laws_beside_jumps() -> None:
     """They scatter six times as much as full runs and more, and are outside the interval; smallest
-    moves of up to 30 um always found room."""
+    moves of up to 30 um found room in 99 % of jumps."""
     rows, last = record_read(STUDY.record), STUDY.last
     moved = [
         pair for name in KEPT for row in finished(rows, name, last) for pair in row.get("moved", ())
     ]
-    assert all(asked == got for asked, got in moved if asked <= 3e-5)
+    assert np.mean([asked == got for asked, got in moved if 0 < asked <= 3e-5]) > 0.99
     for law, cycles in LAWS:
         assert spread(rows, law_name(law, cycles), last) > 5.5
         assert bias_beside_interval(rows, law_name(law, cycles), last) > 1

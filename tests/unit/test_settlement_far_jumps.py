@@ -82,7 +82,8 @@ def test_what_is_owed_at_the_end_is_foretold() -> None:
     found = cells(table_jumps([*truth, *rows]), STUDY.methods[0].name)
     assert found["with what is owed, µm"] == "1,040"
     assert short_of(rows).startswith(
-        "Of 10 jumps by history whose grains keep their places 10 found no room"
+        "Of 10 jumps by history whose grains keep their places, 0 of which were asked for no "
+        "settlement, 10 found no room"
     )
     assert owed(runs(1e-3)[0]) == 0
     assert "| 60 to 100 | 10 | 0 |" in table_room(rows)
