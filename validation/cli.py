@@ -19,8 +19,8 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
         help="write checks and provenance; of a case that has a report, it beside as FILE.html",
     )  # fmt: skip
     parser.description = (
-        f"{parser.description}. Exit code 0 when all checks hold but bars whose miss is known and "
-        "documented, told as missed with the reason (in the JSON: ok false, and why); 6 otherwise."
+        f"{parser.description}\n\nExit code 0 when all checks hold but bars whose miss is known "
+        "and documented,\ntold as missed with the reason (JSON: ok false, and why); 6 otherwise."
     )
     parser.set_defaults(command=validate_command)
 
