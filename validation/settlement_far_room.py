@@ -31,7 +31,8 @@ def short_of(rows: Sequence[Row], last: int = STUDY.last) -> str:
     nothing = sum(asked <= 0.0 for asked, _ in moved)
     return (
         f"Of {len(moved)} jumps by history whose grains keep their places, {nothing} of which were "
-        f"asked for no settlement, {short} found no room for the whole move, after {tries} failed tries in all; what lacked was asked of the next."
+        f"asked for no settlement, {short} found no room for the whole move, after {tries} failed "
+        "tries in all; what lacked was asked of the next."
     )
 
 
