@@ -71,9 +71,17 @@ three compute 35, 129 %, near the 120 % at which the paper misses the settlement
 STUDIES = {
     "coarse": Study(COARSE, 500, METHODS_OF["coarse"], 1, RESULTS / "settlement-rivals.jsonl"),
     "confined": Study(
-        CONFINED, 500, METHODS_OF["confined"],
-        CONFINED.members, RESULTS / "settlement-rivals-confined.jsonl",
-        {"5 growing jumps, by history, profile": 4},
+        CONFINED, 500, METHODS_OF["confined"], 1, RESULTS / "settlement-rivals-confined.jsonl",
+        {
+            "5 growing jumps, by history, profile": 4,
+            **dict.fromkeys(
+                (
+                    "2 jumps", "2 jumps, nothing moved", "2 jumps, by history, profile",
+                    "3 growing jumps, by history, profile",
+                ),
+                CONFINED.members,
+            ),
+        },
     ),
     "far": Study(COARSE, COARSE.last, FAR, 2, RESULTS / "settlement-rivals-far.jsonl"),
     "partial": Study(
