@@ -16,6 +16,7 @@ from typing import Any
 
 from adapters.provenance import provenance
 from adapters.run_folder import write_atomically
+from validation.commit_words import commit_words
 from validation.rigid_indeterminacy import (
     LIMIT,
     SCENES,
@@ -106,7 +107,10 @@ def record_read(path: Path = RECORD) -> list[Data]:
 
 def page(lines: Sequence[Data]) -> str:
     """The page as Markdown: `rigid_indeterminacy_page.md` with its gaps filled."""
-    machine = f"Machine: {lines[0]['machine']}; other work ran on it, costs are provisional."
+    machine = (
+        f"Machine: {lines[0]['machine']}; other work ran on it, costs are provisional.  Lines by "
+        f"code: {commit_words(lines)}."
+    )
     return TEXT.read_text(encoding="utf-8").format(
         machine=machine, slow=f"{SLOW:,}", stiff=stiff_table(lines), loading=loading_table(lines),
         springs=springs_words(lines), costs=cost_table(lines), sliding=sliding_table(lines),
