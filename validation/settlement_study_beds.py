@@ -79,8 +79,8 @@ def ensemble_checks() -> list[Check]:
     ]
     largest = max(sizes, default=0) / 1e6
     words = "reference: greatest size of a run in the record"
-    asked = f"<= {BYTES / 1e6:g}"
-    return [*found, Check(words, largest, asked, largest <= BYTES / 1e6, "MB", ENSEMBLE)]
+    most = f"<= {BYTES / 1e6:g}"
+    return [*found, Check(words, largest, most, largest <= BYTES / 1e6, "MB", ENSEMBLE)]
 
 
 def confined_checks(rows: Sequence[Row] | None = None) -> list[Check]:

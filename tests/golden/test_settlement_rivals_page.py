@@ -18,6 +18,7 @@ from validation.settlement_bars import (
 from validation.settlement_ensemble import CONFINED
 from validation.settlement_ensemble_reading import curves
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_readme import table_readme
 from validation.settlement_rivals import METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
 from validation.settlement_rivals_page import PAGE, page
@@ -172,6 +173,12 @@ def test_sentences_about_the_paper_scale() -> None:
     found = judged(rows, "law log, 20 cycles", LAST, "settlement")
     assert found is not None
     assert found.error[found.seeds.index(2)] < -0.4
+
+
+def test_readme_has_the_table_at_paper_scale() -> None:
+    """README's first table of error against cost is the record's."""
+    text = (PAGE.parents[1] / "README.md").read_text(encoding="utf-8")
+    assert table_readme(record_read(PAPER.record)) in text
 
 
 def test_sentences_about_growing_jumps() -> None:

@@ -102,6 +102,22 @@ def test_a_record_with_a_bar_missed_is_told_as_missed() -> None:
     assert not any(check.holds or check.known for check in gone.values())
 
 
+def test_either_bar_of_the_bias_is_enough_and_one_has_to_be_met() -> None:
+    """Runs that settle a third more are off by both."""
+    rows, name = record_read(STUDIES["confined"].record), CHOSEN["confined"]
+    far = [
+        row | {"settlement": {cycle: 4 / 3 * u for cycle, u in row["settlement"].items()}}
+        if row["method"] == name
+        else row
+        for row in rows
+    ]
+    met, missed = (confined_checks(each)[0] for each in (rows, far))
+    assert met.name.startswith("confined: bias")
+    assert met.holds
+    assert missed.value > 1
+    assert not missed.holds
+
+
 def test_a_hard_case_that_goes_wrong_or_is_lacking_does_not_hold() -> None:
     rows = settlement_hard_runs.record_read()
     assert all(check.holds for check in hard_checks(rows))
