@@ -20,7 +20,7 @@ from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.jump_forecasts import curves_of
 from validation.page_text import page_filled, table
-from validation.settlement_bars import BARS, sides_compared, table_bars
+from validation.settlement_bars import BARS_CONTINUITY, sides_compared, table_bars
 from validation.settlement_ensemble import COARSE, CONFINED, Kind
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_far_jumps import (
@@ -145,12 +145,6 @@ def table_far(record: EnsembleRecord) -> str:
     return table(head, lines)
 
 
-BARS_CONTINUITY = tuple(
-    bar for bar in BARS if "rate behind" in bar.words or bar.words.endswith("goes on")
-)
-"""Of the bars those on what a bed does behind a jump."""
-
-
 def continuity(rows: Sequence[Row], record: EnsembleRecord) -> dict[str, str]:
     """Whether beds go on behind jumps, a line a way, and the least and greatest share of each kind
     of figure over the ways; ``rows`` of the study `STUDY`."""
@@ -160,7 +154,7 @@ def continuity(rows: Sequence[Row], record: EnsembleRecord) -> dict[str, str]:
         bar.words: [bar.value(compared, name, last) for name in names] for bar in BARS_CONTINUITY
     }
     state = shares["coordination goes on"] + shares["stiffness goes on"]
-    stays, rate = shares["rate behind healing stays"], shares["rate goes on"]
+    stays, rate = shares["rate stays"], shares["rate goes on"]
     ratios = [
         (side["last"] - side["first"]) / method.window
         for method in STUDY.methods

@@ -84,6 +84,8 @@ WHY = {
         "one packing's piston hangs by its rim, and the cycles of waiting for it are computed",
     "partial: gained time at equal cost a step":
         "one packing's piston hangs by its rim, and the cycles of waiting for it are computed",
+    "partial: rate stays":
+        "behind the default move the first cycle settles too much; full runs have it in few",
     "partial: rate behind healing stays": "full runs themselves have it in few",
     "partial: rate behind healing goes on":
         "a bed moved by the default settles more for some cycles; full runs do not meet it either",

@@ -13,6 +13,7 @@ import numpy as np
 from validation.case import Check
 from validation.settlement_bars import (
     BARS,
+    BARS_CONTINUITY,
     BARS_PARTIAL,
     Bar,
     bias,
@@ -23,7 +24,7 @@ from validation.settlement_bars import (
 from validation.settlement_ensemble import COARSE, CONFINED, KINDS, PARTIAL
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_far_jumps import CHEAPER, cheaper
-from validation.settlement_far_page import BARS_CONTINUITY, COMPUTED, FAR, outlook_far, study
+from validation.settlement_far_page import COMPUTED, FAR, outlook_far, study
 from validation.settlement_partial_page import way
 from validation.settlement_rivals import Row
 from validation.settlement_rivals_reading import cheaper_even, finished, reference

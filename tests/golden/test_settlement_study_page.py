@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from validation.case import Check
-from validation.settlement_bars import BARS, BARS_PARTIAL, told
-from validation.settlement_far_page import BARS_CONTINUITY
+from validation.settlement_bars import BARS, BARS_CONTINUITY, BARS_PARTIAL, told
 from validation.settlement_partial_page import way
 from validation.settlement_study import WHY, Section, study_checks
 from validation.settlement_study_beds import BEDS, CHOSEN, FAR_PAGE, PARTLY, RIVALS
