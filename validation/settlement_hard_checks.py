@@ -184,7 +184,7 @@ def crystal_stiff(run: Ended) -> Check:
 
 
 def very_loose(run: Ended) -> Check:
-    """Looser under its first load than rain leaves a bed whose contacts slide (ordinary: 0.53)."""
+    """Looser than rain leaves a bed whose contacts slide (`ordinary`: 0.53)."""
     value = run.figures["density"]
     return Check("relative density after the rain", value, "< 0.51", value < 0.51)
 

@@ -98,6 +98,7 @@ def judged(case: HardCase, row: Row, ended: Ended | None) -> Row:
         figures = ended.figures | {
             "settlement": [float(f"{value:.5g}") for value in ended.settlement],
             "cycle": [row["cycle"] for row in ended.rows],
+            "coordination": [round(row["coordination_number"], 4) for row in ended.rows],
         }
     return {"figures": figures, "checks": [told(check) for check in checks]}
 

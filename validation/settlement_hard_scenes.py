@@ -75,6 +75,10 @@ def load(amplitude: float, share: float = 1.0) -> tuple[str, ...]:
     )
 
 
+FAR = ("procedure.k_i=20", "procedure.k=4", "procedure.h=400", "procedure.total_cycles=432")
+"""Settings of a jump a hundred times as long as its window."""
+
+
 def crystal_box(count: int, gap: float = 0.0) -> str:
     """Setting of ``count`` equal grains in the box of the crystal, wider by the share ``gap``."""
     size = 2 * RADIUS * SIDE * (1 + APART) * (1 + gap)
@@ -126,8 +130,8 @@ CASES = (
     ),
     HardCase(
         "near-crystal",
-        "the same less three grains, in a box half a percent wider",
-        (crystal_box(145, 0.005),),
+        "a crystal less three grains, in a box half a percent wider, jumps by history",
+        (crystal_box(145, 0.005), 'procedure.settlement="history"'),
         checks=("does not settle", "nothing invented", "stands still", "below crystal"),
         bed="crystal",
     ),
@@ -200,9 +204,15 @@ CASES = (
     HardCase(
         "far-jump",
         "h/k = 100: 400 cycles from 4",
-        ("procedure.k_i=20", "procedure.k=4", "procedure.h=400", "procedure.total_cycles=432"),
+        FAR,
         code=6,
         says="the law lifts the bed",
+    ),
+    HardCase(
+        "far-jump-by-history",
+        "the same, settled by the history of all 24 cycles",
+        (*FAR, 'procedure.settlement="history"'),
+        checks=("settles",),
     ),
 )
 """All cases; those without words of a refusal have to end."""
