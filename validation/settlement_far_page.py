@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from adapters.fit_auto import Outlook, outlook
-from adapters.fit_regime import COLLAPSE, RATCHETING
+from adapters.fit_refusal import refusals
 from adapters.laws import law_named
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
@@ -76,9 +76,8 @@ class Foretold:
 
     @property
     def trusted(self) -> FloatArray:
-        """1 where the regime is one that a law goes on in, else 0: no band holds there; (r,)."""
-        refused = (RATCHETING, COLLAPSE)
-        return np.array([regime.name not in refused for regime in self.outlook.regime], float)
+        """1 where a prediction is not refused, else 0: no band holds there; (r,)."""
+        return np.array([refusal is None for refusal in refusals(self.outlook)], float)
 
     @property
     def covered(self) -> FloatArray:
@@ -138,8 +137,10 @@ def table_far(record: EnsembleRecord) -> str:
     names = [*(str(n) for n in range(1, len(known))), "mean of all"]
     micro = (1e6 * np.array([known, seen.low, seen.prediction, seen.high])).T
     lines = [
-        [name, *(f"{value:,.0f}" for value in row), regime.name]
-        for name, row, regime in zip(names, micro, seen.regime, strict=True)
+        [name, *(f"{value:,.0f}" for value in row), refusal.regime if refusal else regime.name]
+        for name, row, regime, refusal in zip(
+            names, micro, seen.regime, refusals(seen), strict=True
+        )
     ]
     head = ["run", f"at {COMPUTED:,}, µm", "band from, µm", "prediction, µm", "to, µm", "regime"]
     return table(head, lines)
