@@ -40,6 +40,11 @@ WHY_NOT = {
     COLLAPSE: "the settlement rate grows (collapse)",
 }
 """Regimes in which nothing bounds what comes after the data, and the words for it."""
+WHY_NOT_PISTON = {
+    RATCHETING: "the rate at which the piston sinks hardly falls (ratcheting)",
+    COLLAPSE: "the rate at which the piston sinks grows (collapse)",
+}
+"""The same of a piston that breaks into a bed whose mean grain may even rise."""
 
 
 @dataclass(frozen=True)

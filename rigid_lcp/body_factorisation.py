@@ -22,7 +22,6 @@ from typing import Protocol
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
 
@@ -138,7 +137,7 @@ class ContactFactorisation:
 
     def __init__(self, problem: FrictionProblem) -> None:
         contacts, dim = problem.contacts, problem.dim
-        w = sp.bsr_array(problem.delassus.tobsr((dim, dim)))
+        w = problem.delassus_blocks
         row, column = np.repeat(np.arange(contacts), np.diff(w.indptr)), w.indices.astype(np.int64)
         bare = np.setdiff1d(
             np.arange(contacts), row[row == column]

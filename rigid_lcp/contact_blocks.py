@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numba import njit
 from numpy.typing import NDArray
 
@@ -184,7 +183,7 @@ def inverse_mass_root(space: BodySpace) -> Floats | None:
 def matrix_blocks(problem: FrictionProblem) -> MatrixBlocks:
     """W in blocks, with one on the diagonal of every row, of zeros if need be."""
     dim, contacts = problem.dim, problem.contacts
-    blocks = sp.bsr_array(problem.delassus, blocksize=(dim, dim)) if contacts else None
+    blocks = problem.delassus_blocks if contacts else None
     if blocks is None:
         empty = np.zeros((0, dim, dim))
         return MatrixBlocks(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), empty, empty)

@@ -217,8 +217,11 @@ def entry_places(
     entries = len(rows)
     front = np.empty(entries, dtype=np.int64)
     row, column = np.empty(entries, dtype=np.int64), np.empty(entries, dtype=np.int64)
+    owner = np.empty(first[-1], dtype=np.int64)
+    for f in range(len(first) - 1):
+        owner[first[f] : first[f + 1]] = f
     for k in range(entries):
-        f = np.searchsorted(first, min(rows[k], columns[k]), side="right") - 1
+        f = owner[min(rows[k], columns[k])]
         front[k] = f
         row[k] = place_in_front(rows[k], f, first, row_start, found)
         column[k] = place_in_front(columns[k], f, first, row_start, found)

@@ -128,6 +128,11 @@ class FrictionProblem:
         return self.bodies.matrix
 
     @cached_property
+    def delassus_blocks(self) -> sp.bsr_array:
+        """W in blocks, a row of (dim, dim) ones a contact."""
+        return sp.bsr_array(self.delassus, blocksize=(self.dim, self.dim))
+
+    @cached_property
     def body_jacobians(self) -> tuple[Integers, Integers, Floats]:
         """J of the bodies in blocks: ``first``, ``body``, ``block`` (`rigid_lcp.body_matrix`)."""
         assert self.bodies is not None

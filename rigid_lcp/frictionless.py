@@ -55,7 +55,7 @@ SWEEPS, SWEEPS_AT_ONCE, SETTLED = 400, 20, 1
 """Most sweeps before the first exchange; they end when so few contacts changed sides in 20."""
 SWEEPS_BETWEEN = 100
 """Sweeps instead of an exchange,"""
-SMOOTHED, SMOOTHINGS, HASTE = 5, 3, 15
+SMOOTHED, SMOOTHINGS, HASTE = 1, 3, 15
 """as long as more contacts than that are wrong, so many times; with self-stress they mislead, so
 that the exchanges begin again without them where so many do not end."""
 PROXIMAL_STEPS = 20

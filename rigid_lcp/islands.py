@@ -80,19 +80,23 @@ def labels_by_contacts(
 ) -> tuple[Integers, int]:
     """`labels_by_bodies` where only W is known, by rows."""
     contacts = (len(start) - 1) // dim
-    parent = np.arange(contacts)
+    parent, apart = np.arange(contacts), contacts
     for row in range(contacts * dim):
         for k in range(start[row], start[row + 1]):
-            if value[k] != 0.0:
-                join(parent, row // dim, index[k] // dim)
+            if value[k] != 0.0 and join(parent, row // dim, index[k] // dim):
+                apart -= 1
+        if apart == 1:
+            break
     return labels_in_order(parent, contacts)
 
 
 @njit(cache=True)
-def join(parent: Integers, a: int, b: int) -> None:
-    """Make one tree of those of a and b; the lesser root stays (Galler and Fischer 1964)."""
+def join(parent: Integers, a: int, b: int) -> bool:
+    """Make one tree of those of a and b; the lesser root stays (Galler and Fischer 1964).  Whether
+    they were two."""
     a, b = root_of(parent, a), root_of(parent, b)
     parent[max(a, b)] = min(a, b)
+    return a != b
 
 
 @njit(cache=True)

@@ -17,13 +17,13 @@ from rigid_lcp.sticking import heaviness, seem_loose
 Floats = NDArray[np.float64]
 
 CONVEX_PATH = Path(convex=True, compliance=1e-4)
-CONVEX_SWEEPS, CONVEX_STEPS, CONVEX_CONTACTS = 30, 7, 10_000
+CONVEX_STEPS, CONVEX_CONTACTS = 7, 10_000
 CONVEX_END, CONVEX_USEFUL, CONVEX_NEWTON = 1e-4, 1e-3, 5
-"""Without a start, and up to so many contacts: sweeps where much is loose; steps along the convex
-path to a residual of `CONVEX_END`, and so many of Newton if it came below `CONVEX_USEFUL` (where
-little slides)."""
-FAST, FAST_SWEEPS = 3e-4, 200
-"""A residual that few sweeps leave where so many more may end it."""
+"""Without a start, and up to so many contacts: steps along the convex path to a residual of
+`CONVEX_END`, and so many of Newton if it came below `CONVEX_USEFUL` (where little slides)."""
+FAST_SWEEPS = 200
+STAGES = ((12, 6e-3), (18, 3e-4), (FAST_SWEEPS, 0.0))
+"""Sweeps, and the residual that they leave where so many more as the next says may end it."""
 BENT_STEPS, BENT_ROUNDING, BENT_USEFUL = 25, 0.3, 3e-6
 """Where that is not enough: steps with the term |u_T|, from where the convex path was left, to
 `BENT_USEFUL`, and Newton; if that fails, on to `HAND_OVER`, and Newton again.  Coming from there
@@ -67,17 +67,19 @@ def convex_start(trial: Trial) -> bool:
 
 
 def few_sweeps(trial: Trial) -> bool:
-    """`CONVEX_SWEEPS`, and more where they converge fast (loose grains, crystals)."""
+    """Sweeps as long as they converge fast (loose grains, crystals), by `STAGES`."""
     trial.sweeper = trial.sweeper or sweeper_of(trial.problem)
-    for sweeps in (CONVEX_SWEEPS, FAST_SWEEPS):
+    for sweeps, until in STAGES:
         found = gauss_seidel(
             trial.problem, trial.best.r, trial.tolerance, sweeps, sweeper=trial.sweeper
         )
         trial.keep(found)
-        if trial.best.solved or found.residual > FAST:
+        if trial.best.solved or found.residual > until:
             break
     if trial.problem.contacts <= FEW_CONTACTS:
         trial.sharpen()
+    else:
+        trial.sharpen_by_sweeps()
     return trial.best.solved
 
 

@@ -44,6 +44,8 @@ measured on the scale of all forces, and only what is exact to round-off is so f
 boulder."""
 REFINEMENTS, REFINED_CONTACTS = 8, 300
 """Most such steps, where factorisations cost next to nothing; one where there are more contacts."""
+MORE_SWEEPS = 0.5
+"""Sweeps to that end over those that found the solution, at most."""
 FEW_DRIFT = 50
 """Fewer factorisations than that extrapolated points are not begun with."""
 MOST_FLOPS, MOST_FACTORED = 4e11, 1e7
@@ -244,6 +246,15 @@ class Trial:
                 refined(self.problem, self.best.r, exact, linear=self.linear, steps=steps),
                 self.best.method,
             )
+
+    def sharpen_by_sweeps(self) -> None:
+        """A part more sweeps, from a solution that sweeps found, where the tolerance asks for an
+        exact one: they converge fast there, and need no factors."""
+        if not self.best.solved or self.tolerance > LAST_WORD or self.best.residual <= ROUND_OFF:
+            return
+        self.sweeper = self.sweeper or sweeper_of(self.problem)
+        more = int(np.ceil(MORE_SWEEPS * self.work.get("sweeps", 0.0)))
+        self.keep(gauss_seidel(self.problem, self.best.r, ROUND_OFF, more, sweeper=self.sweeper))
 
     def solution(self, status: Status | None = None, message: str = "") -> FrictionSolution:
         """The best point, with the work of all attempts."""

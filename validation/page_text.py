@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-MARK = re.compile(r"<[A-Z][A-Z0-9_]*>|\{\{[A-Z][A-Z0-9_]*\}\}")
+MARK = re.compile(r"<[A-Z][A-Z0-9_]*>|\{\{\w+\}\}")
 
 
 def page_filled(template: str, parts: Mapping[str, str]) -> str:

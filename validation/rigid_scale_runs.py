@@ -49,7 +49,7 @@ SCALES = (
     Scale("1e4 contacts, discs, warm", 5300, 2, True, 1e-6, 1.0),
     Scale("1e4 contacts, discs, warm, 1e-12", 5300, 2, True, 1e-12, 1.0),
     Scale("1e4 contacts, spheres, warm", 3700, 3, True, 1e-6, 1.0),
-    Scale("1e5 contacts, spheres, cold", 36_000, 3, False, 1e-6, 60.0, settle=60, repeats=3),
+    Scale("1e5 contacts, spheres, cold", 40_000, 3, False, 1e-6, 60.0, settle=60, repeats=3),
 )
 """Some 1.9 contacts a disc and 2.8 a sphere."""
 

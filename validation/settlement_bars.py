@@ -205,6 +205,7 @@ BARS = (
     Bar("elastic deflection", "%", 2.0, error_of("deflection")),
     Bar("gained time", "%", 400.0, gained_time, least=True),
     Bar(EVEN, "%", 400.0, gained_time_even, least=True),
+    bar_stays("rate stays", COLUMNS[0], 0),
     bar_stays("rate behind healing stays", COLUMNS[0], HEALING),
     bar_continues("rate behind healing goes on", COLUMNS[0], HEALING),
     bar_continues("rate behind the first cycle goes on", COLUMNS[0], 1),
@@ -214,12 +215,14 @@ BARS = (
     ),
 )
 """Either of the first two is enough."""
+BARS_CONTINUITY = tuple(bar for bar in BARS if bar.full)
+"""Of them those on what a bed does behind a jump."""
 BARS_PARTIAL = (
     Bar("bias over the total settlement", "%", 4.0, bias),
     Bar("gained time", "%", 300.0, gained_time, least=True),
     Bar(EVEN, "%", 300.0, gained_time_even, least=True),
     *(bar for bar in BARS if bar.value is error_of_profile or "coordination number" in bar.words),
-    *(bar for bar in BARS if "rate behind" in bar.words or bar.words.endswith("goes on")),
+    *BARS_CONTINUITY,
 )
 """Under a piston that covers a part: asked of the first two; of the others what is asked of the
 confined bed."""

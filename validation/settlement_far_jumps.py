@@ -59,6 +59,11 @@ def table_jumps(rows: Sequence[Row], last: int = STUDY.last) -> str:
     return table(HEAD, lines)
 
 
+def cheaper(rows: Sequence[Row], name: str, last: int = STUDY.last) -> float:
+    """CPU time behind k_i of every cycle over a way's, all counted."""
+    return cost(reference(rows, last)) / cost(finished(rows, name, last))
+
+
 def owed(row: Row) -> float:
     """What the last jump of a run was to move it by and did not [m]: debts of earlier ones too."""
     asked, moved = row["moved"][-1] if row.get("moved") else (0.0, 0.0)
@@ -81,7 +86,7 @@ def line_of(rows: Sequence[Row], name: str, last: int, mine: Sequence[Row]) -> l
         foretold = [f"{with_owed:,.0f}", f"{error:.2f}"]
     errors = [judged(rows, name, last, key) for key in ("coordination", "deflection")]
     return [
-        *line, f"{cost(truth) / cost(mine):.1f}", f"{cheaper_even(mine, truth):.1f}",
+        *line, f"{cheaper(rows, name, last):.1f}", f"{cheaper_even(mine, truth):.1f}",
         f"{settled:,.0f}",
         f"{bias_beside_interval(rows, name, last):.2f}", *foretold,
         f"{spread(rows, name, last):.1f}",

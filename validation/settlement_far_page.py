@@ -20,7 +20,7 @@ from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.jump_forecasts import curves_of
 from validation.page_text import page_filled, table
-from validation.settlement_bars import BARS, sides_compared, table_bars
+from validation.settlement_bars import BARS_CONTINUITY, sides_compared, table_bars
 from validation.settlement_ensemble import COARSE, CONFINED, Kind
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_far_jumps import (
@@ -122,12 +122,20 @@ def table_tests(found: Sequence[Foretold]) -> str:
     )  # fmt: skip
 
 
-def table_far(curves: FloatArray) -> str:
-    """Every run of ``curves`` (cycles, r) [m], and their mean, at `FAR` from `COMPUTED`."""
+def outlook_far(record: EnsembleRecord) -> tuple[FloatArray, Outlook]:
+    """Settlement [m] at `COMPUTED` of every coarse run and, last, of their mean, shape (r + 1,),
+    and what is foretold of them at `FAR`."""
+    curves = np.array(curves_of(COARSE, COMPUTED, record)).T
     every = np.column_stack([curves, curves.mean(axis=1)])
     seen = outlook(np.arange(1.0, COMPUTED + 1), every[1 : COMPUTED + 1], FAR)
-    names = [*(str(n) for n in range(1, curves.shape[1] + 1)), "mean of all"]
-    micro = (1e6 * np.array([every[COMPUTED], seen.low, seen.prediction, seen.high])).T
+    return every[COMPUTED], seen
+
+
+def table_far(record: EnsembleRecord) -> str:
+    """Every coarse run, and their mean, at `FAR` from `COMPUTED`."""
+    known, seen = outlook_far(record)
+    names = [*(str(n) for n in range(1, len(known))), "mean of all"]
+    micro = (1e6 * np.array([known, seen.low, seen.prediction, seen.high])).T
     lines = [
         [name, *(f"{value:,.0f}" for value in row), refusal.regime if refusal else regime.name]
         for name, row, regime, refusal in zip(
@@ -136,12 +144,6 @@ def table_far(curves: FloatArray) -> str:
     ]
     head = ["run", f"at {COMPUTED:,}, µm", "band from, µm", "prediction, µm", "to, µm", "regime"]
     return table(head, lines)
-
-
-BARS_CONTINUITY = tuple(
-    bar for bar in BARS if "rate behind" in bar.words or bar.words.endswith("goes on")
-)
-"""Of the bars those on what a bed does behind a jump."""
 
 
 def continuity(rows: Sequence[Row], record: EnsembleRecord) -> dict[str, str]:
@@ -153,7 +155,7 @@ def continuity(rows: Sequence[Row], record: EnsembleRecord) -> dict[str, str]:
         bar.words: [bar.value(compared, name, last) for name in names] for bar in BARS_CONTINUITY
     }
     state = shares["coordination goes on"] + shares["stiffness goes on"]
-    stays, rate = shares["rate behind healing stays"], shares["rate goes on"]
+    stays, rate = shares["rate stays"], shares["rate goes on"]
     ratios = [
         (side["last"] - side["first"]) / method.window
         for method in STUDY.methods
@@ -204,9 +206,8 @@ def study(record: EnsembleRecord) -> list[Foretold]:
 
 def page(found: Sequence[Foretold], record: EnsembleRecord) -> str:
     """The page of a study."""
-    curves = np.array(curves_of(COARSE, COMPUTED, record)).T
     coarse = np.concatenate([one.covered for one in found if one.kind == COARSE])
-    parts = {"TESTS": table_tests(found), "FAR": table_far(curves), "BLOCK": str(BLOCK)}
+    parts = {"TESTS": table_tests(found), "FAR": table_far(record), "BLOCK": str(BLOCK)}
     parts["COMPUTED_TEXT"] = f"{COMPUTED:,}"
     rows = record_read(STUDY.record)
     parts |= {

@@ -31,10 +31,15 @@ def outcome(row: Row) -> str:
     return f"{1e6 * settlement[-1]:.1f} µm after {cycle[-1]} cycles"
 
 
+def failing(row: Row) -> list[str]:
+    """Names of the checks of a case that do not hold."""
+    return [check["name"] for check in row["checks"] if not check["ok"]]
+
+
 def verdict(row: Row) -> str:
     """Whether every check of a case holds."""
-    failing = [check["name"] for check in row["checks"] if not check["ok"]]
-    return "right" if not failing else "**not right: " + "; ".join(failing) + "**"
+    names = failing(row)
+    return "right" if not names else "**not right: " + "; ".join(names) + "**"
 
 
 def table_cases(rows: Sequence[Row]) -> str:

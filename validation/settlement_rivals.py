@@ -114,6 +114,8 @@ class Method:
     """Cycles fitted before each jump."""
     growing: bool = False
     """Whether jumps have the same ratio of cycles, not their number."""
+    healing: int = HEALING
+    """Cycles computed behind each jump and not fitted."""
 
     def kind(self, last: int) -> Kind:
         """The ensemble's scene as this method changes it, to cycle ``last``."""
@@ -122,22 +124,26 @@ class Method:
         if not any(key.startswith("procedure.tolerance") for key in self.settings):
             h: int | list[int] = 0
             if self.growing:
-                h = jump_lengths(self.jumps, last, self.base.k_i, k, HEALING)
+                h = jump_lengths(self.jumps, last, self.base.k_i, k, self.healing)
             elif self.jumps:
-                h = jump_length(self.jumps, last, self.base.k_i, k)
+                h = jump_length(self.jumps, last, self.base.k_i, k, self.healing)
             keys += [f"procedure.k={k}", f"procedure.h={h}"]
+        if self.healing != HEALING:
+            keys.append(f"procedure.healing_cycles={self.healing}")
         return replace(self.base, settings=tuple(keys))
 
 
-def jump_length(jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDOW) -> int:
+def jump_length(
+    jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDOW, healing: int = HEALING
+) -> int:
     """Cycles h of each of equal ``jumps``: from k_i a window, then h, healing and a window each.
 
     ValueError where they do not end at cycle ``last``.
     """
     block, rest = divmod(last - k_i - window, jumps)
-    if rest or block <= HEALING + window:
+    if rest or block <= healing + window:
         raise ValueError(f"{jumps} equal jumps from windows of {window} miss cycle {last}")
-    return block - HEALING - window
+    return block - healing - window
 
 
 JUMPING = Variant()
@@ -179,6 +185,11 @@ def rearranging(method: Method) -> Method:
     return replace(method, name=f"{method.name}, rearranged", settings=keys)
 
 
+def healing(method: Method, cycles: int) -> Method:
+    """The same with another number of cycles behind each jump that are not fitted."""
+    return replace(method, name=f"{method.name}, {cycles} healing", healing=cycles)
+
+
 def softer(factor: int, base: Kind = COARSE) -> Method:
     """Young's modulus of the grains over ``factor``, and the longer time step that goes with it."""
     young = base.scene(1).material.grain.young / factor
@@ -216,6 +227,12 @@ METHODS = (
     remembering(2, "profile"), remembering(5, "profile"),
 )  # fmt: skip
 """On the coarse bed, in the order in which they are run."""
+HEALINGS = (0, 2, 10)
+"""Beside `HEALING`."""
+HEALED = tuple(
+    healing(method, cycles) for cycles in HEALINGS for method in (remembering(5), jumping(5)[0])
+)
+"""Five jumps with other numbers of healing cycles; `METHODS` has the same with `HEALING`."""
 METHODS_OF: dict[str, tuple[Method, ...]] = {
     COARSE.name: METHODS,
     CONFINED.name: tuple(

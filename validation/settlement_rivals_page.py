@@ -52,8 +52,6 @@ from validation.student import interval
 TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "settlement-rivals.md"
 PAPER_PICTURE = PAGE.with_name("settlement-rivals-paper.png")
-PAPER_TICKS = (100, 200, 500, 1000, 2000)
-"""Of CPU time at paper scale [s]."""
 STEPS = COARSE.scene(1).steps_per_cycle
 SCHEDULES = tuple(m.jumps for m in METHODS if m.family == "procedure")
 
@@ -324,9 +322,8 @@ def main() -> None:
     """Write page and picture."""
     rows = record_read()
     write_atomically(PAGE, page(rows))
-    draw(rows, STUDIES["coarse"].last, PAGE.with_suffix(".png"))
-    paper = STUDIES["confined"]
-    draw(record_read(paper.record), paper.last, PAPER_PICTURE, paper.methods, PAPER_TICKS)
+    draw("coarse", PAGE.with_suffix(".png"))
+    draw("confined", PAPER_PICTURE)
 
 
 if __name__ == "__main__":

@@ -109,8 +109,8 @@ def judged(rows: Sequence[Row], method: str, last: int, key: str) -> Judged | No
 def chaos(rows: Sequence[Row], last: int, key: str) -> float:
     """Half of the 95 % interval of the mean error that one full run a packing would have.
 
-    With s the scatter within packings of m members, over P packings and the reference's mean:
-    t s sqrt((1 + 1/m) / P).
+    With s the scatter within packings of n_p members, over P packings and the reference's mean:
+    t s sqrt(mean(1 + 1/n_p) / P).
     """
     figure, runs = FIGURES[key], reference(rows, last)
     seeds = sorted({row["seed"] for row in runs})
@@ -118,8 +118,8 @@ def chaos(rows: Sequence[Row], last: int, key: str) -> float:
         seed: np.array([figure.value(row) for row in runs if row["seed"] == seed]) for seed in seeds
     }
     found = nested(values)
-    members = found.members / found.packings
-    spread = found.within * np.sqrt((1 + 1 / members) / found.packings)
+    members = np.array([len(each) for each in values.values()])
+    spread = found.within * np.sqrt(np.mean(1 + 1 / members) / found.packings)
     return float(student(found.members - found.packings) * spread / found.mean)
 
 
@@ -134,14 +134,17 @@ def profile_error(rows: Sequence[Row], method: str, last: int) -> FloatArray:
 
 
 def profile_chaos(rows: Sequence[Row], last: int) -> float:
-    """The same that one full run a packing would have against the mean of two, mean of packings.
+    """The same that one full run a packing would have against the mean of two, mean of the packings
+    that have two.
 
     A member less another has the variance 2 s^2; less the mean of two others 3/2 s^2.
     """
     found = []
     for seed in seeds_of(rows, last):
-        one, other = (np.array(r["profile"]) for r in reference(rows, last) if r["seed"] == seed)
-        found.append(np.sqrt(3 / 4) * rms(one - other) / (one + other).mean() * 2)
+        runs = [np.array(r["profile"]) for r in reference(rows, last) if r["seed"] == seed]
+        if len(runs) == 2:
+            one, other = runs
+            found.append(np.sqrt(3 / 4) * rms(one - other) / (one + other).mean() * 2)
     return float(np.mean(found))
 
 

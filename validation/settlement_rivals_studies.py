@@ -8,7 +8,6 @@ from pathlib import Path
 
 from validation.settlement_ensemble import COARSE, CONFINED, PARTIAL, Kind
 from validation.settlement_rivals import (
-    JUMPING,
     METHODS_OF,
     Method,
     growing,
@@ -48,8 +47,7 @@ FAR = (
     growing(remembering(13)),
     *BY_PROFILE,
     *map(rearranging, BY_PROFILE),
-    *map(growing, jumping(13)),
-    Method("tolerance 0.1", "tolerance", ("procedure.tolerance=0.1",), JUMPING),
+    growing(jumping(13)[1]),
 )
 """To 10,000 cycles of the coarse bed: 13 jumps compute 345 cycles of 9,900, one in 29, so that one
 in twenty is left when starts of the engine, relaxations and jumps that failed are counted.

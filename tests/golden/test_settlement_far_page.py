@@ -118,14 +118,45 @@ def test_sentences_about_grains_that_change_places(
     assert np.mean(contacts) == pytest.approx(1, abs=0.05)
 
 
+def test_sentences_about_nothing_moved_and_the_default_move() -> None:
+    """Nothing moved: less than half of the reference, 2.9 half-intervals short.  `smoothed`: .8 of
+    one, 10 um in the first cycle behind a jump, where `profile` has 3, and a foretold mean
+    outside."""
+    rows, last = record_read(STUDY.record), STUDY.last
+    truth = settlement_of(rows, last)
+    runs = {
+        move: finished(rows, f"13 growing jumps, {move}", last)
+        for move in ("by history", "by history, profile", "nothing moved")
+    }
+    assert all(len(mine) == 10 for mine in runs.values())
+    settled = {
+        move: float(np.mean([row["settlement"][str(last)] for row in mine]))
+        for move, mine in runs.items()
+    }
+    assert settled["nothing moved"] < 0.5 * truth.mean
+    short = (truth.mean - settled["nothing moved"]) / truth.half_given
+    assert short == pytest.approx(2.87, abs=0.005)
+    short = (truth.mean - settled["by history"]) / truth.half_given
+    assert short == pytest.approx(0.77, abs=0.005)
+    owing = float(np.mean([owed(row) for row in runs["by history"]]))
+    assert settled["by history"] + owing > truth.mean + truth.half_given
+    first = {
+        move: 1e6
+        * np.mean([side["after"]["settlement"][0] for row in mine for side in row["sides"]])
+        for move, mine in runs.items()
+    }
+    assert round(first["by history"]) == 10
+    assert round(first["by history, profile"]) == 3
+
+
 def test_sentences_about_laws_beside_jumps() -> None:
     """They scatter six times as much as full runs and more, and are outside the interval; smallest
-    moves of up to 30 um always found room."""
+    moves of up to 30 um found room in 99 % of jumps."""
     rows, last = record_read(STUDY.record), STUDY.last
     moved = [
         pair for name in KEPT for row in finished(rows, name, last) for pair in row.get("moved", ())
     ]
-    assert all(asked == got for asked, got in moved if asked <= 3e-5)
+    assert np.mean([asked == got for asked, got in moved if 0 < asked <= 3e-5]) > 0.99
     for law, cycles in LAWS:
         assert spread(rows, law_name(law, cycles), last) > 5.5
         assert bias_beside_interval(rows, law_name(law, cycles), last) > 1

@@ -8,6 +8,7 @@ from scipy.stats import f as fisher
 
 from validation.settlement_bars import (
     BARS,
+    bar_stays,
     bias_beside_interval,
     error_of,
     error_of_profile,
@@ -18,8 +19,10 @@ from validation.settlement_bars import (
 from validation.settlement_ensemble import CONFINED
 from validation.settlement_ensemble_reading import curves
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_readme import table_readme
 from validation.settlement_rivals import METHODS, Row
 from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
+from validation.settlement_rivals_continuity import COLUMNS
 from validation.settlement_rivals_page import PAGE, page
 from validation.settlement_rivals_reading import (
     beside,
@@ -174,6 +177,12 @@ def test_sentences_about_the_paper_scale() -> None:
     assert found.error[found.seeds.index(2)] < -0.4
 
 
+def test_readme_has_the_table_at_paper_scale() -> None:
+    """README's first table of error against cost is the record's."""
+    text = (PAGE.parents[1] / "README.md").read_text(encoding="utf-8")
+    assert table_readme(record_read(PAPER.record)) in text
+
+
 def test_sentences_about_growing_jumps() -> None:
     """Five growing jumps, twelve runs: every bar; 54, 59 and 55 of 60 jumps go on."""
     rows, name = record_read(PAPER.record), "5 growing jumps, by history, profile"
@@ -188,10 +197,13 @@ def test_sentences_about_growing_jumps() -> None:
     for words, jumps, share in (
         ("rate goes on", 54, 90), ("coordination goes on", 59, 100), ("stiffness goes on", 55, 90),
         ("rate behind the first cycle goes on", 50, 90), ("rate behind healing goes on", 53, 83),
-        ("rate behind healing stays", 51, 92),
+        ("rate behind healing stays", 51, 92), ("rate stays", 55, 87),
     ):  # fmt: skip
         assert found[words] == pytest.approx(100 * jumps / 60)
         assert round(full[words]) == share
+    drift = [bar_stays("", column, 0) for column in COLUMNS[1:]]
+    assert [round(bar.value(compared, name, LAST)) for bar in drift] == [82, 63]
+    assert [round(bar.full(compared, name, LAST)) for bar in drift if bar.full] == [70, 63]
     for figure, least, most in (("settlement", -20, 10), ("deflection", -5, 5)):
         errors = judged(rows, name, LAST, figure)
         assert errors is not None
