@@ -86,6 +86,22 @@ def table_packings(rows: Sequence[Row]) -> str:
     return table(["case", "relative density after the rain", "contacts over grains"], lines)
 
 
+def not_right(rows: Sequence[Row]) -> str:
+    """Cases with a check that fails: the contacts that their one jump loses, beside the bed's own
+    coming and going of contacts from one cycle's end to the next."""
+    lines = []
+    for row in rows:
+        for check in row["checks"]:
+            if not check["ok"]:
+                computed = row["figures"]["coordination"]
+                lines.append(
+                    f"* `{row['name']}`: {check['name']} {number(check['value'])}, where {check['bar']} is"
+                    f" asked; from cycle to cycle its coordination number goes from {min(computed):.2f}"
+                    f" to {max(computed):.2f}."
+                )
+    return "\n".join(lines)
+
+
 def page(rows: Sequence[Row]) -> str:
     """The page of a record."""
     parts = {
@@ -93,6 +109,7 @@ def page(rows: Sequence[Row]) -> str:
         "REFUSALS": refusals(rows),
         "TABLE_CHECKS": table_checks(rows),
         "TABLE_PACKINGS": table_packings(rows),
+        "NOT_RIGHT": not_right(rows),
         "COMMITS": ", ".join(dict.fromkeys(row["commit"] for row in rows)),
         "MACHINES": "; ".join(dict.fromkeys(row["machine"] for row in rows)),
     }
