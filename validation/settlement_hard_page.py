@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from adapters.run_folder import write_atomically
 from validation.page_text import page_filled
 from validation.same_packing_page import table
@@ -87,17 +89,18 @@ def table_packings(rows: Sequence[Row]) -> str:
 
 
 def not_right(rows: Sequence[Row]) -> str:
-    """Cases with a check that fails: the contacts that their one jump loses, beside the bed's own
-    coming and going of contacts from one cycle's end to the next."""
+    """Cases whose jump loses contacts, beside how these come and go in the cycles computed."""
     lines = []
     for row in rows:
         for check in row["checks"]:
             if not check["ok"]:
-                computed = row["figures"]["coordination"]
+                cycles = np.diff([0, *row["figures"]["cycle"]])
+                computed = np.array(row["figures"]["coordination"])[cycles == 1]
+                low, high = computed.min(), computed.max()
                 lines.append(
-                    f"* `{row['name']}`: {check['name']} {number(check['value'])}, where {check['bar']} is"
-                    f" asked; from cycle to cycle its coordination number goes from {min(computed):.2f}"
-                    f" to {max(computed):.2f}."
+                    f"* `{row['name']}`: {check['name']} {number(check['value'])}, where"
+                    f" {check['bar']} is asked. At the ends of its cycles the coordination number"
+                    f" is {low:.2f} to {high:.2f}."
                 )
     return "\n".join(lines)
 
