@@ -182,7 +182,7 @@ CASES = (
     ),
     HardCase(
         "ratcheting",
-        "friction 0.1, 5 kPa at 20 Hz on 15 % of the section: the piston sinks ever faster",
+        "friction 0.1, 5 kPa at 20 Hz on 15 % of the section: the piston breaks in",
         (
             *friction(0.1),
             *load(5e3, 0.15),
