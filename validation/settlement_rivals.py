@@ -242,6 +242,7 @@ METHODS_OF: dict[str, tuple[Method, ...]] = {
             softer(100, CONFINED), faster(2), heavier(10, CONFINED),
             Method("tolerance 0.02", "tolerance", ("procedure.tolerance=0.02",), JUMPING),
             replace(growing(remembering(5, "profile")), window=10),
+            replace(growing(jumping(5)[1]), window=10),
             replace(growing(remembering(3, "profile")), window=18),
         )
     ),
