@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from adapters.laws import law_named
 from adapters.state import FloatArray
 from validation.settlement_ensemble_reading import nested, student
 from validation.settlement_rivals import FEWER, GRAINS, Row
-from validation.settlement_rivals_budget import EVERY, JUMPED
+from validation.settlement_rivals_budget import AFTER, EVERY, JUMPED
 from validation.student import interval
 
 HALF = 10
@@ -76,8 +76,10 @@ def rows_of(rows: Sequence[Row], part: str, method: str, last: int | None = None
 
 
 def finished(rows: Sequence[Row], method: str, last: int) -> list[Row]:
-    """Rows of a method that came to ``last``, of rivals and of laws."""
-    found = rows_of(rows, "rivals", method, last) + rows_of(rows, "law", method, last)
+    """Rows of a method that came to ``last``, of rivals, of laws and of the study of healing."""
+    found = [
+        row for part in ("rivals", "law", "healing") for row in rows_of(rows, part, method, last)
+    ]
     return [row for row in found if str(last) in row.get("settlement", {})]
 
 
@@ -227,19 +229,42 @@ def settled(row: Row) -> float:
 
 
 def of_place(rows: Sequence[Row], part: str) -> dict[tuple[int, int], Row]:
-    """Rows of a part by packing and member."""
-    return {(row["seed"], row["member"]): row for row in rows_of(rows, "budget", part)}
+    """Rows of a part by packing and member, without those that have nothing behind the place."""
+    found = [row for row in rows_of(rows, "budget", part) if "settlement" in row]
+    return {(row["seed"], row["member"]): row for row in found}
 
 
-def effect(rows: Sequence[Row], part: str, value: Callable[[Row], float]) -> FloatArray:
-    """A part less the run of every cycle, mean over the members of each packing."""
-    every, mine = of_place(rows, EVERY), of_place(rows, part)
-    found: dict[int, list[float]] = {}
+def effect(
+    rows: Sequence[Row], part: str, value: Callable[[Row], float], beside: str = EVERY
+) -> FloatArray:
+    """A part less the run of every cycle, or less another part, mean over the members of each
+    packing."""
+    every, mine = of_place(rows, beside), of_place(rows, part)
+    found = []
     for place in sorted(every.keys() & mine.keys()):
         base = every[place]
         same = over_same(base, mine[place]["cycles"][1] - base["cycles"][0])
-        found.setdefault(place[0], []).append(value(mine[place]) - value(same))
-    return np.array([np.mean(values) for values in found.values()])
+        found.append((place[0], value(mine[place]) - value(same)))
+    return mean_by_packing(found)
+
+
+def mean_by_packing(values: Iterable[tuple[int, float]]) -> FloatArray:
+    """Mean of the values of each packing, by its seed, in the order in which packings come."""
+    found: dict[int, list[float]] = {}
+    for seed, value in values:
+        found.setdefault(seed, []).append(value)
+    return np.array([np.mean(each) for each in found.values()])
+
+
+def between_packings(rows: Sequence[Row], value: Callable[[Row], float]) -> FloatArray:
+    """Differences of all pairs of packings, (P (P - 1) / 2,), in the `AFTER` cycles behind the same
+    place of the run of every cycle; of each packing the mean over its members."""
+    places = of_place(rows, EVERY)
+    means = mean_by_packing(
+        (seed, value(over_same(places[seed, member], AFTER))) for seed, member in sorted(places)
+    )
+    first, second = np.triu_indices(len(means), 1)
+    return means[first] - means[second]
 
 
 def over_same(row: Row, cycles: int) -> Row:
@@ -253,7 +278,7 @@ def law_alone(rows: Sequence[Row], law: str = "log") -> FloatArray:
     Both between means of `HALF` cycles, of each packing the mean over its members.
     """
     chosen = law_named(law)
-    found: dict[int, list[float]] = {}
+    found = []
     for (seed, _), row in of_place(rows, EVERY).items():
         path, start = np.array(row["window"]), row["cycles"][0]
         cycle = np.arange(start - len(path) + 1.0, start + 1)
@@ -261,5 +286,5 @@ def law_alone(rows: Sequence[Row], law: str = "log") -> FloatArray:
         before, after = (
             float(np.mean(chosen.value(parameters, cycle[-HALF:] + ahead))) for ahead in (0, JUMPED)
         )
-        found.setdefault(seed, []).append(after - before - settled(over_same(row, JUMPED)))
-    return np.array([np.mean(values) for values in found.values()])
+        found.append((seed, after - before - settled(over_same(row, JUMPED))))
+    return mean_by_packing(found)

@@ -20,21 +20,16 @@ from validation.settlement_ensemble import CONFINED
 from validation.settlement_ensemble_reading import curves
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_readme import table_readme
-from validation.settlement_rivals import METHODS, Row
-from validation.settlement_rivals_budget import AFTER, EVERY, PARTS
+from validation.settlement_rivals import HEALED, METHODS, Row
+from validation.settlement_rivals_budget import JUMPS, PARTS
 from validation.settlement_rivals_continuity import COLUMNS
 from validation.settlement_rivals_page import PAGE, page
 from validation.settlement_rivals_reading import (
     beside,
     cost,
-    effect,
     finished,
     judged,
-    law_alone,
-    of_place,
-    over_same,
     reference,
-    settled,
 )
 from validation.settlement_rivals_reference import LAWS, law_name
 from validation.settlement_rivals_runs import key, record_read
@@ -63,7 +58,11 @@ def test_record_holds_what_the_study_names(rows: list[Row]) -> None:
     assert len(reference) == 10
     rivals = {row["method"] for row in rows if row["part"] == "rivals"}
     assert rivals <= {method.name for method in METHODS}
-    assert {row["method"] for row in rows if row["part"] == "budget"} <= {p.name for p in PARTS}
+    healed = {row["method"] for row in rows if row["part"] == "healing"}
+    assert healed <= {method.name for method in HEALED}
+    assert {row["method"] for row in rows if row["part"] == "budget"} <= {
+        p.name for p in (*PARTS, *JUMPS)
+    }
     assert all(row["last"] == LAST for row in rows if row["part"] != "budget")
 
 
@@ -244,16 +243,3 @@ def test_sentences_about_rivals(rows: list[Row]) -> None:
         found = judged(rows, "E/10", LAST, figure)
         assert found is not None
         assert sign * found.mean > max(found.half, 0.5)
-
-
-def test_sentences_about_the_budget(rows: list[Row]) -> None:
-    """No part but the jump shows in the settlement; the relaxation of an unmoved bed is none."""
-    for part in PARTS[1:]:
-        mean, half = interval(effect(rows, part.name, settled))
-        assert abs(mean) < half, part.name
-    gains = [settled(over_same(row, AFTER)) for row in of_place(rows, EVERY).values()]
-    assert interval(law_alone(rows))[1] > 0.8 * sum(gains) / len(gains)
-    saved, relaxed = (of_place(rows, PARTS[number].name) for number in (6, 7))
-    assert saved.keys() == relaxed.keys()
-    for place, row in saved.items():
-        assert row["settlement"] == relaxed[place]["settlement"]

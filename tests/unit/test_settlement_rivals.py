@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -35,7 +34,7 @@ from validation.settlement_rivals import (
     jump_length,
     masses_scaled,
 )
-from validation.settlement_rivals_budget import EVERY, PLACE, TWIN
+from validation.settlement_rivals_budget import EVERY
 from validation.settlement_rivals_continuity import (
     COLUMNS,
     CYCLES,
@@ -50,9 +49,7 @@ from validation.settlement_rivals_reading import (
     FIGURES,
     beside,
     chaos,
-    effect,
     judged,
-    law_alone,
     profile_chaos,
     profile_error,
 )
@@ -258,32 +255,6 @@ def test_fewer_grains_are_scaled_to_the_bed() -> None:
     row = made_up("rivals", "75 grains", 1, 0, 1.0)
     values = {key: figure.value(row) for key, figure in FIGURES.items()}
     assert values == {"settlement": 2.0, "coordination": 1.0, "deflection": 2.0, "stiffness": 0.5}
-
-
-def place(method: str, member: int, settlement: list[float], **more: Any) -> Row:
-    """A row of the budget."""
-    window = [1e-4 * np.log(PLACE - 19 + n) for n in range(20)]
-    head = {"part": "budget", "method": method, "seed": 1, "member": member, "last": PLACE}
-    cycles = [PLACE, PLACE + len(settlement)]
-    return head | {"window": window, "settlement": settlement, "cycles": cycles} | more
-
-
-def test_effects_are_paired_at_the_same_cycles() -> None:
-    """A run that ends ten cycles before the other is compared where both are."""
-    path = [1e-4 * np.log(PLACE + 1 + n) for n in range(30)]
-    rows = [place(EVERY, member, path) for member in (0, 1)]
-    rows += [place(TWIN, 0, [u + 2e-6 for u in path[:20]]), place(TWIN, 1, path[:20])]
-    ends = effect(rows, TWIN, lambda row: row["settlement"][-1])
-    assert ends == pytest.approx([1e-6], rel=1e-9)
-
-
-def test_a_law_that_holds_misses_nothing() -> None:
-    """Window and cycles behind on one log curve: what the law adds is what came."""
-    path = [1e-4 * np.log(PLACE + 1 + n) for n in range(30)]
-    steeper = [path[0] + 2 * (u - path[0]) for u in path]
-    missed = [law_alone([place(EVERY, 0, settlement)])[0] for settlement in (path, steeper)]
-    assert missed[0] == pytest.approx(0, abs=1e-12)
-    assert missed[1] < -1e-6
 
 
 # --- bars -----------------------------------------------------------------------------------------
