@@ -83,10 +83,15 @@ def test_sentences_about_jumps_that_differ_in_one_thing(rows: list[Row]) -> None
     assert -mean > half
     for name, off in (
         ("relaxation: none", True), ("relaxation: karrech2007", True), (SAME, False),
-        ("law: by history", False),
+        (damped, False), ("relaxation: proximal", False), ("law: by history", False),
     ):  # fmt: skip
         mean, half = interval(effect(rows, name, settled))
         assert (abs(mean) > half) == off, name
+    for part in JUMPS[1:5]:
+        mean, half = interval(
+            effect(rows, part.name, lambda row: row["first"]["force_error"], SAME)
+        )
+        assert mean > half, part.name
     mean, half = interval(effect(rows, "law: linear", settled, SAME))
     assert abs(mean) < half
     assert moved["law: karrech2007"] / moved[SAME] == pytest.approx(2, abs=0.1)
