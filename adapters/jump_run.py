@@ -43,7 +43,7 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
     rows = _rows(run, bed)
     control = begin(bed.cycle, float(rows[-1]["settlement"]))
     while True:
-        if (seated := seat(run, bed, procedure.k_i)).cycle > bed.cycle:
+        if (seated := seat(run, bed, procedure.carried_cycles)).cycle > bed.cycle:
             bed = seated
             control = begin(bed.cycle, float(_rows(run, bed)[-1]["settlement"]))
         decision = decide(control, settings, piston_regime(run, control))

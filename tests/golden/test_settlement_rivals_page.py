@@ -214,8 +214,16 @@ def test_sentences_about_growing_jumps() -> None:
     )
     assert law is not None
     assert still is not None
-    assert 100 * law.error == pytest.approx([12, 94], abs=0.5)
+    assert 100 * law.error == pytest.approx([12, 94, 15], abs=0.5)
     assert still.error.max() < -0.49
+    assert len(finished(rows, "2 jumps, nothing moved", LAST)) == 6
+    softest = [judged(rows, "E/100", LAST, figure) for figure in ("settlement", "deflection")]
+    assert [round(1 + each.mean) for each in softest if each is not None] == [6, 22]
+    longer = [judged(rows, "step x 2", LAST, figure) for figure in ("settlement", "deflection")]
+    found = [[round(100 * one) for one in each.error] for each in longer if each is not None]
+    assert found == [[0, -8], [5, -1]]
+    ratio = cost(runs) / cost(finished(rows, "step x 2", LAST))
+    assert ratio == pytest.approx(0.4, abs=0.05)
 
 
 def test_sentences_about_rivals(rows: list[Row]) -> None:

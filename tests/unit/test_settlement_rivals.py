@@ -104,7 +104,7 @@ def test_jumps_of_the_other_studies_gain_what_the_issue_asks() -> None:
             assert procedure.total_cycles == study.last
             if not method.jumps:
                 continue
-            behind = HEALING + method.window
+            behind = method.healing + method.window
             computed = method.window + method.jumps * behind
             assert behind >= BLOCK
             assert (study.last - study.kind.k_i) / computed >= least[method.jumps]
