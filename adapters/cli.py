@@ -271,16 +271,26 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "paths", nargs="+", metavar="RUN|DUMP...|CSV", type=Path,
         help="a run folder, dumps with a frame each cycle, or a table (.csv, .tsv, .txt, .dat) of "
-        "cycle,settlement (m), also settlement [mm], strain [%%]; decimal commas beside ; or tabs",
+        "cycle,settlement (m), also settlement [mm], strain [%%]; decimal commas beside ; or tabs; "
+        "two columns of numbers need no header, and their unit is then unknown (see --unit)",
     )  # fmt: skip
     parser.add_argument(
         "--columns", nargs=2, metavar=("CYCLE", "SETTLEMENT"), default=(),
         help="a table's columns, where they are called otherwise",
     )  # fmt: skip
     parser.add_argument(
+        "--unit", metavar="U",
+        help="of a table's settlement where no header gives it: m, cm, mm, um, %%, or 1 (strain)",
+    )  # fmt: skip
+    parser.add_argument(
         "--law", default="log", metavar="NAME",
         help="default: log; auto: the slow laws together, refused (exit code 6) where the series "
-        "ratchets or collapses",
+        "ratchets or collapses, or half the band is wider than all settlement so far",
+    )  # fmt: skip
+    parser.add_argument(
+        "--fail-at", type=float, metavar="U",
+        help="settlement or strain of failure, in the series' unit: a prediction that reaches it "
+        "is refused as collapse (exit code 6)",
     )  # fmt: skip
     parser.add_argument(
         "--to-cycle", type=float, metavar="N", help="cycle to predict; default: the last one given"
@@ -314,7 +324,9 @@ def fit_command(arguments: argparse.Namespace) -> int:
     """Fit a law to a series; print its parameters, a prediction and its band."""
     from adapters.errors import JumpRefused
     from adapters.fit import cycles_needed, fit_auto, fit_series, series_read
+    from adapters.fit_agreement import AGREE
     from adapters.laws import law_named
+    from adapters.settlement_series import UNKNOWN
 
     if (arguments.confidence is None) != (arguments.error is None):
         raise UsageError("--confidence and --error belong together", remedy="give both or none")
@@ -325,7 +337,9 @@ def fit_command(arguments: argparse.Namespace) -> int:
             remedy="name a law for --error, such as --law log",
         )
     law = law_named("log" if auto else arguments.law)
-    series = series_read(arguments.paths, arguments.steps_per_cycle, arguments.columns)
+    series = series_read(
+        arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
+    )
     series = series.since(arguments.from_cycle)
     to_cycle = arguments.to_cycle
     if to_cycle is None:
@@ -335,26 +349,32 @@ def fit_command(arguments: argparse.Namespace) -> int:
         series, ahead = series.after(arguments.load_change), to_cycle - arguments.load_change
     try:
         if auto:
-            fitted = fit_auto(series, ahead, arguments.probability).to_json()
+            found = fit_auto(series, ahead, arguments.probability, arguments.fail_at)
         else:
-            fitted = fit_series(series, law, ahead, arguments.probability).to_json()
+            found = fit_series(series, law, ahead, arguments.probability, arguments.fail_at)
     except JumpRefused as refusal:
         if arguments.json:
             json_print(refusal.to_json(series.unit))
         raise
+    fitted = found.to_json()
     if arguments.error is not None:
         fitted["cycles_needed"] = cycles_needed(series, law, arguments.error, arguments.confidence)
     if arguments.json:
         json_print(fitted)
         return 0
-    unit = fitted["unit"]
+    unit = "(unit as given)" if fitted["unit"] == UNKNOWN else fitted["unit"]
     print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles")
     for name, value in fitted["parameters"].items():
         print(f"  {name} = {value:.6g}")
     print(f"regime: {fitted['regime'] or 'not told from so few cycles'}")
+    if found.laws:
+        agreeing = [name for name, said in found.laws.items() if said.agrees]
+        print(f"laws that agree to {AGREE:.0%}: {', '.join(agreeing) or 'none'}")
     low, high = fitted["band"]
     print(f"settlement at cycle {to_cycle:g}: {fitted['prediction']:.6g} {unit}")
     print(f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}")
+    if arguments.fail_at is not None and max(abs(low), abs(high)) >= arguments.fail_at:
+        print(f"  so that failure at {arguments.fail_at:g} is not excluded")
     if arguments.error is not None:
         print(
             f"cycles that keep the mean error term below {arguments.error:g} {unit} with "

@@ -50,6 +50,8 @@ class FakeBed:
     """Deviation of each reading [m], independent from cycle to cycle."""
     transient: float = 0.0
     """What the bed settles further in the first cycles behind a jump [m]."""
+    sinking: float = 0.0
+    """What the piston sinks further than the mean grain, each cycle [m]."""
 
     def settlement(self, first: int, cycles: int) -> FloatArray:
         """u [m] at the ends of ``cycles`` cycles from ``first`` on, less u before them."""
@@ -193,6 +195,7 @@ class FakeEngine:
         phase = np.arange(1, cycles * TRACK_SAMPLES + 1) / TRACK_SAMPLES
         force = scene.stress_at(phase) * scene.loaded_area
         height = values["piston_height"] - np.interp(phase, np.arange(cycles + 1), settled)
+        height -= BED.sinking * phase
         track = np.column_stack(
             [
                 steps[0] + np.round(phase * scene.steps_per_cycle),

@@ -73,9 +73,11 @@ class DumpError(NotCredible):
 
 
 class JumpRefused(NotCredible):
-    """Nothing bounds what comes after a series: its rate does not fall, or grows.
+    """Nothing credible can be said of what comes after a series.
 
-    ``regime`` is ``ratcheting`` or ``collapse``; ``parameters`` what it was told from.
+    ``regime`` is ``ratcheting`` (its rate hardly falls), ``collapse`` (it grows, or leads to
+    failure) or ``uncertain`` (the laws differ too much); ``parameters`` what it was told from;
+    ``laws`` what each of them says all the same, as in ``trackbed fit --json``.
     """
 
     def __init__(
@@ -84,21 +86,25 @@ class JumpRefused(NotCredible):
         *,
         where: str = "",
         remedy: str = "",
+        law: str = "auto",
         regime: str = "",
         parameters: dict[str, float] | None = None,
+        laws: dict[str, dict[str, object]] | None = None,
     ) -> None:
-        self.regime, self.parameters = regime, parameters or {}
+        self.law, self.regime = law, regime
+        self.parameters, self.laws = parameters or {}, laws or {}
         super().__init__(what, where=where, remedy=remedy)
 
     def to_json(self, unit: str) -> dict[str, object]:
         """The keys of ``trackbed fit --json``, without a prediction."""
         return {
-            "law": "auto",
+            "law": self.law,
             "parameters": self.parameters,
             "prediction": None,
             "band": None,
             "unit": unit,
             "regime": self.regime,
+            "laws": self.laws,
         }
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from math import isfinite, log, sqrt
 from typing import Any
 
 import numpy as np
 
 from adapters.errors import JumpRefused, NotConverged, UsageError
+from adapters.fit_agreement import LawSaid, laws_said
 from adapters.fit_auto import outlook
 from adapters.fit_candidates import ROWS_FEWEST, thinned
-from adapters.fit_regime import WHY_NOT, regimes_of
+from adapters.fit_refusal import Refusal, failure, refusals
+from adapters.fit_regime import regimes_of
 from adapters.laws.law import Law
 from adapters.laws.shaped_law import ShapedLaw
 from adapters.residual import cycles_for_error, error_term
@@ -40,6 +42,8 @@ class Prediction:
     unit: str
     regime: str | None = None
     """One of `fit_regime.REGIMES`; None where the series is too short to tell."""
+    laws: dict[str, LawSaid] = field(default_factory=dict)
+    """What each slow law says, by name; empty for a law that was named."""
 
     def to_json(self) -> dict[str, Any]:
         """What ``trackbed fit --json`` prints."""
@@ -50,22 +54,30 @@ class Prediction:
             "band": list(self.band),
             "unit": self.unit,
             "regime": self.regime,
+            "laws": {name: asdict(said) for name, said in self.laws.items()},
         }
 
 
-def fit_series(series: Series, law: Law, to_cycle: float, probability: float = 0.9) -> Prediction:
+def fit_series(
+    series: Series,
+    law: Law,
+    to_cycle: float,
+    probability: float = 0.9,
+    fail_at: float | None = None,
+) -> Prediction:
     """Fit ``law`` to all of ``series`` and predict the settlement at ``to_cycle``.
 
     The prediction is the last settlement of the series plus the law's increment from there on.
-    ``probability`` is the share of cases in which the band should hold the truth.
+    ``probability`` is the share of cases in which the band should hold the truth; ``fail_at`` is
+    the settlement or strain at which the bed fails, in the unit of the series, where it is known.
 
     Raises `UsageError` when ``to_cycle`` lies before the last cycle of the series or the series
     is too short (one row more than the law has parameters), `NotConverged` when the result is
-    not finite.
+    not finite, `JumpRefused` when it reaches ``fail_at``.
     """
     cycle, settlement = _training_rows(series, law)
     last = float(cycle[-1])
-    _check_target(last, to_cycle, probability)
+    _check_target(last, to_cycle, probability, fail_at)
     with np.errstate(over="ignore", invalid="ignore"):  # judged below, in one place
         parameters = law.fit(cycle, settlement)
         prediction = float(settlement[-1] + law.increment(parameters, last, to_cycle))
@@ -79,42 +91,52 @@ def fit_series(series: Series, law: Law, to_cycle: float, probability: float = 0
             remedy="predict less far, or use the law log",
         )
     named = dict(zip(law.parameter_names, map(float, parameters), strict=True))
+    if to_cycle > last and (refusal := failure(prediction, fail_at, to_cycle)):
+        raise _refused(refusal, law.name, named, {})
     return Prediction(law.name, named, prediction, band, series.unit, regime_of(series))
 
 
-def fit_auto(series: Series, to_cycle: float, probability: float = 0.9) -> Prediction:
+def fit_auto(
+    series: Series, to_cycle: float, probability: float = 0.9, fail_at: float | None = None
+) -> Prediction:
     """Predict the settlement at ``to_cycle`` from the slow laws together; see `fit_auto.outlook`.
 
     ``parameters`` of the result: ``exponent`` beta of the tail with its deviation, which the
     regime is told from, and under each law's name the settlement that it alone predicts (the
-    median of its windows), so that one sees which agree.
+    median of its windows); ``laws`` says which agree.
 
-    Raises `JumpRefused` where the series ratchets or collapses and ``to_cycle`` lies behind it:
-    no law says when that ends.  Otherwise as `fit_series`.
+    Raises `JumpRefused` where `fit_refusal.refusals` says so and ``to_cycle`` lies behind the
+    series; it has ``laws`` too.  Otherwise as `fit_series`.
     """
     rows = series.cycle > 0
     cycle, settlement = series.cycle[rows], series.settlement[rows]
     if len(cycle):
-        _check_target(float(cycle[-1]), to_cycle, probability)
+        _check_target(float(cycle[-1]), to_cycle, probability, fail_at)
     found = outlook(cycle, settlement[:, None], to_cycle, probability)
-    regime, candidates = found.regime[0], found.candidates
-    parameters = regime.parameters()
-    if not regime.jump_allowed and to_cycle > cycle[-1]:
-        raise JumpRefused(
-            f"up to cycle {cycle[-1]:g} {WHY_NOT[regime.name]}: it goes as N^(beta - 1) with "
-            f"beta = {regime.exponent:.2f} ± {regime.deviation:.2f}, and no law says when "
-            "that ends",
-            where="law auto",
-            remedy="compute or measure more cycles, or name a law yourself: --law log, linear ...",
-            regime=regime.name,
-            parameters=parameters,
-        )
-    for name in dict.fromkeys(candidates.law):
-        own = [row for row, law in enumerate(candidates.law) if law == name]
-        parameters[name] = float(settlement[-1] + np.median(candidates.increment[own, 0]))
+    parameters = found.regime[0].parameters()
+    prediction = float(found.prediction[0])
+    (refusal,) = refusals(found)
+    if refusal is None and to_cycle > found.last_cycle:
+        refusal = failure(prediction, fail_at, to_cycle)
+    said = laws_said(found, refused=refusal is not None)
+    if refusal:
+        raise _refused(refusal, "auto", parameters, said)
+    parameters |= {name: one.prediction for name, one in said.items()}
     band = (float(found.low[0]), float(found.high[0]))
-    return Prediction(
-        "auto", parameters, float(found.prediction[0]), band, series.unit, regime.name
+    return Prediction("auto", parameters, prediction, band, series.unit, found.regime[0].name, said)
+
+
+def _refused(
+    refusal: Refusal, law: str, parameters: dict[str, Any], said: dict[str, LawSaid]
+) -> JumpRefused:
+    return JumpRefused(
+        refusal.why,
+        where=f"law {law}",
+        remedy=refusal.remedy,
+        law=law,
+        regime=refusal.regime,
+        parameters=parameters,
+        laws={name: asdict(one) for name, one in said.items()},
     )
 
 
@@ -248,9 +270,11 @@ def cycles_needed(series: Series, law: Law, error: float, confidence: float) -> 
     return cycles_for_error(float(residual.min()), float(residual.max()), error, 1 - confidence)
 
 
-def _check_target(last: float, to_cycle: float, probability: float) -> None:
+def _check_target(last: float, to_cycle: float, probability: float, fail_at: float | None) -> None:
     if not 0 < probability < 1:
         raise UsageError(f"a probability lies between 0 and 1, not at {probability:g}")
+    if fail_at is not None and not (fail_at > 0 and isfinite(fail_at)):
+        raise UsageError(f"the settlement of failure is a positive number, not {fail_at:g}")
     if not (isfinite(to_cycle) and to_cycle >= last):
         raise UsageError(
             f"cycle {to_cycle:g} does not lie behind the last one of the series, {last:g}",

@@ -10,6 +10,7 @@ import numpy as np
 from adapters.errors import NotConverged, UsageError
 from adapters.fit_candidates import (
     ROWS_FEWEST,
+    BoolArray,
     Candidates,
     candidates_of,
     constant_rate_gains,
@@ -41,6 +42,14 @@ class Outlook:
     low: FloatArray
     high: FloatArray
     candidates: Candidates
+    votes: BoolArray
+    """Candidates that have a vote, shape (c, n)."""
+    last_cycle: float
+    to_cycle: float
+    last: FloatArray
+    """Reading at the last cycle."""
+    settled: FloatArray
+    """Largest settlement so far, without its sign."""
 
 
 def outlook(
@@ -78,13 +87,15 @@ def outlook(
         )
     few, means = thinned(cycle, displacement)
     last, regimes = displacement[-1], regimes_of(few, means)
+    settled, reach = np.abs(displacement).max(axis=0), (float(cycle[-1]), to_cycle)
     bounded = np.array([regime.name == SHAKEDOWN for regime in regimes])
     unbounded = np.array([regime.bounded < 1 - CERTAIN for regime in regimes]) & ~bounded
     with np.errstate(over="ignore", invalid="ignore"):  # judged below, in one place
         candidates = candidates_of(few, means, to_cycle)
+        votes = candidates.votes(bounded, unbounded)
         if to_cycle == cycle[-1]:
-            return Outlook(regimes, last, last, last, candidates)
-        moved = candidates.median(bounded, unbounded)
+            return Outlook(regimes, last, last, last, candidates, votes, *reach, last, settled)
+        moved = candidates.median(votes)
         exponent = EXPONENTS[exponent_weights(few, means).argmax(axis=0)]
         reading, tail = tail_error(cycle, displacement, exponent, to_cycle, probability)
         miss = held_out_error(candidates, log(to_cycle / cycle[-1]), probability)
@@ -103,7 +114,7 @@ def outlook(
             f"the slow laws give no finite settlement at cycle {to_cycle:g}",
             remedy="predict less far, or use the law log",
         )
-    return Outlook(regimes, last + moved, low, high, candidates)
+    return Outlook(regimes, last + moved, low, high, candidates, votes, *reach, last, settled)
 
 
 def held_out_error(candidates: Candidates, distance: float, probability: float) -> FloatArray:

@@ -62,9 +62,8 @@ class Candidates:
         bound = VETO * np.nanmedian(np.where(tested, self.miss, np.nan), axis=0)
         return admitted & ~(self.miss > bound)
 
-    def median(self, bounded: BoolArray, unbounded: BoolArray) -> FloatArray:
+    def median(self, votes: BoolArray) -> FloatArray:
         """Median increment of those that have a vote, shape (n,)."""
-        votes = self.votes(bounded, unbounded)
         return np.asarray(np.nanmedian(np.where(votes, self.increment, np.nan), axis=0))
 
     def spread(self, bounded: BoolArray, probability: float) -> tuple[FloatArray, FloatArray]:

@@ -7,6 +7,7 @@ a constant rate; beta = q + 1 is the exponent of the tail u = c + a (N^beta - 1)
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ RESOLUTION = 1e-3
 """Deviation of a reading at best, of the whole range: a digit of a curve of 300 is off by as much.
 A bed that has settled but for its last digit is at rest, whichever way that digit goes."""
 CERTAIN = 0.9
-"""Probability from which a bed is said to shake down or to collapse."""
+"""Probability from which a bed is said to shake down, to ratchet or to collapse."""
 
 SHAKEDOWN, STEADY, RATCHETING, COLLAPSE = REGIMES = (
     "shakedown",
@@ -39,6 +40,11 @@ WHY_NOT = {
     COLLAPSE: "the settlement rate grows (collapse)",
 }
 """Regimes in which nothing bounds what comes after the data, and the words for it."""
+WHY_NOT_PISTON = {
+    RATCHETING: "the rate at which the piston sinks hardly falls (ratcheting)",
+    COLLAPSE: "the rate at which the piston sinks grows (collapse)",
+}
+"""The same of a piston that breaks into a bed whose mean grain may even rise."""
 
 
 @dataclass(frozen=True)
@@ -124,28 +130,30 @@ def tail_residual(cycle: FloatArray, displacement: FloatArray, exponent: FloatAr
 def regimes_of(cycle: FloatArray, displacement: FloatArray) -> list[Regime]:
     """Regime of each of n series (k, n) at ascending cycles > 0, (k,), k >= 3.
 
-    - *ratcheting or collapse* where beta > 1/2 is more likely than not: the rate is nearer to a
-      constant one than to that of the logarithm.  Of these, *collapse* where beta > 1, a rate that
-      grows, has `CERTAIN` probability;
-    - *shakedown* where beta < 0, a total that stays bounded, has `CERTAIN` probability; or where
-      nothing moves;
-    - *steady* otherwise: unbounded, ever slower.
-
     The tail says what the bed does, not what it will do: real ballast at 30 to 40 Hz ratchets for
     some hundred cycles and then shakes down.
     """
     weight = exponent_weights(cycle, displacement)
-    fast, growing = weight[EXPONENTS > 0.5].sum(axis=0), weight[EXPONENTS > 1].sum(axis=0)
-    bounded = weight[EXPONENTS < -1e-9].sum(axis=0)
-    mean = EXPONENTS @ weight
-    deviation = np.sqrt(np.maximum((EXPONENTS**2) @ weight - mean**2, 0.0))
     still = np.ptp(displacement[tail_rows(cycle)], axis=0) == 0
-    name = np.where(
-        fast > 0.5,
-        np.where(growing > CERTAIN, COLLAPSE, RATCHETING),
-        np.where((bounded > CERTAIN) | still, SHAKEDOWN, STEADY),
-    )
-    return [
-        Regime(str(one), float(m), float(d), float(b))
-        for one, m, d, b in zip(name, mean, deviation, bounded, strict=True)
-    ]
+    return [regime_of_weight(*each) for each in zip(weight.T, still, strict=True)]
+
+
+def regime_of_weight(weight: FloatArray, still: bool) -> Regime:
+    """Regime where `EXPONENTS` have the probabilities ``weight``, (g,); each needs `CERTAIN`.
+
+    - *collapse*: beta > 1, a rate that grows;
+    - *ratcheting*: beta > 1/2, a rate nearer to a constant one than to that of the logarithm;
+    - *shakedown*: beta < 0, a total that stays bounded; or nothing moves (``still``);
+    - *steady* otherwise: unbounded, ever slower, or none of these for certain.
+    """
+    fast, growing = (float(weight[limit < EXPONENTS].sum()) for limit in (0.5, 1))
+    bounded = float(weight[EXPONENTS < -1e-9].sum())
+    mean = float(EXPONENTS @ weight)
+    deviation = sqrt(max(float(EXPONENTS**2 @ weight) - mean**2, 0.0))
+    if still or bounded > CERTAIN:
+        name = SHAKEDOWN
+    elif fast > CERTAIN:
+        name = COLLAPSE if growing > CERTAIN else RATCHETING
+    else:
+        name = STEADY
+    return Regime(name, mean, deviation, bounded)

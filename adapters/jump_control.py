@@ -27,7 +27,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from adapters.fit_candidates import BoolArray
-from adapters.fit_regime import WHY_NOT
+from adapters.fit_regime import WHY_NOT, WHY_NOT_PISTON, Regime
 from adapters.jump_forecast import Forecast, forecast_of, laws_gain
 from adapters.jump_rates import (
     Stretch,
@@ -207,8 +207,11 @@ def curve_of(stretch: Stretch, settlement: float) -> tuple[tuple[float, ...], tu
     return tuple(cycles.tolist()), tuple(values.tolist())
 
 
-def decide(control: Control, settings: Settings) -> Decision:
-    """Jump, compute, refuse or end; a pure function of what was observed."""
+def decide(control: Control, settings: Settings, piston: Regime | None = None) -> Decision:
+    """Jump, compute, refuse or end; a pure function of what was observed.
+
+    ``piston``: regime of a piston that can sink into the bed; None where it stands on all of it.
+    """
     left = settings.total_cycles - control.cycle
     if left <= 0:
         return Decision(control.cycle, "end", 0, why="all cycles are done")
@@ -226,9 +229,15 @@ def decide(control: Control, settings: Settings) -> Decision:
         exponent=regime.exponent,
         attempt=control.attempts + 1,
     )
-    if not regime.jump_allowed:
-        action = "compute" if settings.cycle_by_cycle else "refuse"
-        return replace(known, action=action, why=WHY_NOT[regime.name])
+    for one, why_not in ((regime, WHY_NOT), (piston, WHY_NOT_PISTON)):
+        if one is not None and not one.jump_allowed:
+            return replace(
+                known,
+                action="compute" if settings.cycle_by_cycle else "refuse",
+                regime=one.name,
+                exponent=one.exponent,
+                why=why_not[one.name],
+            )
     room = left - settings.healing - SHORTEST_WINDOW
     if room < settings.shortest_jump:
         return replace(known, why="the end is too near for a jump")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def settle_fixed(run: Run, bed: Bed) -> Bed:
     for number in range(p.total_cycles):
         if not run.variant.jumps:
             break
-        bed = seat(run, bed, p.k_i + k)
+        bed = seat(run, bed, p.carried_cycles + k)
         shortest = max(p.healing_cycles, 1) if counted_from(run, bed) else min(p.h or (0,))
         longest = p.total_cycles - bed.cycle - p.healing_cycles - k
         h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
@@ -139,14 +140,26 @@ def compute_on(run: Run, bed: Bed) -> Bed:
 
 def history_gain(run: Run, bed: Bed, h: int) -> float | None:
     """Settlement over a jump [m] by all cycles in which the bed carried the piston, but the first
-    of them; None: by the law."""
+    of them; None: by the law.
+
+    Cycles count from the last in which it hung: from there on the bed takes the load for the first
+    time, and settles by ln of these, as one does that carried its piston from the rain on.
+    """
     p = run.scene.procedure
     assert p is not None
     if p.settlement == "law" or h == 0:
         return None
-    begin, outcomes = counted_from(run, bed) + max(1, round(SEATING * p.k_i)), run.folder.outcomes()
-    known = stretches_of(outcomes, begin, bed.cycle, left_out=1)
-    jumps = [one for one in jumps_of(outcomes, bed.cycle) if one.cycles[0] >= begin]
+    hung, outcomes = counted_from(run, bed), run.folder.outcomes()
+    begin = hung + max(1, round(SEATING * p.k_i))
+    known = [
+        replace(one, first_cycle=one.first_cycle - hung)
+        for one in stretches_of(outcomes, begin, bed.cycle, left_out=1)
+    ]
+    jumps = [
+        replace(one, cycles=one.cycles - hung)
+        for one in jumps_of(outcomes, bed.cycle)
+        if one.cycles[0] >= begin
+    ]
     return asked_gain(known, h, jumps)
 
 

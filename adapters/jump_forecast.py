@@ -9,22 +9,13 @@ not enter.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import log, sqrt
+from math import log
 
 import numpy as np
 from scipy.special import stdtrit
 
 from adapters.fit_candidates import ROWS_FEWEST, increments, thinned
-from adapters.fit_regime import (
-    CERTAIN,
-    COLLAPSE,
-    EXPONENTS,
-    PRIOR,
-    RATCHETING,
-    SHAKEDOWN,
-    STEADY,
-    Regime,
-)
+from adapters.fit_regime import EXPONENTS, PRIOR, Regime, regime_of_weight
 from adapters.jump_rates import Rates, spans
 from adapters.state import FloatArray
 
@@ -71,24 +62,8 @@ class Forecast:
 
     @property
     def regime(self) -> Regime:
-        """Regime of the rates, as `fit_regime.regimes_of` has it, but never on a mere likelihood.
-
-        Here each class needs `CERTAIN` probability: a short jump needs less than a prediction of a
-        whole life, and is checked when it is done.
-        """
-        fast = float(self.weight[EXPONENTS > 0.5].sum())
-        growing = float(self.weight[EXPONENTS > 1].sum())
-        bounded = float(self.weight[EXPONENTS < -1e-9].sum())
-        mean = float(self.weight @ EXPONENTS)
-        deviation = sqrt(max(float(self.weight @ EXPONENTS**2) - mean**2, 0.0))
-        still = not self.rate.any()
-        if growing > CERTAIN and not still:
-            name = COLLAPSE
-        elif fast > CERTAIN and not still:
-            name = RATCHETING
-        else:
-            name = SHAKEDOWN if bounded > CERTAIN or still else STEADY
-        return Regime(name, mean, deviation, bounded)
+        """Regime of the rates; see `fit_regime.regime_of_weight`."""
+        return regime_of_weight(self.weight, not self.rate.any())
 
 
 def forecast_of(rates: Rates, from_cycle: float | None = None) -> Forecast:

@@ -7,7 +7,7 @@ decisions on the finished stages, and finds there what it would do.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from math import isfinite, nan
 from typing import Any
 
@@ -15,9 +15,11 @@ import numpy as np
 
 from adapters import stages
 from adapters.errors import EngineFailed, JumpRefused, NotConverged, NotCredible
+from adapters.fit_regime import Regime
 from adapters.jump_check import accept, judge, reject
-from adapters.jump_control import Control, Decision, Settings, begin, decide, observe
-from adapters.jump_rates import Stretch
+from adapters.jump_control import Control, Decision, Settings, begin, decide, joined, observe
+from adapters.jump_forecast import forecast_of
+from adapters.jump_rates import Stretch, rates_of
 from adapters.jump_record import CHECK, DECISION
 from adapters.jump_seating import seat, warn_if_hung
 from adapters.report_history import cost_total
@@ -41,10 +43,10 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
     rows = _rows(run, bed)
     control = begin(bed.cycle, float(rows[-1]["settlement"]))
     while True:
-        if (seated := seat(run, bed, procedure.k_i)).cycle > bed.cycle:
+        if (seated := seat(run, bed, procedure.carried_cycles)).cycle > bed.cycle:
             bed = seated
             control = begin(bed.cycle, float(_rows(run, bed)[-1]["settlement"]))
-        decision = decide(control, settings)
+        decision = decide(control, settings, piston_regime(run, control))
         if decision.action == "end":
             return bed
         journal.write(DECISION, decision.cycle, decision.attempt, asdict(decision))
@@ -58,6 +60,27 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
         else:
             warn_if_hung(run, bed)
             bed, control = jump_and_check(run, bed, control, decision, settings, journal)
+
+
+def piston_regime(run: Run, control: Control) -> Regime | None:
+    """Regime of a piston on a part of the section, from the windows that still count.
+
+    Such a piston may break into the bed while grains beside it rise as much as those under it
+    sink: what the mean grain settles by does not show it.  None where the piston covers all of the
+    section, where no window is known yet, and where it does not sink.
+    """
+    assert run.scene.loading is not None
+    if run.scene.loading.area_share == 1 or not control.stretches:
+        return None
+    lowered = [
+        replace(one, rows=[row | {"settlement": -row["piston_height"]} for row in one.rows])
+        for one in run.folder.outcomes()
+    ]
+    sunk: tuple[Stretch, ...] = ()
+    for stretch in stretches_of(lowered, control.stretches[0].first_cycle, control.cycle):
+        sunk = joined(sunk, stretch)
+    forecast = forecast_of(rates_of(sunk))
+    return forecast.regime if forecast.rate @ forecast.weight > 0 else None
 
 
 def jump_and_check(

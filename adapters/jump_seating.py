@@ -5,8 +5,9 @@ to nothing until they give way, which no law of the cycles before can tell.  Its
 tells: under one load it is many times that of a bed of such grains, whose stiffness is known to a
 factor of two from the mean field of Walton (1987).
 
-With ``procedure.seating = "waits"`` the k_i first cycles count from the last one in which the
-piston hung.
+With ``procedure.seating = "waits"`` the k_i first cycles, or ``seating_cycles`` in their place,
+count from the last one in which the piston hung, and so do the cycles N by which jumps by history
+forecast: from there on the bed takes the load for the first time.
 """
 
 from __future__ import annotations

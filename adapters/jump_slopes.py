@@ -9,10 +9,10 @@ seen through the noise of each block of computed cycles; its best linear unbiase
 (ordinary kriging, Matheron 1963) weighs the nearest blocks alone where cycles are quiet, and all
 of them where they are not.
 
-A bed that was moved by G settles more than it would have: in the first cycle, as contacts that
-were moved do not bear yet, and by some kappa G / n in the n-th.  kappa is one number for a run,
-0 with standard deviation `RESEATING` before any cycle is seen; the blocks behind jumps tell it,
-since 1 / n falls much faster than 1 / N.
+A bed that was moved by G may settle more than it would have: in the first cycle, as contacts that
+were moved do not bear yet, and by some kappa G / n in the n-th (measured in docs/jump-history.md).
+kappa is one number for a run, 0 with standard deviation `RESEATING` before any cycle is seen; the
+blocks behind jumps tell it, since 1 / n falls much faster than 1 / N.
 """
 
 from __future__ import annotations

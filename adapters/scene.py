@@ -216,6 +216,8 @@ class Procedure(Table):
     """What the mean grain settles by in a jump of h cycles: its law, or all cycles computed."""
     seating: Literal["any", "waits"] = "any"
     """Whether the k_i first cycles count from where the bed carries the piston."""
+    seating_cycles: Annotated[int, Field(ge=1)] | None = None
+    """Where they do and a piston hung: cycles that count in place of k_i; k_i unless told."""
     jammed: Literal["less", "rearranged"] = "less"
     """Where a jump by history finds no room: it moves the bed by less, or grains change places."""
     relaxation: Literal["smallest-move", "karrech2007", "proximal", "none"] = "smallest-move"
@@ -226,7 +228,7 @@ class Procedure(Table):
     def _without_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Stored runs are older than these keys: at their defaults they are left out."""
         newer = {"move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
-        newer |= {"seating": "any", "jammed": "less"}
+        newer |= {"seating": "any", "seating_cycles": None, "jammed": "less"}
         record: dict[str, Any] = whole(self)
         return {
             key: value for key, value in record.items() if key not in newer or value != newer[key]
@@ -235,6 +237,11 @@ class Procedure(Table):
     def jump_cycles(self, jump: int) -> int:
         """Cycles of jump number ``jump`` = 0, 1, ...; 0 where the jumps choose themselves."""
         return self.h[min(jump, len(self.h) - 1)] if self.h else 0
+
+    @property
+    def carried_cycles(self) -> int:
+        """Cycles that the bed carries its piston before windows are fitted, where runs wait."""
+        return self.seating_cycles or self.k_i
 
     @property
     def window_cycles(self) -> int:

@@ -238,6 +238,12 @@ def _settlement(scene: _Values) -> Iterator[Problem]:
         yield Problem(key, "move 'still' moves nothing, so no settlement: leave one of them out")
 
 
+def _seating(scene: _Values) -> Iterator[Problem]:
+    key = "procedure.seating_cycles"
+    if _present(scene, key) and scene.get("procedure.seating") in (None, "any"):
+        yield Problem(key, 'only a run that waits for its piston counts them: seating = "waits"')
+
+
 def _jammed(scene: _Values) -> Iterator[Problem]:
     key = "procedure.jammed"
     if scene.get(key) in (None, "less"):
@@ -369,6 +375,7 @@ CHECKS: tuple[Check, ...] = (
     _procedure,
     _jumps,
     _settlement,
+    _seating,
     _jammed,
     _launcher,
     _law,

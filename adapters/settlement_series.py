@@ -13,6 +13,9 @@ import numpy as np
 from adapters.errors import UsageError
 from adapters.state import FloatArray
 
+UNKNOWN = "unknown"
+"""Unit of numbers that come without one: they may be metres, millimetres or a strain."""
+
 
 @dataclass(frozen=True)
 class Series:
@@ -23,6 +26,7 @@ class Series:
     settlement: FloatArray
     """Settlement, positive downwards, in ``unit``, shape (k,)."""
     unit: str = "m"
+    """m, cm, mm, um, %, 1 (strain), or `UNKNOWN`."""
 
     def since(self, cycle: float) -> Series:
         """The rows from ``cycle`` on, to leave out a bedding-in that no law describes."""
@@ -36,12 +40,16 @@ class Series:
 
 
 def series_read(
-    paths: Sequence[Path], steps_per_cycle: float | None = None, columns: Sequence[str] = ()
+    paths: Sequence[Path],
+    steps_per_cycle: float | None = None,
+    columns: Sequence[str] = (),
+    unit: str | None = None,
 ) -> Series:
     """The series of one table, one run folder, or dumps with one frame a cycle end.
 
     A table is a file named as in `settlement_table.SUFFIXES`, but for dumps of such names;
-    ``columns`` are its columns of cycles and settlement, where they have unusual names.
+    ``columns`` are its columns of cycles and settlement, where they have unusual names; ``unit``
+    is one of `settlement_table.UNITS`, where the table does not say.
 
     Dumps may be one file of many frames or many files, taken in natural order of their names
     (``2.dump`` before ``10.dump``); a frame that repeats the time step before it is skipped.
@@ -64,9 +72,11 @@ def series_read(
         )
     if tables:
         path = tables[0]
-        return series_of_table(path / "settlement.csv" if path.is_dir() else path, columns)
+        return series_of_table(path / "settlement.csv" if path.is_dir() else path, columns, unit)
     if columns:
         raise UsageError("dumps have no columns of cycles and settlement", where=str(paths[0]))
+    if unit not in (None, "m"):
+        raise UsageError(f"dumps are in m, not in {unit}", where=str(paths[0]))
     return series_of_dumps(paths, steps_per_cycle)
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from adapters.errors import UsageError
-from adapters.settlement_series import Series
+from adapters.settlement_series import UNKNOWN, Series
 from adapters.state import FloatArray
 
 SUFFIXES = (".csv", ".tsv", ".txt", ".dat")
@@ -23,7 +23,8 @@ UNITS = {"m": "m", "cm": "cm", "mm": "mm", "um": "um", "µm": "um", "μm": "um",
 """Units a header may give, as in ``settlement_mm`` or ``Settlement [mm]``, and their names."""
 CYCLE_NAMES = ("cycle", "cycles", "n")
 SETTLEMENT_NAMES = {"settlement": "m", "strain": "1", "axial strain": "1"}
-"""Columns that are found without being named, and their unit where the header gives none."""
+"""Columns that are found without being named, and their unit where neither header nor user gives
+one; of other columns, and of a table without a header, it is then not known."""
 KINDS = ("computed", "healing", "jumped")
 """What a row of a run's table may be; only computed ones are data for a law."""
 REMEDY = (
@@ -54,8 +55,10 @@ class Table:
         return f"{self.path}:{self.lines[row]}" + (f", column {column}" if column else "")
 
 
-def series_of_table(path: Path, names: Sequence[str] = ()) -> Series:
+def series_of_table(path: Path, names: Sequence[str] = (), unit: str | None = None) -> Series:
     """The series of a text table; ``names`` are the two columns, where they are not the usual ones.
+
+    ``unit`` is the settlement's, one of `UNITS`, where the header does not give it.
 
     Cells are separated by commas, semicolons, tabs or blanks, whichever the first line has; where
     not by commas, a comma may be the decimal sign.  Columns are `CYCLE_NAMES` and
@@ -64,10 +67,11 @@ def series_of_table(path: Path, names: Sequence[str] = ()) -> Series:
     lines that begin with # are ignored.  Text is UTF-8, UTF-16 with its mark, or Windows-1252.
 
     Raises `UsageError`, which names line and column, for what is no number or not finite, negative
-    cycles and a cycle that is given twice: what such rows mean only their author knows.
+    cycles and a cycle that is given twice: what such rows mean only their author knows; and for a
+    ``unit`` that is not the header's.
     """
     table = _table(path)
-    places, unit = _columns(table, names)
+    places, unit = _columns(table, names, unit)
     if "kind" in places:
         table = _computed_rows(table, places["kind"])
     if not table.rows:
@@ -152,10 +156,18 @@ def _rows(text: str, separator: str) -> tuple[list[int], list[list[str]]]:
     return lines, rows
 
 
-def _columns(table: Table, names: Sequence[str]) -> tuple[dict[str, int], str]:
-    """Places of the columns cycle, settlement and, if there, kind; and the unit."""
+def _columns(table: Table, names: Sequence[str], told: str | None) -> tuple[dict[str, int], str]:
+    """Places of the columns cycle, settlement and, if there, kind; and the unit.
+
+    ``told`` is the unit that the user gives.
+    """
+    if told is not None and told not in UNITS.values():
+        raise UsageError(
+            f"{told} is no unit of settlement or strain",
+            remedy=f"the units are {', '.join(dict.fromkeys(UNITS.values()))}; 1 is plain strain",
+        )
     if not table.header:
-        return {"cycle": 0, "settlement": 1}, "m"
+        return {"cycle": 0, "settlement": 1}, told or UNKNOWN
     split = [_name_and_unit(name) for name in table.header]
     places: dict[str, int] = {}
     wanted = {"cycle": CYCLE_NAMES, "settlement": tuple(SETTLEMENT_NAMES), "kind": ("kind",)}
@@ -185,7 +197,13 @@ def _columns(table: Table, names: Sequence[str]) -> tuple[dict[str, int], str]:
                 remedy=REMEDY,
             )
     name, unit = split[places["settlement"]]
-    return places, unit or SETTLEMENT_NAMES.get(name, "m")
+    if told and unit and told != unit:
+        raise UsageError(
+            f"the column {table.header[places['settlement']]} is in {unit}, not in {told}",
+            where=where,
+            remedy="leave --unit out",
+        )
+    return places, unit or told or SETTLEMENT_NAMES.get(name, UNKNOWN)
 
 
 def _name_and_unit(title: str) -> tuple[str, str]:

@@ -102,15 +102,19 @@ class Bed:
     """First cycles of that window to keep out of the fit."""
 
 
-def prepare(run: Run) -> Bed:
-    """Rain of grains under gravity until equilibrium (section 2.3)."""
+def prepare(run: Run, start: tuple[FloatArray, float] | None = None) -> Bed:
+    """Rain of grains under gravity until equilibrium (section 2.3).
+
+    ``start``: centres of the grains [m], shape (n, 3), and the height that they fill [m], instead
+    of the scene's random ones.
+    """
     scene, name = run.scene, "preparation"
     outcome = run.folder.outcome(name)
     if outcome is None:
         sample = scene.sample
         run.progress.say(f"rain of {scene.grain_count} grains")
         radius = radii_sample(sample.grain_radius.law, scene.grain_count, sample.seed)
-        position, height = sample_start(
+        position, height = start or sample_start(
             radius, scene.container, sample.relative_density_start, sample.seed
         )
         folder = _begin(run, name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
@@ -14,6 +15,9 @@ from typing import Any
 from adapters.errors import UsageError
 from adapters.scene_checks import did_you_mean
 from validation import cases
+
+TOLD = ("reported", "measured", "finite")
+"""In place of a bar: the value is only told."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +31,28 @@ class Check:
     ok: bool
     unit: str = ""
     """SI unit of ``value`` and ``bar``; empty for a pure number."""
+    page: str = ""
+    """Page that shows the value, such as ``docs/laws.md``; empty where there is none."""
+    why: str = ""
+    """Why the bar is known to be missed; empty for one that is to hold."""
+    section: str = ""
+    """Part of the case's report that it belongs to; empty where there are no parts."""
+
+    @property
+    def barred(self) -> bool:
+        """False for a value that is only told."""
+        return self.bar not in TOLD
+
+    @property
+    def asked(self) -> str:
+        """The bar with its unit behind the number; words alone where it has none."""
+        bound = re.match(r"[<>=]=? ?[^\s,]*\d(?=$|[\s,]\D)|.*\d$", self.bar)
+        return f"{bound[0]} {self.unit}".rstrip() + self.bar[bound.end() :] if bound else self.bar
+
+    @property
+    def known(self) -> bool:
+        """True when a finite value misses the bar and it is told why: told, but no failure."""
+        return bool(self.why) and not self.holds and isfinite(self.value)
 
     @property
     def holds(self) -> bool:
@@ -50,6 +76,13 @@ def case_load(name: str) -> Callable[[bool], list[Check]]:
     return run
 
 
+def case_report(name: str) -> Callable[[Path, Sequence[Check], dict[str, Any]], None] | None:
+    """The function ``report_write(path, checks, provenance)`` of a case, None where it has none."""
+    return getattr(
+        import_module(f"validation.cases.{name.replace('-', '_')}"), "report_write", None
+    )
+
+
 def record(name: str, checks: Sequence[Check], provenance: dict[str, Any]) -> dict[str, Any]:
     """What is written of a run of a case; a value that is no finite number becomes null."""
     rows = []
@@ -66,14 +99,24 @@ def record_write(path: Path, content: dict[str, Any]) -> None:
     temporary.replace(path)
 
 
+def checks_told(checks: Sequence[Check]) -> str:
+    """How many bars there are, how many are met, and how many missed, in a sentence."""
+    bars = [check for check in checks if check.barred]
+    met, known = (sum(getattr(check, what) for check in bars) for what in ("holds", "known"))
+    said = f"Of {len(bars)} bars {met} are met and {known} missed for a reason that is known"
+    failing = len(bars) - met - known
+    return f"{said}; {failing} fail." if failing else f"{said}."
+
+
 def checks_table(checks: Sequence[Check]) -> str:
     """The checks as text, a line each."""
     rows = [
         (
-            "ok" if check.holds else "FAILS",
+            "ok" if check.holds else "missed" if check.known else "FAILS",
             check.name,
             f"{check.value:.4g} {check.unit}".rstrip(),
-            f"bar {check.bar} {check.unit}".rstrip(),
+            f"bar {check.asked}",
+            f"known: {check.why}" if check.known else "",
         )
         for check in checks
     ]

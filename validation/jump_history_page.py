@@ -25,6 +25,13 @@ from validation.jump_forecasts import (
     jumped_error,
     way_history,
 )
+from validation.jump_history_behind import (
+    STILL_COARSE,
+    mean_first,
+    shares_told,
+    table_behind,
+    way_jumps,
+)
 from validation.jump_history_layers import table_layers
 from validation.jump_history_schedules import table_schedules
 from validation.page_text import page_filled, table
@@ -169,6 +176,9 @@ def page(found: Sequence[Forecasts], record: EnsembleRecord) -> str:
         "CHOICES": table_choices(record),
         "SCHEDULES": table_schedules(record),
         "LAYERS": table_layers(record),
+        "BEHIND": table_behind(),
+        **shares_told("LAW", "PROFILE"),
+        "STILL_FIRST": f"{1e6 * mean_first(way_jumps('coarse', STILL_COARSE)):.0f}",
         "K": str(FIRST_WINDOW),
         "HEALING": str(HEALING),
         "FIRST_CYCLE": f"{FIRST_CYCLE:g}",

@@ -5,48 +5,40 @@ The page is ``jump_page.md`` beside this file, with tables and numbers of the tw
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from validation import jump_runs, jump_study
+from validation.jump_history_behind import TOLD, shares_told
+from validation.jump_liggghts import Rows, chaos_told, liggghts_table, liggghts_told, share
+from validation.jump_reading import (
+    BAR,
+    bursty,
+    group,
+    overspend_median,
+    settings_of,
+    total,
+    within,
+)
 from validation.law_page import per_cent
 from validation.page_text import page_filled, table
+from validation.settlement_ensemble_record import EnsembleRecord
 
 TEMPLATE = Path(__file__).with_name("jump_page.md")
 PAGE = Path(__file__).parents[1] / "docs" / "jump-control.md"
 PICTURE = PAGE.with_suffix(".png")
 
-Rows = Sequence[dict[str, Any]]
-
-
-def group(rows: Rows, name: str, **keys: Any) -> list[dict[str, Any]]:
-    """Rows of a group with these values."""
-    chosen = [row for row in rows if row["group"] == name]
-    return [row for row in chosen if all(row[key] == value for key, value in keys.items())]
-
-
-def total(rows: Rows, key: str) -> int:
-    """Sum of a column."""
-    return int(sum(row[key] for row in rows))
-
-
-def share(part: int, whole: int) -> str:
-    """12 of 13 (92 %)."""
-    return f"{part} of {whole} ({100 * part / whole:.0f} %)" if whole else "none"
-
 
 def cells(rows: Rows) -> list[str]:
     """Columns of a table of runs on curves."""
-    oracle = [row["computed"] / row["oracle"] for row in rows if row["oracle"]]
+    spent = overspend_median(rows)
     error = np.array([row["error"] for row in rows])
     return [
         share(total(rows, "within"), total(rows, "jumps")),
         str(total(rows, "taken_back")),
         f"{np.median([row['computed'] for row in rows]):,.0f}",
-        f"{np.median(oracle):.1f}" if oracle else "",
+        f"{spent:.1f}" if spent == spent else "",
         f"{100 * error.mean():+.1f} ± {100 * error.std():.1f} %",
         f"{total(rows, 'mean_inside')}, {total(rows, 'single_inside')} of {len(rows)}",
         per_cent(float(np.median([row["half_width"] for row in rows])), 0),
@@ -71,16 +63,11 @@ def noise_table(rows: Rows) -> str:
 
 def bar_told(rows: Rows) -> str:
     """Which settings miss the bar, and how often the bands hold."""
-    settings: dict[tuple[str, float, float], list[dict[str, Any]]] = {}
-    for row in rows:
-        if row["group"] in jump_study.BURSTS or (
-            row["group"] == "tolerances" and row["tolerance"] != 0.02  # those are above already
-        ):
-            settings.setdefault((row["law"], row["bursts"], row["tolerance"]), []).append(row)
+    settings = settings_of(rows)
     missed = [
         f"{law} (bursts {bursts:g}, tolerance {tolerance:g})"
         for (law, bursts, tolerance), these in settings.items()
-        if total(these, "within") < 0.9 * total(these, "jumps")
+        if within(these) < BAR
     ]
     every = [row for these in settings.values() for row in these]
     held = share(total(every, "within"), total(every, "jumps"))
@@ -202,96 +189,11 @@ def measured_table(rows: Rows) -> str:
     return table(head, lines)
 
 
-def settlement_of(run: dict[str, Any]) -> float:
-    """Settlement at the last cycle of a run of the record [m]."""
-    return float(run["rows"][-1][2])
-
-
-def liggghts_error(run: dict[str, Any], runs: Rows) -> float | None:
-    """Against the full run of the same seed; None where that is not there yet."""
-    full = [one for one in runs if one["way"] == "full" and one["seed"] == run["seed"]]
-    return settlement_of(run) / settlement_of(full[0]) - 1 if full else None
-
-
-def band_of_record(run: dict[str, Any]) -> Any:
-    """The band of a run with a tolerance; None for another."""
-    from adapters.jump_band import band_of
-
-    if not run["decisions"]:
-        return None
-    held = [check for check in run["checks"] if check["accepted"]]
-    return band_of(int(run["rows"][-1][0]), settlement_of(run), held)
-
-
-def liggghts_table(runs: Rows) -> str:
-    """Every run of the coarse bed."""
-    lines = []
-    for run in runs:
-        error, band = liggghts_error(run, runs), band_of_record(run)
-        full = [one for one in runs if one["way"] == "full" and one["seed"] == run["seed"]]
-        inside = ""
-        if band is not None and full:
-            truth = settlement_of(full[0])
-            inside = "yes" if band.low <= truth <= band.high else "**no**"
-        lost = sum(one["lost_cycles"] for one in run["lost"])
-        lines.append(
-            [
-                run["way"],
-                str(run["seed"]),
-                f"{run['computed'] + lost}",
-                f"{run['engine_s']:.0f}",
-                f"{1e6 * settlement_of(run):.0f}",
-                "" if error is None or run["way"] == "full" else f"{100 * error:+.1f} %",
-                "" if band is None else observed_within([run]),
-                "" if band is None else str(len(run["lost"])),
-                "" if band is None else f"{1e6 * band.low:.0f} to {1e6 * band.high:.0f}",
-                inside,
-            ]
-        )
-    head = [
-        "way", "seed", "cycles computed", "engine, CPU s", "settlement, µm", "error",
-        "observed within", "taken back", "band, µm", "full run inside",
-    ]  # fmt: skip
-    return table(head, lines)
-
-
-def observed_within(runs: Rows) -> str:
-    """Jumps that stand of runs by one tolerance, and how many erred by no more than that."""
-    tolerance = float(runs[0]["way"].split()[-1])
-    errors = [check["error"] for run in runs for check in run["checks"] if check["accepted"]]
-    return share(sum(abs(error) <= tolerance for error in errors), len(errors))
-
-
-def liggghts_told(runs: Rows) -> str:
-    """What the runs say, and what is missing."""
-    said = []
-    for way in dict.fromkeys(run["way"] for run in runs if run["way"] != "full"):
-        these = [run for run in runs if run["way"] == way]
-        errors = [e for run in these if (e := liggghts_error(run, runs)) is not None]
-        lost = [sum(one["lost_cycles"] for one in run["lost"]) for run in these]
-        cycles = np.mean([run["computed"] for run in these]) + np.mean(lost)
-        held = ""
-        if way.startswith("tolerance"):
-            held = f"{observed_within(these)} of its jumps observed within, "
-        spread = f", error {100 * np.mean(errors):+.1f} % on the mean" if errors else ""
-        if len(errors) > 1:
-            spread += f", {100 * np.std(errors, ddof=1):.1f} % its scatter, "
-            spread += f"{100 * np.mean(np.abs(errors)):.1f} % without signs"
-        said.append(f"{way}: {held}{cycles:.0f} cycles computed{spread} ({len(these)} seeds)")
-    seeds = range(1, jump_runs.STUDY.seeds + 1)
-    wanted = {(way.name, seed) for way in jump_runs.STUDY.ways for seed in seeds}
-    missing = sorted(wanted - {(run["way"], run["seed"]) for run in runs})
-    text = ". ".join(said) + "." if said else ""
-    if missing:
-        text += " Not run yet: " + ", ".join(f"{way} seed {seed}" for way, seed in missing) + "."
-    return text
-
-
 def page(rows: Rows, runs: Rows) -> str:
     """The page, with every mark ``{{name}}`` of the template replaced."""
     named = [row for name in jump_study.BURSTS for row in group(rows, name)]
     worst = max(named, key=lambda row: abs(row["error"]))
-    bursty = [row for row in group(rows, "measured") if row["run"].startswith("coarse")]
+    demo = bursty(rows)
     made = group(rows, "made")[0]
     widths = [np.median([r["half_width"] for r in group(rows, n)]) for n in jump_study.BURSTS]
     parts = {
@@ -303,11 +205,13 @@ def page(rows: Rows, runs: Rows) -> str:
         "again": again_told(rows),
         "tolerances": tolerance_table(rows),
         "moved": moved_table(rows),
+        **shares_told(*TOLD),
         "far": far_table(rows),
         "hard": hard_table(rows),
         "measured": measured_table(rows),
         "liggghts": liggghts_table(runs),
         "liggghts_told": liggghts_told(runs),
+        "liggghts_chaos": chaos_told(runs, EnsembleRecord()),
         "liggghts_k_i": str(jump_runs.STUDY.k_i),
         "liggghts_last": str(jump_runs.STUDY.last),
         "add_up": (
@@ -317,9 +221,9 @@ def page(rows: Rows, runs: Rows) -> str:
         "widths": ", ".join(f"{100 * width:.0f} %" for width in widths),
         "bursty": (
             f"The demo's bed settles in bursts that few windows see: of its full run's jumps "
-            f"{share(total(bursty, 'within'), total(bursty, 'jumps'))} were within: the bar is "
+            f"{share(total(demo, 'within'), total(demo, 'jumps'))} were within: the bar is "
             "missed."
-            if bursty
+            if demo
             else "The demo's full run is not in this record."
         ),
         "machine": f"{made['machine']}; commit {made['commit']}; LIGGGHTS runs: commits "

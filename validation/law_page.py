@@ -9,8 +9,10 @@ from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
+from adapters.fit_refusal import UNCERTAIN, WIDEST
 from adapters.fit_regime import WHY_NOT
-from validation.law_study import LAWS, REGIME_CUTS, RIVALS, Row, record_read
+from validation.law_bound import BOUNDS, LARGE, WAYS
+from validation.law_study import BOUNDED, LAWS, REGIME_CUTS, RIVALS, Row, record_read
 from validation.page_text import page_filled, table
 
 TEMPLATE = Path(__file__).with_name("law_page.md")
@@ -38,6 +40,12 @@ PARAMETERS = {
     "inverse-log": "c, a, tau, B", "sato": "c, g, b, tau", "hca": "c, a, b, tau",
     "karrech2007": "a, b", "polyfit": "c, a", "curve_fit": "a, b",
 }  # fmt: skip
+WAYS_TOLD = {
+    WAYS[0]: "median of the votes (auto)",
+    WAYS[1]: "without the power law, which never slows down to a logarithm",
+    WAYS[2]: "last decade, last two, all rows: weights 3 : 2 : 1",
+    WAYS[3]: "no decade ahead brings more than the last one",
+}
 NAMES = {
     "ballast": "real ballast",
     "other cuts": "the same tests, N_c between these",
@@ -145,16 +153,101 @@ def worst_told(rows: Sequence[Row]) -> str:
     return f"- Largest errors on real ballast: {', '.join(said)}."
 
 
+def bound_table(rows: Sequence[Row]) -> str:
+    """Auto under every bound on the band: what goes ahead, its errors, its cover."""
+    lines = []
+    for bound in BOUNDS:
+        cells = []
+        for source in BOUNDED:
+            row = row_of(rows, f"{source}, bound", f"{WAYS[0]}, {bound:g}")
+            errors = " / ".join(per_cent(row[key]) for key in ("error", "error_90"))
+            cells.append(f"{row['cases']} of {row['of']}: {errors}, {per_cent(row['coverage'], 0)}")
+        name = f"{bound:g}" if isfinite(bound) else "none"
+        lines.append([f"**{name}**" if bound == WIDEST else name, *cells])
+    return table(["half-width at most", *(NAMES[source] for source in BOUNDED)], lines)
+
+
+def large_told(rows: Sequence[Row]) -> str:
+    """Where the large errors on the other cuts are, and how wide their bands."""
+    large = row_of(rows, "other cuts")["large"]
+    fast = [row for row in large if 500 <= row["cut"] <= 1000]
+    wide = [row for row in large if row["width"] > WIDEST]
+    return (
+        f"of {len(large)} errors above {per_cent(LARGE, 0)} {len(fast)} are cuts at 500 to 1,000 "
+        f"cycles, in the fast stage that is told of below, and in {len(wide)} the band reaches "
+        "further on each side than all that settled"
+    )
+
+
+def ways_table(rows: Sequence[Row]) -> str:
+    """Every way to combine the candidates at the bound of auto."""
+    lines = []
+    for way in WAYS:
+        found = [row_of(rows, f"{one}, bound", f"{way}, {WIDEST:g}") for one in BOUNDED]
+        errors = [" / ".join(per_cent(row[key]) for key in ("error", "error_90")) for row in found]
+        lines.append([WAYS_TOLD[way], *errors])
+    return table(["way", *(NAMES[source] for source in BOUNDED)], lines)
+
+
+def whole_table(rows: Sequence[Row]) -> str:
+    """The whole tests: prediction and band at a million cycles, and what is said of them."""
+    lines = [
+        [
+            test_name(row["method"]),
+            f"{row['last_cycle']:,.0f}",
+            f"{row['last']:.3f}",
+            f"{row['exponent'][0]:.2f} ± {row['exponent'][1]:.2f}",
+            f"{row['prediction']:.3f}",
+            f"{row['band'][0]:.3f} to {row['band'][1]:.3f}",
+            regime_cell(row["said"]),
+            regime_cell(row["said_fail_at"]),
+        ]
+        for row in rows
+        if row["source"] == "whole"
+    ]
+    head = [
+        "p / q, f", "its cycles", "its strain", "beta", "laws' median", "band", "said",
+        "with `--fail-at 0.3`",
+    ]  # fmt: skip
+    return table(head, lines)
+
+
+def left_out_told(rows: Sequence[Row]) -> str:
+    """What tests have that a setting was chosen for on the other tests."""
+    row = row_of(rows, "left out")
+    errors = " and ".join(
+        f"{per_cent(row[key])} {name}"
+        for key, name in (("error", "median error"), ("error_90", "90th percentile"))
+    )
+    return (
+        f"{errors} in the {row['cases']} of {row['of']} cases that go ahead, and "
+        f"{per_cent(row['coverage'], 0)} inside the band of auto"
+    )
+
+
+def chosen_told(rows: Sequence[Row]) -> str:
+    """The bounds that were chosen on the others."""
+    chosen = row_of(rows, "left out")["chosen"].values()
+    return " or ".join(sorted({one.rsplit(", ", 1)[1] for one in chosen}))
+
+
+def regime_cell(regime: str | None) -> str:
+    """A regime, in bold where a prediction is refused."""
+    if regime is None:
+        return ""
+    return f"**{regime}**" if regime in WHY_NOT or regime == UNCERTAIN else regime
+
+
+def test_name(name: str) -> str:
+    """p_30kPa_q_230kPa_f_5Hz to 30kPa / 230kPa, 5Hz."""
+    return name.removeprefix("p_").replace("_q_", " / ").replace("_f_", ", ")
+
+
 def regimes_table(rows: Sequence[Row]) -> str:
     """What each test was told to do when it was known so far; what is refused in bold."""
-
-    def cell(regime: str | None) -> str:
-        return "" if regime is None else f"**{regime}**" if regime in WHY_NOT else regime
-
     regimes = row_of(rows, "ballast regimes")["regimes"]
-    names = {name: name.removeprefix("p_").replace("_q_", " / ") for name in regimes}
     head = ["p / q, f", *(f"{cut:,.0f}" if isfinite(cut) else "its end" for cut in REGIME_CUTS)]
-    lines = [[names[name].replace("_f_", ", "), *map(cell, regimes[name])] for name in regimes]
+    lines = [[test_name(name), *map(regime_cell, regimes[name])] for name in regimes]
     return table(head, lines)
 
 
@@ -186,11 +279,13 @@ def page(rows: Sequence[Row]) -> str:
             f"{doubling['cases']} inside the band"
         ),
         "regimes": regimes_table(rows),
-        "other": ", ".join(
-            f"{name} {per_cent(row['error'], 0)} / {per_cent(row['error_90'], 0)}"
-            for name in ("hyperbolic", "log")
-            for row in [row_of(rows, "other cuts", name)]
-        ),
+        "other_all": per_cent(row_of(rows, "other cuts, bound", f"{WAYS[0]}, inf")["error_90"]),
+        "large": large_told(rows),
+        "bound": bound_table(rows),
+        "ways": ways_table(rows),
+        "chosen": chosen_told(rows),
+        "left_out": left_out_told(rows),
+        "whole": whole_table(rows),
         "bursts": f"{inside} of {of}",
     }
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)

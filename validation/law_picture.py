@@ -12,14 +12,14 @@ from adapters.errors import UsageError
 from adapters.fit_auto import outlook
 from validation.cases.jump_without_engine import data_folder
 from validation.law_series import ballast_series
-from validation.law_study import LAWS, RIVALS, Row
+from validation.law_study import LAWS, RIVALS, Row, verdict
 
 SHOWN = (
     ("p_10kPa_q_230kPa_f_5Hz", 1e3),
     ("p_30kPa_q_230kPa_f_30Hz", 3e3),
     ("p_30kPa_q_230kPa_f_50Hz", 1e3),
 )
-"""Series and cuts: a usual one, one that shook down, and the worst."""
+"""Series and cuts: a usual one, one that shook down, and one that is refused."""
 
 
 def draw(rows: Sequence[Row], target: Path) -> None:
@@ -82,5 +82,5 @@ def draw_series(axis: Any, name: str, cut: float, cycle: Any, strain: Any) -> No
     axis.plot(cycle[~known], 100 * strain[~known], "o", **later)
     axis.axvline(10 * last, color="0.6", lw=0.7, ls=":")
     axis.set(xscale="log", xlabel="cycles", ylabel="axial strain, %", ylim=(0, 250 * strain[-1]))
-    regime = said[0].regime[0].name
+    regime = verdict(cycle[known], strain[known])
     axis.set_title(f"{name.replace('_', ' ')}, N_c = {cut:,.0f}: {regime}", fontsize=9)

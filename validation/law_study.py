@@ -10,22 +10,24 @@ import argparse
 import json
 import time
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from adapters.fit_auto import outlook
-from adapters.fit_candidates import thinned
-from adapters.fit_regime import REGIMES, regimes_of
+from adapters.fit_refusal import UNCERTAIN, failure, refusals
+from adapters.fit_regime import REGIMES
 from adapters.laws import law_named
 from adapters.provenance import provenance
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.cases.jump_without_engine import data_folder
+from validation.law_bound import bound_rows, large_errors, left_out, summary, ways
 from validation.law_series import (
     OTHER_CUTS,
+    REACH,
     LawCase,
     ballast_cases,
     ballast_series,
@@ -35,6 +37,8 @@ from validation.law_series import (
     run_cases,
 )
 
+BOUNDED = ("ballast", "other cuts", "families")
+"""Sources on which the bound on the band is varied."""
 RECORD = Path(__file__).with_name("results") / "laws.jsonl"
 MEMBERS = 12
 """Of each family."""
@@ -44,6 +48,8 @@ LAWS = (
 )  # fmt: skip
 REGIME_CUTS = (100.0, 300.0, 1e3, 3e3, 1e4, 1e5, np.inf)
 """Last known cycle; inf: the whole test."""
+WHOLE_TO, FAIL_AT = 1e6, 0.3
+"""Whole tests are predicted up to here; the strain at which they were stopped, 0.297 to 0.305."""
 RIVALS = ("polyfit", "curve_fit")
 Row = dict[str, Any]
 
@@ -95,14 +101,18 @@ def auto_rows(cases: Sequence[LawCase]) -> list[Row]:
         said = outlook(case.cycle, case.settlement[:, None], case.to_cycle)
         cost = time.process_time() - start
         prediction, low, high = (float(x[0]) for x in (said.prediction, said.low, said.high))
+        (refusal,) = refusals(said)
         scale = abs(case.truth)
         each = case.settlement[-1] + said.candidates.increment[:, 0]
         found.append(
             {
                 "name": case.name,
                 "cut": case.cut,
-                "regime": said.regime[0].name,
-                "allowed": said.regime[0].jump_allowed,
+                "regime": refusal.regime if refusal else said.regime[0].name,
+                "allowed": refusal is None,
+                "certain": said.regime[0].jump_allowed,
+                "width": (high - low) / 2 / float(said.settled[0]),
+                "ways": {way: u / case.truth - 1 for way, u in ways(said, case).items()},
                 "exponent": said.regime[0].exponent,
                 "error": prediction / case.truth - 1,
                 "inside": low <= case.truth <= high,
@@ -112,16 +122,6 @@ def auto_rows(cases: Sequence[LawCase]) -> list[Row]:
             }
         )
     return found
-
-
-def summary(error: Iterable[float]) -> Row:
-    """Median and 90th percentile of absolute errors."""
-    size = np.abs(np.array(list(error)))
-    return {
-        "cases": len(size),
-        "error": float(np.median(size)),
-        "error_90": float(np.quantile(size, 0.9)),
-    }
 
 
 def auto_summary(rows: Sequence[Row]) -> Row:
@@ -137,9 +137,12 @@ def auto_summary(rows: Sequence[Row]) -> Row:
         "error_90_without_one": [min(without), max(without)],
         "coverage": float(np.mean([row["inside"] for row in allowed])),
         "half_width": float(np.median([row["half_width"] for row in allowed])),
+        "large": large_errors(rows),
         "hindsight": summary(row["hindsight"] for row in allowed),
         "all": summary(row["error"] for row in rows),
-        "regimes": {name: sum(row["regime"] == name for row in rows) for name in REGIMES},
+        "regimes": {
+            name: sum(row["regime"] == name for row in rows) for name in (*REGIMES, UNCERTAIN)
+        },
         "cost_s": float(np.median([row["cost_s"] for row in rows])),
         "worst": [
             {key: row[key] for key in ("name", "cut", "regime", "error", "exponent")}
@@ -195,9 +198,12 @@ def sources(members: int, folder: Path | None) -> dict[str, list[LawCase]]:
 
 def study(members: int, folder: Path | None) -> list[Row]:
     """All rows: auto and every other method on every source, and the share of alarms."""
-    found = []
+    found, real = [], []
     for source, cases in sources(members, folder).items():
         rows = auto_rows(cases)
+        if source in BOUNDED:
+            found += bound_rows(source, rows)
+            real += rows if source != "families" else []
         allowed = [row["allowed"] for row in rows]
         found.append({"source": source, **auto_summary(rows)})
         for name, predict in predictors().items():
@@ -206,22 +212,55 @@ def study(members: int, folder: Path | None) -> list[Row]:
     refused = sum(not row["allowed"] for row in fast)
     found.append({"source": "fast", "method": "auto", "cases": len(fast), "refused": refused})
     if folder:
-        found.append(regimes_row(folder))
+        found.append({"source": "left out", "method": "auto", **left_out(real)})
+        found += [regimes_row(folder), *whole_rows(folder)]
     return found + [grains_row(name) for name in ("log", "hyperbolic", "stretched-exponential")]
 
 
 def regimes_row(folder: Path) -> Row:
-    """Regime of every ballast test from its readings up to `REGIME_CUTS`; None: too few."""
+    """What is said of every ballast test, `REACH` times ahead, from its readings up to
+    `REGIME_CUTS`: its regime, or that of the refusal; None: too few readings.
+    """
     regimes: dict[str, list[str | None]] = {}
     for name, cycle, strain in ballast_series(folder):
         told: list[str | None] = []
         for cut in REGIME_CUTS:
             known = cycle <= cut * (1 + 1e-9)
             enough = known.sum() >= 5 and (cycle[known][-1] >= cut / 2 or not np.isfinite(cut))
-            rows = thinned(cycle[known], strain[known, None]) if enough else None
-            told.append(regimes_of(*rows)[0].name if rows else None)
+            told.append(verdict(cycle[known], strain[known]) if enough else None)
         regimes[name] = told
     return {"source": "ballast regimes", "method": "auto", "regimes": regimes}
+
+
+def verdict(cycle: FloatArray, strain: FloatArray) -> str:
+    """Regime of a series, or of the refusal to predict it `REACH` times ahead."""
+    said = outlook(cycle, strain[:, None], REACH * float(cycle[-1]))
+    (refusal,) = refusals(said)
+    return refusal.regime if refusal else said.regime[0].name
+
+
+def whole_rows(folder: Path) -> list[Row]:
+    """Each whole test at `WHOLE_TO`: what is said with and without `FAIL_AT`."""
+    found = []
+    for name, cycle, strain in ballast_series(folder):
+        said = outlook(cycle, strain[:, None], WHOLE_TO)
+        (refusal,) = refusals(said)
+        failed = refusal or failure(float(said.prediction[0]), FAIL_AT, WHOLE_TO)
+        told = said.regime[0].name
+        found.append(
+            {
+                "source": "whole",
+                "method": name,
+                "last_cycle": said.last_cycle,
+                "last": float(said.last[0]),
+                "exponent": [said.regime[0].exponent, said.regime[0].deviation],
+                "prediction": float(said.prediction[0]),
+                "band": [float(said.low[0]), float(said.high[0])],
+                "said": refusal.regime if refusal else told,
+                "said_fail_at": failed.regime if failed else told,
+            }
+        )
+    return found
 
 
 def grains_row(name: str, grains: int = 1000, cycles: int = 50) -> Row:

@@ -67,9 +67,8 @@ class Judged:
 
 
 SMALL = Judged(COARSE, tuple(range(1, 9)), 60, 40, 40, 10, (FULL, *moves_known(), TWIN))
-PAPER = Judged(
-    CONFINED, (1,), 50, 20, 20, 5, ("still", "smoothed", "shrunk", "per-grain", FULL), stored=True
-)
+PAPER_WAYS = ("still", "smoothed", "shrunk", "per-grain", "profile", FULL)
+PAPER = Judged(CONFINED, (1,), 50, 20, 20, 5, PAPER_WAYS, stored=True)
 JUDGED = (PAPER, SMALL)
 
 

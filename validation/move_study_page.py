@@ -15,7 +15,9 @@ from adapters.moves import moves_known
 from adapters.run_folder import write_atomically
 from validation.move_study import Row, record_read
 from validation.move_study_engine import FULL, PAPER, SMALL, TWIN, Judged
+from validation.move_study_members import rows_of_members
 from validation.move_study_offline import OTHER_MEMBER
+from validation.move_study_paper import first_rate, later_rate, words_of
 from validation.move_study_picture import draw
 from validation.move_study_reading import (
     CONTINUES,
@@ -34,6 +36,7 @@ from validation.move_study_reading import (
     wins,
 )
 from validation.page_text import page_filled, table
+from validation.settlement_ensemble_record import EnsembleRecord
 
 TEMPLATE = Path(__file__).with_name("move_study_page.md")
 PAGE = Path(__file__).parents[1] / "docs" / "moves.md"
@@ -45,7 +48,7 @@ TOLD = (1, 2, 3, 5, 10)
 
 def way_name(way: str) -> str:
     """A way as code, anything else as it is."""
-    return way if way in (FULL, TWIN, OTHER_MEMBER) else f"`{way}`"
+    return f"`{way}`" if way in moves_known() else way
 
 
 def offline_table(rows: Sequence[Row]) -> str:
@@ -143,8 +146,8 @@ def engine_table(rows: Sequence[Row]) -> str:
             [
                 way_name(way),
                 told(over_beds(mine, lambda row: 1e6 * way_to_end(row))),
-                told(over_beds(mine, lambda row: 1e6 * float(cycles(row, "after", "rate")[0]))),
-                told(over_beds(mine, later_rate), 1),
+                told(over_beds(mine, lambda row: 1e6 * first_rate(row))),
+                told(over_beds(mine, lambda row: 1e6 * later_rate(row)), 1),
                 *(told(over_beds(mine, partial(percent_change, name)), 0, " %")
                   for name in measures),
                 *contacts,
@@ -152,11 +155,6 @@ def engine_table(rows: Sequence[Row]) -> str:
             ]
         )  # fmt: skip
     return table(head, lines)
-
-
-def later_rate(row: Row) -> float:
-    """Settlement a cycle from the second one behind the jump on [µm]."""
-    return 1e6 * float(cycles(row, "after", "rate")[1:].mean())
 
 
 def percent_change(measure: str, row: Row) -> float:
@@ -172,6 +170,38 @@ def healing_table(rows: Sequence[Row]) -> str:
         path = 1e6 * np.mean([cycles(row, "after", "rate") for row in beds(rows, way)], axis=0)
         lines.append([way_name(way), *(f"{path[cycle - 1]:.1f}" for cycle in shown)])
     return table(["cycle", *map(str, shown)], lines)
+
+
+FIRST_CYCLES = 3
+"""Cycles behind the jump that are told one by one where the piston's force is told."""
+
+
+def first_cycles_table(rows: Sequence[Row]) -> str:
+    """Force error of the piston by cycle, and what else cycle 1 has beside the cycles before."""
+    lines = []
+    for way in ways_of(rows):
+        mine = beds(rows, way)
+        before = np.mean([cycles(row, "before", "force_error").mean() for row in mine])
+        after = np.mean([cycles(row, "after", "force_error") for row in mine], axis=0)
+        errors = [before, *after[:FIRST_CYCLES], after[FIRST_CYCLES:].mean()]
+        lines.append(
+            [
+                way_name(way),
+                *(f"{100 * error:.2f}" for error in errors),
+                *(told(over_beds(mine, partial(first_change, measure)), 0, " %")
+                  for measure in ("maximum_overlap", "coordination_number", "elastic_deflection")),
+            ]
+        )  # fmt: skip
+    head = [
+        "way", "force error before, %", *(str(cycle + 1) for cycle in range(FIRST_CYCLES)), "later",
+        "cycle 1: greatest overlap", "coordination number", "elastic deflection",
+    ]  # fmt: skip
+    return table(head, lines)
+
+
+def first_change(measure: str, row: Row) -> float:
+    """First cycle after the jump beside the mean of those before [%]."""
+    return 100 * float(cycles(row, "after", measure)[0] / cycles(row, "before", measure).mean() - 1)
 
 
 def rate_before(rows: Sequence[Row]) -> str:
@@ -206,17 +236,6 @@ def origin(rows: Sequence[Row]) -> str:
     return f"{'; '.join(machines)}; {'; '.join(engines)}; commits {', '.join(commits)}."
 
 
-def first_cycle(rows: Sequence[Row], ways: Sequence[str]) -> str:
-    """Settlement in the first cycle behind the jump [µm]: mean over beds, range over ways."""
-    found = sorted(
-        1e6 * float(np.mean([cycles(row, "after", "rate")[0] for row in mine]))
-        for mine in (beds(rows, way) for way in ways)
-        if mine
-    )
-    low, high = f"{found[0]:.1f}", f"{found[-1]:.1f}"
-    return low if low == high else f"{low} to {high}"
-
-
 def jump_told(judged: Judged) -> str:
     """Window, jump, and cycles behind it."""
     return (
@@ -232,6 +251,8 @@ def page(offline: Sequence[Row], engine: Sequence[Row]) -> str:
         return "{} of {}".format(*wins(offline, scale, "shrunk", "smoothed", key))
 
     small, paper = (rows_of_kind(engine, judged.kind.name) for judged in (SMALL, PAPER))
+    (seed,) = PAPER.seeds
+    with_members = [*paper, *rows_of_members(PAPER, seed, EnsembleRecord())]
     parts = {
         "WINDOWS": str(len({(row["run"], *row["jump"]) for row in offline})),
         "OFFLINE": offline_table(offline),
@@ -250,17 +271,18 @@ def page(offline: Sequence[Row], engine: Sequence[Row]) -> str:
         "SMALL_BEFORE": rate_before(small),
         "PAPER_BEFORE": rate_before(paper),
         "ENGINE_SMALL": engine_table(small),
-        "ENGINE_PAPER": engine_table(paper),
+        "ENGINE_PAPER": engine_table(with_members),
+        "FIRST_SMALL": first_cycles_table(small),
+        "FIRST_PAPER": first_cycles_table(with_members),
         "HEALING_SMALL": healing_table(small),
-        "HEALING_PAPER": healing_table(paper),
+        "HEALING_PAPER": healing_table(with_members),
         "CONTINUES": continues_table(small),
         "FULL_HELD": held_share(small, FULL),
         "TWIN_HELD": held_share(small, TWIN),
         "SMALL_RISE": f"{1e3 * float(np.mean([row['rise'] for row in small])):.0f}",
         "PAPER_RISE": f"{1e3 * float(np.mean([row['rise'] for row in paper])):.1f}",
-        "STILL_FIRST": first_cycle(small, ["still"]),
-        "PAPER_STILL": first_cycle(paper, ["still"]),
-        "PAPER_FIRST": first_cycle(paper, [w for w in moves_known() if w != "still"]),
+        "STILL_FIRST": f"{1e6 * over_beds(beds(small, 'still'), first_rate)[0]:.1f}",
+        **words_of(offline, with_members),
         "ORIGIN": origin([*offline, *engine]),
     }
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)

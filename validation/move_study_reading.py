@@ -8,7 +8,8 @@ import numpy as np
 
 from adapters.state import FloatArray
 from validation.move_study import Row
-from validation.move_study_engine import FULL, TWIN
+from validation.move_study_engine import FULL, PAPER, TWIN
+from validation.move_study_members import member_name
 from validation.move_study_offline import OTHER_MEMBER
 
 SCALES = {
@@ -18,7 +19,7 @@ SCALES = {
 """Runs of the offline part by what they are."""
 ORDER = (
     "still", "per-grain", "robust", "smoothed", "shrunk", "modes", "smooth-field", "profile",
-    OTHER_MEMBER, FULL, TWIN,
+    OTHER_MEMBER, FULL, TWIN, *map(member_name, range(PAPER.kind.members)),
 )  # fmt: skip
 """Ways as the page lists them, then runs of every cycle."""
 CONTINUES = ("rate", "coordination_number", "elastic_deflection", "piston_stiffness")

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
+
+MARK = re.compile(r"<[A-Z][A-Z0-9_]*>|\{\{\w+\}\}")
 
 
 def page_filled(template: str, parts: Mapping[str, str]) -> str:
     """A template whose marks ``{{NAME}}`` and ``<NAME>`` give way to the part of that name.
 
-    ValueError where there is no such mark: a table would be made for no page.
+    ValueError where there is no such mark, as a table would be made for no page, or no such part.
     """
     for name, part in parts.items():
         marks = ("{{" + name + "}}", f"<{name}>")
@@ -16,6 +19,8 @@ def page_filled(template: str, parts: Mapping[str, str]) -> str:
             raise ValueError(f"the template has no mark for {name}")
         for mark in marks:
             template = template.replace(mark, part)
+    if left := MARK.search(template):
+        raise ValueError(f"no part for the mark {left.group()}")
     return template
 
 

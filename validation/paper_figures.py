@@ -47,9 +47,18 @@ from validation.relaxation_ways import own, rough
 Row = dict[str, Any]
 RECORD = Path(__file__).parent / "results" / "paper-figures.jsonl"
 RUN, TWIN = "paper_scale_a", "paper_scale_b"
-"""Two full runs of one bed that began 1e-10 m apart."""
+"""Two full runs of one bed that began 1e-10 m apart, 300 and 98 cycles."""
+LONG_RUN = "coarse_bursty"
+"""The only stored run with 500 cycles before a window: another bed, of 150 softer grains."""
 FIRST = (10, 20, 50, 100, 200)
 """k_i: cycles before the window."""
+PAPER_LAST = 500
+"""The paper's largest k_i."""
+FIRST_LONG = (*FIRST, PAPER_LAST)
+PAPER_LARGEST = {"linear": (0.14, 0.025), "log": (0.14, 0.01)}
+"""The paper's largest E_r in Figs 6 and 7 at its k_i of 10 and of 500, as its text has them."""
+PAPER_LONG = (20, 0.02)
+"""k from which on the paper's E_r is below so much."""
 WINDOWS = (5, 10, 20, 40, 80)
 """k: cycles of the window."""
 JUMPS = (5, 10, 20, 40, 80)
@@ -79,7 +88,9 @@ def accuracy_row(position: FloatArray, k_i: int) -> Row:
     }
 
 
-def jump_row(position: FloatArray, twin: FloatArray, jump: tuple[int, int, int]) -> Row:
+def jump_row(
+    position: FloatArray, twin: FloatArray, jump: tuple[int, int, int], run: str = RUN
+) -> Row:
     """Figs 6, 7: E_r (eq. 22) of a jump by each law, with three displacements as denominator.
 
     ``coordinates``: u are coordinates, as eq. 22 is explained; ``loading``: displacements since the
@@ -97,6 +108,7 @@ def jump_row(position: FloatArray, twin: FloatArray, jump: tuple[int, int, int])
         estimates[OTHER] = first + twin[k_i + k + h] - twin[k_i + k]
     return {
         "figure": "6, 7",
+        "run": run,
         "jump": list(jump),
         "coordinates": {n: digits(error_of_coordinates(last, e)) for n, e in estimates.items()},
         "loading": {
@@ -125,7 +137,14 @@ def relaxed_rows(jumped: Jumped, figure: str, frontier: BoolArray | None = None)
             "way": way,
             "overlaps": digits(np.quantile(overlap, SHARES)) if len(overlap) else [],
             **rough(measured(jumped, position)),
+            **(drawn(jumped, position) if figure == "8" else {}),
         }
+
+
+def drawn(jumped: Jumped, position: FloatArray) -> Row:
+    """What Fig. 8 is drawn from: radii and places of all grains from the middle one's first [m]."""
+    radius, middle = jumped.before.radius, jumped.before.position[0]
+    return {"radius": digits(radius), "position": digits(position - middle, 7)}
 
 
 def jumped_as_shown(scene: Scene, position: FloatArray, radius: FloatArray) -> Jumped:
@@ -193,6 +212,9 @@ def rows_measured() -> Iterator[Row]:
     for jump in product(FIRST, WINDOWS, JUMPS):
         if sum(jump) < len(position):
             yield jump_row(position, twin, jump)
+    long, _ = positions_read(LONG_RUN)
+    for jump in product(FIRST_LONG, WINDOWS, JUMPS):
+        yield jump_row(long, long[:1], jump, LONG_RUN)
     yield from relaxed_rows(jumped_cell(scene), "8", frontier=np.arange(9) > 0)
     yield from relaxed_rows(jumped_as_shown(scene, position, radius), "9")
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from adapters.run_folder import write_atomically
+from validation.rigid_ballast_bed import Bed, bed_scene
 from validation.rigid_ballast_judge import (
     WITHIN,
     Limits,
@@ -58,7 +59,6 @@ def page(rows: Sequence[Row]) -> str:
     found = summaries(rows, limits)
     beds = [row for row in rows if row["kind"] == "bed"]
     unused = sum(row["kind"] == "no bed" for row in rows)
-    runs = [row for row in rows if row["kind"] in ("rigid", "soft") and row["ok"]]
     pushes = pushes_of(rows)
     return TEXT.read_text(encoding="utf-8").format(
         beds=len(limits.reference), cycles=len(found[0].curve),
@@ -68,7 +68,8 @@ def page(rows: Sequence[Row]) -> str:
         gain=gains(rows), failures=failures(rows, len(limits.reference)),
         count=len(beds) + unused, planned=BEDS,
         unused="all were used" if not unused else f"{unused} gave no bed",
-        turn=max(abs(row["tilt"]) for row in runs), long=long_words(rows),
+        turn=turn_words(rows), kept=kept_words(rows), unloaded=unloaded_words(rows),
+        long=long_words(rows),
         push_beds=len(pushes[0].errors) if pushes else 0, pushes=push_table(pushes),
         damped=damped_words(rows, PICTURED[0].name), push_words=push_findings(pushes),
         push_duels=push_duels_table(pushes),
@@ -165,6 +166,47 @@ def claim(paper: Summary, soft: Summary) -> str:
         f"{paper.step / soft.step:,.0f} times shorter; costs {ratio_words(soft, paper)} times as "
         "much."
     )
+
+
+def turn_words(rows: Sequence[Row]) -> str:
+    """The most that the sleeper turns, by the number of cycles."""
+    turns: dict[int, list[float]] = {}
+    for row in rows:
+        if row["kind"] in ("rigid", "soft", "long") and row["ok"]:
+            turns.setdefault(row["cycles"], []).append(abs(row["tilt"]))
+    return " and ".join(
+        f"{max(found):.1e} rad at most in {cycles} cycles ({len(found)} runs)"
+        for cycles, found in sorted(turns.items())
+    )
+
+
+def kept_words(rows: Sequence[Row]) -> str:
+    """Rigid runs whose every step has the residual asked for, and the worst step of the others."""
+    runs = [row for row in rows if row["kind"] == "rigid" and row["ok"]]
+    missed = [
+        f"{row['residual'] / row['level']['extra']:.1f} times that ({row['name']}, seed "
+        f"{row['bed']['seed']})"
+        for row in runs
+        if row["residual"] > row["level"]["extra"]
+    ]
+    if not missed:
+        return f"all {len(runs)} runs"
+    return (
+        f"{len(runs) - len(missed)} of {len(runs)} runs; the worst step of the others leaves "
+        f"{', '.join(missed)}"
+    )
+
+
+def unloaded_words(rows: Sequence[Row]) -> str:
+    """Stones of the pictures that no contact force acts on."""
+    words = []
+    for row in (row for row in rows if row["kind"] == "state"):
+        bodies = bed_scene(Bed(**row["bed"])).bodies
+        force, pair = np.array(row["contacts"]["force"]), np.array(row["contacts"]["bodies"])
+        loaded = set(pair[force[:, 0] > 0].ravel().tolist())
+        stones = {n for n, body in enumerate(bodies) if body.movable and body.name != "sleeper"}
+        words.append(f"{len(stones - loaded)} of {len(stones)} ({row['level']['method']} grains)")
+    return ", ".join(words)
 
 
 def gains(rows: Sequence[Row]) -> str:

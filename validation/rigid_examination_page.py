@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from validation.commit_words import commit_words
 from validation.rigid_examination import BAR_S
 from validation.rigid_examination_families import BEYOND, FAMILIES, SAME, family_named
 from validation.rigid_examination_worker import SHARE_LEFT
@@ -64,11 +65,10 @@ def examination_words(rows: Sequence[Row]) -> str:
         return "There is no record of it."
     seeds = ", ".join(str(seed) for seed in sorted({row["seed"] for row in rows}))
     wrong = sum(bool(row["claims"]) and not row["ok"] for row in rows)
-    commits = ", ".join(sorted({f"`{row['commit'][:10]}`" for row in rows}))
     solved = sum(row["ok"] for row in rows)
     loads, machines = [row["load"] for row in rows], sorted({row["machine"] for row in rows})
     words = (
-        f"{len(rows)} problems of seed {seeds} ({commits}), {solved} solved;"
+        f"{len(rows)} problems of seed {seeds}, {solved} solved (by code: {commit_words(rows)});"
         f" answers called solved that are not: {wrong}. Made on {', '.join(machines)} at load"
         f" averages of {min(loads):.1f} to {max(loads):.1f}: above the number of cores, costs are"
         " greater than alone."
@@ -81,6 +81,20 @@ def examination_words(rows: Sequence[Row]) -> str:
             f" {sum(row['ok'] for row in sure)} of {len(sure)} are solved."
         )
     return words + _beside_rival([row for row in rows if "rival_ok" in row])
+
+
+def noise_words(rows: Sequence[Row]) -> str:
+    """Problems whose W holds noise: solved, and what is proved of the others."""
+    mine = [row for row in rows if row["family"] == "W with noise"]
+    left = [row for row in mine if not row["ok"]]
+    if not mine:
+        return ""
+    none = sum(row["status"] == "no solution" for row in left)
+    gives = sum(row.get("gives_energy", False) for row in left)
+    return (
+        f"Of the {len(mine)} of the record {len(mine) - len(left)} are solved; of the others "
+        f"{gives} have the proof that W gives energy and {none} that there is no solution."
+    )
 
 
 def _beside_rival(given: Sequence[Row]) -> str:

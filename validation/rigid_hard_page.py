@@ -24,6 +24,7 @@ from typing import Any
 from adapters.errors import UsageError
 from adapters.provenance import provenance
 from adapters.run_folder import write_atomically
+from validation.commit_words import commit_words
 from validation.rigid_hard_picture import picture_draw
 from validation.rigid_hard_trials import Row
 
@@ -120,7 +121,11 @@ def page(lines: Sequence[Data]) -> str:
     mine = [line for line in lines if not line["peer"]]
     passed = sum(line["ok"] for line in mine)
     parts = [HEAD, f"{passed} of {len(mine)} rows of ours meet their bars.\n"]
-    parts.append(f"Machine: {lines[0]['machine']}; other work ran on it, costs are provisional.\n")
+    parts.append(
+        f"Machine: {lines[0]['machine']}; other work ran on it, costs are provisional.  Rows by "
+        f"code: {commit_words(lines)}.  Changed files: the record does not hold which; after the "
+        "first family the record itself is one, as it is written family by family.\n"
+    )
     parts += [*_engines(lines), *_named(mine), PICTURE]
     parts.append("| case | answer | bar | engine | measured | CPU s | steps |\n|" + "---|" * 7)
     shown = [line for line in lines if not _absent(line)]

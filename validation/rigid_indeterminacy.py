@@ -19,14 +19,21 @@ from numpy.typing import NDArray
 from rigid_lcp.elastic_limit import elastic_limit
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.micro_displacements import micro_displacements
-from validation.rigid_indeterminacy_liggghts import liggghts_rest, liggghts_there
+from validation.rigid_indeterminacy_liggghts import DAMPING, liggghts_rest, liggghts_there
 from validation.rigid_indeterminacy_scenes import beam, groove, pyramid, wedge
 from validation.rigid_indeterminacy_springs import Grains, springs_rest
 
 Floats = NDArray[np.float64]
 
 LIMIT, RELAXATION, SPRINGS, LIGGGHTS = "direct limit", "relaxation", "springs", "LIGGGHTS"
+DAMPED = "springs with dashpots along the normals"
 FROM_SPRINGS = "direct limit begun where the springs rest"
+ORDER_BAR = 1e-10
+"""Relative change of forces that another order, other numbers or another start may make [-]."""
+SLOW, SLOW_QUICK = 30_000, 10_000
+"""Steps of loading where contacts stick, in the full and in the quick form."""
+LOADINGS = (0, SLOW // 10, SLOW, 10 * SLOW)
+"""Steps of loading that are compared there at one stiffness."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +52,10 @@ class Scene:
     def path_matters(self) -> bool:
         """Where there is friction springs keep what slid on the way: load them slowly."""
         return self.friction > 0
+
+    def loads_as_asked(self, ramp: int) -> bool:
+        """Whether errors of runs loaded in ``ramp`` steps are those to compare by stiffness."""
+        return ramp in (SLOW, SLOW_QUICK) if self.path_matters else ramp == 0
 
 
 SCENES = (
@@ -157,6 +168,7 @@ def scene_rows(scene: Scene, quick: bool) -> Iterator[Row]:
         yield row(
             RELAXATION, relaxed.r.reshape(-1, 2), cpu, relaxed.iterations, tolerance=tolerance
         )
+    yield from damped_rows(scene, grains, row) if not quick else ()
     for stiffness, ramp in settings(scene, quick):
         began = process_time()
         rest = springs_rest(
@@ -181,6 +193,20 @@ def scene_rows(scene: Scene, quick: bool) -> Iterator[Row]:
             yield row(LIGGGHTS, force, cpu, steps, stiffness=stiffness, ramp=ramp)
 
 
+def damped_rows(scene: Scene, grains: Grains, row: Callable[..., Row]) -> Iterator[Row]:
+    """Springs whose contacts are damped as LIGGGHTS damps its, by the steps of loading."""
+    if not scene.path_matters or scene.mobilised:
+        return
+    for ramp in LOADINGS:
+        began = process_time()
+        rest = springs_rest(
+            grains, 1e6 * grains.weight, scene.friction, ramp=ramp, tolerance=1e-8,
+            steps_max=40_000 + ramp, damping=2 * DAMPING,
+        )  # fmt: skip
+        cpu = process_time() - began
+        yield row(DAMPED, rest.force, cpu, rest.steps, stiffness=1e6, ramp=ramp)
+
+
 def settings(scene: Scene, quick: bool) -> list[tuple[float, int]]:
     """Stiffness and steps of loading of the springs' runs."""
     stiffness = (1e4, 1e6) if quick else (1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10)
@@ -189,8 +215,10 @@ def settings(scene: Scene, quick: bool) -> list[tuple[float, int]]:
     if scene.mobilised:
         ramps = (0, 3_000, 30_000) if quick else (0, 1_000, 3_000, 10_000, 30_000, 100_000, 300_000)
         return [(1e7, ramp) for ramp in ramps]
-    slow = 10_000 if quick else 30_000
-    return [(1e6, 0), *((k, slow) for k in stiffness)]
+    if quick:
+        return [(1e6, 0), *((k, SLOW_QUICK) for k in stiffness)]
+    others = [(1e6, ramp) for ramp in LOADINGS if ramp != SLOW]
+    return [*others, *((k, SLOW) for k in stiffness)]
 
 
 @dataclass(frozen=True)

@@ -102,13 +102,14 @@ class Rest:
 
 def springs_rest(
     grains: Grains, stiffness: float, friction: float, *, tangential: float = 1.0,
-    ramp: int = 0, tolerance: float = 1e-12, steps_max: int = 400_000,
+    ramp: int = 0, tolerance: float = 1e-12, steps_max: int = 400_000, damping: float = 0.0,
 ) -> Rest:  # fmt: skip
     """The grains under gravity on springs of ``stiffness`` [N/m], until they rest.
 
     ``tangential``: stiffness of the tangential springs over that of the normal ones; ``ramp``:
     steps in which gravity grows from nothing (0: at once).  Stops when no force out of balance is
-    above ``tolerance`` of the weight, or after ``steps_max``.
+    above ``tolerance`` of the weight, or after ``steps_max``.  ``damping``: of dashpots along the
+    normals, in units of ``(k m)^1/2`` with the mean mass m.
     """
     h = STEP * sqrt(
         float(min(grains.mass.min(), (grains.inertia / arms(grains)).min())) / stiffness
@@ -121,8 +122,9 @@ def springs_rest(
     steps, imbalance = springs_advance(
         state, shear, force, grains.mass, grains.inertia, grains.gravity, grains.body_a,
         grains.body_b, grains.place_a, grains.radius_a, grains.place_b, grains.radius_b,
-        grains.face, friction, stiffness, tangential * stiffness, h, drag, ramp,
-        tolerance * grains.weight, steps_max,
+        grains.face, friction, stiffness, tangential * stiffness, h, drag,
+        damping * sqrt(stiffness * float(grains.mass.mean())), ramp, tolerance * grains.weight,
+        steps_max,
     )  # fmt: skip
     state[:n, :2] -= grains.centre
     moved = state[:n, :3].ravel()
@@ -144,7 +146,7 @@ def springs_advance(
     state: Floats, shear: Floats, force: Floats, mass: Floats, inertia: Floats, gravity: Floats,
     body_a: Ints, body_b: Ints, place_a: Floats, radius_a: Floats, place_b: Floats,
     radius_b: Floats, face: Floats, friction: float, kn: float, kt: float, h: float, drag: float,
-    ramp: int, allowed: float, steps_max: int,
+    dashpot: float, ramp: int, allowed: float, steps_max: int,
 ) -> tuple[int, float]:  # fmt: skip
     """Semi-implicit Euler steps of length ``h`` [s] until rest; steps and imbalance [N].
 
@@ -183,7 +185,7 @@ def springs_advance(
             )
             ux = state[a, 3] - state[a, 5] * ray - state[b, 3] + state[b, 5] * rby
             uy = state[a, 4] + state[a, 5] * rax - state[b, 4] - state[b, 5] * rbx
-            push = max(-kn * gap, 0.0)
+            push = max(-kn * gap - dashpot * (ux * nx + uy * ny), 0.0) if gap < 0.0 else 0.0
             shear[c] += h * (uy * nx - ux * ny)
             rub = -kt * shear[c]
             if abs(rub) > friction * push:

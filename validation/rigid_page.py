@@ -17,14 +17,18 @@ from pathlib import Path
 import numpy as np
 
 from validation import rigid_report as report
+from validation.commit_words import commit_words
 from validation.qdem_record import write_atomically
 from validation.rigid_examination import RECORD as EXAMINATION
 from validation.rigid_examination_page import (
     examination_failures,
     examination_table,
     examination_words,
+    noise_words,
 )
+from validation.rigid_page_bars import bars_words
 from validation.rigid_page_studies import (
+    codes_words,
     dantzig_table,
     ladder_table,
     motion_table,
@@ -67,7 +71,8 @@ def page(rows: Sequence[Row]) -> str:
         "most": f"{max(contacts):,}",
         "asked": _asked(races),
         "summary": _summary(races),
-        "commits": ", ".join(sorted({f"`{row['commit'][:10]}`" for row in rows})),
+        "bars": bars_words(rows),
+        "codes": codes_words(rows),
         "tables": _problem_tables(races),
         "failures": _failures(races),
         "frictionless": _frictionless(races),
@@ -78,6 +83,8 @@ def page(rows: Sequence[Row]) -> str:
         "examination": examination_table(examined),
         "examined": examination_words(examined),
         "unsolved": examination_failures(examined),
+        "noise": noise_words(examined),
+        "dearest": _dearest(races),
         "lemke": f"{SICONOS_MOST['2D_LEMKE']:,}",
         "dense": f"{SICONOS_MOST['2D_NSGS']:,}",
         "wide": f"{SICONOS_SPARSE:,}",
@@ -110,8 +117,10 @@ def _summary(rows: Sequence[Row]) -> str:
     reached = [cost for cost in costs if np.isfinite(cost)]
     if not reached:
         return ""
+    made = commit_words([each[0] for each in mine.values()])
     return (
-        f"`solve_friction` with its default settings brought {len(reached)} of {len(mine)} to it, "
+        f"`solve_friction` with its default settings brought {len(reached)} of {len(mine)} to it "
+        f"(problems by code: {made}), "
         f"in {seconds(float(np.median(reached)))} (median), {seconds(max(reached))} at most. "
         + _beside_hybrid(rows)
     )
@@ -128,6 +137,25 @@ def _beside_hybrid(rows: Sequence[Row]) -> str:
         f"Of the {len(values)} problems that {HYBRID} brings to it too, `solve_friction` is slower "
         f"on {int((values > 1).sum())}, by a factor of {values.max():.2g} at most ({worst}); the "
         f"median of the ratios of costs is {np.median(values):.2g}."
+    )
+
+
+def _dearest(rows: Sequence[Row]) -> str:
+    """The unseen packing that costs `solve_friction` most, beside the others."""
+    found = {
+        name: report.of(each, OURS)
+        for name, each in report.problems(rows).items()
+        if each[0]["family"].startswith("other packings")
+    }
+    costs = {name: report.cost_to(mine, mine[0]["bar"]) for name, mine in found.items()}
+    if len(costs) < 2:
+        return ""
+    *_, second, worst = sorted(costs, key=lambda name: costs[name])
+    mine = found[worst]
+    return (
+        f"The dearest of {len(costs)} unseen packings ({worst}, {mine[0]['contacts']:,} contacts) "
+        f"takes {seconds(costs[worst])} to its bar and {seconds(report.cost_to(mine, 1e-6))} to "
+        f"1e-6; the others take {seconds(costs[second])} at most."
     )
 
 
@@ -192,13 +220,11 @@ def _unseen(found: dict[str, list[Row]]) -> list[str]:
 
 
 def _failures(rows: Sequence[Row]) -> str:
-    lines = [
-        f"| method | problems | {' | '.join(report.OUTCOMES)} |",
-        f"|---|---|{'---|' * len(report.OUTCOMES)}",
-    ]
-    for method in report.method_names(rows):
-        counted = report.outcomes(rows, method)
-        cells = " | ".join(str(counted[name] or "") for name in report.OUTCOMES)
+    counts = {method: report.outcomes(rows, method) for method in report.method_names(rows)}
+    ends = [name for name in report.OUTCOMES if any(each[name] for each in counts.values())]
+    lines = [f"| method | problems | {' | '.join(ends)} |", f"|---|---|{'---|' * len(ends)}"]
+    for method, counted in counts.items():
+        cells = " | ".join(str(counted[name] or "") for name in ends)
         lines.append(f"| {method} | {sum(counted.values())} | {cells} |")
     deaths = report.deaths(rows)
     if deaths:

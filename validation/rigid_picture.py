@@ -128,7 +128,7 @@ def _profile(axes: Any, rows: Sequence[Row]) -> None:
 
 def _success(axes: Any, rows: Sequence[Row]) -> None:
     """Share of the orders of contacts that Dantzig's algorithm solved."""
-    for bed, line in zip(report.dantzig_beds(rows), ("o-", "s--"), strict=False):
+    for bed, line in zip(report.dantzig_beds(rows), ("o-", "^:", "s--"), strict=False):
         for method, colour in (("dantzig", "#0b5394"), ("dantzig, reversal", "#cc7a00")):
             found = report.dantzig_success(rows, method, bed)
             shares = [solved / orders for solved, orders in found.values()]

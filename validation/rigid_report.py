@@ -17,7 +17,11 @@ WRONG = 1e-3
 method says it has solved the problem."""
 TIE_S = 1e-3
 """Costs below this are not compared: they are the overhead of calls [s]."""
-OUTCOMES = ("reached", "stopped short", "wrong, though it says solved", "out of time", "died")
+OUTCOMES = (
+    "reached", "stopped short", "wrong, though it says solved", "out of time", "raised an error",
+    "died",
+)  # fmt: skip
+"""Died: the process ended with the run.  Raised an error: it did not, and there is no answer."""
 HYPERSTATIC = tuple(GRAINS.values())
 """How the names of packings begin."""
 
@@ -93,7 +97,9 @@ def outcome(rows: Sequence[Row]) -> str:
     if any(_wrong(row) for row in rows if row["setting"]["tolerance"] == tightest):
         return "wrong, though it says solved"
     if all(row["error"] is None for row in rows):
-        return "out of time" if any("out of time" in row["why"] for row in rows) else "died"
+        if any("out of time" in row["why"] for row in rows):
+            return "out of time"
+        return "died" if deaths(rows) else "raised an error"
     return "stopped short"
 
 
@@ -189,13 +195,22 @@ def dantzig_success(
     return found
 
 
-def dantzig_ends(rows: Iterable[Row]) -> Counter[tuple[str, str]]:
-    """How runs that did not solve ended: method, status."""
+def dantzig_ends(rows: Iterable[Row]) -> Counter[tuple[str, str, str]]:
+    """How runs that did not solve ended: method, status, and what happened."""
     return Counter(
-        (row["method"], row["why"] or "silent")
+        (row["method"], row["why"] or "silent", row["how"])
         for row in rows
         if row["case"] == "rigid-dantzig" and not row["ok"]
     )
+
+
+def dantzig_sliding(rows: Iterable[Row], bed: str) -> dict[float, int]:
+    """Of a packing, by friction: contacts that slide in the default solver's solution."""
+    return {
+        row["setting"]["friction"]: row["sliding"]
+        for row in rows
+        if row["case"] == "rigid-dantzig" and row["bed"] == bed
+    }
 
 
 def trace(rows: Iterable[Row]) -> Row | None:

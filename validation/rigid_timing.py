@@ -41,11 +41,23 @@ def repeated(
     except RigidError as error:
         return PeerRun(setting, None, why=f"{type(error).__name__}: {error.what}")
     except Exception as error:  # a failure is a result: it is recorded, and the race goes on
+        if of_the_limit(error):
+            return PeerRun(setting, None, why="out of time")
         return PeerRun(setting, None, why=f"{type(error).__name__}: {error}"[:200])
     return PeerRun(
         setting, first.force, float(np.median(costs)), tuple(costs), first.work, first.work_unit,
         first.claims, first.why,
     )  # fmt: skip
+
+
+def of_the_limit(error: BaseException | None) -> bool:
+    """Whether `OutOfTime` is at the root of an error: compiled code and libraries that the limit
+    strikes in wrap it in one of theirs."""
+    while error is not None:
+        if isinstance(error, OutOfTime):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def limited(job: Callable[[], PeerRun], seconds: float) -> PeerRun:

@@ -16,10 +16,11 @@ from validation.page_text import table
 from validation.settlement_ensemble import Kind
 from validation.settlement_ensemble_reading import Nested, nested
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import HEALING, Row
+from validation.settlement_rivals import FEWER, HEALING, Row
 from validation.settlement_rivals_continuity import COLUMNS, change_of, continues, like, stays
 from validation.settlement_rivals_reading import (
     FIGURES,
+    cheaper_even,
     cost,
     finished,
     judged,
@@ -27,6 +28,8 @@ from validation.settlement_rivals_reading import (
     reference,
 )
 from validation.settlement_rivals_reference import curves_of_reference, sides_of_reference
+
+EVEN = "gained time at equal cost a step"
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,15 @@ def gained_time(rows: Sequence[Row], method: str, last: int) -> float:
     return 100 * (cost(reference(rows, last)) / cost(mine) - 1) if mine else np.nan
 
 
+def gained_time_even(rows: Sequence[Row], method: str, last: int) -> float:
+    """The same had a time step cost the same in both [%]: no machine and no hour counts.
+
+    nan for fewer grains, whose steps are cheaper by what they leave out.
+    """
+    mine = [] if method == FEWER.name else finished(rows, method, last)
+    return 100 * (cheaper_even(mine, reference(rows, last)) - 1) if mine else np.nan
+
+
 def sides_compared(rows: Sequence[Row], kind: Kind, record: EnsembleRecord) -> list[Row]:
     """Rows whose jumps have beside their own sides those of full runs, over as many cycles, as
     ``others``."""
@@ -192,6 +204,8 @@ BARS = (
     Bar("density profile", "%", 2.0, error_of_profile),
     Bar("elastic deflection", "%", 2.0, error_of("deflection")),
     Bar("gained time", "%", 400.0, gained_time, least=True),
+    Bar(EVEN, "%", 400.0, gained_time_even, least=True),
+    bar_stays("rate stays", COLUMNS[0], 0),
     bar_stays("rate behind healing stays", COLUMNS[0], HEALING),
     bar_continues("rate behind healing goes on", COLUMNS[0], HEALING),
     bar_continues("rate behind the first cycle goes on", COLUMNS[0], 1),
@@ -201,11 +215,14 @@ BARS = (
     ),
 )
 """Either of the first two is enough."""
+BARS_CONTINUITY = tuple(bar for bar in BARS if bar.full)
+"""Of them those on what a bed does behind a jump."""
 BARS_PARTIAL = (
     Bar("bias over the total settlement", "%", 4.0, bias),
     Bar("gained time", "%", 300.0, gained_time, least=True),
+    Bar(EVEN, "%", 300.0, gained_time_even, least=True),
     *(bar for bar in BARS if bar.value is error_of_profile or "coordination number" in bar.words),
-    *(bar for bar in BARS if "rate behind" in bar.words or bar.words.endswith("goes on")),
+    *BARS_CONTINUITY,
 )
 """Under a piston that covers a part: asked of the first two; of the others what is asked of the
 confined bed."""

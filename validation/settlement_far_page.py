@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from adapters.fit_auto import Outlook, outlook
-from adapters.fit_regime import COLLAPSE, RATCHETING
+from adapters.fit_refusal import refusals
 from adapters.laws import law_named
 from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.jump_forecasts import curves_of
 from validation.page_text import page_filled, table
+from validation.settlement_bars import BARS_CONTINUITY, sides_compared, table_bars
 from validation.settlement_ensemble import COARSE, CONFINED, Kind
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_far_jumps import (
@@ -35,7 +36,8 @@ from validation.settlement_far_room import (
     table_parting,
     table_room,
 )
-from validation.settlement_rivals import BLOCK, FIRST_WINDOW
+from validation.settlement_rivals import BLOCK, FIRST_WINDOW, Row
+from validation.settlement_rivals_reading import finished
 from validation.settlement_rivals_runs import record_read
 
 TEMPLATE = Path(__file__).with_suffix(".md")
@@ -74,9 +76,8 @@ class Foretold:
 
     @property
     def trusted(self) -> FloatArray:
-        """1 where the regime is one that a law goes on in, else 0: no band holds there; (r,)."""
-        refused = (RATCHETING, COLLAPSE)
-        return np.array([regime.name not in refused for regime in self.outlook.regime], float)
+        """1 where a prediction is not refused, else 0: no band holds there; (r,)."""
+        return np.array([refusal is None for refusal in refusals(self.outlook)], float)
 
     @property
     def covered(self) -> FloatArray:
@@ -121,18 +122,53 @@ def table_tests(found: Sequence[Foretold]) -> str:
     )  # fmt: skip
 
 
-def table_far(curves: FloatArray) -> str:
-    """Every run of ``curves`` (cycles, r) [m], and their mean, at `FAR` from `COMPUTED`."""
+def outlook_far(record: EnsembleRecord) -> tuple[FloatArray, Outlook]:
+    """Settlement [m] at `COMPUTED` of every coarse run and, last, of their mean, shape (r + 1,),
+    and what is foretold of them at `FAR`."""
+    curves = np.array(curves_of(COARSE, COMPUTED, record)).T
     every = np.column_stack([curves, curves.mean(axis=1)])
     seen = outlook(np.arange(1.0, COMPUTED + 1), every[1 : COMPUTED + 1], FAR)
-    names = [*(str(n) for n in range(1, curves.shape[1] + 1)), "mean of all"]
-    micro = (1e6 * np.array([every[COMPUTED], seen.low, seen.prediction, seen.high])).T
+    return every[COMPUTED], seen
+
+
+def table_far(record: EnsembleRecord) -> str:
+    """Every coarse run, and their mean, at `FAR` from `COMPUTED`."""
+    known, seen = outlook_far(record)
+    names = [*(str(n) for n in range(1, len(known))), "mean of all"]
+    micro = (1e6 * np.array([known, seen.low, seen.prediction, seen.high])).T
     lines = [
-        [name, *(f"{value:,.0f}" for value in row), regime.name]
-        for name, row, regime in zip(names, micro, seen.regime, strict=True)
+        [name, *(f"{value:,.0f}" for value in row), refusal.regime if refusal else regime.name]
+        for name, row, regime, refusal in zip(
+            names, micro, seen.regime, refusals(seen), strict=True
+        )
     ]
     head = ["run", f"at {COMPUTED:,}, µm", "band from, µm", "prediction, µm", "to, µm", "regime"]
     return table(head, lines)
+
+
+def continuity(rows: Sequence[Row], record: EnsembleRecord) -> dict[str, str]:
+    """Whether beds go on behind jumps, a line a way, and the least and greatest share of each kind
+    of figure over the ways; ``rows`` of the study `STUDY`."""
+    compared, last = sides_compared(rows, STUDY.kind, record), STUDY.last
+    names = [one.name for one in STUDY.methods if finished(rows, one.name, last)]
+    shares = {
+        bar.words: [bar.value(compared, name, last) for name in names] for bar in BARS_CONTINUITY
+    }
+    state = shares["coordination goes on"] + shares["stiffness goes on"]
+    stays, rate = shares["rate stays"], shares["rate goes on"]
+    ratios = [
+        (side["last"] - side["first"]) / method.window
+        for method in STUDY.methods
+        for row in finished(rows, method.name, last)
+        for side in row["sides"]
+    ]
+    return {
+        "CONTINUITY": table_bars(compared, names, last, BARS_CONTINUITY),
+        "STATE_GOES_ON": f"{min(state):.0f}",
+        "RATE_STAYS": f"{min(stays):.0f} to {max(stays):.0f}",
+        "RATE_GOES_ON": f"{min(rate):.0f} to {max(rate):.0f}",
+        "LONGEST": f"{max(ratios):.0f}",
+    }
 
 
 def draw(found: Sequence[Foretold], target: Path) -> None:
@@ -170,9 +206,8 @@ def study(record: EnsembleRecord) -> list[Foretold]:
 
 def page(found: Sequence[Foretold], record: EnsembleRecord) -> str:
     """The page of a study."""
-    curves = np.array(curves_of(COARSE, COMPUTED, record)).T
     coarse = np.concatenate([one.covered for one in found if one.kind == COARSE])
-    parts = {"TESTS": table_tests(found), "FAR": table_far(curves), "BLOCK": str(BLOCK)}
+    parts = {"TESTS": table_tests(found), "FAR": table_far(record), "BLOCK": str(BLOCK)}
     parts["COMPUTED_TEXT"] = f"{COMPUTED:,}"
     rows = record_read(STUDY.record)
     parts |= {
@@ -182,6 +217,7 @@ def page(found: Sequence[Foretold], record: EnsembleRecord) -> str:
         "CHANGED": table_changed(rows),
         "BEHIND": table_behind(rows),
         "PARTING": table_parting(record),
+        **continuity(rows, record),
         "K": str(FIRST_WINDOW),
     }
     parts |= {"NOISE": table_noise(record), "FORECASTS": table_forecasts(record)}

@@ -28,9 +28,11 @@ def short_of(rows: Sequence[Row], last: int = STUDY.last) -> str:
     moved = [pair for row in mine for pair in row.get("moved", ())]
     short = sum(got < asked for asked, got in moved)
     tries = sum(len(row["lost"]) for row in mine if row.get("moved"))
+    nothing = sum(asked <= 0.0 for asked, _ in moved)
     return (
-        f"Of {len(moved)} jumps by history whose grains keep their places {short} found no room "
-        f"for the whole move, after {tries} failed tries in all; what lacked was asked of the next."
+        f"Of {len(moved)} jumps by history whose grains keep their places, {nothing} of which were "
+        f"asked for no settlement, {short} found no room for the whole move, after {tries} failed "
+        "tries in all; what lacked was asked of the next."
     )
 
 

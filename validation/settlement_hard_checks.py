@@ -22,6 +22,7 @@ from adapters.scene import Scene
 from adapters.state import FloatArray
 from adapters.window import Window, window_load
 from validation.case import Check
+from validation.settlement_hard_beds import crystal_deflection, crystal_hollows
 
 CLOSEST = float(np.pi / np.sqrt(18))
 """Relative density of the closest packing of equal grains, 0.7405."""
@@ -151,6 +152,49 @@ def stands_still(run: Ended) -> Check:
     return Check("drift of the settlement behind k_i", drift, f"< {bar:.2g}", drift < bar, "m")
 
 
+def does_not_settle(run: Ended) -> Check:
+    """A crystal can not pack closer: half a hundredth of a radius, its seams taken up, is all."""
+    greatest = float(np.abs(run.settlement).max())
+    bar = 0.005 * run.scene.sample.grain_radius.mean
+    return Check("greatest settlement", greatest, f"< {bar:.2g}", greatest < bar, "m")
+
+
+def nothing_invented(run: Ended) -> Check:
+    """The jump itself settles a bed that is at rest by next to nothing."""
+    first = [row["kind"] for row in run.rows].index("jumped")
+    gained = abs(float(run.settlement[first] - run.settlement[first - 1]))
+    bar = 0.001 * run.scene.sample.grain_radius.mean
+    return Check("settlement of the jump alone", gained, f"< {bar:.2g}", gained < bar, "m")
+
+
+def hollows(run: Ended) -> Check:
+    """Every grain of a crystal keeps the four that it stands on, cycle after cycle."""
+    least = min(row["coordination_number"] for row in run.rows) * run.scene.grain_count / 2
+    bar = crystal_hollows()
+    return Check("fewest contacts between grains", least, f">= {bar}", least > bar - 0.5)
+
+
+def crystal_stiff(run: Ended) -> Check:
+    """Elastic deflection of a crystal, mean of the last cycles, beside `crystal_deflection`."""
+    assert run.scene.procedure is not None
+    last = [row["elastic_deflection"] for row in run.rows[-run.scene.procedure.window_cycles :]]
+    ratio = float(np.mean(last)) / crystal_deflection(run.scene)
+    ok = abs(ratio - 1) < 0.15
+    return Check("elastic deflection over the closed form's", ratio, "1 +- 0.15", ok)
+
+
+def very_loose(run: Ended) -> Check:
+    """Looser than rain leaves a bed whose contacts slide (`ordinary`: 0.53)."""
+    value = run.figures["density"]
+    return Check("relative density after the rain", value, "< 0.51", value < 0.51)
+
+
+def compacts(run: Ended) -> Check:
+    """The load packs a loose bed: its density grows by a hundredth and more, jump and all."""
+    value = run.rows[-1]["relative_density"] - run.figures["density"]
+    return Check("relative density gained", value, "> 0.01", value > 0.01)
+
+
 def isostatic(run: Ended) -> Check:
     """A bed at rest without friction has as many contacts as its forces can be determined by."""
     value = run.figures["contacts"]
@@ -178,6 +222,12 @@ NAMED: dict[str, Callable[[Ended], Check]] = {
     "isostatic": isostatic,
     "loose": loose,
     "below crystal": below_crystal,
+    "does not settle": does_not_settle,
+    "nothing invented": nothing_invented,
+    "hollows": hollows,
+    "crystal stiff": crystal_stiff,
+    "very loose": very_loose,
+    "compacts": compacts,
 }
 """Checks that cases name."""
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from adapters.run_folder import write_atomically
 from validation.page_text import page_filled
 from validation.same_packing_page import table
@@ -31,10 +33,15 @@ def outcome(row: Row) -> str:
     return f"{1e6 * settlement[-1]:.1f} µm after {cycle[-1]} cycles"
 
 
+def failing(row: Row) -> list[str]:
+    """Names of the checks of a case that do not hold."""
+    return [check["name"] for check in row["checks"] if not check["ok"]]
+
+
 def verdict(row: Row) -> str:
     """Whether every check of a case holds."""
-    failing = [check["name"] for check in row["checks"] if not check["ok"]]
-    return "right" if not failing else "**not right: " + "; ".join(failing) + "**"
+    names = failing(row)
+    return "right" if not names else "**not right: " + "; ".join(names) + "**"
 
 
 def table_cases(rows: Sequence[Row]) -> str:
@@ -86,6 +93,23 @@ def table_packings(rows: Sequence[Row]) -> str:
     return table(["case", "relative density after the rain", "contacts over grains"], lines)
 
 
+def not_right(rows: Sequence[Row]) -> str:
+    """Cases whose jump loses contacts, beside how these come and go in the cycles computed."""
+    lines = []
+    for row in rows:
+        for check in row["checks"]:
+            if not check["ok"]:
+                cycles = np.diff([0, *row["figures"]["cycle"]])
+                computed = np.array(row["figures"]["coordination"])[cycles == 1]
+                low, high = computed.min(), computed.max()
+                lines.append(
+                    f"* `{row['name']}`: {check['name']} {number(check['value'])}, where"
+                    f" {check['bar']} is asked. At the ends of its cycles the coordination number"
+                    f" is {low:.2f} to {high:.2f}."
+                )
+    return "\n".join(lines)
+
+
 def page(rows: Sequence[Row]) -> str:
     """The page of a record."""
     parts = {
@@ -93,6 +117,7 @@ def page(rows: Sequence[Row]) -> str:
         "REFUSALS": refusals(rows),
         "TABLE_CHECKS": table_checks(rows),
         "TABLE_PACKINGS": table_packings(rows),
+        "NOT_RIGHT": not_right(rows),
         "COMMITS": ", ".join(dict.fromkeys(row["commit"] for row in rows)),
         "MACHINES": "; ".join(dict.fromkeys(row["machine"] for row in rows)),
     }

@@ -2,7 +2,7 @@
 
     python -m validation.settlement_hard_runs --work FOLDER [--only NAME ...] [--fresh]
 
-Each is one call of ``trackbed run``, about ten CPU seconds, and a line of
+Each is one call of ``trackbed run`` (or two), about ten CPU seconds, and a line of
 ``validation/results/settlement-hard-cases.jsonl``; a second call goes on where the record ends.
 """
 
@@ -23,6 +23,7 @@ from adapters.provenance import commit, machine
 from adapters.run_folder import write_atomically
 from scenes import scene_path
 from validation.case import Check
+from validation.settlement_hard_beds import bed_prepare
 from validation.settlement_hard_checks import Ended, checks_of
 from validation.settlement_hard_scenes import CASES, DEMO, HardCase, case_named
 
@@ -41,16 +42,15 @@ def record_read(path: Path = RECORD) -> list[Row]:
 
 def case_run(case: HardCase, folder: Path) -> Row:
     """Run a case as a user does, in an empty ``folder``, and check how it ended."""
-    words = [str(word) for setting in case.overrides for word in ("--set", setting)]
-    command = [sys.executable, str(ROOT / "trackbed.py"), "run", str(scene_path(DEMO))]
     before = children_cpu_s()
-    done = subprocess.run(
-        [*command, "--run-folder", str(folder), *words],
-        capture_output=True,
-        text=True,
-        errors="replace",
-        cwd=ROOT,
-    )
+    if case.bed:
+        bed_prepare(case.bed, scene_path(DEMO), case.overrides, folder)
+    done = called(folder, case.overrides)
+    kept = None
+    if case.then and done.returncode == 0:
+        table = (folder / "settlement.csv").read_bytes()
+        done = called(folder, [*case.overrides, *case.then])
+        kept = (folder / "settlement.csv").read_bytes() == table
     cpu_s = children_cpu_s() - before
     reason = said(done.stderr, folder)
     row: Row = {
@@ -60,7 +60,29 @@ def case_run(case: HardCase, folder: Path) -> Row:
         "cpu_s": round(cpu_s, 1),
     }
     ended = Ended(case.scene(), folder) if done.returncode == 0 else None
-    return row | judged(case, row, ended)
+    row |= judged(case, row, ended)
+    if kept is not None:
+        check = Check("the run before is as it was", float(kept), "= 1", kept)
+        row["checks"].append(told(check))
+    return row
+
+
+def called(folder: Path, overrides: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    """One call of ``trackbed run`` on the demo's scene with ``overrides``."""
+    words = [word for setting in overrides for word in ("--set", setting)]
+    command = [sys.executable, str(ROOT / "trackbed.py"), "run", str(scene_path(DEMO))]
+    return subprocess.run(
+        [*command, "--run-folder", str(folder), *words],
+        capture_output=True,
+        text=True,
+        errors="replace",
+        cwd=ROOT,
+    )
+
+
+def told(check: Check) -> Row:
+    """A check as the record keeps it."""
+    return asdict(check) | {"value": float(f"{check.value:.5g}"), "ok": check.holds}
 
 
 def judged(case: HardCase, row: Row, ended: Ended | None) -> Row:
@@ -76,12 +98,9 @@ def judged(case: HardCase, row: Row, ended: Ended | None) -> Row:
         figures = ended.figures | {
             "settlement": [float(f"{value:.5g}") for value in ended.settlement],
             "cycle": [row["cycle"] for row in ended.rows],
+            "coordination": [round(row["coordination_number"], 4) for row in ended.rows],
         }
-    told = [
-        asdict(check) | {"value": float(f"{check.value:.5g}"), "ok": check.holds}
-        for check in checks
-    ]
-    return {"figures": figures, "checks": told}
+    return {"figures": figures, "checks": [told(check) for check in checks]}
 
 
 def said(errors: str, folder: Path) -> str:

@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from adapters.scene import Scene
+from adapters.scene_checks import JUMP_KEYS, TOLERANCE_KEY
 from adapters.scene_file import scene_load
 from scenes import scene_path
+from validation.settlement_hard_beds import APART, RADIUS, SIDE
 
 DEMO = "karrech-coarse"
 SHORT = (
@@ -40,11 +42,17 @@ class HardCase:
     """Words that the refusal has to have."""
     checks: tuple[str, ...] = ()
     """Checks of `validation.settlement_hard_checks` beside those that every run has to pass."""
+    bed: str = ""
+    """Preparation of `validation.settlement_hard_beds` that the call goes on with."""
+    then: tuple[str, ...] = ()
+    """Keys that change in a second call on the finished run: ``code`` and ``says`` are its."""
 
     @property
     def overrides(self) -> list[str]:
         """All settings of the demo's scene that differ."""
         own = {setting.partition("=")[0] for setting in self.settings}
+        if TOLERANCE_KEY in own:
+            own |= set(JUMP_KEYS)
         shared = [setting for setting in SHORT if setting.partition("=")[0] not in own]
         return [*shared, *self.settings]
 
@@ -67,6 +75,18 @@ def load(amplitude: float, share: float = 1.0) -> tuple[str, ...]:
     )
 
 
+FAR = ("procedure.k_i=20", "procedure.k=4", "procedure.h=400", "procedure.total_cycles=432")
+"""Settings of a jump a hundred times as long as its window."""
+
+
+def crystal_box(count: int, gap: float = 0.0) -> str:
+    """Setting of ``count`` equal grains in the box of the crystal, wider by the share ``gap``."""
+    size = 2 * RADIUS * SIDE * (1 + APART) * (1 + gap)
+    radii = f'{{distribution="constant",mean={RADIUS}}}'
+    box = f'container="box",size_x={size!r},size_y={size!r}'
+    return f"sample={{{box},count={count},grain_radius={radii}}}"
+
+
 CASES = (
     HardCase("ordinary", "none: the demo, softer and shorter", (), checks=("settles",)),
     HardCase(
@@ -78,13 +98,49 @@ CASES = (
     HardCase("friction-1.5", "friction 1.5", friction(1.5), checks=("settles", "loose")),
     HardCase(
         "equal-grains",
-        "equal grains with hardly any friction",
+        "equal grains with hardly any friction, packed at random",
         (
             'sample.grain_radius.distribution="constant"',
             "sample.grain_radius.standard_deviation=0.0",
             *friction(0.02),
         ),
         checks=("below crystal",),
+    ),
+    HardCase(
+        "crystal",
+        "a face-centred cubic crystal, jumps by history",
+        (crystal_box(148), 'procedure.settlement="history"'),
+        checks=(
+            "does not settle",
+            "nothing invented",
+            "stands still",
+            "hollows",
+            "crystal stiff",
+            "below crystal",
+        ),
+        bed="crystal",
+    ),
+    HardCase(
+        "crystal-by-law",
+        "the same, jumps by the law of its last microns' noise",
+        (crystal_box(148),),
+        code=6,
+        says="relaxation 'smallest-move' stopped",
+        bed="crystal",
+    ),
+    HardCase(
+        "near-crystal",
+        "a crystal less three grains, in a box half a percent wider, jumps by history",
+        (crystal_box(145, 0.005), 'procedure.settlement="history"'),
+        checks=("does not settle", "nothing invented", "stands still", "below crystal"),
+        bed="crystal",
+    ),
+    HardCase(
+        "loose-bed",
+        "rained with friction 10, loaded with 0.5",
+        ("sample.relative_density_start=0.15",),
+        checks=("settles", "very loose", "compacts"),
+        bed="loose",
     ),
     HardCase(
         "loose-start",
@@ -100,10 +156,6 @@ CASES = (
             'sample.grain_radius.distribution="uniform"',
             "sample.grain_radius.mean=2.4e-3",
             "sample.grain_radius.standard_deviation=0.9237e-3",
-            "procedure.k_i=2",
-            "procedure.k=3",
-            "procedure.h=5",
-            "procedure.total_cycles=16",
         ),
         checks=("settles",),
     ),
@@ -121,6 +173,27 @@ CASES = (
         "load-100", "a hundred times the load", load(1.415e6), code=3, says="into one another"
     ),
     HardCase(
+        "load-raised",
+        "three times the load on a run that has ended",
+        (),
+        code=3,
+        says="loading.amplitude: 14150.0 in the run, 42450.0 now",
+        then=load(42.45e3),
+    ),
+    HardCase(
+        "ratcheting",
+        "friction 0.1, 5 kPa at 20 Hz on 15 % of the section: the piston breaks in",
+        (
+            *friction(0.1),
+            *load(5e3, 0.15),
+            "loading.frequency=20.0",
+            "procedure.tolerance=0.05",
+            "procedure.total_cycles=300",
+        ),
+        code=6,
+        says="rate at which the piston sinks",
+    ),
+    HardCase(
         "collapse",
         "20 times the load on 15 % of the section: the piston breaks in",
         load(300e3, 0.15),
@@ -131,9 +204,15 @@ CASES = (
     HardCase(
         "far-jump",
         "h/k = 100: 400 cycles from 4",
-        ("procedure.k_i=20", "procedure.k=4", "procedure.h=400", "procedure.total_cycles=432"),
+        FAR,
         code=6,
         says="the law lifts the bed",
+    ),
+    HardCase(
+        "far-jump-by-history",
+        "the same, settled by the history of all 24 cycles",
+        (*FAR, 'procedure.settlement="history"'),
+        checks=("settles",),
     ),
 )
 """All cases; those without words of a refusal have to end."""

@@ -114,6 +114,8 @@ class Method:
     """Cycles fitted before each jump."""
     growing: bool = False
     """Whether jumps have the same ratio of cycles, not their number."""
+    healing: int = HEALING
+    """Cycles computed behind each jump and not fitted."""
 
     def kind(self, last: int) -> Kind:
         """The ensemble's scene as this method changes it, to cycle ``last``."""
@@ -122,22 +124,26 @@ class Method:
         if not any(key.startswith("procedure.tolerance") for key in self.settings):
             h: int | list[int] = 0
             if self.growing:
-                h = jump_lengths(self.jumps, last, self.base.k_i, k, HEALING)
+                h = jump_lengths(self.jumps, last, self.base.k_i, k, self.healing)
             elif self.jumps:
-                h = jump_length(self.jumps, last, self.base.k_i, k)
+                h = jump_length(self.jumps, last, self.base.k_i, k, self.healing)
             keys += [f"procedure.k={k}", f"procedure.h={h}"]
+        if self.healing != HEALING:
+            keys.append(f"procedure.healing_cycles={self.healing}")
         return replace(self.base, settings=tuple(keys))
 
 
-def jump_length(jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDOW) -> int:
+def jump_length(
+    jumps: int, last: int, k_i: int = K_I, window: int = FIRST_WINDOW, healing: int = HEALING
+) -> int:
     """Cycles h of each of equal ``jumps``: from k_i a window, then h, healing and a window each.
 
     ValueError where they do not end at cycle ``last``.
     """
     block, rest = divmod(last - k_i - window, jumps)
-    if rest or block <= HEALING + window:
+    if rest or block <= healing + window:
         raise ValueError(f"{jumps} equal jumps from windows of {window} miss cycle {last}")
-    return block - HEALING - window
+    return block - healing - window
 
 
 JUMPING = Variant()
@@ -173,10 +179,22 @@ def seated(method: Method) -> Method:
     return replace(method, name=f"{method.name}, seated", settings=keys)
 
 
+def shortly(method: Method, cycles: int = 4) -> Method:
+    """The same where runs wait, so many ``cycles`` that the bed carries its piston in place of k_i:
+    of the first k_i = 20 four are left out of forecasts by history, too."""
+    keys = (*method.settings, f"procedure.seating_cycles={cycles}")
+    return replace(method, name=f"{method.name} for {cycles}", settings=keys)
+
+
 def rearranging(method: Method) -> Method:
     """The same, its grains changing places where a jump finds no room."""
     keys = (*method.settings, 'procedure.jammed="rearranged"')
     return replace(method, name=f"{method.name}, rearranged", settings=keys)
+
+
+def healing(method: Method, cycles: int) -> Method:
+    """The same with another number of cycles behind each jump that are not fitted."""
+    return replace(method, name=f"{method.name}, {cycles} healing", healing=cycles)
 
 
 def softer(factor: int, base: Kind = COARSE) -> Method:
@@ -195,9 +213,9 @@ def faster(factor: int) -> Method:
     return Method(f"{factor * 50} Hz", "frequency", (f"loading.frequency={factor * 50.0}",))
 
 
-def heavier(factor: int) -> Method:
+def heavier(factor: int, base: Kind = COARSE) -> Method:
     """Density scaling, the piston with the grains; `Changed` keeps the weights."""
-    scene = COARSE.scene(1)
+    scene = base.scene(1)
     assert scene.loading is not None
     keys = (
         f"material.grain.density={factor * scene.material.grain.density!r}",
@@ -216,16 +234,22 @@ METHODS = (
     remembering(2, "profile"), remembering(5, "profile"),
 )  # fmt: skip
 """On the coarse bed, in the order in which they are run."""
+HEALINGS = (0, 2, 10)
+"""Beside `HEALING`."""
+HEALED = tuple(
+    healing(method, cycles) for cycles in HEALINGS for method in (remembering(5), jumping(5)[0])
+)
+"""Five jumps with other numbers of healing cycles; `METHODS` has the same with `HEALING`."""
 METHODS_OF: dict[str, tuple[Method, ...]] = {
     COARSE.name: METHODS,
     CONFINED.name: tuple(
         replace(method, base=CONFINED)
         for method in (
-            *jumping(2), longer(0.4), *jumping(5), remembering(2), remembering(2, "profile"),
-            remembering(5), longer(0.6),
+            *jumping(2), longer(0.4), remembering(2, "profile"), softer(10, CONFINED),
+            softer(100, CONFINED), faster(2), heavier(10, CONFINED),
             Method("tolerance 0.02", "tolerance", ("procedure.tolerance=0.02",), JUMPING),
-            softer(10, CONFINED),
             replace(growing(remembering(5, "profile")), window=10),
+            replace(growing(jumping(5)[1]), window=10),
             replace(growing(remembering(3, "profile")), window=18),
         )
     ),

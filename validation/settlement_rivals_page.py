@@ -5,7 +5,7 @@ The page is ``settlement_rivals_page.md`` beside this file with tables and numbe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,26 +23,29 @@ from validation.settlement_ensemble import COARSE, CONFINED
 from validation.settlement_ensemble_page import short
 from validation.settlement_ensemble_reading import nested, student
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import K_I, METHODS, Row
-from validation.settlement_rivals_budget import AFTER, EVERY, PARTS, PLACE, TWIN
+from validation.settlement_rivals import HEALED, K_I, METHODS, Row
+from validation.settlement_rivals_budget import JUMPS, PARTS, PLACE, TWIN
+from validation.settlement_rivals_budget_tables import (
+    pm,
+    refused,
+    scatter,
+    table_budget,
+    table_jumps,
+)
+from validation.settlement_rivals_healing import by_healing, table_healing, table_transient
 from validation.settlement_rivals_picture import draw, shown
 from validation.settlement_rivals_reading import (
     FIGURES,
     beside,
     chaos,
     cost,
-    effect,
     finished,
     judged,
-    law_alone,
     of_place,
-    over_same,
     profile_chaos,
     profile_error,
     reference,
-    rms,
     rows_of,
-    settled,
 )
 from validation.settlement_rivals_reference import LAWS, law_name
 from validation.settlement_rivals_runs import MEMBERS, SEEDS, record_read
@@ -52,21 +55,10 @@ from validation.student import interval
 TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "settlement-rivals.md"
 PAPER_PICTURE = PAGE.with_name("settlement-rivals-paper.png")
-PAPER_TICKS = (100, 200, 500, 1000, 2000)
-"""Of CPU time at paper scale [s]."""
 STEPS = COARSE.scene(1).steps_per_cycle
+RUN = ("rivals", "healing", "budget")
+"""Parts of the record whose cost is not the ensemble's."""
 SCHEDULES = tuple(m.jumps for m in METHODS if m.family == "procedure")
-
-
-def pm(values: FloatArray, factor: float, digits: int, unit: str = "", bold: bool = False) -> str:
-    """Mean and half of Student's interval over packings; bold where it leaves out zero."""
-    if not len(values):
-        return "-"
-    mean, half = interval(values * factor)
-    if half != half:
-        return f"{mean:+.{digits}f}{unit}"
-    text = f"{mean:+.{digits}f} ± {half:.{digits}f}{unit}"
-    return f"**{text}**" if bold and abs(mean) > half else text
 
 
 def table_methods(rows: Sequence[Row], last: int) -> str:
@@ -121,7 +113,8 @@ def table_refused(rows: Sequence[Row], last: int) -> str:
 def missing(rows: Sequence[Row], last: int) -> str:
     """In words, which runs the record lacks: methods by packings, parts of the budget by places."""
     plans = [(method.name, "rivals", last, len(SEEDS)) for method in METHODS]
-    plans += [(part.name, "budget", PLACE, len(SEEDS) * len(MEMBERS)) for part in PARTS]
+    plans += [(method.name, "healing", last, len(SEEDS)) for method in HEALED]
+    plans += [(part.name, "budget", PLACE, len(SEEDS) * len(MEMBERS)) for part in (*PARTS, *JUMPS)]
     lacking = [
         f"{name} ({made} of {planned})"
         for name, part, end, planned in plans
@@ -206,48 +199,12 @@ def jumps_lost(rows: Sequence[Row], last: int, family: str = "procedure") -> str
     )
 
 
-BUDGET: tuple[tuple[str, Callable[[Row], float], float, int], ...] = (
-    ("settlement of the first cycle, µm", lambda row: row["settlement"][0], 1e6, 1),
-    ("settlement after 20 cycles, µm", settled, 1e6, 1),
-    ("coordination number", lambda row: row["state"]["coordination_number"], 1, 3),
-    ("force error, first cycle, %", lambda row: row["first"]["force_error"], 100, 2),
-    ("force error, %", lambda row: row["state"]["force_error"], 100, 2),
-    ("elastic deflection, µm", lambda row: row["state"]["elastic_deflection"], 1e6, 1),
-)
-"""Columns of the budget: words, value of a row, factor, decimals."""
+def paper_scale(last: int, rows: Sequence[Row]) -> dict[str, str]:
+    """What the record at paper scale has so far: bars, runs of each method, the reference.
 
-
-def table_budget(rows: Sequence[Row]) -> str:
-    """A line for each part of a jump: its effect beside the run of every cycle."""
-    lines = []
-    for part in PARTS[1:]:
-        if rows_of(rows, "budget", part.name):
-            cells = [
-                "-" if part.jump and "first" in words else pm(found, factor, digits, bold=True)
-                for words, value, factor, digits in BUDGET
-                for found in [effect(rows, part.name, value)]
-            ]
-            lines.append([part.name, *cells])
-    alone = pm(law_alone(rows), 1e6, 1, bold=True)
-    lines.append(["the law alone (log), no bed", "-", alone, *["-"] * (len(BUDGET) - 2)])
-    return table(["what is done", *(words for words, *_ in BUDGET)], lines)
-
-
-def scatter(rows: Sequence[Row]) -> dict[str, str]:
-    """What a place settles in 20 cycles without a jump, and how far twins part [µm]: rms."""
-    every, twin = of_place(rows, EVERY), of_place(rows, TWIN)
-    gains = [settled(over_same(row, AFTER)) for row in every.values()]
-    apart = [settled(row) - settled(over_same(every[place], AFTER)) for place, row in twin.items()]
-    return {
-        "GAIN": f"{1e6 * float(np.mean(gains)):.0f}" if gains else "-",
-        "APART": f"{1e6 * rms(np.array(apart)):.0f}" if apart else "-",
-    }
-
-
-def paper_scale(last: int) -> dict[str, str]:
-    """What the record at paper scale has so far: bars, runs of each method, the reference."""
+    ``rows``: its lines, with the sides of full runs beside those of jumps.
+    """
     study = STUDIES["confined"]
-    rows = record_read(study.record)
     names = [method.name for method in study.methods]
     made = [
         f"{method.name} ({len(rows_of(rows, 'rivals', method.name, last))} of "
@@ -257,7 +214,7 @@ def paper_scale(last: int) -> dict[str, str]:
     methods = [*names, *(law_name(law, cycles) for law, cycles in LAWS)]
     truth = settlement_of(rows, last)
     return {
-        "PAPER_BARS": table_bars(sides_compared(rows, CONFINED, EnsembleRecord()), methods, last),
+        "PAPER_BARS": table_bars(rows, methods, last),
         "PAPER_WAY": table_on_the_way(rows, "2 jumps, by history, profile", last),
         "PAPER_RUNS": "; ".join(made),
         "PAPER_MEAN": f"{1e6 * truth.mean:.0f}",
@@ -287,6 +244,7 @@ def page(rows: Sequence[Row], last: int = STUDIES["coarse"].last) -> str:
     """The page of a record."""
     truth = reference(rows, last)
     compared = sides_compared(rows, COARSE, EnsembleRecord())
+    paper = sides_compared(record_read(STUDIES["confined"].record), CONFINED, EnsembleRecord())
     figure = FIGURES["settlement"]
     values = {
         seed: np.array([figure.value(row) for row in truth if row["seed"] == seed])
@@ -303,7 +261,7 @@ def page(rows: Sequence[Row], last: int = STUDIES["coarse"].last) -> str:
         "GIVEN": f"{1e6 * found.half_given:.0f}",
         "CHAOS": f"{100 * chaos(rows, last, 'settlement'):.0f}",
         "METHODS": table_methods(rows, last),
-        **paper_scale(last),
+        **paper_scale(last, paper),
         "BARS": table_bars(compared, [method.name for method in METHODS], last),
         "MISSING": missing(rows, last),
         "REFUSED": table_refused(rows, last),
@@ -313,7 +271,17 @@ def page(rows: Sequence[Row], last: int = STUDIES["coarse"].last) -> str:
         "LOST_HISTORY": jumps_lost(rows, last, "history"),
         "VERDICT": verdict(rows, last),
         "BUDGET": table_budget(rows),
-        "MINUTES": f"{sum(r['cpu_s'] for r in rows if r['part'] in ('rivals', 'budget')) / 60:.0f}",
+        "JUMPS": table_jumps(rows),
+        "GIVEN_UP": refused(rows),
+        "HEALING": table_healing(rows, last),
+        "TRANSIENT": table_transient(
+            [
+                ("coarse", compared, [*(one.name for one in by_healing()), "10 jumps, by history"]),
+                ("paper's", paper, ["5 growing jumps, by history, profile"]),
+            ],
+            last,
+        ),
+        "MINUTES": f"{sum(row.get('cpu_s', 0.0) for row in rows if row['part'] in RUN) / 60:.0f}",
         **scatter(rows),
         "ORIGIN": f"{rows[0]['machine']}; {engines}; commits {commits}.",
     }
@@ -324,9 +292,8 @@ def main() -> None:
     """Write page and picture."""
     rows = record_read()
     write_atomically(PAGE, page(rows))
-    draw(rows, STUDIES["coarse"].last, PAGE.with_suffix(".png"))
-    paper = STUDIES["confined"]
-    draw(record_read(paper.record), paper.last, PAPER_PICTURE, paper.methods, PAPER_TICKS)
+    draw("coarse", PAGE.with_suffix(".png"))
+    draw("confined", PAPER_PICTURE)
 
 
 if __name__ == "__main__":

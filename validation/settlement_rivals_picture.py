@@ -1,4 +1,4 @@
-"""The picture of docs/settlement-rivals.md: error against cost in four figures of the bed."""
+"""Work against precision, a picture a study: error against cost in four figures of the bed."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from validation.settlement_rivals_reading import (
     reference,
 )
 from validation.settlement_rivals_reference import LAWS, law_name
+from validation.settlement_rivals_runs import record_read
+from validation.settlement_rivals_studies import STUDIES
 
 COLOURS = {
     "procedure": "#0072B2", "nothing moved": "#E69F00", "law": "#56B4E9", "tolerance": "#0072B2",
@@ -26,8 +28,11 @@ COLOURS = {
     "history, profile": "#CC6677",
 }  # fmt: skip
 """One a family."""
-TICKS = (2, 5, 10, 20, 50, 100)
-"""Of CPU time [s]."""
+TICKS = {
+    "coarse": (2, 5, 10, 20, 50, 100), "confined": (100, 200, 500, 1000, 2000),
+    "far": (5, 20, 50, 100, 200, 500, 1000), "partial": (200, 500, 1000, 2000),
+}  # fmt: skip
+"""Of CPU time [s], by the name of the study."""
 LINEAR = 50
 """Error up to which its scale is linear [%]."""
 INTERVAL_FROM = 3
@@ -35,44 +40,43 @@ INTERVAL_FROM = 3
 PANELS = ("settlement", "coordination", "deflection")
 
 
-def draw(
-    rows: Sequence[Row], last: int, target: Path, methods: Sequence[Method] = METHODS,
-    ticks: Sequence[int] = TICKS,
-) -> None:  # fmt: skip
-    """Errors in per cent of the reference's mean; the band is what one full run a packing has.
+def draw(name: str, target: Path) -> None:
+    """Errors of a study's methods, numbered in its order, in per cent of the reference's mean.
 
-    ``methods``: all of the study, numbered in this order; ``ticks`` of CPU time [s].
+    The band is what one full run a packing has.  Raises KeyError for a ``name`` of no study.
     """
     import matplotlib
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    study = STUDIES[name]
+    rows, last, methods = record_read(study.record), study.last, study.methods
     figure, axes = plt.subplots(2, 2, figsize=(13, 8), layout="constrained")
     for axis, key in zip(axes.flat, PANELS, strict=False):
         band = 100 * chaos(rows, last, key)
         axis.axhspan(-band, band, color="0.88")
         axis.axhline(0, color="0.5", lw=0.8)
-        for number, (name, family) in enumerate(shown(methods), 1):
-            found = judged(rows, name, last, key)
+        for number, (way, family) in enumerate(shown(methods), 1):
+            found = judged(rows, way, last, key)
             if found is not None:
                 half = 100 * found.half if len(found.error) >= INTERVAL_FROM else 0.0
-                point(axis, rows, f"{number}  {name}", family, last, (100 * found.mean, half))
+                point(axis, rows, f"{number}  {way}", family, last, (100 * found.mean, half))
         axis.set_ylabel(f"error of the {FIGURES[key].words} [%]")
         if max(map(abs, axis.get_ylim())) > LINEAR:
             axis.set_yscale("symlog", linthresh=LINEAR)
     axis = axes.flat[3]
     axis.axhline(100 * profile_chaos(rows, last), color="0.5", ls="--", lw=0.8)
-    for number, (name, family) in enumerate(shown(methods), 1):
-        errors = profile_error(rows, name, last)
+    for number, (way, family) in enumerate(shown(methods), 1):
+        errors = profile_error(rows, way, last)
         if len(errors):
             at = 100 * float(errors.mean()), 0.0
-            point(axis, rows, f"{number}  {name}", family, last, at)
+            point(axis, rows, f"{number}  {way}", family, last, at)
     axis.set_ylabel("error of the density profile, rms over layers [%]")
     for axis in axes.flat:
         axis.axvline(cost(reference(rows, last)), color="0.5", lw=0.8, ls=":")
         axis.set(xscale="log", xlabel=f"CPU s to cycle {last} (dotted: every cycle)")
-        axis.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
+        axis.set_xticks(TICKS[name], [f"{tick:,}" for tick in TICKS[name]])
         axis.minorticks_off()
     legend(figure, axes)
     figure.savefig(target, dpi=80)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from adapters.laws import law_named
 from adapters.state import FloatArray
 from validation.settlement_ensemble_reading import nested, student
 from validation.settlement_rivals import FEWER, GRAINS, Row
-from validation.settlement_rivals_budget import EVERY, JUMPED
+from validation.settlement_rivals_budget import AFTER, EVERY, JUMPED
 from validation.student import interval
 
 HALF = 10
@@ -76,8 +76,10 @@ def rows_of(rows: Sequence[Row], part: str, method: str, last: int | None = None
 
 
 def finished(rows: Sequence[Row], method: str, last: int) -> list[Row]:
-    """Rows of a method that came to ``last``, of rivals and of laws."""
-    found = rows_of(rows, "rivals", method, last) + rows_of(rows, "law", method, last)
+    """Rows of a method that came to ``last``, of rivals, of laws and of the study of healing."""
+    found = [
+        row for part in ("rivals", "law", "healing") for row in rows_of(rows, part, method, last)
+    ]
     return [row for row in found if str(last) in row.get("settlement", {})]
 
 
@@ -109,8 +111,8 @@ def judged(rows: Sequence[Row], method: str, last: int, key: str) -> Judged | No
 def chaos(rows: Sequence[Row], last: int, key: str) -> float:
     """Half of the 95 % interval of the mean error that one full run a packing would have.
 
-    With s the scatter within packings of m members, over P packings and the reference's mean:
-    t s sqrt((1 + 1/m) / P).
+    With s the scatter within packings of n_p members, over P packings and the reference's mean:
+    t s sqrt(mean(1 + 1/n_p) / P).
     """
     figure, runs = FIGURES[key], reference(rows, last)
     seeds = sorted({row["seed"] for row in runs})
@@ -118,8 +120,8 @@ def chaos(rows: Sequence[Row], last: int, key: str) -> float:
         seed: np.array([figure.value(row) for row in runs if row["seed"] == seed]) for seed in seeds
     }
     found = nested(values)
-    members = found.members / found.packings
-    spread = found.within * np.sqrt((1 + 1 / members) / found.packings)
+    members = np.array([len(each) for each in values.values()])
+    spread = found.within * np.sqrt(np.mean(1 + 1 / members) / found.packings)
     return float(student(found.members - found.packings) * spread / found.mean)
 
 
@@ -134,14 +136,17 @@ def profile_error(rows: Sequence[Row], method: str, last: int) -> FloatArray:
 
 
 def profile_chaos(rows: Sequence[Row], last: int) -> float:
-    """The same that one full run a packing would have against the mean of two, mean of packings.
+    """The same that one full run a packing would have against the mean of two, mean of the packings
+    that have two.
 
     A member less another has the variance 2 s^2; less the mean of two others 3/2 s^2.
     """
     found = []
     for seed in seeds_of(rows, last):
-        one, other = (np.array(r["profile"]) for r in reference(rows, last) if r["seed"] == seed)
-        found.append(np.sqrt(3 / 4) * rms(one - other) / (one + other).mean() * 2)
+        runs = [np.array(r["profile"]) for r in reference(rows, last) if r["seed"] == seed]
+        if len(runs) == 2:
+            one, other = runs
+            found.append(np.sqrt(3 / 4) * rms(one - other) / (one + other).mean() * 2)
     return float(np.mean(found))
 
 
@@ -163,6 +168,20 @@ def rms(values: FloatArray) -> float:
 def cost(rows: Sequence[Row]) -> float:
     """CPU time behind k_i [s], mean over packings."""
     return float(np.mean([row["cpu_s"] for row in rows]))
+
+
+def cheaper_even(rows: Sequence[Row], truth: Sequence[Row]) -> float:
+    """Cost of the reference over that of ``rows``, had a time step cost the same in both [-].
+
+    The machine differs between sessions, and a run beside two others is slower: so every step of
+    ``truth`` is taken at what the engine spent on one in ``rows``.  Starts, relaxations and failed
+    tries count on their side alone.  A law's cycles are some of the reference's.
+    """
+    cycle = truth[0]["steps_per_cycle"]
+    full = float(np.mean([row["computed"] for row in truth])) * cycle
+    steps = [row["computed"] * row.get("steps_per_cycle", cycle) for row in rows]
+    a_step = sum(row["cost"]["engine"] for row in rows) / sum(steps)
+    return full * a_step / cost(rows)
 
 
 # --- the null hypothesis ---------------------------------------------------------------------
@@ -210,19 +229,42 @@ def settled(row: Row) -> float:
 
 
 def of_place(rows: Sequence[Row], part: str) -> dict[tuple[int, int], Row]:
-    """Rows of a part by packing and member."""
-    return {(row["seed"], row["member"]): row for row in rows_of(rows, "budget", part)}
+    """Rows of a part by packing and member, without those that have nothing behind the place."""
+    found = [row for row in rows_of(rows, "budget", part) if "settlement" in row]
+    return {(row["seed"], row["member"]): row for row in found}
 
 
-def effect(rows: Sequence[Row], part: str, value: Callable[[Row], float]) -> FloatArray:
-    """A part less the run of every cycle, mean over the members of each packing."""
-    every, mine = of_place(rows, EVERY), of_place(rows, part)
-    found: dict[int, list[float]] = {}
+def effect(
+    rows: Sequence[Row], part: str, value: Callable[[Row], float], beside: str = EVERY
+) -> FloatArray:
+    """A part less the run of every cycle, or less another part, mean over the members of each
+    packing."""
+    every, mine = of_place(rows, beside), of_place(rows, part)
+    found = []
     for place in sorted(every.keys() & mine.keys()):
         base = every[place]
         same = over_same(base, mine[place]["cycles"][1] - base["cycles"][0])
-        found.setdefault(place[0], []).append(value(mine[place]) - value(same))
-    return np.array([np.mean(values) for values in found.values()])
+        found.append((place[0], value(mine[place]) - value(same)))
+    return mean_by_packing(found)
+
+
+def mean_by_packing(values: Iterable[tuple[int, float]]) -> FloatArray:
+    """Mean of the values of each packing, by its seed, in the order in which packings come."""
+    found: dict[int, list[float]] = {}
+    for seed, value in values:
+        found.setdefault(seed, []).append(value)
+    return np.array([np.mean(each) for each in found.values()])
+
+
+def between_packings(rows: Sequence[Row], value: Callable[[Row], float]) -> FloatArray:
+    """Differences of all pairs of packings, (P (P - 1) / 2,), in the `AFTER` cycles behind the same
+    place of the run of every cycle; of each packing the mean over its members."""
+    places = of_place(rows, EVERY)
+    means = mean_by_packing(
+        (seed, value(over_same(places[seed, member], AFTER))) for seed, member in sorted(places)
+    )
+    first, second = np.triu_indices(len(means), 1)
+    return means[first] - means[second]
 
 
 def over_same(row: Row, cycles: int) -> Row:
@@ -236,7 +278,7 @@ def law_alone(rows: Sequence[Row], law: str = "log") -> FloatArray:
     Both between means of `HALF` cycles, of each packing the mean over its members.
     """
     chosen = law_named(law)
-    found: dict[int, list[float]] = {}
+    found = []
     for (seed, _), row in of_place(rows, EVERY).items():
         path, start = np.array(row["window"]), row["cycles"][0]
         cycle = np.arange(start - len(path) + 1.0, start + 1)
@@ -244,5 +286,5 @@ def law_alone(rows: Sequence[Row], law: str = "log") -> FloatArray:
         before, after = (
             float(np.mean(chosen.value(parameters, cycle[-HALF:] + ahead))) for ahead in (0, JUMPED)
         )
-        found.setdefault(seed, []).append(after - before - settled(over_same(row, JUMPED)))
-    return np.array([np.mean(values) for values in found.values()])
+        found.append((seed, after - before - settled(over_same(row, JUMPED))))
+    return mean_by_packing(found)

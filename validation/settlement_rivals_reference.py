@@ -79,6 +79,7 @@ def reference_row(piece: Piece, last: int, record: EnsembleRecord) -> Row:
     radius, position = record.states(piece.name)
     layers = profile(piece.kind.scene(piece.seed), kept.density_height, position[last], radius)
     row: Row = {"computed": last - k_i, "cost": {"engine": cpu_s}, "cpu_s": cpu_s}
+    row["steps_per_cycle"] = piece.kind.scene(piece.seed).steps_per_cycle
     row["begun"] = mean_of(found, k_i, "settlement")
     return row | figures_of(found, k_i) | {"profile": layers, "engine": kept.engine}
 

@@ -1,14 +1,14 @@
 """Run the rivals of the settlement procedure on the coarse bed, and its error budget.
 
     python -m validation.settlement_rivals_runs --work FOLDER [--minutes M] [--last N]
-        [--study coarse|confined|far|partial] [--only rivals|budget|reference] [--methods NAME ...]
-        [--packings N ...]
+        [--study coarse|confined|far|partial] [--only rivals|healing|budget|reference]
+        [--methods NAME ...] [--packings N ...]
     python -m validation.settlement_rivals_page      docs/settlement-rivals.md and its picture
 
 Writes a line to the record of the study (`validation.settlement_rivals_studies`) as each run ends
-and goes on where that ends; after M minutes it begins no further run.  The budget is that of the
-coarse bed.  ``reference`` reads the ensemble, from another folder by ``--ensemble``, and needs no
-engine.  FOLDER may be thrown away.
+and goes on where that ends; after M minutes it begins no further run.  ``healing`` and ``budget``
+are those of the coarse bed.  ``reference`` reads the ensemble, from another folder by
+``--ensemble``, and needs no engine.  FOLDER may be thrown away.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import json
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -31,12 +32,12 @@ from validation.move_study import rounded
 from validation.settlement_ensemble import COARSE, Kind, Piece
 from validation.settlement_ensemble_record import RECORD as ENSEMBLE
 from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_rivals import Method, Row, method_run
-from validation.settlement_rivals_budget import EVERY, PARTS, PLACE, part_run
+from validation.settlement_rivals import HEALED, Method, Row, method_run
+from validation.settlement_rivals_budget import EVERY, JUMPS, PARTS, PLACE, part_run
 from validation.settlement_rivals_reference import LAWS, law_name, law_row, reference_row
 from validation.settlement_rivals_studies import STUDIES, Study
 
-PARTS_OF_STUDY = ("reference", "rivals", "budget")
+PARTS_OF_STUDY = ("reference", "rivals", "healing", "budget")
 MEMBERS = range(COARSE.members)
 SEEDS = range(1, COARSE.packings + 1)
 
@@ -67,20 +68,26 @@ def rival_row(
     return row
 
 
-def plan_rivals(work: Path, study: Study, record: EnsembleRecord, last: int) -> Iterator[Planned]:
+def plan_rivals(
+    work: Path, study: Study, record: EnsembleRecord, last: int, part: str = "rivals"
+) -> Iterator[Planned]:
     """Every method on every packing, the first run of all before any second."""
-    most, seeds = max(map(study.runs_of, study.methods)), range(1, study.kind.packings + 1)
+    most, seeds = (
+        max(map(study.runs_of, study.methods), default=0),
+        range(1, study.kind.packings + 1),
+    )
     for member, method, seed in product(range(most), study.methods, seeds):
         if member < study.runs_of(method):
-            head = {"part": "rivals", "method": method.name, "seed": seed, "member": member}
+            head = {"part": part, "method": method.name, "seed": seed, "member": member}
             folder = work / f"{method.name.replace(' ', '-').replace('/', '-')}-{seed}-{member}"
             filled = partial(rival_row, method, seed, member, last, record, folder)
             yield head | {"last": last}, filled
 
 
 def plan_budget(work: Path, record: EnsembleRecord) -> Iterator[Planned]:
-    """Every part of a jump at every place, the first place of all packings before any second."""
-    for member, part, seed in product(MEMBERS, PARTS, SEEDS):
+    """Every part of a jump and every jump at every place, the first place of all packings before
+    any second."""
+    for member, part, seed in product(MEMBERS, (*PARTS, *JUMPS), SEEDS):
         head = {"part": "budget", "method": part.name, "seed": seed, "member": member}
         filled = partial(part_run, part, seed, member, record, work / "budget")
         yield head | {"last": PLACE}, filled
@@ -147,10 +154,13 @@ def main(words: Sequence[str] | None = None) -> None:
     record, study = EnsembleRecord(given.ensemble), STUDIES[given.study]
     path, last = given.record or study.record, given.last or study.last
     with interruptible(), RunFolder(given.work).locked():
+        coarse = given.study == COARSE.name
+        healed = replace(study, methods=HEALED if coarse else ())
         plans = {
             "reference": plan_reference(study.kind, record, last),
             "rivals": plan_rivals(given.work, study, record, last),
-            "budget": plan_budget(given.work, record) if given.study == COARSE.name else iter(()),
+            "healing": plan_rivals(given.work, healed, record, last, "healing"),
+            "budget": plan_budget(given.work, record) if coarse else iter(()),
         }
         for part in given.only:
             go_on(chosen(plans[part], given.methods, given.packings), path, given.minutes)

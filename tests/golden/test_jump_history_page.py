@@ -10,6 +10,8 @@ import pytest
 from adapters.jump_schedule import jump_lengths
 from adapters.state import FloatArray
 from validation.jump_forecasts import (
+    FIRST_CYCLE,
+    KAPPA,
     WAYS,
     curves_of,
     jumped_error,
@@ -17,6 +19,18 @@ from validation.jump_forecasts import (
     way_nothing,
     way_one_slope,
     way_window,
+)
+from validation.jump_history_behind import (
+    LAW_STILL,
+    PAPER_SCALE,
+    STILL_COARSE,
+    TOLD,
+    Behind,
+    first_share,
+    later_share,
+    mean_first,
+    way_jumps,
+    with_error,
 )
 from validation.jump_history_layers import BETWEEN, LAYERS, compacted
 from validation.jump_history_page import PAGE, Forecasts, page, study
@@ -115,3 +129,34 @@ def test_sentences_about_growing_jumps() -> None:
     coarse = [*ratios["coarse"], *ratios["coarse, moved"]]
     assert min(coarse) < 1 < max(coarse)
     assert 0.85 < np.median(coarse) < 1.15
+
+
+def test_sentences_about_cycles_behind_jumps() -> None:
+    """Paper scale, by the law: more in the first cycle, less than the curves' trial, and a kappa
+    within two errors of that; by history with profile next to nothing of both.  Nothing moved: the
+    coarse bed settles more in the first cycle all the same, that at paper scale does not."""
+    law, profile = (way_jumps(*TOLD[name]) for name in ("LAW", "PROFILE"))
+    first, first_error = with_error(law, first_share)
+    kappa, kappa_error = with_error(law, later_share)
+    assert 3 * first_error < first < FIRST_CYCLE
+    assert 3 * kappa_error < kappa < KAPPA + 2 * kappa_error
+    for share in (first_share, later_share):
+        assert abs(share(profile)) < 0.03 < share(law)
+    assert len(profile) == 60
+    assert len({one.run for one in profile}) == 12
+    coarse, paper = way_jumps("coarse", STILL_COARSE), way_jumps(PAPER_SCALE, LAW_STILL)
+    before = np.mean([one.before.mean() for one in coarse])
+    assert mean_first(coarse) > 3 * before
+    assert mean_first(paper) < np.mean([one.before.mean() for one in paper])
+
+
+def test_a_bed_made_to_settle_more_is_read_so() -> None:
+    """u = a ln N on both sides of a jump, .2 G more in the first cycle, .1 G / n in the n-th."""
+    a, moved = 2e-5, 1e-5
+    n = np.arange(1.0, 11.0)
+    before = a / (100 - 9 + n - 1)
+    after = a / (300 + n) + 0.1 * moved / n
+    after[0] = a / 301 + 0.2 * moved
+    jump = Behind("", 100, 300, moved, before, after)
+    assert first_share([jump]) == pytest.approx(0.2, abs=1e-3)
+    assert later_share([jump]) == pytest.approx(0.1, abs=1e-3)

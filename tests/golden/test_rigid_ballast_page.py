@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from validation.cases.rigid_ballast import record_checks
 from validation.rigid_ballast_judge import limits_of, summaries
-from validation.rigid_ballast_page import PAGE, page
+from validation.rigid_ballast_page import PAGE, kept_words, page, turn_words
 from validation.rigid_ballast_runs import PICTURED, RECORD, rows_read
 
 ROWS = rows_read(RECORD)
@@ -39,3 +39,26 @@ def test_no_table_has_a_column_twice() -> None:
     assert len(heads) == 1
     columns = [cell.strip() for cell in heads[0].strip("|").split("|")]
     assert len(set(columns)) == len(columns)
+
+
+def test_a_step_above_its_residual_is_told() -> None:
+    """Of three rigid runs one missed by a factor of two; a run cut off counts as none."""
+
+    def run(residual: float, ok: bool = True) -> dict[str, object]:
+        level = {"method": "rigid", "value": 1e-3, "extra": 1e-6}
+        return {"kind": "rigid", "ok": ok, "level": level, "residual": residual, "name": "h",
+                "bed": {"seed": 7}}  # fmt: skip
+
+    assert kept_words([run(1e-6), run(5e-7)]) == "all 2 runs"
+    words = kept_words([run(1e-6), run(2e-6), run(5e-7), run(9.0, ok=False)])
+    assert words == "2 of 3 runs; the worst step of the others leaves 2.0 times that (h, seed 7)"
+
+
+def test_the_sleepers_turn_is_that_of_all_runs() -> None:
+    """Long runs turn it more than short ones: each by its cycles."""
+    rows = [{"kind": kind, "ok": True, "cycles": cycles, "tilt": tilt}
+            for kind, cycles, tilt in (("rigid", 5, -2e-5), ("soft", 5, 1e-5),
+                                       ("long", 40, 6.2e-4))]  # fmt: skip
+    assert turn_words(rows) == (
+        "2.0e-05 rad at most in 5 cycles (2 runs) and 6.2e-04 rad at most in 40 cycles (1 runs)"
+    )

@@ -13,6 +13,7 @@ from validation.settlement_far_page import PAGE, Foretold, page, study
 from validation.settlement_far_room import KEPT
 from validation.settlement_rivals_reading import (
     FIGURES,
+    cheaper_even,
     cost,
     finished,
     judged,
@@ -77,19 +78,25 @@ def test_sentences_about_jumps(
 
 
 @pytest.mark.parametrize(
-    ("jumps", "cheaper", "short", "foretold_short", "scatter"),
-    [(13, 30.1, 0.72, 0.30, 1.2), (31, 27.8, 0.82, 0.64, 1.6), (40, 20.1, 0.71, 0.17, 1.5)],
+    ("jumps", "cheaper", "even", "short", "foretold_short", "scatter"),
+    [
+        (13, 30.1, 25.1, 0.72, 0.30, 1.2),
+        (31, 27.8, 24.2, 0.82, 0.64, 1.6),
+        (40, 20.1, 17.5, 0.71, 0.17, 1.5),
+    ],
 )
 def test_sentences_about_grains_that_change_places(
-    jumps: int, cheaper: float, short: float, foretold_short: float, scatter: float
+    jumps: int, cheaper: float, even: float, short: float, foretold_short: float, scatter: float
 ) -> None:
-    """20 to 30 times cheaper, beds inside the interval; packing by packing -431 to 333 um off,
-    which tells the mean's error to 301 to 374 um; no shock behind a jump."""
+    """20 to 30 times cheaper, 17 to 25 at equal cost a step, beds inside the interval; packing by
+    packing -431 to 333 um off, which tells the mean's error to 301 to 374 um; no shock behind
+    a jump."""
     rows, last = record_read(STUDY.record), STUDY.last
     name = f"{jumps} growing jumps, by history, profile, rearranged"
     mine, truth = finished(rows, name, last), settlement_of(rows, last)
     assert len(mine) == 10
     assert cost(reference(rows, last)) / cost(mine) == pytest.approx(cheaper, abs=0.05)
+    assert cheaper_even(mine, reference(rows, last)) == pytest.approx(even, abs=0.05)
     found = np.mean([row["settlement"][str(last)] for row in mine])
     foretold = found + np.mean([owed(row) for row in mine])
     assert (truth.mean - found) / truth.half_given == pytest.approx(short, abs=0.005)
@@ -111,14 +118,45 @@ def test_sentences_about_grains_that_change_places(
     assert np.mean(contacts) == pytest.approx(1, abs=0.05)
 
 
+def test_sentences_about_nothing_moved_and_the_default_move() -> None:
+    """Nothing moved: less than half of the reference, 2.9 half-intervals short.  `smoothed`: .8 of
+    one, 10 um in the first cycle behind a jump, where `profile` has 3, and a foretold mean
+    outside."""
+    rows, last = record_read(STUDY.record), STUDY.last
+    truth = settlement_of(rows, last)
+    runs = {
+        move: finished(rows, f"13 growing jumps, {move}", last)
+        for move in ("by history", "by history, profile", "nothing moved")
+    }
+    assert all(len(mine) == 10 for mine in runs.values())
+    settled = {
+        move: float(np.mean([row["settlement"][str(last)] for row in mine]))
+        for move, mine in runs.items()
+    }
+    assert settled["nothing moved"] < 0.5 * truth.mean
+    short = (truth.mean - settled["nothing moved"]) / truth.half_given
+    assert short == pytest.approx(2.87, abs=0.005)
+    short = (truth.mean - settled["by history"]) / truth.half_given
+    assert short == pytest.approx(0.77, abs=0.005)
+    owing = float(np.mean([owed(row) for row in runs["by history"]]))
+    assert settled["by history"] + owing > truth.mean + truth.half_given
+    first = {
+        move: 1e6
+        * np.mean([side["after"]["settlement"][0] for row in mine for side in row["sides"]])
+        for move, mine in runs.items()
+    }
+    assert round(first["by history"]) == 10
+    assert round(first["by history, profile"]) == 3
+
+
 def test_sentences_about_laws_beside_jumps() -> None:
     """They scatter six times as much as full runs and more, and are outside the interval; smallest
-    moves of up to 30 um always found room."""
+    moves of up to 30 um found room in 99 % of jumps."""
     rows, last = record_read(STUDY.record), STUDY.last
     moved = [
         pair for name in KEPT for row in finished(rows, name, last) for pair in row.get("moved", ())
     ]
-    assert all(asked == got for asked, got in moved if asked <= 3e-5)
+    assert np.mean([asked == got for asked, got in moved if 0 < asked <= 3e-5]) > 0.99
     for law, cycles in LAWS:
         assert spread(rows, law_name(law, cycles), last) > 5.5
         assert bias_beside_interval(rows, law_name(law, cycles), last) > 1

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from validation.settlement_bars import gained_time, settlement_total
+from validation.settlement_bars import gained_time, gained_time_even, settlement_total
 from validation.settlement_ensemble import PARTIAL
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_partial_bearing import bearing, gaps_to_disc, near
@@ -100,6 +100,7 @@ def test_sentences_about_runs_that_wait(rows: list[Row]) -> None:
     assert interval(list(error.values()))[1] == pytest.approx(5, abs=0.5)
     assert error[2] * settlement_total(rows, LAST) / 100 == pytest.approx(6.3e-6, abs=1e-7)
     assert gained_time(rows, name, LAST) == pytest.approx(202, abs=0.5)
+    assert gained_time_even(rows, name, LAST) == pytest.approx(184, abs=0.5)
     three = "3 jumps, by history"
     assert np.mean(list(errors(rows, three).values())) == pytest.approx(4.6, abs=0.05)
     assert gained_time(rows, three, LAST) == pytest.approx(147, abs=0.5)

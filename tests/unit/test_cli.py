@@ -225,7 +225,7 @@ def test_fit_prints_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str
     printed = capsys.readouterr()
     assert printed.err == ""
     fitted = json.loads(printed.out)
-    assert set(fitted) == {"law", "parameters", "prediction", "band", "unit", "regime"}
+    assert set(fitted) == {"law", "parameters", "prediction", "band", "unit", "regime", "laws"}
     assert (fitted["law"], fitted["unit"]) == ("log", "mm")
     assert fitted["prediction"] == pytest.approx(2 + 3 * math.log(1000), rel=1e-12)
     low, high = fitted["band"]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from validation.law_bound import WAYS, left_out
 from validation.law_series import CUTS, REACH, LawCase, cut_cases, family_cases, fast_cases
 from validation.law_study import auto_rows, auto_summary, curve_fit, law_alone, polyfit
 
@@ -53,3 +56,21 @@ def test_summary_counts_refusals_apart() -> None:
     assert (found["cases"], found["refused"], found["all"]["cases"]) == (1, 1, 2)
     assert found["error"] == abs(rows[0]["error"])
     assert found["regimes"]["ratcheting"] == 1
+
+
+def test_a_test_is_judged_by_what_the_others_chose() -> None:
+    """Wide bands miss by half in two tests, so 1 is chosen for the third, whose wide ones hit.
+
+    With its own cases counted, refusing none would meet the bar there too.
+    """
+
+    def case(name: str, width: float, error: float, certain: bool = True) -> dict[str, Any]:
+        ways = dict.fromkeys(WAYS, error)
+        return {"name": name, "certain": certain, "width": width, "inside": True, "ways": ways}
+
+    rows = [case(name, 1.5, 0.5) for name in "ab"] + [case(name, 0.9, 0.1) for name in "abc"]
+    rows += [case("c", 3.0, 0.01) for _ in range(40)] + [case("c", 0.1, 9.0, certain=False)]
+    found = left_out(rows)
+    assert found["chosen"]["c"] == f"{WAYS[0]}, 1"
+    assert found["chosen"]["a"].endswith(", 4")  # c's forty cases carry the bar
+    assert found["cases"] == 2 + 2 + 1  # a and b whole, c's narrow one; none that ratchets

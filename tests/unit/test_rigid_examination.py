@@ -24,6 +24,7 @@ from validation.rigid_examination_page import (
     examination_failures,
     examination_table,
     examination_words,
+    noise_words,
 )
 from validation.rigid_examination_problems import assembled
 from validation.rigid_examination_walls import wall_bodies, wall_count, wall_masses
@@ -373,6 +374,17 @@ def row(family: Family, index: int, **more: Any) -> dict[str, Any]:
     } | more  # fmt: skip
 
 
+def test_noise_is_told_by_its_proofs() -> None:
+    """Solved, proved to give energy, proved to have no solution: three of four."""
+    base = {"family": "W with noise", "ok": False, "status": "not converged"}
+    rows = [base | {"ok": True}, base | {"gives_energy": True}, base | {"status": "no solution"},
+            base | {"family": "towers"}]  # fmt: skip
+    assert noise_words(rows) == (
+        "Of the 3 of the record 1 are solved; of the others 1 have the proof that W gives energy "
+        "and 1 that there is no solution."
+    )
+
+
 def test_page_counts() -> None:
     """Solved, slow, slower than the rival where both solve; what failed or was slow by name."""
     near, far = family_named("towers"), family_named("random assemblies")
@@ -387,7 +399,8 @@ def test_page_counts() -> None:
     assert "| towers | 4 | 3 | 1 | 0.5 s | 1.5 s | 1 of 3 |" in table
     assert "| **beyond them, all** | 2 | 0 |  |  |  | 0 of 0 |" in table
     words = examination_words(rows)
-    assert "6 problems of seed 5 (`abc`), 3 solved; answers called solved that are not: 1." in words
+    assert "6 problems of seed 5, 3 solved (by code: `abc` (6)); answers called" in words
+    assert "called solved that are not: 1." in words
     assert "every problem has a solution (towers) 3 of 4 are solved" in words
     assert "the median of our cost over its is 0.5, the greatest 2; we are slower" in words
     assert "take more than 0.01 s on 1. It solves what we do not: towers 2, random" in words

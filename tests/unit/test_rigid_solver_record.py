@@ -20,7 +20,7 @@ from validation.cases import rigid as case
 from validation.cases.rigid import jam_or_part, nonunique_checks, scale_checks
 from validation.rigid_packings import tower
 from validation.rigid_problems import NamedProblem, changed
-from validation.rigid_timing import repeated
+from validation.rigid_timing import OutOfTime, repeated
 
 # --- runs and record --------------------------------------------------------------------------
 
@@ -45,6 +45,18 @@ def test_a_peer_that_raises_is_a_row() -> None:
         raise RuntimeError("it broke")
 
     assert repeated(broken, 1e-8, 1.0).why == "RuntimeError: it broke"
+
+
+def test_the_limit_wrapped_in_another_error_is_out_of_time() -> None:
+    """Compiled code in which the limit strikes raises an error of its own, caused by it."""
+
+    def compiled(*_: float) -> peers.PeerRun:
+        try:
+            raise OutOfTime
+        except OutOfTime as struck:
+            raise SystemError("returned a result with an exception set") from struck
+
+    assert repeated(compiled, 1e-8, 1.0).why == "out of time"
 
 
 def test_forces_that_are_not_finite() -> None:
@@ -188,6 +200,7 @@ def test_lead_on_siconos() -> None:
         (1e-2, {}, "stopped short"),
         (None, {"why": "out of time"}, "out of time"),
         (None, {"why": "died of SIGABRT: x"}, "died"),
+        (None, {"why": "SystemError: x"}, "raised an error"),
     ],
 )
 def test_outcomes(error: float | None, more: dict[str, Any], words: str) -> None:

@@ -28,7 +28,8 @@ def made_up(part: str, method: str, seed: int, member: int, settled: float, cpu_
     return {
         "part": part, "method": method, "seed": seed, "member": member, "last": STUDY.last,
         "settlement": {str(STUDY.last): settled}, "state": dict.fromkeys(STATE, 1.0),
-        "computed": 500, "cpu_s": cpu_s, "refused": "", "lost": [],
+        "computed": 500, "steps_per_cycle": 10, "cpu_s": cpu_s, "cost": {"engine": 0.5 * cpu_s},
+        "refused": "", "lost": [],
     }  # fmt: skip
 
 
@@ -48,7 +49,7 @@ def runs(settled: float) -> list[Row]:
 def test_without_the_reference_nothing_is_judged() -> None:
     found = cells(table_jumps(runs(1e-3)), STUDY.methods[0].name)
     assert found["settlement since kᵢ, µm"] == "1,000"
-    assert found["cheaper by"] == found[HEAD[5]] == "-"
+    assert found["cheaper by"] == found["at equal cost a step"] == found[HEAD[6]] == "-"
 
 
 def test_error_is_told_in_half_intervals_of_the_reference() -> None:
@@ -64,7 +65,8 @@ def test_error_is_told_in_half_intervals_of_the_reference() -> None:
     found = cells(text, STUDY.methods[0].name)
     assert found["with what is owed, µm"] == "-"
     assert float(found["cheaper by"]) == pytest.approx(20.0)
-    assert float(found[HEAD[5]]) == pytest.approx(2.0, abs=0.01)
+    assert float(found["at equal cost a step"]) == pytest.approx(0.5)
+    assert float(found[HEAD[6]]) == pytest.approx(2.0, abs=0.01)
     assert found["coordination number"] == "+0 ± 0 %"
 
 
@@ -77,9 +79,11 @@ def test_what_is_owed_at_the_end_is_foretold() -> None:
         for seed in range(1, 6)
         for member in range(2)
     ]
-    assert cells(table_jumps([*truth, *rows]), STUDY.methods[0].name)[HEAD[6]] == "1,040"
+    found = cells(table_jumps([*truth, *rows]), STUDY.methods[0].name)
+    assert found["with what is owed, µm"] == "1,040"
     assert short_of(rows).startswith(
-        "Of 10 jumps by history whose grains keep their places 10 found no room"
+        "Of 10 jumps by history whose grains keep their places, 0 of which were asked for no "
+        "settlement, 10 found no room"
     )
     assert owed(runs(1e-3)[0]) == 0
     assert "| 60 to 100 | 10 | 0 |" in table_room(rows)

@@ -64,8 +64,8 @@ def test_only_computed_rows_are_taken(tmp_path: Path) -> None:
         ("  cycle   settlement_cm \n  1   0.5 \n 20   0.75\n", "cm"),
         ('"cycle","Axial strain (%)"\r\n1,0.5\r\n20,0.75\r\n', "%"),
         ("cycle, strain\r1, 0.5\r20, 0.75\r", "1"),
-        ("1, 0.5\n20, 0.75\n", "m"),
-        ("20;0,75\n1;0,5\n", "m"),
+        ("1, 0.5\n20, 0.75\n", "unknown"),
+        ("20;0,75\n1;0,5\n", "unknown"),
     ],
 )
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
@@ -79,6 +79,27 @@ def test_tables_of_laboratories_are_read(
     series = series_read([path])
     assert (series.cycle.tolist(), series.settlement.tolist()) == ([1.0, 20.0], [0.5, 0.75])
     assert series.unit == unit
+
+
+def test_unit_is_told_where_no_header_gives_it(tmp_path: Path) -> None:
+    """Of no header and of a column that the user names nothing is supposed; a header wins."""
+    bare = written(tmp_path / "bare.txt", "1, 0.5\n20, 0.75\n")
+    named = written(tmp_path / "named.csv", "N,eps_a\n1,0.5\n20,0.75\n")
+    plain = written(tmp_path / "plain.csv", "N,settlement\n1,0.5\n20,0.75\n")
+    percent = written(tmp_path / "percent.csv", "N,strain [%]\n1,0.5\n20,0.75\n")
+    assert series_read([bare]).unit == "unknown"
+    assert series_read([bare], unit="1").unit == "1"
+    assert series_read([named], columns=("N", "eps_a")).unit == "unknown"
+    assert series_read([named], columns=("N", "eps_a"), unit="%").unit == "%"
+    assert series_read([plain], unit="mm").unit == "mm"
+    assert series_read([percent], unit="%").unit == "%"
+    with pytest.raises(UsageError, match="is in %, not in mm"):
+        series_read([percent], unit="mm")
+    with pytest.raises(UsageError, match="inch is no unit"):
+        series_read([bare], unit="inch")
+    dump = dumped(tmp_path / "dump.txt", {100: [1.0, 2.0], 200: [0.8, 2.0]})
+    with pytest.raises(UsageError, match="dumps are in m"):
+        series_read([dump], unit="mm")
 
 
 def test_columns_of_other_names_are_named(tmp_path: Path) -> None:

@@ -66,6 +66,7 @@ def test_series_that_follows_a_law_is_predicted(name: str, parameters: dict[str,
         "band": list(found.band),
         "unit": "mm",
         "regime": found.regime,
+        "laws": {},
     }
 
 

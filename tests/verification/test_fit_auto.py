@@ -12,8 +12,16 @@ from hypothesis import strategies as st
 
 from adapters.errors import JumpRefused, UsageError
 from adapters.fit import Series, fit_auto, fit_series, regime_of
+from adapters.fit_agreement import AGREE, laws_said
 from adapters.fit_auto import outlook
-from adapters.fit_candidates import candidates_of, constant_rate_gains, held_out_rows, thinned
+from adapters.fit_candidates import (
+    SLOW_LAWS,
+    candidates_of,
+    constant_rate_gains,
+    held_out_rows,
+    thinned,
+)
+from adapters.fit_refusal import UNCERTAIN, refusals
 from adapters.fit_regime import independent, regimes_of, tail_rows
 from adapters.laws import law_named
 from adapters.state import FloatArray
@@ -151,6 +159,65 @@ def test_jumps_are_refused_with_a_sentence(name: str) -> None:
     assert here.prediction == here.band[0] == here.band[1] == series.settlement[-1]
 
 
+def test_a_band_wider_than_the_past_is_no_prediction() -> None:
+    """Half the width over the largest reading: refused above 1, for each series by itself.
+
+    u = N^0.45 is steady; to 1.2 N_k its band is narrow, to 100 N_k the laws differ by more than
+    all that settled.  Beside it a logarithm is let go ahead.  At N_k itself there is a reading.
+    """
+    series = np.stack([READ**0.45, np.log(READ) + 1], axis=1)
+    near, far, here = (outlook(READ, series, to) for to in (1200, 1e5, READ[-1]))
+    assert (far.high - far.low)[0] > 2 * series[-1, 0] > (near.high - near.low)[0]
+    found = refusals(far)
+    assert found[0] is not None
+    assert found[0].regime == UNCERTAIN
+    assert "differ too much" in found[0].why
+    assert [found[1], *refusals(near), *refusals(here)] == [None] * 5
+    with pytest.raises(JumpRefused, match="differ too much") as raised:
+        fit_auto(Series(READ, series[:, 0]), 1e5)
+    assert (raised.value.exit_code, raised.value.regime) == (6, UNCERTAIN)
+    assert raised.value.to_json("1")["laws"]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("name", ["auto", "log"])
+def test_a_prediction_that_reaches_failure_is_refused(name: str, sign: int) -> None:
+    """ln N + 1 is 10.2 at 1e4: refused for failure at 10, not at 11; so is a law that is named."""
+    series = Series(READ, sign * (np.log(READ) + 1))
+
+    def predicted(fail_at: float, to_cycle: float = 1e4) -> float:
+        if name == "auto":
+            return fit_auto(series, to_cycle, fail_at=fail_at).prediction
+        return fit_series(series, law_named(name), to_cycle, fail_at=fail_at).prediction
+
+    assert abs(predicted(11)) == pytest.approx(10.2, rel=0.02)
+    assert predicted(1, READ[-1]) == series.settlement[-1]
+    with pytest.raises(JumpRefused, match="given as failure") as raised:
+        predicted(10)
+    assert raised.value.regime == "collapse"
+    assert raised.value.to_json("m")["law"] == name
+    for wrong in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(UsageError, match="positive number"):
+            predicted(wrong)
+
+
+def test_which_laws_agree() -> None:
+    """Of an exact logarithm the logarithm agrees, and the hyperbola, which ends, does not."""
+    found = outlook(READ, (np.log(READ) + 1)[:, None], 1e6)
+    said = laws_said(found)
+    assert list(said) == list(SLOW_LAWS)
+    assert said["log"].agrees
+    assert said["log"].votes == 3
+    assert said["log"].inside
+    assert said["log"].prediction == pytest.approx(np.log(1e6) + 1)
+    for one in said.values():
+        near = abs(one.prediction / found.prediction[0] - 1) <= AGREE
+        assert one.agrees == near
+        assert one.inside == (found.low[0] <= one.prediction <= found.high[0])
+    assert not said["hyperbolic"].agrees
+    assert all(one.inside is None for one in laws_said(found, refused=True).values())
+
+
 @given(
     seed=st.integers(0, 1000),
     unit=st.sampled_from([1e-3, 100.0, -1.0]),
@@ -286,7 +353,7 @@ def test_command_refuses_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixtu
         path.write_text("cycle,settlement_mm\n" + rows)
 
     words = ["fit", str(path), "--law", "auto", "--to-cycle", "1e4", "--json"]
-    keys = {"law", "parameters", "prediction", "band", "unit", "regime"}
+    keys = {"law", "parameters", "prediction", "band", "unit", "regime", "laws"}
     write(READ)
     assert main(words) == 6
     printed = capsys.readouterr()
@@ -294,12 +361,21 @@ def test_command_refuses_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert set(content) == keys
     assert (content["regime"], content["prediction"], content["unit"]) == ("ratcheting", None, "mm")
     assert "hardly falls" in printed.err
+    assert set(content["laws"]) == set(SLOW_LAWS)
+    assert all(said["inside"] is None for said in content["laws"].values())
     write(np.log(READ))
     assert main(words) == 0
     content = json.loads(capsys.readouterr().out)
     assert set(content) == keys
     assert content["band"][0] <= content["prediction"] <= content["band"][1]
+    assert content["laws"]["log"]["agrees"]
+    assert content["laws"]["log"]["inside"]
+    assert main([*words, "--fail-at", "9"]) == 6
+    content = json.loads(capsys.readouterr().out)
+    assert (content["prediction"], content["regime"]) == (None, "collapse")
     assert main(words[:-1]) == 0
-    assert "regime: steady" in capsys.readouterr().out
+    printed = capsys.readouterr()
+    assert "regime: steady" in printed.out
+    assert "laws that agree to 10%: log" in printed.out
     assert main([*words, "--error", "0.1", "--confidence", "0.9"]) == 2
     assert "no single law" in capsys.readouterr().err

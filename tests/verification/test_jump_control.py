@@ -382,10 +382,10 @@ def test_realised_errors_within_the_tolerance(name: str) -> None:
 
 
 def test_a_moved_bed_that_settles_more() -> None:
-    """Behind each jump by G the bed gains .15 G more in the first cycle and .1 G / n later, as at
-    paper scale: ends off by 10 % root mean square, with a band that holds, for no more cycles
-    than 1.5 times those of a bed that does not.  (Taken for the bed's rate it adds to every
-    further jump: ends 50 % off and more.)"""
+    """Behind each jump by G the bed gains .15 G more in the first cycle and .1 G / n later, about
+    as by the law at paper scale: ends off by 10 % root mean square, with a band that holds, for no
+    more cycles than 1.5 times those of a bed that does not.  (Taken for the bed's rate it adds to
+    every further jump: ends 50 % off and more.)"""
     settings = replace(SETTINGS, total_cycles=1000)
     bare = Curve(CURVES["log"], BURSTY)
     moved = replace(bare, first_cycle=0.15, kappa=0.1)

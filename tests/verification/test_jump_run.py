@@ -126,6 +126,36 @@ def test_collapse_is_refused_with_its_code(
     assert status(tmp_path / "run").cycles_computed == 200
 
 
+@pytest.mark.parametrize(("share", "code"), [(0.3, 6), (1.0, 0)])
+def test_a_piston_that_breaks_in_is_refused(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    share: float,
+    code: int,
+) -> None:
+    """Grains settle by a logarithm and the piston by 5 um a cycle more: no jump, where it can sink.
+
+    On all of the section it stands on the bed's surface, whose grains its record does not show.
+    """
+    monkeypatch.setattr(engine_fake, "BED", FakeBed(sinking=5e-6))
+    scene = small(tmp_path, 100)
+    words = ["run", str(scene), "--set", f"loading.area_share={share}"]
+    assert trackbed.main(words) == code
+    why = "rate at which the piston sinks hardly falls (ratcheting)"
+    assert (why in capsys.readouterr().err) == (code == 6)
+    if code:
+        assert trackbed.main(["resume", str(tmp_path / "run"), "--cycle-by-cycle"]) == 0
+        assert status(tmp_path / "run").cycles_computed == 100
+
+
+def test_a_piston_that_goes_down_with_its_bed_is_not_refused(tmp_path: Path) -> None:
+    """On a part of the section, as on all of it: jumps are made."""
+    scene = small(tmp_path, 100)
+    assert trackbed.main(["run", str(scene), "--set", "loading.area_share=0.3"]) == 0
+    assert status(tmp_path / "run").cycles_computed < 100
+
+
 def test_no_jump_pays_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Tolerance 1e-6: every cycle is computed, and the reason is on the screen once."""
     scene = small(tmp_path, 120)

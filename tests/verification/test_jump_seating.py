@@ -15,6 +15,7 @@ from scipy.integrate import quad
 
 from adapters import engine_fake, jump_fixed, jump_seating, procedure
 from adapters.engine_fake import SETTLEMENT, FakeBed
+from adapters.errors import SceneError
 from adapters.jump_history import Jumped
 from adapters.jump_rates import Stretch
 from adapters.jump_record import DECISION
@@ -216,6 +217,17 @@ def test_a_run_waits_until_the_bed_has_carried_its_piston_for_k_i_cycles(
     assert not any("hung" in words for words in said)
 
 
+def test_cycles_that_count_in_place_of_k_i(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hung until 23, 4 cycles and k = 5 behind it: a jump from 35, where k_i = 10 has one from 40;
+    nothing changes where no piston hung, and without waiting the key is refused."""
+    key = "procedure.seating_cycles=4"
+    for name, hung, start in (("hung", (1, 23), 35), ("never", (1, 2), 15)):
+        folder = tmp_path / name
+        assert settle(folder, monkeypatch, hung, *FIXED, WAITS, key)[0] == [(start, 75)]
+    with pytest.raises(SceneError, match="only a run that waits for its piston counts them"):
+        settle(tmp_path / "any", monkeypatch, (1, 23), *FIXED, key)
+
+
 def test_a_piston_that_hangs_again_is_waited_for_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -242,9 +254,11 @@ def test_a_piston_that_hangs_to_the_end_has_every_cycle_computed(
 def test_history_begins_where_the_bed_carries_its_piston(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing of the cycles until 23 is known to the jump: those of 25 to 40 are, and the gain
-    a ln(76 / 41) follows, to the 2 % that ln N differs from ln(1 + N).  Where the piston hangs
-    again, nothing is owed for jumps before."""
+    """A bed that takes the load from cycle 23 on, u = a ln(1 + N - 23).  Nothing of the cycles
+    until then is known to the jump: those of 25 to 40 are, counted from 23, and the gain
+    a ln(53 / 18) follows, to the 5 % that ln N differs from ln(1 + N); counted from the first
+    cycle it would be 1.3 times that.  Where the piston hangs again, nothing is owed for jumps
+    before."""
     asked: list[tuple[int, int, list[int]]] = []
     real = jump_fixed.asked_gain
 
@@ -255,16 +269,19 @@ def test_history_begins_where_the_bed_carries_its_piston(
 
     monkeypatch.setattr(jump_fixed, "asked_gain", gain)
     history = (WAITS, 'procedure.settlement="history"')
-    settle(tmp_path / "run", monkeypatch, (1, 23), *FIXED, *history)
-    assert asked == [(25, 40, [])]
+    with monkeypatch.context() as late:
+        taken = FakeBed(lambda n: SETTLEMENT * np.log1p(np.clip(n - 23, 0, None)))
+        late.setattr(engine_fake, "BED", taken)
+        settle(tmp_path / "run", monkeypatch, (1, 23), *FIXED, *history)
+    assert asked == [(2, 17, [])]
     jump = RunFolder(tmp_path / "run").outcome("jump_000040_1")
     assert jump is not None
-    assert jump.notes["gain"] == pytest.approx(SETTLEMENT * np.log(76 / 41), rel=0.02)
+    assert jump.notes["gain"] == pytest.approx(SETTLEMENT * np.log(53 / 18), rel=0.05)
     asked.clear()
     keys = ("procedure.h=10", "procedure.healing_cycles=2", "procedure.total_cycles=99")
     settle(tmp_path / "again", monkeypatch, (45, 47), *keys, *history)
     assert [before for _, _, before in asked[:3]] == [[], [15], []]
-    assert asked[2][0] == 49
+    assert asked[2][0] == 49 - 47
     assert asked[3][2] == [asked[2][1]]
 
 

@@ -13,6 +13,8 @@ Both draw all members of the families: the 90th percentile of fewer is off by se
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from validation.case import Check
 from validation.cases.jump_without_engine import data_folder, skipped
 from validation.law_series import fast_cases
@@ -26,14 +28,19 @@ ALARM_BAR = 0.95
 JUDGED = ("ballast", "families")
 
 
-def source_checks(source: str, found: Row, total: int) -> list[Check]:
-    """Error, band and refusals on one source."""
-    judged = source in JUDGED
-    where = f"{source} ({found['cases']} of {total} cases, others refused)"
+def source_checks(
+    source: str, found: Row, total: int, judged: Sequence[str] = JUDGED, where: str = ""
+) -> list[Check]:
+    """Error, band and refusals on one source, against its bars where it is among the ``judged``.
 
-    def at_most(name: str, value: float, bar: float, judged: bool = judged) -> Check:
-        said = f"<= {bar}" if judged else "measured"
-        return Check(f"{where}: {name}", value, said, value <= bar or not judged)
+    ``where``: what the names begin with, if not with the source and its cases.
+    """
+    barred = source in judged
+    where = where or f"{source} ({found['cases']} of {total} cases, others refused)"
+
+    def at_most(name: str, value: float, bar: float, barred: bool = barred) -> Check:
+        said = f"<= {bar}" if barred else "measured"
+        return Check(f"{where}: {name}", value, said, value <= bar or not barred)
 
     covered = found["coverage"]
     return [
@@ -42,8 +49,8 @@ def source_checks(source: str, found: Row, total: int) -> list[Check]:
         Check(
             f"{where}: coverage of the 90 % band",
             covered,
-            f">= {COVERAGE_BAR}" if judged else "measured",
-            covered >= COVERAGE_BAR or not judged,
+            f">= {COVERAGE_BAR}" if barred else "measured",
+            covered >= COVERAGE_BAR or not barred,
         ),
         Check(f"{where}: median half-width", found["half_width"], "measured", True),
         at_most("refused", found["refused"] / total, FALSE_ALARM_BAR, source == "families"),

@@ -191,7 +191,8 @@ def dantzig_checks(rows: Sequence[Row]) -> list[Check]:
             sure = friction == 0
             bar = f"= {orders}" if sure else "reported"
             checks.append(Check(title, solved, bar, solved == orders or not sure))
-    silent = sum(count for (_, end), count in report.dantzig_ends(rows).items() if end == "silent")
+    ends = report.dantzig_ends(rows)
+    silent = sum(count for (_, end, _), count in ends.items() if end == "silent")
     checks.append(Check("dantzig: failures without a status", silent, "= 0", silent == 0))
     return checks
 

@@ -1,4 +1,10 @@
-"""The settlement procedure beside its full control and the two floors under every error.
+"""The whole settlement study: every bar from the records, and a run made now beside its floors.
+
+    trackbed validate settlement --json F     F and F.html; the run at paper scale takes hours, and
+                                              goes on in the folder TRACKBED_VALIDATION where it
+                                              was stopped
+    trackbed validate settlement --quick      the run of the coarse scene alone, minutes
+    trackbed validate settlement-study        the bars alone, seconds, no engine
 
 A bed is chaotic, so the error of a jump is read against what two equal runs differ by (one grain
 moved by 1e-10 m), and against dump, relax and resubmit without a jump (h = 0).
@@ -18,6 +24,10 @@ from adapters.scene_file import scene_load
 from adapters.stages import Variant
 from scenes import scene_path
 from validation.case import Check
+from validation.cases import settlement_study
+from validation.settlement_study_report import report_write
+
+__all__ = ["report_write", "run"]
 
 MEMBERS = {True: 2, False: 4}
 """Perturbed controls, quick or not: an ensemble is better than a twin."""
@@ -27,6 +37,11 @@ FLOORS = 3.0
 
 
 def run(quick: bool) -> list[Check]:
+    """The study's bars, unless ``quick``, and a run made now."""
+    return [*([] if quick else settlement_study.run(quick)), *run_checks(quick)]
+
+
+def run_checks(quick: bool) -> list[Check]:
     """Run the coarse scene (quick) or the paper's; resumes in the folder TRACKBED_VALIDATION."""
     name = "karrech-coarse" if quick else "karrech"
     scene = scene_load(scene_path(name))

@@ -1,0 +1,74 @@
+"""When a prediction of the slow laws together is refused, and the words for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from adapters.fit_auto import Outlook
+from adapters.fit_regime import COLLAPSE, WHY_NOT
+
+UNCERTAIN = "uncertain"
+"""In the place of a regime: the tail excludes none, and the band says nothing of the size."""
+WIDEST = 1.0
+"""Half-width of a band over all that settled so far, above which it is no prediction: what is not
+known of the future is then more than what is known of the past."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why there is no prediction."""
+
+    regime: str
+    """``ratcheting``, ``collapse`` or `UNCERTAIN`."""
+    why: str
+    remedy: str
+
+
+def refusals(outlook: Outlook) -> list[Refusal | None]:
+    """Why each of n series is not predicted; None where it is.
+
+    - the regime is ratcheting or collapse (90 %): no law says when that ends;
+    - half the width of the band exceeds `WIDEST` times the settlement so far (the largest reading,
+      from the series' own zero): the laws differ by more than all that was ever measured.  The
+      constant is 1, and no number that was fitted.  A series whose zero lies far off (a level of a
+      track above the sea) is never refused for it: give settlement since the load began.
+
+    A prediction for the last cycle itself is a reading, and never refused.
+    """
+    return [_refusal(outlook, series) for series in range(len(outlook.regime))]
+
+
+def _refusal(outlook: Outlook, series: int) -> Refusal | None:
+    regime, last = outlook.regime[series], outlook.last_cycle
+    if outlook.to_cycle == last:
+        return None
+    if not regime.jump_allowed:
+        return Refusal(
+            regime.name,
+            f"up to cycle {last:g} {WHY_NOT[regime.name]}: it goes as N^(beta - 1) with "
+            f"beta = {regime.exponent:.2f} ± {regime.deviation:.2f}, and no law says when "
+            "that ends",
+            "compute or measure more cycles, or name a law yourself: --law log, linear ...",
+        )
+    low, high = float(outlook.low[series]), float(outlook.high[series])
+    settled = float(outlook.settled[series])
+    if high - low > 2 * WIDEST * settled:
+        return Refusal(
+            UNCERTAIN,
+            f"the laws differ too much at cycle {outlook.to_cycle:g}: from {low:.3g} to "
+            f"{high:.3g}, where {settled:.3g} is all that settled up to cycle {last:g}",
+            "measure more cycles, predict less far, or name a law yourself: --law log, power ...",
+        )
+    return None
+
+
+def failure(prediction: float, fail_at: float | None, to_cycle: float) -> Refusal | None:
+    """Collapse where ``prediction`` reaches the user's bound, in the same unit, of either sign."""
+    if fail_at is None or abs(prediction) < fail_at:
+        return None
+    return Refusal(
+        COLLAPSE,
+        f"{abs(prediction):.3g} is predicted at cycle {to_cycle:g}, and {fail_at:g} was given as "
+        "failure (--fail-at): no law of settlement describes what comes then",
+        "ask for an earlier cycle",
+    )
