@@ -39,7 +39,7 @@ from validation.rigid_page_studies import (
 from validation.rigid_peers import SICONOS_MOST, SICONOS_SPARSE
 from validation.rigid_picture import PICTURE, picture
 from validation.rigid_report import HYBRID, OSQP, OURS, Row
-from validation.rigid_runs import LARGE, RECORD, rows_read
+from validation.rigid_runs import LADDER, LARGE, RECORD, rows_read
 
 WORDS = Path(__file__).with_suffix(".md")
 PAGE_PATH = Path(__file__).parents[1] / "docs" / "rigid-solvers.md"
@@ -100,7 +100,8 @@ def _asked(rows: Sequence[Row]) -> str:
     """Tolerances of small problems, and those of large ones where they are more."""
     small, large = (
         sorted(
-            {row["setting"]["tolerance"] for row in rows if (row["contacts"] >= LARGE) == is_large},
+            {row["setting"]["tolerance"] for row in rows if (row["contacts"] >= LARGE) == is_large}
+            & {*LADDER},
             reverse=True,
         )
         for is_large in (False, True)

@@ -129,6 +129,18 @@ def test_which_runs_are_made(family: str, method: str, boxes: int, made: bool) -
     assert runs.raced(named, problem, method) is made
 
 
+@pytest.mark.parametrize(("reached", "more"), [(3e-7, (3e-7,)), (2e-13, ()), (1e-3, ())])
+def test_ours_is_asked_for_what_siconos_reached(reached: float, more: tuple[float, ...]) -> None:
+    """Between the tolerances of all, so that costs are those of one residual; ours alone."""
+    problem = tower(125, 3)
+    rows = [{"method": "Siconos 3D_NSGS", "error": reached}, {"method": "Clarabel", "error": 4e-6}]
+    made = runs.methods(problem, True, lambda: rows)
+    asked = [run.setting["tolerance"] for run in made["rigid_lcp"](60.0)]
+    assert asked == sorted({*runs.LADDER, *more}, reverse=True)
+    asked = [run.setting["tolerance"] for run in made["rigid_lcp newton"](1.0)]
+    assert asked == sorted(runs.LADDER, reverse=True)
+
+
 def test_changed_problems_are_of_the_family() -> None:
     """Order, friction and q change by a seed; W keeps its eigenvalues, q its space."""
     problem = tower(3, 2)
