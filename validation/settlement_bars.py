@@ -221,7 +221,7 @@ BARS_PARTIAL = (
     Bar("bias over the total settlement", "%", 4.0, bias),
     Bar("gained time", "%", 300.0, gained_time, least=True),
     Bar(EVEN, "%", 300.0, gained_time_even, least=True),
-    *(bar for bar in BARS if bar.value is error_of_profile or "coordination number" in bar.words),
+    *BARS[2:6],
     *BARS_CONTINUITY,
 )
 """Under a piston that covers a part: asked of the first two; of the others what is asked of the

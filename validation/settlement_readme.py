@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from validation.page_text import table
-from validation.settlement_bars import gained_time, gained_time_even, settlement_of
+from validation.settlement_bars import gained_time, gained_time_even
 from validation.settlement_rivals import Row
-from validation.settlement_rivals_reading import finished, judged, reference
+from validation.settlement_rivals_reading import chaos, finished, judged, reference
 from validation.settlement_rivals_runs import record_read
 from validation.settlement_rivals_studies import STUDIES
 
@@ -31,9 +31,9 @@ SHORT = ("settlement", "coordination", "deflection")
 
 def table_readme(rows: Sequence[Row], last: int = STUDY.last) -> str:
     """A line a way: cost and errors of the mean, for the settlement with half of Student's 95 %
-    interval over packings; ``rows`` of the record at paper scale."""
+    interval over packings, for every cycle that of one run a packing, by chaos alone; ``rows`` of
+    the record at paper scale."""
     truth = reference(rows, last)
-    half = settlement_of(rows, last)
     lines = []
     for name in NAMES:
         mine = finished(rows, name, last)
@@ -51,7 +51,7 @@ def table_readme(rows: Sequence[Row], last: int = STUDY.last) -> str:
                 *(f"{100 * one.mean:+.0f} %" if (one := errors[key]) else "" for key in SHORT[1:]),
             ]
         )  # fmt: skip
-    whole = f"0 ± {100 * half.half_given / half.mean:.0f} %"
+    whole = f"0 ± {100 * chaos(rows, last, 'settlement'):.0f} %"
     lines.append(["every cycle", str(len(truth)), f"{truth[0]['computed']}", "1", "1", whole,
                   "0", "0"])  # fmt: skip
     head = [

@@ -174,13 +174,15 @@ def cheaper_even(rows: Sequence[Row], truth: Sequence[Row]) -> float:
     """Cost of the reference over that of ``rows``, had a time step cost the same in both [-].
 
     The machine differs between sessions, and a run beside two others is slower: so every step of
-    ``truth`` is taken at what the engine spent on one in ``rows``.  Starts, relaxations and failed
-    tries count on their side alone.  A law's cycles are some of the reference's.
+    ``truth`` is taken at what the engine spent on one in ``rows``, its starts apart (they are part
+    of ``engine``).  Starts, relaxations and failed tries count on their side alone.  A law's cycles
+    are some of the reference's.
     """
     cycle = truth[0]["steps_per_cycle"]
     full = float(np.mean([row["computed"] for row in truth])) * cycle
     steps = [row["computed"] * row.get("steps_per_cycle", cycle) for row in rows]
-    a_step = sum(row["cost"]["engine"] for row in rows) / sum(steps)
+    spent = sum(row["cost"]["engine"] - row["cost"].get("start_up", 0.0) for row in rows)
+    a_step = spent / sum(steps)
     return full * a_step / cost(rows)
 
 

@@ -100,7 +100,7 @@ def test_sentences_about_runs_that_wait(rows: list[Row]) -> None:
     assert interval(list(error.values()))[1] == pytest.approx(5, abs=0.5)
     assert error[2] * settlement_total(rows, LAST) / 100 == pytest.approx(6.3e-6, abs=1e-7)
     assert gained_time(rows, name, LAST) == pytest.approx(202, abs=0.5)
-    assert gained_time_even(rows, name, LAST) == pytest.approx(184, abs=0.5)
+    assert gained_time_even(rows, name, LAST) == pytest.approx(183, abs=0.5)
     three = "3 jumps, by history"
     assert np.mean(list(errors(rows, three).values())) == pytest.approx(4.6, abs=0.05)
     assert gained_time(rows, three, LAST) == pytest.approx(147, abs=0.5)
@@ -109,13 +109,11 @@ def test_sentences_about_runs_that_wait(rows: list[Row]) -> None:
     assert all(len(errors(rows, way)) == 5 for way in (name, three, one))
 
 
-def test_a_shorter_wait_gains_more_and_errs_by_more() -> None:
-    """Packing 2 carries its piston from cycle 44 or 45 on.  A jump from cycle 50 gains 300 % over
-    five packings and errs by 72 um in one run; from 65 on, 248 %, by no more than packings
-    scatter."""
+def test_a_shorter_wait_gains_more_and_errs_by_less_from_where_the_piston_is_carried() -> None:
+    """Packing 2 carries its piston from cycle 44 or 45 on.  A jump from cycle 52 gains 308 % over
+    five packings; counted from the first cycle it errs by 75 um in one run, from where the piston
+    is carried by 20 and -24 um; from 64 on by 264 % or less."""
     lines = [line.strip("| ").split(" | ") for line in table_waits(EnsembleRecord()).splitlines()]
-    assert lines[2][:4] == ["50", "6", "20.0", "300"]
-    assert max(abs(float(cell)) for cell in lines[2][4:6]) == pytest.approx(72, abs=0.5)
-    assert lines[5][0] == "65"
-    assert lines[5][3] == "248"
-    assert max(abs(float(cell)) for cell in lines[5][4:6]) < 20
+    assert lines[3] == ["52", "8", "19.6", "308", "+75", "-9", "+20", "-24", "-0.3"]
+    assert (lines[6][0], lines[6][3]) == ("64", "264")
+    assert max(abs(float(cell)) for line in lines[3:] for cell in line[6:8]) < 30

@@ -13,11 +13,12 @@ from validation.settlement_bars import (
     error_of,
     error_of_profile,
     gained_time,
+    runs_by_packing,
     sides_compared,
     spread,
 )
 from validation.settlement_ensemble import CONFINED
-from validation.settlement_ensemble_reading import curves
+from validation.settlement_ensemble_reading import curves, nested
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_readme import table_readme
 from validation.settlement_rivals import HEALED, METHODS, Row
@@ -183,7 +184,8 @@ def test_readme_has_the_table_at_paper_scale() -> None:
 
 
 def test_sentences_about_growing_jumps() -> None:
-    """Five growing jumps, twelve runs: every bar; 54, 59 and 55 of 60 jumps go on."""
+    """Five growing jumps, twelve runs: the bars of the end state and of cost; 54, 59 and 55 of 60
+    jumps go on."""
     rows, name = record_read(PAPER.record), "5 growing jumps, by history, profile"
     runs = finished(rows, name, LAST)
     assert [row["seed"] for row in runs].count(1) == 4
@@ -217,6 +219,11 @@ def test_sentences_about_growing_jumps() -> None:
     assert 100 * law.error == pytest.approx([12, 94, 15], abs=0.5)
     assert still.error.max() < -0.49
     assert len(finished(rows, "2 jumps, nothing moved", LAST)) == 6
+    within = [
+        1e6 * nested(runs_by_packing(each, "settlement")).within
+        for each in (runs, reference(rows, LAST))
+    ]
+    assert [round(one) for one in within] == [18, 11]
     softest = [judged(rows, "E/100", LAST, figure) for figure in ("settlement", "deflection")]
     assert [round(1 + each.mean) for each in softest if each is not None] == [6, 22]
     longer = [judged(rows, "step x 2", LAST, figure) for figure in ("settlement", "deflection")]
