@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, nan
+from math import nan
 from pathlib import Path
 
 from validation import (
@@ -73,50 +73,57 @@ SECTIONS = (
     Section("Relaxation", (relaxation_runs.RECORD,), relaxation_checks),
 )  # fmt: skip
 
-LONG_JUMPS = "behind jumps of some hundred cycles the rate is known no better than a window tells"
-CHAOS = "two full runs of one packing, which part by chaos alone, gain the same in fewer than 90 %"
-WHY = {
-    "confined: rate behind healing stays": "single cycles scatter: full runs have it in few more",
-    "confined: rate behind healing goes on": "full runs themselves have it in fewer",
+RATE = "not known why; full runs between the same cycles have it, nothing moved as few"
+CHAOS = "two full runs of one packing, which part by chaos alone, gain the same in hardly more"
+HUNG = "one packing's piston hangs by its rim, and the cycles of waiting for it are computed"
+LATE = "a bed moved by the default settles more for some cycles; full runs have it in 88 %"
+WHY: dict[str, tuple[float, str]] = {
+    "confined: rate behind healing stays": (85, "not known why; full runs have it in 92 %"),
+    "confined: rate behind healing goes on": (88.33, "full runs themselves have it in 83 %"),
     "confined: rate behind the first cycle goes on":
-        "full runs of one packing part by little here, and only just meet it themselves",
-    "partial: gained time":
-        "one packing's piston hangs by its rim, and the cycles of waiting for it are computed",
-    "partial: gained time at equal cost a step":
-        "one packing's piston hangs by its rim, and the cycles of waiting for it are computed",
+        (83.33, "full runs of one packing part by little here, and only just meet it themselves"),
+    "partial: gained time": (202, HUNG),
+    "partial: gained time at equal cost a step": (183, HUNG),
+    "partial: elastic deflection":
+        (91.2, "in one packing the piston hangs again at the last cycles; else up to 20 % off"),
     "partial: rate stays":
-        "behind the default move the first cycle settles too much; full runs have it in few",
-    "partial: rate behind healing stays": "full runs themselves have it in few",
-    "partial: rate behind healing goes on":
-        "a bed moved by the default settles more for some cycles; full runs do not meet it either",
-    "partial: rate behind the first cycle goes on":
-        "a bed moved by the default settles more for some cycles; one moved by the profile less so",
+        (12.5, "behind the default move the first cycle settles too much; full runs: 38 %"),
+    "partial: rate behind healing stays": (25, "full runs themselves have it in 38 %"),
+    "partial: rate behind healing goes on": (62.5, LATE),
+    "partial: rate behind the first cycle goes on": (25, LATE),
     "partial: rate goes on":
-        "behind the default move contacts do not bear yet, and the first cycle settles too much",
-    "coarse, cycle 10,000: rate behind healing goes on": LONG_JUMPS,
-    "coarse, cycle 10,000: rate behind the first cycle goes on": LONG_JUMPS,
-    "coarse, cycle 10,000: rate goes on": LONG_JUMPS,
-    "coarse: bands that have the truth, in all tests":
-        "ten runs of five packings, whose bursts to come are in no first cycles",
+        (0, "behind the default move the first cycle settles too much"),
+    "coarse, cycle 10,000: coordination number": (3.5, "not known why"),
+    "coarse, cycle 10,000: elastic deflection":
+        (8.9, "not known why; ten runs tell it to 27 %"),
+    "coarse, cycle 10,000: rate behind healing goes on": (86.2, RATE),
+    "coarse, cycle 10,000: rate behind the first cycle goes on": (80, RATE),
+    "coarse, cycle 10,000: rate goes on": (84.6, RATE),
+    "bands that have the truth, where they are given":
+        (69, "bursts that are still to come are in no first cycles; ten runs of five packings"),
     "jump control, curve of the demo's full run: within":
-        "the bed settles in bursts that few windows see",
-    "jump control on LIGGGHTS, tolerance 0.1: as the full run gained": CHAOS,
-    "jump control on LIGGGHTS, tolerance 0.05: as the full run gained": CHAOS,
+        (0.84, "the bed settles in bursts that few windows see"),
+    "jump control on LIGGGHTS, tolerance 0.1: as the full run gained": (0.818, CHAOS),
+    "jump control on LIGGGHTS, tolerance 0.05: as the full run gained": (0.784, CHAOS),
     "jump control on LIGGGHTS, tolerance 0.05: observed within":
-        "the bursts of the coarse bed scatter its windows by more",
+        (0.863, "the bursts of the coarse bed scatter its windows by more"),
     "hard case, a crystal less three grains, in a box half a percent wider, jumps by history: "
-    "checks that do not hold":
-        "6 % fewer contacts behind a jump; from one end of a cycle to another it has 2.57 to 3.21",
+    "checks that do not hold": (1, "not known why: a jump loses contacts, as its page says"),
     "hard case, the same, settled by the history of all 24 cycles: checks that do not hold":
-        "12 % fewer contacts behind a jump; from one end of a cycle to another it has 1.95 to 3.16",
+        (1, "not known why: a jump loses contacts, as its page says"),
 }  # fmt: skip
-"""By the name of a check: why its bar is known to be missed."""
+"""By the name of a check: the value at which its bar is known to be missed, and why."""
+WORSE = 0.1
+"""Part by which a value may be worse than that one and its miss is still called known."""
 
 
 def explained(check: Check) -> Check:
-    """The check with the reason, where it is missed by a known value."""
-    why = WHY.get(check.name, "")
-    return replace(check, why=why) if why and not check.holds and isfinite(check.value) else check
+    """The check with the reason, where it is missed by a value no worse than the known one."""
+    known, why = WHY.get(check.name, (nan, ""))
+    least = check.bar.startswith(">")
+    worst = known * (1 - WORSE if least else 1 + WORSE)
+    as_known = check.value >= worst if least else check.value <= worst
+    return replace(check, why=why) if not check.holds and as_known else check
 
 
 def study_checks(sections: Sequence[Section] = SECTIONS) -> list[tuple[Section, list[Check]]]:

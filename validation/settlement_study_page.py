@@ -13,7 +13,7 @@ from validation.case import Check, checks_told
 from validation.page_text import page_filled, table
 from validation.settlement_study import Section, study_checks
 from validation.settlement_study_beds import chosen_told
-from validation.settlement_study_pareto import pareto_of
+from validation.settlement_study_pareto import HEAD_PARETO, pareto_of
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "settlement-study.md"
@@ -51,7 +51,7 @@ def page(judged: Sequence[tuple[Section, Sequence[Check]]]) -> str:
         "TOLD": checks_told(every),
         "CHOSEN": chosen_told(),
         "SECTIONS": "\n".join(section_told(*one) for one in judged),
-        "PARETO": table(["bed", "way", "gained time, %", "bias, %"], lines),
+        "PARETO": table(HEAD_PARETO, lines),
     }
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)
 

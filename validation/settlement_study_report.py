@@ -15,7 +15,7 @@ from validation.settlement_rivals_picture import draw
 from validation.settlement_rivals_studies import STUDIES
 from validation.settlement_study import SECTIONS, Section
 from validation.settlement_study_beds import chosen_told
-from validation.settlement_study_pareto import pareto_of
+from validation.settlement_study_pareto import HEAD_PARETO, pareto_of
 
 HEAD = ("bar", "value", "asked", "", "page", "why it is missed")
 WORDS = frozenset({0, 3, 4, 5})
@@ -103,7 +103,7 @@ def work_precision(name: str) -> str:
     best = table(
         "Ways that no other beats in bias over the total settlement and gained time; laws leave no "
         "bed",
-        ("way", "gained time, %", "bias, %"),
+        HEAD_PARETO[1:],
         ([escape(cell) for cell in line] for line in pareto_of(name)),
     )
     return drawn + best

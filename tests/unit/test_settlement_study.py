@@ -16,7 +16,7 @@ from validation.case import Check, checks_table, checks_told
 from validation.settlement_rivals_picture import draw
 from validation.settlement_rivals_runs import record_read
 from validation.settlement_rivals_studies import STUDIES
-from validation.settlement_study import SECTIONS, absence, explained
+from validation.settlement_study import SECTIONS, WHY, absence, explained
 from validation.settlement_study_beds import CHOSEN, confined_checks, ensemble_checks
 from validation.settlement_study_pareto import pareto
 from validation.settlement_study_parts import hard_checks
@@ -118,6 +118,22 @@ def test_either_bar_of_the_bias_is_enough_and_one_has_to_be_met() -> None:
     assert not missed.holds
 
 
+def test_a_miss_is_known_only_up_to_what_was_known() -> None:
+    """A tenth worse than the value of `WHY` at most, on either side of a bar."""
+    (gained, _), (turned, _) = (
+        WHY[f"partial: {of}"] for of in ("gained time", "elastic deflection")
+    )
+    for name, bar, value, known in (
+        ("gained time", ">= 300", 0.95 * gained, True), ("gained time", ">= 300", 0.0, False),
+        ("elastic deflection", "<= 2", 1.05 * turned, True),
+        ("elastic deflection", "<= 2", 1.15 * turned, False),
+        ("gained time", ">= 300", float("nan"), False),
+    ):  # fmt: skip
+        found = explained(Check(f"partial: {name}", value, bar, False))
+        assert found.known == known
+    assert not explained(Check("a name that is not there", 0.0, ">= 1", False)).known
+
+
 def test_a_hard_case_that_goes_wrong_or_is_lacking_does_not_hold() -> None:
     """Rows in which all checks hold: one of them goes wrong, another is lacking."""
     rows = [
@@ -149,11 +165,13 @@ def test_absent_record_is_told_in_a_sentence(tmp_path: Path) -> None:
 def test_no_way_on_the_front_is_beaten() -> None:
     """Figures of made rows: one nearer, one cheaper, one neither."""
     truth = {"part": "reference", "method": "every cycle", "seed": 1, "member": 0, "last": 9,
-             "settlement": {"9": 1.0}, "begun": 1.0, "cpu_s": 100.0}  # fmt: skip
+             "settlement": {"9": 1.0}, "begun": 1.0, "cpu_s": 100.0, "computed": 10,
+             "steps_per_cycle": 1}  # fmt: skip
     ways = {"near": (1.01, 50.0), "cheap": (1.5, 10.0), "beaten": (1.6, 20.0)}
     rows = [truth | {"member": 1}, truth] + [
         {"part": "rivals", "method": name, "seed": 1, "member": 0, "last": 9,
-         "settlement": {"9": settled}, "cpu_s": cpu_s}
+         "settlement": {"9": settled}, "cpu_s": cpu_s, "cost": {"engine": cpu_s},
+         "computed": cpu_s / 10}
         for name, (settled, cpu_s) in ways.items()
     ]  # fmt: skip
     found = pareto(rows, [*ways, "never run"], 9)
