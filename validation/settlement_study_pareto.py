@@ -28,7 +28,10 @@ def pareto(rows: Sequence[Row], methods: Sequence[str], last: int) -> list[Figur
         for name in methods
         if {row["seed"] for row in finished(rows, name, last)} == packings
     ]
-    return sorted((one for one in found if not beaten(one, found)), key=lambda one: one[1])
+    comparable = [one for one in found if one[1] == one[1]]
+    return sorted(
+        (one for one in comparable if not beaten(one, comparable)), key=lambda one: one[1]
+    )
 
 
 def beaten(one: Figures, others: Sequence[Figures]) -> bool:
