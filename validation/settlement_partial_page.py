@@ -152,6 +152,21 @@ def table_packings(rows: Sequence[Row], last: int = STUDY.last) -> str:
     return table(head, lines)
 
 
+def shortly_told(rows: Sequence[Row], last: int = STUDY.last) -> dict[str, str]:
+    """Gained time, error over the total and packing 2's error [um] of the run that waits least."""
+    name = STUDY.methods[-1].name
+    mean = float(np.mean(list(errors(rows, name, last).values())))
+    figure = FIGURES["settlement"]
+    mine, truth = (
+        means_by_seed(each, figure) for each in (finished(rows, name, last), reference(rows, last))
+    )
+    return {
+        "SHORT_GAINED": f"{gained_time(rows, name, last):.0f}",
+        "SHORT_ERROR": f"{abs(mean):.1f}",
+        "SHORT_OFF": f"{1e6 * (mine[2] - truth[2]):.0f}",
+    }
+
+
 def members_apart(rows: Sequence[Row], last: int = STUDY.last) -> list[float]:
     """By how much the full runs of each packing that has two part in settlement [m]."""
     found = runs_by_packing(reference(rows, last), "settlement")
@@ -169,7 +184,7 @@ def page(rows: Sequence[Row], record: EnsembleRecord) -> str:
         "CLAIMS": table_claims(rows, record), "PACKINGS": table_packings(rows),
         "BARS": way(text), "BEARING": table_bearing(record),
         "SEATING": table_seating(record), "WAITS": table_waits(record),
-        "HUNG": f"{HUNG:g}", "LAST": str(last), "K_I": str(STUDY.kind.k_i),
+        **shortly_told(rows), "HUNG": f"{HUNG:g}", "LAST": str(last), "K_I": str(STUDY.kind.k_i),
         "HALF": f"{1e6 * settlement_of(rows, last).half_given:.0f}",
         "APART": ", ".join(f"{1e6 * one:.0f}" for one in members_apart(rows)),
         "TOTAL": f"{1e6 * settlement_total(rows, last):.0f}", "MEAN": f"{1e6 * begun.mean:.0f}",
