@@ -5,8 +5,9 @@ A table of docs/jump-history.md, and figures of docs/jump-control.md, from the r
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -29,7 +30,8 @@ class Behind:
     """A jump of a run and the cycles on both sides of it."""
 
     run: str
-    """Runs scatter by themselves, jumps of one do not."""
+    packing: str
+    """Packings scatter by themselves; runs of one and jumps of a run do not."""
     first: int
     """Cycle at whose end it begins,"""
     last: int
@@ -40,6 +42,8 @@ class Behind:
     """Settlement of each of the last cycles before it [m], shape (b,)."""
     after: FloatArray
     """The same of the first cycles behind it [m], shape (a,)."""
+    unmoved: float = 0.0
+    """What the first cycle behind a jump of this packing settles more with nothing moved [m]."""
 
     @property
     def more(self) -> FloatArray:
@@ -64,9 +68,20 @@ def of_rivals(study: str, method: str) -> list[Behind]:
         for sides, gain in zip(row["sides"], moved, strict=True):
             before, after = (np.array(sides[side]["settlement"]) for side in ("before", "after"))
             known = before[np.isfinite(before)]  # the first cycle behind k_i has none before it
-            name = f"{row['seed']}-{row['member']}"
-            found.append(Behind(name, sides["first"], sides["last"], gain, known, after))
+            packing, first, last = str(row["seed"]), sides["first"], sides["last"]
+            run = f"{packing}-{row['member']}"
+            found.append(Behind(run, packing, first, last, gain, known, after))
     return found
+
+
+def beside_unmoved(study: str, method: str, still: str) -> list[Behind]:
+    """The same, with what jumps of a way that moves nothing settle more, by packing."""
+    more = defaultdict(list)
+    for one in of_rivals(study, still):
+        more[one.packing].append(one.more[0])
+    return [
+        replace(one, unmoved=float(np.mean(more[one.packing]))) for one in of_rivals(study, method)
+    ]
 
 
 def of_convergence(ways: Sequence[str]) -> list[Behind]:
@@ -76,7 +91,8 @@ def of_convergence(ways: Sequence[str]) -> list[Behind]:
 
 
 def jumps_of(run: str, rows: Sequence[Sequence[Any]]) -> Iterator[Behind]:
-    """Jumps among rows (cycle, what it is, settlement [m], ...); "j" is the end of a jump."""
+    """Jumps among rows (cycle, what it is, settlement [m], ...); "j" is the end of a jump.  All
+    are of one packing, so runs stand in for packings."""
     cycle = [row[0] for row in rows]
     settlement = np.array([row[2] for row in rows])
     ends = [place for place, row in enumerate(rows) if row[1] == "j"]
@@ -86,7 +102,7 @@ def jumps_of(run: str, rows: Sequence[Sequence[Any]]) -> Iterator[Behind]:
         before = np.diff(settlement[begin:place])[-CYCLES:]
         after = np.diff(settlement[place:stop])[:CYCLES]
         moved = float(settlement[place] - settlement[place - 1])
-        yield Behind(run, cycle[place - 1], cycle[place], moved, before, after)
+        yield Behind(run, run, cycle[place - 1], cycle[place], moved, before, after)
 
 
 @dataclass(frozen=True)
@@ -108,22 +124,31 @@ RIVALS = (
     (PAPER_SCALE, f"{PROFILE}, 3 growing", "confined", "3 growing jumps, by history, profile"),
     ("partial", f"{SMOOTHED}, 1 jump", "partial", "1 jumps, by history"),
     ("partial", f"{PROFILE}, 1 jump", "partial", "1 jumps, by history, profile"),
-    ("coarse", STILL_COARSE, "coarse", "10 jumps, nothing moved"),
-    ("coarse", TOLERANCE, "coarse", "tolerance 0.1"),
-    ("coarse", f"{SMOOTHED}, 5 equal", "coarse", "5 jumps, by history"),
-    ("coarse", f"{PROFILE}, 5 equal", "coarse", "5 jumps, by history, profile"),
 )
 """Bed, jumps in words, study of rivals, name there."""
+STILL_NAME = "10 jumps, nothing moved"
+RIVALS_COARSE = (
+    (TOLERANCE, "tolerance 0.1"),
+    (f"{SMOOTHED}, 5 equal", "5 jumps, by history"),
+    (f"{PROFILE}, 5 equal", "5 jumps, by history, profile"),
+)
+"""Jumps of the coarse bed in words, name in its study."""
 WAYS = (
     Way(PAPER_SCALE, LAW, partial(of_convergence, JUMPED)),
     Way(PAPER_SCALE, LAW_STILL, partial(of_convergence, (STILL,))),
     *(Way(bed, words, partial(of_rivals, *where)) for bed, words, *where in RIVALS),
+    Way("coarse", STILL_COARSE, partial(of_rivals, "coarse", STILL_NAME)),
+    *(
+        Way("coarse", words, partial(beside_unmoved, "coarse", name, STILL_NAME))
+        for words, name in RIVALS_COARSE
+    ),
 )
 
 
 def first_share(jumps: Sequence[Behind]) -> float:
-    """What first cycles behind jumps settle more, over what the beds were moved by [-]."""
-    return float(sum(one.more[0] for one in jumps) / sum(one.moved for one in jumps))
+    """What first cycles behind jumps settle more than with nothing moved, over what the beds were
+    moved by [-]."""
+    return float(sum(one.more[0] - one.unmoved for one in jumps) / sum(one.moved for one in jumps))
 
 
 def later_share(jumps: Sequence[Behind]) -> float:
@@ -136,10 +161,10 @@ def later_share(jumps: Sequence[Behind]) -> float:
 def with_error(
     jumps: Sequence[Behind], share: Callable[[Sequence[Behind]], float]
 ) -> tuple[float, float]:
-    """A share and its standard error, by leaving out one run at a time (jackknife)."""
-    runs = dict.fromkeys(one.run for one in jumps)
-    without = np.array([share([one for one in jumps if one.run != run]) for run in runs])
-    error = np.sqrt((len(runs) - 1) * without.var())
+    """A share and its standard error, by leaving out one packing at a time (jackknife)."""
+    packings = dict.fromkeys(one.packing for one in jumps)
+    without = np.array([share([one for one in jumps if one.packing != name]) for name in packings])
+    error = np.sqrt((len(packings) - 1) * without.var())
     return share(jumps), float(error)
 
 

@@ -170,6 +170,7 @@ def draw(found: Sequence[Forecasts], target: Path) -> None:
 
 def page(found: Sequence[Forecasts], record: EnsembleRecord) -> str:
     """The page of a study."""
+    still = way_jumps("coarse", STILL_COARSE)
     parts = {
         "ERRORS": table_errors(found, False),
         "ERRORS_MOVED": table_errors(found, True),
@@ -178,7 +179,8 @@ def page(found: Sequence[Forecasts], record: EnsembleRecord) -> str:
         "LAYERS": table_layers(record),
         "BEHIND": table_behind(),
         **shares_told("LAW", "PROFILE"),
-        "STILL_FIRST": f"{1e6 * mean_first(way_jumps('coarse', STILL_COARSE)):.0f}",
+        "STILL_FIRST": f"{1e6 * mean_first(still):.0f}",
+        "STILL_MORE": f"{1e6 * np.mean([one.more[0] for one in still]):.0f}",
         "K": str(FIRST_WINDOW),
         "HEALING": str(HEALING),
         "FIRST_CYCLE": f"{FIRST_CYCLE:g}",

@@ -6,12 +6,13 @@ bursts included; it parts from the run that jumps by chaos, too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
-from itertools import pairwise
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 from adapters.jump_band import band_of
 from adapters.jump_control import Settings
@@ -31,6 +32,13 @@ def share(part: int, whole: int) -> str:
     return f"{part} of {whole} ({100 * part / whole:.0f} %)" if whole else "none"
 
 
+def share_interval(held: Sequence[bool]) -> str:
+    """14 of 17 (82 %, 95 % interval 57 to 96 %): Clopper and Pearson's, of independent trials."""
+    found = binomtest(sum(held), len(held)).proportion_ci()
+    said = share(sum(held), len(held)).removesuffix(")")
+    return f"{said}, 95 % interval {100 * found.low:.0f} to {100 * found.high:.0f} %)"
+
+
 def settlement_of(run: dict[str, Any]) -> float:
     """Settlement at the last cycle of a run of the record [m]."""
     return float(run["rows"][-1][2])
@@ -38,8 +46,8 @@ def settlement_of(run: dict[str, Any]) -> float:
 
 def liggghts_error(run: dict[str, Any], runs: Rows) -> float | None:
     """Against the full run of the same seed; None where that is not there yet."""
-    full = [one for one in runs if one["way"] == "full" and one["seed"] == run["seed"]]
-    return settlement_of(run) / settlement_of(full[0]) - 1 if full else None
+    full = full_run(run["seed"], runs)
+    return float(settlement_of(run) / full.path[-1] - 1) if full is not None else None
 
 
 def band_of_record(run: dict[str, Any]) -> Any:
@@ -79,16 +87,28 @@ def overspend(run: dict[str, Any], runs: Rows) -> float | None:
     return float((run["computed"] + lost) / oracle_computed(tuple(full.path), tolerance_of(run)))
 
 
+def spans(run: dict[str, Any]) -> Iterator[tuple[int, int, float, float]]:
+    """Of each jump with the healing cycles behind it, what the tolerance bounds: first and last
+    cycle N and N + h + m, what the run gains between them and its settlement behind them [m]."""
+    rows = run["rows"]
+    for place, row in enumerate(rows):
+        if row[1] != "j":
+            continue
+        begin = rows[place - 1]
+        *_, end = (row, *takewhile(lambda one: one[1] == "h", rows[place + 1 :]))
+        yield begin[0], end[0], end[2] - begin[2], end[2]
+
+
 def realised(run: dict[str, Any], runs: Rows) -> list[bool]:
-    """Of each jump: whether its gain is that of the full run between the same cycles, to within the
-    tolerance of what the run has settled behind it; the chaos between the two counts as error."""
-    full, rows = full_run(run["seed"], runs), run["rows"]
+    """Of each jump: whether its gain, healing cycles included, is that of the full run between the
+    same cycles, to within the tolerance of what the run has settled behind them; the chaos between
+    the two counts as error."""
+    full = full_run(run["seed"], runs)
     if full is None:
         return []
     return [
-        abs(row[2] - before[2] - full.mean(before[0], row[0])) <= tolerance_of(run) * abs(row[2])
-        for before, row in pairwise(rows)
-        if row[1] == "j"
+        abs(gained - full.mean(first, last)) <= tolerance_of(run) * abs(settled)
+        for first, last, gained, settled in spans(run)
     ]
 
 
@@ -103,10 +123,10 @@ def chaos_within(these: Rows, record: EnsembleRecord) -> list[bool]:
             Measured(np.array([0.0, *_settlement(Piece(COARSE, run["seed"], member), record)]))
             for member in range(2)
         )
-        for before, row in pairwise(run["rows"]):
-            if row[1] == "j" and before[0] >= COARSE.k_i:
-                apart = one.mean(before[0], row[0]) - other.mean(before[0], row[0])
-                held.append(abs(apart) <= tolerance_of(run) * one.path[row[0]])
+        for first, last, *_ in spans(run):
+            if first >= COARSE.k_i:
+                apart = one.mean(first, last) - other.mean(first, last)
+                held.append(bool(abs(apart) <= tolerance_of(run) * abs(one.path[last])))
     return held
 
 
@@ -115,14 +135,25 @@ def _settlement(piece: Piece, record: EnsembleRecord) -> FloatArray:
     return np.asarray(record.since_rain(piece.packing.name, piece.name)["settlement"])
 
 
-def chaos_told(runs: Rows, record: EnsembleRecord) -> str:
-    """`chaos_within` of the ways by tolerance."""
-    found = {
-        way.name: chaos_within([run for run in runs if run["way"] == way.name], record)
-        for way in jump_runs.STUDY.ways
-        if way.name.startswith("tolerance")
-    }
-    return " and ".join(f"{share(sum(held), len(held))} at {name}" for name, held in found.items())
+def ways_within(runs: Rows, within: Callable[[Rows], list[bool]]) -> dict[str, list[bool]]:
+    """Of each way by tolerance, what ``within`` says of the jumps of its runs."""
+    ways = [way.name for way in jump_runs.STUDY.ways if way.name.startswith("tolerance")]
+    return {way: within([run for run in runs if run["way"] == way]) for way in ways}
+
+
+def jumps_realised(runs: Rows) -> dict[str, list[bool]]:
+    """`realised`, by way."""
+    return ways_within(runs, lambda these: [one for run in these for one in realised(run, runs)])
+
+
+def jumps_chaos(runs: Rows, record: EnsembleRecord) -> dict[str, list[bool]]:
+    """`chaos_within`, by way."""
+    return ways_within(runs, lambda these: chaos_within(these, record))
+
+
+def ways_told(found: dict[str, list[bool]]) -> str:
+    """Shares and their intervals, by way."""
+    return " and ".join(f"{share_interval(held)} at {way}" for way, held in found.items())
 
 
 def liggghts_table(runs: Rows) -> str:
@@ -130,11 +161,10 @@ def liggghts_table(runs: Rows) -> str:
     lines = []
     for run in runs:
         error, band = liggghts_error(run, runs), band_of_record(run)
-        full = [one for one in runs if one["way"] == "full" and one["seed"] == run["seed"]]
+        full = full_run(run["seed"], runs)
         inside = ""
-        if band is not None and full:
-            truth = settlement_of(full[0])
-            inside = "yes" if band.low <= truth <= band.high else "**no**"
+        if band is not None and full is not None:
+            inside = "yes" if band.low <= full.path[-1] <= band.high else "**no**"
         lost = sum(one["lost_cycles"] for one in run["lost"])
         lines.append(
             [

@@ -11,7 +11,15 @@ import numpy as np
 
 from validation import jump_runs, jump_study
 from validation.jump_history_behind import TOLD, shares_told
-from validation.jump_liggghts import Rows, chaos_told, liggghts_table, liggghts_told, share
+from validation.jump_liggghts import (
+    Rows,
+    jumps_chaos,
+    jumps_realised,
+    liggghts_table,
+    liggghts_told,
+    share,
+    ways_told,
+)
 from validation.jump_reading import (
     BAR,
     bursty,
@@ -211,7 +219,8 @@ def page(rows: Rows, runs: Rows) -> str:
         "measured": measured_table(rows),
         "liggghts": liggghts_table(runs),
         "liggghts_told": liggghts_told(runs),
-        "liggghts_chaos": chaos_told(runs, EnsembleRecord()),
+        "liggghts_realised": ways_told(jumps_realised(runs)),
+        "liggghts_chaos": ways_told(jumps_chaos(runs, EnsembleRecord())),
         "liggghts_k_i": str(jump_runs.STUDY.k_i),
         "liggghts_last": str(jump_runs.STUDY.last),
         "add_up": (

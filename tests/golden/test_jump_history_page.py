@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -25,6 +26,7 @@ from validation.jump_history_behind import (
     PAPER_SCALE,
     STILL_COARSE,
     TOLD,
+    TOLERANCE,
     Behind,
     first_share,
     later_share,
@@ -147,6 +149,13 @@ def test_sentences_about_cycles_behind_jumps() -> None:
     coarse, paper = way_jumps("coarse", STILL_COARSE), way_jumps(PAPER_SCALE, LAW_STILL)
     before = np.mean([one.before.mean() for one in coarse])
     assert mean_first(coarse) > 3 * before
+    tolerance = way_jumps("coarse", TOLERANCE)
+    assert (
+        0
+        < first_share(tolerance)
+        < 0.15
+        < sum(t.more[0] for t in tolerance) / sum(t.moved for t in tolerance)
+    )
     assert mean_first(paper) < np.mean([one.before.mean() for one in paper])
 
 
@@ -157,6 +166,21 @@ def test_a_bed_made_to_settle_more_is_read_so() -> None:
     before = a / (100 - 9 + n - 1)
     after = a / (300 + n) + 0.1 * moved / n
     after[0] = a / 301 + 0.2 * moved
-    jump = Behind("", 100, 300, moved, before, after)
+    jump = Behind("", "", 100, 300, moved, before, after)
     assert first_share([jump]) == pytest.approx(0.2, abs=1e-3)
     assert later_share([jump]) == pytest.approx(0.1, abs=1e-3)
+    assert first_share([replace(jump, unmoved=0.15 * moved)]) == pytest.approx(0.05, abs=1e-3)
+
+
+def test_an_error_counts_packings() -> None:
+    """Shares 0 and .2 of two packings: .1, and the standard error of two readings; more runs of
+    the same tell no more."""
+    a, n = 2e-5, np.arange(1.0, 11.0)
+    jumps = []
+    for run, packing in product(range(3), range(2)):
+        after = a / (300 + n)
+        after[0] += 0.2 * packing * 1e-5
+        name = f"{packing}-{run}"
+        jumps.append(Behind(name, str(packing), 100, 300, 1e-5, a / (90 + n), after))
+    share, error = with_error(jumps, first_share)
+    assert (share, error) == pytest.approx((0.1, 0.1), abs=1e-3)
