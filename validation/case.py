@@ -34,7 +34,7 @@ class Check:
     page: str = ""
     """Page that shows the value, such as ``docs/laws.md``; empty where there is none."""
     why: str = ""
-    """Why the bar is known to be missed; empty for one that is to hold."""
+    """Why a bar that is known to be missed is, or that this is not known; else empty."""
     section: str = ""
     """Part of the case's report that it belongs to; empty where there are no parts."""
 
@@ -58,7 +58,7 @@ class Check:
 
     @property
     def known(self) -> bool:
-        """True when a finite value misses the bar and it is told why: told, but no failure."""
+        """True when a finite value misses the bar and `why` tells of it: told, but no failure."""
         return bool(self.why) and not self.holds and isfinite(self.value)
 
     @property
@@ -123,7 +123,7 @@ def checks_table(checks: Sequence[Check]) -> str:
             check.name,
             f"{check.value:.4g} {check.unit}".rstrip(),
             f"bar {check.asked}",
-            f"known: {check.why}" if check.known else "",
+            check.why if check.known else "",
         )
         for check in checks
     ]

@@ -68,7 +68,7 @@ def test_known_misses_are_missed_and_others_fail() -> None:
     assert [one.verdict for one in (MET, KNOWN, lost, told)] == ["met", "missed", "FAILS", ""]
     lines = checks_table([MET, KNOWN, replace(KNOWN, why="")]).splitlines()
     assert [line.split()[0] for line in lines] == ["ok", "missed", "FAILS"]
-    assert lines[1].endswith("known: there is a reason")
+    assert lines[1].endswith("  there is a reason")
     said = checks_told([MET, KNOWN, lost, told])
     assert said == "Of 3 bars 1 are met and 1 are known to be missed; 1 fail."
 
