@@ -34,7 +34,7 @@ class Check:
     page: str = ""
     """Page that shows the value, such as ``docs/laws.md``; empty where there is none."""
     why: str = ""
-    """Why the bar is known to be missed; empty for one that is to hold."""
+    """Why a bar that is known to be missed is, or that this is not known; else empty."""
     section: str = ""
     """Part of the case's report that it belongs to; empty where there are no parts."""
 
@@ -44,6 +44,13 @@ class Check:
         return self.bar not in TOLD
 
     @property
+    def verdict(self) -> str:
+        """``met``, ``missed`` where that is known, or ``FAILS``; empty for a value only told."""
+        if not self.holds:
+            return "missed" if self.known else "FAILS"
+        return "met" if self.barred else ""
+
+    @property
     def asked(self) -> str:
         """The bar with its unit behind the number; words alone where it has none."""
         bound = re.match(r"[<>=]=? ?[^\s,]*\d(?=$|[\s,]\D)|.*\d$", self.bar)
@@ -51,7 +58,7 @@ class Check:
 
     @property
     def known(self) -> bool:
-        """True when a finite value misses the bar and it is told why: told, but no failure."""
+        """True when a finite value misses the bar and `why` tells of it: told, but no failure."""
         return bool(self.why) and not self.holds and isfinite(self.value)
 
     @property
@@ -100,10 +107,10 @@ def record_write(path: Path, content: dict[str, Any]) -> None:
 
 
 def checks_told(checks: Sequence[Check]) -> str:
-    """How many bars there are, how many are met, and how many missed, in a sentence."""
+    """How many bars there are, how many are met, and how many known to be missed, in a sentence."""
     bars = [check for check in checks if check.barred]
     met, known = (sum(getattr(check, what) for check in bars) for what in ("holds", "known"))
-    said = f"Of {len(bars)} bars {met} are met and {known} missed for a reason that is known"
+    said = f"Of {len(bars)} bars {met} are met and {known} are known to be missed"
     failing = len(bars) - met - known
     return f"{said}; {failing} fail." if failing else f"{said}."
 
@@ -112,11 +119,11 @@ def checks_table(checks: Sequence[Check]) -> str:
     """The checks as text, a line each."""
     rows = [
         (
-            "ok" if check.holds else "missed" if check.known else "FAILS",
+            "ok" if check.holds else check.verdict,
             check.name,
             f"{check.value:.4g} {check.unit}".rstrip(),
             f"bar {check.asked}",
-            f"known: {check.why}" if check.known else "",
+            check.why if check.known else "",
         )
         for check in checks
     ]

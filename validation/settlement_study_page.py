@@ -11,7 +11,7 @@ from pathlib import Path
 from adapters.run_folder import write_atomically
 from validation.case import Check, checks_told
 from validation.page_text import page_filled, table
-from validation.settlement_study import Section, study_checks
+from validation.settlement_study import WORSE, Section, study_checks
 from validation.settlement_study_beds import chosen_told
 from validation.settlement_study_pareto import HEAD_PARETO, pareto_of
 
@@ -19,19 +19,15 @@ TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "settlement-study.md"
 
 
-def said(check: Check) -> str:
-    """Whether a bar is met, and why not; nothing for a value that is only told."""
-    if check.holds:
-        return "met" if check.barred else ""
-    return f"**missed**: {check.why}" if check.known else "**fails**"
-
-
 def table_checks(checks: Sequence[Check]) -> str:
-    """A line a check."""
+    """A line a check; why a bar is missed behind its verdict."""
     lines = [
-        [check.name, f"{check.value:.4g} {check.unit}".rstrip(), check.asked, said(check)]
+        [
+            check.name, f"{check.value:.4g} {check.unit}".rstrip(), check.asked,
+            check.verdict if check.holds else f"**{check.verdict}**: {check.why}".rstrip(": "),
+        ]
         for check in checks
-    ]
+    ]  # fmt: skip
     return table(["bar", "value", "asked", ""], lines)
 
 
@@ -50,6 +46,7 @@ def page(judged: Sequence[tuple[Section, Sequence[Check]]]) -> str:
     parts = {
         "TOLD": checks_told(every),
         "CHOSEN": chosen_told(),
+        "WORSE": f"{100 * WORSE:.0f}",
         "SECTIONS": "\n".join(section_told(*one) for one in judged),
         "PARETO": table(HEAD_PARETO, lines),
     }

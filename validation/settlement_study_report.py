@@ -74,18 +74,12 @@ def checks_table(checks: Sequence[Check]) -> str:
     rows = [
         [
             escape(check.name), f"{plain(check.value, '.4g')} {escape(check.unit)}".rstrip(),
-            escape(check.asked), said(check), escape(check.page), escape(check.why),
+            escape(check.asked), f'<span class="{"yes" if check.holds else "no"}">'
+            f"{check.verdict}</span>", escape(check.page), escape(check.why),
         ]
         for check in checks
     ]  # fmt: skip
     return table("", HEAD, rows, words=WORDS)
-
-
-def said(check: Check) -> str:
-    """Whether a bar is met; nothing for a value without one."""
-    if not check.holds:
-        return f'<span class="no">{"missed" if check.known else "FAILS"}</span>'
-    return '<span class="yes">met</span>' if check.barred else ""
 
 
 def work_precision(name: str) -> str:

@@ -2,12 +2,43 @@
 
 from __future__ import annotations
 
+import re
+
+import numpy as np
 import pytest
 
+from validation import jump_runs, settlement_hard_runs
 from validation.case import Check
-from validation.settlement_bars import BARS, BARS_CONTINUITY, BARS_PARTIAL, told
+from validation.jump_liggghts import chaos_within
+from validation.jump_reading import BAR
+from validation.settlement_bars import (
+    BARS,
+    BARS_CONTINUITY,
+    BARS_PARTIAL,
+    jumps_of,
+    sides_compared,
+    told,
+)
+from validation.settlement_ensemble import COARSE, PARTIAL, Kind
+from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_hard_page import failing
 from validation.settlement_partial_page import way
-from validation.settlement_study import WHY, Section, study_checks
+from validation.settlement_rivals import HEALING
+from validation.settlement_rivals_continuity import change_of
+from validation.settlement_rivals_reading import judged as judged_of
+from validation.settlement_rivals_runs import record_read
+from validation.settlement_rivals_studies import STUDIES
+from validation.settlement_study import (
+    CHAOS,
+    LATE,
+    MEET,
+    MISS,
+    RATE,
+    SWING,
+    WHY,
+    Section,
+    study_checks,
+)
 from validation.settlement_study_beds import BEDS, CHOSEN, FAR_PAGE, PARTLY, RIVALS
 from validation.settlement_study_page import PAGE, page
 
@@ -40,9 +71,65 @@ def test_names_are_told_apart_and_pages_are_there(
 def test_every_missed_bar_has_a_reason_and_every_reason_a_missed_bar(
     checks: dict[str, Check],
 ) -> None:
-    """No miss without its reason, and no reason that outlives its miss."""
+    """No miss without its reason, no reason that outlives its miss, and the value that is known is
+    the record's; reasons have no figures of their own."""
     assert {name for name, check in checks.items() if not check.holds} == set(WHY)
     assert all(check.known for check in checks.values() if not check.holds)
+    for name, (known, why) in WHY.items():
+        assert known == pytest.approx(checks[name].value, rel=0.01)
+        assert not re.search(r"\d", why)
+
+
+def test_reasons_say_of_full_runs_what_the_records_say(checks: dict[str, Check]) -> None:
+    """Where they stand beside the bar: that they meet it, or miss it, too."""
+    missed = [check for check in checks.values() if not check.holds and "full runs" in check.bar]
+    assert len(missed) > 8
+    for check in missed:
+        bound, full = map(float, re.findall(r"\d+", check.bar))
+        assert (MEET in check.why, MISS in check.why) == (full >= bound, full < bound)
+
+
+@pytest.mark.parametrize(
+    ("bed", "kind", "reason"), [("partial", PARTIAL, LATE), ("far", COARSE, RATE)]
+)
+def test_bars_that_are_missed_with_nothing_moved_too(bed: str, kind: Kind, reason: str) -> None:
+    """As their reason says; that of the partial bed says that beds settle more than full runs."""
+    study = STUDIES[bed]
+    rows = sides_compared(record_read(study.record), kind, EnsembleRecord())
+    (still,) = (one.name for one in study.methods if one.name.endswith("nothing moved"))
+    bars = [bar for bar in BARS_CONTINUITY if reason in WHY.get(f"{BEDS[bed]}: {bar.words}", ())]
+    assert len(bars) > 1
+    assert not any(bar.met(bar.value(rows, still, study.last)) for bar in bars)
+    if reason == LATE:
+        for jump in (*jumps_of(rows, still, study.last), *jumps_of(rows, CHOSEN[bed], study.last)):
+            for skipped in (1, HEALING):
+                full = [change_of(one, "settlement", skipped) for one in jump["others"]]
+                assert change_of(jump, "settlement", skipped) > np.mean(full)
+
+
+def test_chaos_swings_and_scatter_are_what_reasons_say() -> None:
+    """Full runs beside full runs miss the bar; contacts swing by more than a jump changes them; no
+    deflection is told from none; the packings whose piston is carried miss it, too."""
+    runs, record = jump_runs.record_read(), EnsembleRecord()
+    for one in ("tolerance 0.05", "tolerance 0.1"):
+        assert WHY[f"jump control on LIGGGHTS, {one}: as the full run gained"][1] == CHAOS
+        assert np.mean(chaos_within([run for run in runs if run["way"] == one], record)) < BAR
+    wrong = [row for row in settlement_hard_runs.record_read() if failing(row)]
+    assert len(wrong) == [why for _, why in WHY.values()].count(SWING)
+    for row in wrong:
+        (change,) = (check["value"] for check in row["checks"] if not check["ok"])
+        computed = np.diff([0, *row["figures"]["cycle"]]) == 1
+        ends = np.array(row["figures"]["coordination"])[computed]
+        assert np.ptp(ends) / ends.mean() > change
+    far, partial = (
+        judged_of(record_read(STUDIES[bed].record), CHOSEN[bed], STUDIES[bed].last, "deflection")
+        for bed in ("far", "partial")
+    )
+    assert far
+    assert partial
+    assert far.half > abs(far.mean)
+    hung = partial.error.argmax()
+    assert 100 * abs(np.delete(partial.error, hung).mean()) > 2
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@
 
 Reference ensemble, the best way of jumping on three beds, laws, jump control, hard cases and
 relaxation, each bar with its value and the page that shows it: ``docs/settlement-study.md``.  A bar
-that is known to be missed is told as missed, with the reason; it does not make the exit code
-non-zero, any other that is missed does.  ``--quick`` changes nothing.
+that is known to be missed is told as missed, with the reason where one is known; it does not make
+the exit code non-zero, any other that is missed does.  ``--quick`` changes nothing.
 """
 
 from __future__ import annotations
