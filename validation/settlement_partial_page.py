@@ -41,6 +41,7 @@ from validation.settlement_rivals import Row
 from validation.settlement_rivals_reading import (
     FIGURES,
     finished,
+    mean_over_packings,
     means_by_seed,
     reference,
 )
@@ -144,7 +145,7 @@ def table_packings(rows: Sequence[Row], last: int = STUDY.last) -> str:
         values = means_by_seed(mine, figure)
         mean, half = interval(list(errors(rows, name).values()))
         lines.append([
-            way(name), f"{np.mean([row['computed'] for row in mine]):.0f}",
+            way(name), f"{mean_over_packings(mine, 'computed'):.0f}",
             f"{gained_time(rows, name, last):.0f} %",
             *(f"{1e6 * values[seed]:.1f}" if seed in values else "-" for seed in truth),
             f"{mean:+.1f} ± {half:.0f} %" if half == half else f"{mean:+.1f} %",

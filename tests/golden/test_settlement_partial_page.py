@@ -99,11 +99,11 @@ def test_sentences_about_runs_that_wait(rows: list[Row]) -> None:
     assert np.mean(list(error.values())) == pytest.approx(2.2, abs=0.05)
     assert interval(list(error.values()))[1] == pytest.approx(5, abs=0.5)
     assert error[2] * settlement_total(rows, LAST) / 100 == pytest.approx(6.3e-6, abs=1e-7)
-    assert gained_time(rows, name, LAST) == pytest.approx(202, abs=0.5)
+    assert gained_time(rows, name, LAST) == pytest.approx(201, abs=0.5)
     assert gained_time_even(rows, name, LAST) == pytest.approx(183, abs=0.5)
     three = "3 jumps, by history"
     assert np.mean(list(errors(rows, three).values())) == pytest.approx(4.6, abs=0.05)
-    assert gained_time(rows, three, LAST) == pytest.approx(147, abs=0.5)
+    assert gained_time(rows, three, LAST) == pytest.approx(146, abs=0.5)
     one = "1 jumps, by history"
     assert np.mean(list(errors(rows, one).values())) == pytest.approx(-10.6, abs=0.05)
     assert all(len(errors(rows, way)) == 5 for way in (name, three, one))
@@ -117,3 +117,19 @@ def test_a_shorter_wait_gains_more_and_errs_by_less_from_where_the_piston_is_car
     assert lines[3] == ["52", "8", "19.6", "308", "+75", "-9", "+20", "-24", "-0.3"]
     assert (lines[6][0], lines[6][3]) == ("64", "264")
     assert max(abs(float(cell)) for line in lines[3:] for cell in line[6:8]) < 30
+
+
+def test_sentences_about_a_run_that_waits_for_four_cycles(rows: list[Row]) -> None:
+    """More than 300 % at equal cost, too, and 7.6 % off: packing 2 jumps from 52 to 90, carried at
+    the end, and settles as much again behind the jump as it moves the bed."""
+    name = "1 jumps, by history, seated for 4"
+    mine = {(row["seed"], row["member"]): row for row in finished(rows, name, LAST)}
+    assert [seed for seed, _ in mine].count(2) == 1
+    assert len({seed for seed, _ in mine}) == 5
+    assert gained_time_even(rows, name, LAST) > 300
+    assert abs(np.mean(list(errors(rows, name).values()))) == pytest.approx(7.6, abs=0.05)
+    hung = mine[2, 0]
+    (side,) = hung["sides"]
+    assert (side["first"], side["last"]) == (52, 90)
+    moved, behind = 1e6 * hung["moved"][0][1], 1e6 * sum(side["after"]["settlement"])
+    assert round(moved) == round(behind) == 37
