@@ -288,9 +288,9 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
         "ratchets or collapses, or half the band is wider than all settlement so far",
     )  # fmt: skip
     parser.add_argument(
-        "--fail-at", type=float, metavar="U",
-        help="settlement or strain of failure, in the series' unit: a prediction that reaches it "
-        "is refused as collapse (exit code 6)",
+        "--fail-at", type=float, metavar="S",
+        help="settlement or strain of failure, in the series' unit, of either sign: a series or a "
+        "prediction that reaches it is refused as collapse (exit code 6)",
     )  # fmt: skip
     parser.add_argument(
         "--to-cycle", type=float, metavar="N", help="cycle to predict; default: the last one given"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from math import isfinite, log, sqrt
 from typing import Any
 
@@ -12,7 +12,7 @@ from adapters.errors import JumpRefused, NotConverged, UsageError
 from adapters.fit_agreement import LawSaid, laws_said
 from adapters.fit_auto import outlook
 from adapters.fit_candidates import ROWS_FEWEST, thinned
-from adapters.fit_refusal import Refusal, failure, refusals
+from adapters.fit_refusal import Refusal, failed, failure, refusals
 from adapters.fit_regime import regimes_of
 from adapters.laws.law import Law
 from adapters.laws.shaped_law import ShapedLaw
@@ -91,7 +91,7 @@ def fit_series(
             remedy="predict less far, or use the law log",
         )
     named = dict(zip(law.parameter_names, map(float, parameters), strict=True))
-    if to_cycle > last and (refusal := failure(prediction, fail_at, to_cycle)):
+    if refusal := failed(cycle, settlement, fail_at) or failure(prediction, fail_at, to_cycle):
         raise _refused(refusal, law.name, named, {})
     return Prediction(law.name, named, prediction, band, series.unit, regime_of(series))
 
@@ -113,11 +113,12 @@ def fit_auto(
     if len(cycle):
         _check_target(float(cycle[-1]), to_cycle, probability, fail_at)
     found = outlook(cycle, settlement[:, None], to_cycle, probability)
+    found = replace(found, settled=np.abs(settlement[:, None] - series.begun).max(axis=0))
     parameters = found.regime[0].parameters()
     prediction = float(found.prediction[0])
     (refusal,) = refusals(found)
-    if refusal is None and to_cycle > found.last_cycle:
-        refusal = failure(prediction, fail_at, to_cycle)
+    told = failed(cycle, settlement, fail_at) or failure(prediction, fail_at, to_cycle)
+    refusal = told or refusal
     said = laws_said(found, refused=refusal is not None)
     if refusal:
         raise _refused(refusal, "auto", parameters, said)

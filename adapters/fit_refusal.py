@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from adapters.fit_auto import Outlook
 from adapters.fit_regime import COLLAPSE, WHY_NOT
+from adapters.state import FloatArray
 
 UNCERTAIN = "uncertain"
 """In the place of a regime: the tail excludes none, and the band says nothing of the size."""
@@ -60,6 +63,21 @@ def _refusal(outlook: Outlook, series: int) -> Refusal | None:
             "measure more cycles, predict less far, or name a law yourself: --law log, power ...",
         )
     return None
+
+
+def failed(cycle: FloatArray, settlement: FloatArray, fail_at: float | None) -> Refusal | None:
+    """Collapse where a series, ``cycle`` and ``settlement`` (k,), has reached the user's bound in
+    the same unit, of either sign: whatever would be predicted then."""
+    reached = np.flatnonzero(np.abs(settlement) >= (np.inf if fail_at is None else fail_at))
+    if not len(reached):
+        return None
+    first = reached[0]
+    return Refusal(
+        COLLAPSE,
+        f"{abs(settlement[first]):.3g} was reached at cycle {cycle[first]:g}, and {fail_at:g} was "
+        "given as failure (--fail-at): it has failed",
+        "leave out what came behind the failure, or give another bound",
+    )
 
 
 def failure(prediction: float, fail_at: float | None, to_cycle: float) -> Refusal | None:

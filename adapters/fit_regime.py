@@ -117,6 +117,10 @@ def independent(residual: FloatArray) -> FloatArray:
     return np.asarray(len(residual) * (1 - alike) / (1 + alike))
 
 
+ROUND_OFF = 1e-12
+"""Relative difference of means of equal readings."""
+
+
 def tail_residual(cycle: FloatArray, displacement: FloatArray, exponent: FloatArray) -> FloatArray:
     """Tail less c + a (N^beta - 1) / beta fitted to it, shape (rows, n), ``exponent`` (n,)."""
     rows = tail_rows(cycle)
@@ -134,7 +138,8 @@ def regimes_of(cycle: FloatArray, displacement: FloatArray) -> list[Regime]:
     some hundred cycles and then shakes down.
     """
     weight = exponent_weights(cycle, displacement)
-    still = np.ptp(displacement[tail_rows(cycle)], axis=0) == 0
+    tail = displacement[tail_rows(cycle)]
+    still = np.ptp(tail, axis=0) <= ROUND_OFF * np.abs(tail).max(axis=0)  # means differ by that
     return [regime_of_weight(*each) for each in zip(weight.T, still, strict=True)]
 
 

@@ -150,7 +150,8 @@ def history_gain(run: Run, bed: Bed, h: int) -> float | None:
     if p.settlement == "law" or h == 0:
         return None
     hung, outcomes = counted_from(run, bed), run.folder.outcomes()
-    begin = hung + max(1, round(SEATING * p.k_i))
+    left_out = max(1, round(SEATING * p.k_i))
+    begin = hung + (min(left_out, p.carried_cycles) if hung else left_out)  # k cycles are left
     known = [
         replace(one, first_cycle=one.first_cycle - hung)
         for one in stretches_of(outcomes, begin, bed.cycle, left_out=1)

@@ -22,6 +22,7 @@ from adapters.jump_forecast import forecast_of
 from adapters.jump_rates import Stretch, rates_of
 from adapters.jump_record import CHECK, DECISION
 from adapters.jump_seating import seat, warn_if_hung
+from adapters.jump_slopes import Landing, slopes_of, unmoved
 from adapters.report_history import cost_total
 from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
@@ -31,7 +32,8 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
     """From the bed after k_i cycles to the end: windows and jumps as the controller decides.
 
     Where jumps wait for a piston that hangs, nothing of the cycles before is known to it behind.
-    Raises `JumpRefused` where the bed ratchets or collapses, unless the run was asked to go on.
+    Raises `JumpRefused` where the bed, or a piston on a part of it, ratchets or collapses, unless
+    the run was asked to go on.
     """
     procedure = run.scene.procedure
     assert procedure is not None
@@ -79,7 +81,15 @@ def piston_regime(run: Run, control: Control) -> Regime | None:
     sunk: tuple[Stretch, ...] = ()
     for stretch in stretches_of(lowered, control.stretches[0].first_cycle, control.cycle):
         sunk = joined(sunk, stretch)
-    forecast = forecast_of(rates_of(sunk))
+    return regime_sinking(sunk, control.landings)
+
+
+def regime_sinking(sunk: Sequence[Stretch], landings: Sequence[Landing]) -> Regime | None:
+    """Regime of what a piston has ``sunk`` by, less what it sinks more behind ``landings``: jumps
+    lower it by what they move the mean grain by.  That excess does not fall with N, and would pass
+    for ratcheting where jumps grow.  None where it does not sink."""
+    kappa = slopes_of(sunk, landings).kappa()[0] if landings else 0.0
+    forecast = forecast_of(rates_of([unmoved(one, landings, kappa) for one in sunk]))
     return forecast.regime if forecast.rate @ forecast.weight > 0 else None
 
 

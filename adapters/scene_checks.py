@@ -242,6 +242,8 @@ def _seating(scene: _Values) -> Iterator[Problem]:
     key = "procedure.seating_cycles"
     if _present(scene, key) and scene.get("procedure.seating") in (None, "any"):
         yield Problem(key, 'only a run that waits for its piston counts them: seating = "waits"')
+    elif _present(scene, key) and scene.need(key) >= scene.need("procedure.total_cycles"):
+        yield Problem(key, "with no fewer than total_cycles a run that waits never jumps")
 
 
 def _jammed(scene: _Values) -> Iterator[Problem]:

@@ -27,16 +27,19 @@ class Series:
     """Settlement, positive downwards, in ``unit``, shape (k,)."""
     unit: str = "m"
     """m, cm, mm, um, %, 1 (strain), or `UNKNOWN`."""
+    begun: float = 0.0
+    """Settlement before cycle 0, where that is known, in ``unit``."""
 
     def since(self, cycle: float) -> Series:
         """The rows from ``cycle`` on, to leave out a bedding-in that no law describes."""
         rows = self.cycle >= cycle
-        return Series(self.cycle[rows], self.settlement[rows], self.unit)
+        return Series(self.cycle[rows], self.settlement[rows], self.unit, self.begun)
 
     def after(self, cycle: float) -> Series:
         """The rows behind ``cycle``, counted from there: a load that changed starts a law anew."""
         rows = self.cycle > cycle
-        return Series(self.cycle[rows] - cycle, self.settlement[rows], self.unit)
+        begun = float(self.settlement[~rows][-1]) if not rows.all() else self.begun
+        return Series(self.cycle[rows] - cycle, self.settlement[rows], self.unit, begun)
 
 
 def series_read(
@@ -72,6 +75,8 @@ def series_read(
         )
     if tables:
         path = tables[0]
+        if path.is_dir() and unit not in (None, "m"):
+            raise UsageError(f"a run's settlement is in m, not in {unit}", where=str(path))
         return series_of_table(path / "settlement.csv" if path.is_dir() else path, columns, unit)
     if columns:
         raise UsageError("dumps have no columns of cycles and settlement", where=str(paths[0]))

@@ -36,6 +36,11 @@ NAME_AND_UNIT = re.compile(
 )
 
 
+BRACKETED = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
+"""A unit in brackets, known or not."""
+STRAIN = "strain is told by 1 or %"
+
+
 @dataclass(frozen=True)
 class Table:
     """Rows of text cells, k of them, as long as the header."""
@@ -161,6 +166,8 @@ def _columns(table: Table, names: Sequence[str], told: str | None) -> tuple[dict
 
     ``told`` is the unit that the user gives.
     """
+    if told is not None:
+        told = UNITS.get(told.strip().lower(), told)
     if told is not None and told not in UNITS.values():
         raise UsageError(
             f"{told} is no unit of settlement or strain",
@@ -202,6 +209,15 @@ def _columns(table: Table, names: Sequence[str], told: str | None) -> tuple[dict
             f"the column {table.header[places['settlement']]} is in {unit}, not in {told}",
             where=where,
             remedy="leave --unit out",
+        )
+    title = table.header[places["settlement"]]
+    if told and SETTLEMENT_NAMES.get(name) == "1" and told not in ("1", "%"):
+        raise UsageError(f"the column {title} has no length, {told}", where=where, remedy=STRAIN)
+    if told and not unit and (given := BRACKETED.search(title)):
+        raise UsageError(
+            f"the column {title} is in {given[1]}, which is not known, and not in {told}",
+            where=where,
+            remedy="convert it, or name the column without a unit",
         )
     return places, unit or told or SETTLEMENT_NAMES.get(name, UNKNOWN)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from adapters.dump import Frame, dump_write
 from adapters.errors import TrackbedError, UsageError
-from adapters.settlement_series import series_read
+from adapters.settlement_series import Series, series_read
 
 
 def written(path: Path, text: str) -> Path:
@@ -239,3 +239,39 @@ def test_series_of_unlike_files_is_refused(tmp_path: Path) -> None:
             series_read(paths)
     with pytest.raises(UsageError, match="steps per cycle"):
         series_read([first], steps_per_cycle=0)
+
+
+def test_a_unit_that_the_data_has_is_not_given_another(tmp_path: Path) -> None:
+    """A run's metres, a strain, a unit that nobody knows: refused, not called mm."""
+    run = tmp_path / "run"
+    run.mkdir()
+    rows = "1,0.001\n2,0.002\n"
+    (run / "settlement.csv").write_text("cycle,settlement\n" + rows)
+    assert series_read([run], unit="m").unit == "m"
+    with pytest.raises(UsageError, match="a run's settlement is in m, not in mm"):
+        series_read([run], unit="mm")
+    table = tmp_path / "one.csv"
+    table.write_text("cycle,strain\n" + rows)
+    assert series_read([table], unit="%").unit == "%"
+    with pytest.raises(UsageError, match="has no length, mm"):
+        series_read([table], unit="mm")
+    table.write_text("cycle,Settlement [inch]\n" + rows)
+    with pytest.raises(UsageError, match="is in inch, which is not known"):
+        series_read([table], columns=("cycle", "Settlement [inch]"), unit="mm")
+
+
+@pytest.mark.parametrize(("told", "unit"), [("µm", "um"), (" MM ", "mm"), ("-", "1"), ("1", "1")])
+def test_units_are_told_as_headers_give_them(tmp_path: Path, told: str, unit: str) -> None:
+    """Case, blanks and the other letter mu do not count."""
+    table = tmp_path / "bare.csv"
+    table.write_text("1,0.001\n2,0.002\n")
+    assert series_read([table], unit=told).unit == unit
+
+
+def test_settlement_before_the_count_began_is_known() -> None:
+    """Behind a change of the load: the last reading up to it; rows left out change nothing."""
+    series = Series(np.array([1.0, 2.0, 5.0, 9.0]), np.array([0.1, 0.2, 0.3, 0.4]))
+    assert series.begun == 0
+    assert series.after(2).begun == series.after(4).begun == 0.2
+    assert series.since(5).begun == 0
+    assert series.after(2).since(4).begun == 0.2

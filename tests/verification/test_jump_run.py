@@ -15,7 +15,12 @@ import trackbed
 from adapters import engine_fake, procedure, stages
 from adapters.engine_fake import FakeBed
 from adapters.errors import JumpRefused, SceneError
+from adapters.fit_regime import RATCHETING, STEADY
+from adapters.jump_control import joined
+from adapters.jump_rates import Stretch
 from adapters.jump_record import checks_of, decisions_of
+from adapters.jump_run import regime_sinking
+from adapters.jump_slopes import Landing
 from adapters.progress import Progress
 from adapters.report import report_write
 from adapters.report_control import control
@@ -154,6 +159,37 @@ def test_a_piston_that_goes_down_with_its_bed_is_not_refused(tmp_path: Path) -> 
     scene = small(tmp_path, 100)
     assert trackbed.main(["run", str(scene), "--set", "loading.area_share=0.3"]) == 0
     assert status(tmp_path / "run").cycles_computed < 100
+
+
+@pytest.mark.parametrize("share", [0.0, 0.12])
+def test_what_a_piston_sinks_more_behind_jumps_is_no_ratcheting(share: float) -> None:
+    """u = a ln N and ``share`` G / n in the n-th cycle behind each of eight doubling jumps of gain
+    G, to cycle 2,000 and more: steady at every window, though raw windows are not."""
+    settled, cycle, random = 5e-5, 40, np.random.default_rng(1)
+    landings: list[Landing] = []
+    sunk: tuple[Stretch, ...] = ()
+
+    def window(first: int, cycles: int) -> Stretch:
+        end = first + 1.0 + np.arange(cycles)
+        gain = settled * np.log(end / (end - 1))
+        for one in landings:
+            gain += share * one.moved / (end - one.cycle)
+        none = np.full(cycles, np.nan)
+        return Stretch(first, gain * (1 + 0.1 * random.standard_normal(cycles)), none, none)
+
+    sunk = joined(sunk, window(20, 20))
+    regimes, raw = [], []
+    for jump in range(9):
+        h = min(int(0.9 * cycle), 20 * 2**jump)
+        landings.append(Landing(cycle + h, settled * np.log((cycle + h) / cycle)))
+        cycle += h + 5
+        sunk = joined(sunk, window(cycle, 10))
+        cycle += 10
+        regimes.append(regime_sinking(sunk, landings))
+        raw.append(regime_sinking(sunk, []))
+    assert cycle > 2000
+    assert [one.name for one in regimes if one] == [STEADY] * 9
+    assert any(one.name == RATCHETING for one in raw if one) == (share > 0)
 
 
 def test_no_jump_pays_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -228,6 +228,19 @@ def test_cycles_that_count_in_place_of_k_i(tmp_path: Path, monkeypatch: pytest.M
         settle(tmp_path / "any", monkeypatch, (1, 23), *FIXED, key)
 
 
+def test_few_seating_cycles_beside_a_large_k_i_leave_cycles_to_forecast_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """k_i = 100 would leave out 20 cycles behind the last hung one, of which 4 + 5 are computed:
+    four are left out, and five tell the jump from there on."""
+    keys = ("procedure.k_i=100", "procedure.seating_cycles=4", 'procedure.settlement="history"')
+    rest = ("procedure.h=60", "procedure.healing_cycles=2", "procedure.total_cycles=200", WAITS)
+    jumps, _, _ = settle(tmp_path / "run", monkeypatch, (1, 121), *keys, *rest)
+    assert jumps == [(130, 190)]
+    with pytest.raises(SceneError, match="never jumps"):
+        settle(tmp_path / "no", monkeypatch, (1, 2), "procedure.seating_cycles=82", *FIXED, WAITS)
+
+
 def test_a_piston_that_hangs_again_is_waited_for_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
