@@ -65,7 +65,10 @@ PARTLY = (
             seated(remembering(1)),
         )
     ),
-    replace(shortly(seated(remembering(1))), base=PARTIAL, window=4, healing=6),
+    *(
+        replace(shortly(seated(way)), base=PARTIAL, window=4, healing=6)
+        for way in (remembering(1), remembering(1, "profile"))
+    ),
 )
 """Under a piston that covers a part: one jump computes 15 cycles of 80, a gained time of 433 %;
 three compute 35, 129 %, near the 120 % at which the paper misses the settlement by 8 % (Fig. 13d).
