@@ -93,6 +93,9 @@ STUDIES = {
     "far": Study(COARSE, COARSE.last, FAR, 2, RESULTS / "settlement-rivals-far.jsonl"),
     "partial": Study(
         PARTIAL, PARTIAL.last, PARTLY, 1, RESULTS / "settlement-rivals-partial.jsonl",
-        {"1 jumps, by history, seated": 2, "1 jumps, by history, seated for 4": 2},
+        {
+            f"1 jumps, by history, {way}": 2
+            for way in ("seated", "seated for 4", "profile, seated for 4")
+        },
     ),
 }  # fmt: skip
