@@ -208,6 +208,12 @@ def longer(share: float) -> Method:
     return Method(f"step x {share / 0.2:g}", "longer step", (f"engine.rayleigh_share={share}",))
 
 
+def together(jumps: Method, rival: Method) -> Method:
+    """Jumps on a bed that is computed as by a rival, which has nothing but other keys."""
+    keys = (*jumps.settings, *rival.settings)
+    return replace(jumps, name=f"{jumps.name}, {rival.name}", settings=keys)
+
+
 def faster(factor: int) -> Method:
     """The load at a higher frequency."""
     return Method(f"{factor * 50} Hz", "frequency", (f"loading.frequency={factor * 50.0}",))
@@ -251,6 +257,7 @@ METHODS_OF: dict[str, tuple[Method, ...]] = {
             replace(growing(remembering(5, "profile")), window=10),
             replace(growing(jumping(5)[1]), window=10),
             replace(growing(remembering(3, "profile")), window=18),
+            together(replace(growing(remembering(5, "profile")), window=10), longer(0.4)),
         )
     ),
 }  # fmt: skip

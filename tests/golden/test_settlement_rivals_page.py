@@ -219,6 +219,20 @@ def test_sentences_about_growing_jumps() -> None:
     assert 100 * law.error == pytest.approx([12, 94, 15], abs=0.5)
     assert still.error.max() < -0.49
     assert len(finished(rows, "2 jumps, nothing moved", LAST)) == 6
+    assert [round(-100 * find(still.error)) for find in (np.max, np.min)] == [51, 110]
+    growing = "5 growing jumps, nothing moved"
+    lacks, contacts = (
+        judged(rows, growing, LAST, figure) for figure in ("settlement", "coordination")
+    )
+    assert lacks is not None
+    assert contacts is not None
+    assert [round(-100 * find(lacks.error)) for find in (np.max, np.min)] == [48, 103]
+    assert len(finished(rows, growing, LAST)) == 3
+    assert contacts.mean == pytest.approx(-1 / 30, abs=0.002)
+    ratio = cost(finished(rows, growing, LAST)) / cost(
+        finished(rows, f"{growing.partition(',')[0]}, by history, profile", LAST)
+    )
+    assert ratio == pytest.approx(1, abs=0.05)
     within = [
         1e6 * nested(runs_by_packing(each, "settlement")).within
         for each in (runs, reference(rows, LAST))
@@ -228,7 +242,7 @@ def test_sentences_about_growing_jumps() -> None:
     assert [round(1 + each.mean) for each in softest if each is not None] == [6, 22]
     longer = [judged(rows, "step x 2", LAST, figure) for figure in ("settlement", "deflection")]
     found = [[round(100 * one) for one in each.error] for each in longer if each is not None]
-    assert found == [[0, -8], [5, -1]]
+    assert found == [[0, -8, -2], [5, -1, -3]]
     ratio = cost(runs) / cost(finished(rows, "step x 2", LAST))
     assert ratio == pytest.approx(0.4, abs=0.05)
 
