@@ -224,18 +224,26 @@ def rows_read() -> list[Row]:
     return record_read(RECORD)
 
 
+def rows_put(measured: Sequence[Row]) -> None:
+    """Put rows into the record in place of those of the same figure and run."""
+    origin = {"commit": commit(), "machine": machine()}
+    known = {place_of(row) for row in measured}
+    kept = [row for row in rows_read() if place_of(row) not in known]
+    rows = sorted([*kept, *(row | origin for row in measured)], key=place_of)
+    write_atomically(RECORD, "".join(json.dumps(row) + "\n" for row in rows))
+
+
+def place_of(row: Row) -> tuple[str, str]:
+    """Figure, and the run where it has one."""
+    return row["figure"], row.get("run", "")
+
+
 def main(words: Sequence[str] | None = None) -> None:
     """Measure, and put what was measured in place of what the record has of it."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--rain", type=Path, metavar="FOLDER", help="measure Fig. 3 instead")
     folder = parser.parse_args(words).rain
-    measured_now = [rain_row(folder)] if folder else list(rows_measured())
-    origin = {"commit": commit(), "machine": machine()}
-    new = [row | origin for row in measured_now]
-    replaced = {row["figure"] for row in new}
-    old = [row for row in rows_read() if row["figure"] not in replaced]
-    rows = sorted(old + new, key=lambda row: row["figure"])
-    write_atomically(RECORD, "".join(json.dumps(row) + "\n" for row in rows))
+    rows_put([rain_row(folder)] if folder else list(rows_measured()))
 
 
 if __name__ == "__main__":
