@@ -32,6 +32,24 @@ def gone_on(folder: Path, settings: tuple[str, ...], heavier: float = 1.0) -> Wi
     return window_load(folder / bed.window / "states.npz")
 
 
+def test_a_full_run_goes_on_from_its_last_state(tmp_path: Path) -> None:
+    """Laid with the cycles of its packing and its own, each once; the next cycle begins where the
+    record's last positions are."""
+    record, piece = EnsembleRecord(), Piece(COARSE, 1, 0)
+    longer = f"procedure.total_cycles={piece.last + 10}"
+    scene = replace(COARSE, settings=(*COARSE.settings, longer)).scene(1)
+    run = run_in(tmp_path, scene, CONTROL)
+    packing_lay(run, piece, record)
+    laid = run.folder.outcome("window_000000")
+    assert laid is not None
+    assert [row["cycle"] for row in laid.rows] == list(range(1, piece.last + 1))
+    bed = compute(run, compute(run, prepare(run), piece.last), 1)
+    window = window_load(tmp_path / bed.window / "states.npz")
+    _, kept = record.states(piece.name)
+    assert window.cycle[0] == piece.last
+    assert window.position[0] == pytest.approx(kept[piece.last], abs=1e-12)
+
+
 def test_load_keeps_its_phase_under_another_step(tmp_path: Path) -> None:
     """The saved step count is no whole number of the new cycles; the load still begins at zero."""
     window = gone_on(tmp_path, (STEP,))
