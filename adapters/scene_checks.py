@@ -433,6 +433,8 @@ def _deep_chains(scene: _Values) -> Iterator[Problem]:
 
 
 def _far_jump(scene: _Values) -> Iterator[Problem]:
+    if scene.get("procedure.settlement") == "history":  # by all cycles computed so far
+        return
     h, k = max(scene.need("procedure.h")), scene.need("procedure.k")
     if h > JUMP_DOUBTFUL * k:
         yield Problem(

@@ -271,6 +271,12 @@ def test_doubts_are_warnings(tmp_path: Path, override: str, words: str) -> None:
     assert words in warning
 
 
+def test_a_jump_by_history_is_not_fitted_to_its_window_alone(tmp_path: Path) -> None:
+    """So its length over the window's is no doubt."""
+    keys = ["procedure.h=1000", 'procedure.settlement="history"']
+    assert scene_load(write(tmp_path, KARRECH), keys).warnings == ()
+
+
 # ---------------------------------------------------------------------------- what is refused
 
 REFUSED = [
