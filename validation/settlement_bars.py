@@ -154,20 +154,28 @@ def percent(held: Sequence[bool]) -> float:
     return 100 * float(np.mean(held)) if len(held) else float("nan")
 
 
+def beside_full(jump: Row, column: str, skipped: int) -> tuple[float, bool]:
+    """Change of a column over one of `jumps_of` behind ``skipped`` cycles less the mean of full
+    runs', and whether it goes on."""
+    full, change = changes(jump["others"], column, skipped), change_of(jump, column, skipped)
+    return change - float(full.mean()), continues(change, full)
+
+
+def changes(sides: Sequence[Row], column: str, skipped: int) -> FloatArray:
+    """`change_of` of each of ``sides``."""
+    return np.array([change_of(one, column, skipped) for one in sides])
+
+
 def bar_continues(words: str, column: str, skipped: int = 0) -> Bar:
     """In nine jumps of ten a column goes on behind so many ``skipped`` cycles as full runs have;
     beside it each full run beside the others."""
 
     def share(rows: Sequence[Row], method: str, last: int) -> float:
-        return percent(
-            [
-                continues(change_of(one, column, skipped), changes(one["others"]))
-                for one in jumps_of(rows, method, last)
-            ]
-        )
+        found = [beside_full(one, column, skipped) for one in jumps_of(rows, method, last)]
+        return percent([goes_on for _, goes_on in found])
 
     def share_full(rows: Sequence[Row], method: str, last: int) -> float:
-        known = [changes(one["others"]) for one in jumps_of(rows, method, last)]
+        known = [changes(one["others"], column, skipped) for one in jumps_of(rows, method, last)]
         return percent(
             [
                 continues(change, np.delete(others, place))
@@ -175,9 +183,6 @@ def bar_continues(words: str, column: str, skipped: int = 0) -> Bar:
                 for place, change in enumerate(others)
             ]
         )
-
-    def changes(others: Sequence[Row]) -> FloatArray:
-        return np.array([change_of(one, column, skipped) for one in others])
 
     return Bar(words, "%", 90.0, share, least=True, full=share_full)
 

@@ -25,6 +25,8 @@ CYCLES = 10
 COLUMNS = ("settlement", "coordination_number", "piston_stiffness")
 """Settlement gained in each cycle [m], grains that touch a grain, N/m."""
 PROBABILITY = 0.95
+SCATTERS = 2.0
+"""Standard deviations of single cycles before a jump, within which the rate behind it stays."""
 
 
 def sides_of(run: Run) -> list[Row]:
@@ -117,6 +119,18 @@ def stays(sides: Row, column: str, skipped: int) -> bool:
     No full run is asked, and a bed need not slow down: what is called no shock, and less than
     `continues`.
     """
+    return abs(scatters_off(sides, column, skipped)) <= SCATTERS
+
+
+def scatters_off(sides: Row, column: str, skipped: int, slowing: bool = False) -> float:
+    """Mean behind a jump and ``skipped`` cycles less that before it, in standard deviations of
+    single cycles before it; ``slowing``: less what cycles behind it settle by the same slope of
+    ln N, where that is less a cycle."""
     before, after = (np.array(sides[name][column], float) for name in ("before", "after"))
-    before = before[np.isfinite(before)]
-    return bool(abs(after[skipped:].mean() - before.mean()) <= 2 * before.std(ddof=1))
+    known, behind = np.isfinite(before), after[skipped:]
+    expected = before[known].mean()
+    if slowing:
+        number = sides["first"] - len(before) + 1 + np.arange(len(before))
+        later = sides["last"] + 1 + skipped + np.arange(len(behind))
+        expected = (before * number)[known].mean() * (1 / later).mean()
+    return float((behind.mean() - expected) / before[known].std(ddof=1))

@@ -9,10 +9,12 @@ from scipy.stats import f as fisher
 from validation.settlement_bars import (
     BARS,
     bar_stays,
+    beside_full,
     bias_beside_interval,
     error_of,
     error_of_profile,
     gained_time,
+    jumps_of,
     runs_by_packing,
     sides_compared,
     spread,
@@ -21,9 +23,13 @@ from validation.settlement_ensemble import CONFINED
 from validation.settlement_ensemble_reading import curves, nested
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_readme import table_readme
-from validation.settlement_rivals import HEALED, METHODS, Row
+from validation.settlement_rivals import HEALED, HEALING, METHODS, Row
 from validation.settlement_rivals_budget import JUMPS, PARTS
-from validation.settlement_rivals_continuity import COLUMNS
+from validation.settlement_rivals_continuity import (
+    COLUMNS,
+    SCATTERS,
+    scatters_off,
+)
 from validation.settlement_rivals_page import PAGE, page
 from validation.settlement_rivals_reading import (
     beside,
@@ -250,6 +256,25 @@ def test_sentences_about_growing_jumps() -> None:
     ]
     ratio = cost(runs) / cost(finished(rows, "step x 2", LAST))
     assert ratio == pytest.approx(0.4, abs=0.05)
+
+
+def test_sentences_about_why_growing_jumps_miss_two_readings_of_the_rate() -> None:
+    """Behind healing eight of nine are slower, and 55 of 60 stay by the slope of ln N; behind the
+    first cycle nine of ten settle more, half as much as with nothing moved."""
+    compared = sides_compared(record_read(PAPER.record), CONFINED, EnsembleRecord())
+    ways = [f"5 growing jumps, {end}" for end in ("by history, profile", "nothing moved")]
+    jumps = jumps_of(compared, ways[0], LAST)
+    off = np.array([scatters_off(jump, "settlement", HEALING) for jump in jumps])
+    assert [np.sum(off < -SCATTERS), np.sum(off > SCATTERS)] == [8, 1]
+    slowed = [scatters_off(jump, "settlement", HEALING, slowing=True) for jump in jumps]
+    assert np.sum(np.abs(slowed) <= SCATTERS) == 55
+    found = [beside_full(jump, "settlement", 1) for jump in jumps]
+    assert sorted(more > 0 for more, goes_on in found if not goes_on) == [False] + 9 * [True]
+    for way, mean, error in zip(ways, (16, 34), (8, 16), strict=True):
+        found = [beside_full(jump, "settlement", 1) for jump in jumps_of(compared, way, LAST)]
+        more = 1e6 * np.array([one for one, _ in found])
+        assert more.mean() == pytest.approx(mean, abs=0.5)
+        assert more.std(ddof=1) / np.sqrt(len(more)) == pytest.approx(error, abs=0.5)
 
 
 def test_sentences_about_rivals(rows: list[Row]) -> None:

@@ -15,6 +15,7 @@ from validation.settlement_bars import (
     BARS,
     BARS_CONTINUITY,
     BARS_PARTIAL,
+    beside_full,
     jumps_of,
     sides_compared,
     told,
@@ -24,7 +25,6 @@ from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_hard_page import failing
 from validation.settlement_partial_page import way
 from validation.settlement_rivals import HEALING
-from validation.settlement_rivals_continuity import change_of
 from validation.settlement_rivals_reading import judged as judged_of
 from validation.settlement_rivals_runs import record_read
 from validation.settlement_rivals_studies import STUDIES
@@ -100,11 +100,16 @@ def test_bars_that_are_missed_with_nothing_moved_too(bed: str, kind: Kind, reaso
     bars = [bar for bar in BARS_CONTINUITY if reason in WHY.get(f"{BEDS[bed]}: {bar.words}", ())]
     assert len(bars) > 1
     assert not any(bar.met(bar.value(rows, still, study.last)) for bar in bars)
+    jumps = jumps_of(rows, CHOSEN[bed], study.last)
+    if reason == RATE:
+        for skipped in (1, HEALING):
+            found = [beside_full(jump, "settlement", skipped) for jump in jumps]
+            missed = [more > 0 for more, goes_on in found if not goes_on]
+            assert missed.count(False) >= 2 * missed.count(True)
     if reason == LATE:
-        for jump in (*jumps_of(rows, still, study.last), *jumps_of(rows, CHOSEN[bed], study.last)):
+        for jump in (*jumps_of(rows, still, study.last), *jumps):
             for skipped in (1, HEALING):
-                full = [change_of(one, "settlement", skipped) for one in jump["others"]]
-                assert change_of(jump, "settlement", skipped) > np.mean(full)
+                assert beside_full(jump, "settlement", skipped)[0] > 0
 
 
 def test_chaos_swings_and_scatter_are_what_reasons_say() -> None:

@@ -40,6 +40,7 @@ from validation.settlement_rivals_continuity import (
     CYCLES,
     change_of,
     continues,
+    scatters_off,
     sides_of,
     sides_without_jump,
     stays,
@@ -382,6 +383,17 @@ def test_what_stays_is_within_the_scatter_of_single_cycles() -> None:
             assert not stays(one, "settlement", 0)
     assert np.mean(held[0.0]) > 0.98
     assert np.mean(held[6.0]) < 0.02
+
+
+def test_a_bed_that_settles_by_the_logarithm_slows_down_and_stays_by_its_slope() -> None:
+    """1/N a cycle to cycle 100 and from 201 on: a half of it, far off; by the slope of ln N not."""
+    number = np.arange(91.0, 101), np.arange(201.0, 211)
+    sides = {
+        side: {"settlement": 1 / of} for side, of in zip(("before", "after"), number, strict=True)
+    }
+    sides |= {"first": 100, "last": 200}
+    assert scatters_off(sides, "settlement", 5) < -10
+    assert scatters_off(sides, "settlement", 5, slowing=True) == pytest.approx(0, abs=1e-9)
 
 
 def run_of_small_bed(folder: Path, h: int, total_cycles: int, k: int = 12) -> Run:
