@@ -23,7 +23,7 @@ from adapters.procedure import CONTROL, settle
 from adapters.run_folder import RunFolder
 from adapters.state import FloatArray
 from adapters.window import window_load
-from validation.paper_figures import JUMPS, PAPER_LAST, WINDOWS, Row, jump_row, rows_put
+from validation.paper_figures import JUMPS, LATE_RUNS, PAPER_LAST, WINDOWS, Row, jump_row, rows_put
 from validation.settlement_ensemble import CONFINED, Piece
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_ensemble_start import packing_lay
@@ -34,11 +34,6 @@ LATE = replace(
     CONFINED,
     settings=(f"procedure.total_cycles={LAST}", "procedure.k=10", "procedure.h=0"),
 )
-
-
-def run_late(seed: int) -> str:
-    """Name of a packing's run in the record of figures: that of the ensemble's member."""
-    return Piece(CONFINED, seed, 0).name
 
 
 def positions_late(seed: int, folder: Path) -> FloatArray:
@@ -63,7 +58,7 @@ def rows_late(seed: int, folder: Path) -> list[Row]:
     """Figs 6 and 7 of a packing at k_i = `PAPER_LAST`, every k and h."""
     position = positions_late(seed, folder)
     jumps = product((PAPER_LAST,), WINDOWS, JUMPS)
-    return [jump_row(position, position[:1], jump, run_late(seed)) for jump in jumps]
+    return [jump_row(position, position[:1], jump, LATE_RUNS[seed - 1]) for jump in jumps]
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -71,12 +66,12 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--work", type=Path, required=True, help="folder for the engine's files")
     parser.add_argument(
-        "--packings", type=int, nargs="+", default=range(1, CONFINED.packings + 1), metavar="N"
+        "--packings", type=int, nargs="+", default=range(1, len(LATE_RUNS) + 1), metavar="N"
     )
     arguments = parser.parse_args(words)
     for seed in arguments.packings:
         with interruptible(), RunFolder(arguments.work).locked():
-            rows = rows_late(seed, arguments.work / run_late(seed))
+            rows = rows_late(seed, arguments.work / LATE_RUNS[seed - 1])
         rows_put(rows)
         print(f"packing {seed}: measured", flush=True)
 

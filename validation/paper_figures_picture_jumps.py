@@ -10,6 +10,7 @@ from validation.paper_figures import (
     FIRST,
     FIRST_LONG,
     JUMPS,
+    LATE_RUNS,
     LONG_RUN,
     NOTHING,
     PAPER_LARGEST,
@@ -22,13 +23,18 @@ from validation.paper_figures_picture import PAPER
 
 SHOWN_H = 40
 """Length of the jumps of which E_r is drawn over k."""
-SHOWN_FIRST = (10, 200)
+SHOWN_RUNS = (RUN, LATE_RUNS[0])
+"""Of which E_r is drawn over k and h."""
+SHOWN_FIRST = (10, 500)
 """k_i, drawn full and dashed, of jumps of which E_r is drawn over h."""
 SHOWN_K = 20
 """Window of which what moving nothing errs by is drawn over h."""
-FIRST_COLOURS = {10: "#0072B2", 50: "#E69F00", 200: "#c8553d"}
+FIRST_COLOURS = {10: "#0072B2", 50: "#E69F00", 200: "#c8553d", 500: "#6a4c93"}
 WINDOW_COLOURS = {5: "#0072B2", 20: "#E69F00", 80: "#c8553d"}
-BEDS = {RUN: ("paper scale", "-"), LONG_RUN: ("150 softer grains", "--")}
+BEDS = {
+    (RUN, *LATE_RUNS): ("paper scale", "-"),
+    (LONG_RUN,): ("150 softer grains", "--"),
+}
 
 
 def draw(rows: Sequence[Row], target: Path) -> None:
@@ -42,8 +48,8 @@ def draw(rows: Sequence[Row], target: Path) -> None:
     figure, axes = pyplot.subplots(2, 3, figsize=(14, 8.4), layout="constrained")
     for line, number, law in zip(axes, (6, 7), PAPER_LARGEST, strict=True):
         title = f"Fig. {number}: {law} law"
-        draw_windows(line[0], [row for row in jumps if row["run"] == RUN], law, title)
-        draw_lengths(line[1], [row for row in jumps if row["run"] == RUN], law, title)
+        draw_windows(line[0], [row for row in jumps if row["run"] in SHOWN_RUNS], law, title)
+        draw_lengths(line[1], [row for row in jumps if row["run"] in SHOWN_RUNS], law, title)
         draw_largest(line[2], jumps, law, title)
     figure.savefig(target, dpi=110, metadata={"Software": None})
     pyplot.close(figure)
@@ -88,11 +94,11 @@ def draw_lengths(axis: Any, rows: Sequence[Row], law: str, title: str) -> None:
 
 def draw_largest(axis: Any, rows: Sequence[Row], law: str, title: str) -> None:
     """The largest E_r of coordinates over all k and h against k_i, with what the paper prints."""
-    for run, (words, line) in BEDS.items():
+    for runs, (words, line) in BEDS.items():
         for method, colour in ((law, "#0072B2"), (NOTHING, "0.5")):
             found: dict[int, float] = {}
             for row in rows:
-                if row["run"] == run:
+                if row["run"] in runs:
                     k_i, error = row["jump"][0], row["coordinates"][method]
                     found[k_i] = max(error, found.get(k_i, 0.0))
             label = f"{words}: {method}"
