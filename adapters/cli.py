@@ -310,7 +310,7 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--probability", type=float, default=0.9, metavar="P",
-        help="that the band should hold the truth; default: 0.9. No part of what is refused",
+        help="that the band should hold the truth; default: 0.9; refusals do not depend on it",
     )  # fmt: skip
     parser.add_argument(
         "--confidence", type=float, metavar="C",
