@@ -285,12 +285,13 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--law", default="log", metavar="NAME",
         help="default: log; auto: the slow laws together, refused (exit code 6) where the series "
-        "ratchets or collapses, or half the band is wider than all settlement so far",
+        "ratchets or collapses, or half the 90 %% band is wider than all settlement so far",
     )  # fmt: skip
     parser.add_argument(
         "--fail-at", type=float, metavar="S",
         help="settlement or strain of failure, in the series' unit, of either sign: a series or a "
-        "prediction that reaches it is refused as collapse (exit code 6)",
+        "prediction that reaches it is refused as collapse (exit code 6); failure_excluded in the "
+        "JSON: the band does not reach it",
     )  # fmt: skip
     parser.add_argument(
         "--to-cycle", type=float, metavar="N", help="cycle to predict; default: the last one given"
@@ -309,7 +310,7 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--probability", type=float, default=0.9, metavar="P",
-        help="that the band should hold the truth; default: 0.9",
+        help="that the band should hold the truth; default: 0.9; refusals do not depend on it",
     )  # fmt: skip
     parser.add_argument(
         "--confidence", type=float, metavar="C",
@@ -326,7 +327,6 @@ def fit_command(arguments: argparse.Namespace) -> int:
     from adapters.fit import cycles_needed, fit_auto, fit_series, series_read
     from adapters.fit_agreement import AGREE
     from adapters.laws import law_named
-    from adapters.settlement_series import UNKNOWN
 
     if (arguments.confidence is None) != (arguments.error is None):
         raise UsageError("--confidence and --error belong together", remedy="give both or none")
@@ -347,6 +347,10 @@ def fit_command(arguments: argparse.Namespace) -> int:
     ahead = to_cycle
     if arguments.load_change is not None:
         series, ahead = series.after(arguments.load_change), to_cycle - arguments.load_change
+    needed = {}
+    if arguments.error is not None:
+        cycles = cycles_needed(series, law, arguments.error, arguments.confidence)
+        needed = {"cycles_needed": cycles}
     try:
         if auto:
             found = fit_auto(series, ahead, arguments.probability, arguments.fail_at)
@@ -354,33 +358,46 @@ def fit_command(arguments: argparse.Namespace) -> int:
             found = fit_series(series, law, ahead, arguments.probability, arguments.fail_at)
     except JumpRefused as refusal:
         if arguments.json:
-            json_print(refusal.to_json(series.unit))
+            unexcluded = {} if arguments.fail_at is None else {"failure_excluded": False}
+            json_print(refusal.to_json(series.unit) | unexcluded | needed)
+        else:
+            cycles_needed_print(needed, arguments, series.unit)
         raise
-    fitted = found.to_json()
-    if arguments.error is not None:
-        fitted["cycles_needed"] = cycles_needed(series, law, arguments.error, arguments.confidence)
+    fitted = found.to_json() | needed
     if arguments.json:
         json_print(fitted)
         return 0
-    unit = "(unit as given)" if fitted["unit"] == UNKNOWN else fitted["unit"]
+    unit = unit_words(series.unit)
     print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles")
     for name, value in fitted["parameters"].items():
         print(f"  {name} = {value:.6g}")
     print(f"regime: {fitted['regime'] or 'not told from so few cycles'}")
     if found.laws:
         agreeing = [name for name, said in found.laws.items() if said.agrees]
-        print(f"laws that agree to {AGREE:.0%}: {', '.join(agreeing) or 'none'}")
+        print(f"laws that agree to {AGREE:.0%} of the increment: {', '.join(agreeing) or 'none'}")
     low, high = fitted["band"]
-    print(f"settlement at cycle {to_cycle:g}: {fitted['prediction']:.6g} {unit}")
+    print(f"settlement at cycle {to_cycle:.10g}: {fitted['prediction']:.6g} {unit}")
     print(f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}")
-    if arguments.fail_at is not None and max(abs(low), abs(high)) >= arguments.fail_at:
+    if found.failure_excluded is False:
         print(f"  so that failure at {arguments.fail_at:g} is not excluded")
-    if arguments.error is not None:
-        print(
-            f"cycles that keep the mean error term below {arguments.error:g} {unit} with "
-            f"confidence {arguments.confidence:g}: {fitted['cycles_needed']}"
-        )
+    cycles_needed_print(needed, arguments, series.unit)
     return 0
+
+
+def unit_words(unit: str) -> str:
+    """The unit of a series, for a text."""
+    from adapters.settlement_series import UNKNOWN
+
+    return "(unit as given)" if unit == UNKNOWN else unit
+
+
+def cycles_needed_print(needed: dict[str, int], arguments: argparse.Namespace, unit: str) -> None:
+    """Print the bound of eq. 15 where it was asked for; a refused prediction has it too."""
+    if needed:
+        print(
+            f"cycles that keep the mean error term below {arguments.error:g} {unit_words(unit)} "
+            f"with confidence {arguments.confidence:g}: {needed['cycles_needed']}"
+        )
 
 
 def relax_register(parser: argparse.ArgumentParser) -> None:

@@ -73,11 +73,23 @@ class DumpError(NotCredible):
 
 
 class JumpRefused(NotCredible):
-    """Nothing credible can be said of what comes after a series.
+    """Nothing credible can be said of what comes after a series of settlements.
 
-    ``regime`` is ``ratcheting`` (its rate hardly falls), ``collapse`` (it grows, or leads to
-    failure) or ``uncertain`` (the laws differ too much); ``parameters`` what it was told from;
-    ``laws`` what each of them says all the same, as in ``trackbed fit --json``.
+    ``trackbed fit`` ends with it and exit code 6: with ``--law auto`` for every regime below, with
+    a law that is named only for ``--fail-at``.  So do ``trackbed run`` and ``trackbed resume``
+    where jumps choose themselves (``--tolerance``), for ``ratcheting`` and ``collapse``, unless
+    ``--cycle-by-cycle`` is given.
+
+    - ``what``, ``where``, ``remedy``: as in `TrackbedError`; cycles as the user counts them,
+      settlements in the unit of the series;
+    - ``law``: the law named, or ``auto``, also of jumps;
+    - ``regime``: ``ratcheting`` (the rate hardly falls), ``collapse`` (it grows, or the series or
+      its prediction reaches ``--fail-at``) or ``uncertain`` (the laws differ too much);
+    - ``parameters``: of ``auto`` ``exponent`` beta, without unit, and, from ``fit``,
+      ``exponent_deviation``; of a law that is named its own: lengths in the unit of the series,
+      rates in that per cycle, counted from a load change where there is one.  Only finite ones;
+    - ``laws``: by name, what each slow law says all the same: fields of `fit_agreement.LawSaid`,
+      ``prediction`` in the unit of the series; empty for a law that is named, and for jumps.
     """
 
     def __init__(
@@ -96,7 +108,7 @@ class JumpRefused(NotCredible):
         super().__init__(what, where=where, remedy=remedy)
 
     def to_json(self, unit: str) -> dict[str, object]:
-        """The keys of ``trackbed fit --json``, without a prediction."""
+        """The keys of ``trackbed fit --json``, without a prediction; ``unit`` of the series."""
         return {
             "law": self.law,
             "parameters": self.parameters,

@@ -10,14 +10,14 @@ import numpy as np
 
 from adapters.errors import JumpRefused, NotConverged, UsageError
 from adapters.fit_agreement import LawSaid, laws_said
-from adapters.fit_auto import outlook
+from adapters.fit_auto import TO_TELL, outlook
 from adapters.fit_candidates import ROWS_FEWEST, thinned
 from adapters.fit_refusal import Refusal, failed, failure, refusals
 from adapters.fit_regime import regimes_of
 from adapters.laws.law import Law
 from adapters.laws.shaped_law import ShapedLaw
 from adapters.residual import cycles_for_error, error_term
-from adapters.settlement_series import Series, series_read
+from adapters.settlement_series import Series, series_read, too_few
 from adapters.state import FloatArray
 
 __all__ = ["Prediction", "Series", "cycles_needed", "fit_auto", "fit_series", "series_read"]
@@ -44,10 +44,16 @@ class Prediction:
     """One of `fit_regime.REGIMES`; None where the series is too short to tell."""
     laws: dict[str, LawSaid] = field(default_factory=dict)
     """What each slow law says, by name; empty for a law that was named."""
+    failure_excluded: bool | None = None
+    """True where no end of the band reaches the user's bound of failure; None without a bound."""
 
     def to_json(self) -> dict[str, Any]:
-        """What ``trackbed fit --json`` prints."""
-        return {
+        """What ``trackbed fit --json`` prints.
+
+        The fields by name; of ``laws`` those of `LawSaid`.  ``failure_excluded`` only with
+        ``--fail-at``, and ``cycles_needed``, which the command adds, only with ``--error``.
+        """
+        content = {
             "law": self.law,
             "parameters": self.parameters,
             "prediction": self.prediction,
@@ -56,6 +62,9 @@ class Prediction:
             "regime": self.regime,
             "laws": {name: asdict(said) for name, said in self.laws.items()},
         }
+        if self.failure_excluded is not None:
+            content["failure_excluded"] = self.failure_excluded
+        return content
 
 
 def fit_series(
@@ -67,17 +76,20 @@ def fit_series(
 ) -> Prediction:
     """Fit ``law`` to all of ``series`` and predict the settlement at ``to_cycle``.
 
+    ``to_cycle`` counts as ``series.cycle`` does; errors name cycles as the user counts them, from
+    before ``series.counted_from``.
     The prediction is the last settlement of the series plus the law's increment from there on.
     ``probability`` is the share of cases in which the band should hold the truth; ``fail_at`` is
     the settlement or strain at which the bed fails, in the unit of the series, where it is known.
 
     Raises `UsageError` when ``to_cycle`` lies before the last cycle of the series or the series
-    is too short (one row more than the law has parameters), `NotConverged` when the result is
-    not finite, `JumpRefused` when it reaches ``fail_at``.
+    is too short (one row more than the law has parameters), `JumpRefused` when the series or the
+    result reaches ``fail_at``, `NotConverged` when the result is not finite.
     """
     cycle, settlement = _training_rows(series, law)
     last = float(cycle[-1])
-    _check_target(last, to_cycle, probability, fail_at)
+    _check_target(series, last, to_cycle, probability, fail_at)
+    begin = series.counted_from
     with np.errstate(over="ignore", invalid="ignore"):  # judged below, in one place
         parameters = law.fit(cycle, settlement)
         prediction = float(settlement[-1] + law.increment(parameters, last, to_cycle))
@@ -85,15 +97,20 @@ def fit_series(
         if to_cycle > last:
             below, above = prediction_band(law, cycle, settlement, to_cycle, probability)
             band = (prediction - below, prediction + above)
+    named = dict(zip(law.parameter_names, map(float, parameters), strict=True))
+    if refusal := failed(cycle + begin, settlement, fail_at):
+        raise _refused(refusal, law.name, named, {})
     if not (np.isfinite(parameters).all() and np.isfinite(band).all()):
         raise NotConverged(
-            f"the law {law.name} gives no finite settlement at cycle {to_cycle:g}",
+            f"the law {law.name} gives no finite settlement at cycle {to_cycle + begin:.10g}",
             remedy="predict less far, or use the law log",
         )
-    named = dict(zip(law.parameter_names, map(float, parameters), strict=True))
-    if refusal := failed(cycle, settlement, fail_at) or failure(prediction, fail_at, to_cycle):
+    if refusal := failure(prediction, fail_at, to_cycle + begin):
         raise _refused(refusal, law.name, named, {})
-    return Prediction(law.name, named, prediction, band, series.unit, regime_of(series))
+    return Prediction(
+        law.name, named, prediction, band, series.unit, regime_of(series),
+        failure_excluded=failure_excluded(band, fail_at),
+    )  # fmt: skip
 
 
 def fit_auto(
@@ -106,25 +123,41 @@ def fit_auto(
     median of its windows); ``laws`` says which agree.
 
     Raises `JumpRefused` where `fit_refusal.refusals` says so and ``to_cycle`` lies behind the
-    series; it has ``laws`` too.  Otherwise as `fit_series`.
+    series; it has ``laws`` too.  Otherwise as `fit_series`: a regime that is refused comes before
+    a result that is not finite.
     """
     rows = series.cycle > 0
     cycle, settlement = series.cycle[rows], series.settlement[rows]
-    if len(cycle):
-        _check_target(float(cycle[-1]), to_cycle, probability, fail_at)
+    if len(cycle) < ROWS_FEWEST:
+        raise too_few(
+            len(cycle), ROWS_FEWEST, TO_TELL, where=series.where or "law auto",
+            left_out=series.left_out, else_do=", or name a law: --law log",
+        )  # fmt: skip
+    _check_target(series, float(cycle[-1]), to_cycle, probability, fail_at)
     found = outlook(cycle, settlement[:, None], to_cycle, probability)
-    found = replace(found, settled=np.abs(settlement[:, None] - series.begun).max(axis=0))
+    begin, settled = series.counted_from, np.abs(settlement[:, None] - series.begun).max(axis=0)
+    found = replace(found, settled=settled, counted_from=begin)
     parameters = found.regime[0].parameters()
     prediction = float(found.prediction[0])
-    (refusal,) = refusals(found)
-    told = failed(cycle, settlement, fail_at) or failure(prediction, fail_at, to_cycle)
-    refusal = told or refusal
+    refusal = failed(cycle + begin, settlement, fail_at)
+    if refusal is None and isfinite(prediction):
+        refusal = failure(prediction, fail_at, to_cycle + begin)
+    refusal = refusal or refusals(found)[0]
     said = laws_said(found, refused=refusal is not None)
     if refusal:
         raise _refused(refusal, "auto", parameters, said)
-    parameters |= {name: one.prediction for name, one in said.items()}
+    alone = {name: one.prediction for name, one in said.items()}
+    parameters |= {name: value for name, value in alone.items() if value is not None}
     band = (float(found.low[0]), float(found.high[0]))
-    return Prediction("auto", parameters, prediction, band, series.unit, found.regime[0].name, said)
+    return Prediction(
+        "auto", parameters, prediction, band, series.unit, found.regime[0].name, said,
+        failure_excluded=failure_excluded(band, fail_at),
+    )  # fmt: skip
+
+
+def failure_excluded(band: tuple[float, float], fail_at: float | None) -> bool | None:
+    """Whether ``band`` ends below the bound of failure, of either sign; None without a bound."""
+    return None if fail_at is None else max(map(abs, band)) < fail_at
 
 
 def _refused(
@@ -136,7 +169,7 @@ def _refused(
         remedy=refusal.remedy,
         law=law,
         regime=refusal.regime,
-        parameters=parameters,
+        parameters={name: value for name, value in parameters.items() if isfinite(value)},
         laws={name: asdict(one) for name, one in said.items()},
     )
 
@@ -271,14 +304,18 @@ def cycles_needed(series: Series, law: Law, error: float, confidence: float) -> 
     return cycles_for_error(float(residual.min()), float(residual.max()), error, 1 - confidence)
 
 
-def _check_target(last: float, to_cycle: float, probability: float, fail_at: float | None) -> None:
+def _check_target(
+    series: Series, last: float, to_cycle: float, probability: float, fail_at: float | None
+) -> None:
     if not 0 < probability < 1:
         raise UsageError(f"a probability lies between 0 and 1, not at {probability:g}")
     if fail_at is not None and not (fail_at > 0 and isfinite(fail_at)):
         raise UsageError(f"the settlement of failure is a positive number, not {fail_at:g}")
     if not (isfinite(to_cycle) and to_cycle >= last):
         raise UsageError(
-            f"cycle {to_cycle:g} does not lie behind the last one of the series, {last:g}",
+            f"cycle {to_cycle + series.counted_from:.10g} does not lie behind the last one of the "
+            f"series, {last + series.counted_from:.10g}",
+            where=series.where,
             remedy="ask for a later cycle: the earlier ones are known",
         )
 
@@ -289,8 +326,6 @@ def _training_rows(series: Series, law: Law) -> tuple[FloatArray, FloatArray]:
     cycle, settlement = series.cycle[rows], series.settlement[rows]
     fewest = law.minimum_cycles + 1
     if len(cycle) < fewest:
-        raise UsageError(
-            f"{len(cycle)} cycles are too few to fit the law {law.name} and know its error",
-            remedy=f"give at least {fewest} computed cycles",
-        )
+        purpose = f"to fit the law {law.name} and know its error"
+        raise too_few(len(cycle), fewest, purpose, where=series.where, left_out=series.left_out)
     return cycle, settlement

@@ -7,7 +7,6 @@ from math import log
 
 import numpy as np
 
-from adapters.errors import NotConverged, UsageError
 from adapters.fit_candidates import (
     ROWS_FEWEST,
     BoolArray,
@@ -19,6 +18,8 @@ from adapters.fit_candidates import (
 from adapters.fit_regime import (
     CERTAIN,
     EXPONENTS,
+    RESOLUTION,
+    ROUND_OFF,
     SHAKEDOWN,
     Regime,
     exponent_weights,
@@ -30,12 +31,25 @@ from adapters.fit_regime import (
 )
 from adapters.laws import law_named
 from adapters.laws.law import training_data
+from adapters.settlement_series import too_few
 from adapters.state import FloatArray
+
+JUDGED = 0.9
+"""Probability of the band that a prediction is judged by (`fit_refusal`, `fit_agreement`), whatever
+band is asked for: a narrower one is no way round a refusal.  `validation.law_study` measured the
+refusals at 90 %, the probability that regimes are told with too."""
+
+TO_TELL = "to tell a regime from"
+"""What `ROWS_FEWEST` rows are needed for, in the words of an error."""
 
 
 @dataclass(frozen=True)
 class Outlook:
-    """What n series are expected to do; each array of shape (n,), in the unit of the series."""
+    """What n series are expected to do; each array of shape (n,), in the unit of the series.
+
+    Prediction and ends of bands are not finite where the laws overflow; `fit_refusal.refusals`
+    raises then.
+    """
 
     regime: list[Regime]
     prediction: FloatArray
@@ -50,6 +64,12 @@ class Outlook:
     """Reading at the last cycle."""
     settled: FloatArray
     """Largest settlement so far, without its sign."""
+    judged: tuple[FloatArray, FloatArray]
+    """Low and high end of the band with probability `JUDGED`."""
+    reading: FloatArray
+    """Error of a reading: its half-width with `JUDGED`, `RESOLUTION` of the range at least."""
+    counted_from: float = 0.0
+    """The user's number of cycle 0, as in `Series`: for sentences."""
 
 
 def outlook(
@@ -76,45 +96,48 @@ def outlook(
     not rise.  The band does not hold in the regimes ratcheting and collapse.
 
     Cycle 0 must be left out.  Raises `UsageError` for what no law can take and for fewer than
-    `ROWS_FEWEST` cycles, `NotConverged` when the prediction is not finite.
+    `ROWS_FEWEST` cycles.
     """
     cycle, displacement = training_data(law_named("log"), cycle, displacement)
     if len(cycle) < ROWS_FEWEST:
-        raise UsageError(
-            f"{len(cycle)} cycles are too few to tell a regime from",
-            where="law auto",
-            remedy=f"give at least {ROWS_FEWEST} computed cycles, or name a law: --law log",
-        )
+        raise too_few(len(cycle), ROWS_FEWEST, TO_TELL, where="law auto")
     few, means = thinned(cycle, displacement)
     last, regimes = displacement[-1], regimes_of(few, means)
     settled, reach = np.abs(displacement).max(axis=0), (float(cycle[-1]), to_cycle)
     bounded = np.array([regime.name == SHAKEDOWN for regime in regimes])
     unbounded = np.array([regime.bounded < 1 - CERTAIN for regime in regimes]) & ~bounded
-    with np.errstate(over="ignore", invalid="ignore"):  # judged below, in one place
+    exponent = EXPONENTS[exponent_weights(few, means).argmax(axis=0)]
+    known = to_cycle == cycle[-1]
+    with np.errstate(over="ignore", invalid="ignore"):  # judged in `fit_refusal`
         candidates = candidates_of(few, means, to_cycle)
         votes = candidates.votes(bounded, unbounded)
-        if to_cycle == cycle[-1]:
-            return Outlook(regimes, last, last, last, candidates, votes, *reach, last, settled)
-        moved = candidates.median(votes)
-        exponent = EXPONENTS[exponent_weights(few, means).argmax(axis=0)]
-        reading, tail = tail_error(cycle, displacement, exponent, to_cycle, probability)
-        miss = held_out_error(candidates, log(to_cycle / cycle[-1]), probability)
-        further = np.hypot(miss, tail)
-        lowest, highest = candidates.spread(bounded, probability)
+        moved = np.zeros_like(last) if known else candidates.median(votes)
         endless = np.where(unbounded, constant_rate_gains(few, means, to_cycle), np.nan)
-        lowest = np.fmin(lowest, np.fmin.reduce(endless))
-        highest = np.fmax(highest, np.fmax.reduce(endless))
-        below = np.hypot(np.maximum(moved - lowest, 0.0), further)
-        above = np.hypot(np.maximum(highest - moved, 0.0), further)
-        low, high = last + moved - below, last + moved + above
-        low = np.where(moved > 0, np.maximum(low, last - reading), low)
-        high = np.where(moved < 0, np.minimum(high, last + reading), high)
-    if not (np.isfinite(low).all() and np.isfinite(high).all()):
-        raise NotConverged(
-            f"the slow laws give no finite settlement at cycle {to_cycle:g}",
-            remedy="predict less far, or use the law log",
-        )
-    return Outlook(regimes, last + moved, low, high, candidates, votes, *reach, last, settled)
+
+        def band(probability: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+            """Low end, high end, and half-width of a reading."""
+            reading, tail = tail_error(cycle, displacement, exponent, to_cycle, probability)
+            if known:
+                return last, last, reading
+            miss = held_out_error(candidates, log(to_cycle / cycle[-1]), probability)
+            further = np.hypot(miss, tail)
+            lowest, highest = candidates.spread(bounded, probability)
+            lowest = np.fmin(lowest, np.fmin.reduce(endless))
+            highest = np.fmax(highest, np.fmax.reduce(endless))
+            below = np.hypot(np.maximum(moved - lowest, 0.0), further)
+            above = np.hypot(np.maximum(highest - moved, 0.0), further)
+            low, high = last + moved - below, last + moved + above
+            low = np.where(moved > 0, np.maximum(low, last - reading), low)
+            high = np.where(moved < 0, np.minimum(high, last + reading), high)
+            return low, high, reading
+
+        low, high, _ = band(probability)
+        *judged, reading = band(JUDGED)
+    least = np.fmax(RESOLUTION * np.ptp(displacement, axis=0), ROUND_OFF * settled)
+    return Outlook(
+        regimes, last + moved, low, high, candidates, votes, *reach, last, settled,
+        judged=(judged[0], judged[1]), reading=np.fmax(reading, least),
+    )  # fmt: skip
 
 
 def held_out_error(candidates: Candidates, distance: float, probability: float) -> FloatArray:

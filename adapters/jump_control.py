@@ -127,9 +127,14 @@ class Control:
 
 @dataclass(frozen=True)
 class Decision:
-    """What to do from a state, and why."""
+    """What to do from a state, and why.
+
+    ``jump_run`` turns ``refuse`` into the error `JumpRefused`, with which ``trackbed run`` and
+    ``trackbed resume`` end, exit code 6.
+    """
 
     cycle: int
+    """Cycles done since the start of the run, with those jumped over."""
     action: str
     """``jump``, ``compute``, ``refuse`` or ``end``."""
     window: int
@@ -145,16 +150,20 @@ class Decision:
     half_width: float = 0.0
     """How far that can be off with `PROBABILITY`, before it is tried [m]."""
     limits: tuple[tuple[str, float], ...] = ()
-    """Longest jump by each rule."""
+    """Longest jump by each rule [cycles]."""
     binding: str = ""
     """The rule that set h."""
     regime: str = ""
+    """One of `fit_regime.REGIMES`, of the bed or, where that is refused, of the piston; empty
+    before the first cycles to be fitted."""
     exponent: float = 0.0
     """beta: the rate goes as N^(beta - 1)."""
     bound: int | None = None
     """Cycles k of the paper's bound (eq. 15) for the same error; not used."""
     attempt: int = 1
+    """Which try of a jump from this cycle it is, from 1."""
     why: str = ""
+    """One sentence, or the part of one that follows "up to cycle N" where it refuses."""
 
 
 def begin(cycle: int, settlement: float) -> Control:

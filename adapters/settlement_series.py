@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adapters.errors import UsageError
 from adapters.state import FloatArray
@@ -29,17 +30,45 @@ class Series:
     """m, cm, mm, um, %, 1 (strain), or `UNKNOWN`."""
     begun: float = 0.0
     """Settlement before cycle 0, where that is known, in ``unit``."""
+    counted_from: float = 0.0
+    """The user's number of cycle 0: the load change that ``cycle`` is counted from."""
+    where: str = ""
+    """File or folder it was read from, for errors."""
+    left_out: int = 0
+    """Rows that `since` and `after` left out."""
 
     def since(self, cycle: float) -> Series:
         """The rows from ``cycle`` on, to leave out a bedding-in that no law describes."""
-        rows = self.cycle >= cycle
-        return Series(self.cycle[rows], self.settlement[rows], self.unit, self.begun)
+        return self._kept(self.cycle >= cycle)
 
     def after(self, cycle: float) -> Series:
         """The rows behind ``cycle``, counted from there: a load that changed starts a law anew."""
         rows = self.cycle > cycle
         begun = float(self.settlement[~rows][-1]) if not rows.all() else self.begun
-        return Series(self.cycle[rows] - cycle, self.settlement[rows], self.unit, begun)
+        kept, counted_from = self._kept(rows), self.counted_from + cycle
+        return replace(kept, cycle=kept.cycle - cycle, begun=begun, counted_from=counted_from)
+
+    def _kept(self, rows: NDArray[np.bool_]) -> Series:
+        return replace(
+            self,
+            cycle=self.cycle[rows],
+            settlement=self.settlement[rows],
+            left_out=self.left_out + int((~rows).sum()),
+        )
+
+
+def too_few(
+    count: int, fewest: int, purpose: str, *, where: str, left_out: int = 0, else_do: str = ""
+) -> UsageError:
+    """The error of a series of ``count`` cycles, where ``purpose`` (to fit ..., to tell ...) needs
+    ``fewest``; ``left_out`` rows before them were given but not taken."""
+    gone = f", as {left_out} earlier rows are left out" if left_out else ""
+    back = ", or leave fewer rows out (--from-cycle, --load-change)" if left_out else ""
+    return UsageError(
+        f"{count} cycles are too few {purpose}{gone}",
+        where=where,
+        remedy=f"give at least {fewest} computed cycles{back}{else_do}",
+    )
 
 
 def series_read(
@@ -77,12 +106,13 @@ def series_read(
         path = tables[0]
         if path.is_dir() and unit not in (None, "m"):
             raise UsageError(f"a run's settlement is in m, not in {unit}", where=str(path))
-        return series_of_table(path / "settlement.csv" if path.is_dir() else path, columns, unit)
+        table = path / "settlement.csv" if path.is_dir() else path
+        return replace(series_of_table(table, columns, unit), where=str(table))
     if columns:
         raise UsageError("dumps have no columns of cycles and settlement", where=str(paths[0]))
     if unit not in (None, "m"):
         raise UsageError(f"dumps are in m, not in {unit}", where=str(paths[0]))
-    return series_of_dumps(paths, steps_per_cycle)
+    return replace(series_of_dumps(paths, steps_per_cycle), where=str(paths[0]))
 
 
 def series_of_dumps(paths: Sequence[Path], steps_per_cycle: float | None = None) -> Series:

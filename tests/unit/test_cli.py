@@ -269,6 +269,36 @@ def test_fit_confidence_is_eq_15(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(words) == 0
     assert capsys.readouterr().out.rstrip().endswith(": 30")
     assert main(words[:-2]) == 2
+    capsys.readouterr()
+    refused = [*words, "--to-cycle", "1000", "--fail-at", "500"]
+    assert main([*refused, "--json"]) == 6
+    content = json.loads(capsys.readouterr().out)
+    assert (content["prediction"], content["cycles_needed"]) == (None, 30)
+    assert main(refused) == 6
+    printed = capsys.readouterr()
+    assert printed.out.rstrip().endswith(": 30")
+    assert "given as failure" in printed.err
+
+
+@pytest.mark.parametrize(("law", "fewest"), [("auto", 4), ("log", 3)])
+def test_fit_of_too_few_cycles_names_file_and_flags(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], law: str, fewest: int
+) -> None:
+    """Of 12 rows 2 are left; without the flags nothing was left out, and nothing is said of it."""
+    series, short = tmp_path / "series.csv", tmp_path / "short.csv"
+    rows = [f"{n},{math.log(n)!r}\n" for n in range(1, 13)]
+    series.write_text("cycle,settlement\n" + "".join(rows))
+    short.write_text("cycle,settlement\n" + "".join(rows[:2]))
+    for flags in (["--from-cycle", "11"], ["--from-cycle", "5", "--load-change", "10"]):
+        assert main(["fit", str(series), "--law", law, "--to-cycle", "90", *flags]) == 2
+        said = capsys.readouterr().err
+        assert f"{series}: 2 cycles are too few" in said
+        assert "10 earlier rows are left out" in said
+        assert f"give at least {fewest} computed cycles, or leave fewer rows out" in said
+    assert main(["fit", str(short), "--law", law]) == 2
+    said = capsys.readouterr().err
+    assert f"{short}: 2 cycles are too few" in said
+    assert "left out" not in said
 
 
 def test_relax_writes_a_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

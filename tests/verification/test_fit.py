@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapters import fit
-from adapters.errors import NotConverged, UsageError
+from adapters.errors import JumpRefused, NotConverged, UsageError
 from adapters.fit import (
     Series,
     autoregression,
@@ -284,5 +284,10 @@ def test_faulty_series_are_refused() -> None:
         with pytest.raises(UsageError, match="between 0 and 1"):
             fit_series(series, LOG, 20, probability)
     huge = Series(np.arange(1.0, 11.0), 1e300 * np.arange(10.0))
-    with pytest.raises(NotConverged, match="no finite settlement"):
+    with pytest.raises(NotConverged, match=r"no finite settlement at cycle 1e[+]300"):
         fit_series(huge, law_named("linear"), 1e300)
+    late = Series(huge.cycle + 500, huge.settlement).after(500)
+    with pytest.raises(NotConverged, match="no finite settlement at cycle 1000000500"):
+        fit_series(late, law_named("linear"), 1e9)
+    with pytest.raises(JumpRefused, match="was reached at cycle 502"):
+        fit_series(late, law_named("linear"), 1e9, fail_at=1.0)
