@@ -136,6 +136,17 @@ CASES = (
         bed="crystal",
     ),
     HardCase(
+        "near-crystal-by-profile",
+        "the same, its grains moved by their mean profile",
+        (
+            crystal_box(145, 0.005),
+            'procedure.settlement="history"',
+            'procedure.move="profile"',
+        ),
+        checks=("does not settle", "nothing invented", "stands still", "below crystal"),
+        bed="crystal",
+    ),
+    HardCase(
         "loose-bed",
         "rained with friction 10, loaded with 0.5",
         ("sample.relative_density_start=0.15",),
