@@ -64,8 +64,9 @@ def too_few(
     ``fewest``; ``left_out`` rows before them were given but not taken."""
     gone = f", as {left_out} earlier rows are left out" if left_out else ""
     back = ", or leave fewer rows out (--from-cycle, --load-change)" if left_out else ""
+    given = "1 cycle is" if count == 1 else f"{count} cycles are"
     return UsageError(
-        f"{count} cycles are too few {purpose}{gone}",
+        f"{given} too few {purpose}{gone}",
         where=where,
         remedy=f"give at least {fewest} computed cycles{back}{else_do}",
     )
