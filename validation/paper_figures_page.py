@@ -111,9 +111,9 @@ def share_rising(rows: Sequence[Row], denominator: str, method: str, axis: int) 
     return sum(up), len(up)
 
 
-def wins(rows: Sequence[Row], better: str, than: str) -> int:
+def wins(rows: Sequence[Row], better: str, than: str, runs: Sequence[str] = BED) -> int:
     """Jumps where one method is nearer than another."""
-    return sum(row["of_jump"][better] < row["of_jump"][than] for row in jump_rows(rows))
+    return sum(row["of_jump"][better] < row["of_jump"][than] for row in jump_rows(rows, runs))
 
 
 def per_cent(value: float) -> str:
@@ -287,11 +287,17 @@ def page(rows: Sequence[Row]) -> str:
     """The page, with every mark ``{{NAME}}`` of the template replaced."""
     (rain,) = figure_rows(rows, "3")
     origin = sorted({f"commit {row['commit'][:7]}, {row['machine']}" for row in rows})
+    late = [run.split("-")[1] for run in LATE_RUNS if jump_rows(rows, [run])]
     parts = {
         "CLAIMS": claims(rows),
         "LOG_LAST": per_cent(max(errors_of(rows, "coordinates", "log", PAPER_LAST))),
         "LOG_MOST": per_cent(max(errors_of(rows, "coordinates", "log", FIRST[-1]))),
         "LOG_FIRST": per_cent(max(errors_of(rows, "coordinates", "log", FIRST[0]))),
+        "STILL_LAST": per_cent(max(errors_of(rows, "coordinates", NOTHING, PAPER_LAST))),
+        "LATE_PACKINGS": " and ".join(late),
+        "LATE_JUMPS": str(len(jump_rows(rows, LATE_RUNS))),
+        "LATE_LOG": str(wins(rows, "log", NOTHING, LATE_RUNS)),
+        "LATE_LINEAR": str(wins(rows, "linear", NOTHING, LATE_RUNS)),
         "LOG_PAPER": per_cent(PAPER_LARGEST["log"][1]),
         "LOG_WINS": str(wins(rows, "log", NOTHING)),
         "LINEAR_WINS": str(wins(rows, "linear", NOTHING)),

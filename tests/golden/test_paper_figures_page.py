@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -9,10 +11,13 @@ from scenes import scene_path
 from validation.paper_figures import (
     CELL_DEPTH,
     FIRST_LONG,
+    JUMPS,
+    LATE_RUNS,
     LONG_RUN,
     NOTHING,
     PAPER_LARGEST,
     PAPER_LAST,
+    WINDOWS,
     Row,
     jump_row,
     jumped_cell,
@@ -20,7 +25,6 @@ from validation.paper_figures import (
     rows_read,
 )
 from validation.paper_figures_page import (
-    FIRST,
     PAGE,
     claims,
     errors_of,
@@ -60,29 +64,30 @@ def test_sentences_about_figure_5(rows: list[Row]) -> None:
 
 def test_sentences_about_figures_6_and_7(rows: list[Row]) -> None:
     """Coordinates, at every k_i: the linear law is below the paper's last error, and nearer to it
-    at the last than at the first; the log law is below its 1 % but at 200, where it is above and
-    higher than at 10.  Displacements: at every k_i above the paper's first error."""
+    at the last than at the first; the log law is below its 1 % but at 200, where it is above, and
+    at 500 nearer than at 10.  Displacements: at every k_i above the paper's first error."""
 
     def largest(key: str, law: str) -> list[float]:
-        return [max(errors_of(rows, key, law, k_i)) for k_i in FIRST]
+        return [max(errors_of(rows, key, law, k_i)) for k_i in FIRST_LONG]
 
     linear, log = largest("coordinates", "linear"), largest("coordinates", "log")
     assert max(linear) < PAPER_LARGEST["linear"][1]
     assert linear[-1] < linear[0]
-    assert max(log[:-1]) < PAPER_LARGEST["log"][1] < log[-1]
-    assert log[0] < log[-1]
+    assert max(log[:-2]) < PAPER_LARGEST["log"][1] < log[-2]
+    assert log[-1] < log[0]
+    assert largest("coordinates", NOTHING)[-1] < log[-1]
     for law, (first, _) in PAPER_LARGEST.items():
         assert min(largest("loading", law)) > first
     lines = {number: line.split(" | ")[-1] for line in claims(rows).splitlines()
              for number in [line.split(" | ")[0].strip("| ")]}  # fmt: skip
     assert lines["6"] == "of coordinates only |"
-    assert lines["7"] == "no |"
+    assert lines["7"] == "of coordinates only |"
     assert max(errors_of(rows, "coordinates", NOTHING)) < 0.02
     for law in ("linear", "log"):
         assert max(errors_of(rows, "coordinates", law, None, 20)) < 0.02
         assert max(errors_of(rows, "loading", law, None, 20)) > 0.02
     jumps = len(jump_rows(rows))
-    assert wins(rows, "log", "linear") > 0.75 * jumps
+    assert 0.5 * jumps < wins(rows, "log", "linear") < 0.75 * jumps
     assert wins(rows, "linear", NOTHING) < 0.5 * jumps
     worse, steps = share_rising(rows, "loading", "log", 1)
     assert 0.1 < worse / steps < 0.5
@@ -91,18 +96,25 @@ def test_sentences_about_figures_6_and_7(rows: list[Row]) -> None:
 
 
 def test_sentences_about_five_hundred_cycles_before(rows: list[Row]) -> None:
-    """No window at paper scale begins at the paper's k_i of 500; on the other bed all k_i have the
+    """At the paper's k_i of 500 every k and h are measured, both laws hardly nearer than no move
+    from windows of 20 cycles on and farther from shorter ones; on the other bed all k_i have the
     same k and h, one has errors several times those of its neighbours, and at 500 both laws have
     0.8 to 1 of what moving nothing errs by."""
-    assert max(row["jump"][0] for row in jump_rows(rows)) < PAPER_LAST
-    assert {row["jump"][0] for row in jump_rows(rows, LONG_RUN)} == set(FIRST_LONG)
+    late = jump_rows(rows, LATE_RUNS)
+    assert {tuple(row["jump"]) for row in late} == set(product((PAPER_LAST,), WINDOWS, JUMPS))
+    for law in PAPER_LARGEST:
+        ratios = {short: [row["of_jump"][law] for row in late if (row["jump"][1] < 20) == short]
+                  for short in (True, False)}  # fmt: skip
+        assert min(ratios[True]) > 1
+        assert 0.8 < np.median(ratios[False]) < 1
+    assert {row["jump"][0] for row in jump_rows(rows, (LONG_RUN,))} == set(FIRST_LONG)
     assert (
-        len({len(errors_of(rows, "coordinates", "log", k_i, 0, LONG_RUN)) for k_i in FIRST_LONG})
+        len({len(errors_of(rows, "coordinates", "log", k_i, 0, (LONG_RUN,))) for k_i in FIRST_LONG})
         == 1
     )
 
     def largest(method: str, k_i: int, key: str = "coordinates") -> float:
-        return max(errors_of(rows, key, method, k_i, run=LONG_RUN))
+        return max(errors_of(rows, key, method, k_i, runs=(LONG_RUN,)))
 
     for law in PAPER_LARGEST:
         assert largest(law, 100) > 3 * max(largest(law, 50), largest(law, 200))
