@@ -19,6 +19,7 @@ from validation.settlement_rivals_studies import STUDIES
 STUDY = STUDIES["confined"]
 NAMES = (
     "5 growing jumps, by history, profile",
+    "5 growing jumps, by history, profile, step x 2",
     "5 growing jumps, nothing moved",
     "step x 2",
     "E/10",

@@ -85,6 +85,7 @@ STUDIES = {
                 (
                     "2 jumps", "2 jumps, nothing moved", "2 jumps, by history, profile",
                     "3 growing jumps, by history, profile",
+                    "5 growing jumps, by history, profile, step x 2",
                 ),
                 CONFINED.members,
             ),

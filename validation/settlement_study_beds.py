@@ -36,7 +36,7 @@ ENSEMBLE, RIVALS = "docs/settlement-ensemble.md", "docs/settlement-rivals.md"
 PARTLY, FAR_PAGE = "docs/settlement-partial.md", "docs/settlement-far.md"
 CHOSEN = {
     "confined": "5 growing jumps, by history, profile",
-    "partial": "1 jumps, by history, seated",
+    "partial": "1 jumps, by history, profile, seated for 4",
     "far": "13 growing jumps, by history, profile, rearranged",
 }
 """The way that is judged on each bed: the best of its study, chosen with the record in sight."""
