@@ -291,7 +291,7 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
         "--fail-at", type=float, metavar="S",
         help="settlement or strain of failure, in the series' unit, of either sign: a series or a "
         "prediction that reaches it is refused as collapse (exit code 6); failure_excluded in the "
-        "JSON: the band does not reach it",
+        "JSON: the band (of --probability) does not reach it",
     )  # fmt: skip
     parser.add_argument(
         "--to-cycle", type=float, metavar="N", help="cycle to predict; default: the last one given"
@@ -340,13 +340,13 @@ def fit_command(arguments: argparse.Namespace) -> int:
     series = series_read(
         arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
     )
-    series = series.since(arguments.from_cycle)
     to_cycle = arguments.to_cycle
     if to_cycle is None:
         to_cycle = series.cycle.max(initial=0.0)
     ahead = to_cycle
     if arguments.load_change is not None:
         series, ahead = series.after(arguments.load_change), to_cycle - arguments.load_change
+    series = series.since(arguments.from_cycle)
     needed = {}
     if arguments.error is not None:
         cycles = cycles_needed(series, law, arguments.error, arguments.confidence)

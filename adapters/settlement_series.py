@@ -38,8 +38,11 @@ class Series:
     """Rows that `since` and `after` left out."""
 
     def since(self, cycle: float) -> Series:
-        """The rows from ``cycle`` on, to leave out a bedding-in that no law describes."""
-        return self._kept(self.cycle >= cycle)
+        """The rows from the user's ``cycle`` on, to leave out a bedding-in that no law describes.
+
+        Behind `after`, not before it: that takes what settled before the change from earlier rows.
+        """
+        return self._kept(self.cycle + self.counted_from >= cycle)
 
     def after(self, cycle: float) -> Series:
         """The rows behind ``cycle``, counted from there: a load that changed starts a law anew."""

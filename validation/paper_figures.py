@@ -49,10 +49,10 @@ RECORD = Path(__file__).parent / "results" / "paper-figures.jsonl"
 RUN, TWIN = "paper_scale_a", "paper_scale_b"
 """Two full runs of one bed that began 1e-10 m apart, 300 and 98 cycles."""
 LONG_RUN = "coarse_bursty"
-"""The only stored run with 500 cycles before a window: another bed, of 150 softer grains."""
+"""Another bed, of 150 softer grains, with windows behind 500 cycles."""
 LATE_RUNS = ("confined-1-0", "confined-2-0", "confined-3-0")
 """Full runs of three packings of the same bed, by their names in the settlement ensemble, of which
-`validation.paper_figures_late` measures jumps behind cycle `PAPER_LAST`."""
+`validation.paper_figures_late` measures jumps behind cycle `PAPER_LAST`; the record has some."""
 FIRST = (10, 20, 50, 100, 200)
 """k_i: cycles before the window."""
 PAPER_LAST = 500

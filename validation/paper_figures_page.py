@@ -118,7 +118,7 @@ def wins(rows: Sequence[Row], better: str, than: str, runs: Sequence[str] = BED)
 
 def per_cent(value: float) -> str:
     """A share in per cent, two digits."""
-    return f"{100 * value:.2g} %" if value < 1 else f"{100 * value:.0f} %"
+    return f"{100 * value:.2g} %" if value < 0.995 else f"{100 * value:.0f} %"
 
 
 def errors_table(

@@ -75,16 +75,14 @@ SECTIONS = (
 
 MEET, MISS = "full runs between the same cycles meet the bar", "full runs miss the bar, too"
 RATE = f"moved beds settle less, not known why; {MEET}, and with nothing moved it is missed, too"
-SLOWER = f"beds slow down as the logarithm does; beside its slope they meet the bar; {MEET}"
-YOUNGER = f"beds settle more behind jumps, by half of what they do with nothing moved; {MEET}"
+SLOWER = f"most settle less a cycle than before, not known why; {MEET}"
+YOUNGER = f"most settle more than full runs, not known why; {MEET}"
 HUNG = "one packing's piston hangs by its rim, and the cycles of waiting for it are computed"
 FIRST = f"behind the default move the first cycle settles too much; {MISS}"
 LATE = f"not known why; beds settle more behind the jump, with nothing moved, too; {MISS}"
 CHAOS = "two full runs of one packing gain the same in too few to tell whether chaos alone does it"
 SWING = "not known why; between ends of cycles the coordination number swings by more"
-NOISE = (
-    "the default move takes the noise of a bed at rest for rates; by a mean profile none is lost"
-)
+NOISE = f"{SWING}; by a mean profile, which hardly moves it, there are as many as before"
 WHY: dict[str, tuple[float, str]] = {
     "confined: rate behind healing stays": (85, SLOWER),
     "confined: rate behind healing goes on": (88.33, MISS),

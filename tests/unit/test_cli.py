@@ -232,6 +232,16 @@ def test_fit_prints_json_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert low < fitted["prediction"] < high
 
 
+def test_rows_left_out_before_a_load_change_still_tell_its_zero(tmp_path: Path) -> None:
+    """10 m settle up to cycle 100, then 1e-3 N^0.45, whose future is uncertain; leaving out the
+    earlier rows is no way round the refusal."""
+    series = tmp_path / "series.csv"
+    later = "".join(f"{100 + n},{10 + 1e-3 * n**0.45!r}\n" for n in range(1, 41))
+    series.write_text("cycle,settlement\n1,9.9\n100,10\n" + later)
+    words = ["fit", str(series), "--law", "auto", "--load-change", "100", "--to-cycle", "10000"]
+    assert main(words) == main([*words, "--from-cycle", "101"]) == 6
+
+
 def test_fit_starts_anew_where_the_load_changed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
