@@ -189,6 +189,7 @@ def shortly_told(rows: Sequence[Row], last: int = STUDY.last) -> dict[str, str]:
     hung = [row for row in finished(rows, BEST, last) if row["seed"] == HANGING]
     return {
         **{name: f"{abs(value):.1f}" for name, value in mean.items()},
+        "BEST_HALF": f"{interval(list(errors(rows, BEST, last).values()))[1]:.0f}",
         "BEST_GAINED": f"{gained_time(rows, BEST, last):.0f}",
         "BEST_EVEN": f"{gained_time_even(rows, BEST, last):.0f}",
         "SHORT_OFF": f"{1e6 * off(rows, SHORT, HANGING):.0f}",

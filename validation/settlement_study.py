@@ -77,9 +77,8 @@ MEET, MISS = "full runs between the same cycles meet the bar", "full runs miss t
 RATE = f"moved beds settle less, not known why; {MEET}, and with nothing moved it is missed, too"
 SLOWER = f"most settle less a cycle than before, not known why; {MEET}"
 YOUNGER = f"most settle more than full runs, not known why; {MEET}"
-HUNG = "one packing's piston hangs by its rim, and the cycles of waiting for it are computed"
-FIRST = f"behind the default move the first cycle settles too much; {MISS}"
-LATE = f"not known why; beds settle more behind the jump, with nothing moved, too; {MISS}"
+HUNG = f"one packing's piston hangs again in single cycles behind the jump; {MEET}"
+LATE = f"most settle more than full runs, with nothing moved, too, not known why; {MISS}"
 CHAOS = "two full runs of one packing gain the same in too few to tell whether chaos alone does it"
 SWING = "not known why; between ends of cycles the coordination number swings by more"
 NOISE = f"{SWING}; by a mean profile, which hardly moves it, there are as many as before"
@@ -87,15 +86,12 @@ WHY: dict[str, tuple[float, str]] = {
     "confined: rate behind healing stays": (85, SLOWER),
     "confined: rate behind healing goes on": (88.33, MISS),
     "confined: rate behind the first cycle goes on": (83.33, YOUNGER),
-    "partial: gained time": (201, HUNG),
-    "partial: gained time at equal cost a step": (183, HUNG),
-    "partial: elastic deflection":
-        (91.2, "one packing's piston hangs again at the last cycles; the others miss the bar, too"),
-    "partial: rate stays": (12.5, FIRST),
-    "partial: rate behind healing stays": (25, MISS),
-    "partial: rate behind healing goes on": (62.5, LATE),
-    "partial: rate behind the first cycle goes on": (25, LATE),
-    "partial: rate goes on": (0, FIRST),
+    "partial: rate stays": (60, MISS),
+    "partial: rate behind healing stays": (60, MISS),
+    "partial: rate behind healing goes on": (40, LATE),
+    "partial: rate behind the first cycle goes on": (80, LATE),
+    "partial: rate goes on": (70, LATE),
+    "partial: stiffness goes on": (80, HUNG),
     "coarse, cycle 10,000: coordination number": (3.52, "not known why"),
     "coarse, cycle 10,000: elastic deflection":
         (8.89, "not known why; the runs do not tell it from none"),

@@ -25,6 +25,7 @@ from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_hard_page import failing
 from validation.settlement_partial_page import way
 from validation.settlement_rivals import HEALING
+from validation.settlement_rivals_reading import finished
 from validation.settlement_rivals_reading import judged as judged_of
 from validation.settlement_rivals_runs import record_read
 from validation.settlement_rivals_studies import STUDIES
@@ -102,20 +103,16 @@ def test_bars_that_are_missed_with_nothing_moved_too(bed: str, kind: Kind, reaso
     assert len(bars) > 1
     assert not any(bar.met(bar.value(rows, still, study.last)) for bar in bars)
     jumps = jumps_of(rows, CHOSEN[bed], study.last)
-    if reason == RATE:
-        for skipped in (1, HEALING):
-            found = [beside_full(jump, "settlement", skipped) for jump in jumps]
-            missed = [more > 0 for more, goes_on in found if not goes_on]
-            assert missed.count(False) >= 2 * missed.count(True)
-    if reason == LATE:
-        for jump in (*jumps_of(rows, still, study.last), *jumps):
-            for skipped in (1, HEALING):
-                assert beside_full(jump, "settlement", skipped)[0] > 0
+    share = 2 if reason == RATE else 1
+    for skipped in (0, 1, HEALING):
+        found = [beside_full(jump, "settlement", skipped) for jump in jumps]
+        missed = [(more > 0) == (reason == LATE) for more, goes_on in found if not goes_on]
+        assert missed.count(True) > share * missed.count(False)
 
 
 def test_chaos_swings_and_scatter_are_what_reasons_say() -> None:
     """Full runs beside full runs miss the bar; contacts swing by more than a jump changes them; no
-    deflection is told from none; the packings whose piston is carried miss it, too."""
+    deflection is told from none."""
     runs, record = jump_runs.record_read(), EnsembleRecord()
     for one in ("tolerance 0.05", "tolerance 0.1"):
         assert WHY[f"jump control on LIGGGHTS, {one}: as the full run gained"][1] == CHAOS
@@ -129,15 +126,21 @@ def test_chaos_swings_and_scatter_are_what_reasons_say() -> None:
         computed = np.diff([0, *row["figures"]["cycle"]]) == 1
         ends = np.array(row["figures"]["coordination"])[computed]
         assert np.ptp(ends) / ends.mean() > change
-    far, partial = (
-        judged_of(record_read(STUDIES[bed].record), CHOSEN[bed], STUDIES[bed].last, "deflection")
-        for bed in ("far", "partial")
+    far = judged_of(
+        record_read(STUDIES["far"].record), CHOSEN["far"], STUDIES["far"].last, "deflection"
     )
     assert far
-    assert partial
     assert far.half > abs(far.mean)
-    hung = partial.error.argmax()
-    assert 100 * abs(np.delete(partial.error, hung).mean()) > 2
+
+
+def test_a_piston_hangs_again_where_stiffness_does_not_go_on() -> None:
+    """Jumps of one packing, behind which the unloading stiffness of some cycles is negative."""
+    rows = sides_compared(record_read(STUDIES["partial"].record), PARTIAL, EnsembleRecord())
+    for row in finished(rows, CHOSEN["partial"], STUDIES["partial"].last):
+        for jump in jumps_of([row], CHOSEN["partial"], STUDIES["partial"].last):
+            hangs = min(jump["after"]["piston_stiffness"]) < 0
+            assert beside_full(jump, "piston_stiffness", 0)[1] != hangs
+            assert hangs == (row["seed"] == 2)
 
 
 @pytest.mark.parametrize(
