@@ -95,7 +95,7 @@ def test_reasons_say_of_full_runs_what_the_records_say(checks: dict[str, Check])
     ("bed", "kind", "reason"), [("partial", PARTIAL, LATE), ("far", COARSE, RATE)]
 )
 def test_bars_that_are_missed_with_nothing_moved_too(bed: str, kind: Kind, reason: str) -> None:
-    """As their reason says; that of the partial bed says that beds settle more than full runs."""
+    """As their reason says, which tells whether most settle more or less than full runs, too."""
     study = STUDIES[bed]
     rows = sides_compared(record_read(study.record), kind, EnsembleRecord())
     (still,) = (one.name for one in study.methods if one.name.endswith("nothing moved"))
@@ -103,11 +103,10 @@ def test_bars_that_are_missed_with_nothing_moved_too(bed: str, kind: Kind, reaso
     assert len(bars) > 1
     assert not any(bar.met(bar.value(rows, still, study.last)) for bar in bars)
     jumps = jumps_of(rows, CHOSEN[bed], study.last)
-    share = 2 if reason == RATE else 1
-    for skipped in (0, 1, HEALING):
+    for skipped in (1, HEALING):
         found = [beside_full(jump, "settlement", skipped) for jump in jumps]
         missed = [(more > 0) == (reason == LATE) for more, goes_on in found if not goes_on]
-        assert missed.count(True) > share * missed.count(False)
+        assert missed.count(True) > missed.count(False)
 
 
 def test_chaos_swings_and_scatter_are_what_reasons_say() -> None:
