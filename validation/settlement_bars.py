@@ -161,6 +161,23 @@ def beside_full(jump: Row, column: str, skipped: int) -> tuple[float, bool]:
     return change - float(full.mean()), continues(change, full)
 
 
+def settled_more(rows: Sequence[Row], method: str, last: int) -> FloatArray:
+    """What beds settle behind a method's jumps less what full runs settle in the same cycles [m]:
+    a row a packing, mean over its jumps; in the first cycle, and in the next nine together.
+
+    ``rows`` of `sides_compared`; of jumps whose windows have ten cycles behind them.
+    """
+    found: dict[int, list[FloatArray]] = {}
+    for row in finished(rows, method, last):
+        for jump in jumps_of([row], method, last):
+            mine, *full = (
+                np.array(one["after"]["settlement"], float) for one in (jump, *jump["others"])
+            )
+            more = mine - np.mean(full, axis=0)
+            found.setdefault(row["seed"], []).append(np.array([more[0], more[1:].sum()]))
+    return np.array([np.mean(found[seed], axis=0) for seed in sorted(found)])
+
+
 def changes(sides: Sequence[Row], column: str, skipped: int) -> FloatArray:
     """`change_of` of each of ``sides``."""
     return np.array([change_of(one, column, skipped) for one in sides])

@@ -20,7 +20,12 @@ from adapters.run_folder import write_atomically
 from adapters.state import FloatArray
 from validation.jump_forecasts import curves_of
 from validation.page_text import page_filled, table
-from validation.settlement_bars import BARS_CONTINUITY, sides_compared, table_bars
+from validation.settlement_bars import (
+    BARS_CONTINUITY,
+    settled_more,
+    sides_compared,
+    table_bars,
+)
 from validation.settlement_ensemble import COARSE, CONFINED, Kind
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_far_jumps import (
@@ -30,6 +35,7 @@ from validation.settlement_far_jumps import (
     table_noise,
 )
 from validation.settlement_far_room import (
+    REARRANGED,
     short_of,
     table_behind,
     table_changed,
@@ -39,6 +45,7 @@ from validation.settlement_far_room import (
 from validation.settlement_rivals import BLOCK, FIRST_WINDOW, Row
 from validation.settlement_rivals_reading import finished
 from validation.settlement_rivals_runs import record_read
+from validation.student import interval
 
 TEMPLATE = Path(__file__).with_suffix(".md")
 PAGE = Path(__file__).parents[1] / "docs" / "settlement-far.md"
@@ -168,7 +175,21 @@ def continuity(rows: Sequence[Row], record: EnsembleRecord) -> dict[str, str]:
         "RATE_STAYS": f"{min(stays):.0f} to {max(stays):.0f}",
         "RATE_GOES_ON": f"{min(rate):.0f} to {max(rate):.0f}",
         "LONGEST": f"{max(ratios):.0f}",
+        **springing(compared),
     }
+
+
+def springing(compared: Sequence[Row]) -> dict[str, str]:
+    """What beds settle more than full runs in the first cycle behind a jump, and in the next nine
+    [um]: the way that is judged, and with nothing moved; `sides_compared` has been called."""
+    told = {}
+    (still,) = (one.name for one in STUDY.methods if one.name.endswith("nothing moved"))
+    for mark, name in (("MOVED", REARRANGED[0]), ("STILL", still)):
+        more = 1e6 * settled_more(compared, name, STUDY.last)
+        for part, values in zip(("FIRST", "NEXT"), more.T, strict=True):
+            mean, half = interval(values)
+            told[f"{mark}_{part}"] = f"{mean:+.0f} ± {half:.0f}"
+    return told
 
 
 def draw(found: Sequence[Foretold], target: Path) -> None:

@@ -75,7 +75,7 @@ SECTIONS = (
 
 MEET, MISS = "full runs between the same cycles meet the bar", "full runs miss the bar, too"
 STILL = f"{MEET}, and with nothing moved it is missed, too"
-RATE = f"most settle less than full runs, not known why; {STILL}"
+RATE = f"moved beds settle more in the first cycle behind a jump and rise in the next; {STILL}"
 SLOWER = f"most settle less a cycle than before, not known why; {MEET}"
 YOUNGER = f"most settle more than full runs, not known why; {MEET}"
 HUNG = f"one packing's piston hangs again in single cycles behind the jump; {MEET}"
@@ -98,7 +98,7 @@ WHY: dict[str, tuple[float, str]] = {
         (8.89, "not known why; the runs do not tell it from none"),
     "coarse, cycle 10,000: rate behind healing goes on": (86.2, RATE),
     "coarse, cycle 10,000: rate behind the first cycle goes on": (80, RATE),
-    "coarse, cycle 10,000: rate goes on": (84.6, f"not known why; {STILL}"),
+    "coarse, cycle 10,000: rate goes on": (84.6, RATE),
     "bands that have the truth, where they are given":
         (69, "bursts that are still to come are in no first cycles"),
     "jump control, curve of the demo's full run: within":

@@ -17,6 +17,7 @@ from validation.settlement_bars import (
     BARS_PARTIAL,
     beside_full,
     jumps_of,
+    settled_more,
     sides_compared,
     told,
 )
@@ -43,6 +44,7 @@ from validation.settlement_study import (
 )
 from validation.settlement_study_beds import BEDS, CHOSEN, FAR_PAGE, PARTLY, RIVALS
 from validation.settlement_study_page import PAGE, page
+from validation.student import interval
 
 DOCS = PAGE.parent.parent
 
@@ -103,6 +105,11 @@ def test_bars_that_are_missed_with_nothing_moved_too(bed: str, kind: Kind, reaso
     assert len(bars) > 1
     assert not any(bar.met(bar.value(rows, still, study.last)) for bar in bars)
     jumps = jumps_of(rows, CHOSEN[bed], study.last)
+    if reason == RATE:
+        first, after = (
+            interval(values) for values in settled_more(rows, CHOSEN[bed], study.last).T
+        )
+        assert first[0] - first[1] > 0 > after[0] + after[1]
     for skipped in (1, HEALING):
         found = [beside_full(jump, "settlement", skipped) for jump in jumps]
         missed = [(more > 0) == (reason == LATE) for more, goes_on in found if not goes_on]
