@@ -16,7 +16,7 @@ from adapters.run_folder import RunFolder
 from adapters.scene_file import scene_load
 from adapters.stages import Run, Variant
 from tests.small_bed import small_bed
-from validation.settlement_bars import BARS, EVEN, gained_time_even, table_bars
+from validation.settlement_bars import BARS, EVEN, gained_time_even, settled_more, table_bars
 from validation.settlement_ensemble import COARSE, CONFINED
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals import (
@@ -366,6 +366,19 @@ def test_full_runs_beside_a_shocked_bed_go_on() -> None:
     assert bar.full(rows, "none", LAST) != bar.full(rows, "none", LAST)
     cell = table_bars(rows, ["1 jumps"], LAST, [bar]).splitlines()[-1]
     assert re.fullmatch(r"\| 1 jumps \| \d \(9\d\) \|", cell)
+
+
+def test_what_a_moved_bed_settles_more_is_told_packing_by_packing() -> None:
+    """3 less 1 in the first cycle and 0 less 1 in each of the next nine; half of that in another
+    packing's two jumps, of which one is no different from full runs."""
+    full = {"after": {"settlement": [1.0] * 10}}
+    jump = {"after": {"settlement": [3.0] + [0.0] * 9}, "others": [full] * 3}
+    same = full | {"others": [full] * 3}
+    rows = [
+        made_up("rivals", "1 jumps", seed, 0, 1.0) | {"sides": jumps}
+        for seed, jumps in ((1, [jump]), (2, [jump, same]))
+    ]
+    assert settled_more(rows, "1 jumps", LAST).tolist() == [[2.0, -9.0], [1.0, -4.5]]
 
 
 def test_what_stays_is_within_the_scatter_of_single_cycles() -> None:
