@@ -260,6 +260,34 @@ def test_sentences_about_growing_jumps() -> None:
     assert ratio == pytest.approx(0.4, abs=0.05)
 
 
+def test_sentences_about_jumps_on_a_longer_step_and_by_tolerance() -> None:
+    """On a step twice as long: half the cost, inside the bars of state, 27, 29 and 30 of 30 jumps
+    go on; by tolerance: one run, nearer than chaos tells, at the cost of the step alone."""
+    rows = record_read(PAPER.record)
+    compared = sides_compared(rows, CONFINED, EnsembleRecord())
+    name = "5 growing jumps, by history, profile"
+    both = f"{name}, step x 2"
+    runs = finished(rows, both, LAST)
+    assert [row["seed"] for row in runs] == [1, 2, 3, 1, 2, 3]
+    assert cost(runs) / cost(finished(rows, name, LAST)) == pytest.approx(0.5, abs=0.02)
+    assert all(bar.met(bar.value(compared, both, LAST)) for bar in BARS[:8])
+    settled = judged(rows, both, LAST, "settlement")
+    assert settled is not None
+    assert [round(100 * one) for one in settled.error] == [9, -10, 2]
+    assert round(100 * settled.half) == 24
+    found = {bar.words: bar.value(compared, both, LAST) for bar in BARS}
+    assert found["gained time"] == pytest.approx(1378, abs=0.5)
+    assert found["gained time at equal cost a step"] == pytest.approx(931, abs=0.5)
+    assert found["elastic deflection"] == pytest.approx(1.1, abs=0.05)
+    on = ("rate goes on", "coordination goes on", "stiffness goes on", "rate stays")
+    assert [round(found[words]) for words in on] == [90, 97, 100, 80]
+    (chosen,) = finished(rows, "tolerance 0.02", LAST)
+    assert (len(chosen["sides"]), chosen["computed"]) == (14, 236)
+    assert gained_time(rows, "tolerance 0.02", LAST) == pytest.approx(157, abs=0.5)
+    off = [judged(rows, "tolerance 0.02", LAST, figure) for figure in ("settlement", "deflection")]
+    assert [round(100 * one.mean) for one in off if one] == [-4, -2]
+
+
 def test_sentences_about_two_readings_of_the_rate_that_growing_jumps_miss() -> None:
     """Behind healing eight of nine are slower; 55 of 60 stay by the slope of ln N, full runs in 83
     %; behind the first cycle nine of ten settle more; packing 2 makes what beds settle more."""
