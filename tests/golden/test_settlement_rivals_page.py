@@ -251,11 +251,12 @@ def test_sentences_about_growing_jumps() -> None:
     longer = [judged(rows, "step x 2", LAST, figure) for figure in ("settlement", "deflection")]
     found = [[round(100 * one) for one in each.error] for each in longer if each is not None]
     assert found == [[0, -8, -2], [5, -1, -3]]
-    heavy = [judged(rows, "density x 10", LAST, key) for key in ("settlement", "coordination")]
-    assert [[round(100 * one) for one in each.error] for each in heavy if each is not None] == [
-        [33, 56],
-        [-16, -13],
-    ]
+    for name, errors in (
+        ("density x 10", [[33, 56], [-16, -13]]),
+        ("100 Hz", [[22, 23], [-12, -9]]),
+    ):
+        off = [judged(rows, name, LAST, figure) for figure in ("settlement", "coordination")]
+        assert [[round(100 * one) for one in each.error] for each in off if each] == errors
     ratio = cost(runs) / cost(finished(rows, "step x 2", LAST))
     assert ratio == pytest.approx(0.4, abs=0.05)
 
