@@ -174,8 +174,13 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
             "window", bed.cycle, bed.cycle + cycles, rows, cost, checks=figures, notes=notes
         )
         _finish(run, folder, outcome)
+    return bed_behind(run.folder, name, outcome, healing)
+
+
+def bed_behind(folder: RunFolder, name: str, outcome: Outcome, healing: int = 0) -> Bed:
+    """Where the finished window ``name`` leaves a run in ``folder``; ``healing``: `compute`."""
     start = EngineStart(
-        run.folder.path / name / "end.restart",
+        folder.path / name / "end.restart",
         outcome.notes["time_step"],
         outcome.notes["piston_mesh"],
         outcome.notes["piston_height"],

@@ -88,10 +88,15 @@ def record_read(path: Path = STUDY.record) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
+def folder_of(way: Way, seed: int, work: Path) -> RunFolder:
+    """Where the run of a seed, in that way, is made in ``work``."""
+    return RunFolder(work / f"{way.name.replace(' ', '-')}-{seed}")
+
+
 def run(study: Study, way: Way, seed: int, work: Path) -> dict[str, Any]:
     """One run to its end, in a folder of its own; the stages before the first jump are shared."""
     full = RunFolder(work / f"full-{seed}")
-    home = RunFolder(work / f"{way.name.replace(' ', '-')}-{seed}")
+    home = folder_of(way, seed, work)
     home.path.mkdir(parents=True, exist_ok=True)
     refused = ""
     with home.locked():
