@@ -25,7 +25,7 @@ the point what it is.
 
 The path of a non-monotone law may still fold.  Then another rounding is gone on with, whose path
 folds elsewhere, from a sigma some times as great.  When none leads on the best point is given back,
-from which `rigid_lcp.extrapolated_points` often ends.
+from which `rigid_lcp.extrapolated_points` often ends; `rigid_lcp.folded_path` goes round folds.
 """
 
 from __future__ import annotations
@@ -50,16 +50,10 @@ another path, and they are followed in turn."""
 SHRINK, LESS = 0.3, 0.55
 """sigma of the next point over that of the last, and where that was not found."""
 BACK = (3.0, 10.0)
-"""sigma with which another path is begun where one folds, over that of its last point: greater ones
+"""sigma with which another path is begun where one folds, over that of its last point: the greater
 when all paths have folded."""
 HOPS = 6
-"""So many other paths at most are gone on with,"""
-FURTHER_ROUNDINGS, FURTHER_BACK = (-4.0, -0.5), (0.1, 1.5)
-"""or more, with roundings and sigmas spread evenly between these powers of ten: the same ones again
-would lead to the same folds again."""
-SPREAD = (0.7548776662466927, 0.5698402909980532)
-"""Steps of the evenest sequence of pairs in the unit square (Roberts 2018): 1/g and 1/g^2, where
-g^3 = g + 1."""
+"""So many other paths at most are gone on with."""
 SHIFT = 1e-8
 """Of W in the matrices, over mean(diag W)."""
 FOUND = 0.03
@@ -80,16 +74,14 @@ def smoothed_path(
     *,
     linear: Factorisation | None = None,
     factorisations: int = FACTORISATIONS,
-    hops: int = HOPS,
 ) -> FrictionSolution:
     """Follow the path from a great sigma until the residual is at or below ``tolerance``.
 
     ``begin``: forces r (nc * dim,) and sigma [N^2] of a point near the path, as another method left
     them; else it begins at the forces of springs.  ``linear``: factorisations of this problem's W,
-    made if not given; at most ``factorisations`` are spent, and so many ``hops`` made to other
-    paths where one folds.  Some 40 to 100 factorisations solve most settled beds; for what sticks
-    or hardly slides `rigid_lcp.interior_point` and Newton need a third of that.  ``work``:
-    ``points`` and ``factorisations``.
+    made if not given; at most ``factorisations`` are spent.  Some 40 to 100 factorisations solve
+    most settled beds; for what sticks or hardly slides `rigid_lcp.interior_point` and Newton need a
+    third of that.  ``work``: ``points`` and ``factorisations``.
     """
     linear = linear or factorisation(problem)
     best, least = np.zeros(problem.offset.shape), np.inf
@@ -122,7 +114,7 @@ def smoothed_path(
                     best, least = ended.r, ended.residual
         elif shrink == SHRINK:
             shrink = LESS
-        elif hopped < hops:
+        elif hopped < HOPS:
             hopped, most = hopped + 1, FIRST_STEPS
             rounding, shrink = other_path(hopped)
         else:
@@ -136,14 +128,7 @@ def smoothed_path(
 def other_path(hop: int) -> tuple[float, float]:
     """Rounding [-] and sigma (over that of the last point) of the path that is gone on with after
     ``hop`` folds."""
-    if hop <= HOPS:
-        return ROUNDINGS[hop % len(ROUNDINGS)], BACK[hop // len(ROUNDINGS)]
-    powers = (
-        low + (high - low) * ((0.5 + hop * step) % 1.0)
-        for (low, high), step in zip((FURTHER_ROUNDINGS, FURTHER_BACK), SPREAD, strict=True)
-    )
-    rounding, back = (float(10.0**power) for power in powers)
-    return rounding, back
+    return ROUNDINGS[hop % len(ROUNDINGS)], BACK[hop // len(ROUNDINGS)]
 
 
 def path_begin(problem: FrictionProblem, linear: Factorisation) -> tuple[Floats, float]:
@@ -199,12 +184,19 @@ def smoothed_point(
 
 @njit(cache=True)
 def smoothed_map(
-    force: Floats, velocity: Floats, mu: Floats, rho: Floats, sigma: float, eps: float
+    force: Floats,
+    velocity: Floats,
+    mu: Floats,
+    rho: Floats,
+    sigma: float,
+    eps: float,
+    share: float = 1.0,
 ) -> tuple[Floats, Floats, Floats]:
     """F and its derivatives A = dF/dr, B = dF/du.
 
     ``force`` and ``velocity`` (nc, dim); ``mu`` and ``rho`` (nc,), rho force per velocity;
-    ``sigma`` force squared, ``eps`` a velocity.  F (nc, dim) a force, A (nc, dim, dim), B (nc, dim,
+    ``sigma`` force squared, ``eps`` a velocity; ``share`` of the term |u_T|: 1 is Coulomb's law, 0
+    a convex one.  F (nc, dim) a force, A (nc, dim, dim), B (nc, dim,
     dim) force per velocity.  Without friction x and s are the normal parts, and ``F_T = r_T``.
     """
     nc, dim = force.shape
@@ -228,7 +220,7 @@ def smoothed_map(
             squares += velocity[c, i] ** 2
         rounded = np.sqrt(squares + eps**2)
         x[0] = mu[c] * force[c, 0]
-        s[0] = rho[c] * (velocity[c, 0] / mu[c] + squares / rounded)
+        s[0] = rho[c] * (velocity[c, 0] / mu[c] + share * squares / rounded)
         across = 0.0  # |z_T| of z = x - s
         for i in range(1, dim):
             x[i], s[i] = force[c, i], rho[c] * velocity[c, i]
@@ -251,7 +243,7 @@ def smoothed_map(
             for j in range(1, dim):
                 slope[i, j] = (along - sideways) * turn[i] * turn[j]
             slope[i, i] += sideways
-        bend = (squares + 2.0 * eps**2) / rounded**3  # of the rounded |u_T|, over u_T
+        bend = share * (squares + 2.0 * eps**2) / rounded**3  # of the rounded |u_T|, over u_T
         for i in range(dim):
             for j in range(dim):
                 same = 1.0 if i == j else 0.0

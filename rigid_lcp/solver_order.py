@@ -21,14 +21,14 @@
                      hard for the one is often easy for the other.  Where W is found to give
                      energy (`rigid_lcp.energy_proof`) no solution need exist, and one more turn is
                      the last
+    folded path      by arc length round the folds (`rigid_lcp.folded_path`), and turns from there
     by turns again   from the end of the convex path, and of three paths of the interior point;
                      then extrapolated points from the best
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
                      goes to Newton, and if that is not enough to Gauss-Seidel and Newton again.
                      They end after the effort that `FALLBACK_SHARE` names, or before they begin
-                     where a linear programme proves that there is no solution.  Then the
-                     smoothed path from its beginning, past many folds, and extrapolated points
-                     again from the best
+                     where a linear programme proves that there is no solution.  Then extrapolated
+                     points again from the best
                      Where friction is above 10, problems of less come first, each the start of the
                      next
     islands          what is still not solved, each island apart, by all of this (large problems
@@ -55,11 +55,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import factorisation
+from rigid_lcp.folded_path import folded_path
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.frictionless import frictionless
 from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
 from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
-from rigid_lcp.smoothed_path import smoothed_path
 from rigid_lcp.solver_cold import (
     BENT_USEFUL,
     CONVEX_CONTACTS,
@@ -93,9 +93,8 @@ DEAR_SWEEPS, DEAR_STEPS = 6000, 40
 FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
 """What the paths of the interior point may cost in all before no further one is begun: so many
 times what was spent before them, or so many flops (some seconds) if that is more."""
-LAST_HOPS, LAST_FLOPS, LAST_FEW, LAST_MANY = 300, 4e10, 300, 3000
-"""Where little else is left, from the beginning and with so many folds left behind: at most as many
-factorisations as all before or the last number, and at such a cost; or so few, if that is more."""
+FOLDED_STEPS, FOLDED_FLOPS, FOLDED_SHARE = 1000, 4e10, 0.5
+"""Factorisations along a path by arc length, their cost, and their share of what is affordable."""
 DRIFT, DRIFT_FLOPS = 1500, 5e9
 """Factorisations of extrapolated points before the paths, and their cost in all (or so much as was
 spent before, if that is more)."""
@@ -205,8 +204,8 @@ def friction_steps(trial: Trial) -> bool:
 
 
 def fallback_paths(trial: Trial, accept: float) -> None:
-    """Extrapolated points, then the interior point along one path after another, within the effort
-    of `FALLBACK_SHARE`, and extrapolated points again."""
+    """The folded path and extrapolated points, then the interior point along one path after
+    another, within the effort of `FALLBACK_SHARE`, and extrapolated points again."""
     problem, tolerance = trial.problem, trial.tolerance
     if trial.forces > ENDLESS and proved_insoluble(problem):  # a proof before the paths
         trial.forget_endless()
@@ -216,7 +215,7 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         by_turns(trial, trial.best.r if trial.path_end is None else trial.path_end, patience=1)
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
-    if turns_from_paths(trial):
+    if folded(trial) or turns_from_paths(trial):
         return
     trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort))
     if trial.best.solved:
@@ -234,27 +233,27 @@ def fallback_paths(trial: Trial, accept: float) -> None:
             return
         if trial.best.residual <= accept and problem.contacts > FEW_CONTACTS:
             return
-    if not smoothed(trial):
-        trial.drift(LAST_DRIFT, LAST_DRIFT_FLOPS)
+    trial.drift(LAST_DRIFT, LAST_DRIFT_FLOPS)
     if trial.best.solved:
         return
     if trial.effort <= most:
         trial.sweep(None, LAST_SWEEPS)
 
 
-def smoothed(trial: Trial) -> bool:
-    """The smoothed path from its beginning, past many folds."""
+def folded(trial: Trial) -> bool:
+    """Coulomb's path by arc length, past its folds, and turns from its best point."""
     trial.linear = trial.linear or factorisation(trial.problem)
-    before, dearest = trial.work.get("factorisations", 0.0), LAST_FLOPS / trial.linear.flops
-    count = max(LAST_FEW, int(min(max(before, LAST_MANY), dearest)))
-    trial.keep(
-        smoothed_path(
-            trial.problem, trial.tolerance, linear=trial.linear,
-            factorisations=min(count, trial.affordable), hops=LAST_HOPS,
+    dearest = FOLDED_FLOPS / trial.linear.flops
+    count = int(min(FOLDED_STEPS, dearest, FOLDED_SHARE * trial.affordable))
+    found = trial.keep(
+        folded_path(
+            trial.problem, trial.tolerance, linear=trial.linear, factorisations=count,
         )
     )  # fmt: skip
     trial.sharpen()
-    return trial.best.solved
+    if not trial.best.solved and found.residual <= HAND_OVER:
+        trial.newton(found.r, FEW, found.method)
+    return trial.best.solved or by_turns(trial, found.r)
 
 
 def proved_insoluble(problem: FrictionProblem) -> bool:

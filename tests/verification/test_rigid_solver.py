@@ -240,14 +240,12 @@ def test_where_a_proof_is_at_hand_no_path_is_tried():
 
 def test_the_search_ends_after_the_effort_that_is_stated(monkeypatch):
     """With no floor of flops, and none for turns, paths end once they cost `FALLBACK_SHARE` of what
-    went before, the last one included: six paths and twice the factorisations otherwise.  The
-    smoothed path past many folds may then cost as much as all before, with no `LAST_MANY` of its
-    own."""
+    went before, the last one included: six paths and twice the factorisations otherwise."""
     problem = random_problem(40, 30, 0.5, 3)
     all_paths = solve_auto(problem).work
     monkeypatch.setattr("rigid_lcp.solver_order.FALLBACK_FLOPS", 0.0)
     monkeypatch.setattr("rigid_lcp.solver_turns.TURNS_FLOPS", 0.0)
-    monkeypatch.setattr("rigid_lcp.solver_order.LAST_MANY", 0)
+    monkeypatch.setattr("rigid_lcp.solver_order.LAST_DRIFT_FLOPS", 0.0)
     found = solve_auto(problem)
     assert not found.solved
     assert "->" in found.message
