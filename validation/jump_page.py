@@ -5,11 +5,12 @@ The page is ``jump_page.md`` beside this file, with tables and numbers of the tw
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from validation import jump_runs, jump_study
+from validation import jump_runs, jump_study, jump_twins
 from validation.jump_history_behind import TOLD, shares_told
 from validation.jump_liggghts import (
     Rows,
@@ -29,6 +30,7 @@ from validation.jump_reading import (
     total,
     within,
 )
+from validation.jump_twins import Jump, jumps_read, twins_told
 from validation.law_page import per_cent
 from validation.page_text import page_filled, table
 from validation.settlement_ensemble_record import EnsembleRecord
@@ -197,7 +199,7 @@ def measured_table(rows: Rows) -> str:
     return table(head, lines)
 
 
-def page(rows: Rows, runs: Rows) -> str:
+def page(rows: Rows, runs: Rows, jumps: Sequence[Jump]) -> str:
     """The page, with every mark ``{{name}}`` of the template replaced."""
     named = [row for name in jump_study.BURSTS for row in group(rows, name)]
     worst = max(named, key=lambda row: abs(row["error"]))
@@ -221,6 +223,7 @@ def page(rows: Rows, runs: Rows) -> str:
         "liggghts_told": liggghts_told(runs),
         "liggghts_realised": ways_told(jumps_realised(runs)),
         "liggghts_chaos": ways_told(jumps_chaos(runs, EnsembleRecord())),
+        **twins_told(jumps),
         "liggghts_k_i": str(jump_runs.STUDY.k_i),
         "liggghts_last": str(jump_runs.STUDY.last),
         "add_up": (
@@ -247,7 +250,8 @@ def main() -> None:
     from validation.jump_picture import draw
 
     rows, runs = jump_study.record_read(), jump_runs.record_read()
-    PAGE.write_text(page(rows, runs), encoding="utf-8")
+    jumps = jumps_read(runs, jump_runs.record_read(jump_twins.RECORD))
+    PAGE.write_text(page(rows, runs, jumps), encoding="utf-8")
     draw(rows, runs, PICTURE)
 
 

@@ -29,7 +29,7 @@ from adapters.run_folder import Outcome
 from adapters.stages import bed_behind, compute
 from adapters.state import FloatArray
 from validation import jump_runs
-from validation.jump_liggghts import spans, tolerance_of
+from validation.jump_liggghts import spans, tolerance_of, ways_told
 from validation.jump_runs import STUDY
 from validation.settlement_ensemble import STEP
 from validation.settlement_rivals import run_in
@@ -72,6 +72,16 @@ class Jump:
     def forecast_error(self) -> float:
         """The same without what was to make good earlier jumps [m]."""
         return self.error - self.made_good
+
+    @property
+    def within(self) -> bool:
+        """Whether the forecast holds the tolerance, as the check behind a jump has it."""
+        return abs(self.forecast_error) <= self.allowed
+
+    @property
+    def side(self) -> int:
+        """1 where every twin gains more than the run, -1 where every twin gains less, else 0."""
+        return int(self.twins.min() > self.gained) - int(self.twins.max() < self.gained)
 
     @property
     def twin_errors(self) -> FloatArray:
@@ -119,6 +129,36 @@ class Twin:
     """Cycles N and N + h + m."""
     member: int
     """From 1: how many times `STEP` one grain begins aside."""
+
+
+def by_way(jumps: Sequence[Jump]) -> dict[str, list[Jump]]:
+    """The jumps of each way by tolerance that has some."""
+    ways = {way.name: [jump for jump in jumps if jump.way == way.name] for way in WAYS}
+    return {way: these for way, these in ways.items() if these}
+
+
+def twins_told(jumps: Sequence[Jump]) -> dict[str, str]:
+    """What the twins say, for the page: shares of jumps within, of twins beside one another, and on
+    which side of the run the twins of the other jumps lie."""
+    ways = by_way(jumps)
+    missed = {way: [one for one in these if not one.within] for way, these in ways.items()}
+    return {
+        "twins": ways_told({way: [one.within for one in these] for way, these in ways.items()}),
+        "twins_strict": ways_told(
+            {way: [abs(one.error) <= one.allowed for one in these] for way, these in ways.items()}
+        ),
+        "twins_chaos": ways_told(
+            {
+                way: [bool(held) for one in these for held in abs(one.twin_errors) <= one.allowed]
+                for way, these in ways.items()
+            }
+        ),
+        "twins_sides": " and ".join(
+            f"in {sum(one.side != 0 for one in these)} of the {len(these)} others at {way} "
+            f"({sum(one.side > 0 for one in these)} of these gain less than all twins)"
+            for way, these in missed.items()
+        ),
+    }
 
 
 def plan(work: Path, members: int) -> Iterator[Twin]:

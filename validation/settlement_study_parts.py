@@ -17,6 +17,7 @@ from adapters.state import FloatArray
 from validation import (
     jump_runs,
     jump_study,
+    jump_twins,
     law_study,
     relaxation_runs,
     settlement_hard_runs,
@@ -93,11 +94,15 @@ def law_checks(rows: Sequence[Row] | None = None) -> list[Check]:
 
 
 def jump_checks(
-    rows: Sequence[Row] | None = None, runs: Sequence[Row] | None = None
+    rows: Sequence[Row] | None = None,
+    runs: Sequence[Row] | None = None,
+    twins: Sequence[Row] | None = None,
 ) -> list[Check]:
     """Jumps within the tolerance by which they chose themselves."""
     rows = jump_study.record_read() if rows is None else rows
     runs = jump_runs.record_read() if runs is None else runs
+    twins = jump_runs.record_read(jump_twins.RECORD) if twins is None else twins
+    known = jump_twins.by_way(jump_twins.jumps_read(runs, twins))
     settings = settings_of(rows)
     every = [row for these in settings.values() for row in these]
     measured = group(rows, "measured")
@@ -130,6 +135,10 @@ def jump_checks(
         spent = [one for run in these if (one := overspend(run, runs)) is not None]
         checks += [
             at_least(f"{where}: observed within", inside / jumps if jumps else nan, BAR, JUMPS),
+            at_least(
+                f"{where}: as the bed itself would have gained",
+                mean_of([one.within for one in known.get(way, ())]), BAR, JUMPS,
+            ),
             at_least(f"{where}: as the full run gained", mean_of(gained), BAR, JUMPS),
             reported(
                 f"{where}: cycles computed over the oracle's",
