@@ -203,7 +203,15 @@ def folded_path(
     and ``factorisations``.
     """
     linear = linear or factorisation(problem)
+    return folded_walk(problem, tolerance, linear, factorisations)[0]
+
+
+def folded_walk(
+    problem: FrictionProblem, tolerance: float, linear: Factorisation, factorisations: int
+) -> tuple[FrictionSolution, Floats]:
+    """The best point of `folded_path`, and the forces r (nc * dim,) where the curve was left."""
     ends, points, folds, spent = Ends(problem, tolerance, linear), 0, 0, 0
+    left = ends.best
     try:
         curve, here = curve_begin(problem, linear)
         step, most = Step(curve, here), (1.0 - LAST_SHARE) * factorisations
@@ -212,13 +220,13 @@ def folded_path(
             if not step.take():
                 break
             points, folds = points + 1, folds + (rising != (step.tangent.level > 0.0))
-        spent = curve.spent
-        ends.end(step.here.force, factorisations - spent - ends.spent, LAST_PATIENCE)
+        spent, left = curve.spent, step.here.force
+        ends.end(left, factorisations - spent - ends.spent, LAST_PATIENCE)
     except SingularSystem:
         pass  # the best point so far is the answer
     work = {"points": float(points), "folds": float(folds)}
     work["factorisations"] = float(spent + ends.spent)
-    return friction_solution(problem, ends.best, tolerance, "folded path", work)
+    return friction_solution(problem, ends.best, tolerance, "folded path", work), left
 
 
 def curve_begin(problem: FrictionProblem, linear: Factorisation) -> tuple[Curve, Place]:

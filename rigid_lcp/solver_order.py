@@ -55,7 +55,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import factorisation
-from rigid_lcp.folded_path import folded_path
+from rigid_lcp.folded_path import folded_walk
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.frictionless import frictionless
 from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
@@ -241,19 +241,16 @@ def fallback_paths(trial: Trial, accept: float) -> None:
 
 
 def folded(trial: Trial) -> bool:
-    """Coulomb's path by arc length, past its folds, and turns from its best point."""
+    """Coulomb's path by arc length, past its folds, and turns from where it is left."""
     trial.linear = trial.linear or factorisation(trial.problem)
     dearest = FOLDED_FLOPS / trial.linear.flops
     count = int(min(FOLDED_STEPS, dearest, FOLDED_SHARE * trial.affordable))
-    found = trial.keep(
-        folded_path(
-            trial.problem, trial.tolerance, linear=trial.linear, factorisations=count,
-        )
-    )  # fmt: skip
+    found, left = folded_walk(trial.problem, trial.tolerance, trial.linear, count)
+    trial.keep(found)
     trial.sharpen()
     if not trial.best.solved and found.residual <= HAND_OVER:
         trial.newton(found.r, FEW, found.method)
-    return trial.best.solved or by_turns(trial, found.r)
+    return trial.best.solved or by_turns(trial, left)
 
 
 def proved_insoluble(problem: FrictionProblem) -> bool:
