@@ -64,7 +64,9 @@ shorter than such a part of the step."""
 CORRECTIONS, FACTORED = 12, 6
 """Of a point, and its factorisations: as long as corrections shrink by `SLOW` the last one
 serves."""
-SLOW, STUCK = 0.25, 0.9
+SLOW, STUCK, STUCK_FACTORED = 0.25, 0.9, 3
+"""Where they shrink by no more than the second after so many, the point is not found."""
+FINITE = float(np.finfo(float).max)
 GROWTH = (1.0, 2.0, 1.4, 1.1, 0.8, 0.6, 0.5)
 """Greatest growth of a step, by the factorisations that the last point took."""
 SHORTER, LEAP, LONGEST_LEAP, TURN, SHARP_STEP = 0.4, 2.0, 1.5, 0.3, 1e-6
@@ -281,7 +283,10 @@ class Step:
     def take(self) -> bool:
         """Go one step, as long as can be corrected; whether one was."""
         while self.arc > LEAST_STEP:
-            error, found = self.corrected(self.predicted())
+            try:
+                error, found = self.corrected(self.predicted())
+            except SingularSystem:
+                error, found = AIM, None
             if found is not None:
                 there, tangent, factored = found
                 self.before = self.tangent, self.curve.length(there.plus(self.here, -1.0))
@@ -319,35 +324,34 @@ class Step:
     def corrected(self, place: Place) -> tuple[float, tuple[Place, Place, int] | None]:
         """The predictor's error, and the point found from there, with its tangent and the
         factorisations that it took; None where it was not found."""
-        border, factored, first, shift = None, 0, np.inf, np.inf
-        error = last = shrunk = np.inf
+        border, factored, first = None, 0, np.inf
+        error, shift, shrunk = np.inf, np.inf, 0.0  # of F, of the last correction, its shrinkage
         for count in range(CORRECTIONS):
             f, a, b = self.curve.at(place)
             error, last = float(np.abs(f).max()), error
-            if count == 0:
-                first = error
-            if not error <= FAR * AIM and (count == 0 or not np.isfinite(error)):
-                return first, None
-            if border is not None and (
-                error < EXACT or (error < CLOSE and shift < CLOSE_STEP * self.arc)
-            ):
+            first = error if count == 0 else first
+            if not error <= (FAR * AIM if count == 0 else FINITE):
+                break
+            if border is not None and self.close(error, shift):
                 tangent = border.tangent(self.tangent)
-                if self.curve.product(tangent, self.tangent) < TURN and self.arc > SHARP_STEP:
-                    return first, None
-                return first, (place, tangent, factored)
-            if shrunk > STUCK and count > 1 and factored >= 3:
-                return first, None
-            if border is None or error > SLOW * last or (count > 1 and shrunk > SLOW):
-                if factored == FACTORED:
-                    return first, None
-                try:
-                    border, factored = Border(self.curve, place, a, b), factored + 1
-                except SingularSystem:
-                    return first, None
+                return first, None if self.sharp(tangent) else (place, tangent, factored)
+            stale = border is None or error > SLOW * last or shrunk > SLOW
+            if (shrunk > STUCK and factored >= STUCK_FACTORED) or (stale and factored == FACTORED):
+                break
+            if border is None or stale:
+                border, factored = Border(self.curve, place, a, b), factored + 1
             step = border.correction(f, self.tangent)
             now = self.curve.length(step)
             shrunk, shift = now / shift, now
             if (now > LEAP * self.arc and error > 10.0 * EXACT) or abs(step.level) > LONGEST_LEAP:
-                return first, None
+                break
             place = place.plus(step)
         return first, None
+
+    def close(self, error: float, shift: float) -> bool:
+        """Whether a point with so great an |F|, behind so long a correction, counts as found."""
+        return error < EXACT or (error < CLOSE and shift < CLOSE_STEP * self.arc)
+
+    def sharp(self, tangent: Place) -> bool:
+        """Whether the curve turns too far for a step so long."""
+        return self.curve.product(tangent, self.tangent) < TURN and self.arc > SHARP_STEP
