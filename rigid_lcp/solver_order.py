@@ -21,8 +21,8 @@
                      hard for the one is often easy for the other.  Where W is found to give
                      energy (`rigid_lcp.energy_proof`) no solution need exist, and one more turn is
                      the last
-    folded path      by arc length round the folds (`rigid_lcp.folded_path`), and turns from there
-    by turns again   from the end of the convex path, and of three paths of the interior point;
+    by turns again   from the end of the convex path, and of three paths of the interior point
+    folded path      by arc length round the folds (`rigid_lcp.folded_path`), and turns from there;
                      then extrapolated points from the best
     interior point   along several paths to Coulomb's law (`rigid_lcp.interior_point`); each end
                      goes to Newton, and if that is not enough to Gauss-Seidel and Newton again.
@@ -204,8 +204,8 @@ def friction_steps(trial: Trial) -> bool:
 
 
 def fallback_paths(trial: Trial, accept: float) -> None:
-    """The folded path and extrapolated points, then the interior point along one path after
-    another, within the effort of `FALLBACK_SHARE`, and extrapolated points again."""
+    """Turns, the folded path, extrapolated points, then the interior point along path after path,
+    within the effort of `FALLBACK_SHARE`, and extrapolated points again."""
     problem, tolerance = trial.problem, trial.tolerance
     if trial.forces > ENDLESS and proved_insoluble(problem):  # a proof before the paths
         trial.forget_endless()
@@ -215,7 +215,7 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         by_turns(trial, trial.best.r if trial.path_end is None else trial.path_end, patience=1)
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
-    if folded(trial) or turns_from_paths(trial):
+    if turns_from_paths(trial) or folded(trial):
         return
     trial.drift(DRIFT, max(DRIFT_FLOPS, trial.effort))
     if trial.best.solved:

@@ -21,6 +21,7 @@ from validation.jump_liggghts import (
     share,
     ways_told,
 )
+from validation.jump_paper import PaperJump, paper_jumps, paper_told
 from validation.jump_reading import (
     BAR,
     bursty,
@@ -34,6 +35,8 @@ from validation.jump_twins import Jump, jumps_read, twins_told
 from validation.law_page import per_cent
 from validation.page_text import page_filled, table
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals_runs import record_read
+from validation.settlement_rivals_studies import STUDIES
 
 TEMPLATE = Path(__file__).with_name("jump_page.md")
 PAGE = Path(__file__).parents[1] / "docs" / "jump-control.md"
@@ -199,7 +202,7 @@ def measured_table(rows: Rows) -> str:
     return table(head, lines)
 
 
-def page(rows: Rows, runs: Rows, jumps: Sequence[Jump]) -> str:
+def page(rows: Rows, runs: Rows, jumps: Sequence[Jump], paper: Sequence[PaperJump]) -> str:
     """The page, with every mark ``{{name}}`` of the template replaced."""
     named = [row for name in jump_study.BURSTS for row in group(rows, name)]
     worst = max(named, key=lambda row: abs(row["error"]))
@@ -224,6 +227,7 @@ def page(rows: Rows, runs: Rows, jumps: Sequence[Jump]) -> str:
         "liggghts_realised": ways_told(jumps_realised(runs)),
         "liggghts_chaos": ways_told(jumps_chaos(runs, EnsembleRecord())),
         **twins_told(jumps),
+        **paper_told(paper),
         "liggghts_k_i": str(jump_runs.STUDY.k_i),
         "liggghts_last": str(jump_runs.STUDY.last),
         "add_up": (
@@ -251,7 +255,8 @@ def main() -> None:
 
     rows, runs = jump_study.record_read(), jump_runs.record_read()
     jumps = jumps_read(runs, jump_runs.record_read(jump_twins.RECORD))
-    PAGE.write_text(page(rows, runs, jumps), encoding="utf-8")
+    paper = list(paper_jumps(record_read(STUDIES["confined"].record), EnsembleRecord()))
+    PAGE.write_text(page(rows, runs, jumps, paper), encoding="utf-8")
     draw(rows, runs, PICTURE)
 
 

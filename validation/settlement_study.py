@@ -69,8 +69,8 @@ SECTIONS = (
     Section("Coarse bed, to 10,000 cycles and beyond", (STUDIES["far"].record, ENSEMBLE),
             far_checks, ("coarse", "far")),
     Section("Laws of settlement", (law_study.RECORD,), law_checks),
-    Section("Jump control", (jump_study.RECORD, jump_runs.STUDY.record, jump_twins.RECORD),
-            jump_checks),
+    Section("Jump control", (jump_study.RECORD, jump_runs.STUDY.record, jump_twins.RECORD,
+            STUDIES["confined"].record, ENSEMBLE), jump_checks),
     Section("Hard cases", (settlement_hard_runs.RECORD,), hard_checks),
     Section("Relaxation", (relaxation_runs.RECORD,), relaxation_checks),
 )  # fmt: skip

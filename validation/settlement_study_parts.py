@@ -25,6 +25,7 @@ from validation import (
 from validation.case import Check
 from validation.cases.laws import ALARM_BAR, JUDGED, source_checks
 from validation.jump_liggghts import observed, overspend, realised
+from validation.jump_paper import WAY, paper_jumps
 from validation.jump_reading import (
     BAR,
     bursty,
@@ -44,8 +45,11 @@ from validation.relaxation_reading import (
     refused,
     values,
 )
+from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_hard_page import failing
 from validation.settlement_hard_scenes import CASES
+from validation.settlement_rivals_runs import record_read
+from validation.settlement_rivals_studies import STUDIES
 
 LAWS, JUMPS = "docs/laws.md", "docs/jump-control.md"
 HARD, RELAXATION = "docs/settlement-hard-cases.md", "docs/relaxation.md"
@@ -97,11 +101,14 @@ def jump_checks(
     rows: Sequence[Row] | None = None,
     runs: Sequence[Row] | None = None,
     twins: Sequence[Row] | None = None,
+    paper: Sequence[Row] | None = None,
 ) -> list[Check]:
     """Jumps within the tolerance by which they chose themselves."""
     rows = jump_study.record_read() if rows is None else rows
     runs = jump_runs.record_read() if runs is None else runs
     twins = jump_runs.record_read(jump_twins.RECORD) if twins is None else twins
+    paper = record_read(STUDIES["confined"].record) if paper is None else paper
+    held_there = [one.within for one in paper_jumps(paper, EnsembleRecord())]
     known = jump_twins.by_way(jump_twins.jumps_read(runs, twins))
     settings = settings_of(rows)
     every = [row for these in settings.values() for row in these]
@@ -147,7 +154,12 @@ def jump_checks(
         ]  # fmt: skip
     seeds = min((len({run["seed"] for run in these}) for these in ways.values()), default=0)
     fewest = "jump control on LIGGGHTS: fewest seeds of a way"
-    return [*checks, at_least(fewest, seeds, SEEDS, JUMPS)]
+    there = f"jump control at paper scale, {WAY}: as the packing's full runs gained"
+    return [
+        *checks,
+        at_least(fewest, seeds, SEEDS, JUMPS),
+        at_least(there, mean_of(held_there), BAR, JUMPS),
+    ]
 
 
 def hard_checks(rows: Sequence[Row] | None = None) -> list[Check]:

@@ -11,12 +11,15 @@ from adapters.state import FloatArray
 from validation import jump_runs, jump_study, jump_twins
 from validation.jump_liggghts import jumps_chaos, jumps_realised
 from validation.jump_page import PAGE, page
+from validation.jump_paper import PaperJump, paper_jumps
 from validation.settlement_ensemble_record import EnsembleRecord
+from validation.settlement_rivals_runs import record_read
+from validation.settlement_rivals_studies import STUDIES
 
 
 def test_page_is_made_from_the_records() -> None:
     """Made again, the page is the one that ships."""
-    made = page(jump_study.record_read(), jump_runs.record_read(), jumps())
+    made = page(jump_study.record_read(), jump_runs.record_read(), jumps(), at_paper_scale())
     assert made == PAGE.read_text(encoding="utf-8")
     assert "{{" not in made
 
@@ -25,6 +28,11 @@ def jumps() -> list[jump_twins.Jump]:
     """Of the record, beside their twins."""
     rows = jump_runs.record_read(jump_twins.RECORD)
     return jump_twins.jumps_read(jump_runs.record_read(), rows)
+
+
+def at_paper_scale() -> list[PaperJump]:
+    """Jumps of the study of rivals."""
+    return list(paper_jumps(record_read(STUDIES["confined"].record), EnsembleRecord()))
 
 
 def errors(way: str) -> FloatArray:
