@@ -12,7 +12,7 @@ from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.folded_path import Border, Curve, Place, Step, curve_begin, folded_path, settled
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.smoothed_path import smoothed_path
-from tests.verification.test_rigid_smoothed_path import plain_map
+from tests.verification.test_rigid_smoothed_path import plain_map, units_change_nothing
 from validation.rigid_packings import packing
 
 SEEDS = range(4)
@@ -106,17 +106,7 @@ def test_the_curve_begins_at_the_one_point_of_a_convex_problem() -> None:
 
 
 def test_units_change_nothing() -> None:
-    """Velocities in other units and masses in others: the same steps, forces in other units."""
-    problem = wedged(1)
-    assert problem.bodies is not None
-    w = problem.bodies.matrix
-    found = [
-        folded_path(friction_problem(a * w, b * problem.offset, problem.friction, 2))
-        for a, b in ((1.0, 1.0), (1024.0, 2.0**-20))  # powers of two: no round-off
-    ]
-    assert found[0].solved
-    assert found[0].work == found[1].work
-    assert found[1].r == pytest.approx(2.0**-30 * found[0].r, rel=1e-9)
+    assert units_change_nothing(folded_path, wedged(1))
 
 
 def test_it_spends_no_more_than_it_may() -> None:
