@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import f as fisher
 
+from validation.jump_paper import paper_jumps
 from validation.settlement_bars import (
     BARS,
     bar_stays,
@@ -252,8 +253,8 @@ def test_sentences_about_growing_jumps() -> None:
     found = [[round(100 * one) for one in each.error] for each in longer if each is not None]
     assert found == [[0, -8, -2], [5, -1, -3]]
     for name, errors in (
-        ("density x 10", [[33, 56], [-16, -13]]),
-        ("100 Hz", [[22, 23], [-12, -9]]),
+        ("density x 10", [[33, 56, 49], [-16, -13, -18]]),
+        ("100 Hz", [[22, 23, 14], [-12, -9, -14]]),
     ):
         off = [judged(rows, name, LAST, figure) for figure in ("settlement", "coordination")]
         assert [[round(100 * one) for one in each.error] for each in off if each] == errors
@@ -263,7 +264,8 @@ def test_sentences_about_growing_jumps() -> None:
 
 def test_sentences_about_jumps_on_a_longer_step_and_by_tolerance() -> None:
     """On a step twice as long: half the cost, inside the bars of state, 27, 29 and 30 of 30 jumps
-    go on; by tolerance: one run, nearer than chaos tells, at the cost of the step alone."""
+    go on; by tolerance: three runs, nearer on the mean than chaos tells, at the cost of the step
+    alone; 35 of 38 jumps within."""
     rows = record_read(PAPER.record)
     compared = sides_compared(rows, CONFINED, EnsembleRecord())
     name = "5 growing jumps, by history, profile"
@@ -282,11 +284,18 @@ def test_sentences_about_jumps_on_a_longer_step_and_by_tolerance() -> None:
     assert found["elastic deflection"] == pytest.approx(1.1, abs=0.05)
     on = ("rate goes on", "coordination goes on", "stiffness goes on", "rate stays")
     assert [round(found[words]) for words in on] == [90, 97, 100, 80]
-    (chosen,) = finished(rows, "tolerance 0.02", LAST)
-    assert (len(chosen["sides"]), chosen["computed"]) == (14, 236)
-    assert gained_time(rows, "tolerance 0.02", LAST) == pytest.approx(157, abs=0.5)
+    chosen = finished(rows, "tolerance 0.02", LAST)
+    assert [(len(row["sides"]), row["computed"]) for row in chosen] == [
+        (14, 236), (11, 205), (13, 234),
+    ]  # fmt: skip
+    assert gained_time(rows, "tolerance 0.02", LAST) == pytest.approx(170, abs=0.5)
     off = [judged(rows, "tolerance 0.02", LAST, figure) for figure in ("settlement", "deflection")]
-    assert [round(100 * one.mean) for one in off if one] == [-4, -2]
+    assert [[round(100 * one) for one in each.error] for each in off[:1] if each] == [[-4, 12, 1]]
+    assert [(round(100 * one.mean, 1), round(100 * one.half)) for one in off if one] == [
+        (2.7, 21), (0.1, 4),
+    ]  # fmt: skip
+    held = [one.within for one in paper_jumps(rows, EnsembleRecord())]
+    assert (sum(held), len(held)) == (35, 38)
 
 
 def test_sentences_about_two_readings_of_the_rate_that_growing_jumps_miss() -> None:
