@@ -153,6 +153,11 @@ def twins_told(jumps: Sequence[Jump]) -> dict[str, str]:
                 for way, these in ways.items()
             }
         ),
+        "twins_sum": " and ".join(
+            f"{sum(one.gained for one in these) / sum(one.twins.mean() for one in these):.2f} "
+            f"times what their twins do at {way}"
+            for way, these in ways.items()
+        ),
         "twins_sides": " and ".join(
             f"in {sum(one.side != 0 for one in these)} of the {len(these)} others at {way} "
             f"({sum(one.side > 0 for one in these)} of these gain less than all twins)"

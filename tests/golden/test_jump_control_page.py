@@ -76,6 +76,8 @@ def test_sentences_about_jumps_beside_their_twins() -> None:
     for way, these in ways.items():
         held = [abs(one.twin_errors) <= one.allowed for one in these]
         assert np.mean(held) >= 0.9
+        more = [one.side < 0 for one in these if one.side]
+        assert np.mean(more) > 0.5  # of those whose twins are all to one side
         sides = [one.side != 0 for one in these if not one.within]
         assert np.mean(sides) > 0.5
         assert way != "tolerance 0.05" or all(sides)

@@ -75,6 +75,7 @@ def test_what_is_told_of_them() -> None:
     told = twins_told([jump(2.0, 3.0), jump(7.0, 8.0)])
     assert told["twins"].startswith("1 of 2 (50 %")
     assert told["twins_chaos"].startswith("4 of 4 (100 %")
+    assert told["twins_sum"] == "0.60 times what their twins do at tolerance 0.1"  # 6 of 2.5 + 7.5
     assert told["twins_sides"] == (
         "in 1 of the 1 others at tolerance 0.1 (1 of these gain less than all twins)"
     )
