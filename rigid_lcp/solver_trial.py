@@ -48,8 +48,8 @@ MORE_SWEEPS = 0.5
 """Sweeps to that end over those that found the solution, at most."""
 FEW_DRIFT = 50
 """Fewer factorisations than that extrapolated points are not begun with."""
-MOST_FLOPS, MOST_FACTORED = 4e11, 1e7
-"""An effort (some 20 s), and a number of factorisations times contacts (some 10 s), beyond which no
+MOST_FLOPS, MOST_FACTORED = 4e11, 2e7
+"""An effort, and a number of factorisations times contacts (some 20 s each), beyond which no
 factorisation is begun.  Only large problems come there: one of 10,400 contacts between spheres
 takes 1.5e10 flops, most of a second, and one of 10,000 between discs 20 ms."""
 MISLED = 2.0
