@@ -131,6 +131,22 @@ def examination_failures(rows: Sequence[Row]) -> str:
     return "\n".join(lines).strip()
 
 
+def seeds_words(rows: Sequence[Row]) -> str:
+    """Of each seed of another record how many problems of its families were solved, by the code of
+    each commit that was given them, the dearest among them."""
+    told = []
+    for seed, code in dict.fromkeys((row["seed"], row["commit"]) for row in rows):
+        mine = [row for row in rows if (row["seed"], row["commit"]) == (seed, code)]
+        solved = [row["cpu_s"] for row in mine if row["ok"]]
+        slow = sum(cost > BAR_S for cost in solved)
+        lost = [f"{row['family']} {row['index']}" for row in mine if not row["ok"]]
+        told.append(
+            f"{len(solved)} of {len(mine)} of seed {seed} by `{code[:10]}`, {slow} in more than "
+            f"{BAR_S:g} s" + f" (not {', '.join(lost)})" * bool(lost)
+        )
+    return "; ".join(told)
+
+
 def _told(row: Row) -> str:
     words = f"- {row['family']} {row['index']} ({row['recipe']}; {row['contacts']:,} contacts): "
     if row["residual"] is None:

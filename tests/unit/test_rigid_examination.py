@@ -25,6 +25,7 @@ from validation.rigid_examination_page import (
     examination_table,
     examination_words,
     noise_words,
+    seeds_words,
 )
 from validation.rigid_examination_problems import assembled
 from validation.rigid_examination_walls import wall_bodies, wall_count, wall_masses
@@ -422,3 +423,15 @@ def test_committed_record_is_whole() -> None:
         judged = each["residual"] is not None and each["residual"] <= each["bar"]
         assert each["ok"] == (judged and each["left"] <= worker.SHARE_LEFT)
         assert each["ok"] or not each["claims"], examination.told(each)
+
+
+def test_other_seeds_are_told_code_by_code() -> None:
+    """Solved, solved late and not solved, by two commits."""
+    row = {"family": "towers", "seed": 42, "commit": 12 * "a", "index": 1, "ok": True, "cpu_s": 0.5}
+    late = row | {"index": 2, "cpu_s": 2.0}
+    lost = row | {"index": 3, "ok": False}
+    newer = [one | {"commit": 12 * "b"} for one in (row, late)]
+    assert seeds_words([row, late, lost, *newer]) == (
+        "2 of 3 of seed 42 by `aaaaaaaaaa`, 1 in more than 1 s (not towers 3); "
+        "2 of 2 of seed 42 by `bbbbbbbbbb`, 1 in more than 1 s"
+    )
