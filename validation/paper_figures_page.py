@@ -294,7 +294,7 @@ def page(rows: Sequence[Row]) -> str:
         "LOG_MOST": per_cent(max(errors_of(rows, "coordinates", "log", FIRST[-1]))),
         "LOG_FIRST": per_cent(max(errors_of(rows, "coordinates", "log", FIRST[0]))),
         "STILL_LAST": per_cent(max(errors_of(rows, "coordinates", NOTHING, PAPER_LAST))),
-        "LATE_PACKINGS": " and ".join(late),
+        "LATE_PACKINGS": ", ".join(late),
         "LATE_JUMPS": str(len(jump_rows(rows, LATE_RUNS))),
         "LATE_LOG": str(wins(rows, "log", NOTHING, LATE_RUNS)),
         "LATE_LINEAR": str(wins(rows, "linear", NOTHING, LATE_RUNS)),
