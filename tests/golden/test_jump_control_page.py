@@ -12,6 +12,7 @@ from validation import jump_runs, jump_study, jump_twins
 from validation.jump_liggghts import jumps_chaos, jumps_realised
 from validation.jump_page import PAGE, page
 from validation.jump_paper import PaperJump, paper_jumps
+from validation.jump_reading import settings_of, within
 from validation.settlement_ensemble_record import EnsembleRecord
 from validation.settlement_rivals_runs import record_read
 from validation.settlement_rivals_studies import STUDIES
@@ -22,6 +23,9 @@ def test_page_is_made_from_the_records() -> None:
     made = page(jump_study.record_read(), jump_runs.record_read(), jumps(), at_paper_scale())
     assert made == PAGE.read_text(encoding="utf-8")
     assert "{{" not in made
+
+
+ROOT = PAGE.parents[1]
 
 
 def jumps() -> list[jump_twins.Jump]:
@@ -81,3 +85,19 @@ def test_sentences_about_jumps_beside_their_twins() -> None:
         sides = [one.side != 0 for one in these if not one.within]
         assert np.mean(sides) > 0.5
         assert way != "tolerance 0.05" or all(sides)
+
+
+def test_readme_has_the_shares_of_the_page() -> None:
+    """Of jumps that hold their tolerance: on curves, at paper scale, on the coarse bed."""
+    every = [row for these in settings_of(jump_study.record_read()).values() for row in these]
+    ways = jump_twins.by_way(jumps())
+    on_curves, at_scale = within(every), np.mean([one.within for one in at_paper_scale()])
+    ten, five = (
+        np.mean([one.within for one in ways[way]]) for way in ("tolerance 0.1", "tolerance 0.05")
+    )
+    said = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    assert (
+        f"On curves with known laws {on_curves:.0%} of the jumps hold their tolerance, on the "
+        f"paper's bed {at_scale:.0%} at 0.02; on a small bed that settles in bursts {ten:.0%} at "
+        f"0.1 and {five:.0%} at 0.05,"
+    ).replace("%", " %") in said
