@@ -56,7 +56,7 @@ RESIZED = 0.05
 FIRST_STEP, LONGEST_STEP, LEAST_STEP = 0.05, 3.0, 1e-8
 """Arc lengths."""
 AIM, FAR = 0.2, 8.0
-"""Error of the predictor that is aimed at, greatest |F| of a contact over ``sqrt(sigma)``, and so
+"""Error of the predictor that is aimed at, the greatest component of F over ``sqrt(sigma)``, and so
 many times that from which nothing is corrected."""
 EXACT, CLOSE, CLOSE_STEP = 1e-5, 1e-4, 0.1
 """A point is found where the error is below the first, or below the second with a last correction
@@ -67,6 +67,8 @@ serves."""
 SLOW, STUCK, STUCK_FACTORED = 0.25, 0.9, 3
 """Where they shrink by no more than the second after so many, the point is not found."""
 FINITE = float(np.finfo(float).max)
+LEAST_SIGMA = float(np.sqrt(np.finfo(float).tiny))
+"""Of [N^2]: higher powers of its root are divided by."""
 GROWTH = (1.0, 2.0, 1.4, 1.1, 0.8, 0.6, 0.5)
 """Greatest growth of a step, by the factorisations that the last point took."""
 SHORTER, LEAP, LONGEST_LEAP, TURN, SHARP_STEP = 0.4, 2.0, 1.5, 0.3, 1e-6
@@ -94,19 +96,37 @@ class Place:
         return Place(self.force + part * other.force, self.level + part * other.level)
 
 
-class Curve:
-    """F and its derivatives along the curve of a problem, and their factorisations."""
+class Spent(ArithmeticError):
+    """No further factorisation may be made, or nothing is left to be followed."""
 
-    def __init__(self, problem: FrictionProblem, linear: Factorisation, sigma: float) -> None:
-        self.problem, self.linear, self.sigma, self.spent = problem, linear, sigma, 0
+
+class Curve:
+    """F and its derivatives along the curve of a problem, and their factorisations, so many at
+    ``most``."""
+
+    def __init__(self, problem: FrictionProblem, linear: Factorisation, most: float) -> None:
+        self.problem, self.linear, self.most, self.spent = problem, linear, most, 0
+        self.sigma = 1.0
+        """sigma_1 [N^2 or N^2 s^2]."""
         self.rho = contact_rho(problem)
         self.size = 1.0
         """Of the forces, |r|, as arc length and shift measure them."""
 
+    def measure(self, place: Place) -> None:
+        """Measure arc length by the forces of a place.  Raises `SingularSystem` where they are too
+        small to be squared."""
+        self.size = length(place.force)
+        if not self.size**2 > 0.0:
+            raise SingularSystem
+
     def at(self, place: Place) -> tuple[Floats, Floats, Floats]:
-        """F (nc * dim,), dF/dr and dF/du (nc, dim, dim), over ``sqrt(sigma)``."""
+        """F (nc * dim,), dF/dr and dF/du (nc, dim, dim), over ``sqrt(sigma)``.
+
+        Raises `Spent` where that is too small to be told."""
         shape = self.problem.contacts, self.problem.dim
         sigma = self.sigma * float(np.exp(place.level))
+        if not sigma > LEAST_SIGMA:
+            raise Spent
         eps = ROUNDING * np.sqrt(sigma) / float(self.rho.mean())
         f, a, b = smoothed_map(
             place.force.reshape(shape), self.problem.velocity(place.force).reshape(shape),
@@ -116,7 +136,9 @@ class Curve:
         return scale * f.ravel(), scale * a, scale * b
 
     def factor(self, place: Place, a: Floats, b: Floats) -> Solve:
-        """What solves with the matrix dF/dr there.  Raises `SingularSystem`."""
+        """What solves with the matrix dF/dr there.  Raises `SingularSystem` and `Spent`."""
+        if self.spent >= self.most:
+            raise Spent
         share = SHIFT_SHARE * self.sigma * np.exp(place.level) * len(place.force) / self.size**2
         shift = float(np.clip(share, LEAST_SHIFT, SHIFT)) / self.problem.rho
         self.spent += 1
@@ -212,41 +234,44 @@ def folded_walk(
     problem: FrictionProblem, tolerance: float, linear: Factorisation, factorisations: int
 ) -> tuple[FrictionSolution, Floats]:
     """The best point of `folded_path`, and the forces r (nc * dim,) where the curve was left."""
-    ends, points, folds, spent = Ends(problem, tolerance, linear), 0, 0, 0
+    ends, points, folds = Ends(problem, tolerance, linear), 0, 0
+    curve = Curve(problem, linear, (1.0 - LAST_SHARE) * factorisations)
     left = ends.best
-    try:
-        curve, here = curve_begin(problem, linear)
-        step, most = Step(curve, here), (1.0 - LAST_SHARE) * factorisations
-        while not ends.near(step.here.force) and curve.spent + ends.spent < most:
-            rising = step.tangent.level > 0.0
-            if not step.take():
-                break
-            points, folds = points + 1, folds + (rising != (step.tangent.level > 0.0))
-        spent, left = curve.spent, step.here.force
-        ends.end(left, factorisations - spent - ends.spent, LAST_PATIENCE)
-    except SingularSystem:
-        pass  # the best point so far is the answer
+    if not ends.keep(left, problem.residual(left)):
+        try:
+            left = curve_begin(curve).force
+            step = Step(curve, Place(left, 0.0))
+            while not ends.near(left) and curve.spent + ends.spent < curve.most:
+                rising = step.tangent.level > 0.0
+                if not step.take():
+                    break
+                left, points = step.here.force, points + 1
+                folds += rising != (step.tangent.level > 0.0)
+        except (SingularSystem, Spent):
+            pass  # the point found last is gone on from
+        ends.end(left, factorisations - curve.spent - ends.spent, LAST_PATIENCE)
     work = {"points": float(points), "folds": float(folds)}
-    work["factorisations"] = float(spent + ends.spent)
+    work["factorisations"] = float(curve.spent + ends.spent)
     return friction_solution(problem, ends.best, tolerance, "folded path", work), left
 
 
-def curve_begin(problem: FrictionProblem, linear: Factorisation) -> tuple[Curve, Place]:
-    """The curve, its sigma_1 so small that forces are `FORCES` times its root, and its point at
-    level 0, of the convex problem.  Raises `SingularSystem`."""
-    force, sigma = path_begin(problem, linear)
-    curve = Curve(problem, linear, HIGHEST * sigma)
+def curve_begin(curve: Curve) -> Place:
+    """The point of the convex problem, level 0, at a sigma_1 so small that forces are `FORCES`
+    times its root.  Raises `SingularSystem`, also where there are no forces, and `Spent`."""
+    curve.spent += 1
+    force, sigma = path_begin(curve.problem, curve.linear)
+    curve.sigma = HIGHEST * sigma
     here = Place(np.sqrt(HIGHEST) * force, 0.0)
     while True:
-        curve.size = length(here.force)
+        curve.measure(here)
         here = settled(curve, here, CONVEX_CLOSE)
         size = float(np.sqrt(np.mean(here.force**2)))
         if size >= FORCES * np.sqrt(curve.sigma) or curve.sigma <= LOWEST * sigma:
             break
         curve.sigma *= DOWN
     here = settled(curve, here, EXACT)
-    curve.size = length(here.force)
-    return curve, here
+    curve.measure(here)
+    return here
 
 
 def settled(curve: Curve, here: Place, enough: float) -> Place:
@@ -303,10 +328,10 @@ class Step:
 
     def measured(self, tangent: Place) -> Place:
         """The tangent, of length 1 as the forces now measure it."""
-        size = length(self.here.force)
-        if abs(size / self.curve.size - 1.0) < RESIZED:
+        if abs(length(self.here.force) / self.curve.size - 1.0) < RESIZED:
             return tangent
-        self.curve.size = size
+        self.curve.measure(self.here)
+        self.before = None  # the last step was measured otherwise
         part = 1.0 / self.curve.length(tangent)
         return Place(part * tangent.force, part * tangent.level)
 

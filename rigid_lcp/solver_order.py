@@ -67,7 +67,14 @@ from rigid_lcp.solver_cold import (
     NEWTON_PATIENCE,
     convex_start,
 )
-from rigid_lcp.solver_trial import ENDLESS, FEW_CONTACTS, HAND_OVER, LAST_WORD, Trial
+from rigid_lcp.solver_trial import (
+    ENDLESS,
+    FEW_CONTACTS,
+    FEW_DRIFT,
+    HAND_OVER,
+    LAST_WORD,
+    Trial,
+)
 from rigid_lcp.solver_turns import by_turns, from_path, turns_from_paths
 from rigid_lcp.solver_warm import deep, yielding
 
@@ -245,6 +252,8 @@ def folded(trial: Trial) -> bool:
     trial.linear = trial.linear or factorisation(trial.problem)
     dearest = FOLDED_FLOPS / trial.linear.flops
     count = int(min(FOLDED_STEPS, dearest, FOLDED_SHARE * trial.affordable))
+    if count < FEW_DRIFT:
+        return False
     found, left = folded_walk(trial.problem, trial.tolerance, trial.linear, count)
     trial.keep(found)
     trial.sharpen()
