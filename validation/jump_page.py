@@ -244,7 +244,9 @@ def page(rows: Rows, runs: Rows, jumps: Sequence[Jump], paper: Sequence[PaperJum
         ),
         "machine": f"{made['machine']}; commit {made['commit']}; LIGGGHTS runs: commits "
         + ", ".join(dict.fromkeys(run["commit"] for run in runs))
-        + ".",
+        + f", {runs[0]['machine']}; their twins: commits "
+        + ", ".join(dict.fromkeys(one.commit for one in jumps))
+        + "; at paper scale: see the page of rivals.",
     }
     return page_filled(TEMPLATE.read_text(encoding="utf-8"), parts)
 

@@ -57,6 +57,8 @@ class Jump:
     """What of the jump was to make good what the bed was ahead, or behind, by earlier jumps."""
     twins: FloatArray
     """Settlement of each twin between the same cycles, shape (members,)."""
+    commit: str = ""
+    """Of the code that computed the twins."""
 
     @property
     def allowed(self) -> float:
@@ -80,8 +82,10 @@ class Jump:
 
     @property
     def side(self) -> int:
-        """1 where every twin gains more than the run, -1 where every twin gains less, else 0."""
-        return int(self.twins.min() > self.gained) - int(self.twins.max() < self.gained)
+        """1 where every twin gains more than the run, what was to make good earlier jumps left out,
+        -1 where every twin gains less, else 0."""
+        own = self.gained - self.made_good
+        return int(self.twins.min() > own) - int(self.twins.max() < own)
 
     @property
     def twin_errors(self) -> FloatArray:
@@ -96,7 +100,7 @@ def jumps_read(runs: Sequence[dict[str, Any]], rows: Sequence[dict[str, Any]]) -
     for run in runs:
         for first, last, gained, settled in spans(run):
             mine = [
-                row["gained"]
+                row
                 for row in rows
                 if (row["way"], row["seed"], row["first"], row["last"])
                 == (run["way"], run["seed"], first, last)
@@ -104,7 +108,8 @@ def jumps_read(runs: Sequence[dict[str, Any]], rows: Sequence[dict[str, Any]]) -
             if len(mine) >= 2:
                 good = made_good_of(run, first)
                 head = run["way"], run["seed"], first, last, gained, settled, good
-                found.append(Jump(*head, np.array(mine)))
+                twins = np.array([row["gained"] for row in mine])
+                found.append(Jump(*head, twins, mine[0].get("commit", "")))
     return found
 
 
@@ -138,30 +143,29 @@ def by_way(jumps: Sequence[Jump]) -> dict[str, list[Jump]]:
 
 
 def twins_told(jumps: Sequence[Jump]) -> dict[str, str]:
-    """What the twins say, for the page: shares of jumps within, of twins beside one another, and on
-    which side of the run the twins of the other jumps lie."""
+    """What the twins say, for the page: shares of jumps within, of twins beside one another, and
+    how often all twins lie on one side of the run."""
     ways = by_way(jumps)
-    missed = {way: [one for one in these if not one.within] for way, these in ways.items()}
+    alone = 2 / (1 + MEMBERS)  # of so many equal draws one is the greatest or the least
     return {
         "twins": ways_told({way: [one.within for one in these] for way, these in ways.items()}),
         "twins_strict": ways_told(
             {way: [abs(one.error) <= one.allowed for one in these] for way, these in ways.items()}
         ),
-        "twins_chaos": ways_told(
-            {
-                way: [bool(held) for one in these for held in abs(one.twin_errors) <= one.allowed]
-                for way, these in ways.items()
-            }
-        ),
+        "twins_chaos": " and ".join(
+            f"{np.mean([abs(one.twin_errors) <= one.allowed for one in these]):.0%} at {way}"
+            for way, these in ways.items()
+        ).replace("%", " %"),
         "twins_sum": " and ".join(
-            f"{sum(one.gained for one in these) / sum(one.twins.mean() for one in these):.2f} "
-            f"times what their twins do at {way}"
+            f"{sum(o.gained - o.made_good for o in these) / sum(o.twins.mean() for o in these):.2f}"
+            f" times what their twins do at {way}"
             for way, these in ways.items()
         ),
         "twins_sides": " and ".join(
-            f"in {sum(one.side != 0 for one in these)} of the {len(these)} others at {way} "
-            f"({sum(one.side > 0 for one in these)} of these gain less than all twins)"
-            for way, these in missed.items()
+            f"in {sum(one.side != 0 for one in these)} of {len(these)} jumps at {way} "
+            f"(in {sum(one.side < 0 for one in these)} it gains more, in "
+            f"{sum(one.side > 0 for one in these)} less; by chance in {alone * len(these):.0f})"
+            for way, these in ways.items()
         ),
     }
 

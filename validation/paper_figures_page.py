@@ -296,6 +296,8 @@ def page(rows: Sequence[Row]) -> str:
         "STILL_LAST": per_cent(max(errors_of(rows, "coordinates", NOTHING, PAPER_LAST))),
         "LATE_PACKINGS": ", ".join(late),
         "LATE_JUMPS": str(len(jump_rows(rows, LATE_RUNS))),
+        "LATE_LONG": late_ratios(rows),
+        "LATE_SHORT": f"{max(row['of_jump']['log'] for row in jump_rows(rows, LATE_RUNS)):.0f}",
         "LATE_LOG": str(wins(rows, "log", NOTHING, LATE_RUNS)),
         "LATE_LINEAR": str(wins(rows, "linear", NOTHING, LATE_RUNS)),
         "LOG_PAPER": per_cent(PAPER_LARGEST["log"][1]),
@@ -319,6 +321,16 @@ def page(rows: Sequence[Row]) -> str:
         "ORIGIN": "; ".join(origin) + ".",
     }
     return page_filled(TEXT.read_text(encoding="utf-8"), parts)
+
+
+def late_ratios(rows: Sequence[Row], window: int = 20) -> str:
+    """Errors by the log law over those of moving nothing, from windows so long and longer: the
+    least and the greatest of each packing."""
+    told = []
+    for run in LATE_RUNS:
+        mine = [row["of_jump"]["log"] for row in jump_rows(rows, [run]) if row["jump"][1] >= window]
+        told += [f"{min(mine):.2g} to {max(mine):.2g}"] if mine else []
+    return ", ".join(told[:-1]) + " and " + told[-1]
 
 
 def main() -> None:
