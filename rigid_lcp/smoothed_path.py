@@ -196,8 +196,8 @@ def smoothed_map(
 
     ``force`` and ``velocity`` (nc, dim); ``mu`` and ``rho`` (nc,), rho force per velocity;
     ``sigma`` force squared, ``eps`` a velocity; ``share`` of the term |u_T|: 1 is Coulomb's law, 0
-    a convex one.  F (nc, dim) a force, A (nc, dim, dim), B (nc, dim,
-    dim) force per velocity.  Without friction x and s are the normal parts, and ``F_T = r_T``.
+    a convex one.  F (nc, dim) a force, A (nc, dim, dim), B (nc, dim, dim) force per velocity.
+    Without friction x and s are the normal parts, and ``F_T = r_T``.
     """
     nc, dim = force.shape
     f = np.zeros((nc, dim))

@@ -195,13 +195,13 @@ def twin_run(twin: Twin, work: Path) -> dict[str, float]:
     window = next(
         one for one in home.outcomes() if one.stage == "window" and one.last_cycle == twin.first
     )
+    shutil.rmtree(work / "twin", ignore_errors=True)  # what the last one, or a kill, has left
     run = run_in(work / "twin", STUDY.scene(way, twin.seed), CONTROL)
     run.folder.share_start(home, 0)
     bed = bed_behind(home, f"window_{window.first_cycle:06d}", window)
     bed = replace(bed, start=replace(bed.start, perturbation=twin.member * STEP))
     done = run.folder.outcome(compute(run, bed, twin.last - twin.first).window)
     assert done is not None
-    shutil.rmtree(run.folder.path)
     gained = done.rows[-1]["settlement"] - window.rows[-1]["settlement"]
     return {"gained": float(f"{gained:.7g}"), "cpu_s": round(cost_total(done.cost), 2)}
 

@@ -132,8 +132,8 @@ def examination_failures(rows: Sequence[Row]) -> str:
 
 
 def seeds_words(rows: Sequence[Row]) -> str:
-    """Of each seed of another record how many problems of its families were solved, by the code of
-    each commit that was given them, the dearest among them."""
+    """Of each seed of another record how many problems were solved by the code of each commit that
+    was given them, how many of these late, and which were not."""
     told = []
     for seed, code in dict.fromkeys((row["seed"], row["commit"]) for row in rows):
         mine = [row for row in rows if (row["seed"], row["commit"]) == (seed, code)]
