@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rigid_lcp.dense_tiles import TILE
 from rigid_lcp.elimination_order import (
     column_parents,
-    minimum_degree,
+    elimination_order,
     postorder,
     symmetric_pattern,
 )
@@ -70,7 +70,7 @@ def elimination_tree(blocks: int, size: int, rows: Integers, columns: Integers) 
     may become one.
     """
     start, neighbour = symmetric_pattern(blocks, np.asarray(rows), np.asarray(columns))
-    order = minimum_degree(start, neighbour)
+    order = elimination_order(start, neighbour, size)
     parent, count = column_parents(start, neighbour, order)
     after = postorder(parent)
     order = order[after]

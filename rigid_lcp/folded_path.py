@@ -32,7 +32,6 @@ from rigid_lcp.body_factorisation import Factorisation, SingularSystem, Solve, f
 from rigid_lcp.cones import length
 from rigid_lcp.extrapolated_points import extrapolated_points
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
-from rigid_lcp.newton import contact_rho
 from rigid_lcp.smoothed_path import path_begin, smoothed_map
 
 Floats = NDArray[np.float64]
@@ -108,7 +107,7 @@ class Curve:
         self.problem, self.linear, self.most, self.spent = problem, linear, most, 0
         self.sigma = 1.0
         """sigma_1 [N^2 or N^2 s^2]."""
-        self.rho = contact_rho(problem)
+        self.rho = problem.contact_rho
         self.size = 1.0
         """Of the forces, |r|, as arc length and shift measure them."""
 

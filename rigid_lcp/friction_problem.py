@@ -154,6 +154,12 @@ class FrictionProblem:
         return 1.0 / mean if mean > 0 else 1.0
 
     @cached_property
+    def contact_rho(self) -> Floats:
+        """``1 / max(diag W_cc)`` of every contact: force per velocity of it alone, (nc,)."""
+        most = self.diagonal.reshape(-1, self.dim).max(axis=1)
+        return 1.0 / np.maximum(most, 1e-9 / self.rho)
+
+    @cached_property
     def error_without_forces(self) -> float:
         """Norm of the natural map at r = 0, in units of r: what forces have to mend."""
         shape = (self.contacts, self.dim)
@@ -184,9 +190,25 @@ class FrictionProblem:
         )  # fmt: skip
 
     def mended(self, force: Floats, residual: float) -> bool:
-        """Whether forces of this residual leave little of the error without forces."""
+        """Whether forces of this residual leave little of the error without forces.
+
+        Or of the velocities, each contact by its own rho: where W of one is 1e15 times that of
+        another, rho of the mean sees nothing of the latter's.
+        """
         left = max(residual, ROUND_OFF) * length(force)
-        return left <= SHARE_LEFT * self.error_without_forces
+        if left <= SHARE_LEFT * self.error_without_forces:
+            return True
+        none = self._approach(np.zeros_like(force))
+        return none > 0.0 and self._approach(force) <= SHARE_LEFT * none
+
+    def _approach(self, force: Floats) -> float:
+        """Norm of the natural maps of all contacts over their own rho, what round-off of the forces
+        may hide included."""
+        shape = (self.contacts, self.dim)
+        own, r = self.contact_rho[:, None], np.ascontiguousarray(force).reshape(shape)
+        push = own * self.velocity(force).reshape(shape)
+        error = np.abs(natural_map(r, push, self.friction, 1.0))
+        return length(np.maximum(error, ROUND_OFF * np.abs(r)) / own)
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,6 @@ from rigid_lcp.lorentz_cones import (
     cone_scaling_square,
     cone_step,
 )
-from rigid_lcp.newton import contact_rho
 
 Floats = NDArray[np.float64]
 
@@ -143,7 +142,7 @@ class PathStep:
 
     def sigma(self) -> float:
         """The mean of ``x . s`` as the path of `rigid_lcp.smoothed_path` measures it [N^2]."""
-        return float(np.mean(contact_rho(self.problem))) * float(path_gap(self.x, self.s))
+        return float(np.mean(self.problem.contact_rho)) * float(path_gap(self.x, self.s))
 
     def take(self) -> float:
         """One predictor-corrector step; returns its length.  Raises `SingularSystem`."""

@@ -107,7 +107,7 @@ def newton(
     """
     shape = (problem.contacts, problem.dim)
     linear = linear or factorisation(problem)
-    rho = contact_rho(problem)
+    rho = problem.contact_rho
     best = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
     best_residual, done = problem.residual(best), 0
     offered = problem.rho * length(problem.offset)
@@ -144,9 +144,3 @@ def newton(
         problem, best, tolerance, "newton",
         {"iterations": float(done), "factorisations": float(done)},
     )  # fmt: skip
-
-
-def contact_rho(problem: FrictionProblem) -> Floats:
-    """``1 / max(diag W_cc)`` of every contact: force per velocity of it alone, (nc,)."""
-    diagonal = problem.diagonal.reshape(-1, problem.dim).max(axis=1)
-    return 1.0 / np.maximum(diagonal, 1e-9 / problem.rho)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factorisation
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
-from rigid_lcp.newton import alart_curnier, contact_rho
+from rigid_lcp.newton import alart_curnier
 
 Floats = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def proximal_point(
     ``alpha`` [velocity per force]; ``enough``: size of Alart and Curnier's F over that of r.
     """
     shape = (problem.contacts, problem.dim)
-    rho = contact_rho(problem)
+    rho = problem.contact_rho
     force, least = centre, np.inf
     best, errors = centre, []
     for step in range(steps + 1):

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import Factorisation, SingularSystem, Solve, factorisation
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
-from rigid_lcp.newton import alart_curnier, contact_rho
+from rigid_lcp.newton import alart_curnier
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def refined(
     """
     shape = (problem.contacts, problem.dim)
     linear = linear or factorisation(problem)
-    rho = contact_rho(problem)
+    rho = problem.contact_rho
     force = best = start
     tolerance = max(tolerance, EXACT)
     least, done, level = problem.residual(start), 0, 0

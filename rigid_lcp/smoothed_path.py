@@ -38,7 +38,7 @@ from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factoris
 from rigid_lcp.cones import length
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
 from rigid_lcp.interior_point import spring_size
-from rigid_lcp.newton import contact_rho, newton
+from rigid_lcp.newton import newton
 
 Floats = NDArray[np.float64]
 
@@ -139,7 +139,7 @@ def path_begin(problem: FrictionProblem, linear: Factorisation) -> tuple[Floats,
     size = spring_size(problem, linear, COMPLIANCE) or problem.rho * speed
     slides = problem.friction > 0.0
     force[:, 0] = size / np.where(slides, problem.friction, 1.0)
-    return force.ravel(), float(np.mean(contact_rho(problem))) * speed * size
+    return force.ravel(), float(np.mean(problem.contact_rho)) * speed * size
 
 
 def smoothed_point(
@@ -149,7 +149,7 @@ def smoothed_point(
     """Forces of the path's point at ``sigma`` [N^2], from ``force``: whether they were found, and
     the factorisations it took."""
     shape = (problem.contacts, problem.dim)
-    rho = contact_rho(problem)
+    rho = problem.contact_rho
     eps = rounding * np.sqrt(sigma) / float(rho.mean())
     enough = FOUND * np.sqrt(sigma * problem.contacts)
 

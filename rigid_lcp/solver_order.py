@@ -43,8 +43,7 @@ counts it); there is no proof: read ``status`` and ``residual``.
 
 Cost: hundreds of sweeps or some factorisations; the interior point takes some 20 a path.  In 3D
 their fill grows fast: where one costs as much as a hundred sweeps (3D packings above some 3,000
-contacts), thousands of sweeps go first, then a few proximal points, and a path of the interior
-point without its tail (`dear_path`).
+contacts), thousands of sweeps go before the convex path.
 """
 
 from __future__ import annotations
@@ -60,13 +59,7 @@ from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.frictionless import frictionless
 from rigid_lcp.interior_point import ITERATIONS, Path, interior_point
 from rigid_lcp.proximal_newton import FACTORISATIONS as MANY
-from rigid_lcp.solver_cold import (
-    BENT_USEFUL,
-    CONVEX_CONTACTS,
-    CONVEX_STEPS,
-    NEWTON_PATIENCE,
-    convex_start,
-)
+from rigid_lcp.solver_cold import CONVEX_CONTACTS, convex_path, convex_start
 from rigid_lcp.solver_trial import (
     ENDLESS,
     FEW_CONTACTS,
@@ -95,8 +88,8 @@ in motion; where there are more contacts, news need more sweeps to get through t
 FIRST_SWEEPS = 1000
 """What is spent where the first try was too short."""
 LAST_SWEEPS = 2000
-DEAR_SWEEPS, DEAR_STEPS = 6000, 40
-"""What is spent before a factorisation that is dear; steps of a path of such ones."""
+DEAR_SWEEPS = 6000
+"""What is spent before a factorisation that is dear."""
 FALLBACK_SHARE, FALLBACK_FLOPS = 1.0, 2e10
 """What the paths of the interior point may cost in all before no further one is begun: so many
 times what was spent before them, or so many flops (some seconds) if that is more."""
@@ -152,7 +145,9 @@ def attempts(
             return trial
         if trial.best.residual <= accept:
             return trial
-    if not small and trial.dear and trial.sweep(start, DEAR_SWEEPS, factorisations=0):
+    if (not small and trial.dear) and (
+        trial.sweep(start, DEAR_SWEEPS, factorisations=0) or (cold and both_paths(trial))
+    ):
         return trial
     plan: tuple[tuple[int, int], ...] = ((FIRST_SWEEPS, MANY if small else FEW),)
     if moving:  # where one place of a large bed resists, proximal points fail for all
@@ -164,8 +159,6 @@ def attempts(
             return trial
     if trial.best.residual <= accept and not small:
         return trial
-    if cold and not small and trial.dear and dear_path(trial):
-        return trial
     if rough > tolerance and trial.sweep(trial.best.r, FIRST_SWEEPS):
         return trial
     if paths and not (by_friction and friction_steps(trial)):
@@ -173,18 +166,11 @@ def attempts(
     return trial
 
 
-def dear_path(trial: Trial) -> bool:
-    """Where factorisations are dear: a path of the interior point and a few steps of Newton, which
-    end many static beds in 30 factorisations or not at all."""
-    found = trial.keep(
-        interior_point(
-            trial.problem, None, max(HAND_OVER, trial.tolerance), PATHS[0][0],
-            linear=trial.linear, iterations=min(DEAR_STEPS, trial.affordable),
-        )
-    )  # fmt: skip
-    if found.residual <= BENT_USEFUL:
-        trial.newton(found.r, CONVEX_STEPS + 1, found.method, NEWTON_PATIENCE)
-    return trial.best.solved
+def both_paths(trial: Trial) -> bool:
+    """The convex path, if it was not followed yet, and the smoothed one from its end."""
+    if trial.path_point is None and convex_path(trial):
+        return True
+    return trial.path_point is not None and from_path(trial, trial.path_point)
 
 
 def friction_steps(trial: Trial) -> bool:
@@ -211,8 +197,9 @@ def friction_steps(trial: Trial) -> bool:
 
 
 def fallback_paths(trial: Trial, accept: float) -> None:
-    """Turns, the folded path, extrapolated points, then the interior point along path after path,
-    within the effort of `FALLBACK_SHARE`, and extrapolated points again."""
+    """The smoothed path, where a start kept it from being tried; turns, the folded path,
+    extrapolated points, then the interior point along path after path, within the effort of
+    `FALLBACK_SHARE`, and extrapolated points again."""
     problem, tolerance = trial.problem, trial.tolerance
     if trial.forces > ENDLESS and proved_insoluble(problem):  # a proof before the paths
         trial.forget_endless()
@@ -220,6 +207,9 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         return
     if trial.gives_energy:  # what is near is found in one turn
         by_turns(trial, trial.best.r if trial.path_end is None else trial.path_end, patience=1)
+        return
+    new = tolerance < HAND_OVER and problem.contacts <= CONVEX_CONTACTS and not trial.smoothed
+    if new and both_paths(trial):  # where there was a start
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
     if turns_from_paths(trial) or folded(trial):

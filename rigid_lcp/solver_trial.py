@@ -74,6 +74,8 @@ class Trial:
         self.sweeper: Sweeper | None = None
         self.path_end: Floats | None = None
         self.path_point: tuple[Floats, float] | None = None
+        self.smoothed = False
+        """Whether the smoothed path was followed."""
         self.start: Floats | None = None
         """The forces given to start from; None where they mislead."""
         if start is not None:

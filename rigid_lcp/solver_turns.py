@@ -82,6 +82,7 @@ def swept(trial: Trial, start: Floats) -> FrictionSolution:
 def smoothed_further(trial: Trial, begin: tuple[Floats, float]) -> bool:
     """The smoothed path from the forces and sigma where the convex one ended, and from its end
     extrapolated points."""
+    trial.smoothed = True
     found = smoothed_path(
         trial.problem, trial.tolerance, begin, linear=trial.linear,
         factorisations=min(SMOOTHED_STEPS, trial.affordable),

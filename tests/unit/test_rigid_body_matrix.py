@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -18,7 +20,14 @@ from rigid_lcp.body_matrix import (
     jacobian_blocks,
     multiply_blocks,
 )
-from rigid_lcp.elimination_order import FEW_BLOCKS, minimum_degree, symmetric_pattern
+from rigid_lcp.elimination_order import (
+    FEW_BLOCKS,
+    MUCH_FLOPS,
+    elimination_flops,
+    elimination_order,
+    minimum_degree,
+    symmetric_pattern,
+)
 from rigid_lcp.sparse_products import columns_product, factors_product, row_forms, rows_product
 
 BODIES, CONTACTS = 7, 12
@@ -148,6 +157,37 @@ def test_the_order_of_a_chain_fills_nothing_in():
         assert len(near) <= 2
         linked[near, k] = linked[k, near] = False
         linked[np.ix_(near, near)] |= ~np.eye(len(near), dtype=bool)
+
+
+def cube(side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Pattern of blocks in a cube, each joined to its neighbours."""
+    number = np.arange(side**3).reshape(side, side, side)
+    before = [number.take(range(side - 1), axis).ravel() for axis in range(3)]
+    behind = [number.take(range(1, side), axis).ravel() for axis in range(3)]
+    return symmetric_pattern(side**3, np.concatenate(before), np.concatenate(behind))
+
+
+def test_a_cube_is_dissected_where_that_costs_less(monkeypatch):
+    """Blocks of 6 rows in a cube of 12: nested dissection takes 0.72 of the flops (0.9 asked); a
+    chain has no fill and is not looked at twice; without METIS the order is that of before."""
+    start, neighbour = cube(12)
+    by_degree = minimum_degree(start, neighbour)
+    found = elimination_order(start, neighbour, 6)
+    np.testing.assert_array_equal(np.sort(found), np.arange(12**3))
+    before, now = (elimination_flops(start, neighbour, o, 6) for o in (by_degree, found))
+    assert before > MUCH_FLOPS
+    assert now < 0.9 * before
+    monkeypatch.setitem(sys.modules, "pymetis", None)
+    np.testing.assert_array_equal(elimination_order(start, neighbour, 6), by_degree)
+
+
+def test_the_flops_of_an_order_are_those_of_dense_columns():
+    """A full matrix of n blocks of size k: ``2/3 (k n)^3`` to the first order in 1 / n."""
+    blocks, size = 60, 3
+    rows, columns = np.triu_indices(blocks, 1)
+    start, neighbour = symmetric_pattern(blocks, rows, columns)
+    flops = elimination_flops(start, neighbour, np.arange(blocks), size)
+    assert flops == pytest.approx(2.0 / 3.0 * (size * blocks) ** 3, rel=2.0 / blocks)
 
 
 @pytest.mark.parametrize(("dim", "size"), [(2, 3), (3, 6), (3, 3), (2, 6)])

@@ -12,7 +12,6 @@ from rigid_lcp import smoothed_path as smoothed
 from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_problem
 from rigid_lcp.interior_point import Path, interior_point
-from rigid_lcp.newton import contact_rho
 from rigid_lcp.smoothed_path import path_begin, smoothed_map, smoothed_path, smoothed_point
 from validation.rigid_packings import packing, tower
 
@@ -118,7 +117,7 @@ def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(
     force, sigma = path_begin(kicked, linear)
     force, found, _ = smoothed_point(kicked, force, sigma, linear, 60)
     assert found
-    rho = contact_rho(kicked)
+    rho = kicked.contact_rho
     eps = smoothed.ROUNDINGS[0] * np.sqrt(sigma) / rho.mean()
     r, u = force.reshape(-1, 3), kicked.velocity(force).reshape(-1, 3)
     for c in range(kicked.contacts):

@@ -7,6 +7,7 @@ unique.
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.problem_files import read_problem
 from rigid_lcp.solver import solve_auto
 from rigid_lcp.solver_cold import CONVEX_STEPS
-from rigid_lcp.solver_order import DEAR_STEPS, dear_path, friction_steps
+from rigid_lcp.solver_order import attempts, fallback_paths, friction_steps
 from rigid_lcp.solver_trial import Trial
 from validation.rigid_packings import packing
 
@@ -214,20 +215,47 @@ def random_problem(contacts: int, rank: int, friction: float, seed: int) -> Fric
     return friction_problem(b @ b.T, g.standard_normal(3 * contacts), friction, 3)
 
 
-def test_a_path_of_dear_factorisations_ends_a_static_bed_or_stops(monkeypatch):
-    """From nothing to round-off in so few factorisations; where it comes to nothing, no tail.
+@pytest.mark.parametrize("ratio", [1e12, 1e15, 1e18])
+def test_an_exact_answer_is_solved_whatever_bodies_weigh_beside_others(ratio):
+    """Two blocks on the ground, W = 1 and ``ratio``: ``r = 1 / W``, u = 0, no residual at all."""
+    found = solve_friction(np.diag([1.0, 1.0, ratio, ratio]), [-1.0, 0.0, -1.0, 0.0], 0.5, 2)
+    assert found.solved
+    np.testing.assert_allclose(found.r, [1.0, 0.0, 1.0 / ratio, 0.0], rtol=1e-14)
 
-    The bed that led to it (1,500 spheres) is in docs/rigid-solvers.md; it takes 6 s.
-    """
-    problem = packing(60, 3, seed=3, friction=0.5)
-    trial = Trial(problem, None, 1e-12)
-    assert dear_path(trial)
-    assert problem.residual(trial.best.r) <= 1e-12
-    assert trial.work["factorisations"] <= DEAR_STEPS + CONVEX_STEPS + 1
-    monkeypatch.setattr("rigid_lcp.solver_order.DEAR_STEPS", 3)
-    trial = Trial(problem, None, 1e-12)
-    assert not dear_path(trial)
-    assert trial.work["factorisations"] <= 5
+
+@pytest.fixture(scope="module")
+def still() -> FrictionProblem:
+    """120 spheres at rest, friction .1."""
+    return packing(120, 3, seed=0, friction=0.1)
+
+
+@pytest.fixture(scope="module")
+def struck(still) -> FrictionProblem:
+    """The same, hit: solved neither by the convex path nor by Newton from a hundred sweeps."""
+    hit = np.random.default_rng(0).standard_normal(still.bodies.jacobian.shape[1])
+    push = still.bodies.jacobian @ hit
+    push *= 0.3 * np.linalg.norm(still.offset) / np.linalg.norm(push)
+    return replace(still, offset=still.offset + push)
+
+
+def test_dear_factorisations_do_not_keep_from_the_smoothed_path(struck, monkeypatch):
+    """Beds of thousands of spheres take minutes to settle, so sweeps are told to cost next to
+    nothing here, which makes every factorisation dear."""
+    monkeypatch.setattr("rigid_lcp.solver_trial.DEAR", 0.0)
+    monkeypatch.setattr("rigid_lcp.solver_order.DEAR_SWEEPS", 100)
+    trial = attempts(struck, None, 1e-12)
+    assert struck.residual(trial.best.r) <= 1e-12
+    assert trial.work["smoothed path points"] > 5
+    assert trial.work["sweeps"] < 2000
+
+
+def test_a_start_does_not_keep_from_the_smoothed_path(still, struck):
+    """Where sweeps from the forces of the step before have failed, both paths are followed."""
+    trial = Trial(struck, solve_auto(still).r, 1e-12)
+    assert not trial.best.solved
+    fallback_paths(trial, 0.0)
+    assert struck.residual(trial.best.r) <= 1e-12
+    assert trial.work["smoothed path points"] > 5
 
 
 def test_where_a_proof_is_at_hand_no_path_is_tried():
