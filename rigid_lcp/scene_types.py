@@ -203,6 +203,10 @@ class SceneTables(Table):
     @model_validator(mode="after")
     def _fits_together(self) -> SceneTables:
         vectors = [
+            (f"body.{i}.vertices.{k} (body {body.name})", vertex)
+            for i, body in enumerate(self.body)
+            for k, vertex in enumerate(body.vertices or [])
+        ] + [
             (f"{kind}.{i}.{key}", value)
             for kind in ("ground", "body", "grains", "load")
             for i, table in enumerate(getattr(self, kind))

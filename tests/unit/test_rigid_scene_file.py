@@ -104,6 +104,19 @@ def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
             '[[body]]\nname = "a"\nradius = 1\nfixed = true\n[[body]]',
             "load.0.body: a is fixed",
         ),
+        (  # the second corner was a traceback of numpy
+            "box = [0.2, 0.1]",
+            "vertices = [[0, 0], [1, 0, 0], [0, 1]]",
+            "body.0.vertices.1 .body block. has 3 numbers in 2 dimensions.*correct these keys",
+        ),
+        (
+            SMALL,
+            SMALL.replace("= 2\n", "= 3\n")
+            .replace("[0, 1]", "[0, 0, 1]")
+            .replace("[0.0, 0.05]", "[0, 0, 1]")
+            .replace("box = [0.2, 0.1]", "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0]]"),
+            "body.0.vertices.3 .body block. has 2 numbers in 3 dimensions",
+        ),
         ("density =", "densty =", "body.0.densty: unknown key; did you mean density?"),
         ("[[ground]]", "[[grund]]", "grund: unknown key; did you mean ground?"),
         ("density =", "colour = 1\ndensity =", "body.0.colour: unknown key; known: name, box,"),
