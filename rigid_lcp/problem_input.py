@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,8 @@ COLUMNS = 256
 """Columns of an operator that are written out at a time."""
 
 
+OPERATOR = "let it return a number for every row"
+"""What to do about an operator whose products are none."""
 FROM_A_DIVISION = "look for a mass of zero or a division by zero where it was made"
 """What to do about numbers that are not finite."""
 
@@ -101,7 +104,7 @@ def matrix_given(matrix: Any, name: str = "W") -> sp.csr_array:
     ``name``: what messages call it.
     """
     if hasattr(matrix, "matmat") and not sp.issparse(matrix):
-        matrix = operator_written(matrix)
+        matrix = operator_written(matrix, name)
     given = matrix if sp.issparse(matrix) else finite_numbers(matrix, name)
     if given.ndim != 2:
         raise ProblemError(
@@ -118,15 +121,35 @@ def matrix_given(matrix: Any, name: str = "W") -> sp.csr_array:
     return w
 
 
-def operator_written(operator: Any) -> sp.csr_array:
-    """The matrix of an operator, from its products with the columns of the identity."""
-    rows, columns = operator.shape
+def operator_written(operator: Any, name: str) -> sp.csr_array:
+    """The matrix of an operator, from its products with the columns of the identity.
+
+    Raises `ProblemError` where it has no shape, or its products are not of that shape.
+    """
+    shape = getattr(operator, "shape", None)
+    if not isinstance(shape, tuple) or [isinstance(n, Integral) for n in shape] != [True, True]:
+        raise ProblemError(
+            f"the operator's shape is {shape!r}", where=name,
+            remedy="give it a shape, (rows, columns), or use scipy's LinearOperator",
+        )  # fmt: skip
+    rows, columns = shape
     parts = []
     for first in range(0, columns, COLUMNS):
         width = min(COLUMNS, columns - first)
         unit = np.zeros((columns, width))
         unit[first + np.arange(width), np.arange(width)] = 1.0
-        parts.append(sp.csc_array(finite_numbers(operator.matmat(unit), "W")))
+        try:
+            product = operator.matmat(unit)
+        except ValueError as error:  # scipy's, of a product that it can not put into shape
+            raise ProblemError(
+                f"the operator's product failed ({error})", where=name, remedy=OPERATOR
+            ) from error
+        if np.shape(product) != (rows, width):
+            raise ProblemError(
+                f"the operator's product of {columns} x {width} numbers has shape "
+                f"{np.shape(product)}, not {(rows, width)}", where=name, remedy=OPERATOR,
+            )  # fmt: skip
+        parts.append(sp.csc_array(finite_numbers(product, name)))
     return sp.csr_array(sp.hstack(parts)) if parts else sp.csr_array((rows, columns))
 
 
@@ -139,6 +162,11 @@ def check_factors(bodies: BodySpace) -> None:
             raise ProblemError(
                 f"{name} is no sparse matrix by rows", where=where,
                 remedy="give scipy.sparse.csr_array",
+            )  # fmt: skip
+        if part.dtype.kind not in "biuf":
+            raise ProblemError(
+                f"{name} is not made of numbers (but of {part.dtype})", where=where,
+                remedy="give real numbers",
             )  # fmt: skip
         if not np.isfinite(part.data).all():
             raise ProblemError(

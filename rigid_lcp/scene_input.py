@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import SceneError, UsageError
 from rigid_lcp.motion import Motion
+from rigid_lcp.real_numbers import real_numbers
 
 if TYPE_CHECKING:
     from rigid_lcp.shapes_2d import HalfSpace
@@ -25,9 +26,7 @@ Loads = Callable[[float, Motion], ArrayLike | None]
 def vector_given(values: ArrayLike, size: int, what: str, where: str) -> Floats:
     """A copy of ``size`` finite numbers; `SceneError` for anything else."""
     try:
-        if np.iscomplexobj(values):
-            raise TypeError
-        vector = np.atleast_1d(np.array(values, dtype=float))
+        vector = np.atleast_1d(real_numbers(values))
     except (TypeError, ValueError):
         vector = np.zeros(0)
     if vector.shape != (size,) or not np.isfinite(vector).all():
@@ -127,14 +126,19 @@ class CheckedLoads:
         if given is None:
             return None
         shape = motion.rates.shape
+        wrong = ""
         try:
-            forces = np.asarray(given, dtype=float)
-        except (TypeError, ValueError):
-            forces = np.zeros(0)
-        if forces.shape != shape or not np.isfinite(forces).all():
-            what = f"have shape {forces.shape}" if forces.shape != shape else "are not finite"
+            forces = real_numbers(given)
+        except (TypeError, ValueError) as error:
+            wrong = f"are not real numbers ({error})"
+        else:
+            if forces.shape != shape:
+                wrong = f"have shape {forces.shape}"
+            elif not np.isfinite(forces).all():
+                wrong = "are not finite"
+        if wrong:
             raise SceneError(
-                f"they {what}", where=f"loads at {time:.6g} s",
+                f"they {wrong}", where=f"loads at {time:.6g} s",
                 remedy=f"return finite numbers {shape}: a row for every body, the fixed ones and"
                 " fragments too",
             )  # fmt: skip

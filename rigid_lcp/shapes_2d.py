@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ShapeError
+from rigid_lcp.real_numbers import real_numbers
 
 Floats = NDArray[np.float64]
 
@@ -142,9 +143,14 @@ class HalfSpace:
                 f"the normal is {normal!r}", where="half-space",
                 remedy="give two or three numbers that are not all zero",
             )  # fmt: skip
+        distance = _given(offset, "offset", "half-space")
+        if distance.ndim:
+            raise ShapeError(
+                f"the offset is {offset!r}", where="half-space", remedy="give one number of metres"
+            )
         direction = direction / largest  # squares of what is left neither vanish nor overflow
         object.__setattr__(self, "normal", direction / np.linalg.norm(direction))
-        object.__setattr__(self, "offset", float(_given(offset, "offset", "half-space")))
+        object.__setattr__(self, "offset", float(distance))
 
     @property
     def dim(self) -> int:
@@ -200,9 +206,7 @@ def _outline(vertices: ArrayLike) -> Floats:
 def _given(values: ArrayLike, what: str, where: str) -> Floats:
     """A copy of finite numbers; a `ShapeError` for anything else."""
     try:
-        if np.iscomplexobj(values):
-            raise TypeError("complex ones")
-        array = np.array(values, dtype=float)
+        array = real_numbers(values)
     except (TypeError, ValueError) as error:
         raise ShapeError(
             f"the {what} holds what are not numbers ({error})", where=where, remedy="give metres"
