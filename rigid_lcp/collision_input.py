@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from numbers import Integral
 from typing import Literal, get_args
 
 import numpy as np
@@ -10,7 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import BodySpace
-from rigid_lcp.problem_input import check_factors, finite_numbers, in_range, one_number
+from rigid_lcp.problem_input import (
+    check_factors,
+    finite_numbers,
+    in_range,
+    one_number,
+    whole_number,
+)
 
 Floats = NDArray[np.float64]
 Law = Literal["newton", "moreau"]
@@ -77,7 +82,4 @@ def check_choices(
     one_number(tolerance, "tolerance")
     one_number(still, "still", zero=True)
     one_number(rest_speed, "rest_speed", zero=True)
-    if isinstance(max_rounds, bool) or not isinstance(max_rounds, Integral) or max_rounds < 0:
-        raise UsageError(
-            f"max_rounds is {max_rounds!r}", where="max_rounds", remedy="give a count of 0 or more"
-        )
+    whole_number(max_rounds, "max_rounds")

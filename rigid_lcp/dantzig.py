@@ -74,6 +74,7 @@ from rigid_lcp.pivot_state import (
     pivots_solution,
     pivots_state,
 )
+from rigid_lcp.problem_input import one_number, order_given, whole_number
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -128,17 +129,24 @@ def dantzig(
     without bound, and a linear programme proves that no forces at all keep the contacts from
     approaching (Painleve: go over to impulses); ``singular``; ``not converged``: the pivots are
     used up, a ray without that proof, or with reversal the driven force came back to zero.
-    Raises `ProblemError` in 3D.  Takes memory for (2 nc)^2 numbers: not for above some 2,000
-    contacts.
+    Raises `ProblemError` in 3D and for an order or velocities that are none, `UsageError` for other
+    options that are none.  Takes memory for (2 nc)^2 numbers: not for above some 2,000 contacts.
     """
-    state = pivots_state(problem, shift, perturbation, tangential_velocity, trace is not None)
-    sequence = np.arange(problem.contacts) if order is None else np.asarray(order, dtype=np.int64)
-    if not np.array_equal(np.sort(sequence), np.arange(problem.contacts)):
+    tolerance = one_number(tolerance, "tolerance")
+    shift = one_number(shift, "shift", zero=True)
+    perturbation = one_number(perturbation, "perturbation", zero=True)
+    limit = 40 * problem.contacts + 100
+    if max_pivots is not None:
+        limit = whole_number(max_pivots, "max_pivots")
+    sequence = order_given(
+        np.arange(problem.contacts) if order is None else order, problem.contacts
+    )
+    if sequence is None:
         raise ProblemError(
             "the order does not name every contact once", where="order",
             remedy=f"give a permutation of 0 ... {problem.contacts - 1}",
         )  # fmt: skip
-    limit = 40 * problem.contacts + 100 if max_pivots is None else max_pivots
+    state = pivots_state(problem, shift, perturbation, tangential_velocity, trace is not None)
     ended, where = contacts_consider(
         state.geometry, state.reduced, state.b, state.f, state.a, sequence, reversal, limit,
         state.codes, state.trace, state.events,

@@ -37,6 +37,7 @@ from rigid_lcp.contact_blocks import BodyBlocks, body_blocks, matrix_blocks
 from rigid_lcp.contact_sweeps import Momentum, SweepBlocks, residual_of, sweep_once, sweeps_until
 from rigid_lcp.errors import UsageError
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
+from rigid_lcp.problem_input import order_given
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -171,8 +172,8 @@ def contact_order(order: Order | Integers, contacts: int) -> Integers:
         if order in ("forward", "symmetric"):
             return np.arange(contacts, dtype=np.int64)
     else:
-        given = np.asarray(order, dtype=np.int64)
-        if given.shape == (contacts,) and (np.sort(given) == np.arange(contacts)).all():
+        given = order_given(order, contacts)
+        if given is not None:
             return given
     raise UsageError(
         "the order of the contacts is not one", where="gauss_seidel, order",

@@ -33,6 +33,7 @@ from rigid_lcp.factor_updates import (
 )
 from rigid_lcp.force_proof import forces_insufficient
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, Status
+from rigid_lcp.problem_input import finite_numbers
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -71,7 +72,10 @@ def pivots_state(
     tangential_velocity: ArrayLike | None,
     traced: bool,
 ) -> Pivots:
-    """The kernels' arrays of a 2D problem, or of normal equations alone where mu = 0."""
+    """The kernels' arrays of a 2D problem, or of normal equations alone where mu = 0.
+
+    Raises `ProblemError` in 3D with friction and for a tangential velocity that is none.
+    """
     nc, dim = problem.contacts, problem.dim
     mu = problem.friction
     if dim == 3 and mu.any():
@@ -79,13 +83,14 @@ def pivots_state(
             "pivoting knows two directions of sliding, in 3D there is a circle of them",
             where="dim", remedy="use a Newton or interior-point method",
         )  # fmt: skip
-    velocity = np.zeros(nc) if tangential_velocity is None else np.asarray(
-        tangential_velocity, dtype=float
+    remedy = "give one finite tangential velocity a contact"
+    velocity = np.zeros(nc) if tangential_velocity is None else finite_numbers(
+        tangential_velocity, "tangential_velocity", remedy
     )  # fmt: skip
-    if velocity.shape != (nc,) or not np.isfinite(velocity).all():
+    if velocity.shape != (nc,):
         raise ProblemError(
-            f"u_T is not {nc} finite numbers", where="tangential_velocity",
-            remedy="give one tangential velocity a contact",
+            f"it has the shape {velocity.shape} for {nc} contacts", where="tangential_velocity",
+            remedy=remedy,
         )  # fmt: skip
     keep = np.zeros((nc, dim), dtype=bool)
     keep[:, 0] = True

@@ -57,6 +57,7 @@ from rigid_lcp.pivot_state import (
     pivots_solution,
     pivots_state,
 )
+from rigid_lcp.problem_input import one_number, whole_number
 
 Floats = NDArray[np.float64]
 
@@ -83,10 +84,15 @@ def pivoting(
 
     ``work``: ``pivots``, changes of lists; ``paths``, how many were begun; ``sweeps``.
     Status ``no solution`` is proved by a linear programme.  Raises `ProblemError` in 3D with
-    friction.  Takes memory for (2 nc)^2 numbers and O(k^2) work a pivot for k unknown forces: not
-    for above some 2,000 contacts.
+    friction and for velocities that are none, `UsageError` for other options that are none.
+    Takes memory for (2 nc)^2 numbers and O(k^2) work a pivot for k unknown forces: not for above
+    some 2,000 contacts.
     """
-    most = 60 * problem.contacts + 100 if max_pivots is None else max_pivots
+    tolerance, sweeps = one_number(tolerance, "tolerance"), whole_number(sweeps, "sweeps")
+    shift = one_number(shift, "shift", zero=True)
+    most = 60 * problem.contacts + 100
+    if max_pivots is not None:
+        most = whole_number(max_pivots, "max_pivots")
     few, spent, swept = problem.contacts + 50, 0, 0
     attempts: list[tuple[float, bool, int]] = [(shift, False, 4 * few), (shift, False, most)]
     if (start is not None or sweeps > 0) and tangential_velocity is None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rigid_lcp.friction_problem import BodySpace
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 LEAST, MOST = 1e-100, 1e100
 """Range of the largest number of W, and of q: squares beyond it are no numbers any more."""
@@ -86,6 +87,22 @@ def one_number(value: Any, name: str, *, zero: bool = False) -> float:
             remedy="give a number " + ("of zero or more" if zero else "above zero"),
         )  # fmt: skip
     return number
+
+
+def whole_number(value: Any, name: str) -> int:
+    """A count of zero or more; `UsageError`, with ``name``, for all else."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 0:
+        raise UsageError(f"{name} is {value!r}", where=name, remedy="give a count of 0 or more")
+    return int(value)
+
+
+def order_given(order: ArrayLike, count: int) -> Integers | None:
+    """An order as the numbers 0 ... ``count`` - 1, or None where it has not each of them once."""
+    given = np.asarray(order)
+    if given.shape != (count,) or (count and given.dtype.kind not in "iu"):
+        return None
+    numbers = given.astype(np.int64)
+    return numbers if np.array_equal(np.sort(numbers), np.arange(count)) else None
 
 
 def in_range(values: Floats, name: str, least: float = LEAST) -> None:

@@ -1,0 +1,72 @@
+"""Options of the pivoting methods and of the sweeps: kept, or refused in one of our sentences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigid_lcp.dantzig import dantzig
+from rigid_lcp.errors import ProblemError, UsageError
+from rigid_lcp.friction_problem import friction_problem
+from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.pivoting import pivoting
+
+PROBLEM = friction_problem(np.diag([1.0, 2.0, 1.0, 2.0]), [-1.0, 0.5, 1.0, 0.0], 0.5, 2)
+R = [1.0, -0.25, 0.0, 0.0]
+"""Contact 0 sticks: ``r_T = -q_T / W_TT``, less than mu r_N = 0.5; contact 1 parts."""
+ORDERS = ["a", [np.nan, 1.0], [0.5, 1.5], [0.0, 1.0], [0], [0, 0], [0, 2], [[0, 1]], 3]
+
+
+@pytest.mark.parametrize("method", [dantzig, pivoting])
+@pytest.mark.parametrize(
+    ("option", "values"),
+    [
+        ("tolerance", [0.0, -1.0, np.nan, "a", None]),
+        ("shift", [-1.0, np.nan, np.inf, "a", None]),
+        ("max_pivots", ["a", -5, 1.5, np.nan, True]),
+    ],
+)
+def test_options_that_are_none_are_named(method, option, values):
+    """A shift of NaN was told as a ray, one of text as an error of the compiler."""
+    for value in values:
+        with pytest.raises(UsageError, match=rf"^{option}: .*{value}.*\n  -> give"):
+            method(PROBLEM, **{option: value})
+
+
+@pytest.mark.parametrize("value", [-1.0, np.nan, "a", None])
+def test_a_perturbation_that_is_none_is_named(value):
+    """NaN made forces of ``[inf nan]``."""
+    with pytest.raises(UsageError, match=rf"^perturbation: .*{value}"):
+        dantzig(PROBLEM, perturbation=value)
+
+
+@pytest.mark.parametrize("value", ["a", -1, 0.5, None])
+def test_sweeps_that_are_none_are_named(value):
+    with pytest.raises(UsageError, match=r"^sweeps: .*\n  -> give a count"):
+        pivoting(PROBLEM, sweeps=value)
+
+
+@pytest.mark.parametrize("method", [dantzig, pivoting])
+@pytest.mark.parametrize("value", ["a", [1.0], [np.nan, 1.0], ["a", "b"], [1j, 0.0]])
+def test_tangential_velocities_that_are_none_are_named(method, value):
+    with pytest.raises(ProblemError, match="tangential_velocity"):
+        method(PROBLEM, tangential_velocity=value)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_orders_that_are_none_are_named(order):
+    """0.5 was read as 0."""
+    with pytest.raises(ProblemError, match="name every contact once"):
+        dantzig(PROBLEM, order=order)
+    with pytest.raises(UsageError, match="order of the contacts"):
+        gauss_seidel(PROBLEM, order=order)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"order": [1, 0]}, {"order": np.array([1, 0], dtype=np.int32)}, {"perturbation": 0},
+     {"shift": 1e-3}, {"max_pivots": np.int64(9)}, {"tangential_velocity": [0, 0]}],
+)  # fmt: skip
+def test_options_that_can_be_given_change_no_forces(given):
+    found = dantzig(PROBLEM, **given)
+    np.testing.assert_allclose(found.r, R, atol=1e-12)
