@@ -18,6 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ShapeError
+from rigid_lcp.real_numbers import real_numbers
+from rigid_lcp.scene_input import MOST_OF_A_STATE, density_given, line_given, vector_given
+from rigid_lcp.shapes_2d import Polygon, convex_outline
 
 if TYPE_CHECKING:
     from rigid_lcp.motion import Motion
@@ -86,10 +89,12 @@ def polygon_split(
     corners = _numbers(vertices, "vertices")
     along, origin = _numbers(direction, "direction"), _numbers(point, "point")
     length = float(np.linalg.norm(along))
-    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or along.shape != (2,):
+    planar = corners.ndim == 2 and corners.shape[1] == 2 and len(corners) >= 3
+    if not planar or origin.shape != (2,) or along.shape != (2,):
         raise ShapeError(
-            f"vertices have shape {corners.shape}, direction {along.shape}", where="split",
-            remedy="give corners (n, 2), three at least, and a direction (2,)",
+            f"vertices have shape {corners.shape}, point {origin.shape}, direction {along.shape}",
+            where="split",
+            remedy="give corners (n, 2), three at least, a point and a direction (2,)",
         )  # fmt: skip
     if length == 0:
         raise ShapeError(
@@ -132,16 +137,31 @@ def fragment(
 
     ``vertices`` (n, 2) [m] in the world, anticlockwise; ``point``, ``direction``: see
     `polygon_split`; ``density`` [kg/m^2]; ``velocity`` (2,) [m/s] of the centre of mass of the
-    whole; ``spin`` [rad/s].  Raises `ShapeError` as `polygon_split` does.
+    whole; ``spin`` [rad/s].  Raises `ShapeError` for what is no polygon, as
+    `rigid_lcp.shapes_2d.Polygon` does, and as `polygon_split` does; `SceneError` for a line,
+    density, velocity or spin that is none, as `rigid_lcp.scene.Scene.add` does.
     """
-    whole = np.asarray(vertices, dtype=float)
+    whole, where = convex_outline(vertices), "fragment"
+    origin, along = line_given((point, direction), 2)
+    return _fragments(
+        whole, origin, along, density_given(density, where),
+        vector_given(velocity, 2, "velocity", where, MOST_OF_A_STATE),
+        float(vector_given(spin, 1, "spin", where, MOST_OF_A_STATE)[0]),
+    )  # fmt: skip
+
+
+def _fragments(
+    whole: Floats, point: Floats, direction: ArrayLike, density: float, velocity: Floats,
+    spin: float,
+) -> tuple[tuple[Fragment, Fragment], CutContacts]:  # fmt: skip
+    """`fragment` of what is known to be sound."""
     parts = polygon_split(whole, point, direction)
     _, centre, _ = polygon_moments(whole)
     made = []
     for part in parts:
         area, position, second = polygon_moments(part)
         arm = position - centre
-        moved = np.asarray(velocity, dtype=float) + spin * np.array([-arm[1], arm[0]])
+        moved = velocity + spin * np.array([-arm[1], arm[0]])
         made.append(Fragment(part, density * area, density * second, position, moved, spin))
     return (made[0], made[1]), cut_contacts(*parts)
 
@@ -196,14 +216,12 @@ def broken_scene(
 
 
 def _parts_2d(body: Body, point: ArrayLike, direction: ArrayLike) -> tuple[Body, Body]:
-    from rigid_lcp.shapes_2d import Polygon
-
     angle = float(body.angle[0])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     # about the body's own place: far from the origin its corners would lose digits, and it mass
-    parts, _ = fragment(
+    parts, _ = _fragments(
         body.shape.vertices @ turn.T, _numbers(point, "point") - body.position, direction,
-        density=body.mass / body.shape.area, velocity=body.velocity, spin=float(body.spin[0]),
+        body.mass / body.shape.area, body.velocity, float(body.spin[0]),
     )  # fmt: skip
     made = [
         replace(
@@ -244,7 +262,7 @@ def _parts_3d(body: Body, point: ArrayLike, normal: ArrayLike) -> tuple[Body, Bo
 def _numbers(values: ArrayLike, what: str) -> Floats:
     remedy = "give metres"
     try:
-        array = np.asarray(values, dtype=float)
+        array = real_numbers(values)
     except (TypeError, ValueError) as error:
         raise ShapeError(f"{what} is {values!r}", where="split", remedy=remedy) from error
     if not np.isfinite(array).all():

@@ -17,7 +17,13 @@ from rigid_lcp.detection_2d import detect_2d, shapes_2d
 from rigid_lcp.errors import SceneError
 from rigid_lcp.friction_problem import MOST_FRICTION
 from rigid_lcp.motion import Motion, motion_displaced
-from rigid_lcp.scene_input import check_half_space, number_in, vector_given
+from rigid_lcp.scene_input import (
+    MOST_OF_A_STATE,
+    check_half_space,
+    density_given,
+    number_in,
+    vector_given,
+)
 from rigid_lcp.shapes_2d import HalfSpace
 
 if TYPE_CHECKING:
@@ -25,10 +31,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-
-MOST_DENSITY = 1e50
-"""Densities above it [kg/m^3] have masses that can not be computed with."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,9 @@ class Scene:
         default = np.zeros(dim)
         default[-1] = -9.81
         self.gravity = (
-            default if gravity is None else vector_given(gravity, dim, "gravity", "scene")
+            default
+            if gravity is None
+            else vector_given(gravity, dim, "gravity", "scene", MOST_OF_A_STATE)
         )
         self.bodies: list[Body] = []
 
@@ -100,30 +104,32 @@ class Scene:
             fixed = True
         mass, inertia = np.inf, np.inf
         if not fixed:
-            remedy = "give a positive density, or fixed=True for a body that does not move"
-            density = number_in(density, 0.0, MOST_DENSITY, "the density", where, remedy, True)
+            otherwise = ", or fixed=True for a body that does not move"
+            density = density_given(density, where, otherwise)
             mass, inertia = shape.mass_properties(density)
         if friction is not None:
             remedy = f"give 0 to {MOST_FRICTION:g}"
             friction = number_in(friction, 0.0, MOST_FRICTION, "friction", where, remedy)
         if restitution is not None:
             restitution = number_in(restitution, 0.0, 1.0, "restitution", where, "give 0 to 1")
+
+        def state(values: ArrayLike | None, default: ArrayLike, size: int, what: str) -> Floats:
+            given = default if values is None else values
+            return vector_given(given, size, what, where, MOST_OF_A_STATE)
+
         origin = getattr(shape, "centroid", np.zeros(self.dim))
         turn = 3 if self.dim == 3 else 1
-        upright = [1.0, 0.0, 0.0, 0.0] if self.dim == 3 else 0.0
-        angle = vector_given(
-            upright if angle is None else angle, 1 if self.dim == 2 else 4, "angle", where
-        )
+        upright = [1.0, 0.0, 0.0, 0.0] if self.dim == 3 else [0.0]
+        angle = state(angle, upright, len(upright), "angle")
         length = float(np.linalg.norm(angle))
         if self.dim == 3 and length == 0:
             raise SceneError("the quaternion is zero", where=where, remedy="give (1, 0, 0, 0)")
-        rest = np.zeros(self.dim)
         self.bodies.append(Body(
             shape, mass, inertia,
-            vector_given(origin if position is None else position, self.dim, "position", where),
+            state(position, origin, self.dim, "position"),
             angle / length if self.dim == 3 else angle,
-            vector_given(rest if velocity is None else velocity, self.dim, "velocity", where),
-            vector_given(np.zeros(turn) if spin is None else spin, turn, "spin", where),
+            state(velocity, np.zeros(self.dim), self.dim, "velocity"),
+            state(spin, np.zeros(turn), turn, "spin"),
             friction, restitution, name,
         ))  # fmt: skip
         return len(self.bodies) - 1

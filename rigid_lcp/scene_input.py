@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, nan
 from numbers import Integral, Real
+from sys import float_info
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,17 +24,33 @@ Loads = Callable[[float, Motion], ArrayLike | None]
 """Forces and torques (n, 3) in 2D, (n, 6) in 3D [N, N m] at a time [s] and state."""
 
 
-def vector_given(values: ArrayLike, size: int, what: str, where: str) -> Floats:
-    """A copy of ``size`` finite numbers; `SceneError` for anything else."""
+MOST_DENSITY = 1e50
+"""Densities above it [kg/m^3] have masses that can not be computed with."""
+MOST_OF_A_STATE = 1e50
+"""Places, velocities, spins and gravity above it [SI] have energies that are no numbers, with
+lengths as great as shapes may have."""
+
+
+def vector_given(
+    values: ArrayLike, size: int, what: str, where: str, most: float = float_info.max
+) -> Floats:
+    """A copy of ``size`` finite numbers, ``most`` at most; `SceneError` for anything else."""
     try:
         vector = np.atleast_1d(real_numbers(values))
     except (TypeError, ValueError):
         vector = np.zeros(0)
-    if vector.shape != (size,) or not np.isfinite(vector).all():
+    if vector.shape != (size,) or not (np.abs(vector) <= most).all():
+        bound = "" if most == float_info.max else f", {most:g} at most"
         raise SceneError(
-            f"{what} is {values!r}", where=where, remedy=f"give {size} finite number(s)"
+            f"{what} is {values!r}", where=where, remedy=f"give {size} finite number(s){bound}"
         )
     return vector
+
+
+def density_given(value: Any, where: str, otherwise: str = "") -> float:
+    """A density [kg/m^3], in 2D [kg/m^2]; else `SceneError`, whose remedy goes on ``otherwise``."""
+    remedy = f"give a density above zero, {MOST_DENSITY:g} at most{otherwise}"
+    return number_in(value, 0.0, MOST_DENSITY, "the density", where, remedy, above=True)
 
 
 def number_in(

@@ -41,7 +41,7 @@ class Polygon:
     dim = 2
 
     def __init__(self, vertices: ArrayLike) -> None:
-        outline = _outline(vertices)
+        outline = convex_outline(vertices)
         start = outline.mean(axis=0)
         area, first, _ = _moments(outline - start)
         centroid = start + first / area
@@ -158,7 +158,7 @@ class HalfSpace:
         return len(self.normal)
 
 
-def _outline(vertices: ArrayLike) -> Floats:
+def convex_outline(vertices: ArrayLike) -> Floats:
     """The vertices (n, 2) if they are a convex polygon, anticlockwise; else a `ShapeError`."""
     where = "polygon"
     outline = _given(vertices, "outline", where)

@@ -1,0 +1,77 @@
+"""`fragment` refuses what `Polygon` and `Scene.add` refuse, and breaks what is sound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigid_lcp import Polygon, Scene
+from rigid_lcp.errors import SceneError, ShapeError
+from rigid_lcp.fragmentation import fragment, polygon_split
+
+SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
+MIDDLE, UP = (0.5, 0.5), (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "words"),
+    [
+        (SQUARE[::-1], "clockwise"), ("ab", "not numbers"), (SQUARE[:2], "shape"),
+        ([(0, 0), (1, 1), (1, 0), (0, 1)], "crosses itself"),
+        ([(0, 0), (2, 0), (1, 0.5), (2, 2), (0, 2)], "not convex"),
+        (np.ma.masked_equal(SQUARE, 1), "masked"), (np.array(SQUARE) * 1j, "complex"),
+    ],
+)  # fmt: skip
+def test_outlines_that_are_none_are_named(vertices, words):
+    """Clockwise ones gave parts of negative mass, crossing ones a division by zero."""
+    with pytest.raises(ShapeError, match=words):
+        fragment(vertices, MIDDLE, UP, density=1.0)
+    with pytest.raises(ShapeError, match=words):
+        Polygon(vertices)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        *(({"density": bad}, "the density is") for bad in (-1, 0, np.nan, "a", None, 1e300)),
+        *(({"velocity": bad}, "velocity is") for bad in ((np.nan, 0), (1, 0, 0), "a", (1e200, 0))),
+        *(({"spin": bad}, "spin is") for bad in (np.nan, (1, 2), "a", 1j, 1e200)),
+    ],
+)  # fmt: skip
+def test_motions_and_densities_that_are_none_are_named(given, words):
+    """NaN became masses and velocities of NaN, without a word; `Scene.add` says the same."""
+    with pytest.raises(SceneError, match=f"^fragment: {words}") as told:
+        fragment(SQUARE, MIDDLE, UP, **({"density": 1.0} | given))
+    with pytest.raises(SceneError, match=words) as added:
+        Scene().add(Polygon(SQUARE), **({"density": 1.0} | given))
+    assert added.value.what == told.value.what
+    assert added.value.remedy.startswith(told.value.remedy)
+
+
+@pytest.mark.parametrize(
+    ("point", "direction"),
+    [(0.5, UP), ((0.5, 0.5, 0), UP), (MIDDLE, (0, 0, 1)), (MIDDLE, None), ("a", UP)],
+)
+def test_lines_that_are_none_are_named(point, direction):
+    with pytest.raises(SceneError, match=r"fragment: the (point|direction) is"):
+        fragment(SQUARE, point, direction, density=1.0)
+
+
+@pytest.mark.parametrize("point", [(0.5, 0.5, 0), 0.5])
+def test_a_point_of_another_space_splits_nothing(point):
+    with pytest.raises(ShapeError, match=r"split: .*point"):
+        polygon_split(SQUARE, point, UP)
+
+
+@pytest.mark.parametrize("length", [1e-200, 1.0, 1e200])
+def test_parts_have_the_mass_of_the_whole(length):
+    """Halves of a unit square; their velocities are ``v + w x r`` at x = -+ 1/4."""
+    (left, right), _ = fragment(SQUARE, MIDDLE, (0, length), density=2.0, velocity=(3, 0), spin=4.0)
+    assert (left.mass, right.mass) == pytest.approx((1.0, 1.0), rel=1e-15)
+    np.testing.assert_allclose([left.velocity, right.velocity], [(3, -1), (3, 1)], rtol=1e-15)
+
+
+def test_the_remedy_of_a_density_names_both_bounds():
+    """1e300 was told to be positive."""
+    with pytest.raises(SceneError, match=r"is 1e\+300\n  -> .*above zero, 1e\+50 at most.*fixed"):
+        Scene().add(Polygon(SQUARE), density=1e300)
