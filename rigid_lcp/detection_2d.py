@@ -7,7 +7,7 @@ they share (Fig. 2, right); a vertex on a half-space is one each.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,8 +53,13 @@ class Shapes2D:
     """Pairs of bodies that can not move are never looked at."""
 
 
-def shapes_2d(shapes: Sequence[object], movable: Bools) -> Shapes2D:
-    """Flat arrays of polygons, discs and half-spaces; `SceneError` for any other shape."""
+def shapes_2d(
+    shapes: Sequence[object], movable: Bools, called: Callable[[int], str] = "body {}".format
+) -> Shapes2D:
+    """Flat arrays of polygons, discs and half-spaces; `SceneError` for any other shape.
+
+    ``called``: the name of a body for messages, by its number.
+    """
     kind, first, vertices, normals, radius = [], [0], [], [], []
     for number, shape in enumerate(shapes):
         if isinstance(shape, Polygon):
@@ -68,12 +73,12 @@ def shapes_2d(shapes: Sequence[object], movable: Bools) -> Shapes2D:
             corners, outward, size = shape.normal[None], shape.normal[None], shape.offset
         else:
             raise SceneError(
-                f"it is no shape of the plane ({type(shape).__name__})", where=f"body {number}",
+                f"it is no shape of the plane ({type(shape).__name__})", where=called(number),
                 remedy="use Polygon, Disc or HalfSpace with a normal of two numbers",
             )  # fmt: skip
         if len(corners) >= 1 << FACE_BITS:
             raise SceneError(
-                f"it has {len(corners)} vertices", where=f"body {number}",
+                f"it has {len(corners)} vertices", where=called(number),
                 remedy=f"use fewer than {1 << FACE_BITS}, or a disc",
             )  # fmt: skip
         vertices.append(corners)

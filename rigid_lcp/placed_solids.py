@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.errors import SceneError
+from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.near_pairs import HALF_SPACE
 from rigid_lcp.rotations import rotation_matrix
 from rigid_lcp.separation_3d import NEARLY, TILT, Solids
@@ -40,17 +40,27 @@ class Shapes3D:
     """Pairs of bodies that can not move are never looked at."""
 
 
-def shapes_3d(shapes: Sequence[object], movable: Bools) -> Shapes3D:
-    """Flat arrays of polyhedra, spheres and half-spaces; `SceneError` for any other shape."""
+def shapes_3d(
+    shapes: Sequence[object], movable: Bools, called: Callable[[int], str] = "body {}".format
+) -> Shapes3D:
+    """Flat arrays of polyhedra, spheres and half-spaces; `SceneError` for any other shape.
+
+    ``called``: the name of a body for messages, by its number.  Raises `ShapeError` for a
+    polyhedron whose faces do not meet edge to edge.
+    """
     kind, reach, parts = [], [], []
     for number, shape in enumerate(shapes):
-        where = f"body {number}"
+        where = called(number)
         if isinstance(shape, Polyhedron):
             kind.append(POLYHEDRON)
             reach.append(shape.reach)
-            if len(shape.edges) + 2 > MOST_EDGES:  # as many faces and corners together
+            try:
+                edges = len(shape.edges)
+            except ShapeError as error:
+                raise error.at(where) from error
+            if edges + 2 > MOST_EDGES:  # as many faces and corners together
                 raise SceneError(
-                    f"it has {len(shape.edges)} edges", where=where,
+                    f"it has {edges} edges", where=where,
                     remedy=f"use at most {MOST_EDGES - 2}, or a sphere",
                 )  # fmt: skip
             parts.append(_solid(shape))

@@ -32,7 +32,8 @@ from numpy.typing import ArrayLike, NDArray
 from rigid_lcp.acceleration_forces import forces_found
 from rigid_lcp.contacts import ContactForces, Contacts
 from rigid_lcp.equations import body_space, contact_offset
-from rigid_lcp.errors import NoSolution, NotConverged, Overlapping
+from rigid_lcp.errors import NoSolution, NotConverged, Overlapping, ProblemError, RigidError
+from rigid_lcp.finite_states import is_finite, too_much
 from rigid_lcp.lasting_contacts import (
     OVERLAP,
     Lasting,
@@ -114,7 +115,8 @@ def runge_kutta_advance(
 ) -> tuple[Motion, ContactForces]:  # fmt: skip
     """The state ``seconds`` [s] later, and the forces at the start of the last step.
 
-    Raises `NoSolution` (Painleve), `NotConverged`, or `Overlapping` where no step is short enough.
+    Raises `NoSolution` (Painleve), `NotConverged` or `Overlapping` where no step is short enough,
+    `SceneError` where a state would not be finite.
     """
     end, forces = time + seconds, None
     fastest = _travel_limit(world, motion)
@@ -139,6 +141,11 @@ def runge_kutta_advance(
                 tried = h / 2
                 pace.shortened += 1
                 continue
+            except ProblemError as error:
+                pull = _pull(loads, time, motion)
+                raise too_much(world, motion, pull, h, time, error) from error
+            if not is_finite(world, after):  # speeds so great leave no step that is long enough
+                raise too_much(world, motion, _pull(loads, time, motion), h, time)
             first, last = rates[0], rates[-1]
             pressed, stuck = lasting_keys(first, last)
             overlap = overlap_beyond(world, after, pressed)
@@ -161,11 +168,7 @@ def runge_kutta_advance(
             else:
                 break
             if tried < SHORTEST * pace.longest:
-                raise Overlapping(
-                    f"bodies overlap by {overlap:.2g} m after the shortest step",
-                    where=f"time {time:.9g} s",
-                    remedy="use method='time-stepping', which removes overlaps",
-                )
+                raise _no_step(world, after, overlap, time)
         time += h
         pace.accepted += 1
         pace.clean += 1
@@ -188,7 +191,7 @@ def runge_kutta_step(
 
     def rate_at(part: float, previous: Rate | None) -> Rate:
         stage = motion if previous is None else moved(motion, part * h, [(1.0, previous)])
-        pull = None if loads is None else loads(time + part * h, stage)
+        pull = _pull(loads, time + part * h, stage)
         return state_rate(world, stage, h, lasting, pull, tolerance)
 
     first = rate_at(0.0, None)
@@ -238,11 +241,35 @@ def state_rate(
     )  # fmt: skip
 
 
-def _travel_limit(world: World, motion: Motion) -> float:
-    speed = np.linalg.norm(motion.velocity, axis=1) + (
-        np.linalg.norm(motion.rates[:, motion.dim :], axis=1) * world.reach
+def _pull(loads: Loads | None, time: float, motion: Motion) -> ArrayLike | None:
+    return None if loads is None else loads(time, motion)
+
+
+def _no_step(world: World, motion: Motion, overlap: float, time: float) -> RigidError:
+    """What is wrong with the end ``motion`` of the shortest step, which may have an ``overlap``."""
+    where, remedy = f"time {time:.9g} s", "use method='time-stepping'"
+    if overlap > OVERLAP * world.length:
+        return Overlapping(
+            f"bodies overlap by {overlap:.2g} m after the shortest step", where=where,
+            remedy=f"{remedy}, which removes overlaps",
+        )  # fmt: skip
+    speed = _speeds(world, motion)
+    body = int(np.argmax(speed))
+    return NotConverged(
+        f"the shortest step is too long for it; its points go at {speed[body]:.3g} m/s",
+        where=f"{world.scene.called(body)}, {where}",
+        remedy=f"look at its loads and at gravity, or {remedy}",
     )
-    fastest = float(speed.max())
+
+
+def _speeds(world: World, motion: Motion) -> Floats:
+    """Bound of the velocity of each body's points [m/s], (n,)."""
+    turning = np.linalg.norm(motion.rates[:, motion.dim :], axis=1) * world.reach
+    return np.asarray(np.linalg.norm(motion.velocity, axis=1) + turning)
+
+
+def _travel_limit(world: World, motion: Motion) -> float:
+    fastest = float(_speeds(world, motion).max())
     return TRAVEL * world.length / fastest if fastest > 0 else np.inf
 
 

@@ -163,6 +163,14 @@ class World:
         """Freedoms of a body: 3 in 2D, 6 in 3D."""
         return 3 if self.scene.dim == 2 else 6
 
+    @cached_property
+    def heaviest(self) -> float:
+        """Greatest mass [kg] or, in numbers, moment of inertia [kg m^2] of the movable bodies."""
+        inertia = self.inertia[self.movable]
+        if self.scene.dim == 3:
+            inertia = np.trace(inertia, axis1=1, axis2=2)
+        return float(max(self.mass[self.movable].max(), inertia.max()))
+
     def inverse_mass(self, motion: Motion) -> sp.csr_array:
         """M^-1 of the movable bodies (eq. 12), in the world frame."""
         moving = self.movable
@@ -287,14 +295,14 @@ def world_of(scene: Scene) -> tuple[World, Motion]:
     reach = np.array([shape.reach if isfinite(shape.reach) else 0.0 for shape in shapes])
     mass = np.array([body.mass for body in bodies])
     if scene.dim == 2:
-        arrays = shapes_2d(shapes, movable)
+        arrays = shapes_2d(shapes, movable, scene.called)
         inertia = np.array([body.inertia for body in bodies])
 
         detect = partial(_detected, detect_2d, arrays)
     else:
         from rigid_lcp.detection_3d import detect_3d, shapes_3d
 
-        solids = shapes_3d(shapes, movable)
+        solids = shapes_3d(shapes, movable, scene.called)
         inertia = np.array([body.inertia if body.movable else np.eye(3) for body in bodies])
         detect = partial(_detected, detect_3d, solids)
 

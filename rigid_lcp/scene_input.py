@@ -31,6 +31,15 @@ MOST_OF_A_STATE = 1e50
 lengths as great as shapes may have."""
 
 
+MOST_STEPS = 1e10
+"""Steps of a run, more than any machine makes."""
+
+
+def too_many_steps(what: str, steps: float) -> str:
+    """Sentence on a span of time, ``what``, of more steps than can be made."""
+    return f"{what} is {steps:.3g} steps: at most {MOST_STEPS:.0e} can be made"
+
+
 def vector_given(
     values: ArrayLike, size: int, what: str, where: str, most: float = float_info.max
 ) -> Floats:

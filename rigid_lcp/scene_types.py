@@ -6,14 +6,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from rigid_lcp.scene_input import MOST_STEPS, too_many_steps
+
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """Whole numbers too, but neither true nor a word."""
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]{0,59}$")]
-MOST_STEPS, LEAST_OF_A_STEP = 1e10, 1e-6
-"""Steps of a run, more than any machine makes; shortest time between two frames in steps."""
+LEAST_OF_A_STEP = 1e-6
+"""Shortest time between two frames in steps."""
 
 
 class Table(BaseModel):
@@ -47,8 +49,8 @@ class Run(Table):
         steps = self.duration / self.step
         if not LEAST_OF_A_STEP * self.frames <= steps <= MOST_STEPS:
             raise ValueError(
-                f"duration is {steps:.3g} steps: at most {MOST_STEPS:.0e} can be made, and the "
-                f"time between two frames must be at least {LEAST_OF_A_STEP:g} of one"
+                f"{too_many_steps('duration', steps)}, and the time between two frames must be"
+                f" at least {LEAST_OF_A_STEP:g} of one"
             )
         return self
 

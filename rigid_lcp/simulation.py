@@ -13,18 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.breakage import Breakage, Broken, breaks, refuse_dust, scene_broken
 from rigid_lcp.contacts import ContactForces
-from rigid_lcp.errors import NotConverged, Overlapping, ShapeError
+from rigid_lcp.errors import NotConverged, Overlapping, ProblemError, ShapeError, UsageError
+from rigid_lcp.finite_states import is_finite, too_much
 from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.motion import Motion
 from rigid_lcp.runge_kutta import Pace, runge_kutta_advance
 from rigid_lcp.scene import Scene, world_of
 from rigid_lcp.scene_input import (
+    MOST_STEPS,
     CheckedLoads,
     Loads,
     body_given,
     line_given,
     residual_given,
     seconds_given,
+    too_many_steps,
 )
 from rigid_lcp.simulation_input import Method, check_run
 from rigid_lcp.time_stepping import contact_forces, moreau_step
@@ -94,6 +97,8 @@ class Simulation:
             np.zeros((0, scene.dim)), None, 1.0,
         )  # fmt: skip
         """Contacts of the last step and the forces in it."""
+        if not is_finite(self.world, self.motion):
+            raise too_much(self.world, self.motion, None, 0.0, 0.0)
         self._refuse_overlap()
 
     def advance(self, seconds: float) -> None:
@@ -102,18 +107,25 @@ class Simulation:
         Less than a billionth of a step is none: sums of times differ by so much.
 
         Raises `NotConverged` where a step's forces are not found; the state before it is kept.
-        `UsageError` for a negative time, `SceneError` for loads that are none, or for grains that
+        `UsageError` for a negative time, or one of more steps than can be made; `SceneError` for
+        loads that are none, for a state or an energy that would not be finite, or for grains that
         break without end.
         """
         seconds = seconds_given(seconds, "the time to go on")
+        if seconds / self.step > MOST_STEPS:
+            raise UsageError(
+                too_many_steps("the time to go on", seconds / self.step),
+                remedy="go on for less, or give a longer step",
+            )
         if seconds <= NO_STEP * self.step:
             return
-        if self.method == "acceleration":
-            self._integrate(seconds)
-            return
-        count = max(ceil(seconds / self.step - NO_STEP), 1)
-        for _ in range(count):
-            self._time_step(seconds / count)
+        with np.errstate(over="ignore"):  # a step that ends beyond numbers is told as that
+            if self.method == "acceleration":
+                self._integrate(seconds)
+                return
+            count = max(ceil(seconds / self.step - NO_STEP), 1)
+            for _ in range(count):
+                self._time_step(seconds / count)
 
     def fragment(self, body: int, line: tuple[ArrayLike, ArrayLike]) -> int:
         """Break a polygon (polyhedron) that moves in two; returns the number of the second part.
@@ -183,9 +195,14 @@ class Simulation:
         if self.loads is not None:
             middle = self.world.drifted(self.motion, h / 2)
             loads = self.loads(self.time + h / 2, middle)
-        made = moreau_step(
-            self.world, self.motion, loads, h, self.contacts, self.tolerance, self.accept
-        )
+        try:
+            made = moreau_step(
+                self.world, self.motion, loads, h, self.contacts, self.tolerance, self.accept
+            )
+        except ProblemError as error:
+            raise too_much(self.world, self.motion, loads, h, self.time, error) from error
+        if not is_finite(self.world, made.motion):
+            raise too_much(self.world, self.motion, loads, h, self.time)
         self._judge(made.residual, made.message)
         self.steps_scaled += made.scaled
         before, self.motion, self.contacts = self.motion, made.motion, made.contacts
