@@ -210,7 +210,10 @@ def broken_scene(
             remedy="give it a density, or make the shape a polygon",
         )  # fmt: skip
     parts = _parts_2d if scene.dim == 2 else _parts_3d
-    made.bodies[body], added = parts(made.bodies[body], point, direction)
+    try:
+        made.bodies[body], added = parts(made.bodies[body], point, direction)
+    except ShapeError as error:
+        raise error.at(f"{where}, {error.where}") from error
     made.bodies.append(added)
     return made
 

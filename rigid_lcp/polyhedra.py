@@ -62,8 +62,10 @@ def cut(shape: Polyhedron, normal: ArrayLike, offset: float) -> tuple[Polyhedron
     slack = CLEARANCE * shape.reach
     if height.max() <= slack or height.min() >= -slack:
         raise ShapeError(
-            "the plane does not cut the polyhedron", where="cut",
-            remedy=f"its corners lie {height.min():.3g} to {height.max():.3g} m from the plane",
+            f"the plane does not cut the polyhedron: its corners lie {height.min():.3g} to "
+            f"{height.max():.3g} m from the plane", where="cut",
+            remedy=f"move the plane along its normal, by {-offset / length:.3g} m to go through"
+            " the centre of mass",
         )  # fmt: skip
     beyond = Polyhedron(points_before(shape, -height))
     before = Polyhedron(points_before(shape, height))

@@ -14,7 +14,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import fields
-from errno import EDQUOT, EFBIG, ENOSPC
+from errno import EDQUOT, EEXIST, EFBIG, ENOSPC, ENOTDIR
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,8 @@ OURS = (
 COUNTERS = ("time", "steps", "worst_residual", "steps_above", "steps_scaled")
 NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 """No space on the disk, none left in the user's quota, or a longer file than is allowed."""
+NO_FOLDER = (EEXIST, ENOTDIR)
+"""A file where the folder, or one above it, should be."""
 
 
 @contextmanager
@@ -47,6 +49,11 @@ def refusal_told(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        if error.errno in NO_FOLDER:
+            raise UsageError(
+                f"this is no folder, nor can it become one ({error.strerror})", where=str(path),
+                remedy="give a --run-folder whose path has no file in it",
+            ) from error  # fmt: skip
         full = error.errno in NO_ROOM
         refusal = DiskFull if full else UsageError
         room = "make room" if full else "get leave to write there"

@@ -92,7 +92,7 @@ def moreau_step(
     ``accept``, as `solve_friction` has them.  Raises `NotConverged` for a body that turns by more
     than half a turn within the step.
     """
-    _refuse_fast_spin(motion, h)
+    _refuse_fast_spin(world, motion, h)
     middle = world.drifted(motion, 0.5 * h)
     pull = None if loads is None else np.asarray(loads, dtype=float)
     accelerations = world.accelerations(middle, pull, gyroscopic=False)
@@ -276,12 +276,12 @@ def contact_forces(
     return ContactForces(**given, normal_force=normal, tangential_force=tangential, status=status)
 
 
-def _refuse_fast_spin(motion: Motion, h: float) -> None:
+def _refuse_fast_spin(world: World, motion: Motion, h: float) -> None:
     spin = np.abs(motion.spin) if motion.dim == 2 else np.linalg.norm(motion.spin, axis=1)
     if (h * spin > GREATEST_TURN).any():
         worst = int(np.argmax(spin))
         raise NotConverged(
-            f"it turns by {h * spin[worst]:.3g} rad within a step", where=f"body {worst}",
+            f"it turns by {h * spin[worst]:.3g} rad within a step", where=world.scene.called(worst),
             remedy=f"take a step shorter than {GREATEST_TURN / spin[worst]:.3g} s",
         )  # fmt: skip
 

@@ -1,0 +1,121 @@
+"""Sentences that name the place and something to do: bodies of scenes, cuts, folders, steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import trackbed
+from rigid_lcp import Disc, Polygon, Polyhedron, Scene, Simulation, Sphere, box
+from rigid_lcp.errors import NotConverged, RigidError, SceneError, ShapeError, UsageError
+from rigid_lcp.polyhedra import cut
+from tests.rigid_runs import SLIDING_BLOCK
+
+NEAR = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1e-10, 0], [1e-10, 0, 1]]
+"""Corners 0 and 4 nearly the same, so that faces do not meet edge to edge."""
+
+
+@pytest.mark.parametrize("offset", [9.0, -9.0])
+def test_a_plane_that_misses_says_how_far_to_move_it(offset):
+    """Corners of a unit cube at +-1/2; the normal is twice a unit vector, so the plane is at 4.5 m.
+
+    By the way that the remedy names it goes through the centre of mass, and cuts.
+    """
+    cube, normal = box(1.0, 1.0, 1.0), np.array([2.0, 0.0, 0.0])
+    with pytest.raises(ShapeError, match=r"do.* not cut .* corners lie \S+ to \S+ m") as told:
+        cut(cube, normal, offset)
+    moved = float(told.value.remedy.split("by ")[1].split(" m")[0])
+    assert moved == pytest.approx(-offset / 2, rel=1e-3)
+    parts = cut(cube, normal, offset + 2 * moved)
+    assert [part.volume for part in parts] == pytest.approx([0.5, 0.5], rel=1e-3)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_line_or_plane_that_misses_names_the_body(dim):
+    scene = Scene(dim=dim)
+    shape = Polygon.rectangle(1, 1) if dim == 2 else box(1, 1, 1)
+    scene.add(shape, density=1.0, name="stone")
+    place = np.zeros(dim)
+    place[0] = 9.0
+    with pytest.raises(ShapeError, match=r"^stone, (split|cut): .*\n  -> move the (line|plane)"):
+        Simulation(scene).fragment(0, (place, np.eye(dim)[1 if dim == 2 else 0]))
+
+
+@pytest.mark.parametrize(
+    ("dim", "shape", "words"),
+    [
+        (2, Polygon.regular(1100, 0.1), "it has 1100 vertices"),
+        (3, Polyhedron(NEAR), "its faces do not meet edge to edge"),
+        (3, Polyhedron(np.vstack([
+            np.column_stack([np.cos(a), np.sin(a), np.full(300, z)])
+            for a in [2 * np.pi * np.arange(300) / 300] for z in (0.0, 1.0)
+        ])), "it has 900 edges"),
+    ],
+)  # fmt: skip
+def test_shapes_with_too_much_or_too_near_name_their_body(dim, shape, words):
+    """They were ``body 1``, or only ``Polyhedron``."""
+    scene = Scene(dim=dim)
+    scene.add(Disc(0.1) if dim == 2 else Sphere(0.1), fixed=True)
+    scene.add(shape, density=1.0, name="a")
+    with pytest.raises(RigidError, match=f"^a: {words}") as told:
+        Simulation(scene)
+    assert told.value.exit_code == 3
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_spin_too_fast_for_the_step_names_its_body(dim):
+    """1e5 rad/s for a step of 1 ms are 100 rad."""
+    scene = Scene(dim=dim)
+    shape = Polygon.rectangle(0.2, 0.1) if dim == 2 else box(0.2, 0.1, 0.1)
+    scene.add(shape, density=1.0, spin=1e5 * np.eye(1 if dim == 2 else 3)[0], name="a")
+    with pytest.raises(NotConverged, match=r"^a: it turns by 100 rad"):
+        Simulation(scene).advance(0.01)
+
+
+@pytest.mark.parametrize("method", ["time-stepping", "acceleration"])
+def test_steps_without_end_are_refused_as_the_scene_file_does(method, tmp_path):
+    """2 ms in steps of 1e-90 s are 2e87 of them; they were begun."""
+    scene = Scene()
+    scene.add(Disc(0.1), density=1.0)
+    run = Simulation(scene, method, step=1e-90)
+    with pytest.raises(UsageError, match=r"is 2e\+87 steps: at most 1e\+10 can be made\n  -> "):
+        run.advance(0.002)
+    assert (run.time, run.steps) == (0.0, 0)
+    from rigid_lcp.scene_file import scene_read
+
+    path = tmp_path / "scene.toml"
+    path.write_text(SLIDING_BLOCK.replace("step = 2e-3", "step = 1e-90"), encoding="utf-8")
+    with pytest.raises(SceneError, match=r"is 6e\+88 steps: at most 1e\+10 can be made, and"):
+        scene_read(path)
+
+
+@pytest.mark.parametrize("below", [False, True])
+def test_a_run_folder_that_is_a_file_is_told_as_that(
+    below: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One was told to get leave to write there."""
+    scene, file = tmp_path / "slide.toml", tmp_path / "notes"
+    scene.write_text(SLIDING_BLOCK, encoding="utf-8")
+    file.write_text("mine", encoding="utf-8")
+    folder = file / "run" if below else file
+    assert trackbed.main(["rigid", str(scene), "--run-folder", str(folder)]) == 2
+    message = capsys.readouterr().err
+    assert f"{folder}: this is no folder" in message
+    assert "give a --run-folder" in message
+    assert "leave" not in message
+    assert file.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_scene_file_s_huge_load_and_gravity_are_named_by_body_and_key(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = tmp_path / "slide.toml"
+    load = '\n[[load]]\nbody = "block"\nforce = [0, -1e300]\n'
+    scene.write_text(SLIDING_BLOCK + load, encoding="utf-8")
+    assert trackbed.main(["rigid", str(scene), "--no-pictures"]) == 3
+    assert "block at 0 s: its load is 1e+300 N on 40 kg" in capsys.readouterr().err
+    scene.write_text("gravity = [0, -1e200]\n" + SLIDING_BLOCK, encoding="utf-8")
+    assert trackbed.main(["rigid", str(scene), "--dry-run"]) == 3
+    assert "gravity is [0.0, -1e+200]\n  -> give 2 finite" in capsys.readouterr().err
