@@ -49,19 +49,18 @@ def refusal_told(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno in NO_FOLDER:
-            raise UsageError(
-                f"this is no folder, nor can it become one ({error.strerror})", where=str(path),
-                remedy="give a --run-folder whose path has no file in it",
-            ) from error  # fmt: skip
         full = error.errno in NO_ROOM
         refusal = DiskFull if full else UsageError
         room = "make room" if full else "get leave to write there"
+        remedy = (
+            f"{room}, then the same command with --resume goes on from the last frame; "
+            "or give another --run-folder"
+        )
+        if error.errno in NO_FOLDER:
+            remedy = "a file is where the folder should be: give another --run-folder"
         raise refusal(
-            f"can not be written ({error.strerror or error})", where=str(path),
-            remedy=f"{room}, then the same command with --resume goes on from the last frame; "
-            "or give another --run-folder",
-        ) from error  # fmt: skip
+            f"can not be written ({error.strerror or error})", where=str(path), remedy=remedy
+        ) from error
 
 
 def write_whole(path: Path, content: bytes | str) -> None:

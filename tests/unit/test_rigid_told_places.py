@@ -102,8 +102,8 @@ def test_a_run_folder_that_is_a_file_is_told_as_that(
     folder = file / "run" if below else file
     assert trackbed.main(["rigid", str(scene), "--run-folder", str(folder)]) == 2
     message = capsys.readouterr().err
-    assert f"{folder}: this is no folder" in message
-    assert "give a --run-folder" in message
+    assert f"{folder}: can not be written (" in message
+    assert "\n  -> a file is where the folder should be: give another --run-folder" in message
     assert "leave" not in message
     assert file.read_text(encoding="utf-8") == "mine"
 
