@@ -42,6 +42,9 @@ LAST_WORD, ROUND_OFF = 1e-11, 1e-15
 """At such a tolerance and below a step of Newton ends what the others found: the residual is
 measured on the scale of all forces, and only what is exact to round-off is so for a pebble under a
 boulder."""
+REST = 100.0
+"""Velocity times rho over the error of the forces, up to which it is taken for that of a contact at
+rest: corrections of a solution are of the size of its error."""
 REFINEMENTS, REFINED_CONTACTS = 8, 300
 """Most such steps, where factorisations cost next to nothing; one where there are more contacts."""
 MORE_SWEEPS = 0.5
@@ -244,10 +247,24 @@ class Trial:
         exact = ROUND_OFF / max(1.0, self.forces / GREAT_FORCES)
         if self.best.residual > exact:
             steps = REFINEMENTS if self.problem.contacts <= REFINED_CONTACTS else 1
-            self.keep(
-                refined(self.problem, self.best.r, exact, linear=self.linear, steps=steps),
-                self.best.method,
-            )
+            found = refined(self.problem, self.best.r, exact, linear=self.linear, steps=steps)
+            if not self.leaves_rest(found):
+                self.keep(found, self.best.method)
+
+    def leaves_rest(self, found: FrictionSolution) -> bool:
+        """Whether contacts that rest in the best point, a solution, move in ``found``.
+
+        Without its shift Newton's method may step along a self-stress to where forces meet their
+        cones' boundaries and, above the least friction that holds, into a motion that solves the
+        problem as well.  Both are exact; bodies at rest stay so.
+        """
+        error = max(self.best.residual, ROUND_OFF) * length(self.best.r)
+        before, after = (
+            self.problem.rho * np.linalg.norm(each.u.reshape(-1, self.problem.dim), axis=1)
+            <= REST * error
+            for each in (self.best, found)
+        )
+        return bool((before & ~after).any())
 
     def sharpen_by_sweeps(self) -> None:
         """A part more sweeps, from a solution that sweeps found, where the tolerance asks for an

@@ -86,6 +86,34 @@ def test_card_house(phi: float) -> None:
     assert 1e-10 < slow < 1e-8
 
 
+def uneven_house(mu: float) -> Simulation:
+    """Cards at 12 degrees to the vertical, one 1.7 times denser, with friction everywhere."""
+    lean, scene = tan(radians(12)), Scene(dim=2)
+    card = np.array([(-lean - 0.02, 0), (-lean, 0), (0, 0.95), (0, 1), (-0.02, 1)])
+    scene.add(HalfSpace((0, 1)), friction=mu)
+    scene.add(Polygon(card), density=1000, friction=mu)
+    scene.add(Polygon((card * (-1, 1))[::-1]), density=1700, friction=mu)
+    return Simulation(scene)
+
+
+def test_uneven_card_house_stays_at_rest_where_a_motion_solves_its_steps_as_well() -> None:
+    """Static theorem: forces at rest exist from a friction of 0.749045 on (linear programme).
+
+    Just above it a slow slide is another exact solution of a step.  A house at rest, whose forces
+    of the step before are those of rest, goes on resting: rounding leaves 1e-17 m/s a step, far
+    below 1e-9 m in 0.3 s.  Below the limit the least acceleration is of the order of g times what
+    is missing, 1e-3, and so the way g 1e-3 t^2 / 2 = 4e-4 m; a thousandth of it is a fall.
+    """
+    run = uneven_house(0.75)
+    limit = least_that_rests(lambda mu: unbalance(run, mu) <= BALANCED, 0.7, 0.8, 1e-8)
+    assert limit == pytest.approx(0.749045, abs=1e-6)
+    for above in (7e-5, 1e-3, 1e-2):
+        house = uneven_house(limit * (1 + above))
+        assert stack_drop(house, 0.3) < 1e-9
+        assert house.worst_residual <= house.tolerance
+    assert stack_drop(uneven_house(limit * (1 - 1e-3)), 0.3) > 4e-7
+
+
 @pytest.mark.parametrize("share", [1 + 1e-6, 1 - 1e-6, 0.5])
 def test_wedge(share: float) -> None:
     """It jams iff ``mu >= tan(half angle)``; else it is squeezed out as fast as on paper."""
