@@ -13,12 +13,19 @@ What the limit is:
   ``f = k (-J dq)`` where that is positive, with dq the multiplier: eqs 37 and 38.  It is strictly
   convex, so f is unique, whatever the order of contacts and bodies and whatever the start.
   `minimum_norm_forces` computes it apart, by linear algebra, for contacts that stick.
-- Where contacts slide while others hold (friction mobilised inside a jammed pile): equilibrium of
-  springs and sliders loaded in one go from nothing.  Coulomb's law has no potential, and there is
-  more than one such state: forces were the same to 1e-10 for any order, and up to 590 contacts
-  for starts up to a tenth of the final displacements, but 25 % different for a start as large as
-  those, and 8 times as large in a wedge with a history of sliding (`coulomb_slider`, MD).  All obey
-  eqs 26 and 27.
+- Where contacts slide or open while others hold by friction (friction mobilised inside a jammed
+  pile): equilibrium of springs and sliders loaded in one go from nothing.  Coulomb's law has no
+  potential, and there is more than one such state: relaxed from another one
+  (`state_reached_from`), the forces of a box of 46 discs with friction 1 differ by up to a third,
+  and in a wedge with a history of sliding by 8 times (`coulomb_slider`, MD).  All obey eqs 26 and
+  27.  The unique forces are by definition those reached from no displacements.
+
+So an earlier answer (``start``) may change the cost and never the answer.  Without friction the
+relaxation goes on from it, as the energy is convex.  With friction it is first asked whether all
+contacts hold (`rigid_lcp.held_contacts`: one factorisation, from the problem alone): then this is
+the answer, and a start has nothing to add.  Else the relaxation is done from nothing: which state
+it ends in hangs on where it begins, and no cheaper check tells it from its rivals.
+
 - Where bodies accelerate: displacements drift along the motion for ever, which opens what opens
   and slides what slides, friction against the velocity, and the forces of the contacts that hold
   are as above.
@@ -33,12 +40,15 @@ way has eigenvalues with negative real parts, and the relaxation does not settle
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.elastic_network import ElasticNetwork
 from rigid_lcp.friction_problem import FrictionProblem
+from rigid_lcp.held_contacts import held_displacement
 from rigid_lcp.micro_displacements import (
     ElasticForces,
     bodies_of,
@@ -46,6 +56,7 @@ from rigid_lcp.micro_displacements import (
     coulomb_spring,
     free_motion,
     mass_free_jacobian,
+    small_start,
     start_displacement,
     stiffest_mode,
 )
@@ -76,24 +87,90 @@ def elastic_limit(
     """Forces that springs at the contacts choose, in the limit of stiff springs.
 
     ``problem`` with bodies; ``stiffness`` [N/m], see `contact_stiffness` (ratios matter only);
-    ``start``: an earlier answer, or displacements (ndof,) [m, rad]; ``tolerance``: on the
+    ``start``: an earlier answer, or displacements (ndof,) [m, rad], which may save steps without
+    friction and is of no effect with it (module docstring); ``tolerance``: on the
     scale-free residual and on the relative change of the forces in a last step (where bodies
     accelerate, the change may stall at 1e-11 by round-off and is then accepted).
-    ``iterations_max`` counts Newton steps.  Never raises for want of convergence.
+    ``iterations_max`` counts Newton steps.  Raises `ProblemError` for a start that does not fit
+    the problem; never raises for want of convergence.
     """
-    bodies = bodies_of(problem)
-    shape = (problem.contacts, problem.dim)
+    springs = _springs(problem, stiffness)
+    bodies, network = bodies_of(problem), springs.network
+    begun, _ = start_displacement(start, bodies, network.stiffness.shape)
+    if problem.friction.any():
+        held = held_displacement(
+            problem, network.jacobian, network.free, network.stiffness, tolerance
+        )
+        if held is not None:
+            return _held(problem, springs, held)
+        begun = np.zeros_like(begun)
+    begun = small_start(
+        begun, bodies, springs.mode * network.stiffness, network.jacobian, network.free
+    )
+    return _relaxed(problem, springs, begun, tolerance, iterations_max)
+
+
+def state_reached_from(
+    problem: FrictionProblem,
+    displacement: ArrayLike,
+    stiffness: ArrayLike = 1.0,
+    *,
+    tolerance: float = 1e-12,
+    iterations_max: int = 2000,
+) -> ElasticForces:
+    """Forces in the limit of the relaxation that begins at ``displacement`` (ndof,) [m, rad].
+
+    Everything else as `elastic_limit` has it, which begins at none.  Use it to see whether a state
+    (that of springs with a history, say) is an equilibrium of eqs 37 and 38; when not to use it:
+    for the unique forces, as with friction each state may lead to its own.
+    """
+    springs = _springs(problem, stiffness)
+    begun, _ = start_displacement(displacement, bodies_of(problem), springs.network.stiffness.shape)
+    return _relaxed(problem, springs, begun, tolerance, iterations_max)
+
+
+@dataclass(frozen=True)
+class _Springs:
+    """The springs of a problem, scaled to the stiffest mode: h = 1 is a step without overshoot."""
+
+    network: ElasticNetwork
+    root: sp.csr_array
+    """``M^-1/2``, (ndof, ndof)."""
+    mode: float
+    """The stiffest mode [1/s^2]."""
+
+
+def _springs(problem: FrictionProblem, stiffness: ArrayLike) -> _Springs:
     k = contact_stiffness(problem, stiffness)
-    jacobian, root = mass_free_jacobian(bodies)
+    jacobian, root = mass_free_jacobian(bodies_of(problem))
     free = free_motion(jacobian, problem.offset)
-    # springs scaled to the stiffest mode: h = 1 is then a step without overshoot
     mode = stiffest_mode(jacobian, k) or 1.0
-    network = ElasticNetwork(jacobian, free, k / mode, problem.friction)
+    return _Springs(ElasticNetwork(jacobian, free, k / mode, problem.friction), root, mode)
+
+
+def _held(problem: FrictionProblem, springs: _Springs, displacement: Floats) -> ElasticForces:
+    """The answer of contacts that all hold, at mass-free ``displacement`` (ndof,)."""
+    network = springs.network
+    nil = np.zeros(network.stiffness.shape)
+    deformation = -(network.jacobian @ displacement).reshape(nil.shape)
+    force, _ = coulomb_spring(deformation, nil, network.stiffness, problem.friction)
+    return ElasticForces(
+        force.ravel(), springs.root @ displacement / springs.mode, nil,
+        problem.residual(force.ravel()), "solved", 1,
+    )  # fmt: skip
+
+
+def _relaxed(
+    problem: FrictionProblem, springs: _Springs, begun: Floats, tolerance: float,
+    iterations_max: int,
+) -> ElasticForces:  # fmt: skip
+    """Implicit relaxation from displacements ``begun`` (ndof,) [m, rad]."""
+    bodies, network, mode = bodies_of(problem), springs.network, springs.mode
+    jacobian, shape = network.jacobian, network.stiffness.shape
     nil = np.zeros(shape)
     # starting deformations are those of displacements: others would be a self-stress for good
-    begun, _ = start_displacement(start, bodies, shape)
     deformation = -mode * (bodies.jacobian @ begun).reshape(shape)
-    displacement, force = np.zeros(jacobian.shape[1]), nil
+    way, force = np.zeros(jacobian.shape[1]), nil
     residual, change, h, longest = np.inf, np.inf, FIRST_STEP, LONGEST_STEP
     growth = GROWTH_SLIDING if problem.friction.any() else GROWTH
     solved = shape[0] == 0
@@ -106,7 +183,7 @@ def elastic_limit(
         if not converged:
             h /= 4.0
             continue
-        displacement = displacement + move
+        way = way + move
         deformation = deformation - (jacobian @ move).reshape(shape)
         previous, earlier = force, change
         force, _ = coulomb_spring(deformation, nil, network.stiffness, problem.friction)
@@ -131,7 +208,7 @@ def elastic_limit(
         "in more ways than one"
     )  # fmt: skip
     return ElasticForces(
-        force.ravel(), begun + root @ displacement / mode, nil, residual,
+        force.ravel(), begun + springs.root @ way / mode, nil, residual,
         "solved" if solved else "not converged", spent, message,
     )  # fmt: skip
 

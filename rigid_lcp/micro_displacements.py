@@ -22,8 +22,9 @@ What the paper leaves open, and what is done here:
 - "As many variables as degrees of freedom, i.e., the system is unique": so it is for forces that
   are an increasing function of xi, hence without friction or with all contacts sticking, where
   the limit is the weighted minimum-norm solution (`rigid_lcp.elastic_limit`).  Coulomb's law
-  where contacts slide is no such function: the forces can then depend on the start
-  (`coulomb_spring`) and do depend on the path (`coulomb_slider`).
+  where contacts slide is no such function: the state reached can then depend on where the
+  relaxation begins (`coulomb_spring`), so it begins at no displacements, and the forces do depend
+  on the path of a law with memory (`coulomb_slider`).
 - h is not given: `stable_step` derives it.  The number of iterations grows as the ratio of the
   stiffest to the softest mode; `elastic_limit` finds the same forces without that cost.
 - The last line of eq. 27 lacks ``a_T f_T <= 0``: friction opposes sliding.  The residual has it.
@@ -42,6 +43,7 @@ from scipy.sparse.linalg import splu
 from rigid_lcp.cones import natural_residual
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, Status
+from rigid_lcp.held_contacts import held_displacement, held_stiffness
 
 Floats = NDArray[np.float64]
 ForceLaw = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
@@ -51,6 +53,9 @@ ForceLaw = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
 ``slip`` (nc, dim) [m], what the law remembers of earlier sliding, zero at first; ``stiffness``
 (nc, dim) [N/m]; ``friction`` (nc,); ``force`` (nc, dim) [N].
 """
+
+GREATEST_START = 1e4
+"""Pull of the springs over the load, above which a start is not used."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +95,16 @@ def coulomb_spring(
     allowed = friction * normal
     share = np.divide(allowed, size, out=np.ones_like(size), where=size > allowed)
     return np.column_stack([normal, trial[:, 1:] * share[:, None]]), slip
+
+
+def spring(
+    deformation: Floats, slip: Floats, stiffness: Floats, friction: Floats
+) -> tuple[Floats, Floats]:
+    """Eq. 38 of contacts that hold: linear, pulling as well as pushing; ``slip`` is of no effect.
+
+    For contacts that `rigid_lcp.held_contacts` has found to hold in the end.
+    """
+    return stiffness * deformation, slip
 
 
 def coulomb_slider(
@@ -208,18 +223,33 @@ def micro_displacements(
 
     ``problem`` with bodies; ``stiffness`` [N/m], see `contact_stiffness`; ``start``: an earlier
     answer, or displacements (ndof,) [m, rad]; ``step`` h [s^2] (default: `stable_step`);
-    ``tolerance`` on the scale-free residual; ``law``: eq. 38.  Never raises for want of
-    convergence: see ``status``.  When not to use it: for many grains, where
+    ``tolerance`` on the scale-free residual; ``law``: eq. 38.  Raises `ProblemError` for a start
+    that does not fit; never for want of convergence: see ``status``.
+
+    With `coulomb_spring` a start changes the cost and not the answer: without friction, and where
+    all contacts hold (`rigid_lcp.held_contacts`; springs are then linear on the way as well), there
+    is one limit; elsewhere with friction the start is left aside.  A law with memory, or of your
+    own, begins at the start as it is.  When not to use it: for many grains, where
     `rigid_lcp.elastic_limit.elastic_limit` has the same answer at a fraction of the cost.
     """
     bodies = bodies_of(problem)
     shape = (problem.contacts, problem.dim)
     k = contact_stiffness(problem, stiffness)
     jacobian, root = mass_free_jacobian(bodies)
-    free = root @ free_motion(jacobian, problem.offset)
+    coast = free_motion(jacobian, problem.offset)
+    free = root @ coast
     if step is None:
         step = stable_step(jacobian, k)
     displacement, slip = start_displacement(start, bodies, shape)
+    if law is coulomb_spring:
+        slip = np.zeros(shape)
+        displacement = small_start(displacement, bodies, k, jacobian, coast)
+    if law is coulomb_spring and problem.friction.any():
+        mode = stiffest_mode(jacobian, k) or 1.0
+        if held_displacement(problem, jacobian, coast, k / mode, tolerance) is None:
+            displacement = np.zeros_like(displacement)
+        else:
+            law, k = spring, held_stiffness(k, problem.friction)
     lost = problem.offset - bodies.jacobian @ free
 
     best = (np.inf, np.zeros(shape), displacement, slip)
@@ -264,3 +294,16 @@ def start_displacement(
             remedy="give the displacement of an earlier answer for the same bodies, or none",
         )  # fmt: skip
     return displacement, slip
+
+
+def small_start(
+    displacement: Floats, bodies: BodySpace, stiffness: Floats, jacobian: sp.csr_array,
+    free: Floats,
+) -> Floats:  # fmt: skip
+    """The start ``displacement`` (ndof,), or none where its round-off would be left in the forces.
+
+    ``stiffness`` (nc, dim) [N/m]; ``jacobian`` mass free; ``free`` (ndof,), see `free_motion`.
+    """
+    pull = jacobian.T @ (stiffness.ravel() * (bodies.jacobian @ displacement))
+    small = np.linalg.norm(pull) <= GREATEST_START * np.linalg.norm(free)
+    return displacement if small else np.zeros_like(displacement)

@@ -16,7 +16,7 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.elastic_limit import elastic_limit
+from rigid_lcp.elastic_limit import elastic_limit, state_reached_from
 from rigid_lcp.friction_problem import FrictionProblem
 from rigid_lcp.micro_displacements import micro_displacements
 from validation.rigid_indeterminacy_liggghts import DAMPING, liggghts_rest, liggghts_there
@@ -179,7 +179,7 @@ def scene_rows(scene: Scene, quick: bool) -> Iterator[Row]:
         yield row(SPRINGS, rest.force, cpu, rest.steps, stiffness=stiffness, ramp=ramp)
         if scene.mobilised and ramp >= 30_000:
             # whether the springs' forces are those of another state of eq. 38
-            other = elastic_limit(problem, start=stiffness * weight * rest.displacement)
+            other = state_reached_from(problem, stiffness * weight * rest.displacement)
             apart = float(np.abs(rest.force - other.r.reshape(-1, 2)).max()) / weight
             yield row(
                 FROM_SPRINGS, other.r.reshape(-1, 2), 0.0, other.iterations, stiffness=stiffness,
@@ -233,7 +233,7 @@ class OrderRow:
     order: float
     """Relative difference (2-norm) with contacts and bodies in random order [-]."""
     start: float
-    """As well, begun from random displacements of a tenth of the final ones [-]."""
+    """As well, with random displacements of a tenth of the final ones given as a start [-]."""
 
 
 def order_rows(sizes: tuple[int, ...]) -> Iterator[OrderRow]:

@@ -170,8 +170,8 @@ def found_words(lines: Sequence[Data]) -> str:
     if other:
         told = ", ".join(f"{scene} ({error:.1e} of the weight)" for scene, error in other.items())
         words += (
-            "  That is no proof that there is one state: begun where the springs rest (table "
-            f"above), it ends in another on: {told}."
+            "  That is no proof that there is one state: relaxed from where the springs rest "
+            f"(table above), it ends in another on: {told}."
         )
     if lost:
         words += (
