@@ -27,7 +27,9 @@ So an earlier answer (``start``) may change the cost and never the answer.  With
 relaxation goes on from it, as the energy is convex.  With friction it is first asked whether all
 contacts hold (`rigid_lcp.held_contacts`: one factorisation, from the problem alone): then this is
 the answer, and a start has nothing to add.  Else the relaxation is done from nothing: which state
-it ends in hangs on where it begins, and no cheaper check tells it from its rivals.
+it ends in hangs on where it begins, and no cheaper check tells it from its rivals.  Between states
+that are near round-off may decide, so all is done in the problem's own order
+(`rigid_lcp.own_order`), whatever the order of contacts and bodies.
 
 Measured, one thread, warm: towers of 10, 50 and 200 boxes (20 to 400 contacts) 0.01 to 0.1 s, a
 frictionless pyramid of 465 discs (1,335 contacts) 0.6 s.  Pyramids between walls at
@@ -39,7 +41,7 @@ way has eigenvalues with negative real parts, and the relaxation does not settle
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -59,6 +61,7 @@ from rigid_lcp.micro_displacements import (
     start_displacement,
     stiffest_mode,
 )
+from rigid_lcp.own_order import OwnOrder, own_order
 
 Floats = NDArray[np.float64]
 FIRST_STEP = 1e3
@@ -93,20 +96,22 @@ def elastic_limit(
     ``iterations_max`` counts Newton steps.  Raises `ProblemError` for a start that does not fit
     the problem; never raises for want of convergence.
     """
-    springs = _springs(problem, stiffness)
-    bodies, network = bodies_of(problem), springs.network
-    begun, _ = start_displacement(start, bodies, network.stiffness.shape)
+    bodies = bodies_of(problem)
+    begun, _ = start_displacement(start, bodies, (problem.contacts, problem.dim))
+    order, springs = _springs(problem, stiffness)
+    network, begun = springs.network, begun[order.column]
     if problem.friction.any():
         held = held_displacement(
-            problem, network.jacobian, network.free, network.stiffness, tolerance
+            order.problem, network.jacobian, network.free, network.stiffness, tolerance
         )
         if held is not None:
-            return _held(problem, springs, held)
+            return _restored(_held(order.problem, springs, held), order)
         begun = np.zeros_like(begun)
     begun = small_start(
-        begun, bodies, springs.mode * network.stiffness, network.jacobian, network.free
-    )
-    return _relaxed(problem, springs, begun, tolerance, iterations_max)
+        begun, bodies_of(order.problem), springs.mode * network.stiffness, network.jacobian,
+        network.free,
+    )  # fmt: skip
+    return _restored(_relaxed(order.problem, springs, begun, tolerance, iterations_max), order)
 
 
 def state_reached_from(
@@ -123,9 +128,10 @@ def state_reached_from(
     (that of springs with a history, say) is an equilibrium of eqs 37 and 38; when not to use it:
     for the unique forces, as with friction each state may lead to its own.
     """
-    springs = _springs(problem, stiffness)
-    begun, _ = start_displacement(displacement, bodies_of(problem), springs.network.stiffness.shape)
-    return _relaxed(problem, springs, begun, tolerance, iterations_max)
+    begun, _ = start_displacement(displacement, bodies_of(problem), (problem.contacts, problem.dim))
+    order, springs = _springs(problem, stiffness)
+    found = _relaxed(order.problem, springs, begun[order.column], tolerance, iterations_max)
+    return _restored(found, order)
 
 
 @dataclass(frozen=True)
@@ -139,12 +145,21 @@ class _Springs:
     """The stiffest mode [1/s^2]."""
 
 
-def _springs(problem: FrictionProblem, stiffness: ArrayLike) -> _Springs:
+def _springs(problem: FrictionProblem, stiffness: ArrayLike) -> tuple[OwnOrder, _Springs]:
+    """The problem in its own order, and its springs in that order."""
     k = contact_stiffness(problem, stiffness)
-    jacobian, root = mass_free_jacobian(bodies_of(problem))
-    free = free_motion(jacobian, problem.offset)
+    order = own_order(problem, bodies_of(problem))
+    jacobian, root = mass_free_jacobian(bodies_of(order.problem))
+    free = free_motion(jacobian, order.problem.offset)
+    k = k[order.contact]
     mode = stiffest_mode(jacobian, k) or 1.0
-    return _Springs(ElasticNetwork(jacobian, free, k / mode, problem.friction), root, mode)
+    network = ElasticNetwork(jacobian, free, k / mode, order.problem.friction)
+    return order, _Springs(network, root, mode)
+
+
+def _restored(found: ElasticForces, order: OwnOrder) -> ElasticForces:
+    r, displacement = order.restored(found.r, found.displacement)
+    return replace(found, r=r, displacement=displacement)
 
 
 def _held(problem: FrictionProblem, springs: _Springs, displacement: Floats) -> ElasticForces:

@@ -93,8 +93,9 @@ takes the shift out.
 "Energy never grows" is of these scenes and bars.  In general time stepping without friction adds
 no energy to the second order in the step, as midpoint geometry is exact to that order only where
 bodies turn: eight needles of 3000 : 1 that fall upon each other without friction (0.5 s, steps of
-1 ms) gain 7.8e-8 J of 13 J in all, 1.6e-9 J at most in a step.  With friction 0.4 they gain 6.3e-7 J,
-4.6e-7 J of it in one step, where a body that comes to rest may gain up to `m (g h)^2 / 8` = 4.0e-6 J.
+1 ms) gain 7.8e-8 J of 13 J in all, 1.6e-9 J at most in a step.  With friction 0.4 they gain 6.3e-7
+J, 4.6e-7 J of it in one step, where a body that comes to rest may gain up to `m (g h)^2 / 8` =
+4.0e-6 J.
 
 Above the least friction that holds, a slow slide can solve a step of a card house exactly, beside
 rest.  A scene at rest whose forces of the step before still solve its step stays at rest: two cards
