@@ -2,7 +2,7 @@
 
 Where a problem has several solutions round-off decides between them, and round-off hangs on the
 order of sums.  In its own order a problem is solved by the same operations, however it was written
-down.  What is left is round-off of the numbers given, q above all.
+down.  What is left is round-off of the numbers given.
 """
 
 from __future__ import annotations
