@@ -86,6 +86,8 @@ class Collision:
     """Smallest factor eps had to be multiplied by for impulses to exist and energy not to grow; 1
     without friction."""
     message: str = ""
+    cut_off: bool = False
+    """Whether rounds ran out, and the rest was taken without restitution."""
 
     @property
     def solved(self) -> bool:
@@ -164,7 +166,8 @@ def collide(
             break  # what approaches still does so within the tolerance
     # the work of the impulses at the mean velocity: no difference of large energies
     change = 0.5 * float(impulse @ (first + bodies.jacobian @ after + moved))
-    if rounds > max_rounds and eps.any():
+    cut_off = rounds > max_rounds and bool(eps.any())
+    if cut_off:
         told.insert(0, f"after {max_rounds} rounds the rest was taken without restitution")
     if factor < 1.0:
         told.insert(
@@ -173,7 +176,9 @@ def collide(
         )  # fmt: skip
     if change > work_round_off(bodies, impulse, first):
         told.append(f"energy grew by {change:.3g} J\n  -> use energy='safe', or law='moreau'")
-    return Collision(after, impulse, change, worst, status, rounds, factor, "; ".join(told))
+    return Collision(
+        after, impulse, change, worst, status, rounds, factor, "; ".join(told), cut_off
+    )  # fmt: skip
 
 
 def collision_round(

@@ -10,23 +10,36 @@ was an error of the step.  What that changes:
   turn of all, but that would change their energy.)
 * Energy: bodies that lie on what is fixed are lifted, by at most their weight times the overlap.  A
   body that comes to rest lost more in the same step.  Where a step would end with more energy than
-  it began with, `lift_paid` takes the lift from the kinetic energy of the bodies moved.
+  it began with, `lift_paid` takes the lift from what restitution gave, or else from the kinetic
+  energy of the bodies moved.
+
+Who pays: a disc that lands on a floor is by ``v h / 2`` too deep at the midpoint, comes out again
+by the end if it bounces, and does not if it hands its velocity on to a disc above it.  It is then
+lifted, at rest, and what the lift costs is in the disc above.  Both got their velocities from
+impulses with restitution; so much less of it acts among the bodies that push each other as makes
+the energy that of the start.  That changes impulses alone, so it keeps momentum, and lets no pair
+approach that would not without restitution.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
+from rigid_lcp.contacts import Contacts
 from rigid_lcp.equations import body_space
 from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 OVERLAP = 1e-12
 """Overlap that is left alone, as a share of the smallest body's size."""
@@ -40,14 +53,29 @@ GREATEST_TURN = 0.1
 TURNING, STIFF = 6, 1e-6
 """After so many, turning costs ``1 / STIFF`` times as much: small grains between large ones may
 turn to and fro for ever, where the large ones must give way."""
+ROUND_OFF = 1e-15
+"""Lifts that cost no more than this part of the energy are none [-]."""
 
 
-def overlap_removed(world: World, motion: Motion) -> Motion:
+@dataclass(frozen=True)
+class Restitution:
+    """What restitution did in a step."""
+
+    body_a: Ints
+    body_b: Ints
+    """Bodies that pushed each other in the step, (nc,)."""
+    taken_out: Callable[[], Floats]
+    """What velocities would be without it, less what they are, (n, 3) or (n, 6) [m/s, 1/s]."""
+
+
+def overlap_removed(world: World, motion: Motion, touching: Contacts | None = None) -> Motion:
     """Bodies moved apart until no two overlap: what turning, and impacts of more speed than the
     contacts were looked for with, leave at the end of a step.  No velocity changes, but that spins
-    in space turn along with their bodies."""
+    in space turn along with their bodies.  ``touching``: contacts without margin, where known."""
     for done in range(PROJECTIONS):
-        deepest = -float(world.contacts(motion, 0.0).gap.min(initial=0.0))
+        if touching is None or done:
+            touching = world.contacts(motion, 0.0)
+        deepest = -float(touching.gap.min(initial=0.0))
         if deepest <= (OVERLAP_LEFT if done else OVERLAP) * world.length:
             break
         found = world.contacts(motion, deepest)  # neighbours that the move may reach stay clear
@@ -84,37 +112,81 @@ def shifted(motion: Motion, move: Floats) -> Motion:
 
 
 def bodies_parted(
-    world: World, start: Motion, end: Motion, loads: Floats | None, h: float
-) -> Motion:
+    world: World, start: Motion, end: Motion, loads: Floats | None, h: float,
+    touching: Contacts | None = None, restitution: Restitution | None = None,
+) -> Motion:  # fmt: skip
     """The end of a step of length ``h`` [s] from ``start``, without overlaps and without the
-    energy that taking them out would add; ``loads`` (n, 3) or (n, 6) [N, N m] at its midpoint."""
-    parted = overlap_removed(world, end)
+    energy that taking them out would add; ``loads`` (n, 3) or (n, 6) [N, N m] at its midpoint.
+
+    ``touching``: contacts of ``end`` without margin, where known; ``restitution``: None where
+    nothing bounced.
+    """
+    parted = overlap_removed(world, end, touching)
     if parted is end:
         return end
     work = 0.0
     if loads is not None:
         way = 0.5 * h * (start.rates + end.rates)[world.movable]
         work = float((np.asarray(loads)[world.movable] * way).sum())
-    return lift_paid(world, end, parted, world.energy(start) + work)
+    return lift_paid(world, end, parted, world.energy(start) + work, restitution)
 
 
-def lift_paid(world: World, end: Motion, parted: Motion, budget: float) -> Motion:
-    """Bodies that were lifted, slower by as much energy as the step has above ``budget`` [J].
+def lift_paid(
+    world: World, end: Motion, parted: Motion, budget: float,
+    restitution: Restitution | None = None,
+) -> Motion:  # fmt: skip
+    """Bodies slower by as much energy as the step has above ``budget`` [J], not more than the lift
+    from ``end`` to ``parted``.
 
-    Not more than the lift from ``end`` to ``parted``, nor than the kinetic energy of the bodies
-    moved; all of them slow down by one factor.  Where a fixed body moves it may bring energy in,
-    and nothing is taken.
+    First ``restitution`` pays among the bodies moved and those that touch them; then the bodies
+    moved, all slower by one factor; then those that touch them.  Where a fixed body moves it may
+    bring energy in, and nothing is taken.
     """
     if parted.rates[~world.movable].any():
         return parted
     energy = world.energy(parted)
     owed = min(energy - world.energy(end), energy - budget)
-    moved = world.movable & (parted.position != end.position).any(axis=1)
-    slower = parted.rates
-    slower[moved] = 0.0
-    kinetic = energy - world.energy(motion_with_rates(parted, slower))
-    if owed <= 0.0 or kinetic <= 0.0:
+    none = ROUND_OFF * abs(energy)
+    if owed <= none:
         return parted
-    rates = parted.rates
-    rates[moved] *= max(0.0, 1.0 - owed / kinetic) ** 0.5
-    return motion_with_rates(parted, rates)
+    moved = world.movable & (parted.position != end.position).any(axis=1)
+    payers = [moved]
+    if restitution is not None:
+        near = bodies_joined(world, moved, restitution)
+        parted = energy_taken(world, parted, near, restitution.taken_out(), owed)
+        payers.append(near)
+    for bodies in payers:
+        owed -= energy - world.energy(parted)
+        energy = world.energy(parted)
+        if owed > none:
+            parted = energy_taken(world, parted, bodies, -parted.rates, owed)
+    return parted
+
+
+def bodies_joined(world: World, moved: Bools, restitution: Restitution) -> Bools:
+    """``moved`` bodies, and those that movable ones join to them by pushing each other, (n,)."""
+    a, b = restitution.body_a, restitution.body_b
+    both = world.movable[a] & world.movable[b]
+    count = len(moved)
+    pairs = sp.coo_array((np.ones(both.sum()), (a[both], b[both])), shape=(count, count))
+    _, label = connected_components(pairs, directed=False)
+    joined: Bools = world.movable & np.isin(label, label[moved])
+    return joined
+
+
+def energy_taken(
+    world: World, motion: Motion, bodies: Bools, change: Floats, owed: float
+) -> Motion:
+    """``motion`` with as small a part of ``change`` (n, 3) or (n, 6) [m/s, 1/s] in the velocities
+    of ``bodies`` (n,) as takes ``owed`` [J] of energy, or the part that takes most, at most all."""
+    rates, change = motion.rates, np.where(bodies[:, None], change, 0.0)
+    moving = replace(motion, position=np.zeros_like(motion.position))  # kinetic energies alone
+    here = world.energy(moving)
+    half = world.energy(motion_with_rates(moving, rates + 0.5 * change)) - here
+    whole = world.energy(motion_with_rates(moving, rates + change)) - here
+    square, slope = 2.0 * whole - 4.0 * half, 4.0 * half - whole  # of the parabola in the part
+    if slope >= 0.0:
+        return motion
+    root = slope**2 - 4.0 * square * owed
+    part = 2.0 * owed / (root**0.5 - slope) if root > 0.0 else -slope / (2.0 * square)
+    return motion_with_rates(motion, rates + min(part, 1.0) * change)

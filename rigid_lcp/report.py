@@ -48,6 +48,7 @@ ROWS = (
     ("worst residual of any step", "residual_worst", "{:.2g}"),
     ("steps left above the tolerance", "steps_above", "{:,}"),
     ("impacts with restitution scaled down", "steps_scaled", "{:,}"),
+    ("collisions that ran out of rounds, ended without restitution", "steps_cut_off", "{:,}"),
     ("processor time", "cpu_s", "{:.3g} s"),
     ("processor time a step", "cpu_a_step", "{:.3g} s"),
 )
@@ -80,6 +81,11 @@ def report_write(
         f"{summary['overlap_largest']:.2g} m, "
         f"{summary['cpu_s']:.3g} s of processor time."
     )
+    if summary.get("steps_cut_off"):
+        claim += (
+            f" In {summary['steps_cut_off']:,} steps collisions ran out of rounds, and their rest "
+            "ended without restitution, which costs energy."
+        )
     rows = "".join(
         f"<tr><td>{name}</td><td>{form.format(summary[key])}</td></tr>"
         for name, key, form in ROWS

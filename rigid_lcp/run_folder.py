@@ -36,7 +36,7 @@ OURS = (
     "movie.gif", ".*.partial",
 )  # fmt: skip
 """Files of a run; what starts anew removes these and no other."""
-COUNTERS = ("time", "steps", "worst_residual", "steps_above", "steps_scaled")
+COUNTERS = ("time", "steps", "worst_residual", "steps_above", "steps_scaled", "steps_cut_off")
 NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
 """No space on the disk, none left in the user's quota, or a longer file than is allowed."""
 NO_FOLDER = (EEXIST, ENOTDIR)

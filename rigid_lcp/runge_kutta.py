@@ -88,6 +88,8 @@ class Pace:
     collisions: int = 0
     scaled: int = 0
     """Collisions whose restitution was scaled down (`rigid_lcp.restitution_scale`)."""
+    cut_off: int = 0
+    """Collisions that ran out of rounds (`rigid_lcp.collisions`)."""
     worst_residual: float = 0.0
     steps_above: int = 0
     """Steps with a stage whose forces were found no better than the tolerance."""
@@ -129,6 +131,7 @@ def runge_kutta_advance(
         motion, collision = collided(world, motion, tolerance)
         pace.collisions += collision is not None
         pace.scaled += collision is not None and collision.restitution_scale < 1.0
+        pace.cut_off += collision is not None and collision.cut_off
         lasting = lasting_contacts(world, motion)
         tried, located = pace.step, 0
         while True:

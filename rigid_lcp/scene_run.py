@@ -180,7 +180,11 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
         "tolerance": run.tolerance,
         "residual_worst": run.worst_residual,
         "steps_above": run.steps_above,
-        **({"steps_scaled": run.steps_scaled} if _any_has(file, "restitution") else {}),
+        **(
+            {"steps_scaled": run.steps_scaled, "steps_cut_off": run.steps_cut_off}
+            if _any_has(file, "restitution")
+            else {}
+        ),
         "speed_largest": float(np.abs(run.velocities).max(initial=0.0)),
         "positions": {
             body.name: run.positions[n].tolist()

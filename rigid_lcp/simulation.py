@@ -92,6 +92,9 @@ class Simulation:
         self.steps_scaled = 0
         """Steps (at acceleration level collisions) with restitution scaled down, as friction would
         have made energy by it, or no impulses let the bodies bounce."""
+        self.steps_cut_off = 0
+        """Steps (at acceleration level collisions) whose collisions ran out of rounds: the rest was
+        closed without restitution, which costs energy also at restitution 1."""
         self.contacts: ContactForces = contact_forces(
             self.world.contacts(self.motion, 0.0)[np.zeros(0, np.int64)],
             np.zeros((0, scene.dim)), None, 1.0,
@@ -205,6 +208,7 @@ class Simulation:
             raise too_much(self.world, self.motion, loads, h, self.time)
         self._judge(made.residual, made.message)
         self.steps_scaled += made.scaled
+        self.steps_cut_off += made.cut_off
         before, self.motion, self.contacts = self.motion, made.motion, made.contacts
         self.time += h
         self.steps += 1
@@ -244,6 +248,7 @@ class Simulation:
         self.worst_residual = self.pace.worst_residual
         self.steps_above = self.pace.steps_above
         self.steps_scaled = self.pace.scaled
+        self.steps_cut_off = self.pace.cut_off
 
     def _judge(self, residual: float, message: str) -> None:
         self.worst_residual = max(self.worst_residual, residual)

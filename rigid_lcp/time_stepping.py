@@ -12,10 +12,12 @@ by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur
 93; Jean, CMAME 177 (1999) 235).  Without friction no step adds energy: the mean of ``J v`` and
 ``J v+`` is never positive where p_N is not zero (to the second order in h where J turns), and what
 spins freely keeps its energy (`rigid_lcp.gyroscopic.free_rotation`); with restitution 1 a bounce
-keeps it to round-off, of bodies that turn as well, and so does a row of balls that pass it on
-within the step (`rigid_lcp.passed_collisions`).  With friction a body that comes to rest within a
-step may gain up to ``m (h |f/m|)^2 / 8``, and restitution is scaled down where it would make more,
-or where wedged bodies have no impulses that let them bounce (`rigid_lcp.restitution_scale`).
+keeps it to round-off, of bodies that turn as well, and so do chains of collisions within the step
+(`rigid_lcp.passed_collisions`, `rigid_lcp.struck_bodies`) unless they run out of rounds, which is
+told.  An approach no faster than what gravity gives in a step, ``g h``, does not bounce.  With
+friction a body that comes to rest within a step may gain up to ``m (h |f/m|)^2 / 8``, and
+restitution is scaled down where it would make more, or where wedged bodies have no impulses that
+let them bounce (`rigid_lcp.restitution_scale`).
 
 What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart
 (`rigid_lcp.overlap_removal`).  That keeps momentum; the angular momentum of bodies that slide upon
@@ -39,7 +41,7 @@ from rigid_lcp.equations import body_space, inertial_acceleration, relative_velo
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction_problem import BodySpace, FrictionSolution
 from rigid_lcp.motion import Motion, motion_with_rates
-from rigid_lcp.overlap_removal import OVERLAP, bodies_parted
+from rigid_lcp.overlap_removal import OVERLAP, Restitution, bodies_parted
 from rigid_lcp.passed_collisions import (
     Closing,
     Impulses,
@@ -55,14 +57,21 @@ from rigid_lcp.restitution_scale import (
 from rigid_lcp.restitution_share import Share
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
+from rigid_lcp.struck_bodies import collisions_missed, contacts_of_struck, moreau_margin
 
 Floats = NDArray[np.float64]
+SolveFrom = Callable[..., tuple[FrictionSolution, float]]
+"""Impulses and their error [-] from the contacts' `BodySpace`, q (nc, dim), friction (nc,) and, if
+known, a start (nc * dim,)."""
 
 SHARE_LEFT = 0.1
 """Part of the offending velocities that a solution may leave before its forces are called wrong."""
 START_AGAIN = 1e-4
 """Error of the forces above which they are looked for once more, from nothing, and without the
 inertial terms that ask bodies to part: those are of the velocities before the step."""
+WIDENINGS = 10
+"""Most times that a step is made again as bodies were struck that then struck others; what is left
+are overlaps, taken out, and collisions of the next step."""
 GREATEST_TURN = np.pi
 """Angle [rad] that a body may turn within a step: beyond it midpoint geometry means nothing."""
 
@@ -79,6 +88,8 @@ class Step:
     """What the solver has to say of impulses that it did not find."""
     scaled: bool = False
     """Whether restitution was scaled down (`rigid_lcp.restitution_scale`)."""
+    cut_off: bool = False
+    """Whether collisions were closed without restitution (`rigid_lcp.passed_collisions`)."""
 
 
 def moreau_step(
@@ -97,17 +108,55 @@ def moreau_step(
     pull = None if loads is None else np.asarray(loads, dtype=float)
     accelerations = world.accelerations(middle, pull, gyroscopic=False)
     free = motion_with_rates(middle, middle.rates + h * accelerations)
-    contacts = world.contacts(middle, moreau_margin(world, motion, accelerations, h))
+    margin = moreau_margin(world, motion, accelerations, h)
+    contacts = world.contacts(middle, margin)
     if len(contacts) == 0:
         end = bodies_parted(world, motion, world.drifted(free, 0.5 * h), pull, h)
         return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
+    slow = float(np.linalg.norm(world.scene.gravity)) * h
+    solve = partial(impulses_judged, slow=slow, tolerance=tolerance, accept=accept)
+    for turn in range(WIDENINGS + 1):
+        made = contacts_made(world, contacts, middle, free, h, solve, known)
+        end = world.drifted(made.after, 0.5 * h)
+        touching = world.contacts(end, 0.0)
+        struck = collisions_missed(world, contacts, end, touching, slow)
+        if turn == WIDENINGS or not struck.any():
+            break
+        wider, margin = contacts_of_struck(world, middle, margin, struck, end, h)
+        if len(wider) == len(contacts):
+            break
+        contacts = wider
+    end = bodies_parted(world, motion, end, pull, h, touching, made.restitution)
+    found = made.impulses
+    forces = contact_forces(contacts, found.impulse, found.velocity, h)
+    return Step(end, forces, found.error, found.message, made.scaled, found.cut_off)
+
+
+@dataclass(frozen=True)
+class Made:
+    """What contacts did in a step."""
+
+    impulses: Impulses
+    after: Motion
+    """The bodies at the midpoint, with their rates at the end."""
+    scaled: bool
+    """Whether restitution was scaled down."""
+    restitution: Restitution | None
+    """What restitution did; None where nothing bounced."""
+
+
+def contacts_made(
+    world: World, contacts: Contacts, middle: Motion, free: Motion, h: float, solve: SolveFrom,
+    known: ContactForces | None,
+) -> Made:  # fmt: skip
+    """Impulses of the contacts of a step, with as much restitution as makes no energy, and the
+    rates they leave; ``middle`` and ``free`` as `closing_contacts` has them."""
     bodies = body_space(contacts, middle.position, world.columns, world.inverse_mass(middle))
     closing = closing_contacts(world, contacts, middle, free, h)
-    solve = partial(impulses_judged, slow=closing.slow, tolerance=tolerance, accept=accept)
     found = impulses_of_step(bodies, closing, solve, known_impulses(contacts, known, h))
     velocities = StepVelocities(
         relative_velocity(contacts, middle), relative_velocity(contacts, free),
-        h * accelerations[world.movable],
+        (free.rates - middle.rates)[world.movable],
     )  # fmt: skip
     share, full = Share(len(contacts)), closing.restitution
     while (bounce := bouncing(closing)).any():
@@ -117,12 +166,27 @@ def moreau_step(
             break
         closing = replace(closing, restitution=share.now * full)
         found = impulses_of_step(bodies, closing, solve, None)
+    restitution = None
+    if bounce.any():
+        restitution = Restitution(
+            contacts.body_a, contacts.body_b,
+            partial(_restitution_taken_out, world, bodies, closing, found, solve),
+        )  # fmt: skip
     rates = free.rates
     rates[world.movable] += _velocities(bodies, found.impulse, world.size)
-    end = world.drifted(motion_with_rates(middle, rates), 0.5 * h)
-    end = bodies_parted(world, motion, end, pull, h)
-    forces = contact_forces(contacts, found.impulse, found.velocity, h)
-    return Step(end, forces, found.error, found.message, bool((share.now < 1.0).any()))
+    after = motion_with_rates(middle, rates)
+    return Made(found, after, bool((share.now < 1.0).any()), restitution)
+
+
+def _restitution_taken_out(
+    world: World, bodies: BodySpace, closing: Closing, found: Impulses, solve: SolveFrom
+) -> Floats:
+    """What the rates (n, 3) or (n, 6) would be without restitution, less what they are."""
+    inelastic = replace(closing, restitution=np.zeros_like(closing.restitution))
+    calm = impulses_at_once(bodies, inelastic, solve, None)
+    change = np.zeros((len(world.mass), world.size))
+    change[world.movable] = _velocities(bodies, calm.impulse - found.impulse, world.size)
+    return change
 
 
 def closing_contacts(
@@ -151,7 +215,7 @@ def closing_contacts(
 
 
 def impulses_of_step(
-    bodies: BodySpace, closing: Closing, solve: Callable[..., tuple[FrictionSolution, float]],
+    bodies: BodySpace, closing: Closing, solve: SolveFrom,
     start: Floats | None,
 ) -> Impulses:  # fmt: skip
     """Impulses of all contacts together, or in turn where collisions are passed on."""
@@ -163,7 +227,7 @@ def impulses_of_step(
 
 
 def impulses_at_once(
-    bodies: BodySpace, closing: Closing, solve: Callable[..., tuple[FrictionSolution, float]],
+    bodies: BodySpace, closing: Closing, solve: SolveFrom,
     start: Floats | None,
 ) -> Impulses:  # fmt: skip
     """Impulses that answer to all contacts together (eq. 27), looked for from ``start``."""
@@ -234,16 +298,6 @@ def forces_error(
         return error
     share = left / max(rho * float(np.linalg.norm(offset)), least, 1e-300)
     return share if share > SHARE_LEFT else error
-
-
-def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float) -> Floats:
-    """How far each body's points can get within a step [m], (n,)."""
-    dim = motion.dim
-    rates = np.abs(motion.rates) + h * np.abs(accelerations)
-    speed = np.linalg.norm(rates[:, :dim], axis=1)
-    return h * (speed + np.linalg.norm(rates[:, dim:], axis=1) * world.reach) + (
-        OVERLAP * world.length
-    )
 
 
 def known_impulses(contacts: Contacts, known: ContactForces | None, h: float) -> Floats | None:

@@ -149,3 +149,64 @@ def test_loads_may_lift() -> None:
     way = run.positions[0, 1] - 0.5
     assert way > 0.05
     assert run.energy - first == pytest.approx(pull * way, rel=1e-12)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("step", [1e-3, 1e-4])
+@pytest.mark.parametrize("speed", [0.02, 0.1, 1.0])
+@pytest.mark.parametrize("gap", [0.0, 1e-6])
+def test_who_got_the_velocity_pays_for_the_lift(
+    dim: int, step: float, speed: float, gap: float
+) -> None:
+    """A ball lands on a floor under a ball at rest that it touches, e = 1: it bounces and hands its
+    velocity on.  Energy after the step is that before it, to round-off (before, ``m g v h / 2``
+    more, half of it at 2 cm/s).  Where they touch, the upper ball leaves with what its climb of at
+    most ``v h`` left, ``v^2 - 2 g v h <= v'^2 <= v^2``; else they may meet in the next step."""
+    scene = r.Scene(dim)
+    up = np.eye(dim)[-1]
+    ball = r.Disc(0.01) if dim == 2 else r.Sphere(0.01)
+    scene.add(ball, density=1000.0, position=0.01 * up, velocity=-speed * up, restitution=1)
+    scene.add(ball, density=1000.0, position=(0.03 + gap) * up, restitution=1)
+    scene.add(r.HalfSpace(up), restitution=1)
+    run = r.Simulation(scene, step=step)
+    begin = run.energy
+    run.advance(step)
+    assert run.energy == pytest.approx(begin, rel=1e-14)
+    squared = run.velocities[1, -1] ** 2
+    if gap == 0.0:
+        assert speed**2 - 2 * G * speed * step <= squared <= speed**2 * (1 + 1e-12)
+    assert run.overlap <= 1e-9 * run.world.length
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 10])
+@pytest.mark.parametrize("e", [1.0, 0.8, 0.3])
+def test_a_struck_stack_never_gains_energy(count: int, e: float) -> None:
+    """A column whose lowest ball comes down on the floor: no step of 1 ms gains more than round-off
+    of the energy, 1e-13 of it."""
+    scene = r.Scene(2)
+    for k in range(count):
+        scene.add(
+            r.Disc(0.01), density=1000.0, position=(0, 0.01 + 0.020001 * k),
+            velocity=(0, -0.1 * (k == 0)), restitution=e,
+        )  # fmt: skip
+    scene.add(r.HalfSpace((0, 1)), restitution=e)
+    run = r.Simulation(scene)
+    before = first = run.energy
+    for _ in range(100):
+        run.advance(1e-3)
+        assert run.energy - before <= 1e-13 * first
+        before = run.energy
+
+
+def test_a_lift_keeps_momentum_along_the_floor() -> None:
+    """A ball comes down on a floor at a slant, under another: what the lift costs is not taken from
+    what both have along the floor."""
+    scene = r.Scene(2)
+    scene.add(r.Disc(0.01), density=1000.0, position=(0, 0.01), velocity=(0.3, -0.1), restitution=1)
+    scene.add(r.Disc(0.01), density=1000.0, position=(0, 0.03), velocity=(0.3, 0), restitution=1)
+    scene.add(r.HalfSpace((0, 1)), restitution=1)
+    run = r.Simulation(scene)
+    begin = run.energy
+    run.advance(1e-3)
+    assert run.energy == pytest.approx(begin, rel=1e-14)
+    assert run.velocities[:2, 0].sum() == pytest.approx(0.6, rel=1e-13)
