@@ -207,7 +207,7 @@ def _from_nothing(
     first, deformation = _relaxed(rough, near, none, FIRST_STEP, tolerance, iterations_max)
     if not first.solved:
         return replace(first, residual=problem.residual(first.r))
-    rest = iterations_max - first.iterations
+    rest = max(iterations_max - first.iterations, 1)  # the forces of none would be zero
     last, _ = _relaxed(problem, springs, deformation, LONGEST_STEP, tolerance, rest)
     return replace(
         last, displacement=first.displacement + last.displacement,

@@ -29,8 +29,6 @@ MOST_DENSITY = 1e50
 MOST_OF_A_STATE = 1e50
 """Places, velocities, spins and gravity above it [SI] have energies that are no numbers, with
 lengths as great as shapes may have."""
-
-
 MOST_STEPS = 1e10
 """Steps of a run, more than any machine makes."""
 

@@ -11,7 +11,8 @@
                      does not, the path is bent to Coulomb's law, and Newton again
     smoothed path    from there on, as it needs not stay inside the cones
                      (`rigid_lcp.smoothed_path`): kicked, tilted and slippery beds.  Where
-                     factorisations are dear some sweeps go before it
+                     factorisations are dear sweeps go before both paths, and with a start all of
+                     Gauss-Seidel below
     by turns         from there on, sweeps of Gauss-Seidel and proximal points that run ahead of
                      their drift (`rigid_lcp.extrapolated_points`): beds whose self-stress has to
                      grow a long way before a contact lets go.  Neither goes back to its best point,

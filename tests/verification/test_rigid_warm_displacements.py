@@ -147,3 +147,15 @@ def test_round_off_does_not_choose_between_states(rows, friction, walls, orders)
         assert again.solved
         back = again.r.reshape(-1, 2)[np.argsort(contact)]
         assert difference(back.ravel(), first.r) < 1e-10
+
+
+def test_steps_that_run_out_leave_the_forces_of_the_last():
+    """Also where they run out between the rounded load, 1e-9 off, and the load itself."""
+    problem = box_of_discs(4, 0.3, 0)
+    whole = elastic_limit(problem)
+    assert whole.solved
+    errors = [
+        difference(elastic_limit(problem, iterations_max=most).r, whole.r)
+        for most in range(whole.iterations - 7, whole.iterations + 1)
+    ]
+    assert max(errors) < 1e-7
