@@ -18,7 +18,7 @@ demo-rigid: setup
 
 test:
 	@./setup.sh test
-	$(bin)/python -m pytest -n 2 --dist worksteal
+	$(bin)/python -m pytest -n 2 --dist worksteal --long-until 600
 
 lint:
 	@./setup.sh lint

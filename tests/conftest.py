@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from functools import cache
 from pathlib import Path
 
@@ -19,20 +20,34 @@ settings.register_profile(  # beside other processes time says nothing
 settings.load_profile("no clock")
 
 
+BEGAN = time.monotonic()  # each process reads this file at its start
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """``--long-until 600``: a slow machine leaves out long tests and still ends in time."""
+    parser.addoption(
+        "--long-until", type=float, default=float("inf"), metavar="SECONDS",
+        help="skip tests marked long that have not begun when these seconds are over",
+    )  # fmt: skip
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The two packages with many kernels apart from each other: one early, one last.
 
     A third of a whole run is compiling.  Two processes (``-n 2 --dist worksteal``) begin with one
     half of the tests each and trade what is left later: so hardly a kernel is compiled in both.
-    Tests that lean on their order stand in front, where nothing is traded.
+    Tests that lean on their order stand in front, where nothing is traded.  Each process has the
+    long ones last, so that these are what a slow machine leaves out.
     """
-    items.sort(key=lambda item: _place(item.path))
+    items.sort(key=_place)
 
 
-def _place(path: Path) -> int:
-    if path.parent.name not in ("unit", "verification"):
-        return 0
-    return {"qdem": 1, "rigid": 3}.get(path.stem.split("_")[1], 2)  # test_STORY_...
+def _place(item: pytest.Item) -> tuple[int, bool, int]:
+    """Half, long or not, and story."""
+    story = item.path.stem.split("_")[1]  # test_STORY_...
+    of_story = {"qdem": 1, "rigid": 3}.get(story, 2)
+    number = of_story if item.path.parent.name in ("unit", "verification") else 0
+    return number // 2, item.get_closest_marker("long") is not None, number
 
 
 @cache
@@ -51,7 +66,13 @@ def engine_missing(name: str) -> str:
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Skip a test whose ``@pytest.mark.engine`` (default: liggghts) is missing; fail it in CI."""
+    """Skip what a slow machine has no time for, and what needs an engine that is missing.
+
+    In CI a missing engine (``@pytest.mark.engine``; default: liggghts) fails.
+    """
+    seconds = item.config.getoption("--long-until")
+    if item.get_closest_marker("long") and time.monotonic() - BEGAN > seconds:
+        pytest.skip(f"a long test, and {seconds:g} s are over (pytest -m long runs them)")
     for mark in item.iter_markers("engine"):
         name = mark.args[0] if mark.args else mark.kwargs.get("name", "liggghts")
         missing = engine_missing(name)

@@ -34,6 +34,7 @@ def all_hold(checks: list[Check]) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.long
 def test_head_on_impacts(engine: str) -> None:
     """Tests 1 and 3 within 1 % at 1,000 steps in the contact, and as they were recorded."""
     measured: Measured = {}
@@ -44,6 +45,7 @@ def test_head_on_impacts(engine: str) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("restitution", [0.2, 1.0])
+@pytest.mark.long
 def test_order_in_the_step(engine: str, restitution: float) -> None:
     """First order with damping, 5/2 without."""
     all_hold([order_check(engine, restitution)])
@@ -51,6 +53,7 @@ def test_order_in_the_step(engine: str, restitution: float) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("setting", [TEST_4, TEST_8], ids=lambda s: f"test_{s.test}")
+@pytest.mark.long
 def test_sliding_and_sticking(engine: str, setting: Setting) -> None:
     """Tests 4 and 8 within 2 %, momentum to round-off, and as they were recorded."""
     measured: Measured = {}
@@ -67,12 +70,14 @@ def test_pull_of_eq_7_is_all_that_lammps_adds() -> None:
 
 
 @pytest.mark.engine("lammps")
+@pytest.mark.long
 def test_friction_converges_with_the_step() -> None:
     """First order, elastic and under the scenes' law."""
     all_hold(tangential_order_checks("lammps"))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.long
 def test_what_closes_the_gap(engine: str) -> None:
     """Each of pull and tangential damping adds what its law, integrated on paper, says."""
     all_hold(closing_checks(engine))

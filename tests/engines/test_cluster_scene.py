@@ -76,6 +76,7 @@ def grids(folder: Path) -> set[str]:
 
 @pytest.mark.engine("liggghts")
 @pytest.mark.parametrize("engine", LAUNCHERS)
+@pytest.mark.long
 def test_small_on_two_processes(engine: str, tmp_path: Path) -> None:
     """Two processes share the bed as columns, and compute what one does."""
     two = computed(engine, launcher_of(engine), tmp_path / "two")

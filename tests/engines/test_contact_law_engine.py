@@ -29,6 +29,7 @@ PAIR_MASS = grain_mass(table_1()) / 2
 
 
 @pytest.mark.parametrize("speed", [0.01, 1.0])
+@pytest.mark.long
 def test_rebound_has_the_papers_restitution(speed: float) -> None:
     """alpha = 0.44 rebounds with e = exp(-pi alpha/sqrt(1 - alpha^2)) = 0.2145 at any speed.
 
@@ -82,6 +83,7 @@ def test_contacts_may_pull() -> None:
     assert hit.restitution == pytest.approx(ended.restitution, rel=2e-3)
 
 
+@pytest.mark.long
 def test_rebound_converges_at_first_order() -> None:
     """Half the time step, half the error of the restitution: damping lags by half a step."""
     scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
@@ -91,6 +93,7 @@ def test_rebound_converges_at_first_order() -> None:
 
 
 @pytest.mark.parametrize(("loop", "sign"), [*zip(LOOPS, (1, -1, 0), strict=True)])
+@pytest.mark.long
 def test_tangential_force_is_eq_6_on_closed_loops(loop: str, sign: int) -> None:
     """F_t = k_t delta_t loses (k_t1 - k_t0) delta_t^2/2 around a loop, or creates it the other way.
 
@@ -136,6 +139,7 @@ def test_tangential_damping_ends_where_sliding_begins() -> None:
     assert force[moved > 1.5 * slip] == pytest.approx(friction, rel=2e-3)
 
 
+@pytest.mark.long
 def test_mirror_plane_is_a_mirrored_pair() -> None:
     """A grain that hits the rigid plane x = 0 rebounds as two that mirror each other, within 0.1 %.
 

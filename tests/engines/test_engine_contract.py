@@ -193,6 +193,7 @@ def test_forces_of_contacts_obey_hertz_and_coulomb(sample: Sample) -> None:
 # --- save, load, move, go on ----------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_goes_on_where_it_was_saved(sample: Sample, tmp_path: Path) -> None:
     """A window's first state is the last one of the window before it."""
     before = sample.window(SECOND).state(-1)
@@ -207,6 +208,7 @@ def test_goes_on_where_it_was_saved(sample: Sample, tmp_path: Path) -> None:
     np.testing.assert_allclose(after.contacts.tangential_spring, spring, rtol=0, atol=tolerance)
 
 
+@pytest.mark.long
 def test_repeats_itself(sample: Sample, tmp_path: Path) -> None:
     """The same window twice, bit for bit: an interrupted run ends in the same table."""
     one, two = (sample.computed(sample.start(FIRST), 1, tmp_path / name) for name in "ab")
@@ -214,6 +216,7 @@ def test_repeats_itself(sample: Sample, tmp_path: Path) -> None:
     assert np.array_equal(one.piston.contact_force, two.piston.contact_force)
 
 
+@pytest.mark.long
 def test_moved_grains_keep_their_springs(sample: Sample, tmp_path: Path) -> None:
     """A whole bed shifted up by 1 mm, at rest: places bit for bit, and the drag of each contact.
 
@@ -239,6 +242,7 @@ def test_moved_grains_keep_their_springs(sample: Sample, tmp_path: Path) -> None
         check_springs(sample, before, after)
 
 
+@pytest.mark.long
 def test_new_contacts_start_without_a_spring(sample: Sample, tmp_path: Path) -> None:
     """A grain put on a far one: that contact has no history, and the others theirs.
 
@@ -273,6 +277,7 @@ def test_new_contacts_start_without_a_spring(sample: Sample, tmp_path: Path) -> 
     check_springs(sample, before, after, without=top + 1)
 
 
+@pytest.mark.long
 def test_perturbed_start(sample: Sample, tmp_path: Path) -> None:
     """One grain moved by 1e-10 m along x, nothing else."""
     start = sample.start(FIRST)
@@ -283,6 +288,7 @@ def test_perturbed_start(sample: Sample, tmp_path: Path) -> None:
     np.testing.assert_allclose(after.position, expected, rtol=0, atol=1e-16)
 
 
+@pytest.mark.long
 def test_jump_and_report(sample: Sample) -> None:
     """The procedure went through its jump, and the report can be written."""
     from adapters.report import report_write
@@ -318,6 +324,7 @@ def gone(folder: Path) -> bool:
 
 
 @pytest.mark.parametrize("stage", ["preparation", AFTER])
+@pytest.mark.long
 def test_killed_run_resumes_to_the_identical_table(
     sample: Sample, commands: Commands, tmp_path: Path, stage: str
 ) -> None:
@@ -341,6 +348,7 @@ def test_killed_run_resumes_to_the_identical_table(
     assert (run / "settlement.csv").read_bytes() == sample.table
 
 
+@pytest.mark.long
 def test_lost_stage_is_computed_again(sample: Sample, tmp_path: Path) -> None:
     """Without its last window a run resumes to the identical table."""
     run = sample.copy(tmp_path / "run", AFTER)

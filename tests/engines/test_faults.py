@@ -133,6 +133,7 @@ LEFT: dict[str, tuple[str, Damage, int, str]] = {
 
 
 @pytest.mark.parametrize("fault", LEFT)
+@pytest.mark.long
 def test_what_an_engine_leaves_is_judged(
     sample: Sample,
     tmp_path: Path,
@@ -152,6 +153,7 @@ def test_what_an_engine_leaves_is_judged(
         check_goes_on(sample, run)
 
 
+@pytest.mark.long
 def test_absurd_time_step_is_not_credible(
     sample: Sample, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -172,6 +174,7 @@ STARTED = "while ! test -s screen.txt; do sleep 0.01; done; sleep 0.05"
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.long
 def test_engine_killed(
     sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str], number: signal.Signals
 ) -> None:
@@ -185,6 +188,7 @@ def test_engine_killed(
     check_goes_on(sample, run)
 
 
+@pytest.mark.long
 def test_full_disk(sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An engine that may write no more; with room again the run goes on.
 
@@ -289,6 +293,7 @@ def test_wrong_version(
         ("sh -c 'exit 0' sh", 5, "no sentinel line"),
     ],
 )
+@pytest.mark.long
 def test_no_mpi(
     sample: Sample,
     tmp_path: Path,
@@ -310,6 +315,7 @@ def test_no_mpi(
     assert RunFolder(tmp_path / "run").stage_names() == []
 
 
+@pytest.mark.long
 def test_mpi_of_another_kind(
     sample: Sample, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -305,6 +305,7 @@ def test_walls_keep_their_springs(run: Path, scene: Scene, tmp_path: Path) -> No
 SHORT = ("procedure.k_i=1", "procedure.k=2", "procedure.total_cycles=3")
 
 
+@pytest.mark.long
 def test_box(tmp_path: Path) -> None:
     """A box with a mirror plane is prepared and loaded; grains stay inside."""
     text = scene_path("karrech-coarse").read_text().replace('"cylinder"', '"box"')
@@ -322,6 +323,7 @@ def test_box(tmp_path: Path) -> None:
     assert (high[:2] < np.array([0.02, 0.016]) - 0.9 * window.radius.min()).all()
 
 
+@pytest.mark.long
 def test_partial_piston_presses_its_part_only(tmp_path: Path) -> None:
     """A piston on 60 % of the section: no grain beyond its reach and a radius feels it."""
     overrides = (*TINY, *SHORT, "loading.area_share=0.6")
@@ -336,6 +338,7 @@ def test_partial_piston_presses_its_part_only(tmp_path: Path) -> None:
     assert (place[pressed] < scene.piston_reach + window.radius.max()).all()
 
 
+@pytest.mark.long
 def test_load_series(tmp_path: Path) -> None:
     """Every sample of the series, at the ends of its segments too, to 1e-9, in all windows."""
     stress = 3000 + 11000 * np.array([0, 0.3, 1.0, 0.5, 0.1, 0])
@@ -357,6 +360,7 @@ def test_load_series(tmp_path: Path) -> None:
         np.testing.assert_allclose(track.target_force, target, rtol=1e-9)
 
 
+@pytest.mark.long
 def test_frictionless_scene_has_no_tangential_law(tmp_path: Path) -> None:
     """Without friction no deck names a tangential stiffness, and no file a tangential force."""
     friction = ("material.grain.friction=0.0", "material.wall.friction=0.0")
@@ -501,6 +505,7 @@ def test_version_names_the_release() -> None:
     assert ENGINE.version().startswith("LAMMPS ")
 
 
+@pytest.mark.long
 def test_runs_where_neither_apt_engine_is(tmp_path: Path) -> None:
     """``trackbed run --engine lammps`` with an empty PATH: no LIGGGHTS, no YADE, no activation."""
     words = [word for override in (*TINY, *SHORT) for word in ("--set", override)]
@@ -549,6 +554,7 @@ def test_lammps_is_never_loaded_into_the_users_python() -> None:
     subprocess.run([sys.executable, "-c", textwrap.dedent(code)], cwd=root, check=True)
 
 
+@pytest.mark.long
 def test_example_by_hand(tmp_path: Path) -> None:
     """The shipped decks with the files of example/ run without Python, window after window."""
     decks = Path(str(files("lammps_inputs")))

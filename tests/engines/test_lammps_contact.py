@@ -38,6 +38,7 @@ ELASTIC = "material.grain.restitution=1.0"
 
 
 @pytest.mark.parametrize("speed", [0.01, 1.0])
+@pytest.mark.long
 def test_rebound_has_the_papers_restitution(speed: float) -> None:
     """alpha = 0.44 rebounds with e = exp(-pi alpha/sqrt(1 - alpha^2)) = 0.2145 at any speed.
 
@@ -107,6 +108,7 @@ def loop_driven(rule: str, loop: str) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 @pytest.mark.parametrize("rule", FORCE_OF_RULE)
 @pytest.mark.parametrize("loop", LOOPS)
+@pytest.mark.long
 def test_tangential_force_follows_its_rule_on_closed_loops(rule: str, loop: str) -> None:
     """Force at every point, and energy lost or created around the loop, are those of the rule.
 
@@ -220,6 +222,7 @@ def test_wall_rebound_has_the_papers_restitution() -> None:
     assert rebound == pytest.approx(law.restitution_of_alpha(ALPHA), rel=1e-2)
 
 
+@pytest.mark.long
 def test_mirror_plane_is_a_mirrored_pair() -> None:
     """A grain that hits the mirror plane rebounds as two that mirror each other, to round-off.
 

@@ -213,6 +213,7 @@ def test_overlaps_are_those_of_the_positions(run: Path) -> None:
 # --- restarts -------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_window_goes_on_where_the_last_one_ended(run: Path, scene: Scene, tmp_path: Path) -> None:
     """Two windows of two cycles are one of four up to the seam, and a bed as good behind it.
 
@@ -263,6 +264,7 @@ def test_walls_keep_their_springs(run: Path, scene: Scene, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("lift", [0.5, 2.0])
+@pytest.mark.long
 def test_a_lifted_loose_grain_does_not_raise_the_piston(
     run: Path, scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lift: float
 ) -> None:
@@ -334,6 +336,7 @@ def gone(folder: Path) -> bool:
     return True
 
 
+@pytest.mark.long
 def test_killed_while_the_engine_works(
     commands: Commands, scene_file: Path, run: Path, tmp_path: Path
 ) -> None:
@@ -353,6 +356,7 @@ def test_killed_while_the_engine_works(
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.long
 def test_interrupted_while_the_engine_works(
     commands: Commands, scene_file: Path, run: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -372,6 +376,7 @@ def test_interrupted_while_the_engine_works(
 @pytest.mark.parametrize(
     ("number", "named"), [(signal.SIGKILL, "SIGKILL"), (signal.SIGTERM, "SIGTERM")]
 )
+@pytest.mark.long
 def test_engine_killed_alone(
     commands: Commands, run: Path, tmp_path: Path, number: signal.Signals, named: str
 ) -> None:
@@ -387,6 +392,7 @@ def test_engine_killed_alone(
     assert not RunFolder(folder).failure(JUMP)
 
 
+@pytest.mark.long
 def test_full_disk(run: Path, scene_file: Path, tmp_path: Path) -> None:
     """An engine that may write no more is named, not taken for a failed jump; then it goes on.
 
@@ -418,6 +424,7 @@ def test_full_disk(run: Path, scene_file: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("share", [2.0, 50.0])
+@pytest.mark.long
 def test_absurd_time_step(
     scene_file: Path,
     tmp_path: Path,
@@ -443,6 +450,7 @@ def test_absurd_time_step(
 
 
 @pytest.mark.parametrize("symmetry", ['["y"]', "[]"])
+@pytest.mark.long
 def test_box(scene_file: Path, tmp_path: Path, symmetry: str) -> None:
     """A box, with a mirror plane and without, is prepared, loaded, jumped and read."""
     text = scene_file.read_text().replace('"cylinder"', '"box"')
@@ -463,6 +471,7 @@ def test_box(scene_file: Path, tmp_path: Path, symmetry: str) -> None:
     assert (high[:2] < np.array([0.02, 0.016]) - 0.9 * window.radius.min()).all()
 
 
+@pytest.mark.long
 def test_load_series_across_a_jump(scene_file: Path, tmp_path: Path) -> None:
     """Every sample of the series, at the ends of its segments too, to 1e-9, in all windows."""
     series = tmp_path / "load.csv"
@@ -492,6 +501,7 @@ def test_load_series_across_a_jump(scene_file: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="mpirun is not installed")
+@pytest.mark.long
 def test_launcher(commands: Commands, scene_file: Path, tmp_path: Path) -> None:
     """Two processes under mpirun compute a run; killed, they leave nothing behind."""
     folder = tmp_path / "run"
@@ -511,6 +521,7 @@ def test_launcher(commands: Commands, scene_file: Path, tmp_path: Path) -> None:
     assert "1 by 2" in log or "2 by 1" in log or "1 by 1 by 2" in log
 
 
+@pytest.mark.long
 def test_example_by_hand(tmp_path: Path) -> None:
     """The shipped decks with the files of example/ run without Python, window after window."""
     decks = Path(str(files("liggghts_inputs")))

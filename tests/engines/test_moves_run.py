@@ -25,6 +25,7 @@ def moved_by(scene: Scene, way: str) -> Scene:
     "sample", ["fake", pytest.param("liggghts", marks=pytest.mark.engine)], indirect=True
 )
 @pytest.mark.parametrize("way", moves_known())
+@pytest.mark.long
 def test_run_goes_on_after_each_way(sample: Sample, tmp_path: Path, way: str) -> None:
     """The engine takes the relaxed bed: overlaps as carried before, no grain lost, all cycles."""
     folder = RunFolder(sample.copy(tmp_path / "run", JUMP, AFTER))

@@ -32,6 +32,7 @@ def gone_on(folder: Path, settings: tuple[str, ...], heavier: float = 1.0) -> Wi
     return window_load(folder / bed.window / "states.npz")
 
 
+@pytest.mark.long
 def test_a_full_run_goes_on_from_its_last_state(tmp_path: Path) -> None:
     """Laid with the cycles of its packing and its own, each once; the next cycle begins where the
     record's last positions are."""

@@ -193,6 +193,7 @@ def test_grains_are_in_balance(run: Path) -> None:
     assert np.median(np.linalg.norm(force, axis=1)) < 0.05 * 9.81 * state.mass.mean()
 
 
+@pytest.mark.long
 def test_serial_runs_repeat_bit_for_bit(run: Path, scene_file: Path, tmp_path: Path) -> None:
     """The same scene gives the same table, so that an interrupted run can end in it too."""
     run_scene(scene_file, tmp_path / "run", overrides=TINY, progress=QUIET)
@@ -200,6 +201,7 @@ def test_serial_runs_repeat_bit_for_bit(run: Path, scene_file: Path, tmp_path: P
     assert again == (run / "settlement.csv").read_bytes()
 
 
+@pytest.mark.long
 def test_five_kills(run: Path, scene_file: Path, tmp_path: Path) -> None:
     """Five SIGKILLs at random times; resumed, the table is identical and no engine is left."""
     seed = random.randrange(10**6)
@@ -223,6 +225,7 @@ def test_five_kills(run: Path, scene_file: Path, tmp_path: Path) -> None:
     assert str(folder) not in working
 
 
+@pytest.mark.long
 def test_load_series_is_followed_to_the_sample(scene_file: Path, run: Path, tmp_path: Path) -> None:
     """The engine's target force is the CSV's, linear between samples, in every recorded step."""
     series = tmp_path / "load.csv"
@@ -259,6 +262,7 @@ def test_load_series_is_followed_to_the_sample(scene_file: Path, run: Path, tmp_
     ],
     ids=["frictionless", "whole cylinder", "partial piston"],
 )
+@pytest.mark.long
 def test_other_scenes_run(changes: tuple[str, ...], scene_file: Path, tmp_path: Path) -> None:
     """A scene with less, or another, physics is prepared, loaded and read."""
     short = ("procedure.k_i=2", "procedure.k=2", "procedure.total_cycles=4")
@@ -267,6 +271,7 @@ def test_other_scenes_run(changes: tuple[str, ...], scene_file: Path, tmp_path: 
     assert len(table) == 5
 
 
+@pytest.mark.long
 def test_decks_run_by_hand(scene_file: Path, run: Path, tmp_path: Path) -> None:
     """A dry run's folder, and a window's, run with the bare engine."""
     run_scene(scene_file, tmp_path / "run", overrides=TINY, dry_run=True, progress=QUIET)
@@ -300,6 +305,7 @@ def test_digests_are_those_of_the_shipped_decks(run: Path) -> None:
     assert replace(outcome, notes={}).stage == "window"
 
 
+@pytest.mark.long
 def test_engine_goes_on_from_grains_that_changed_places(
     scene_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

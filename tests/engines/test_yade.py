@@ -52,6 +52,7 @@ TINY = (
 # --- one contact ----------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_elastic_rebound_is_hertz() -> None:
     """e = 1: overlap (15 m* v^2/(16 E* sqrt(R*)))^(2/5), contact time 2.943 overlap/v, e = 1."""
     scene = table_1("material.grain.restitution=1.0")
@@ -66,6 +67,7 @@ def test_elastic_rebound_is_hertz() -> None:
 
 
 @pytest.mark.parametrize("speed", [0.01, 1.0])
+@pytest.mark.long
 def test_alpha_is_the_viscous_force_and_contacts_never_pull(speed: float) -> None:
     """alpha = 0.44 damps with c = 2 (5/6)^(1/2) alpha (m* S_n)^(1/2), cut where it would pull.
 
@@ -85,6 +87,7 @@ def test_alpha_is_the_viscous_force_and_contacts_never_pull(speed: float) -> Non
 
 
 @pytest.mark.parametrize("restitution", [0.9, 0.5, 0.2145])
+@pytest.mark.long
 def test_restitution_is_the_rebound(restitution: float) -> None:
     """A scene that names a restitution gets it: more damping makes up for the missing pull."""
     scene = table_1(f"material.grain.restitution={restitution}")
@@ -94,6 +97,7 @@ def test_restitution_is_the_rebound(restitution: float) -> None:
     assert damping_ratio(scene) > literal
 
 
+@pytest.mark.long
 def test_rebound_converges_at_first_order() -> None:
     """Half the time step, half the error of the restitution: damping lags by half a step."""
     scene = table_1("material.grain.restitution=0.5")
@@ -105,6 +109,7 @@ def test_rebound_converges_at_first_order() -> None:
 
 
 @pytest.mark.parametrize(("loop", "sign"), [*zip(LOOPS, (-1, 1, 0), strict=True)])
+@pytest.mark.long
 def test_tangential_force_is_incremental_on_closed_loops(loop: str, sign: int) -> None:
     """dF_t = k_t d delta_t: the normal force alone never changes F_t.
 
@@ -133,6 +138,7 @@ def test_tangential_force_is_incremental_on_closed_loops(loop: str, sign: int) -
     assert work(expected, moved) == pytest.approx(sign * unit, abs=0.01 * unit)
 
 
+@pytest.mark.long
 def test_mirror_plane_is_a_mirrored_pair() -> None:
     """A grain rebounds from the rigid plane x = 0 as from its image, and is not braked along it."""
     scene = table_1(f"material.grain.viscous_alpha={ALPHA}")
@@ -159,6 +165,7 @@ def hit_wall(scene: Scene, place: FloatArray, inward: FloatArray, speed: float) 
 
 
 @pytest.mark.parametrize("name", ["floor", "cylinder_5", "seam"])
+@pytest.mark.long
 def test_walls_are_flat_and_hertzian(name: str) -> None:
     """R* = R and E* of grain and wall, on a plane, in the middle of a side, and above its corners.
 
@@ -265,6 +272,7 @@ def bed(tmp_path_factory: pytest.TempPathFactory) -> Bed:
     return Bed(tmp_path_factory.mktemp("bed"))
 
 
+@pytest.mark.long
 def test_piston_moves_by_its_forces(bed: Bed) -> None:
     """M dv/dt = F_contact - F_target, step by step: no weight, no drag, nothing added at a seam.
 
@@ -286,6 +294,7 @@ def test_piston_moves_by_its_forces(bed: Bed) -> None:
     assert track.target_force == pytest.approx(target, abs=1e-9 * target.max())
 
 
+@pytest.mark.long
 def test_window_goes_on_where_the_last_one_ended(bed: Bed) -> None:
     """One window of two cycles or two of one: the same but for the digits of what is renewed."""
     seam = bed.computed(bed.start, 1, "half")
@@ -340,6 +349,7 @@ def test_energies_of_the_record_are_those_of_the_grains(bed: Bed) -> None:
     ],
     ids=["frictionless", "whole cylinder", "partial piston"],
 )
+@pytest.mark.long
 def test_other_scenes(changes: tuple[str, ...], tmp_path: Path) -> None:
     """Less, or other, physics is prepared, loaded and read; grains stay inside."""
     bed = Bed(tmp_path, *changes)

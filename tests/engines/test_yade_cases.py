@@ -78,6 +78,7 @@ def seam_floor(text: str) -> str:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.5])
+@pytest.mark.long
 def test_two_triangles_push_as_derived(share: float) -> None:
     """Within a contact radius of their seam both push: 1 + (1 - s^2/a^2)^(3/2) times a plane.
 
@@ -140,6 +141,7 @@ def test_seams_are_the_edges_of_two_triangles() -> None:
     assert half == pytest.approx(np.sqrt(0.5), rel=1e-3)
 
 
+@pytest.mark.long
 def test_partial_piston_moves_by_its_forces(tmp_path: Path) -> None:
     """M dv/dt = F_contact - F_target for a piston over 0.4 of the section, pushing none beyond.
 

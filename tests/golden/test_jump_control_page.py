@@ -6,6 +6,7 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+import pytest
 from scipy.stats import binomtest, wilcoxon
 
 from adapters.state import FloatArray
@@ -19,6 +20,7 @@ from validation.settlement_rivals_runs import record_read
 from validation.settlement_rivals_studies import STUDIES
 
 
+@pytest.mark.long
 def test_page_is_made_from_the_records() -> None:
     """Made again, the page is the one that ships."""
     made = page(jump_study.record_read(), jump_runs.record_read(), jumps(), at_paper_scale())

@@ -57,6 +57,7 @@ def errors(
     return mine
 
 
+@pytest.mark.long
 def test_page_is_made_from_the_record(found: list[Forecasts]) -> None:
     """Made again, the page is the one that ships."""
     assert page(found, EnsembleRecord()) == PAGE.read_text(encoding="utf-8")
@@ -96,6 +97,7 @@ def test_sentences_of_the_page(found: list[Forecasts]) -> None:
                 assert rms(history) < rms(one.error) + 0.04
 
 
+@pytest.mark.long
 def test_sentences_about_layers() -> None:
     """Paper scale: layers 2 to 4 of 6 take less than 2/3 of a uniform strain's, the piston sinks by
     more than twice as much; the coarse bed's piston by no more than a half further."""
@@ -110,6 +112,7 @@ def test_sentences_about_layers() -> None:
             assert 2 < found.ratio.mean() < 3
 
 
+@pytest.mark.long
 def test_sentences_about_growing_jumps() -> None:
     """Paper scale: growing jumps err no more than equal ones, on moved beds by a third to two
     thirds as much; coarse: neither is better, by the median of all schedules."""

@@ -20,6 +20,7 @@ KEPT = [
 ]
 
 
+@pytest.mark.long
 def test_page_is_made_from_the_record() -> None:
     """Made again, the page is the one that ships."""
     assert page(RECORD) == PAGE.read_text(encoding="utf-8")

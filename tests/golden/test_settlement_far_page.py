@@ -30,6 +30,7 @@ def found() -> list[Foretold]:
     return study(EnsembleRecord())
 
 
+@pytest.mark.long
 def test_page_is_made_from_the_record(found: list[Foretold]) -> None:
     """Made again, the page is the one that ships."""
     assert page(found, EnsembleRecord()) == PAGE.read_text(encoding="utf-8")

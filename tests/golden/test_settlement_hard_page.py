@@ -79,6 +79,7 @@ def test_raised_load_leaves_the_run(rows: list[Row]) -> None:
 
 @pytest.mark.engine("liggghts")
 @pytest.mark.parametrize("name", QUICK)
+@pytest.mark.long
 def test_quick_cases(tmp_path: Path, rows: list[Row], name: str) -> None:
     """Run again, a case ends as in the record, with the same reason or every check kept."""
     row = case_run(case_named(name), tmp_path / "run")

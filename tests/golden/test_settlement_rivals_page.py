@@ -52,6 +52,7 @@ def rows() -> list[Row]:
     return record_read()
 
 
+@pytest.mark.long
 def test_page_is_made_from_the_record(rows: list[Row]) -> None:
     """Made again, the page is the one that ships."""
     text = PAGE.read_text(encoding="utf-8")

@@ -96,6 +96,7 @@ def test_reasons_say_of_full_runs_what_the_records_say(checks: dict[str, Check])
 @pytest.mark.parametrize(
     ("bed", "kind", "reason"), [("partial", PARTIAL, LATE), ("far", COARSE, RATE)]
 )
+@pytest.mark.long
 def test_bars_that_are_missed_with_nothing_moved_too(bed: str, kind: Kind, reason: str) -> None:
     """As their reason says, which tells whether most settle more or less than full runs, too."""
     study = STUDIES[bed]

@@ -104,6 +104,7 @@ def test_version() -> None:
         (["train", "--out", "."], ". is a folder"),
     ],
 )
+@pytest.mark.long
 def test_wrong_use(words: list[str], sentence: str, tmp_path: Path) -> None:
     """Wrong words end with exit code 2 and a sentence naming them, never a traceback."""
     run = command(*words, cwd=tmp_path)
@@ -115,6 +116,7 @@ def test_wrong_use(words: list[str], sentence: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\x80garbage", b"[sample\n", b"a = 1\n" * 3])
+@pytest.mark.long
 def test_malformed_scene(content: bytes, tmp_path: Path) -> None:
     """A scene file that is none ends with exit code 3, naming the file, and makes no run."""
     scene = tmp_path / "scene.toml"

@@ -219,6 +219,7 @@ def test_interrupted_run_goes_on_to_the_same_bits(
     assert results(parts) == results(whole)
 
 
+@pytest.mark.long
 def test_killed_run_goes_on_to_the_same_bits(scene: Path) -> None:
     """SIGKILL at any moment, several times: what comes out in the end is the uninterrupted run."""
     whole, parts = scene.with_name("whole"), scene.with_name("parts")
@@ -246,6 +247,7 @@ def test_killed_run_goes_on_to_the_same_bits(scene: Path) -> None:
     assert results(parts) == results(whole)
 
 
+@pytest.mark.long
 def test_video_shows_the_pictures_of_a_run(scene: Path) -> None:
     """A frame for every picture; without pictures it is refused, naming the key."""
     from PIL import Image

@@ -203,6 +203,7 @@ def test_units_are_shown_in_a_fitting_multiple(value: float, expected: tuple[flo
     assert unit_of(value, "m") == expected
 
 
+@pytest.mark.long
 def test_pictures_are_written_and_repeat(tmp_path: Path) -> None:
     """Every picture is a PNG of the same bytes each time, with nothing else left behind."""
     time = np.linspace(0, 1, 400)

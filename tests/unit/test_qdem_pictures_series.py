@@ -72,6 +72,7 @@ def hue(picture: Path) -> np.ndarray:
     return np.asarray(most / np.linalg.norm(most))
 
 
+@pytest.mark.long
 def test_colours_of_a_series_are_shares_of_its_greatest_stress(tmp_path: Path) -> None:
     """Shading scales a colour and keeps its hue, to 1/2 of 255 steps.  The first picture, next to
     empty, is at the dark end; drawn alone it would be at the bright one."""
@@ -112,6 +113,7 @@ def along(picture: np.ndarray, colour: tuple[float, ...]) -> np.ndarray:
     return np.argwhere((alike > 0.9995) & (np.ptp(pixels, axis=2) > 0.1))
 
 
+@pytest.mark.long
 def test_pictures_of_an_interrupted_run_are_those_of_a_whole_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -166,6 +166,7 @@ def test_own_work_is_not_counted_as_others() -> None:
         assert own + interval.others <= 1 + 0.1
 
 
+@pytest.mark.long
 def test_another_process_makes_a_time_unquiet() -> None:
     if isnan(measure(lambda: None).others):
         pytest.skip("this system does not tell what others compute")

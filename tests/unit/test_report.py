@@ -179,6 +179,7 @@ def test_sections_stand_in_order(finished: Path) -> None:
 
 
 @pytest.mark.engine("chromium")
+@pytest.mark.long
 def test_page_opens_in_a_browser(finished: Path, tmp_path: Path) -> None:
     """Chromium shows every image, writes nothing to its console and asks for nothing."""
     page = (finished / "report.html").read_text(encoding="utf-8")
@@ -209,6 +210,7 @@ def test_page_opens_in_a_browser(finished: Path, tmp_path: Path) -> None:
     assert "CONSOLE" not in run.stderr
 
 
+@pytest.mark.long
 def test_report_changes_nothing_else_and_repeats_itself(finished: Path, copy: Path) -> None:
     """A report adds three things to the run folder, the same bytes each time and anywhere."""
 
@@ -283,6 +285,7 @@ def no_jumps(folder: Path) -> None:
         (no_jumps, ["No jump was made.", "The error is unknown"]),
     ],
 )
+@pytest.mark.long
 def test_report_of_a_part_of_a_run(
     damage: Callable[[Path], None], sentences: list[str], copy: Path
 ) -> None:
@@ -296,6 +299,7 @@ def test_report_of_a_part_of_a_run(
     assert status(copy).to_dict()["cycle"] == numbers["cycle"]
 
 
+@pytest.mark.long
 def test_failed_jumps_are_named_counted_and_charged(finished: Path, copy: Path) -> None:
     """A jump that was given up is in the report with its reason, and its time in the cost."""
     before = report_of(finished)[0]
@@ -335,6 +339,7 @@ def test_scene_without_loading(tmp_path: Path) -> None:
     assert status(tmp_path / "run").next.startswith("trackbed report ")
 
 
+@pytest.mark.long
 def test_further_runs_stand_beside(copy: Path) -> None:
     """Runs of the same scene inside the folder are rows of the table, and the claim's floor."""
     shutil.copytree(copy / "control", copy / "control_perturbed_1")

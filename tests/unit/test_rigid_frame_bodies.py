@@ -20,6 +20,7 @@ def scene_file(tmp_path, text=WORN_AND_BROKEN):
     return scene_read(path)
 
 
+@pytest.mark.long
 def test_frames_of_changed_bodies_are_drawn(tmp_path):
     """Worn and broken bodies as they were in each frame; `test_rigid_resume` goes on from them."""
     file = scene_file(tmp_path)

@@ -82,6 +82,7 @@ CHANGES = [
     + [("acceleration", change) for change in CHANGES[:4]],
     ids=str,
 )
+@pytest.mark.long
 def test_the_same_scene_seen_otherwise_moves_the_same(method, change, as_it_is):
     positions, angles, spins = fall(method, **change)
     assert np.ptp(as_it_is[method][2]) > 1.0  # it is a scene that does something

@@ -272,6 +272,7 @@ def some_solution(w: Floats, q: Floats, mu: float) -> bool:
 
 
 @pytest.mark.parametrize("method", ["auto", "pivoting", "dantzig"])
+@pytest.mark.long
 def test_no_solution_is_a_proof(method):
     """Every problem that is said to have none: all statuses are tried, none is a solution."""
     rng = np.random.default_rng(11)

@@ -39,6 +39,7 @@ def test_out_of_time_is_a_row() -> None:
     assert (found.force, found.why) == (None, "out of time")
 
 
+@pytest.mark.long
 def test_kernels_that_are_compiled_in_a_run_cost_it_nothing() -> None:
     """A checkout's first run: compiling takes longer than the limit, which does not count it, and
     the run is made again."""
@@ -156,6 +157,7 @@ def test_which_runs_are_made(family: str, method: str, boxes: int, made: bool) -
 
 
 @pytest.mark.parametrize(("reached", "more"), [(3e-7, (3e-7,)), (2e-13, ()), (1e-3, ())])
+@pytest.mark.long
 def test_ours_is_asked_for_what_siconos_reached(reached: float, more: tuple[float, ...]) -> None:
     """Between the tolerances of all, so that costs are those of one residual; ours alone."""
     problem = tower(125, 3)

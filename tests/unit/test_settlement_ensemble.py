@@ -121,6 +121,7 @@ print(json.dumps(number - 1))
 """
 
 
+@pytest.mark.long
 def test_killed_at_every_file_operation(tmp_path: Path) -> None:
     """SIGKILL in place of any one change of the record: resumed, the record is the same.
 

@@ -118,6 +118,7 @@ def test_columns_of_other_names_are_named(tmp_path: Path) -> None:
         series_read([dump], columns=("cycle", "z"))
 
 
+@pytest.mark.long
 def test_long_tables_are_read_fast(tmp_path: Path) -> None:
     """200,000 readings within four times what Python's csv module takes to tell their numbers
     alone, in one run: 1.9 to 3 times here, 6 times if each row were looked at by itself."""

@@ -52,6 +52,7 @@ def areas(triangles: FloatArray) -> FloatArray:
 
 @settings(deadline=None, max_examples=20)
 @given(st.floats(0.06, 0.999))
+@pytest.mark.long
 def test_damping_of_rebound_makes_the_rebound(restitution: float) -> None:
     """Integrated without a pull, the damping rebounds as asked, and exceeds that with a pull."""
     ratio = law.damping_of_rebound(restitution)

@@ -214,6 +214,7 @@ def test_grain_lost_in_the_rain(
 
 
 @pytest.mark.parametrize("fault", WINDOWS)
+@pytest.mark.long
 def test_fault_in_a_window(
     scene: Path,
     whole: Path,
@@ -259,6 +260,7 @@ def failing(count: int, error: Exception) -> Callable[..., EngineRun]:
     [NotCredible("made to fail"), EngineFailed("made to fail"), engine_failure(-11, Path("."))],
 )
 @pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.long
 def test_failed_jump_is_retried(
     scene: Path, monkeypatch: pytest.MonkeyPatch, count: int, error: Exception
 ) -> None:
@@ -323,6 +325,7 @@ def test_cycles_in_place_of_jumps_that_fail_for_good(
 
 
 @pytest.mark.parametrize("stop_at", [1, 2, 3])
+@pytest.mark.long
 def test_resume_amid_retries(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stop_at: int
 ) -> None:
@@ -384,6 +387,7 @@ def test_killed_engine_is_not_a_failed_jump(
     ],
 )
 @pytest.mark.parametrize("how", ["truncated", "missing"])
+@pytest.mark.long
 def test_damage_is_noticed_on_resume(
     tmp_path: Path, whole: Path, capsys: pytest.CaptureFixture[str], stage: str, name: str, how: str
 ) -> None:

@@ -362,6 +362,7 @@ def test_failed_jumps_halve_and_end_in_computing() -> None:
 
 
 @pytest.mark.parametrize("name", ["log", "hyperbolic"])
+@pytest.mark.long
 def test_realised_errors_within_the_tolerance(name: str) -> None:
     """Five seeds to 1,000 cycles: at least 90 % of the jumps, ends off by 10 % root mean square.
 
@@ -381,6 +382,7 @@ def test_realised_errors_within_the_tolerance(name: str) -> None:
     assert inside >= 4  # a band of 90 %
 
 
+@pytest.mark.long
 def test_a_moved_bed_that_settles_more() -> None:
     """Behind each jump by G the bed gains .15 G more in the first cycle and .1 G / n later, about
     as by the law at paper scale: ends off by 10 % root mean square, with a band that holds, for no
@@ -401,6 +403,7 @@ def test_a_moved_bed_that_settles_more() -> None:
     assert np.mean(kappas) == pytest.approx(0.1, abs=0.05)
 
 
+@pytest.mark.long
 def test_load_step_in_mid_run() -> None:
     """From cycle 600 on the bed settles anew, ten times as fast: it is seen and computed.  Bursts
     part single runs by several per cent, so the error is that of eight."""
@@ -414,6 +417,7 @@ def test_load_step_in_mid_run() -> None:
     assert np.sqrt(np.mean(np.square(errors))) < 0.1
 
 
+@pytest.mark.long
 def test_a_rate_that_drifts_through_zero() -> None:
     """200 ln(1 + N) - 0.3 N um turns at cycle 666: windows behind it lie to one side of forecasts.
 

@@ -241,6 +241,7 @@ def test_damaged_position_is_named(row: int) -> None:
         jump_field(CYCLE, position, radius, LOG, 30)
 
 
+@pytest.mark.long
 def test_hundred_thousand_grains_take_seconds() -> None:
     """1e5 grains and 20 cycles: under 3 s of processor time (0.7 s measured), by a tree."""
     random = np.random.default_rng(0)

@@ -53,6 +53,7 @@ def run(folder: Path, total: int = 300, **options: bool) -> list[dict[str, str]]
         return list(csv.DictReader(stream))
 
 
+@pytest.mark.long
 def test_to_the_end_with_its_control(tmp_path: Path) -> None:
     """The logarithm to cycle 200: it is met within the tolerance, from half of the cycles.
 
@@ -286,6 +287,7 @@ def test_jump_that_fails_is_halved(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert int(rows[-1]["cycle"]) == 120
 
 
+@pytest.mark.long
 def test_report_of_a_run_by_an_earlier_version(tmp_path: Path) -> None:
     """Events that do not say what jumps moved, nor what more a bed settled, are told as before."""
     run(tmp_path, 120)

@@ -62,6 +62,7 @@ def resume(commands: Commands, run: Path) -> tuple[object, ...]:
     return ("run", commands.folder / "scene.toml", "--run-folder", run)
 
 
+@pytest.mark.long
 def test_killed_at_random_times(commands: Commands, whole: bytes, tmp_path: Path) -> None:
     """24 SIGKILLs at random times in rain, windows, jumps and relaxations change nothing."""
     times, kills, number = random.Random(SEED), [], 0
@@ -83,6 +84,7 @@ def test_killed_at_random_times(commands: Commands, whole: bytes, tmp_path: Path
     assert table(run) == whole, f"after the kills {kills}, seed {SEED}"
 
 
+@pytest.mark.long
 def test_killed_at_every_file_operation(commands: Commands, whole: bytes, tmp_path: Path) -> None:
     """A kill in place of any one change outside partial/: resumed, the table is the same."""
     assert commands.run(*resume(commands, tmp_path / "0"), root=str(tmp_path)) == 0
@@ -101,6 +103,7 @@ def test_killed_at_every_file_operation(commands: Commands, whole: bytes, tmp_pa
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize("part", PARTS)
+@pytest.mark.long
 def test_interrupted(
     commands: Commands, whole: bytes, tmp_path: Path, part: str, number: signal.Signals
 ) -> None:
@@ -160,6 +163,7 @@ def test_two_writers(
     assert table(run) == whole
 
 
+@pytest.mark.long
 def test_report_killed_at_random_times(commands: Commands, whole: bytes, tmp_path: Path) -> None:
     """Kills while the report is written: the page of before or the new one, never a part."""
     run, times, statuses = tmp_path / "run", random.Random(SEED), []

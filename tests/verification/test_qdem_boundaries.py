@@ -289,6 +289,7 @@ def test_other_ends_send_all_back(end: str) -> None:
     assert share.absorbed == 0.0
 
 
+@pytest.mark.long
 def test_oblique_waves_come_back_as_derived() -> None:
     """A packet at 30 degrees: the closed form's share, to second order in the cell; one at 60.
 

@@ -21,6 +21,7 @@ SHORT = [words for words in CASES if words != "spinning grain"]
 
 @BY_MODEL
 @pytest.mark.parametrize("words", SHORT)
+@pytest.mark.long
 def test_energies_close(words: str, model: str) -> None:
     """Within a thousandth of the greatest there was; and the bodies did touch."""
     lacks, stored, _ = account(*CASES[words](model))

@@ -36,6 +36,7 @@ def apart() -> dict[str, float]:
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.long
 def test_twins_agree_under_all_conditions(apart: dict[str, float], variant: str) -> None:
     """Displacement, velocity, samples and work are the CPU's to the round-off of their sums."""
     assert apart[variant] <= 1
@@ -51,12 +52,14 @@ def test_twins_agree_under_all_conditions(apart: dict[str, float], variant: str)
         "not a number: steps and count",
     ],
 )
+@pytest.mark.long
 def test_twins_agree_in_special_cases(apart: dict[str, float], variant: str) -> None:
     """Empty lists, joined nodes, the energies for relaxation, and the stop at a bad element."""
     assert apart[variant] <= 1
 
 
 @pytest.mark.parametrize("variant", [*MARCHES, "too deep"])
+@pytest.mark.long
 def test_contact_of_spheres_is_that_of_the_processor(apart: dict[str, float], variant: str) -> None:
     """Places, forces, springs, losses and energies; lists made anew and stops in the same step.
 
@@ -66,6 +69,7 @@ def test_contact_of_spheres_is_that_of_the_processor(apart: dict[str, float], va
 
 
 @pytest.mark.parametrize("name", CLOUDS)
+@pytest.mark.long
 def test_pairs_are_those_of_the_processor(apart: dict[str, float], name: str) -> None:
     """Lists of whole clouds, number by number; `test_qdem_cuda_search.py` has many small ones."""
     assert apart[f"pairs: {name}"] == 0
@@ -78,6 +82,7 @@ def test_surfaces_are_not_computed_on_a_gpu() -> None:
         q.Simulation([q.Body(TETRAHEDRON, CONCRETE)], device="cuda", contact=touch)
 
 
+@pytest.mark.long
 def test_every_variant_was_compared(apart: dict[str, float]) -> None:
     assert set(VARIANTS) < set(apart)
 

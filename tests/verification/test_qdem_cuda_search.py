@@ -56,6 +56,7 @@ def simulator() -> Iterator[Executor]:
     axis=st.sampled_from(["", "x", "y", "z"]),
     same=st.sampled_from([0.0, 0.5]),
 )
+@pytest.mark.long
 def test_lists_are_the_processors(
     simulator: Executor, seed: int, count: int, room: float, ratio: float, bodies: int,
     walls: int, skin: float, axis: str, same: float,
@@ -127,6 +128,7 @@ def test_what_a_march_asks_is_the_processors(simulator: Executor, name: str) -> 
     assert found.finite
 
 
+@pytest.mark.long
 def test_steps_behind_the_end_of_a_window_are_not_launched(simulator: Executor) -> None:
     """But those up to the host's next look; a list of two steps ends each window but the last."""
     windows = simulator.submit(steps_launched, 3).result()

@@ -88,6 +88,7 @@ def test_jumps_of_a_thousand(name: Any, where: Any) -> None:
 # --- steps -----------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_steps_near_the_critical_one() -> None:
     """H <= E <= H/(1 - s^2) at s = 0.99 and at the reported value; 1.01 is stopped."""
     hold(qdem_hard_steps.near_critical_checks(20_000))
@@ -178,6 +179,7 @@ def test_hinges(shared: int) -> None:
 # --- size ------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_large_body_in_its_own_process() -> None:
     """The measurement itself, on 40,000 elements."""
     checks = large_body_checks(20)

@@ -143,6 +143,7 @@ def test_patch(method: Any) -> None:
 # --- statics ----------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_cantilever_of_46080_elements() -> None:
     """Known figures of the Kuhn mesh 96 x 10 x 8: tip 88.093 um, first mode 27.550 Hz."""
     nodes, _, matrix, mass, free, load, tip = cantilever((96, 10, 8))
@@ -154,6 +155,7 @@ def test_cantilever_of_46080_elements() -> None:
     assert found.frequency[0] == pytest.approx(27.550, abs=5e-4)
 
 
+@pytest.mark.long
 def test_linear_elements_converge_at_order_two_to_quadratic_ones() -> None:
     """Linear elements are too stiff, by C h^2 against P2: a ratio near 4 as sides are halved."""
     reference = judge.cantilever_p2((32, 4, 4))

@@ -296,6 +296,7 @@ def chunk_arguments(dtype: str, viscous: bool) -> tuple[Any, ...]:
 @pytest.mark.skipif(not hasattr(os, "uname") or os.uname().machine != "x86_64", reason="x86 only")
 @VISCOUS
 @PRECISION
+@pytest.mark.long
 def test_the_loop_over_elements_is_packed(precision: str, viscous: bool) -> None:
     """Every sum and product of the element runs on whole registers, and nothing is called.
 
@@ -370,6 +371,7 @@ print(imported - begun, time.process_time() - imported)
 """
 
 
+@pytest.mark.long
 def test_a_new_process_starts_fast(tmp_path: Path) -> None:
     """CPU seconds: import below 1, first compilation below 10, from the cache below 1.5.
 
@@ -411,6 +413,7 @@ print((time.process_time() - cpu) / (time.perf_counter() - clock))
 """
 
 
+@pytest.mark.long
 def test_no_thread_computes_beside_those_asked_for() -> None:
     """A march on one thread takes no more processor time than time.
 

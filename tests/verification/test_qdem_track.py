@@ -135,6 +135,7 @@ def test_what_falls_is_not_stopped_in_the_air(fall: bool) -> None:
 
 
 @pytest.mark.parametrize("scattered", [True, False])
+@pytest.mark.long
 def test_grains_that_fall_in_a_column_do_not_stand_as_a_tower(scattered: bool) -> None:
     """Eight of the paper's grains in one column of the lattice: plumb, some stand on each other,
     four high; scattered, all lie on the ground."""

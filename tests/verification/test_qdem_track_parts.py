@@ -196,6 +196,7 @@ def test_a_bed_that_repeats_rests_where_all_are_stopped_together() -> None:
 
 
 @pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.long
 def test_hard_stages_of_a_periodic_bed_are_stopped_together(
     periodic: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

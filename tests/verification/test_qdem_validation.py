@@ -100,6 +100,7 @@ def test_thickness_mode_decays_by_four_thirds_of_the_viscosity() -> None:
     hold(qdem_viscous.decay_checks(8))
 
 
+@pytest.mark.long
 def test_creep_in_uniaxial_strain_has_four_thirds_of_the_viscosity() -> None:
     """Within 0.5 % of the closed form at 4/3 mu_D/E, and far from eq. 14's mu_D/E."""
     time, strain = qdem_viscous.creep_run(free_sides=False)

@@ -232,6 +232,7 @@ def test_mode_response_solves_its_equation() -> None:
     )
 
 
+@pytest.mark.long
 def test_slow_bending_reference_is_timoshenkos_deflection() -> None:
     """A load raised in 10 s, 270 periods, is static: P L^3/3EI + P L/kappa G A.
 
@@ -242,6 +243,7 @@ def test_slow_bending_reference_is_timoshenkos_deflection() -> None:
     assert tip < timoshenko_tip(200.0)
 
 
+@pytest.mark.long
 def test_pulse_reference_is_dalemberts_without_poissons_ratio() -> None:
     """With nu = 0 the wave is plane: the free end moves with 2 p(t - L/c) / rho c."""
     beam = replace(CONCRETE_BEAM, poisson=0.0)

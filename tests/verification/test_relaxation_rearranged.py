@@ -68,6 +68,7 @@ def found_by(
         return None
 
 
+@pytest.mark.long
 def test_room_where_a_smallest_move_finds_none() -> None:
     """Neither under the lowered piston nor below the old one does a smallest move fit.  Grains that
     change places find room in every bed and in most tries, for all that is asked in some.  Told
@@ -102,6 +103,7 @@ def test_grains_move_as_far_as_in_a_full_run() -> None:
     assert moves.max() < 6
 
 
+@pytest.mark.long
 def test_same_generator_same_bed_another_one_another() -> None:
     before, container = bed_of(3, 1)
     beds = [found_by(3, before, GAIN / 2, container, seed) for seed in (7, 7, 8)]

@@ -24,6 +24,7 @@ def on_floor(shape: object, **state: object) -> Simulation:
     return Simulation(scene)
 
 
+@pytest.mark.long
 def test_box_at_rest_stays_and_weighs_what_it_should() -> None:
     run = on_floor(box(1.0, 0.6, 0.4), position=[0.0, 0.0, 0.2], friction=0.5)
     run.advance(0.3)
@@ -35,6 +36,7 @@ def test_box_at_rest_stays_and_weighs_what_it_should() -> None:
 
 @pytest.mark.parametrize("corners", [5, 8])
 @pytest.mark.parametrize("below", ["floor", "block"])
+@pytest.mark.long
 def test_a_leaning_prism_stands_on_all_of_its_face(corners: int, below: str) -> None:
     """Its centre is over the face, a thirtieth from an edge: with four of the corners for all of
     them it tips towards those left out, and creeps by 0.1 mm a second."""
@@ -61,6 +63,7 @@ def test_a_leaning_prism_stands_on_all_of_its_face(corners: int, below: str) -> 
 
 @pytest.mark.parametrize("excess", [-1e-6, 0.0, 1e-6])
 @pytest.mark.parametrize("azimuth", [0.0, 0.3, np.pi / 4, 2.0])
+@pytest.mark.long
 def test_box_on_incline_slides_below_the_angle_of_friction(excess: float, azimuth: float) -> None:
     """mu = tan(alpha) (1 + excess): at rest for excess >= 0, else a = g sin(alpha) |excess|.
 
@@ -83,6 +86,7 @@ def test_box_on_incline_slides_below_the_angle_of_friction(excess: float, azimut
     assert np.allclose(run.positions[0] - 0.25 * normal, wanted, rtol=0, atol=G * 1e-12)
 
 
+@pytest.mark.long
 def test_a_kicked_box_slides_straight_in_every_direction() -> None:
     """A box pushed along the floor stops after v^2 / (2 mu g), straight ahead."""
     for azimuth in (0.0, 0.7, np.pi / 4):
@@ -122,6 +126,7 @@ def test_a_sphere_with_backspin_rolls_as_the_textbook_says() -> None:
     assert np.linalg.norm(found) < 1e-9
 
 
+@pytest.mark.long
 def test_a_sphere_spins_on_like_a_top() -> None:
     """A point contact has no moment about its normal: a sphere that stands keeps its spin."""
     run = on_floor(Sphere(0.1), position=[0.0, 0.0, 0.1], spin=[0.0, 0.0, 50.0], friction=0.8)
@@ -177,6 +182,7 @@ def precessing_top(step: float, seconds: float) -> float:
     return float(np.linalg.norm(run.positions[0] / length - wanted))
 
 
+@pytest.mark.long
 def test_a_top_precesses_at_second_order() -> None:
     """190 rad/s about its axis: without the gyroscopic change of spin within the step, the order
     is one and the error of the finer run twice as large."""
@@ -189,6 +195,7 @@ def test_a_top_precesses_at_second_order() -> None:
 
 
 @pytest.mark.parametrize("top", [1.0, 1e4])
+@pytest.mark.long
 def test_a_tower_of_ten_boxes_stands(top: float) -> None:
     scene = Scene(dim=3)
     start = np.array([[0.0, 0.0, 0.5 + k] for k in range(10)])
@@ -263,6 +270,7 @@ def check_pile(count: int, seconds: float) -> None:
     assert run.contacts.force[floor, 2].sum() == pytest.approx(weight, rel=0.05)
 
 
+@pytest.mark.long
 def test_a_handful_of_stones_comes_to_rest() -> None:
     check_pile(9, 0.8)
 

@@ -70,6 +70,7 @@ def nearest_corners(name: str, seed: int, form: str, gap: float) -> tuple[Pair, 
     st.sampled_from([1e-6, 1e-3, 0.3]),
 )  # fmt: skip
 @example("needles", 3, "corner on edge", 1e-6)
+@pytest.mark.long
 def test_gap_and_normal_are_those_of_the_nearest_points(
     name: str, seed: int, form: str, share: float
 ) -> None:
@@ -140,6 +141,7 @@ def test_at_touch_a_plane_parts_the_bodies(form: str, seed: int) -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(st.sampled_from(["stones", "tetrahedra", "boxes"]), st.integers(0, 10_000))
+@pytest.mark.long
 def test_the_least_gap_is_continuous(name: str, seed: int) -> None:
     """Moved by s, two bodies change their distance, or depth, by at most s: on a straight way past
     a corner, into touch and out again, over faces, edges and corners."""
@@ -182,6 +184,7 @@ def test_edges_are_found_whoever_has_the_margin(margins: list[float]) -> None:
     st.sampled_from(FAMILIES), st.integers(0, 10_000), st.sampled_from(FORMS),
     st.sampled_from([1e-3, 0.3]),
 )  # fmt: skip
+@pytest.mark.long
 def test_gap_and_normal_are_those_of_coal(name: str, seed: int, form: str, share: float) -> None:
     pytest.importorskip("coal")
     gap = share * min(shape.reach for shape in family(name, np.random.default_rng(seed)))
@@ -228,6 +231,7 @@ def test_a_step_stops_a_corner_before_it_gets_in(form: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
+@pytest.mark.long
 def test_stones_that_meet_at_corners_never_overlap(form: str) -> None:
     """At the end of every step overlaps stay below 1e-9 of a stone, and no energy is made."""
     for seed in range(4):

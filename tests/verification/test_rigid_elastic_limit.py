@@ -115,6 +115,7 @@ def test_friction_can_be_mobilised_in_more_ways_than_one():
 
 
 @pytest.mark.parametrize("seed", [95, 98])
+@pytest.mark.long
 def test_grains_that_go_on_sliding_in_space(seed):
     """Friction along the velocity: springs alone turn into it as 1 over the way, and ended with a
     residual of 3e-9.  The same forces with the contacts the other way round, on these beds: of 16

@@ -88,6 +88,7 @@ def test_points_without_gain_are_left_after_their_patience() -> None:
     assert found.work["factorisations"] <= 10 + module.STEPS
 
 
+@pytest.mark.long
 def test_sweeps_and_points_by_turns_solve_a_bed_that_each_alone_leaves() -> None:
     """A plane bed pushed against a wall (beds kicked 2 of the examination): turns take about 10,000
     sweeps and 500 factorisations; so many sweeps end above 1e-6, and twice as many factorisations

@@ -50,6 +50,7 @@ def test_block_at_its_threshold(share: float) -> None:
     assert abs(run.angles[0]) < 1e-12
 
 
+@pytest.mark.long
 def test_block_does_not_creep() -> None:
     """At rest on 20 degrees with mu = 1: 1e-12 m in 1e5 steps is 1e-17 m a step; 2,000 of them."""
     run = block_on_incline(SLOPE, 1.0)
@@ -57,6 +58,7 @@ def test_block_does_not_creep() -> None:
 
 
 @pytest.mark.parametrize("top", [1.0, 1e4])
+@pytest.mark.long
 def test_stack(top: float) -> None:
     """Ten boxes, the top one up to 1e4 times heavier, stay within 1e-9 m in 2 s."""
     run = stack(10, top, step=2e-3)
@@ -67,6 +69,7 @@ def test_stack(top: float) -> None:
     assert run.contacts.normal_force[below].sum() == pytest.approx(load, rel=1e-6)
 
 
+@pytest.mark.long
 def test_light_on_heavy_on_light() -> None:
     assert stack_drop(light_on_heavy(1e6), 2.0) < 1e-9
 
@@ -96,6 +99,7 @@ def uneven_house(mu: float) -> Simulation:
     return Simulation(scene)
 
 
+@pytest.mark.long
 def test_uneven_card_house_stays_at_rest_where_a_motion_solves_its_steps_as_well() -> None:
     """Static theorem: forces at rest exist from a friction of 0.749045 on (linear programme).
 
@@ -221,6 +225,7 @@ def test_needles() -> None:
     assert run.energy < DENSITY * 0.01 * 4 * G * 0.4
 
 
+@pytest.mark.long
 def test_hopper_that_pouring_jammed() -> None:
     """30 discs poured over an outlet of 2.6 diameters jam, and the arch stays."""
     poured = jam(30, 0)

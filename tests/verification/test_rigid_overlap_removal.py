@@ -124,6 +124,7 @@ def test_the_lift_is_paid(dim: int, speed: float) -> None:
 
 
 @pytest.mark.parametrize(("seed", "step"), [(1, 1e-3), (5, 4e-3), (6, 8e-3)])
+@pytest.mark.long
 def test_no_step_of_a_pour_gains_energy(seed: int, step: float) -> None:
     """Round-off of the sums alone, 1e-13 of the energy (seed 1 gained 8e-6 J of 117 J in a step
     before lifts were paid)."""
@@ -180,6 +181,7 @@ def test_who_got_the_velocity_pays_for_the_lift(
 
 @pytest.mark.parametrize("count", [2, 3, 5, 10])
 @pytest.mark.parametrize("e", [1.0, 0.8, 0.3])
+@pytest.mark.long
 def test_a_struck_stack_never_gains_energy(count: int, e: float) -> None:
     """A column whose lowest ball comes down on the floor: no step of 1 ms gains more than round-off
     of the energy, 1e-13 of it."""

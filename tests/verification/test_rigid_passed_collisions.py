@@ -66,6 +66,7 @@ def test_galperin_counts_digits_of_pi(ratio: float) -> None:
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("step", [1e-2, 1e-3])
 @pytest.mark.parametrize("ratio", [1.0, 100.0, 1e4])
+@pytest.mark.long
 def test_a_light_ball_between_a_wall_and_a_heavy_one(ratio: float, step: float, dim: int) -> None:
     """Final velocities of the two-body maps, energy kept, nothing cut off (before, the heavy ball
     stopped dead at 1e4).  Round-off: 2e-16 a collision of the velocity ``sqrt(M / m)`` at most."""
@@ -131,6 +132,7 @@ def test_a_run_tells_what_was_cut_off(tmp_path: Path, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize("gap", [1e-3, 1e-4, 1e-5, 1e-6, 1e-9])
 @pytest.mark.parametrize("step", [1e-2, 1e-3, 1e-4])
 @pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.long
 def test_the_last_ball_of_a_row_leaves(gap: float, step: float, dim: int) -> None:
     """Equal balls swap velocities at each collision: one in at 1 m/s, one out, however many of the
     gaps [m] a step closes (balls at rest were not seen to be in the way of those struck: of five
@@ -181,6 +183,7 @@ def test_a_row_of_unequal_balls(gap: float, dim: int) -> None:
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.long
 def test_a_gas_of_light_and_heavy_keeps_its_energy(dim: int, seed: int) -> None:
     """Mass ratios to 1e4, e = 1, no friction, a wall on every side: energy to round-off, about
     1e-15 for each of a hundred rounds in each of a hundred steps (before, a third of it went in a

@@ -115,6 +115,7 @@ def test_great_mass_ratios_rest(build: object, bar: float) -> None:
 
 @pytest.mark.parametrize("off", [-1e-9, 0.0, 1e-9])
 @pytest.mark.parametrize("direction", [0.0, 0.9273, 1.2])
+@pytest.mark.long
 def test_a_block_in_space_at_the_threshold(off: float, direction: float) -> None:
     """Gravity along the slope by any angle to the tangents: it slides ``g (sin - mu cos) t^2 / 2``.
 

@@ -93,6 +93,7 @@ def run_in(folder: RunFolder, file: SceneFile, *, resume: bool) -> Simulation:
 
 
 @pytest.mark.parametrize("kind", SCENES)
+@pytest.mark.long
 def test_a_resumed_run_is_the_uninterrupted_one(tmp_path: Path, kind: str) -> None:
     """From every frame on; whatever a step needs of the one before is in the frame."""
     path = tmp_path / "scene.toml"
@@ -114,6 +115,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(tmp_path: Path, kind: str) -> No
         assert resumed.pace == whole.pace
 
 
+@pytest.mark.long
 def test_steps_above_the_tolerance_are_counted_over_a_stop(tmp_path: Path) -> None:
     """No method reaches 1e-30: steps that are not exact are counted, before the stop and after."""
     path = tmp_path / "scene.toml"

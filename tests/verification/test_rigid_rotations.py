@@ -145,6 +145,7 @@ def test_free_rotation_is_of_second_order() -> None:
 
 
 @pytest.mark.parametrize("axis", [None, 0, 1, 2])
+@pytest.mark.long
 def test_free_rotation_keeps_momentum_and_energy(axis: int | None) -> None:
     """Both to round-off of every step, at any spin and next to a principal axis."""
     q, spin = random_rotations(1)[0], np.array([1.0, 2.0, -1.5])

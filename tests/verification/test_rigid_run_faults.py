@@ -89,6 +89,7 @@ class RefusingDisk:
         return refuse
 
 
+@pytest.mark.long
 def test_full_disk_at_every_write(
     scene: Path, whole: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -113,6 +114,7 @@ def test_full_disk_at_every_write(
 
 
 @pytest.mark.parametrize("name", ["picture-000002.png", "movie.gif", "picture-end.png"])
+@pytest.mark.long
 def test_full_disk_at_a_picture(
     scene: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -182,6 +184,7 @@ def test_folder_that_vanishes(
 # --- killed and stopped -----------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_killed_at_every_file_operation(
     commands: Commands, scene: Path, whole: list[dict[str, Any]], tmp_path: Path
 ) -> None:
@@ -199,6 +202,7 @@ def test_killed_at_every_file_operation(
         goes_on(scene, folder, whole)
 
 
+@pytest.mark.long
 def test_killed_at_random_times(
     commands: Commands, scene: Path, whole: list[dict[str, Any]], tmp_path: Path
 ) -> None:

@@ -75,6 +75,7 @@ def falling(mu: float, seconds: float) -> float:
 
 
 @pytest.mark.parametrize("mu", [0.0, 5.0])
+@pytest.mark.long
 def test_fourth_order(mu: float) -> None:
     """A needle falls about its tip (sticking) or with its tip free to slide, against SciPy."""
     seconds = 0.24
@@ -172,6 +173,7 @@ def test_sliding_stops_where_it_should() -> None:
     assert (run.contacts.status == "stick").all()
 
 
+@pytest.mark.long
 def test_bounces_keep_the_energy() -> None:
     """Restitution 1: 1e-13 a bounce; time between bounces as on paper."""
     run = bouncing_disc(0.01, 1.0, method="acceleration", step=0.01)
@@ -254,6 +256,7 @@ def test_first_fall(values: tuple[float, ...], expected: float | None) -> None:
         assert hermite == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.long
 def test_steps_with_rough_forces_are_counted() -> None:
     """A tolerance below round-off is met by no step, the default one by all."""
     for tolerance, above in ((1e-12, 0), (1e-30, 3)):

@@ -141,6 +141,7 @@ def test_a_sphere_rolls_in_circles_on_a_turntable(method: Method) -> None:
     ("method", "order", "steps"),
     [("acceleration", 4.0, [0.02, 0.01, 0.005]), ("time-stepping", 1.0, [8e-3, 4e-3, 2e-3])],
 )
+@pytest.mark.long
 def test_a_block_slides_and_turns(method: Method, order: float, steps: list[float]) -> None:
     """Both methods go to the one solution, Runge-Kutta with the fourth order.
 
@@ -193,6 +194,7 @@ def test_a_cube_falls_from_a_corner_with_its_energy() -> None:
 
 
 @pytest.mark.parametrize("method", ["acceleration", "time-stepping"])
+@pytest.mark.long
 def test_a_cube_rocks_over_the_edge_as_housner_says(method: str) -> None:
     """The edge lands: the first corner lifts off, the spin about the other is `OTHER` of before.
 

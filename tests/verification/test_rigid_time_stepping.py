@@ -261,6 +261,7 @@ def test_a_body_that_turns_too_far_within_a_step_is_refused() -> None:
         Simulation(scene, step=1e-3).advance(1e-3)
 
 
+@pytest.mark.long
 def test_steps_above_the_tolerance_are_counted_and_bad_ones_stop_the_run() -> None:
     """No method reaches 1e-30; a residual above zero is counted, and above ``give_up`` it ends."""
     run = stack(5, 10.0)
@@ -274,6 +275,7 @@ def test_steps_above_the_tolerance_are_counted_and_bad_ones_stop_the_run() -> No
 
 @pytest.mark.parametrize("gap", [1e-4, 3e-4, 2e-3])
 @pytest.mark.parametrize("restitution", [1.0, 0.5, 0.0])
+@pytest.mark.long
 def test_collisions_are_passed_on_within_a_step(gap: float, restitution: float) -> None:
     """Balls nearer than the way of a step: at e = 1 the energy stays, and two in are two out where
     a step holds all collisions or one at a time, and at acceleration level (those that two steps

@@ -54,6 +54,7 @@ def test_a_start_leaves_the_forces_of_a_box_where_contacts_slide(friction, seed,
     assert difference(again.r, first.r) < 1e-10
 
 
+@pytest.mark.long
 def test_a_box_has_more_states_than_one():
     """Why: of 12 states reached from elsewhere, all exact, some are not that reached from none."""
     others = []
@@ -71,6 +72,7 @@ def test_a_box_has_more_states_than_one():
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3, 0.9, 5.0])
+@pytest.mark.long
 def test_a_start_leaves_the_relaxed_forces(friction):
     """The printed relaxation ends at a residual: 1e-12 of it is 1e-9 in the forces (as the softest
     mode is 1e3 times softer), from any start."""
@@ -133,6 +135,7 @@ def test_a_start_out_of_all_proportion_is_left_aside():
 @pytest.mark.parametrize(
     ("rows", "friction", "walls", "orders"), [(10, 0.3, True, 4), (30, 5.0, False, 1)]
 )
+@pytest.mark.long
 def test_round_off_does_not_choose_between_states(rows, friction, walls, orders):
     """55 discs at friction 0.3, 465 at 5: random orders ended in another of two states, 6.5 and
     6.9 % apart, before the way there was made with rounded numbers in an order of their own."""

@@ -144,6 +144,7 @@ def test_depth_of_a_cut_in_closed_form(share):
     seed=st.integers(0, 10**6), share=st.floats(1e-9, 0.03),
     form=st.sampled_from(["stone", "needle", "sliver", "tetrahedron", "plate"]),
 )  # fmt: skip
+@pytest.mark.long
 def test_worn_polyhedra_lose_exactly_what_they_shall(seed, share, form):
     """Any polyhedron, worn at any features, repeatedly: volume to round-off, inside the first.
 

@@ -220,6 +220,7 @@ echo "Submitted batch job $!"
 SCANCEL = "#!/bin/sh\nkill -- -$1\n"
 
 
+@pytest.mark.long
 def test_slurm_jobs_that_are_lost_are_replaced(tmp_path: Path) -> None:
     """``--scheduler slurm`` submits a job; killed, its member goes on in the next; none is left."""
     for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
@@ -309,6 +310,7 @@ def test_a_signal_loses_no_result(
     assert states[sent[0]] == "finished"
 
 
+@pytest.mark.long
 def test_killed_it_goes_on(
     scene: Path, tmp_path: Path, in_process: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -344,6 +346,7 @@ def test_killed_it_goes_on(
 
 
 @pytest.mark.engine("lammps")
+@pytest.mark.long
 def test_a_real_engine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Twenty soft grains on LAMMPS, two seeds, each in a process of its own: two settlements."""
     from scenes import scene_template
