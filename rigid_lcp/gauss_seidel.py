@@ -37,7 +37,7 @@ from rigid_lcp.contact_blocks import BodyBlocks, body_blocks, matrix_blocks
 from rigid_lcp.contact_sweeps import Momentum, SweepBlocks, residual_of, sweep_once, sweeps_until
 from rigid_lcp.errors import UsageError
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
-from rigid_lcp.problem_input import order_given
+from rigid_lcp.problem_input import one_number, order_given, start_given, whole_number
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -67,14 +67,19 @@ def gauss_seidel(
     best point lose the way made.  ``slow``: sweeps after which to give up if more than this
     residual is left, looked at as often as the residual is.
 
-    Raises `UsageError` for an order that is no permutation.
+    Raises `ProblemError` for a start that is none, `UsageError` for an order that is no permutation
+    and other options that are none.
     """
+    tolerance, sweeps = (
+        one_number(tolerance, "tolerance", zero=True),
+        whole_number(sweeps, "sweeps"),
+    )
     contacts, dim = problem.contacts, problem.dim
     if sweeper is None:
         visit = contact_order(order, contacts)
         symmetric = isinstance(order, str) and order == "symmetric"
         sweeper = Sweeper(problem, visit, symmetric=symmetric, momentum=momentum)
-    force = np.zeros((contacts, dim)) if start is None else np.array(start, dtype=float)
+    force = np.zeros(contacts * dim) if start is None else start_given(start, contacts * dim, dim)
     best, _, stuck = sweeper.sweep_until(force.reshape(contacts, dim), tolerance, sweeps, slow)
     message = (
         f"{stuck} contacts have no solution while the others are held (Painleve, or no mass)"

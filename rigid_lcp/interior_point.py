@@ -44,6 +44,7 @@ from rigid_lcp.lorentz_cones import (
     cone_scaling_square,
     cone_step,
 )
+from rigid_lcp.problem_input import one_number, whole_number
 
 Floats = NDArray[np.float64]
 
@@ -90,7 +91,13 @@ def interior_point(
     factorisations of this problem's W, made if not given; ``begun``: the path, to go on where an
     earlier call left it.  About 1e-10 is what it can reach, as its matrices become singular;
     `rigid_lcp.newton` goes on from there.
+
+    Raises `UsageError` for a tolerance that is no number of zero or more, and for no count.
     """
+    tolerance, iterations = (
+        one_number(tolerance, "tolerance", zero=True),
+        whole_number(iterations, "iterations"),
+    )
     contacts, dim = problem.contacts, problem.dim
     best, best_residual, done, short = np.zeros(contacts * dim), np.inf, 0, 0
     try:

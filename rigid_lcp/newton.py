@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factorisation
 from rigid_lcp.cones import length
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
+from rigid_lcp.problem_input import one_number, start_given, whole_number
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.int8]
@@ -104,11 +105,19 @@ def newton(
     best point and on with a greater shift, which is slower and steadier; asked for less patience
     than `PATIENCE` it ends there.  ``linear``: factorisations of this problem's W, made if not
     given.
+
+    Raises `ProblemError` for a start that is none, `UsageError` for other options that are none.
     """
+    tolerance, iterations = (
+        one_number(tolerance, "tolerance", zero=True),
+        whole_number(iterations, "iterations"),
+    )
     shape = (problem.contacts, problem.dim)
     linear = linear or factorisation(problem)
     rho = problem.contact_rho
-    best = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
+    best = np.zeros(problem.offset.shape)
+    if start is not None:
+        best = start_given(start, len(best), problem.dim)
     best_residual, done = problem.residual(best), 0
     offered = problem.rho * length(problem.offset)
     first = min(FIRST_SHIFTS[0], BEARABLE * offered / (length(best) or 1.0)) or FIRST_SHIFTS[0]

@@ -7,14 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.errors import ShapeError
+from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.rotations import rotate, rotate_back
+from rigid_lcp.scene_input import vector_given
 from rigid_lcp.shapes_3d import Polyhedron
 
 Floats = NDArray[np.float64]
 
 CLEARANCE = 1e-6
 """Share of its reach by which a cut must miss the corners of a grain, or go through them."""
+
+UNIT = 1e-6
+"""Error of a quaternion's squared length that a run may have left."""
 
 
 def ballast_stone(
@@ -49,11 +53,12 @@ def cut(shape: Polyhedron, normal: ArrayLike, offset: float) -> tuple[Polyhedron
 
     Plane and parts in the body frame of ``shape``: ``part.centroid`` is where the centre of mass
     of the part lies in it.  The volumes add up to that of the whole.  Raises `ShapeError` where
-    the plane misses the polyhedron or only grazes it.
+    the plane misses the polyhedron or only grazes it, `SceneError` for numbers that are none.
     """
-    direction = np.asarray(normal, dtype=float)
+    direction = vector_given(normal, 3, "the normal", "cut")
+    (offset,) = vector_given(offset, 1, "the offset", "cut")
     length = float(np.linalg.norm(direction))
-    if direction.shape != (3,) or not (np.isfinite(length) and length > 0):
+    if not 0.0 < length < np.inf:
         raise ShapeError(
             f"the normal of the plane is {normal!r}", where="cut",
             remedy="give three numbers that are not all zero",
@@ -102,16 +107,31 @@ class Fragment:
 
 
 def fragments(
-    shape: Polyhedron, position: Floats, quaternion: Floats, velocity: Floats, spin: Floats,
-    normal: ArrayLike, point: ArrayLike,
+    shape: Polyhedron, position: ArrayLike, quaternion: ArrayLike, velocity: ArrayLike,
+    spin: ArrayLike, normal: ArrayLike, point: ArrayLike,
 ) -> tuple[Fragment, Fragment]:  # fmt: skip
     """A moving polyhedron broken by the plane through ``point`` [m] with ``normal``, both world.
 
     Every point of the parts keeps place and velocity: mass, momentum, angular momentum and
-    energy are those of the whole.  Raises `ShapeError` as `cut` does.
+    energy are those of the whole.  Raises as `cut` does, and `SceneError` for a quaternion that
+    is not of unit length.
     """
+    where = "fragments"
+    position, velocity, spin, normal, point = (
+        vector_given(given, 3, f"the {what}", where)
+        for what, given in (
+            ("position", position), ("velocity", velocity), ("spin", spin), ("normal", normal),
+            ("point", point),
+        )
+    )  # fmt: skip
+    quaternion = vector_given(quaternion, 4, "the quaternion", where)
+    if not abs(quaternion @ quaternion - 1.0) < UNIT:
+        raise SceneError(
+            f"the quaternion is {quaternion.tolist()}, not of unit length", where=where,
+            remedy="divide it by its length",
+        )  # fmt: skip
     direction = rotate_back(quaternion, normal)
-    offset = float(direction @ rotate_back(quaternion, np.asarray(point, float) - position))
+    offset = float(direction @ rotate_back(quaternion, point - position))
     made = []
     for part in cut(shape, direction, offset):
         arm = rotate(quaternion, part.centroid)

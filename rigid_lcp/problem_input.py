@@ -96,6 +96,17 @@ def whole_number(value: Any, name: str) -> int:
     return int(value)
 
 
+def start_given(start: ArrayLike, numbers: int, dim: int) -> Floats:
+    """Forces to begin from as a copy (``numbers``,) = (nc * dim,); `ProblemError` for all else."""
+    force = numbers_by_contact(start, "start", dim)
+    if len(force) != numbers:
+        raise ProblemError(
+            f"it has {len(force)} numbers and q has {numbers}", where="start",
+            remedy="give the forces of all contacts, in the order of q",
+        )  # fmt: skip
+    return force
+
+
 def order_given(order: ArrayLike, count: int) -> Integers | None:
     """An order as the numbers 0 ... ``count`` - 1, or None where it has not each of them once."""
     given = np.asarray(order)

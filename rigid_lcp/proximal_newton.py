@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from rigid_lcp.body_factorisation import Factorisation, SingularSystem, factorisation
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
 from rigid_lcp.newton import alart_curnier
+from rigid_lcp.problem_input import one_number, start_given, whole_number
 
 Floats = NDArray[np.float64]
 
@@ -53,9 +54,15 @@ def proximal_newton(
     end fast; a great one takes off what is stiff of the error.  Good from a rough point on (a few
     dozen sweeps, or the forces of the step before); where `rigid_lcp.newton` converges it needs
     fewer factorisations.
+
+    Raises `ProblemError` for a start that is none, `UsageError` for other options that are none.
     """
+    tolerance = one_number(tolerance, "tolerance", zero=True)
+    factorisations = whole_number(factorisations, "factorisations")
     linear = linear or factorisation(problem)
-    centre = np.zeros(problem.offset.shape) if start is None else np.array(start, dtype=float)
+    centre = np.zeros(problem.offset.shape)
+    if start is not None:
+        centre = start_given(start, len(centre), problem.dim)
     best, best_residual = centre, problem.residual(centre)
     residual, spent, points = best_residual, 0, 0
     shift = max(LEAST_SHIFT, min(FIRST_SHIFT, residual)) if first_shift is None else first_shift

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.cones import length
-from rigid_lcp.errors import ProblemError, UsageError
+from rigid_lcp.errors import UsageError
 from rigid_lcp.friction_problem import (
     ROUND_OFF,
     SHARE_LEFT,
@@ -31,7 +31,7 @@ from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.interior_point import interior_point
 from rigid_lcp.islands import islands, solve_islands
 from rigid_lcp.newton import newton
-from rigid_lcp.problem_input import in_range, numbers_by_contact, one_number
+from rigid_lcp.problem_input import in_range, one_number, start_given
 from rigid_lcp.solver_order import PATHS, attempts, proved_insoluble
 from rigid_lcp.solver_trial import FEW_CONTACTS, HAND_OVER, Trial
 
@@ -86,7 +86,10 @@ def solve_friction(
             remedy="one of " + ", ".join(get_args(Method)),
         )  # fmt: skip
     tolerance, accept = one_number(tolerance, "tolerance"), one_number(accept, "accept", zero=True)
-    begin = None if start is None else _start(start, problem)
+    begin = None
+    if start is not None:
+        begin = start_given(start, len(problem.offset), problem.dim)
+        in_range(begin, "start", least=0.0)
     if problem.contacts == 0:
         return friction_solution(problem, problem.offset.copy(), tolerance, method)
     largest = float(np.abs(problem.offset).max())
@@ -191,14 +194,3 @@ def _methods() -> dict[str, Callable[..., FrictionSolution]]:
         "pivoting": pivoting,
         "dantzig": dantzig,
     }
-
-
-def _start(start: ArrayLike, problem: FrictionProblem) -> Floats:
-    force = numbers_by_contact(start, "start", problem.dim)
-    if force.shape != problem.offset.shape:
-        raise ProblemError(
-            f"it has {len(force)} numbers and q has {len(problem.offset)}", where="start",
-            remedy="give the forces of all contacts, in the order of q",
-        )  # fmt: skip
-    in_range(force, "start", least=0.0)
-    return force

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_lcp import Polygon, Scene
+from rigid_lcp import Polygon, Scene, box
 from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.fragmentation import fragment, polygon_split
+from rigid_lcp.polyhedra import cut, fragments
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 MIDDLE, UP = (0.5, 0.5), (0, 1)
@@ -75,3 +76,27 @@ def test_the_remedy_of_a_density_names_both_bounds():
     """1e300 was told to be positive."""
     with pytest.raises(SceneError, match=r"is 1e\+300\n  -> .*above zero, 1e\+50 at most.*fixed"):
         Scene().add(Polygon(SQUARE), density=1e300)
+
+
+BREAK = {
+    "position": (0, 0, 0), "quaternion": (1, 0, 0, 0), "velocity": (1, 0, 0), "spin": (0, 1, 0),
+    "normal": (0, 0, 1), "point": (0, 0, 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BREAK)
+@pytest.mark.parametrize("bad", [(np.nan, 0, 0), (1, 0), "a", 1j, None, (np.inf, 0, 0, 0)])
+def test_breaks_in_space_that_are_none_are_named(name, bad):
+    """NaN became the place and the velocity of the parts."""
+    with pytest.raises(SceneError, match=f"^fragments: the {name} is .*\n  -> give"):
+        fragments(box(1, 1, 1), **(BREAK | {name: bad}))
+
+
+def test_breaks_in_space_want_a_unit_quaternion_and_a_normal():
+    with pytest.raises(SceneError, match=r"fragments: the quaternion is .*not of unit length"):
+        fragments(box(1, 1, 1), **(BREAK | {"quaternion": (1, 1, 0, 0)}))
+    with pytest.raises(ShapeError, match="cut: the normal of the plane"):
+        fragments(box(1, 1, 1), **(BREAK | {"normal": (0, 0, 0)}))
+    for offset in (np.nan, "a", None):
+        with pytest.raises(SceneError, match="cut: the offset is"):
+            cut(box(1, 1, 1), (0, 0, 1), offset)

@@ -1,4 +1,4 @@
-"""Options of the pivoting methods and of the sweeps: kept, or refused in one of our sentences."""
+"""Options of the methods called by themselves: kept, or refused in one of our sentences."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from rigid_lcp.dantzig import dantzig
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import friction_problem
 from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.interior_point import interior_point
+from rigid_lcp.newton import newton
 from rigid_lcp.pivoting import pivoting
+from rigid_lcp.proximal_newton import proximal_newton
 
 PROBLEM = friction_problem(np.diag([1.0, 2.0, 1.0, 2.0]), [-1.0, 0.5, 1.0, 0.0], 0.5, 2)
 R = [1.0, -0.25, 0.0, 0.0]
@@ -70,3 +73,32 @@ def test_orders_that_are_none_are_named(order):
 def test_options_that_can_be_given_change_no_forces(given):
     found = dantzig(PROBLEM, **given)
     np.testing.assert_allclose(found.r, R, atol=1e-12)
+
+
+COUNTS = {
+    newton: "iterations",
+    gauss_seidel: "sweeps",
+    interior_point: "iterations",
+    proximal_newton: "factorisations",
+}
+
+
+@pytest.mark.parametrize("method", COUNTS)
+def test_tolerances_and_counts_that_are_none_are_named(method):
+    """Text was an error of the compiler, -1 a solve without an end or without a step."""
+    for tolerance in (-1.0, np.nan, "a", None):
+        with pytest.raises(UsageError, match=rf"^tolerance: .*{tolerance}.*\n  -> give"):
+            method(PROBLEM, tolerance=tolerance)
+    for count in (-1, 2.5, "a", None, True):
+        with pytest.raises(UsageError, match=rf"^{COUNTS[method]}: .*\n  -> give a count"):
+            method(PROBLEM, **{COUNTS[method]: count})
+    assert method(PROBLEM, **{COUNTS[method]: 0}).status == "not converged"
+
+
+@pytest.mark.parametrize("method", [newton, gauss_seidel, proximal_newton])
+@pytest.mark.parametrize("start", [[np.nan] * 4, [np.inf] * 4, [1.0, 2.0], "a", [1j] * 4])
+def test_starts_that_are_none_are_named(method, start):
+    """NaN came back as the best forces known."""
+    with pytest.raises(ProblemError, match=r"^start: .*\n  -> "):
+        method(PROBLEM, start=start)
+    assert method(PROBLEM, start=[[1.0, 0.0], [0.0, 0.0]]).solved
