@@ -69,7 +69,7 @@ from rigid_lcp.solver_trial import (
     LAST_WORD,
     Trial,
 )
-from rigid_lcp.solver_turns import by_turns, from_path, turns_from_paths
+from rigid_lcp.solver_turns import by_turns, from_path, sharp_path, turns_from_paths
 from rigid_lcp.solver_warm import deep, yielding
 
 Floats = NDArray[np.float64]
@@ -168,7 +168,10 @@ def attempts(
 
 
 def both_paths(trial: Trial) -> bool:
-    """The convex path, if it was not followed yet, and the smoothed one from its end."""
+    """Coulomb's path, hardly rounded, the convex one and the smoothed one from its end, each if it
+    was not followed yet (as factorisations are dear, or there was a start)."""
+    if not trial.sharp and sharp_path(trial):
+        return True
     if trial.path_point is None and convex_path(trial):
         return True
     return trial.path_point is not None and from_path(trial, trial.path_point)

@@ -77,8 +77,8 @@ class Trial:
         self.sweeper: Sweeper | None = None
         self.path_end: Floats | None = None
         self.path_point: tuple[Floats, float] | None = None
-        self.smoothed = False
-        """Whether the smoothed path was followed."""
+        self.sharp = self.smoothed = False
+        """Whether the hardly rounded path was followed, and the smoothed one."""
         self.start: Floats | None = None
         """The forces given to start from; None where they mislead."""
         if start is not None:

@@ -12,11 +12,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import FrictionSolution
 from rigid_lcp.gauss_seidel import gauss_seidel, sweeper_of
 from rigid_lcp.interior_point import Path, interior_point
 from rigid_lcp.smoothed_path import smoothed_path
-from rigid_lcp.solver_trial import HAND_OVER, Trial
+from rigid_lcp.solver_trial import FEW_STEPS, HAND_OVER, Trial
 
 Floats = NDArray[np.float64]
 
@@ -36,17 +37,43 @@ TURN_PATHS = (
     Path(rounding=1e-3, compliance=1e-4, lagged=True),
     Path(convex=True, compliance=1e-4),
 )
+SHARP_PATH, SHARP_STEPS, NEAR_TURNS = Path(rounding=1e-4, compliance=1e-3), 40, 3
+SHARP_END, SHARP_USEFUL, SHARP_NEAR = 3e-8, 1e-5, 1e-7
+"""Coulomb's path of the interior point with hardly any rounding, steps along it and its end; what
+residual Newton may begin from, and from what turns may: where the law is hardly rounded the path
+can jam, and where it does not its end is near."""
 PATH_STEPS = 45
 """Paths from whose ends turns begin again, and steps along each: how many turns are needed differs
 by ten between starts that look alike, so a few of many starts cost less than many of one."""
 
 
 def from_path(trial: Trial, begin: tuple[Floats, float]) -> bool:
-    """Where the convex path ended short: sweeps if they are cheap (`SWEPT_FIRST`), the smoothed
-    path, and turns from the best point; whether the tolerance is reached."""
+    """Where the convex path ended short: Coulomb's, hardly rounded, sweeps if they are cheap
+    (`SWEPT_FIRST`), the smoothed path, and turns from the best point; whether the tolerance is
+    reached."""
+    if not trial.sharp and sharp_path(trial):
+        return True
     if trial.sweeps_a_factorisation > SWEPT_FIRST and trial.path_end is not None:
         swept(trial, trial.path_end)
     return trial.best.solved or smoothed_further(trial, begin) or by_turns(trial, trial.best.r)
+
+
+def sharp_path(trial: Trial) -> bool:
+    """`SHARP_PATH` and Newton from its end, and turns from where that is near; whether the
+    tolerance is reached."""
+    trial.sharp = True
+    trial.linear = trial.linear or factorisation(trial.problem)
+    found = trial.keep(
+        interior_point(
+            trial.problem, None, max(SHARP_END, trial.tolerance), SHARP_PATH, linear=trial.linear,
+            iterations=min(SHARP_STEPS, trial.affordable),
+        )
+    )  # fmt: skip
+    if found.residual <= SHARP_USEFUL:
+        found = trial.newton(found.r, FEW_STEPS, found.method)
+    if not trial.best.solved and found.residual <= SHARP_NEAR:
+        by_turns(trial, found.r, NEAR_TURNS)
+    return trial.best.solved
 
 
 def by_turns(trial: Trial, force: Floats, patience: int = TURNS_PATIENCE) -> bool:

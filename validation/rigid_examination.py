@@ -37,8 +37,8 @@ Row = dict[str, Any]
 RECORD = Path(__file__).parent / "results" / "rigid-examination.jsonl"
 SEED = 2026
 """Of the committed record."""
-OTHER_SEED = RECORD.with_stem("rigid-examination-42")
-"""Record of some families of another seed, by the code of two commits, one after the other."""
+OTHER_SEEDS = RECORD.with_stem("rigid-examination-others")
+"""Record of some families of other seeds, by the code of several commits, one after the other."""
 BAR_S = 1.0
 """Processor seconds that a solve may take."""
 CLOSE_S, REPEATS = (0.5, 2.0), 5

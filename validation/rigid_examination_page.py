@@ -133,18 +133,19 @@ def examination_failures(rows: Sequence[Row]) -> str:
 
 def seeds_words(rows: Sequence[Row]) -> str:
     """Of each seed of another record how many problems were solved by the code of each commit that
-    was given them, how many of these late, and which were not."""
+    was given them, how many of these late, which were not, and what the rival made of them."""
     told = []
     for seed, code in dict.fromkeys((row["seed"], row["commit"]) for row in rows):
         mine = [row for row in rows if (row["seed"], row["commit"]) == (seed, code)]
         solved = [row["cpu_s"] for row in mine if row["ok"]]
         slow = sum(cost > BAR_S for cost in solved)
         lost = [f"{row['family']} {row['index']}" for row in mine if not row["ok"]]
-        told.append(
-            f"{len(solved)} of {len(mine)} of seed {seed} by `{code[:10]}`, {slow} in more than "
+        words = (
+            f"- Seed {seed} by `{code[:10]}`: {len(solved)} of {len(mine)}, {slow} in more than "
             f"{BAR_S:g} s" + f" (not {', '.join(lost)})" * bool(lost)
         )
-    return "; ".join(told)
+        told.append(words + "." + _beside_rival([row for row in mine if "rival_ok" in row]))
+    return "\n".join(told)
 
 
 def _told(row: Row) -> str:

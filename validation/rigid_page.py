@@ -19,7 +19,7 @@ import numpy as np
 from validation import rigid_report as report
 from validation.commit_words import commit_words
 from validation.qdem_record import write_atomically
-from validation.rigid_examination import OTHER_SEED
+from validation.rigid_examination import OTHER_SEEDS
 from validation.rigid_examination import RECORD as EXAMINATION
 from validation.rigid_examination_page import (
     examination_failures,
@@ -86,7 +86,7 @@ def page(rows: Sequence[Row]) -> str:
         "examined": examination_words(examined),
         "unsolved": examination_failures(examined),
         "noise": noise_words(examined),
-        "seeds": seeds_words(rows_read(OTHER_SEED)),
+        "seeds": seeds_words(rows_read(OTHER_SEEDS)),
         "dearest": _dearest(races),
         "lemke": f"{SICONOS_MOST['2D_LEMKE']:,}",
         "dense": f"{SICONOS_MOST['2D_NSGS']:,}",

@@ -432,6 +432,6 @@ def test_other_seeds_are_told_code_by_code() -> None:
     lost = row | {"index": 3, "ok": False}
     newer = [one | {"commit": 12 * "b"} for one in (row, late)]
     assert seeds_words([row, late, lost, *newer]) == (
-        "2 of 3 of seed 42 by `aaaaaaaaaa`, 1 in more than 1 s (not towers 3); "
-        "2 of 2 of seed 42 by `bbbbbbbbbb`, 1 in more than 1 s"
+        "- Seed 42 by `aaaaaaaaaa`: 2 of 3, 1 in more than 1 s (not towers 3).\n"
+        "- Seed 42 by `bbbbbbbbbb`: 2 of 2, 1 in more than 1 s."
     )
