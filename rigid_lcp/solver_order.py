@@ -9,9 +9,12 @@
                      are swept a few times before, which ends what is loose or regular
     convex path      without a start: a part of it, and Newton; solves most static piles.  Where it
                      does not, the path is bent to Coulomb's law, and Newton again
-    smoothed path    from there on, as it needs not stay inside the cones
+    sharp path       the interior point along Coulomb's law hardly rounded, Newton, and where its
+                     end is near turns (below): most of what is left.  It jams where forces are
+                     many times what approaches
+    smoothed path    from the convex one's end on, as it needs not stay inside the cones
                      (`rigid_lcp.smoothed_path`): kicked, tilted and slippery beds.  Where
-                     factorisations are dear sweeps go before both paths, and with a start all of
+                     factorisations are dear sweeps go before all paths, and with a start all of
                      Gauss-Seidel below
     by turns         from there on, sweeps of Gauss-Seidel and proximal points that run ahead of
                      their drift (`rigid_lcp.extrapolated_points`): beds whose self-stress has to
@@ -147,7 +150,7 @@ def attempts(
         if trial.best.residual <= accept:
             return trial
     if (not small and trial.dear) and (
-        trial.sweep(start, DEAR_SWEEPS, factorisations=0) or (cold and both_paths(trial))
+        trial.sweep(start, DEAR_SWEEPS, factorisations=0) or (cold and all_paths(trial))
     ):
         return trial
     plan: tuple[tuple[int, int], ...] = ((FIRST_SWEEPS, MANY if small else FEW),)
@@ -167,7 +170,7 @@ def attempts(
     return trial
 
 
-def both_paths(trial: Trial) -> bool:
+def all_paths(trial: Trial) -> bool:
     """Coulomb's path, hardly rounded, the convex one and the smoothed one from its end, each if it
     was not followed yet (as factorisations are dear, or there was a start)."""
     if not trial.sharp and sharp_path(trial):
@@ -213,7 +216,7 @@ def fallback_paths(trial: Trial, accept: float) -> None:
         by_turns(trial, trial.best.r if trial.path_end is None else trial.path_end, patience=1)
         return
     new = tolerance < HAND_OVER and problem.contacts <= CONVEX_CONTACTS and not trial.smoothed
-    if new and both_paths(trial):  # where there was a start
+    if new and all_paths(trial):  # where there was a start
         return
     most = max(FALLBACK_FLOPS, (1.0 + FALLBACK_SHARE) * trial.effort)
     if turns_from_paths(trial) or folded(trial):

@@ -1,4 +1,4 @@
-"""From where the convex path ends short: the smoothed path, then sweeps and points by turns.
+"""From where the convex path ends short: two other paths, then sweeps and points by turns.
 
 A self-stress may have to grow a long way before the next contact lets go.  Sweeps of Gauss-Seidel
 are cheap and hardly ever fail, but creep; extrapolated proximal points run far ahead, and get stuck
