@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import SingularSystem, factorisation
+from rigid_lcp.cones import length
 from rigid_lcp.friction_problem import FrictionSolution
 from rigid_lcp.gauss_seidel import gauss_seidel, sweeper_of
 from rigid_lcp.interior_point import Path, PathStep, interior_point
@@ -21,6 +22,10 @@ CONVEX_STEPS, CONVEX_CONTACTS = 7, 10_000
 CONVEX_END, CONVEX_USEFUL, CONVEX_NEWTON = 1e-4, 1e-3, 5
 """Without a start, and up to so many contacts: steps along the convex path to a residual of
 `CONVEX_END`, and so many of Newton if it came below `CONVEX_USEFUL` (where little slides)."""
+REST, REST_END, REST_STEPS = 1e-3, 1e-8, 15
+"""Where nothing moves the convex law is Coulomb's: velocities so small beside those of q are taken
+for rest, and the convex path is followed to its end.  Other paths may end at a motion that solves
+the problem as well (an arch that only just stands)."""
 CONVEX_SWEEPS, SLOW = 30, (15, 4e-3)
 """Sweeps where much is loose; they end where half of them leave more than that (towers)."""
 FAST, FAST_SWEEPS = 3e-4, 200
@@ -85,7 +90,8 @@ def few_sweeps(trial: Trial) -> bool:
 
 
 def convex_path(trial: Trial) -> bool:
-    """A part of the convex path and Newton; then from there on Coulomb's, and Newton."""
+    """A part of the convex path and Newton; all of it where it seems to end at rest; then from its
+    part on Coulomb's, and Newton."""
     if not trial.affordable:
         return False
     try:
@@ -95,6 +101,11 @@ def convex_path(trial: Trial) -> bool:
     found = follow(trial, path, CONVEX_END, CONVEX_STEPS)
     if found.residual < CONVEX_USEFUL:
         trial.newton(found.r, CONVEX_NEWTON, found.method, NEWTON_PATIENCE)
+    if not trial.best.solved and seems_at_rest(trial):
+        part = path.x, path.s
+        rest = follow(trial, path, REST_END, REST_STEPS)
+        trial.newton(rest.r, CONVEX_NEWTON, rest.method, NEWTON_PATIENCE)
+        path.x, path.s = part
     path.path = replace(CONVEX_PATH, convex=False, rounding=BENT_ROUNDING)
     steps = BENT_STEPS
     for until in (BENT_USEFUL, HAND_OVER):
@@ -107,6 +118,12 @@ def convex_path(trial: Trial) -> bool:
         trial.newton(found.r, CONVEX_STEPS + 1, found.method, NEWTON_PATIENCE)
     trial.path_end, trial.path_point = found.r, (path.force(), WIDER * path.sigma())
     return trial.best.solved
+
+
+def seems_at_rest(trial: Trial) -> bool:
+    """Whether the best point is near an answer, by its residual, with velocities of almost none."""
+    best, offset = trial.best, trial.problem.offset
+    return best.residual <= CONVEX_END and length(best.u) <= REST * length(offset)
 
 
 def heavy_path(trial: Trial, stuck: Floats, finer: float) -> bool:

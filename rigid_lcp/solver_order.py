@@ -8,7 +8,8 @@
     all stick        one factorisation; exact for towers and much of what stands.  Large problems
                      are swept a few times before, which ends what is loose or regular
     convex path      without a start: a part of it, and Newton; solves most static piles.  Where it
-                     does not, the path is bent to Coulomb's law, and Newton again
+                     does not, all of it if it seems to end at rest; then the path is bent to
+                     Coulomb's law, and Newton again
     sharp path       the interior point along Coulomb's law hardly rounded, Newton, and where its
                      end is near turns (below): most of what is left.  It jams where forces are
                      many times what approaches

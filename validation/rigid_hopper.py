@@ -56,7 +56,8 @@ def hopper(grains: int, seed: int, *, mu: float = 0.6, step: float = 1e-3) -> Si
 def jam(grains: int, seed: int, *, longest: float = 4.0) -> tuple[Simulation, float] | None:
     """A scene of the discs that an arch holds, at rest, and how long it took [s]; None: no jam.
 
-    Discs that fell through are left out; the arch bears at least a third of the grains.
+    Discs that fell through are left out; the arch bears at least a third of the grains.  Discs that
+    fall over a saddle are still for a moment: what moves again by itself is no jam yet.
     """
     run = hopper(grains, seed)
     while run.time < longest:
@@ -64,11 +65,17 @@ def jam(grains: int, seed: int, *, longest: float = 4.0) -> tuple[Simulation, fl
         held = run.positions[:-WALL, 1] > 0
         if held.sum() < grains / 3:
             return None
-        if np.abs(run.velocities[:-WALL][held]).max() < STILL:
+        if _still(run, held):
             jammed = _held(run, held)
             jammed.advance(SETTLING)
-            return _held(jammed, jammed.positions[:-WALL, 1] > 0), run.time
+            left = jammed.positions[:-WALL, 1] > 0
+            if left.sum() >= grains / 3 and _still(jammed, left):
+                return _held(jammed, left), run.time
     return None
+
+
+def _still(run: Simulation, held: NDArray[np.bool_]) -> bool:
+    return bool(np.abs(run.velocities[:-WALL][held]).max() < STILL)
 
 
 def _held(run: Simulation, held: NDArray[np.bool_]) -> Simulation:
