@@ -172,9 +172,10 @@ def attempts(
 
 
 def all_paths(trial: Trial) -> bool:
-    """Coulomb's path, hardly rounded, the convex one and the smoothed one from its end, each if it
-    was not followed yet (as factorisations are dear, or there was a start)."""
-    if not trial.sharp and sharp_path(trial):
+    """The paths that were not followed yet, as factorisations are dear or there was a start: the
+    convex one, which finds rest, and those of `from_path`; where they are dear Coulomb's, hardly
+    rounded, first, which solves more."""
+    if trial.dear and not trial.sharp and sharp_path(trial):
         return True
     if trial.path_point is None and convex_path(trial):
         return True

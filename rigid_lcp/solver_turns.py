@@ -37,14 +37,14 @@ TURN_PATHS = (
     Path(rounding=1e-3, compliance=1e-4, lagged=True),
     Path(convex=True, compliance=1e-4),
 )
-SHARP_PATH, SHARP_STEPS, NEAR_TURNS = Path(rounding=1e-4, compliance=1e-3), 40, 3
-SHARP_END, SHARP_USEFUL, SHARP_NEAR = 3e-8, 1e-5, 1e-7
-"""Coulomb's path of the interior point with hardly any rounding, steps along it and its end; what
-residual Newton may begin from, and from what turns may: where the law is hardly rounded the path
-can jam, and where it does not its end is near."""
 PATH_STEPS = 45
 """Paths from whose ends turns begin again, and steps along each: how many turns are needed differs
 by ten between starts that look alike, so a few of many starts cost less than many of one."""
+SHARP_PATH, SHARP_STEPS, NEAR_TURNS = Path(rounding=1e-4, compliance=1e-3), 40, 3
+SHARP_END, SHARP_USEFUL, SHARP_NEAR = 3e-8, 1e-5, 1e-7
+"""Coulomb's path of the interior point with hardly any rounding, steps along it and its end; what
+residual Newton may begin from, and from what turns may, so many of which may fail: where the law is
+hardly rounded the path can jam, and where it does not its end is near."""
 
 
 def from_path(trial: Trial, begin: tuple[Floats, float]) -> bool:
