@@ -70,10 +70,8 @@ def gauss_seidel(
     Raises `ProblemError` for a start that is none, `UsageError` for an order that is no permutation
     and other options that are none.
     """
-    tolerance, sweeps = (
-        one_number(tolerance, "tolerance", zero=True),
-        whole_number(sweeps, "sweeps"),
-    )
+    tolerance = one_number(tolerance, "tolerance", zero=True)
+    sweeps = whole_number(sweeps, "sweeps")
     contacts, dim = problem.contacts, problem.dim
     if sweeper is None:
         visit = contact_order(order, contacts)

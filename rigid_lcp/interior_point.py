@@ -94,10 +94,8 @@ def interior_point(
 
     Raises `UsageError` for a tolerance that is no number of zero or more, and for no count.
     """
-    tolerance, iterations = (
-        one_number(tolerance, "tolerance", zero=True),
-        whole_number(iterations, "iterations"),
-    )
+    tolerance = one_number(tolerance, "tolerance", zero=True)
+    iterations = whole_number(iterations, "iterations")
     contacts, dim = problem.contacts, problem.dim
     best, best_residual, done, short = np.zeros(contacts * dim), np.inf, 0, 0
     try:

@@ -108,10 +108,8 @@ def newton(
 
     Raises `ProblemError` for a start that is none, `UsageError` for other options that are none.
     """
-    tolerance, iterations = (
-        one_number(tolerance, "tolerance", zero=True),
-        whole_number(iterations, "iterations"),
-    )
+    tolerance = one_number(tolerance, "tolerance", zero=True)
+    iterations = whole_number(iterations, "iterations")
     shape = (problem.contacts, problem.dim)
     linear = linear or factorisation(problem)
     rho = problem.contact_rho

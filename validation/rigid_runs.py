@@ -312,7 +312,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if os.environ.get(name) != "1":
             raise SystemExit(f"set {', '.join(peers.ONE_THREAD)} to 1: costs are of one thread")
     words = sys.argv[1:] if arguments is None else arguments
-    command = ["python", "-m", "validation.rigid_runs", *map(str, words)]
+    place = str(asked.out)  # of one machine: rows name the file alone
+    told = [str(word).replace(place, asked.out.name) for word in words]
+    command = ["python", "-m", "validation.rigid_runs", *told]
     race(
         asked.out, asked.quick, only_problems=asked.problems, only_methods=asked.methods,
         fresh=asked.fresh, budget_s=asked.budget, command=command,

@@ -302,3 +302,15 @@ def test_what_the_record_holds_is_not_made_again(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(case, "all_problems", lambda quick: named)
     rows = [{"case": "rigid-solvers", "problem": "here", "method": report.OURS}]
     assert case.problems_lacking(rows) == ["lacking"]
+
+
+@pytest.mark.parametrize("form", ["--out {}", "--out={}"])
+def test_rows_name_the_record_and_not_its_place(form, tmp_path, monkeypatch) -> None:
+    """A path of the machine that made a row means nothing to who makes it again."""
+    kept: list[str] = []
+    monkeypatch.setattr(runs, "race", lambda *_, command, **__: kept.extend(command))
+    for name in peers.ONE_THREAD:
+        monkeypatch.setenv(name, "1")
+    runs.main(["--quick", *form.format(tmp_path / "some.jsonl").split()])
+    assert " ".join(kept).endswith("--quick " + form.format("some.jsonl"))
+    assert all(" /" not in row["command"] for row in runs.rows_read(runs.RECORD))
