@@ -22,7 +22,7 @@ THREADS = (
 )  # fmt: skip
 """A member runs on one core unless the worker's environment says more: others run beside it."""
 
-COMMAND = Path(__file__).parents[1] / "trackbed.py"
+COMMAND = (sys.executable, "-m", "trackbed")
 """The command, as it is installed on the worker."""
 
 
@@ -50,7 +50,7 @@ STOPPED = Ended(130, "stopped with the sweep; every finished window is saved")
 
 def member_command(scene: Path, run_folder: Path, overrides: Sequence[str]) -> list[str]:
     """The command line of a member; on a folder with a run it goes on with that."""
-    words = [sys.executable, str(COMMAND), "run", str(scene), "--run-folder", str(run_folder)]
+    words = [*COMMAND, "run", str(scene), "--run-folder", str(run_folder)]
     return words + [word for override in overrides for word in ("--set", override)]
 
 

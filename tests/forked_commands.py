@@ -91,7 +91,7 @@ def count_operations(root: str, crash: int) -> None:
 
 def serve(request: dict[str, Any]) -> None:
     """Run one request in this process."""
-    import trackbed
+    from trackbed import command
 
     if "path" in request:
         os.environ["PATH"] = request["path"]
@@ -105,7 +105,7 @@ def serve(request: dict[str, Any]) -> None:
     if "root" in request:
         count_operations(request["root"], request.get("crash", 0))
     with open(request["output"], "w") as output, redirect_stdout(output), redirect_stderr(output):
-        status = trackbed.main(request["words"])
+        status = command.main(request["words"])
     tell(operations=operations)
     if not request.get("here"):
         os._exit(status)

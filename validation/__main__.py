@@ -2,6 +2,6 @@
 
 import sys
 
-from trackbed import main
+from trackbed.command import main
 
 sys.exit(main(["validate", *sys.argv[1:]]))

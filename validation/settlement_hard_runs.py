@@ -70,7 +70,7 @@ def case_run(case: HardCase, folder: Path) -> Row:
 def called(folder: Path, overrides: Sequence[str]) -> subprocess.CompletedProcess[str]:
     """One call of ``trackbed run`` on the demo's scene with ``overrides``."""
     words = [word for setting in overrides for word in ("--set", setting)]
-    command = [sys.executable, str(ROOT / "trackbed.py"), "run", str(scene_path(DEMO))]
+    command = [sys.executable, "-m", "trackbed", "run", str(scene_path(DEMO))]
     return subprocess.run(
         [*command, "--run-folder", str(folder), *words],
         capture_output=True,

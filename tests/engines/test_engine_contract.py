@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from adapters.dump import dump_frames
 from adapters.engine import Engine
 from adapters.run_folder import RunFolder
@@ -352,5 +352,5 @@ def test_killed_run_resumes_to_the_identical_table(
 def test_lost_stage_is_computed_again(sample: Sample, tmp_path: Path) -> None:
     """Without its last window a run resumes to the identical table."""
     run = sample.copy(tmp_path / "run", AFTER)
-    assert trackbed.main(["resume", str(run)]) == 0
+    assert command.main(["resume", str(run)]) == 0
     assert (run / "settlement.csv").read_bytes() == sample.table

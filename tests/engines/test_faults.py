@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from adapters import engine_lammps
 from adapters.dump import Frame, dump_frames, dump_write
 from adapters.engine import engine_named
@@ -51,7 +51,7 @@ def check_failure(
 ) -> None:
     """The run ends with an exit code and a sentence on what to do, and is no bug of ours."""
     capsys.readouterr()
-    assert trackbed.main(sample.words(run)) == code
+    assert command.main(sample.words(run)) == code
     text = capsys.readouterr().err
     assert said in text
     assert "\n  -> " in text
@@ -61,7 +61,7 @@ def check_failure(
 def check_goes_on(sample: Sample, run: Path) -> None:
     """Without the fault the run ends in the table of the undisturbed one."""
     sample.replayed(run)
-    assert trackbed.main(sample.words(run)) == 0
+    assert command.main(sample.words(run)) == 0
     assert (run / "settlement.csv").read_bytes() == sample.table
 
 
@@ -308,7 +308,7 @@ def test_no_mpi(
     for override in sample.overrides:
         if "launcher" not in override:
             words += ["--set", override]
-    assert trackbed.main([*words, "--launcher", launcher]) == code
+    assert command.main([*words, "--launcher", launcher]) == code
     text = capsys.readouterr().err
     assert said in text
     assert "\n  -> " in text

@@ -519,7 +519,7 @@ def test_runs_where_neither_apt_engine_is(tmp_path: Path) -> None:
             *("--engine", "lammps", "--run-folder", str(tmp_path / "run"), *words),
         ],
         env=os.environ | {"PATH": str(tmp_path / "nothing")},
-        cwd=Path(trackbed.__file__).parent,
+        cwd=Path(trackbed.__file__).parents[1],
         capture_output=True,
         text=True,
     )
@@ -550,7 +550,7 @@ def test_lammps_is_never_loaded_into_the_users_python() -> None:
         assert "lammps" not in sys.modules
         assert "libmpi" not in open("/proc/self/maps").read()
     """
-    root = Path(trackbed.__file__).parent
+    root = Path(trackbed.__file__).parents[1]
     subprocess.run([sys.executable, "-c", textwrap.dedent(code)], cwd=root, check=True)
 
 

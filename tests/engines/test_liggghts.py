@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from adapters import stages
 from adapters.engine import EngineStart
 from adapters.engine_liggghts import LiggghtsEngine
@@ -407,19 +407,19 @@ def test_full_disk(run: Path, scene_file: Path, tmp_path: Path) -> None:
     overrides = [word for override in (*TINY, launcher) for word in ("--set", override)]
     words = ["run", str(scene_file), "--run-folder", str(folder), *overrides]
     full.touch()
-    assert trackbed.main(words) == 5
+    assert command.main(words) == 5
     assert RunFolder(folder).stage_names() == []
     full.unlink()
-    assert trackbed.main(words) == 0
+    assert command.main(words) == 0
     table = (folder / "settlement.csv").read_bytes()
     assert table == (run / "settlement.csv").read_bytes()
     shutil.rmtree(folder / AFTER)
     full.touch()
-    assert trackbed.main(["resume", str(folder)]) == 5
+    assert command.main(["resume", str(folder)]) == 5
     assert RunFolder(folder).stage_names() == ["preparation", FIRST, SECOND, JUMP]
     assert not RunFolder(folder).failure(JUMP)
     full.unlink()
-    assert trackbed.main(["resume", str(folder)]) == 0
+    assert command.main(["resume", str(folder)]) == 0
     assert (folder / "settlement.csv").read_bytes() == table
 
 
@@ -434,7 +434,7 @@ def test_absurd_time_step(
 ) -> None:
     """Beyond the Rayleigh time the scene is refused; computed all the same, the result is."""
     words = ["--set", f"engine.rayleigh_share={share}", "--run-folder", str(tmp_path / "no")]
-    assert trackbed.main(["run", str(scene_file), *words]) == 3
+    assert command.main(["run", str(scene_file), *words]) == 3
     assert "rayleigh_share" in capsys.readouterr().err
     plain = scene_load(scene_file, TINY)
     step = plain.rayleigh_time * share
@@ -544,7 +544,7 @@ def test_dry_run_by_hand(scene_file: Path, run: Path, tmp_path: Path) -> None:
     """What --dry-run writes, run with the bare engine, is the preparation of the run itself."""
     words = [word for override in TINY for word in ("--set", override)]
     assert (
-        trackbed.main(["run", str(scene_file), "--run-folder", str(tmp_path), "--dry-run", *words])
+        command.main(["run", str(scene_file), "--run-folder", str(tmp_path), "--dry-run", *words])
         == 0
     )
     folder = tmp_path / "dry_run"

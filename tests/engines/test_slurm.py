@@ -96,7 +96,7 @@ class JobSweep:
 
     def start(self) -> subprocess.Popen[str]:
         return subprocess.Popen(
-            [sys.executable, ROOT / "trackbed.py", *self.words], cwd=self.folder, text=True,
+            [sys.executable, "-m", "trackbed", *self.words], cwd=self.folder, text=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
 
@@ -158,7 +158,7 @@ def test_a_killed_job_is_replaced(tmp_path: Path) -> None:
     (run,) = (sweep.into / "members").iterdir()
     assert "resumed" in [event["event"] for event in RunFolder(run).events()]
     alone = tmp_path / "alone"
-    words = [sys.executable, ROOT / "trackbed.py", "run", tmp_path / "scene.toml"]
+    words = [sys.executable, "-m", "trackbed", "run", tmp_path / "scene.toml"]
     subprocess.run(
         [*words, *set_words(settings), "--run-folder", alone], check=True, capture_output=True
     )
@@ -184,7 +184,7 @@ def test_a_stopped_sweep_leaves_no_job(tmp_path: Path) -> None:
 JOB = """\
 #!/bin/sh
 #SBATCH --job-name=bed --nodes=1 --ntasks=2 --time=00:10:00 --output=job.txt
-{python} {trackbed} run scene.toml --run-folder run
+{python} -m trackbed run scene.toml --run-folder run
 """
 
 
@@ -202,7 +202,7 @@ def test_srun_starts_the_engine(
     ]  # fmt: skip
     answer("srun", f"--mpi={mpi}", "-n", 1, "true")  # the plugin may lack its library
     (tmp_path / "scene.toml").write_text(scene_path("cluster").read_text())
-    text = JOB.format(python=sys.executable, trackbed=ROOT / "trackbed.py").rstrip()
+    text = JOB.format(python=sys.executable).rstrip()
     words = shlex.join(set_words(settings))
     (tmp_path / "job.sh").write_text(f"{text} {words}\n")
     monkeypatch.setenv("OMPI_MCA_mpi_yield_when_idle", "1")  # other work may hold the processors

@@ -17,7 +17,7 @@ import pytest
 
 import trackbed
 from adapters import errors
-from trackbed import main
+from trackbed.command import VERBS, explained, main
 
 ROOT = Path(__file__).parents[2]
 
@@ -25,7 +25,7 @@ ROOT = Path(__file__).parents[2]
 def command(*words: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
     """The command in a process of its own."""
     return subprocess.run(
-        [sys.executable, str(ROOT / "trackbed.py"), *words],
+        [sys.executable, "-m", "trackbed", *words],
         cwd=cwd, capture_output=True, text=True, stdin=subprocess.DEVNULL,
     )  # fmt: skip
 
@@ -38,8 +38,8 @@ def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str])
     text = capsys.readouterr().out
     shipped = {"doctor", "new", "run", "resume", "status", "report", "export", "fit", "relax"}
     others = {"sweep", "qdem", "advise", "grains", "train", "rigid", "validate", "cite"}
-    assert shipped | others == set(trackbed.VERBS)
-    for verb in trackbed.VERBS:
+    assert shipped | others == set(VERBS)
+    for verb in VERBS:
         assert f"\n    {verb}" in text
     codes = {
         kind.exit_code
@@ -50,7 +50,7 @@ def test_help_names_every_verb_and_exit_code(capsys: pytest.CaptureFixture[str])
         assert f"  {code}  " in text
 
 
-@pytest.mark.parametrize("verb", trackbed.VERBS)
+@pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     """``trackbed VERB --help`` exits 0 and shows the verb's usage."""
     with pytest.raises(SystemExit) as stop:
@@ -62,8 +62,8 @@ def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> N
 def test_help_loads_nothing_heavy() -> None:
     """The help of the command and of every verb starts without any of the big libraries."""
     code = (
-        "import sys, trackbed\n"
-        "[trackbed.parser_build(verb) for verb in trackbed.VERBS]\n"
+        "import sys; from trackbed import command\n"
+        "[command.parser_build(verb) for verb in command.VERBS]\n"
         "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
     )
     run = subprocess.run(
@@ -167,7 +167,7 @@ def test_exit_codes(
 def test_reader_goes_away() -> None:
     """``trackbed cite | true`` ends quietly."""
     run = subprocess.run(
-        ["bash", "-o", "pipefail", "-c", f"{sys.executable} trackbed.py cite | true"],
+        ["bash", "-o", "pipefail", "-c", f"{sys.executable} -m trackbed cite | true"],
         cwd=ROOT, capture_output=True, text=True,
     )  # fmt: skip
     assert (run.returncode, run.stderr) == (0, "")
@@ -406,7 +406,7 @@ def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
     def code(number: int, told: Callable[[Path], AbstractContextManager[None]]) -> int:
         with pytest.raises(Exception, match=os.strerror(number)) as caught, told(tmp_path):
             raise OSError(number, os.strerror(number))
-        return trackbed.explained(caught.value)[1]
+        return explained(caught.value)[1]
 
     for number, wanted in (
         (errno.ENOSPC, 5), (errno.EDQUOT, 5), (errno.EFBIG, 5), (errno.EACCES, 2), (errno.EIO, 2)
@@ -414,8 +414,8 @@ def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
         assert code(number, disk_full_named) == wanted
         assert code(number, refusal_told) == wanted
         found = can_not_write(tmp_path, OSError(number, os.strerror(number)))
-        assert trackbed.explained(found)[1] == wanted
-        assert trackbed.explained(OSError(number, os.strerror(number)))[1] == wanted
+        assert explained(found)[1] == wanted
+        assert explained(OSError(number, os.strerror(number)))[1] == wanted
 
 
 def test_validate_refuses_a_record_it_can_not_write(

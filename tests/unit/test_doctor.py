@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from adapters import engine_lammps
-from trackbed import main
+from trackbed.command import main
 
 
 @pytest.fixture

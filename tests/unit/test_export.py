@@ -14,7 +14,7 @@ import meshio
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from adapters.container import Container, sides_needed
 from adapters.errors import EngineFailed
 from adapters.export import FORMATS, export_run
@@ -330,20 +330,20 @@ def test_csv_reads_back(run: Path, tmp_path: Path) -> None:
 def test_verb(run: Path, tmp_path: Path, to: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Files and their size as JSON; again into the same folder gives the same bytes."""
     words = ["export", str(run), "--to", to, "--into", str(tmp_path / "out"), "--json"]
-    assert trackbed.main(words) == 0
+    assert command.main(words) == 0
     answer = json.loads(capsys.readouterr().out)
     files = [Path(path) for path in answer["files"]]
     assert set(files) == {path for path in (tmp_path / "out").rglob("*") if path.is_file()}
     assert answer["bytes"] == sum(path.stat().st_size for path in files)
     before = [path.read_bytes() for path in files]
-    assert trackbed.main(words) == 0
+    assert command.main(words) == 0
     assert [path.read_bytes() for path in files] == before
 
 
 def test_every(run: Path, tmp_path: Path) -> None:
     """Multiples of N, the first and the last; 7 is the end of a jump."""
     words = ["export", str(run), "--to", "vtu", "--into", str(tmp_path), "--every", "3"]
-    assert trackbed.main(words) == 0
+    assert command.main(words) == 0
     found = sorted(path.name[-7:-4] for path in (tmp_path / "vtu").glob("grains_*"))
     assert found == ["000", "003", "009", "011"]
 
@@ -353,8 +353,8 @@ def test_default_folder_is_no_run(scene_file: Path, tmp_path: Path) -> None:
     run = tmp_path / "run"
     overrides = (*TINY, "procedure.total_cycles=4")
     run_scene(scene_file, run, overrides=overrides, progress=Progress(quiet=True), control=True)
-    assert trackbed.main(["export", str(run), "--to", "csv"]) == 0
-    assert trackbed.main(["export", str(run), "--to", "csv", "--variant", "control"]) == 0
+    assert command.main(["export", str(run), "--to", "csv"]) == 0
+    assert command.main(["export", str(run), "--to", "csv", "--variant", "control"]) == 0
     one, other = run / "export" / "grains.csv", run / "control" / "export" / "grains.csv"
     assert one.read_bytes() == other.read_bytes()  # nothing was jumped in four cycles
     record = record_read(run)
@@ -373,16 +373,16 @@ def test_refusals(
     run: Path, words: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Wrong use is exit code 2 and a sentence."""
-    assert trackbed.main(["export", str(run), *words]) == 2
+    assert command.main(["export", str(run), *words]) == 2
     assert said in capsys.readouterr().err
 
 
 def test_nothing_to_export(tmp_path: Path, run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """No run folder, and a run that is not prepared yet."""
-    assert trackbed.main(["export", str(tmp_path), "--to", "vtu"]) == 2
+    assert command.main(["export", str(tmp_path), "--to", "vtu"]) == 2
     for name in ("manifest.json", "scene.toml"):
         (tmp_path / name).write_bytes((run / name).read_bytes())
-    assert trackbed.main(["export", str(tmp_path), "--to", "vtu"]) == 2
+    assert command.main(["export", str(tmp_path), "--to", "vtu"]) == 2
     assert "not prepared yet" in capsys.readouterr().err
 
 

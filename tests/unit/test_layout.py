@@ -21,7 +21,6 @@ def sources() -> list[Path]:
     """Python files of the project."""
     folders = [package for package in PACKAGES if "." not in package] + ["tests"]
     return [
-        ROOT / "trackbed.py",
         *(path for folder in folders for path in (ROOT / folder).rglob("*.py")),
     ]
 

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
-import trackbed
+from trackbed import command
 from qdem_fem.advise import advise, compliance_of, error_together, stiffness_matrix
 from qdem_fem.advise_check import advice_check, advise_scene
 from qdem_fem.mesh_generation import box_mesh
@@ -93,12 +93,12 @@ def test_two_runs_tell_that_the_prediction_bounds() -> None:
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A line a body, and the same in JSON; a tolerance that is none is refused."""
     file = tmp_path / "advice.json"
-    assert trackbed.main(["advise", str(STONES), "--tolerance", "0.05", "--json", str(file)]) == 0
+    assert command.main(["advise", str(STONES), "--tolerance", "0.05", "--json", str(file)]) == 0
     told = capsys.readouterr().out
     assert "pad: deformable: it makes 0.9" in told
     assert "rigid: 2 of 3 bodies" in told
     written = json.loads(file.read_text())
     assert [body["rigid"] for body in written["bodies"]] == [False, True, True]
-    assert trackbed.main(["advise", str(STONES), "--tolerance", "2"]) == 2
-    assert trackbed.main(["advise", str(STONES), "--check"]) == 0
+    assert command.main(["advise", str(STONES), "--tolerance", "2"]) == 2
+    assert command.main(["advise", str(STONES), "--check"]) == 0
     assert "nothing to check" in capsys.readouterr().err

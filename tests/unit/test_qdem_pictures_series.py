@@ -21,7 +21,7 @@ from qdem_fem.output import bodies_vtu_write
 from qdem_fem.periodic import PeriodicWidth
 from qdem_fem.pictures_series import Shown, inside, picture_beside, series_draw
 from qdem_fem.surface import surface_faces
-from trackbed import main
+from trackbed.command import main
 
 SCENE = """
 [[body]]

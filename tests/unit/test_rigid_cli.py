@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from rigid_lcp.run_folder import RunFolder, frame_read
 from tests.rigid_runs import SLIDING_BLOCK
 
@@ -24,7 +24,7 @@ def test_a_run_ends_where_friction_stops_the_block(
     scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """``s = v^2 / (2 mu g)``; a step of h stops it within ``v h`` of that."""
-    assert trackbed.main(["rigid", str(scene), "--json"]) == 0
+    assert command.main(["rigid", str(scene), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     stopped = 0.1**2 / (2 * 0.5 * 9.81)
     assert answer["positions"]["block"][0] == pytest.approx(stopped, abs=0.1 * 2e-3)
@@ -40,14 +40,14 @@ def test_a_run_ends_where_friction_stops_the_block(
 
 
 def test_a_run_goes_on_from_its_last_sound_frame_to_the_same_end(scene: Path) -> None:
-    assert trackbed.main(["rigid", str(scene), "--no-pictures"]) == 0
+    assert command.main(["rigid", str(scene), "--no-pictures"]) == 0
     folder = RunFolder(scene.with_name("slide-run"))
     last = frame_read(folder.frames()[-1])
     (folder.path / "result.json").unlink()
     (folder.path / "frame_000003.npz").unlink()
     (folder.path / "frame_000002.npz").write_bytes(b"PK cut short")
-    assert trackbed.main(["rigid", str(scene), "--no-pictures"]) == 2
-    assert trackbed.main(["rigid", str(scene), "--no-pictures", "--resume"]) == 0
+    assert command.main(["rigid", str(scene), "--no-pictures"]) == 2
+    assert command.main(["rigid", str(scene), "--no-pictures", "--resume"]) == 0
     again = frame_read(folder.frames()[-1])
     np.testing.assert_array_equal(again["motion"].position, last["motion"].position)
     np.testing.assert_array_equal(again["motion"].rates, last["motion"].rates)
@@ -59,21 +59,21 @@ def test_a_folder_is_never_taken_from_others(
     folder = scene.with_name("slide-run")
     folder.mkdir()
     (folder / "thesis.tex").write_text("mine", encoding="utf-8")
-    assert trackbed.main(["rigid", str(scene), "--force"]) == 2
+    assert command.main(["rigid", str(scene), "--force"]) == 2
     assert "thesis.tex" in capsys.readouterr().err
     assert (folder / "thesis.tex").read_text(encoding="utf-8") == "mine"
 
 
 def test_another_scene_needs_force(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = ["rigid", str(scene), "--no-pictures"]
-    assert trackbed.main(run) == 0
-    assert trackbed.main([*run, "--set", "run.step=1e-3"]) == 2
+    assert command.main(run) == 0
+    assert command.main([*run, "--set", "run.step=1e-3"]) == 2
     assert "another scene" in capsys.readouterr().err
-    assert trackbed.main([*run, "--set", "run.step=1e-3", "--force"]) == 0
+    assert command.main([*run, "--set", "run.step=1e-3", "--force"]) == 0
 
 
 def test_a_dry_run_writes_nothing(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert trackbed.main(["rigid", str(scene), "--dry-run", "--json"]) == 0
+    assert command.main(["rigid", str(scene), "--dry-run", "--json"]) == 0
     outlook = json.loads(capsys.readouterr().out)
     assert (outlook["bodies"], outlook["steps"]) == (1, 30)
     assert not scene.with_name("slide-run").exists()
@@ -90,12 +90,12 @@ def test_bad_scenes_have_their_exit_codes(scene: Path, change: str, code: int) -
         table = "[run]" if key == "step" else "[[body]]"
         kept.insert(kept.index(table) + 1, change)
     scene.write_text("\n".join(kept), encoding="utf-8")
-    assert trackbed.main(["rigid", str(scene)]) == code
+    assert command.main(["rigid", str(scene)]) == code
     assert not scene.with_name("slide-run").exists()
 
 
 def test_resume_and_force_exclude_each_other(scene: Path) -> None:
-    assert trackbed.main(["rigid", str(scene), "--resume", "--force"]) == 2
+    assert command.main(["rigid", str(scene), "--resume", "--force"]) == 2
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_flags_that_are_none_are_named(
     words: list[str], scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:
-        trackbed.main(["rigid", *(str(scene) if word == scene.name else word for word in words)])
+        command.main(["rigid", *(str(scene) if word == scene.name else word for word in words)])
     assert ended.value.code == 2
     assert "error: " in capsys.readouterr().err
     assert not scene.with_name("slide-run").exists()
@@ -127,7 +127,7 @@ def test_flags_that_are_none_are_named(
 def test_overrides_that_are_none_are_named(
     override: str, code: int, said: str, scene: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert trackbed.main(["rigid", str(scene), "--set", override]) == code
+    assert command.main(["rigid", str(scene), "--set", override]) == code
     message = capsys.readouterr().err
     assert said in message
     assert "\n  -> " in message
@@ -138,7 +138,7 @@ def test_overrides_that_are_none_are_named(
 def test_a_scene_that_can_not_be_read_is_named(
     path: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert trackbed.main(["rigid", str(tmp_path / path)]) == 2
+    assert command.main(["rigid", str(tmp_path / path)]) == 2
     assert "the scene can not be read" in capsys.readouterr().err
 
 
@@ -147,7 +147,7 @@ def test_report_and_summary_say_what_was_left_out_and_what_was_not_reached(
 ) -> None:
     """Without friction one unknown a contact; steps above the tolerance are counted."""
     words = ["rigid", str(scene), "--no-pictures", "--json", "--set", "surface.friction=0"]
-    assert trackbed.main([*words, "--set", "run.tolerance=1e-14"]) == 0
+    assert command.main([*words, "--set", "run.tolerance=1e-14"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["unknowns_a_contact"] == 1
     assert any(text.startswith("friction: ") for text in answer["left_out"])

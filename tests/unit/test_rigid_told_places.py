@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from rigid_lcp import Disc, Polygon, Polyhedron, Scene, Simulation, Sphere, box
 from rigid_lcp.errors import NotConverged, RigidError, SceneError, ShapeError, UsageError
 from rigid_lcp.polyhedra import cut
@@ -100,7 +100,7 @@ def test_a_run_folder_that_is_a_file_is_told_as_that(
     scene.write_text(SLIDING_BLOCK, encoding="utf-8")
     file.write_text("mine", encoding="utf-8")
     folder = file / "run" if below else file
-    assert trackbed.main(["rigid", str(scene), "--run-folder", str(folder)]) == 2
+    assert command.main(["rigid", str(scene), "--run-folder", str(folder)]) == 2
     message = capsys.readouterr().err
     assert f"{folder}: can not be written (" in message
     assert "\n  -> a file is where the folder should be: give another --run-folder" in message
@@ -114,8 +114,8 @@ def test_a_scene_file_s_huge_load_and_gravity_are_named_by_body_and_key(
     scene = tmp_path / "slide.toml"
     load = '\n[[load]]\nbody = "block"\nforce = [0, -1e300]\n'
     scene.write_text(SLIDING_BLOCK + load, encoding="utf-8")
-    assert trackbed.main(["rigid", str(scene), "--no-pictures"]) == 3
+    assert command.main(["rigid", str(scene), "--no-pictures"]) == 3
     assert "block at 0 s: its load is 1e+300 N on 40 kg" in capsys.readouterr().err
     scene.write_text("gravity = [0, -1e200]\n" + SLIDING_BLOCK, encoding="utf-8")
-    assert trackbed.main(["rigid", str(scene), "--dry-run"]) == 3
+    assert command.main(["rigid", str(scene), "--dry-run"]) == 3
     assert "gravity is [0.0, -1e+200]\n  -> give 2 finite" in capsys.readouterr().err

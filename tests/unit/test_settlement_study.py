@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from trackbed import main
+from trackbed.command import main
 from validation import (
     cases,
     jump_runs,

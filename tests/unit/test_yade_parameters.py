@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import trackbed
+from trackbed import command
 from adapters import contact_law as law
 from adapters.container import Container, sides_needed
 from adapters.decks import PISTON_MARGIN
@@ -262,7 +262,7 @@ def test_run_that_fails(
 def test_dry_run_prints_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """``trackbed run --dry-run`` leaves scripts and parameters, and says how to run them."""
     words = ["run", str(scene_path("karrech-coarse")), "--engine", "yade", "--dry-run"]
-    assert trackbed.main([*words, "--run-folder", str(tmp_path / "run")]) == 0
+    assert command.main([*words, "--run-folder", str(tmp_path / "run")]) == 0
     assert "yade -n -x -j1 prepare.py params.json" in capsys.readouterr().out
     names = {path.name for path in (tmp_path / "run" / "dry_run").iterdir()}
     assert names == {"prepare.py", "bed.py", "record.py", "params.json"}

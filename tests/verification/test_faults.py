@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from adapters import procedure, stages
 from adapters.dump import Frame, dump_frames, dump_write
 from adapters.engine import EngineRun, engine_failure
@@ -45,7 +45,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Run folder of an undisturbed run."""
     folder = tmp_path_factory.mktemp("whole")
     (folder / "scene.toml").write_text(SCENE)
-    assert trackbed.main(["run", str(folder / "scene.toml")]) == 0
+    assert command.main(["run", str(folder / "scene.toml")]) == 0
     assert AFTER in RunFolder(folder / "run").stage_names()
     return folder / "run"
 
@@ -197,7 +197,7 @@ def test_fault_in_the_rain(
     damage, code, words = STATES[fault]
     with monkeypatch.context() as patch:
         patch.setattr(FakeEngine, "run", damaged(damage, "preparation"))
-        assert trackbed.main(["run", str(scene)]) == code
+        assert command.main(["run", str(scene)]) == code
     said = capsys.readouterr().err
     assert words in said
     assert "this is a bug" not in said
@@ -209,7 +209,7 @@ def test_grain_lost_in_the_rain(
 ) -> None:
     """A grain that is in no frame of the rain is missed all the same."""
     monkeypatch.setattr(FakeEngine, "run", damaged(lost_always, "preparation"))
-    assert trackbed.main(["run", str(scene)]) == 6
+    assert command.main(["run", str(scene)]) == 6
     assert "1 of 60 grains are lost" in capsys.readouterr().err
 
 
@@ -227,13 +227,13 @@ def test_fault_in_a_window(
     run = scene.parent / "run"
     with monkeypatch.context() as patch:
         patch.setattr(FakeEngine, "run", damaged(damage, SECOND))
-        assert trackbed.main(["run", str(scene)]) == code
+        assert command.main(["run", str(scene)]) == code
     said = capsys.readouterr().err
     assert words in said
     assert "this is a bug" not in said
     assert RunFolder(run).stage_names() == ["preparation", FIRST]
     assert table(whole).startswith(table(run))
-    assert trackbed.main(["resume", str(run)]) == 0
+    assert command.main(["resume", str(run)]) == 0
     assert table(run) == table(whole)
     kept = run / "discarded" / f"{SECOND}.1"
     assert (kept / "input.npz").exists()
@@ -267,7 +267,7 @@ def test_failed_jump_is_retried(
     """Jumps of 8, 4, 2 cycles fail, the next is half as long, succeeds, and all is recorded."""
     run = scene.parent / "run"
     monkeypatch.setattr(FakeEngine, "run", failing(count, error))
-    assert trackbed.main(["run", str(scene)]) == 0
+    assert command.main(["run", str(scene)]) == 0
     names = RunFolder(run).stage_names()
     assert [f"jump_000006_{i}" for i in range(1, count + 2)] == names[3 : 4 + count]
     assert names[4 + count] == f"window_{6 + (8 >> count):06d}"
@@ -288,7 +288,7 @@ def test_jump_that_fails_for_good(
     run = scene.parent / "run"
     monkeypatch.setattr(FakeEngine, "run", failing(4, NotCredible("made to fail")))
     for words in (["run", str(scene)], ["resume", str(run)]):
-        assert trackbed.main(words) == 6
+        assert command.main(words) == 6
         assert "failed 4 times, the last time: made to fail" in capsys.readouterr().err
         jumps = [f"jump_000006_{i}" for i in (1, 2, 3, 4)]
         assert RunFolder(run).stage_names() == ["preparation", FIRST, SECOND, *jumps]
@@ -310,8 +310,8 @@ def test_cycles_in_place_of_jumps_that_fail_for_good(
         raise NotCredible("made to fail")
 
     monkeypatch.setattr(stages, "jump", fail)
-    assert trackbed.main(["run", str(scene)]) == 6
-    assert trackbed.main(["resume", str(run), "--cycle-by-cycle"]) == 0
+    assert command.main(["run", str(scene)]) == 6
+    assert command.main(["resume", str(run), "--cycle-by-cycle"]) == 0
     lines = table(run).decode().splitlines()[1:]
     assert [int(line.split(",")[0]) for line in lines] == list(range(1, 25))
     assert not any("jumped" in line for line in lines)
@@ -320,7 +320,7 @@ def test_cycles_in_place_of_jumps_that_fail_for_good(
     assert places == [6, 10]  # at 18 no jump of 8 and a window fit before the end
     again = scene.parent / "again"
     words = ["run", str(scene), "--run-folder", str(again), "--cycle-by-cycle"]
-    assert trackbed.main(words) == 0
+    assert command.main(words) == 0
     assert table(again) == table(run)
 
 
@@ -333,7 +333,7 @@ def test_resume_amid_retries(
     run, fails = scene.parent / "run", failing(3, NotCredible("made to fail"))
     monkeypatch.setattr(FakeEngine, "run", fails)
     other = tmp_path / "undisturbed"
-    assert trackbed.main(["run", str(scene), "--run-folder", str(other)]) == 0
+    assert command.main(["run", str(scene), "--run-folder", str(other)]) == 0
 
     def stop(self: FakeEngine, scene: Scene, deck: str, folder: Path, *rest: object) -> EngineRun:
         if folder.name == f"window_{6 + (8 >> stop_at):06d}":
@@ -342,9 +342,9 @@ def test_resume_amid_retries(
 
     with monkeypatch.context() as patch:
         patch.setattr(FakeEngine, "run", stop)
-        assert trackbed.main(["run", str(scene)]) == 130
+        assert command.main(["run", str(scene)]) == 130
     assert len([e for e in RunFolder(run).events() if e["event"] == "jump failed"]) == stop_at
-    assert trackbed.main(["resume", str(run)]) == 0
+    assert command.main(["resume", str(run)]) == 0
     assert table(run) == table(other)
     assert len([e for e in RunFolder(run).events() if e["event"] == "jump failed"]) == 3
 
@@ -362,10 +362,10 @@ def test_killed_engine_is_not_a_failed_jump(
     error = engine_failure(status, scene.parent)
     with monkeypatch.context() as patch:
         patch.setattr(FakeEngine, "run", failing(4, error))
-        assert trackbed.main(["run", str(scene)]) == 5
+        assert command.main(["run", str(scene)]) == 5
     assert "was ended by SIG" in capsys.readouterr().err
     assert not any(RunFolder(run).failure(name) for name in RunFolder(run).stage_names())
-    assert trackbed.main(["resume", str(run)]) == 0
+    assert command.main(["resume", str(run)]) == 0
     assert table(run) == table(whole)
 
 
@@ -402,7 +402,7 @@ def test_damage_is_noticed_on_resume(
     left = {
         other: (run / other / "outcome.json").stat().st_ino for other in names if other != stage
     }
-    assert trackbed.main(["resume", str(run)]) == 0
+    assert command.main(["resume", str(run)]) == 0
     assert f"{stage} is damaged" in capsys.readouterr().err
     assert table(run) == table(whole)
     assert RunFolder(run).stage_names() == names
@@ -423,7 +423,7 @@ def test_lost_table_is_written_again(tmp_path: Path, whole: Path) -> None:
         (run / "settlement.csv").unlink()
         if content is not None:
             (run / "settlement.csv").write_bytes(content)
-        assert trackbed.main(["resume", str(run)]) == 0
+        assert command.main(["resume", str(run)]) == 0
         assert table(run) == table(whole)
 
 
@@ -439,7 +439,7 @@ def test_changed_parameter_is_refused(
     shutil.copytree(whole, run)
     scene = str(whole.parent / "scene.toml")
     words = ["run", scene, "--run-folder", str(run), "--set", f"{key}={value}"]
-    assert trackbed.main(words) == 3
+    assert command.main(words) == 3
     said = capsys.readouterr().err
     assert f"{key}: " in said
     assert " in the run, " in said
@@ -454,7 +454,7 @@ def test_edited_scene_is_refused_on_resume(
     shutil.copytree(whole, run)
     path = run / "scene.toml"
     path.write_text(path.read_text().replace("2710.0", "2700.0"))
-    assert trackbed.main(["resume", str(run)]) == 3
+    assert command.main(["resume", str(run)]) == 3
     assert "material.grain.density: 2710.0 in the run, 2700.0 now" in capsys.readouterr().err
 
 
@@ -488,12 +488,12 @@ def test_full_disk(
 
     with monkeypatch.context() as patch:
         patch.setattr(where, full)
-        assert trackbed.main(["run", str(scene)]) == 5
+        assert command.main(["run", str(scene)]) == 5
     said = capsys.readouterr().err
     assert "the disk is full" in said
     assert "trackbed resume" in said
     assert RunFolder(run).stage_names() == [name for name in [stage] if name]
-    assert trackbed.main(["resume", str(run)]) == 0
+    assert command.main(["resume", str(run)]) == 0
     assert table(run) == table(whole)
 
 
@@ -511,9 +511,9 @@ def test_full_disk_in_a_jump_is_no_failed_jump(
 
     with monkeypatch.context() as patch:
         patch.setattr(stages, "state_save", full)
-        assert trackbed.main(["run", str(scene)]) == 5
+        assert command.main(["run", str(scene)]) == 5
     assert not any(event["event"] == "jump failed" for event in RunFolder(run).events())
-    assert trackbed.main(["resume", str(run)]) == 0
+    assert command.main(["resume", str(run)]) == 0
     assert table(run) == table(whole)
 
 
@@ -526,10 +526,10 @@ def test_full_disk_that_the_engine_did_not_notice(
     with monkeypatch.context() as patch:
         patch.setattr(FakeEngine, "run", damaged(truncated("states.dump", 0.9), AFTER))
         patch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=4096))
-        assert trackbed.main(["run", str(scene)]) == 5
+        assert command.main(["run", str(scene)]) == 5
     assert "the disk is full (4096 bytes left)" in capsys.readouterr().err
     assert not any(event["event"] == "jump failed" for event in RunFolder(run).events())
-    assert trackbed.main(["resume", str(run)]) == 0
+    assert command.main(["resume", str(run)]) == 0
     assert table(run) == table(whole)
 
 
@@ -544,7 +544,7 @@ def test_full_disk_at_the_lock(
         raise FULL
 
     monkeypatch.setattr("adapters.run_folder.socket.gethostname", full)
-    assert trackbed.main(["resume", str(run)]) == 5
+    assert command.main(["resume", str(run)]) == 5
     assert "the disk is full" in capsys.readouterr().err
 
 
@@ -574,7 +574,7 @@ GOOD = 'echo "LIGGGHTS-PUBLIC 3.8.0, compiled 2022-01-26"'
 
 
 def liggghts(scene: Path) -> int:
-    return trackbed.main(["run", str(scene), "--engine", "liggghts"])
+    return command.main(["run", str(scene), "--engine", "liggghts"])
 
 
 def test_engine_missing(scene: Path, programs: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -609,7 +609,7 @@ def test_launcher_missing(scene: Path, programs: Path, capsys: pytest.CaptureFix
     """A launcher that is not there is named."""
     install(programs, GOOD)
     words = ["run", str(scene), "--engine", "liggghts", "--launcher", "no-such-launcher -np 2"]
-    assert trackbed.main(words) == 4
+    assert command.main(words) == 4
     assert "can not start no-such-launcher" in capsys.readouterr().err
 
 

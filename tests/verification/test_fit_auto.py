@@ -26,7 +26,7 @@ from adapters.fit_refusal import UNCERTAIN, refusals
 from adapters.fit_regime import SHAKEDOWN, independent, regimes_of, tail_rows
 from adapters.laws import law_named
 from adapters.state import FloatArray
-from trackbed import main
+from trackbed.command import main
 
 READ = np.unique(np.geomspace(1, 1000, 22).round())
 """Cycles at which a laboratory reads."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from adapters import engine_fake, procedure, stages
 from adapters.engine_fake import FakeBed
 from adapters.errors import JumpRefused, SceneError
@@ -124,11 +124,11 @@ def test_collapse_is_refused_with_its_code(
     """Exit code 6 and what to do; ``resume --cycle-by-cycle`` goes on to the end, for good."""
     monkeypatch.setattr(engine_fake, "BED", FakeBed(lambda n: 0.005 * CURVES["collapse"](n)))
     scene = small(tmp_path, 200)
-    assert trackbed.main(["run", str(scene)]) == JumpRefused.exit_code == 6
+    assert command.main(["run", str(scene)]) == JumpRefused.exit_code == 6
     assert "trackbed resume RUN --cycle-by-cycle" in capsys.readouterr().err
-    assert trackbed.main(["resume", str(tmp_path / "run")]) == 6
-    assert trackbed.main(["resume", str(tmp_path / "run"), "--cycle-by-cycle"]) == 0
-    assert trackbed.main(["resume", str(tmp_path / "run")]) == 0
+    assert command.main(["resume", str(tmp_path / "run")]) == 6
+    assert command.main(["resume", str(tmp_path / "run"), "--cycle-by-cycle"]) == 0
+    assert command.main(["resume", str(tmp_path / "run")]) == 0
     assert status(tmp_path / "run").cycles_computed == 200
 
 
@@ -147,18 +147,18 @@ def test_a_piston_that_breaks_in_is_refused(
     monkeypatch.setattr(engine_fake, "BED", FakeBed(sinking=5e-6))
     scene = small(tmp_path, 100)
     words = ["run", str(scene), "--set", f"loading.area_share={share}"]
-    assert trackbed.main(words) == code
+    assert command.main(words) == code
     why = "rate at which the piston sinks hardly falls (ratcheting)"
     assert (why in capsys.readouterr().err) == (code == 6)
     if code:
-        assert trackbed.main(["resume", str(tmp_path / "run"), "--cycle-by-cycle"]) == 0
+        assert command.main(["resume", str(tmp_path / "run"), "--cycle-by-cycle"]) == 0
         assert status(tmp_path / "run").cycles_computed == 100
 
 
 def test_a_piston_that_goes_down_with_its_bed_is_not_refused(tmp_path: Path) -> None:
     """On a part of the section, as on all of it: jumps are made."""
     scene = small(tmp_path, 100)
-    assert trackbed.main(["run", str(scene), "--set", "loading.area_share=0.3"]) == 0
+    assert command.main(["run", str(scene), "--set", "loading.area_share=0.3"]) == 0
     assert status(tmp_path / "run").cycles_computed < 100
 
 
@@ -197,7 +197,7 @@ def test_no_jump_pays_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     """Tolerance 1e-6: every cycle is computed, and the reason is on the screen once."""
     scene = small(tmp_path, 120)
     words = ["--tolerance", "1e-6", "--cycles", "110", "--run-folder", str(tmp_path / "run")]
-    assert trackbed.main(["run", str(scene), *words]) == 0
+    assert command.main(["run", str(scene), *words]) == 0
     assert capsys.readouterr().err.count("no jump pays") == 1
     assert status(tmp_path / "run").cycles_computed == 110
 
@@ -219,7 +219,7 @@ def test_scene_keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         with pytest.raises(SceneError, match=r"procedure\.tolerance"):
             scene_load(scene, [f"procedure.tolerance={value}"])
     words = ["run", str(scene), "--tolerance", "0.02", "--set", "procedure.h=3"]
-    assert trackbed.main(words) == 2
+    assert command.main(words) == 2
     assert "--tolerance chooses k and h" in capsys.readouterr().err
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from adapters import engine_process
 from adapters.engine_process import process_run
 from adapters.run_folder import RunFolder
@@ -141,7 +141,7 @@ def test_interrupt_is_not_taken_for_a_damaged_file(
         return load(path, **named)
 
     monkeypatch.setattr(np, "load", interrupt)
-    assert trackbed.main(["run", str(tmp_path / "scene.toml")]) == 130
+    assert command.main(["run", str(tmp_path / "scene.toml")]) == 130
     events = [event["event"] for event in RunFolder(tmp_path / "run").events()]
     assert "jump failed" not in events
     assert events[-1] == "stopped"
@@ -155,10 +155,10 @@ def test_two_writers(
     run = tmp_path / "run"
     pid = commands.start(*resume(commands, run), slow=SLOW)
     assert commands.until("window")
-    assert trackbed.main(["resume", str(run)]) == 2
+    assert command.main(["resume", str(run)]) == 2
     assert f"pid {pid} on " in capsys.readouterr().err
     scene = str(commands.folder / "scene.toml")
-    assert trackbed.main(["run", scene, "--run-folder", str(run)]) == 2
+    assert command.main(["run", scene, "--run-folder", str(run)]) == 2
     assert commands.end() == 0
     assert table(run) == whole
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import qdem_fem as q
-import trackbed
+from trackbed import command
 from qdem_fem.contact_search import pairs_near, pairs_periodic
 from qdem_fem.errors import CheckpointError, ConditionError, SceneError
 from qdem_fem.leapfrog import accelerations_free
@@ -474,7 +474,7 @@ def test_a_scene_names_absorbing_faces(tmp_path: Path) -> None:
     """Its energies are columns of energy.csv, which close; what is wrong is told with its key."""
     path = tmp_path / "scene.toml"
     path.write_text(ABSORBING)
-    assert trackbed.main(["qdem", str(path), "--no-pictures"]) == 0
+    assert command.main(["qdem", str(path), "--no-pictures"]) == 0
     rows = table_read(next(tmp_path.rglob("energy.csv")))
     assert rows["absorbed"][-1] > 0.0 < rows["foundation"][-1]
     stored = sum(rows[name] for name in ("kinetic", "elastic", "absorbed", "foundation"))

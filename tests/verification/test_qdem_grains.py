@@ -40,7 +40,7 @@ from qdem_fem.grain_surface import (
 from qdem_fem.mesh import element_gradients
 from qdem_fem.mesh_checks import FloatArray, IntArray
 from qdem_fem.surface import surface_faces
-from trackbed import main
+from trackbed.command import main
 
 CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)]) - 0.5
 TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])

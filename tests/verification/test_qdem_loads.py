@@ -31,7 +31,7 @@ from qdem_fem.mesh import TetMesh, element_gradients, lumped_mass
 from qdem_fem.sleeper_mesh import SleeperShape, sleeper_mesh
 from qdem_fem.sleeper_modes import free_modes
 from qdem_fem.spectra import fourier_spectrum
-from trackbed import main
+from trackbed.command import main
 
 CONCRETE = Material(young=45e9, poisson=0.167, density=2350)
 TRACK = Track()

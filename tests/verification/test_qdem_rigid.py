@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj
 
 import qdem_fem as q
-import trackbed
+from trackbed import command
 from qdem_fem.contact_step import network_bound
 from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, SceneError, Unstable
 from qdem_fem.mesh_generation import box_mesh
@@ -541,12 +541,12 @@ def test_a_scene_names_its_rigid_bodies(tmp_path: Path, capsys: pytest.CaptureFi
     left = prepared.scene.left_out()
     assert any("deformation" in text for text in left)
     assert any(text.startswith("viscosity") for text in left)
-    assert trackbed.main(["qdem", str(file), "--no-pictures"]) == 0
+    assert command.main(["qdem", str(file), "--no-pictures"]) == 0
     assert "governed by contact" in capsys.readouterr().out
     alone = SCENE[: SCENE.index("[contact]")] + SCENE[SCENE.index("[output]") :]
     falls = "duration = 1e-5\nstep = 1e-6\ngravity = [0, 0, -9.81]"  # a loop compiled already
     file.write_text(alone.replace("duration = 1e-5", falls), encoding="utf-8")
-    assert trackbed.main(["qdem", str(file), "--force", "--json"]) == 0
+    assert command.main(["qdem", str(file), "--force", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["critical_step"]["value"] is None
     file.write_text(SCENE, encoding="utf-8")
     lumped = scene_load(file, ['body.0.rigid="lumped"'])

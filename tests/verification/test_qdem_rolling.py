@@ -36,7 +36,7 @@ from qdem_fem.scene_checks import scene_load
 from qdem_fem.track_cli import SEAT_AREA
 from qdem_fem.track_load import bogie_series
 from qdem_fem.track_scene import TrackPrepared
-from trackbed import main
+from trackbed.command import main
 from validation.track_trials import SCENE
 
 TRACK, ROLLING, SPEED, LOAD = Track(), Rolling(), 32.0, 50e3

@@ -41,7 +41,7 @@ from qdem_fem.track_load import RISE, bogie_series
 from qdem_fem.track_recipe import BedRecipe, grains_of
 from qdem_fem.track_scene import TrackPrepared
 from qdem_fem.track_table import BogieTable, TrackTable
-from trackbed import main
+from trackbed.command import main
 from validation import track_page
 from validation.track_bogie import passages, settlement_at
 from validation.track_trials import SCENE

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from qdem_fem.errors import SceneError, StepWarning
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
@@ -64,7 +64,7 @@ def test_advice_on_a_track_is_checked_with_all_grains_rigid(
     was predicted: a share of the compliance that is left out is left out of the way too."""
     scene, file = folder / "scene.toml", folder / "advice.json"
     marks = [f"--set={one}" for one in (*FEW, "simulation.duration=0.006")]
-    assert trackbed.main(["advise", str(scene), "--check", "--json", str(file), *marks]) == 0
+    assert command.main(["advise", str(scene), "--check", "--json", str(file), *marks]) == 0
     told = capsys.readouterr().out
     assert "two runs, 11 bodies rigid in one" in told
     found = json.loads(file.read_text(encoding="utf-8"))

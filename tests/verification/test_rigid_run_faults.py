@@ -56,7 +56,7 @@ def run_words(scene: Path, folder: Path, *more: str) -> list[str]:
 
 def goes_on(scene: Path, folder: Path, whole: list[dict[str, Any]]) -> None:
     """The same command with --resume brings the run to the end it would have had."""
-    assert trackbed.main(run_words(scene, folder, "--resume")) == 0
+    assert command.main(run_words(scene, folder, "--resume")) == 0
     assert frame_bits(folder) == whole
     assert RunFolder(folder).summary is not None
     assert not list(folder.glob(".*.partial"))
@@ -98,7 +98,7 @@ def test_full_disk_at_every_write(
         folder = tmp_path / str(refused)
         with pytest.MonkeyPatch.context() as patch:
             disk = RefusingDisk(folder, patch, refused)
-            code = trackbed.main(run_words(scene, folder))
+            code = command.main(run_words(scene, folder))
         said = capsys.readouterr().err
         if disk.count < refused:
             break
@@ -121,10 +121,10 @@ def test_full_disk_at_a_picture(
     run = ["rigid", str(scene), "--run-folder", str(tmp_path / "run"), "--set", "run.frames=2"]
     with pytest.MonkeyPatch.context() as patch:
         disk = RefusingDisk(tmp_path / "run" / f".{name}", patch, 1)
-        assert trackbed.main(run) == 5
+        assert command.main(run) == 5
     assert disk.count == 1
     assert f"{name}: can not be written (No space left" in capsys.readouterr().err
-    assert trackbed.main([*run, "--resume"]) == 0
+    assert command.main([*run, "--resume"]) == 0
     assert (tmp_path / "run" / name).stat().st_size > 0
 
 
@@ -132,10 +132,10 @@ def test_files_that_the_system_cuts_short(
     scene: Path, whole: list[dict[str, Any]], tmp_path: Path
 ) -> None:
     """A limit on the length of files, set by the system, is told like a full disk."""
-    command = [sys.executable, trackbed.__file__, *run_words(scene, tmp_path / "run")]
+    command = [sys.executable, "-m", "trackbed", *run_words(scene, tmp_path / "run")]
     limited = ["bash", "-c", 'ulimit -f 2; exec "$@"', "bash", *command]  # 2 KiB; a frame has 7
     ended = subprocess.run(
-        limited, capture_output=True, text=True, cwd=Path(trackbed.__file__).parent
+        limited, capture_output=True, text=True, cwd=Path(trackbed.__file__).parents[1]
     )
     assert ended.returncode == 5, ended.stderr
     assert "frame_000000.npz: can not be written (File too large)" in ended.stderr
@@ -147,7 +147,7 @@ def test_folder_that_can_not_be_made(
 ) -> None:
     (tmp_path / "file").write_text("mine", encoding="utf-8")
     for folder in (tmp_path / "file", tmp_path / "file" / "run", Path("/proc/run")):
-        assert trackbed.main(run_words(scene, folder)) == 2
+        assert command.main(run_words(scene, folder)) == 2
         said = capsys.readouterr().err
         assert f"{folder}: can not be written (" in said
         assert "give another --run-folder" in said
@@ -175,7 +175,7 @@ def test_folder_that_vanishes(
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Simulation, "advance", remove)
-        assert trackbed.main(run_words(scene, folder)) == 2
+        assert command.main(run_words(scene, folder)) == 2
     assert "removed or replaced while the run went on" in capsys.readouterr().err
     assert [path.name for path in folder.glob("*")] == ([".lock"] if comes_back else [])
     goes_on(scene, folder, whole)
@@ -244,7 +244,7 @@ def test_stopped_by_a_signal(
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Simulation, "advance", stop)
-        assert trackbed.main(run_words(scene, tmp_path / "run")) == 130
+        assert command.main(run_words(scene, tmp_path / "run")) == 130
     said = capsys.readouterr().err
     assert f"stopped by {number.name}; every finished frame is saved" in said
     assert "--resume" in said
@@ -255,9 +255,9 @@ def test_stopped_by_a_signal(
 
 def test_the_reader_of_the_progress_goes_away(scene: Path, tmp_path: Path) -> None:
     """As in ``trackbed rigid ... 2>&1 | head -1``: the run comes to its end all the same."""
-    command = [sys.executable, trackbed.__file__, *run_words(scene, tmp_path / "run")]
+    command = [sys.executable, "-m", "trackbed", *run_words(scene, tmp_path / "run")]
     piped = ["bash", "-c", '"$@" 2>&1 | true', "bash", *command]
-    subprocess.run(piped, check=True, cwd=Path(trackbed.__file__).parent)
+    subprocess.run(piped, check=True, cwd=Path(trackbed.__file__).parents[1])
     assert RunFolder(tmp_path / "run").summary is not None
 
 
@@ -272,10 +272,10 @@ def test_two_writers(
 ) -> None:
     """The second one is refused with the first one's pid, --force or not; nothing changes."""
     folder = RunFolder(tmp_path / "run")
-    assert trackbed.main(run_words(scene, folder.path)) == 0
+    assert command.main(run_words(scene, folder.path)) == 0
     with folder.locked():
         for flag in ("--resume", "--force"):
-            assert trackbed.main(run_words(scene, folder.path, flag)) == 2
+            assert command.main(run_words(scene, folder.path, flag)) == 2
             assert f"another process writes to this run (pid {os.getpid()} on " in (
                 capsys.readouterr().err
             )
@@ -308,7 +308,7 @@ def test_frames_without_their_manifest_are_not_lost(
         manifest = folder / "manifest.json"
         manifest.write_text(damage, encoding="utf-8") if damage else manifest.unlink()
         for flags in ([], ["--resume"]):
-            assert trackbed.main(run_words(scene, folder, *flags)) == 2
+            assert command.main(run_words(scene, folder, *flags)) == 2
             assert "manifest.json of this run is missing or can not be read" in (
                 capsys.readouterr().err
             )

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import trackbed
+from trackbed import command
 from adapters import sweep_member, sweep_run
 from adapters.run_folder import RunFolder
 from adapters.sweep import Member, Sweep
@@ -47,14 +47,14 @@ def in_process(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     ran: list[list[str]] = []
 
     def run(
-        command: Sequence[str], folder: Path, watch: Callable[[], None]
+        words: Sequence[str], folder: Path, watch: Callable[[], None]
     ) -> tuple[int, float, float]:
         watch()
-        words = list(command[command.index(str(sweep_member.COMMAND)) + 1 :])
+        words = list(words[len(sweep_member.COMMAND) :])
         ran.append(words)
         screen = (folder / "screen.txt").open("w")
         with screen, redirect_stdout(screen), redirect_stderr(screen):
-            return trackbed.main(words), 0.0, 0.0
+            return command.main(words), 0.0, 0.0
 
     monkeypatch.setattr(sweep_member, "process_run", run)
     return ran
@@ -64,7 +64,7 @@ def sweep(
     capsys: pytest.CaptureFixture[str], *words: object
 ) -> tuple[int, dict[str, Any] | None, str]:
     """Exit code, JSON and standard error of ``trackbed sweep``, one member at a time."""
-    code = trackbed.main(["sweep", *map(str, words), "--workers", "1", "--json"])
+    code = command.main(["sweep", *map(str, words), "--workers", "1", "--json"])
     printed = capsys.readouterr()
     return code, json.loads(printed.out) if printed.out else None, printed.err
 
@@ -158,7 +158,7 @@ def test_dry_run_starts_nothing(
 ) -> None:
     """Each member's command line, one that a shell takes, and no folder."""
     words = ["sweep", str(scene), *FREQUENCIES, "--into", str(tmp_path / "sweep"), "--dry-run"]
-    assert trackbed.main(words) == 0
+    assert command.main(words) == 0
     out = capsys.readouterr().out
     assert out.count("--run-folder") == 2
     assert "# loading.frequency=20,sample.seed=1: waiting" in out
@@ -181,7 +181,7 @@ def test_wrong_use(
 ) -> None:  # fmt: skip
     """A scheduler that does not answer, and flags that can not be, end with exit code 2."""
     monkeypatch.setattr("adapters.sweep_cluster.CONNECT_S", 1)
-    assert trackbed.main(["sweep", str(scene), "--into", str(tmp_path / "sweep"), *words]) == 2
+    assert command.main(["sweep", str(scene), "--into", str(tmp_path / "sweep"), *words]) == 2
     assert sentence in capsys.readouterr().err
 
 
@@ -234,7 +234,7 @@ def test_slurm_jobs_that_are_lost_are_replaced(tmp_path: Path) -> None:
     words = ["sweep", scene, "--into", into, "--scheduler", "slurm", "--cluster-config", config]
     path = f"{tmp_path}{os.pathsep}{os.environ['PATH']}"
     child = subprocess.Popen(
-        [sys.executable, ROOT / "trackbed.py", *words, "--json"],
+        [sys.executable, "-m", "trackbed", *words, "--json"],
         env=os.environ | {"PATH": path, "PYTHONPATH": str(ROOT)},  # as if it were installed
         cwd=tmp_path, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
     )  # fmt: skip
@@ -264,7 +264,7 @@ def test_stopped_it_goes_on(
     into, run = tmp_path / "sweep", sweep_member.process_run
 
     def stopped_in_the_second(
-        command: Sequence[str], folder: Path, watch: Callable[[], None]
+        words: Sequence[str], folder: Path, watch: Callable[[], None]
     ) -> tuple[int, float, float]:
         if "sample.seed=2" in command:
             os.kill(os.getpid(), signal.SIGTERM)
@@ -318,7 +318,7 @@ def test_killed_it_goes_on(
     into = tmp_path / "sweep"
     words = ["sweep", str(scene), "--seeds", "2", "--into", str(into), "--workers", "1"]
     child = subprocess.Popen(
-        [sys.executable, ROOT / "trackbed.py", *words], stderr=subprocess.DEVNULL, cwd=tmp_path
+        [sys.executable, "-m", "trackbed", *words], stderr=subprocess.DEVNULL, cwd=tmp_path
     )
     first, second = (into / "members" / f"sample.seed={seed}" for seed in (1, 2))
     deadline = time.monotonic() + 300
@@ -341,7 +341,7 @@ def test_killed_it_goes_on(
     for seed, run in ((1, first), (2, second)):
         whole = tmp_path / f"whole_{seed}"
         alone = ["run", str(scene), "--run-folder", str(whole), "--set", f"sample.seed={seed}"]
-        assert trackbed.main(alone) == 0
+        assert command.main(alone) == 0
         assert (whole / "settlement.csv").read_bytes() == (run / "settlement.csv").read_bytes()
 
 

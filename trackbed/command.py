@@ -10,7 +10,7 @@ from errno import EDQUOT, EFBIG, ENOSPC
 from importlib import import_module
 from textwrap import wrap
 
-__version__ = "0.1.0"
+from trackbed import __version__
 
 ADAPTERS = "adapters.cli"
 VERBS = {

@@ -1,0 +1,7 @@
+"""``python -m trackbed``."""
+
+import sys
+
+from trackbed.command import main
+
+sys.exit(main())

@@ -1,0 +1,1 @@
+"""Timings and problems that several studies and tests share: races, packings, scenes."""

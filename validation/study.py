@@ -1,0 +1,153 @@
+"""One way to keep a study's record, draw its figure and write its page.
+
+A study is a folder ``validation/studies/NAME`` that reads like an experiment:
+
+- ``__init__.py``: the question, the answer and the design, fixed before the run;
+- ``run.py``: ``PARTS``, each measured by a function that returns a row of the record;
+- ``bars.py``: ``check_bars(rows) -> list[Check]``, the record's figures against their bars;
+- ``page.py``: ``describe(rows) -> dict[str, str]``, the text for each mark of ``page.md``, and
+  ``draw(rows, picture)``, the one figure.
+
+    python -m validation.study NAME run [--only PART ...]   # measure: record.jsonl in the folder
+    python -m validation.study NAME page                    # docs/NAME.md and docs/NAME.png
+    trackbed validate NAME                                  # the bars, from the record
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import t as student
+
+from adapters.provenance import provenance
+from adapters.run_folder import write_atomically
+
+Row = dict[str, Any]
+STUDIES = Path(__file__).with_name("studies")
+DOCS = Path(__file__).parents[1] / "docs"
+MARK = re.compile(r"<[A-Z][A-Z0-9_]*>|\{\{\w+\}\}")
+
+
+def list_studies() -> list[str]:
+    """Names of the studies: the folders of ``validation/studies``, with dashes."""
+    return sorted(module.name.replace("_", "-") for module in iter_modules([str(STUDIES)]))
+
+
+def import_part(name: str, part: str) -> Any:
+    """The module ``part`` (run, bars or page) of the study ``name``."""
+    return import_module(f"validation.studies.{name.replace('-', '_')}.{part}")
+
+
+def record_path(name: str) -> Path:
+    """Where the record of a study is."""
+    return STUDIES / name.replace("-", "_") / "record.jsonl"
+
+
+def read_record(path: Path) -> list[Row]:
+    """The rows of a record; a line cut off by a kill is the last one and is left out."""
+    lines = path.read_text(encoding="utf-8").split("\n")
+    return [json.loads(line) for line in lines[:-1] if line]
+
+
+def measure_parts(
+    name: str, parts: Mapping[str, Callable[[], Row]], only: Sequence[str], path: Path
+) -> None:
+    """Measure ``only`` these parts; each replaces its row of the record at ``path`` once done."""
+    for part in only:
+        started = time.process_time()
+        row = {"part": part, **parts[part]()}
+        row["cpu_s"] = round(time.process_time() - started, 1)
+        row["origin"] = provenance(
+            ["python", "-m", "validation.study", name, "run", "--only", part]
+        )
+        known = {old["part"]: old for old in (read_record(path) if path.exists() else [])}
+        known[part] = row
+        ordered = [*(one for one in parts if one in known), *(one for one in known if one not in parts)]
+        write_atomically(path, "".join(json.dumps(known[one]) + "\n" for one in ordered))
+        print(json.dumps(row), flush=True)
+
+
+def fill_page(template: str, parts: Mapping[str, str]) -> str:
+    """A template whose marks ``{{NAME}}`` and ``<NAME>`` are replaced by the part of that name.
+
+    ValueError where a part has no mark in the template, or a mark no part.
+    """
+    for name, part in parts.items():
+        marks = ("{{" + name + "}}", f"<{name}>")
+        if not any(mark in template for mark in marks):
+            raise ValueError(f"the template has no mark for {name}")
+        for mark in marks:
+            template = template.replace(mark, part)
+    if left := MARK.search(template):
+        raise ValueError(f"no part for the mark {left.group()}")
+    return template
+
+
+def format_table(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    rule = ["---"] * len(head)
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in [head, rule, *lines])
+
+
+def mean_interval(values: npt.ArrayLike, level: float = 0.95) -> tuple[float, float]:
+    """Mean of values (k,) and half the width of Student's interval of it; nan for a single one."""
+    found = np.asarray(values, dtype=float)
+    count = len(found)
+    if count < 2:
+        return float(found.mean()), float("nan")
+    error = float(found.std(ddof=1)) / np.sqrt(count)
+    return float(found.mean()), float(student.ppf(0.5 + level / 2, count - 1)) * error
+
+
+def describe_commits(commits: Iterable[str]) -> str:
+    """Commits by which rows were made, with their numbers of rows, the most frequent first."""
+
+    def short(commit: str) -> str:
+        digits, _, modified = commit.partition("-")
+        return f"`{digits[:10]}`" + (" with changed files" if modified else "")
+
+    counted = Counter(map(short, commits))
+    return ", ".join(f"{name} ({count:,})" for name, count in counted.most_common())
+
+
+def write_page(name: str) -> None:
+    """Write ``docs/NAME.md`` and its figure from the record of the study."""
+    rows, page = read_record(record_path(name)), import_part(name, "page")
+    template = record_path(name).with_name("page.md").read_text(encoding="utf-8")
+    DOCS.joinpath(f"{name}.md").write_text(fill_page(template, page.describe(rows)), "utf-8")
+    page.draw(rows, DOCS / f"{name}.png")
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """``python -m validation.study NAME run|page``."""
+    parser = argparse.ArgumentParser(
+        prog="python -m validation.study", description=(__doc__ or "").splitlines()[0],
+        allow_abbrev=False,
+    )  # fmt: skip
+    parser.add_argument("name", choices=list_studies())
+    parser.add_argument("step", choices=("run", "page"))
+    parser.add_argument("--only", nargs="+", metavar="PART", help="measure these parts of the record")
+    arguments = parser.parse_args(words)
+    if arguments.step == "page":
+        write_page(arguments.name)
+        return
+    parts = import_part(arguments.name, "run").PARTS
+    only = arguments.only or list(parts)
+    if unknown := [part for part in only if part not in parts]:
+        parser.error(f"{arguments.name} has no part {unknown[0]}; its parts are {', '.join(parts)}")
+    measure_parts(arguments.name, parts, only, record_path(arguments.name))
+
+
+if __name__ == "__main__":
+    main()
