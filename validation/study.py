@@ -73,7 +73,10 @@ def measure_parts(
         )
         known = {old["part"]: old for old in (read_record(path) if path.exists() else [])}
         known[part] = row
-        ordered = [*(one for one in parts if one in known), *(one for one in known if one not in parts)]
+        ordered = [
+            *(one for one in parts if one in known),
+            *(one for one in known if one not in parts),
+        ]
         write_atomically(path, "".join(json.dumps(known[one]) + "\n" for one in ordered))
         print(json.dumps(row), flush=True)
 
@@ -137,7 +140,9 @@ def main(words: Sequence[str] | None = None) -> None:
     )  # fmt: skip
     parser.add_argument("name", choices=list_studies())
     parser.add_argument("step", choices=("run", "page"))
-    parser.add_argument("--only", nargs="+", metavar="PART", help="measure these parts of the record")
+    parser.add_argument(
+        "--only", nargs="+", metavar="PART", help="measure these parts of the record"
+    )
     arguments = parser.parse_args(words)
     if arguments.step == "page":
         write_page(arguments.name)

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trackbed import command
 from adapters.dump import dump_frames
 from adapters.engine import Engine
 from adapters.run_folder import RunFolder
@@ -25,6 +24,7 @@ from adapters.scene_file import scene_load
 from adapters.state import Contacts, State, state_load
 from tests.engine_sample import AFTER, FIRST, JUMP, SECOND, Sample
 from tests.forked_commands import Commands, processes_in
+from trackbed import command
 
 ROOT = Path(__file__).parents[2]
 HISTORY = 7

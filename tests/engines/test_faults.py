@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trackbed import command
 from adapters import engine_lammps
 from adapters.dump import Frame, dump_frames, dump_write
 from adapters.engine import engine_named
@@ -33,6 +32,7 @@ from tests.engine_sample import (
     Sample,
     fake_damaged,
 )
+from trackbed import command
 
 PREPARATION = "preparation"
 LOST = {PREPARATION: (PREPARATION, "window_*", "jump_*"), SECOND: (SECOND, AFTER, "jump_*")}

@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trackbed import command
 from adapters import stages
 from adapters.engine import EngineStart
 from adapters.engine_liggghts import LiggghtsEngine
@@ -32,6 +31,7 @@ from adapters.state import FloatArray, State, state_load
 from adapters.window import Window, window_load, window_read
 from scenes import scene_template
 from tests.forked_commands import Commands, processes_in
+from trackbed import command
 
 pytestmark = pytest.mark.engine("liggghts")
 

@@ -14,7 +14,6 @@ import meshio
 import numpy as np
 import pytest
 
-from trackbed import command
 from adapters.container import Container, sides_needed
 from adapters.errors import EngineFailed
 from adapters.export import FORMATS, export_run
@@ -27,6 +26,7 @@ from adapters.scene_file import scene_load
 from adapters.state import Contacts, State
 from adapters.window import PistonTrack, Window
 from scenes import scene_template
+from trackbed import command
 
 CYCLES = [0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
 """Instants of the fixture's run, which jumps from 5 to 7."""

@@ -12,11 +12,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
-from trackbed import command
 from qdem_fem.advise import advise, compliance_of, error_together, stiffness_matrix
 from qdem_fem.advise_check import advice_check, advise_scene
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.sleeper_modes import free_modes
+from trackbed import command
 from validation.qdem_bodies import STONES
 
 STONE = q.Material(30e9, 0.2, 2700.0)

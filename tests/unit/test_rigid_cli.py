@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trackbed import command
 from rigid_lcp.run_folder import RunFolder, frame_read
 from tests.rigid_runs import SLIDING_BLOCK
+from trackbed import command
 
 
 @pytest.fixture

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trackbed import command
 from rigid_lcp import Disc, Polygon, Polyhedron, Scene, Simulation, Sphere, box
 from rigid_lcp.errors import NotConverged, RigidError, SceneError, ShapeError, UsageError
 from rigid_lcp.polyhedra import cut
 from tests.rigid_runs import SLIDING_BLOCK
+from trackbed import command
 
 NEAR = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1e-10, 0], [1e-10, 0, 1]]
 """Corners 0 and 4 nearly the same, so that faces do not meet edge to edge."""

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trackbed import command
 from adapters import contact_law as law
 from adapters.container import Container, sides_needed
 from adapters.decks import PISTON_MARGIN
@@ -29,6 +28,7 @@ from adapters.yade_parameters import (
     side_triangle,
 )
 from scenes import scene_path
+from trackbed import command
 
 ENGINE = YadeEngine()
 

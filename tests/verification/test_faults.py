@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trackbed import command
 from adapters import procedure, stages
 from adapters.dump import Frame, dump_frames, dump_write
 from adapters.engine import EngineRun, engine_failure
@@ -24,6 +23,7 @@ from adapters.run_folder import RunFolder
 from adapters.scene import Scene
 from adapters.stages import Bed
 from tests.small_bed import small_bed
+from trackbed import command
 
 SCENE = small_bed(k=4, h=8, total_cycles=24)
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trackbed import command
 from adapters import engine_fake, procedure, stages
 from adapters.engine_fake import FakeBed
 from adapters.errors import JumpRefused, SceneError
@@ -31,6 +30,7 @@ from adapters.status import status
 from scenes import scene_path
 from tests.forked_commands import Commands
 from tests.small_bed import small_bed
+from trackbed import command
 from validation.jump_curves import CURVES
 
 QUIET = Progress(quiet=True)

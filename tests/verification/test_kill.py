@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from trackbed import command
 from adapters import engine_process
 from adapters.engine_process import process_run
 from adapters.run_folder import RunFolder
 from tests.forked_commands import Commands, alive, awaited, processes_in
 from tests.small_bed import small_bed
+from trackbed import command
 
 SEED = 2007
 SLOW = 0.04

@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from trackbed import command
 from qdem_fem.contact_search import pairs_near, pairs_periodic
 from qdem_fem.errors import CheckpointError, ConditionError, SceneError
 from qdem_fem.leapfrog import accelerations_free
@@ -18,6 +17,7 @@ from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.output import table_read
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
+from trackbed import command
 from validation.qdem_boundary_waves import (
     GROUND,
     PRESSURE,

@@ -17,13 +17,13 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj
 
 import qdem_fem as q
-from trackbed import command
 from qdem_fem.contact_step import network_bound
 from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, SceneError, Unstable
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.rigid_mass import cross_matrix, rigid_mass
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
+from trackbed import command
 from validation.qdem_contact_trials import slope_gain
 
 Floats = NDArray[np.float64]

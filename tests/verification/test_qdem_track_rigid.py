@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trackbed import command
 from qdem_fem.errors import SceneError, StepWarning
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.track_bed import bed_prepare, bed_read
 from qdem_fem.track_scene import TrackPrepared, contact_of
 from qdem_fem.track_stand import bed_begin
+from trackbed import command
 from validation.track_trials import SCENE, scene_at
 
 FEW = ("track.below=8", "track.beside=3", "track.unbalanced=0.5")

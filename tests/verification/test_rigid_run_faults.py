@@ -22,6 +22,7 @@ from rigid_lcp.run_folder import RunFolder
 from rigid_lcp.simulation import Simulation
 from tests.forked_commands import Commands
 from tests.rigid_runs import SLIDING_BLOCK, frame_bits
+from trackbed import command
 
 SEED = 2002
 

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from trackbed import command
 from adapters import sweep_member, sweep_run
 from adapters.run_folder import RunFolder
 from adapters.sweep import Member, Sweep
 from adapters.sweep_member import Ended
 from tests.forked_commands import processes_in
 from tests.small_bed import small_bed
+from trackbed import command
 
 pytest.importorskip("distributed", reason="the extra sweep is not installed")
 pytest.importorskip("dask_jobqueue", reason="the extra sweep is not installed")
