@@ -29,17 +29,8 @@ lint:
 bench:
 	@./setup.sh bench
 	$(bin)/trackbed validate dump-speed
-	$(bin)/trackbed validate qdem-speed
+	$(bin)/python -m validation.study qdem-cost run --only speed
 
 validate:
 	@./setup.sh test
-	$(bin)/trackbed validate settlement --quick
-	$(bin)/trackbed validate engines --quick
-	$(bin)/trackbed validate qdem --quick
-	$(bin)/trackbed validate qdem-cost --quick
-	$(bin)/trackbed validate qdem-hard-cases --quick
-	$(bin)/trackbed validate rigid --quick
-	$(bin)/trackbed validate rigid-hard-cases --quick
-	$(bin)/trackbed validate rigid-integration --quick
-	$(bin)/trackbed validate rigid-indeterminacy --quick
-	$(bin)/trackbed validate rigid-ballast --quick
+	for study in $$($(bin)/trackbed validate); do $(bin)/trackbed validate $$study || exit; done

@@ -2,7 +2,7 @@
 
 A bed settles by about the same in equal steps of ln N.  Of equal jumps the first is asked for most
 of the settlement, when least of the bed is known; jumps whose ends are evenly spaced in ln N are
-each asked for about as much.  docs/jump-history.md compares the two.
+each asked for about as much.  docs/jumps.md.
 """
 
 from __future__ import annotations

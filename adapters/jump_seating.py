@@ -29,7 +29,7 @@ HUNG = 5.0
 """Elastic deflection over that of the mean field, above which the piston hangs.
 
 Ten packings of the reference ensemble have 0.6 to 2.2 in every cycle from the fifth on, the one
-whose piston hangs 10 to 40 (docs/settlement-partial.md); any bar from 3 to 10 tells the same ones,
+whose piston hangs 10 to 40 (docs/history.md); any bar from 3 to 10 tells the same ones,
 and moves the cycle at which it is carried by some.
 """
 CONSTRAINED = 9 / 5

@@ -10,7 +10,7 @@ seen through the noise of each block of computed cycles; its best linear unbiase
 of them where they are not.
 
 A bed that was moved by G may settle more than it would have: in the first cycle, as contacts that
-were moved do not bear yet, and by some kappa G / n in the n-th (measured in docs/jump-history.md).
+were moved do not bear yet, and by some kappa G / n in the n-th (docs/jumps.md).
 kappa is one number for a run, 0 with standard deviation `RESEATING` before any cycle is seen; the
 blocks behind jumps tell it, since 1 / n falls much faster than 1 / N.
 """

@@ -5,7 +5,7 @@ Lysmer and Kuhlemeyer (J. Eng. Mech. Div. ASCE 95 (1969) 859) put on a face of u
     t = -rho c_p v_n n - rho c_s v_t,      c_p = sqrt((lambda + 2 mu)/rho),  c_s = sqrt(mu/rho),
 
 which is what a half-space of the same material behind it would do to a plane wave along n: none
-comes back.  At other angles some does (docs/qdem-boundaries.md).  Lumped, a node takes a third
+comes back.  At other angles some does.  Lumped, a node takes a third
 of each face: a 3 x 3 matrix C.
 
 A half-space has no stiffness against a uniform load: with dashpots alone, a body under a lasting

@@ -9,7 +9,7 @@ slow      seconds that every part of a run sleeps before and behind its work
 crash     number of the file operation in place of which the process kills itself
 root      folder below which file operations count, except those inside a folder ``partial``
 path      PATH of the process
-bed       name of a curve of `validation.jump_curves` by which the fake engine's bed settles
+bed       name of a curve of `tests.jump_curves` by which the fake engine's bed settles
 output    file for what the command prints
 ========= ======================================================================================
 
@@ -97,7 +97,7 @@ def serve(request: dict[str, Any]) -> None:
         os.environ["PATH"] = request["path"]
     if "bed" in request:
         from adapters import engine_fake
-        from validation.jump_curves import CURVES, Curve
+        from tests.jump_curves import CURVES, Curve
 
         engine_fake.BED = Curve(CURVES[request["bed"]], bursts=0.2).bed
     if "slow" in request:

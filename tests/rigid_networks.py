@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from validation.rigid_integration_collisions import contact_rows
+from tests.rigid_collision_sets import contact_rows
 
 Floats = NDArray[np.float64]
 GRAVITY, STEP = 9.81, 1e-3

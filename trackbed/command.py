@@ -95,7 +95,10 @@ def import_failed(error: ImportError) -> str:
     try:
         metadata.distribution("adapters")
     except metadata.PackageNotFoundError:
-        if (error.name or "").partition(".")[0] in ("", "adapters", "validation"):
+        missing = (error.name or "").partition(".")[0]
+        if error.name == "validation":
+            return f"{error}\n  -> studies are not installed: trackbed validate wants a checkout"
+        if missing in ("", "adapters", "validation"):
             return ""
         return f"{error}\n  -> install trackbed with its dependencies: pip install -e ."
     return (

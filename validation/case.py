@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib import import_module
 from math import isfinite
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 from adapters.errors import UsageError
 from adapters.scene_checks import did_you_mean
 from validation import cases
+from validation.study import import_part, list_studies, read_record, record_path
 
 TOLD = ("reported", "measured", "finite")
 """In place of a bar: the value is only told."""
@@ -67,27 +69,49 @@ class Check:
         return bool(self.ok) and isfinite(self.value)
 
 
+BENCH = Path(__file__).with_name("bench")
+
+
+def live_cases() -> dict[str, str]:
+    """Modules that measure now, by name: files of ``validation/cases``, and those of
+    ``validation/bench`` that have a function ``run(quick)``."""
+    found = {
+        module.name: f"validation.cases.{module.name}" for module in iter_modules(cases.__path__)
+    }
+    for path in BENCH.glob("*.py"):
+        if "\ndef run(quick: bool)" in path.read_text(encoding="utf-8"):
+            found[path.stem] = f"validation.bench.{path.stem}"
+    return {name.replace("_", "-"): module for name, module in found.items()}
+
+
 def case_names() -> list[str]:
-    """Names of the cases: the files of ``validation/cases``, with dashes."""
-    return sorted(module.name.replace("_", "-") for module in iter_modules(cases.__path__))
+    """Names of the studies, judged by their records, and of the cases that measure now."""
+    return sorted({*list_studies(), *live_cases()})
 
 
 def case_load(name: str) -> Callable[[bool], list[Check]]:
-    """The function ``run(quick)`` of a case; raises `UsageError` for a name that is none."""
-    if name not in case_names():
-        known = did_you_mean(name, case_names())
-        raise UsageError(f"there is no validation case {name}{known}")
-    run: Callable[[bool], list[Check]] = import_module(
-        f"validation.cases.{name.replace('-', '_')}"
-    ).run
-    return run
+    """The function ``run(quick)`` of a case, or of a study its bars from the record; raises
+    `UsageError` for a name that is none."""
+    live = live_cases()
+    if name in live:
+        run: Callable[[bool], list[Check]] = import_module(live[name]).run
+        return run
+    if name in list_studies():
+        return partial(judge_study, name)
+    known = did_you_mean(name, case_names())
+    raise UsageError(f"there is no validation case {name}{known}")
+
+
+def judge_study(name: str, quick: bool) -> list[Check]:
+    """Bars of a study from its record; there is nothing to make quicker."""
+    checks: list[Check] = import_part(name, "bars").check_bars(read_record(record_path(name)))
+    return checks
 
 
 def case_report(name: str) -> Callable[[Path, Sequence[Check], dict[str, Any]], None] | None:
     """The function ``report_write(path, checks, provenance)`` of a case, None where it has none."""
-    return getattr(
-        import_module(f"validation.cases.{name.replace('-', '_')}"), "report_write", None
-    )
+    live = live_cases()
+    return getattr(import_module(live[name]), "report_write", None) if name in live else None
 
 
 def record(name: str, checks: Sequence[Check], provenance: dict[str, Any]) -> dict[str, Any]:

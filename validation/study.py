@@ -24,7 +24,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,9 @@ from scipy.stats import t as student
 
 from adapters.provenance import provenance
 from adapters.run_folder import write_atomically
+
+if TYPE_CHECKING:
+    from validation.case import Check
 
 Row = dict[str, Any]
 STUDIES = Path(__file__).with_name("studies")
@@ -101,6 +104,15 @@ def format_table(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
     """A table in Markdown."""
     rule = ["---"] * len(head)
     return "\n".join("| " + " | ".join(cells) + " |" for cells in [head, rule, *lines])
+
+
+def format_checks(checks: Iterable[Check]) -> str:
+    """Bars of a study as a table in Markdown."""
+    lines = [
+        [check.name, f"{check.value:.4g} {check.unit}".rstrip(), check.asked, check.verdict]
+        for check in checks
+    ]
+    return format_table(["bar", "value", "asked", ""], lines)
 
 
 def mean_interval(values: npt.ArrayLike, level: float = 0.95) -> tuple[float, float]:

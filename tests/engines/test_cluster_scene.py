@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -11,15 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engine import engine_named
+from adapters.engine import EngineStart, engine_named
+from adapters.engine_yade import PARAMETERS
 from adapters.errors import EngineMissing, SceneError
 from adapters.radii import grain_count_expected, radii_sample
 from adapters.sample import sample_start
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
+from adapters.state import FloatArray
 from adapters.window import Window, window_read
 from scenes import scene_path
-from validation.engine_speed_windows import start_at_rest
 
 SMALL = (
     "sample.count=60",
@@ -50,6 +52,39 @@ def launcher_of(engine: str) -> tuple[str, ...]:
     if found is None:
         pytest.skip(f"{words[0]} is not here")
     return (found, *words[1:])
+
+
+def start_at_rest(
+    scene: Scene, position: FloatArray, radius: FloatArray, folder: Path
+) -> EngineStart:
+    """A saved state of the scene's engine: the bed after a single look at its energies.
+
+    Centres [m], shape (n, 3), radii [m], shape (n,).  Raises as `Engine.run`.
+    """
+    engine = engine_named(scene.engine.name)
+    folder.mkdir(parents=True)
+    top = float((position[:, 2] + radius).max())
+    digests = engine.write_preparation(scene, position, radius, top, folder)
+    steps = scene.steps_per_cycle
+    look_once(folder, check_steps=steps, minimum_steps=steps, history_steps=steps)
+    engine.run(scene, "in.prepare", folder, lambda: None, digests)
+    return EngineStart(folder / "end.restart", steps, 0, top)
+
+
+def look_once(folder: Path, **settle: float) -> None:
+    """Have the preparation in ``folder`` end at its first look, whatever still moves there."""
+    settle["equilibrium_ratio"] = 1e300
+    if (folder / PARAMETERS).exists():
+        content = json.loads((folder / PARAMETERS).read_text())
+        content["settle"] |= settle
+        (folder / PARAMETERS).write_text(json.dumps(content))
+        return
+    text = (folder / "parameters.in").read_text()
+    for name, value in settle.items():
+        text = re.sub(
+            rf"^variable {name} index .*$", f"variable {name} index {value:g}", text, flags=re.M
+        )
+    (folder / "parameters.in").write_text(text)
 
 
 def computed(engine_name: str, launcher: tuple[str, ...], folder: Path) -> Window:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from adapters import contact_law as law
-from validation.few_grains import (
+from validation.bench.few_grains import (
     RADIUS,
     driven_contact,
     grain_mass,
@@ -19,7 +19,7 @@ from validation.few_grains import (
     shear_modulus,
     table_1,
 )
-from validation.tangential_rules import LOOPS, force_secant, work
+from validation.bench.tangential_rules import LOOPS, force_secant, work
 
 pytestmark = pytest.mark.engine("liggghts")
 

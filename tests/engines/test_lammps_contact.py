@@ -9,7 +9,7 @@ import pytest
 
 from adapters import contact_law as law
 from adapters.lammps_decks import TANGENTIAL_RULES
-from validation.few_grains import (
+from validation.bench.few_grains import (
     PLACE,
     RADIUS,
     Track,
@@ -20,8 +20,8 @@ from validation.few_grains import (
     shear_modulus,
     table_1,
 )
-from validation.few_grains_lammps import track_run, track_run_under
-from validation.tangential_rules import (
+from validation.bench.few_grains_lammps import track_run, track_run_under
+from validation.bench.tangential_rules import (
     LOOPS,
     force_incremental,
     force_rescaled,

@@ -20,7 +20,7 @@ from adapters.state import FloatArray
 from adapters.window import Window, state_read, window_read
 from adapters.yade_parameters import damping_ratio
 from scenes import scene_template
-from validation.few_grains import (
+from validation.bench.few_grains import (
     RADIUS,
     Track,
     driven_contact,
@@ -30,8 +30,8 @@ from validation.few_grains import (
     shear_modulus,
     table_1,
 )
-from validation.few_grains_yade import track_run
-from validation.tangential_rules import LOOPS, force_incremental, work
+from validation.bench.few_grains_yade import track_run
+from validation.bench.tangential_rules import LOOPS, force_incremental, work
 
 pytestmark = pytest.mark.engine("yade")
 

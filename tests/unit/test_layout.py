@@ -19,7 +19,7 @@ PACKAGES = PYPROJECT["tool"]["setuptools"]["packages"]
 
 def sources() -> list[Path]:
     """Python files of the project."""
-    folders = [package for package in PACKAGES if "." not in package] + ["tests"]
+    folders = [package for package in PACKAGES if "." not in package] + ["validation", "tests"]
     return [
         *(path for folder in folders for path in (ROOT / folder).rglob("*.py")),
     ]
@@ -82,11 +82,11 @@ def test_no_vague_names() -> None:
 
 
 def test_package_list_is_the_folders() -> None:
-    """Each folder with an ``__init__.py`` is packaged, tests are not, and nothing else is."""
+    """Each folder with an ``__init__.py`` is packaged but tests and studies, and nothing else."""
     folders = {
         ".".join(path.parent.relative_to(ROOT).parts)
         for path in ROOT.glob("*/**/__init__.py")
-        if not path.relative_to(ROOT).parts[0].startswith((".", "build", "tests"))
+        if not path.relative_to(ROOT).parts[0].startswith((".", "build", "tests", "validation"))
     }
     assert folders == set(PACKAGES)
 

@@ -17,9 +17,10 @@ from qdem_fem.advise_check import advice_check, advise_scene
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.sleeper_modes import free_modes
 from trackbed import command
-from validation.qdem_bodies import STONES
 
 STONE = q.Material(30e9, 0.2, 2700.0)
+STONES = Path(__file__).parents[1] / "qdem_stones.toml"
+"""A soft pad and two stones; the second one falls."""
 
 
 def beam(young: float = 30e9, turn: Any = None) -> q.Body:

@@ -15,7 +15,7 @@ from qdem_fem import simulation
 from qdem_fem.assembly import Assembly
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.output import bodies_vtu_write
-from validation.qdem_hard_meshes import delaunay_mesh
+from validation.bench.qdem.meshes import delaunay_mesh
 
 YOUNG, POISSON, DENSITY = 1e6, 0.25, 1000.0
 CORNERS = np.array([[0.0, 0, 0], [1, 0.1, 0], [0.2, 1, 0], [0.1, 0.3, 1.1]])

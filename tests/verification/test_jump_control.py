@@ -31,7 +31,7 @@ from adapters.jump_rates import (
     slope_trend,
 )
 from adapters.state import FloatArray
-from validation.jump_curves import CURVES, Curve, play
+from tests.jump_curves import CURVES, Curve, play
 
 SETTINGS = Settings(tolerance=0.02, healing=5, total_cycles=2000)
 BURSTY = 0.35

@@ -29,9 +29,9 @@ from adapters.scene_file import scene_load
 from adapters.status import status
 from scenes import scene_path
 from tests.forked_commands import Commands
+from tests.jump_curves import CURVES
 from tests.small_bed import small_bed
 from trackbed import command
-from validation.jump_curves import CURVES
 
 QUIET = Progress(quiet=True)
 

@@ -32,9 +32,6 @@ from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
 from scenes import scene_path
-from validation.settlement_ensemble import KINDS, PARTIAL
-from validation.settlement_ensemble_record import EnsembleRecord
-from validation.settlement_partial_bearing import mean_field_ratios
 
 COARSE = scene_path("karrech-coarse")
 HANGS = 30.0
@@ -363,22 +360,3 @@ def test_a_control_shares_the_cycles_that_were_waited_for(
         assert (control.path / name / "states.npz").samefile(own.path / name / "states.npz")
     assert max(one.last_cycle for one in control.outcomes()) == 82
     assert all(one.stage != "jump" for one in control.outcomes())
-
-
-def test_packings_of_the_ensemble_hang_or_do_not() -> None:
-    """Every full run: 0.6 to 2.3 times the mean field from the fifth cycle on, but of one packing,
-    whose piston hangs by its rim (docs/settlement-partial.md): 10 to 40 times, until cycle 43 or
-    44; in one of its runs it hangs again, from 68 to 87."""
-    record = EnsembleRecord()
-    for kind in KINDS.values():
-        for piece in kind.runs():
-            if piece.member is None:
-                continue
-            ratio = mean_field_ratios(piece, record)[4:]
-            hung = np.flatnonzero(ratio > jump_seating.HUNG) + 5
-            if (kind, piece.seed) == (PARTIAL, 2):
-                until, again = ((44, []), (43, range(68, 88)))[piece.member]
-                assert hung.tolist() == [*range(5, until + 1), *again]
-                assert 10 < ratio[: until - 4].min() < ratio.max() < 40
-            else:
-                assert 0.6 < ratio.min() < ratio.max() < 2.3

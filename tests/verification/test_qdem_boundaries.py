@@ -17,8 +17,7 @@ from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.output import table_read
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
-from trackbed import command
-from validation.qdem_boundary_waves import (
+from tests.qdem_boundary_waves import (
     GROUND,
     PRESSURE,
     SPEED,
@@ -26,6 +25,7 @@ from validation.qdem_boundary_waves import (
     bar_share,
     oblique_share,
 )
+from trackbed import command
 
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import qdem_fem as q
 from qdem_fem.errors import ConditionError, QdemError
 from qdem_fem.mesh_generation import box_mesh
-from validation.qdem_hard_meshes import delaunay_mesh
+from validation.bench.qdem.meshes import delaunay_mesh
 
 YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0
 STEEL = q.Material(YOUNG, POISSON, DENSITY)

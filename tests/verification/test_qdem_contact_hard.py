@@ -5,16 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from validation.qdem_contact_hard import (
+from tests.qdem_slopes import tetrahedron
+from validation.bench.qdem.contact import (
     CASES,
-    CLOSES,
+    MODELS,
     account,
     momenta,
     near_critical,
     spinning,
 )
-from validation.qdem_contact_pressed import MODELS, tetrahedron
 
+CLOSES = 1e-3
+"""Share of the greatest energy that the account may lack."""
 BY_MODEL = pytest.mark.parametrize("model", MODELS)
 SHORT = [words for words in CASES if words != "spinning grain"]
 

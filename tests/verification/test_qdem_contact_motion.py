@@ -24,7 +24,7 @@ from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.periodic import extents
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
-from validation.qdem_contact_trials import slope_gain
+from tests.qdem_slopes import slope_gain
 
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)

@@ -17,7 +17,7 @@ from qdem_fem.contact_surface import face_points, sharp_edges
 from qdem_fem.contact_window import advance_of
 from qdem_fem.errors import ConditionError, ContactTooDeep
 from qdem_fem.mesh_generation import box_mesh
-from validation.qdem_contact_trials import slope_gain
+from tests.qdem_slopes import slope_gain
 
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)

@@ -15,8 +15,8 @@ from qdem_fem.errors import StepWarning, Unstable
 from qdem_fem.mass_scaling import element_step, mass_scaling_factor
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.reference_forces import Strain
-from validation.qdem_hard_meshes import SLIVER_STEP, box_with_sliver, delaunay_mesh
-from validation.qdem_judge import lumped_mass, stiffness, stiffness_lame
+from validation.bench.qdem.judge import lumped_mass, stiffness, stiffness_lame
+from validation.bench.qdem.meshes import SLIVER_STEP, box_with_sliver, delaunay_mesh
 
 LAW = pytest.mark.parametrize("law", get_args(Strain))
 YOUNG, POISSON, DENSITY = 1e6, 0.3, 1000.0

@@ -13,9 +13,9 @@ import qdem_fem as q
 from qdem_fem import kernel, stress
 from qdem_fem.cuda_assembly import node_actions, sample_numbers
 from qdem_fem.errors import ConditionError, LibraryMissing
+from validation.bench.qdem_gpu.contact import MARCHES
+from validation.bench.qdem_gpu.search import CLOUDS
 from validation.cases.qdem_gpu import STRAINS, twins_in_simulator
-from validation.qdem_gpu_contact import MARCHES
-from validation.qdem_gpu_search import CLOUDS
 
 pytest.importorskip("numba.cuda")
 

@@ -11,20 +11,23 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from validation.qdem_gpu_contact import STEPS, steps_launched
-from validation.qdem_gpu_search import (
+from tests.cuda_marches import (
+    lists_gpu_shuffled,
+    motion_summed,
+    simulator_begin,
+    steps_launched,
+    sums_before,
+    sums_gpu,
+    sums_processor,
+)
+from validation.bench.qdem_gpu.contact import STEPS
+from validation.bench.qdem_gpu.search import (
     CLOUDS,
     Cloud,
     cloud,
     differing,
     lists_gpu,
-    lists_gpu_shuffled,
     lists_processor,
-    motion_summed,
-    simulator_begin,
-    sums_before,
-    sums_gpu,
-    sums_processor,
 )
 
 pytest.importorskip("numba.cuda")

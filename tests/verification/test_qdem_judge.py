@@ -7,14 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.sparse as sparse
 import skfem
 
-from qdem_fem.errors import LibraryMissing, NotConverged, Unstable, UsageError
-from validation import qdem_closed_forms as closed
-from validation import qdem_judge as judge
-from validation.qdem_judge_dynamics import central_difference, newmark, quasi_static_kelvin_voigt
-from validation.qdem_judge_modes import modes
+from qdem_fem.errors import LibraryMissing, NotConverged, UsageError
+from validation.bench.qdem import closed_forms as closed
+from validation.bench.qdem import judge
+from validation.bench.qdem.modes import modes
 
 YOUNG, POISSON, DENSITY = 45e9, 0.167, 2350.0
 SIZE = (2.4, 0.25, 0.22)
@@ -272,226 +270,11 @@ def test_beam_frequencies() -> None:
     assert closed.Beam(width=1.0, height=1.0).torsion_constant == pytest.approx(0.140577, rel=1e-5)
 
 
-# --- motion -----------------------------------------------------------------------------------
-
-
-def one_mode() -> tuple[Any, ...]:
-    """A short cantilever in its first mode: K, mass, free, shape [m], omega [rad/s]."""
-    nodes, elements = kuhn((6, 2, 2), (1.0, 0.25, 0.22))
-    matrix = judge.stiffness(nodes, elements, YOUNG, POISSON)
-    mass = judge.lumped_mass(nodes, elements, DENSITY)
-    free = nodes[:, 0] > 1e-9
-    found = modes(matrix, mass, free, 1)
-    return matrix, mass, free, 1e-5 * found.shape[0], 2 * np.pi * found.frequency[0]
-
-
-def critical_step(matrix: Any, mass: np.ndarray, free: np.ndarray) -> float:
-    """2 / omega_max [s] of the assembled matrices."""
-    dof = judge.free_dof(free, matrix.shape[0])
-    root = 1 / np.sqrt(np.repeat(mass, 3)[dof])
-    scaled = sparse.diags(root) @ matrix[dof][:, dof] @ sparse.diags(root)
-    return float(2 / np.sqrt(np.linalg.eigvalsh(scaled.toarray())[-1]))
-
-
-def test_newmark_is_of_order_two_and_conserves_energy() -> None:
-    """A mode, u = phi cos(omega t), over 1.25 periods: steps halved; energy to rounding."""
-    matrix, mass, free, shape, omega = one_mode()
-    still = np.zeros_like(shape)
-    error = []
-    for steps in (40, 80):
-        step = 2 * np.pi / omega / steps
-        end = newmark(matrix, mass, None, still, free, step, steps * 5 // 4, displacement=shape)
-        error.append(np.linalg.norm(end.displacement) / np.linalg.norm(shape))
-        kinetic = np.sum(mass[:, None] * end.velocity**2) / 2
-        u = end.displacement.ravel()
-        start = shape.ravel() @ (matrix @ shape.ravel()) / 2
-        assert kinetic + u @ (matrix @ u) / 2 == pytest.approx(start, rel=1e-10)
-    # average acceleration lags by (omega dt)^2 / 12 of the phase: after 1.25 periods the sine
-    # passes zero and the displacement is that lag
-    assert error[0] / error[1] == pytest.approx(4, rel=0.02)
-    assert error[1] == pytest.approx(2.5 * np.pi * (2 * np.pi / 80) ** 2 / 12, rel=0.02)
-
-
-def test_newmark_and_central_differences_agree() -> None:
-    """A load suddenly put on, with viscosity: two methods, the same record as steps get short.
-
-    Central differences lag the viscous force by half a step: first order in C, second without.
-    """
-    matrix, mass, free, shape, omega = one_mode()
-    nodes, elements = kuhn((6, 2, 2), (1.0, 0.25, 0.22))
-    load = np.zeros_like(shape)
-    load[np.isclose(nodes[:, 0], 1.0), 2] = -10.0
-    tip = len(nodes) - 1
-    period = 2 * np.pi / omega
-    viscous = judge.stiffness_lame(nodes, elements, -2 / 3 * 2e5, 2e5)
-    for damping, order in ((None, 2), (viscous, 1)):
-        difference = []
-        for steps in (1500, 3000):
-            run = (load, free, period / steps, steps)
-            one = newmark(matrix, mass, damping, *run, record=[tip]).recorded
-            other = central_difference(matrix, mass, damping, *run, record=[tip]).recorded
-            difference.append(np.abs(one - other).max() / np.abs(one).max())
-        assert difference[1] < 2e-3
-        assert difference[0] / difference[1] > 0.8 * 2**order
-
-
-def test_newmark_by_multigrid_and_what_is_kept() -> None:
-    """The same record as factorised; a held node reads zero; cost is split."""
-    nodes, _, matrix, mass, free, load, tip = cantilever((12, 2, 2))
-    held = int(np.flatnonzero(~free)[0])
-    run = (matrix, mass, None, lambda t: load * min(1.0, t / 1e-3), free, 1e-4, 20)
-    one = newmark(*run, record=[tip, held])
-    other = newmark(*run, record=[tip, held], method="amg", nodes=nodes)
-    np.testing.assert_allclose(one.recorded, other.recorded, atol=1e-7 * np.abs(one.recorded).max())
-    assert not one.recorded[:, 1].any()
-    np.testing.assert_array_equal(one.recorded[-1, 0], one.displacement[tip])
-    assert one.time[-1] == pytest.approx(2e-3)
-    assert one.setup_s >= 0
-    assert one.stepping_s >= 0
-
-
-def test_a_step_too_long_is_said() -> None:
-    """Stable below 2 / omega_max of the assembled matrices, `Unstable` above."""
-    matrix, mass, free, shape, _ = one_mode()
-    critical = critical_step(matrix, mass, free)
-    noise = shape + 1e-9 * np.random.default_rng(5).standard_normal(shape.shape)
-    run = (matrix, mass, None, np.zeros_like(shape), free)
-    calm = central_difference(*run, 0.99 * critical, 4000, displacement=noise)
-    assert np.abs(calm.displacement).max() < 10 * np.abs(shape).max()
-    with pytest.raises(Unstable, match="step"):
-        central_difference(*run, 1.02 * critical, 4000, displacement=noise)
-
-
-def test_viscosity_shortens_the_critical_step() -> None:
-    """A viscous force of the last velocity: dt <= (sqrt(1 + xi^2) - xi) 2 / omega_max.
-
-    From lambda = -1 in u_{k+1} - 2 u_k + u_{k-1} = -W^2 u_k - 2 xi W (u_k - u_{k-1}), W = omega dt;
-    with C = tau K, xi = omega tau / 2.
-    """
-    matrix, mass, free, shape, _ = one_mode()
-    omega = 2 / critical_step(matrix, mass, free)
-    xi = 0.6
-    critical = (np.sqrt(1 + xi**2) - xi) * 2 / omega
-    noise = shape + 1e-9 * np.random.default_rng(6).standard_normal(shape.shape)
-    run = (matrix, mass, matrix * (2 * xi / omega), np.zeros_like(shape), free)
-    calm = central_difference(*run, 0.99 * critical, 4000, displacement=noise)
-    assert np.abs(calm.displacement).max() < 2 * np.abs(shape).max()
-    with pytest.raises(Unstable, match="step"):
-        central_difference(*run, 1.02 * critical, 20_000, displacement=noise)
-
-
-# --- creep, section 3.2 -----------------------------------------------------------------------
-
-CREEP_YOUNG, VISCOSITY, HEIGHT = 0.5e6, 1.0, 0.22
-STRESS = 10 / (2.4 * 0.25)
-
-
-def slab(cells: tuple[int, int, int]) -> tuple[Any, ...]:
-    """Section 3.2: nodes, K, C (nu = 0, no bulk viscosity), load of a uniform pressure, centre."""
-    nodes, elements = kuhn(cells)
-    load = np.zeros_like(nodes)
-    load[:, 2] = -STRESS * end_area(nodes, elements, 2)
-    centre = int(np.argmin(np.linalg.norm(nodes - [1.2, 0.125, HEIGHT], axis=1)))
-    return (
-        nodes,
-        judge.stiffness(nodes, elements, CREEP_YOUNG, 0.0),
-        judge.stiffness_lame(nodes, elements, -2 / 3 * VISCOSITY, VISCOSITY),
-        load,
-        centre,
-    )
-
-
-@pytest.mark.parametrize("sides", ["rollers", "free"])
-def test_creep_and_recovery(sides: str) -> None:
-    """Uniform strain, so the mesh does not matter: both closed forms, to backward Euler's error.
-
-    Its error is at most h/2 tau e^-1 of the amplitude, 5e-4 at h = tau/400 on a time of
-    3/4 tau; the load goes at 2 tau.
-    """
-    nodes, matrix, viscous, load, centre = slab((4, 2, 2))
-    tau = VISCOSITY / CREEP_YOUNG
-    free = np.ones_like(nodes, bool)
-    free[np.isclose(nodes[:, 2], 0), 2] = False
-    if sides == "rollers":
-        free[:, :2] = False
-    else:  # a symmetric quarter: planes through two sides hold the rigid motions alone
-        free[np.isclose(nodes[:, 0], 0), 0] = False
-        free[np.isclose(nodes[:, 1], 0), 1] = False
-    step, steps = tau / 400, 1600
-
-    def pressed(t: float) -> np.ndarray:
-        return load if t < 2 * tau + step / 2 else np.zeros_like(load)
-
-    run = quasi_static_kelvin_voigt(matrix, viscous, pressed, free, step, steps, record=[centre])
-    theory = closed.creep_uniaxial_strain if sides == "rollers" else closed.creep_uniaxial_stress
-    exact = theory(run.time, STRESS, CREEP_YOUNG, VISCOSITY, unloaded=2 * tau)
-    strain = -run.recorded[:, 0, 2] / HEIGHT
-    np.testing.assert_allclose(strain, exact, atol=6e-4 * STRESS / CREEP_YOUNG)
-    wrong = closed.creep_equation_14(run.time, STRESS, CREEP_YOUNG, VISCOSITY, 2 * tau)
-    assert np.abs(strain - wrong).max() > 0.08 * STRESS / CREEP_YOUNG
-
-
-def test_creep_under_the_papers_conditions() -> None:
-    """No slip at both ends, nodal shares, Kuhn 40 x 6 x 6: known figures of the top's centre."""
-    nodes, matrix, viscous, _, centre = slab((40, 6, 6))
-    free = np.ones_like(nodes, bool)
-    free[np.isclose(nodes[:, 2], 0)] = False
-    top = np.isclose(nodes[:, 2], HEIGHT)
-    free[top, :2] = False
-    load = np.zeros_like(nodes)
-    load[top, 2] = -10 / top.sum()
-    tau = VISCOSITY / CREEP_YOUNG
-    run = quasi_static_kelvin_voigt(matrix, viscous, load, free, tau / 100, 400, record=[centre])
-    strain = -run.recorded[[50, 100, 200, 300, 400], 0, 2] / HEIGHT / (STRESS / CREEP_YOUNG)
-    assert strain == pytest.approx([0.3125, 0.5085, 0.7185, 0.8144, 0.8620], abs=3e-3)
-
-
-def test_creep_closed_forms() -> None:
-    """Known table; general forms at other nu and bulk viscosity end at sigma/M and sigma/E."""
-    t = np.array([0.5, 1, 2, 3, 4])
-    assert closed.creep_uniaxial_strain(t, 1, 1, 1) == pytest.approx(
-        [0.3127, 0.5276, 0.7769, 0.8946, 0.9502], abs=5e-5
-    )
-    assert closed.creep_uniaxial_stress(t, 1, 1, 1) == pytest.approx(
-        [0.4808, 0.5956, 0.7547, 0.8512, 0.9098], abs=5e-5
-    )
-    assert closed.creep_equation_14(t, 1, 1, 1) == pytest.approx(
-        [0.3935, 0.6321, 0.8647, 0.9502, 0.9817], abs=5e-5
-    )
-    assert closed.creep_equation_14([2.0, 2.001], 1, 1, 1, 2.0, printed=True)[1] < 0
-    late = {"poisson": 0.3, "bulk_viscosity": 2.0}
-    assert closed.creep_uniaxial_stress(1e4, 1, 1, 1, **late) == pytest.approx(1)
-    modulus = closed.dilatational_speed(1, 0.3, 1) ** 2
-    assert closed.creep_uniaxial_strain(1e4, 1, 1, 1, **late) == pytest.approx(1 / modulus)
-
-
-def test_thickness_mode_decays_by_four_thirds_of_the_viscosity() -> None:
-    """On rollers the first mode decays at phi C phi / 2: 0.01446 mu_D, the paper's 0.015.
-
-    12 layers: (k h)^2 / 24 = 0.07 % off in k^2.
-    """
-    nodes, elements = kuhn((2, 2, 12), (0.3, 0.1, HEIGHT))
-    matrix = judge.stiffness(nodes, elements, YOUNG, 0.0)
-    viscous = judge.stiffness_lame(nodes, elements, -2 / 3, 1.0)
-    free = np.zeros_like(nodes, bool)
-    free[:, 2] = nodes[:, 2] > 1e-9
-    found = modes(matrix, judge.lumped_mass(nodes, elements, DENSITY), free, 1)
-    phi = found.shape[0].ravel()
-    decay = closed.thickness_decay(HEIGHT, 1.0, DENSITY)
-    assert decay == pytest.approx(0.01446, rel=3e-4)
-    assert phi @ (viscous @ phi) / 2 == pytest.approx(decay, rel=3e-3)
-    frequency = closed.thickness_frequency(HEIGHT, YOUNG, DENSITY)
-    assert found.frequency[0] == pytest.approx(frequency, rel=2e-3)
-    assert frequency == pytest.approx(4973, abs=1)
-
-
 def test_waves() -> None:
-    """Ordering of speeds, and the discrete row: exact at a Courant number of one."""
+    """Ordering of speeds, and the ratio of the two in a solid."""
     bar = closed.bar_speed(YOUNG, DENSITY)
     fast = closed.dilatational_speed(YOUNG, POISSON, DENSITY)
     slow = closed.shear_speed(YOUNG, POISSON, DENSITY)
     assert slow < bar < fast
     ratio = np.sqrt(2 * (1 - POISSON) / (1 - 2 * POISSON))
     assert fast / slow == pytest.approx(ratio, rel=1e-12)
-    k = np.array([1.0, 10.0, 100.0])
-    assert closed.discrete_frequency(k, bar, 0.01, 0.01 / bar) == pytest.approx(bar * k, rel=1e-12)

@@ -20,7 +20,7 @@ from qdem_fem import kernel, lanes, reference_forces, stress
 from qdem_fem.assembly import NO_LOADS
 from qdem_fem.layout import layout_build
 from qdem_fem.reference_forces import Elements, Strain, displacement_gradient, volume_change
-from validation.qdem_hard_meshes import delaunay_mesh
+from validation.bench.qdem.meshes import delaunay_mesh
 
 LAWS: tuple[Strain, ...] = get_args(Strain)
 LAW = pytest.mark.parametrize("law", LAWS)

@@ -10,7 +10,7 @@ import pytest
 import qdem_fem as q
 from qdem_fem.errors import ConditionError, ElementInverted, NotConverged
 from qdem_fem.mesh_generation import box_mesh
-from validation import qdem_judge
+from validation.bench.qdem import judge as qdem_judge
 
 LOAD = np.array([0.0, 0.0, -200.0])
 SIZE = (2.4, 0.25, 0.22)

@@ -23,8 +23,8 @@ from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.rigid_mass import cross_matrix, rigid_mass
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
+from tests.qdem_slopes import slope_gain
 from trackbed import command
-from validation.qdem_contact_trials import slope_gain
 
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
@@ -293,10 +293,42 @@ def test_collision_of_a_rigid_and_a_deformable_body(model: str) -> None:
     assert total(run) == pytest.approx(energy, rel=2e-2)
 
 
+def bounce(kind: float | str, cells: int = 2, samples: int = 100) -> Floats:
+    """Motion of a tilted brick that is thrown at a wall, spinning, (samples, 6) [m].
+
+    ``kind``: Young's modulus [Pa] of a deformable brick, or ``"solid"`` or ``"lumped"`` of a rigid
+    one.  The mean displacement, and the vector of rotation (best fit of all nodes) times 0.05 m.
+    """
+    mesh = box_mesh(BRICK, (cells,) * 3)
+    nodes = Rotation.from_euler("xyz", [0.5, 0.3, 0.2]).apply(mesh.nodes)
+    nodes[:, 2] += 0.006 + 1e-6 - nodes[:, 2].min()
+    young = 30e9 if isinstance(kind, str) else float(kind)
+    rigid: Any = False if not isinstance(kind, str) else (kind == "solid" or "lumped")
+    body = q.Body((nodes, mesh.elements), q.Material(young, 0.2, 2700.0), rigid=rigid)
+    spin = np.cross([20.0, 10.0, 30.0], nodes - body.rigid_mass.centre)
+    body.velocity = np.array([0.3, 0.0, -1.0]) + spin
+    wall = q.ContactPlane((0, 0, 0), (0, 0, 1))
+    contact = q.SphereContact(0.006, 1e6, 0.3, planes=[wall])
+    fastest = 2e-7 if rigid else None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", q.StepWarning)
+        run = q.Simulation([body], contact=contact, threads=1, step=fastest)
+        rows: list[Floats] = []
+        for _ in range(samples):
+            run.advance((len(rows) + 1) * 1.5e-3 / samples - run.time)
+            rows.append(np.append(body.displacement.mean(axis=0), 0.05 * turn_of(body)))
+    return np.array(rows)
+
+
+def turn_of(body: q.Body) -> Floats:
+    """Vector of the rotation that fits the nodes best [rad], (3,)."""
+    arm, moved = body.nodes, body.nodes + body.displacement
+    fit, _ = Rotation.align_vectors(moved - moved.mean(axis=0), arm - arm.mean(axis=0))
+    return np.asarray(fit.as_rotvec())
+
+
 def test_a_stiff_deformable_body_tends_to_the_rigid_one() -> None:
     """Bounced off a wall: the error falls as 1/E, and only with the inertia of its own mesh."""
-    from validation.qdem_bodies import bounce
-
     limit = bounce("lumped")
     errors = [np.linalg.norm(bounce(young) - limit) for young in (3e9, 12e9)]
     assert errors[1] < 0.02 * np.linalg.norm(limit)

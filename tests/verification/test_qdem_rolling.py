@@ -37,7 +37,7 @@ from qdem_fem.track_cli import SEAT_AREA
 from qdem_fem.track_load import bogie_series
 from qdem_fem.track_scene import TrackPrepared
 from trackbed.command import main
-from validation.track_trials import SCENE
+from validation.bench.track_trials import SCENE
 
 TRACK, ROLLING, SPEED, LOAD = Track(), Rolling(), 32.0, 50e3
 NO_LOSS = Rolling(pad_loss=1e-12, ballast_loss=1e-12)

@@ -42,9 +42,7 @@ from qdem_fem.track_recipe import BedRecipe, grains_of
 from qdem_fem.track_scene import TrackPrepared
 from qdem_fem.track_table import BogieTable, TrackTable
 from trackbed.command import main
-from validation import track_page
-from validation.track_bogie import passages, settlement_at
-from validation.track_trials import SCENE
+from validation.bench.track_trials import SCENE
 
 GRAVITY = (0.0, 0.0, -9.81)
 STONE = Material(1e8, 0.2, 2700.0, shear_viscosity=100.0)
@@ -471,29 +469,7 @@ def test_scene_of_the_small_track_is_sound() -> None:
     assert prepared.scene.simulation.duration == pytest.approx(prepared.load.times[-1], abs=1e-3)
 
 
-def test_settlement_is_told_by_axle() -> None:
-    """3 m at 30 m/s to the first axle; the bogie's own distance to the second.  A point that sinks
-    evenly has its greatest settlement at the end of a passage, one that swings has it before."""
-    on, ends = passages(BogieTable(lead=3.0, speed=30.0))
-    apart = Train(cars=1).axle_distance / 30.0
-    assert on == pytest.approx([0.1, 0.1 + apart])
-    assert ends == pytest.approx([0.1 + apart / 2, 0.2 + apart])
-    time = np.linspace(0.0, 1.0, 101)
-    assert settlement_at(time, time, np.array([0.25, 0.5])) == [
-        {"greatest": 0.25, "end": 0.25}, {"greatest": 0.5, "end": 0.5}
-    ]  # fmt: skip
-    swing = np.sin(4 * np.pi * time)
-    found = settlement_at(time, swing, np.array([0.25, 0.5]))
-    assert found[0]["greatest"] == pytest.approx(1.0, abs=1e-2)
-    assert found[0]["end"] == pytest.approx(0.0, abs=1e-9)
-
-
 def test_every_key_of_a_track_is_named_in_its_scene() -> None:
     text = (Path(__file__).parents[2] / "scenes" / "track-small.toml").read_text(encoding="utf-8")
     keys = [*TrackTable.model_fields, *BogieTable.model_fields]
     assert [key for key in keys if key not in text] == []
-
-
-def test_page_is_written_from_its_records() -> None:
-    expected = track_page.page_text(track_page.records())
-    assert track_page.PAGE.read_text(encoding="utf-8") == expected

@@ -16,7 +16,7 @@ from qdem_fem.track_cli import SEAT_AREA
 from qdem_fem.track_load import RISE, bogie_series
 from qdem_fem.track_scene import TrackPrepared
 from trackbed.command import main
-from validation.track_trials import SCENE
+from validation.bench.track_trials import SCENE
 
 SHARE = 0.13
 """Of `SCENE`."""

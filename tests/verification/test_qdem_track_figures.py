@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.signal import periodogram
 
-from qdem_fem.errors import UsageError
 from qdem_fem.output import Table
 from qdem_fem.scene_series import TimeSeries
 from qdem_fem.spectra import fourier_spectrum, frequency_response, parzen_smoothed
@@ -26,7 +25,6 @@ from qdem_fem.track_figures import (
     track_facts,
     track_pictures,
 )
-from validation.track_bogie import settlement_at
 
 STEP = 1e-4
 
@@ -151,28 +149,6 @@ def test_peaks_at_the_edges_and_in_constants_are_none() -> None:
     assert peaks_of(frequency, np.array([9.0, 1, 2, 1, 1, 9])) == [2.0]
     assert peaks_of(frequency, np.full(6, 3.0)) == []
     assert peaks_of(frequency, np.array([0.0, 1, np.nan, 1, 2, 0])) == [4.0]
-
-
-def test_settlement_by_axle_of_ramps_drift_and_steps() -> None:
-    """Each passage has what lies in it: a step at each axle, on a steady drift."""
-    time = np.linspace(0.0, 0.2, 2001)
-    down = 1e-3 * time + 2e-5 * (time >= 0.06) + 3e-5 * (time >= 0.12)
-    first, last = settlement_at(time, down, np.array([0.1, 0.2]))
-    assert first == pytest.approx({"greatest": 1.2e-4, "end": 1.2e-4})
-    assert last == pytest.approx({"greatest": 2.5e-4, "end": 2.5e-4})
-    lifted = settlement_at(time, -down, np.array([0.1, 0.2]))
-    assert lifted[1] == pytest.approx({"greatest": -1.2e-4, "end": -2.5e-4})
-    (only,) = settlement_at(time, down, np.array([0.2]))
-    assert only["end"] == pytest.approx(2.5e-4)
-
-
-def test_a_record_that_ends_before_the_passage_is_refused() -> None:
-    """One sample early is what a record of whole steps may end; more is not the passage."""
-    time = np.linspace(0.0, 0.1, 1001)
-    settlement_at(time, time, np.array([0.05, 0.1 + 1e-4]))
-    for end in (0.1003, 0.5):
-        with pytest.raises(UsageError, match=r"the record ends at 0\.1 s, the last passage"):
-            settlement_at(time, time, np.array([0.05, end]))
 
 
 def rows_written(folder: Path, count: int) -> None:

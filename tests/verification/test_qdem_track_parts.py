@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +12,6 @@ from scipy.spatial import cKDTree
 
 import qdem_fem as q
 from qdem_fem import track_bed, track_scene
-from qdem_fem.contact_spheres import SKIN
 from qdem_fem.errors import SceneError
 from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
@@ -25,13 +23,12 @@ from qdem_fem.track_bodies import TrackBox, grains_nodes
 from qdem_fem.track_layout import TrackLayout
 from qdem_fem.track_recipe import grains_of
 from qdem_fem.track_scene import TrackPrepared, track_enter
-from validation import track_periodic
-from validation.track_split import ghosts, shared_nodes
-from validation.track_trials import SCENE, scene_at
+from validation.bench.track_trials import SCENE, scene_at
 
 CONCRETE = Material(45e9, 0.167, 2350.0)
 WHOLE = TrackLayout("whole", TrackBox(5.0, 0.6), SleeperShape(), (24, 4, 3), 0.012, (0.5, 1.3))
 HALF = replace(WHOLE, part="half", box=TrackBox(2.4, 0.6), cells=(12, 4, 3))
+WIDTH = 'contact.periodic={axis="y", width=0.42}'
 SCENES = Path(__file__).parents[2] / "scenes"
 
 
@@ -68,7 +65,7 @@ def test_modes_of_a_free_track_sleeper_are_those_of_its_eigenproblem() -> None:
 
 
 def test_bending_modes_are_what_the_printed_measures_allow() -> None:
-    # Ten-node tetrahedra: 190, 502 and 932 Hz by validation/results/qdem-grains.jsonl, where the
+    # Ten-node tetrahedra: 190, 502 and 932 Hz, where the
     # paper names 200, 400 and 800 Hz of a sleeper whose section it does not print.
     modes = free_modes(replace(WHOLE, cells=(16, 2, 2)).sleeper(0.0), CONCRETE, 6, quadratic=True)
     bending = [f for f, kind in zip(modes.frequency, modes.kind, strict=True) if kind == "vertical"]
@@ -187,14 +184,6 @@ def test_scenes_of_half_and_whole_sleepers_are_sound(name: str, grains: int) -> 
         assert np.diff(np.unique(nodes[:, axis].round(9))).max() <= 2 * recipe.radius
 
 
-def test_a_bed_that_repeats_rests_where_all_are_stopped_together() -> None:
-    record = json.loads(track_periodic.RECORD.read_text(encoding="utf-8"))
-    assert not record["one by one"]["hard"]["reached"]
-    for stage in ("hard", "rest"):
-        assert record["all together"][stage]["reached"]
-        assert record["all together"][stage]["loose"] == 0.0
-
-
 @pytest.mark.parametrize("periodic", [False, True])
 @pytest.mark.long
 def test_hard_stages_of_a_periodic_bed_are_stopped_together(
@@ -207,7 +196,7 @@ def test_hard_stages_of_a_periodic_bed_are_stopped_together(
         return Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
 
     monkeypatch.setattr(track_bed, "rest_find", find)
-    recipe = scene_at(tmp_path, *(track_periodic.WIDTH,) * periodic).recipe
+    recipe = scene_at(tmp_path, *(WIDTH,) * periodic).recipe
     track_bed.bed_prepare(recipe, tmp_path / "bed.npz", 1)
     assert asked == [True] * (len(track_bed.STAGES) - 2) + [not periodic] * 2
 
@@ -216,38 +205,3 @@ def test_a_grain_that_left_a_periodic_box_counts_where_its_image_is() -> None:
     places = np.array([[2.5, y, 0.3] for y in (0.3, 0.3 + 0.6, 0.3 - 1.2, 0.6, 0.9 + 0.2)])
     assert WHOLE.across(places) == pytest.approx([0.0, 0.0, 0.0, 0.3, 0.2], abs=1e-12)
     assert WHOLE.under(places).tolist() == [True, True, True, False, False]
-
-
-def test_what_processes_tell_each_other_is_counted() -> None:
-    """A row of vertices 10 mm apart, cut in three: two radii and the skin reach over two of them,
-    so two are told across each cut, each way; two elements on a face share its three nodes."""
-    every = np.column_stack([0.01 * np.arange(30), np.zeros(30), np.zeros(30)])
-    none = np.zeros(30, bool)
-    told, heard = ghosts(0.012, None, every, np.arange(30) // 10, none, 3)
-    assert told.tolist() == heard.tolist() == [2, 4, 2]
-    rolled, _ = ghosts(0.012, 0.3, every[:, [1, 0, 2]], np.arange(30) // 10, none, 3)
-    assert rolled.tolist() == [4, 4, 4]
-    pair = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
-    assert shared_nodes(pair, np.array([0, 1]), 2).tolist() == [3, 3]
-
-
-@pytest.mark.parametrize("width", [None, 0.2])
-def test_vertices_told_are_those_of_all_distances(width: float | None) -> None:
-    """Every pair of 800 vertices in a box cut in four along y, where it may repeat, one by one."""
-    every = np.random.default_rng(4).uniform(0.0, [0.3, 0.2, 0.2], (800, 3))
-    owner = np.searchsorted([0.06, 0.1, 0.15], every[:, 1])
-    cut = every[:, 2] > 0.12  # a body in all four, whose vertices do not touch each other
-    away = every[:, None] - every[None]
-    if width is not None:
-        away[..., 1] -= width * np.round(away[..., 1] / width)
-    near = np.linalg.norm(away, axis=2) <= (2 + SKIN) * 0.012
-    near &= ~(cut[:, None] & cut)
-    told, heard = np.zeros((2, 4), int)
-    for here in range(4):
-        for there in set(range(4)) - {here}:
-            needed = near[np.ix_(owner == there, owner == here)].any(axis=1).sum()
-            told[there] += needed
-            heard[here] += needed
-    found = ghosts(0.012, width, every, owner, cut, 4)
-    assert [one.tolist() for one in found] == [told.tolist(), heard.tolist()]
-    assert told.sum() > 100

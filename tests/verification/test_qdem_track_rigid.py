@@ -16,7 +16,7 @@ from qdem_fem.track_bed import bed_prepare, bed_read
 from qdem_fem.track_scene import TrackPrepared, contact_of
 from qdem_fem.track_stand import bed_begin
 from trackbed import command
-from validation.track_trials import SCENE, scene_at
+from validation.bench.track_trials import SCENE, scene_at
 
 FEW = ("track.below=8", "track.beside=3", "track.unbalanced=0.5")
 

@@ -26,7 +26,7 @@ from qdem_fem.track_bed import (
     stage_run,
 )
 from qdem_fem.track_recipe import BedRecipe, grains_of
-from validation.track_trials import scene_at
+from validation.bench.track_trials import scene_at
 
 JUDGEMENTS = 3
 """After so many the process is killed; the stage of 20 grains takes more."""

@@ -30,7 +30,7 @@ from qdem_fem.track_recipe import grains_of
 from qdem_fem.track_scene import TrackPrepared, contact_of
 from qdem_fem.track_stand import bed_begin, bed_judge, bed_stand
 from tests.verification.test_qdem_track import RADIUS, RECIPE, STIFFNESS, STONE
-from validation.track_trials import SCENE
+from validation.bench.track_trials import SCENE
 
 SLOPE, TIME = np.arctan(0.2), 5e-3
 DOWN = 9.81 * np.array([np.sin(SLOPE), 0.0, -np.cos(SLOPE)])

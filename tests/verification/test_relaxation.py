@@ -31,7 +31,7 @@ from adapters.relaxation_kernel import (
 )
 from adapters.state import Contacts, FloatArray, State
 from tests.deepest_overlap import deepest
-from validation.cases.relaxation import STIFFNESS, bed_made, jump, state_at_rest
+from tests.made_beds import STIFFNESS, bed_made, jump, state_at_rest
 
 BOX = Container("box", size_x=0.1, size_y=0.1)
 GRAVITY = 9.81

@@ -9,7 +9,7 @@ from adapters.container import Container
 from adapters.overlaps import neighbours
 from adapters.relaxation import relax
 from adapters.state import FloatArray, State
-from validation.cases.relaxation import STIFFNESS, state_at_rest
+from tests.made_beds import STIFFNESS, state_at_rest
 
 RADIUS, OVERLAP = 3.2e-3, 6e-8
 WALLS = Container("box", size_x=1.0, size_y=1.0).walls()

@@ -1,25 +1,29 @@
 """Grains that change places: room in jammed beds, where no smallest move has any.
 
-The beds are those of the reference ensemble (150 grains, 10^9 Pa) after 10,000 computed cycles, the
-load at its trough.  Asked is a settlement of 120 um by an even strain, 4 % of a mean radius.
+The beds, ``tests/jammed_beds.npz``, are those of full runs (150 grains, 10^9 Pa) after 10,000
+computed cycles, the load at its trough.  Asked is a settlement of 120 um by an even strain, 4 % of
+a mean radius.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from adapters.contact_law import HertzStiffness
 from adapters.container import Container, Walls
 from adapters.errors import UsageError
 from adapters.relaxation import RelaxationNotConverged, relax
 from adapters.relaxation_rearranged import ENOUGH, LEAST, MOST, OVERLAP_MAX, rearrange
+from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State
+from scenes import scene_path
 from tests.deepest_overlap import deepest
-from validation.cases.relaxation import STIFFNESS, state_at_rest
-from validation.settlement_ensemble import COARSE
-from validation.settlement_ensemble_record import RECORD
+from tests.made_beds import STIFFNESS, state_at_rest
 
+BEDS = Path(__file__).parents[1] / "jammed_beds.npz"
+SCENE = scene_load(scene_path("karrech-coarse"), ["material.grain.young=1e9"])
 GAIN = 120e-6
 JAMMED = ((3, 0), (3, 1), (5, 1))
 """Packing and member."""
@@ -27,9 +31,9 @@ JAMMED = ((3, 0), (3, 1), (5, 1))
 
 def bed_of(packing: int, member: int, scale: float = 1.0) -> tuple[State, Container]:
     """The bed after 10,000 cycles, all lengths times ``scale``."""
-    with np.load(RECORD / f"coarse-{packing}-{member}.states.npz") as kept:
-        state = state_at_rest(scale * kept["position_10000"], scale * kept["radius"])
-    container = COARSE.scene(packing).container
+    with np.load(BEDS) as kept:
+        position, radius = (kept[f"{name}_{packing}_{member}"] for name in ("position", "radius"))
+    state, container = state_at_rest(scale * position, scale * radius), SCENE.container
     assert container.radius is not None
     return state, Container("cylinder", container.symmetry, radius=scale * container.radius)
 
@@ -46,22 +50,18 @@ def strained(
     return target, container.walls(top), container.walls(lowered), container.walls(top)
 
 
-def stiffness_of(packing: int) -> HertzStiffness:
-    return COARSE.scene(packing).stiffness
-
-
 def settled(before: State, position: FloatArray) -> float:
     return float((before.position - position)[:, 2].mean())
 
 
 def found_by(
-    packing: int, before: State, gain: float, container: Container, seed: int, gravity: float = 9.81
+    before: State, gain: float, container: Container, seed: int, gravity: float = 9.81
 ) -> FloatArray | None:
     """Positions [m] (n, 3) that `rearrange` finds under the lowered piston; None: none."""
     target, walls, lowered, _ = strained(before, container, gain)
     try:
         return rearrange(
-            target, before, walls, stiffness_of(packing), np.random.default_rng(seed),
+            target, before, walls, SCENE.stiffness, np.random.default_rng(seed),
             walls_after=lowered, gravity=gravity,
         )[0].position  # fmt: skip
     except RelaxationNotConverged:
@@ -80,9 +80,9 @@ def test_room_where_a_smallest_move_finds_none() -> None:
         target, walls, lowered, still = strained(before, container, GAIN)
         for after in (lowered, still):
             with pytest.raises(RelaxationNotConverged):
-                relax(target, before, walls, stiffness_of(packing), walls_after=after)
+                relax(target, before, walls, SCENE.stiffness, walls_after=after)
         deep = OVERLAP_MAX * deepest(before.position, before.radius, walls)
-        beds = [found_by(packing, before, GAIN, container, seed) for seed in range(3)]
+        beds = [found_by(before, GAIN, container, seed) for seed in range(3)]
         got = [settled(before, x) for x in beds if x is not None]
         assert all(deepest(x, before.radius, lowered) <= deep for x in beds if x is not None)
         assert all(LEAST * GAIN <= gain <= MOST * GAIN for gain in got)
@@ -96,7 +96,7 @@ def test_grains_move_as_far_as_in_a_full_run() -> None:
     """No bed is made anew: the root mean square of the grains' moves stays below a radius, where
     full runs have 0.3 to 0.4 while the cycles double, and the greatest below three diameters."""
     before, container = bed_of(5, 1)
-    found = found_by(5, before, GAIN, container, 0)
+    found = found_by(before, GAIN, container, 0)
     assert found is not None
     moves = np.linalg.norm(found - before.position, axis=1) / before.radius.mean()
     assert 0.1 < np.sqrt(np.mean(moves**2)) < 1
@@ -106,7 +106,7 @@ def test_grains_move_as_far_as_in_a_full_run() -> None:
 @pytest.mark.long
 def test_same_generator_same_bed_another_one_another() -> None:
     before, container = bed_of(3, 1)
-    beds = [found_by(3, before, GAIN / 2, container, seed) for seed in (7, 7, 8)]
+    beds = [found_by(before, GAIN / 2, container, seed) for seed in (7, 7, 8)]
     first, same, other = (bed for bed in beds if bed is not None)
     np.testing.assert_array_equal(first, same)
     assert np.abs(first - other).max() > 1e-6
@@ -118,7 +118,7 @@ def test_room_does_not_depend_on_the_unit_of_length(scale: float) -> None:
     as c, and the bed is the same bed.  Rounding parts the paths, not what they find."""
     before, container = bed_of(5, 0, scale)
     gain, gravity = scale * GAIN / 2, 9.81 / scale
-    beds = [found_by(5, before, gain, container, seed, gravity) for seed in range(3)]
+    beds = [found_by(before, gain, container, seed, gravity) for seed in range(3)]
     got = [settled(before, x) / gain for x in beds if x is not None]
     assert len(got) >= 2
     assert max(got) >= ENOUGH

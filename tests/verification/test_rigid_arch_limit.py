@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from validation.rigid_arch_limit import arch_limit, arch_unbalance
-from validation.rigid_hard_equilibrium import BALANCED
+from validation.bench.rigid.rest_limit import BALANCED, arch_limit, arch_unbalance
 
 MILANKOVITCH = 0.10748
 """Least thickness over mean radius of a semicircular arch of very many stones."""

@@ -15,14 +15,14 @@ from rigid_lcp.collision_input import Law
 from rigid_lcp.collisions import Collision, Floats, collide
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import BodySpace
-from tests.rigid_networks import network_bodies
-from validation.rigid_integration_collisions import (
+from tests.rigid_collision_sets import (
     cradle,
     cradle_answer,
     kinetic_energy,
     one_body,
     random_collision,
 )
+from tests.rigid_networks import network_bodies
 
 
 def energy_of(bodies: BodySpace, velocity: Floats, found: Collision) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from tests.rigid_static_problems import (
     pyramid,
     tower,
 )
-from validation.rigid_packings import packing
+from validation.bench.rigid.packings import packing
 
 
 @pytest.mark.parametrize("top", [1.0, 1e4])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rigid_lcp import BodySpace, solve_friction
 from rigid_lcp.energy_proof import CERTAIN, energy_least, gives_energy
 from rigid_lcp.friction_problem import friction_problem
-from validation.rigid_packings import packing
+from validation.bench.rigid.packings import packing
 
 
 def one_contact(coupling: float, mu: float):

@@ -18,8 +18,8 @@ from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.proximal_newton import proximal_newton, proximal_point
 from rigid_lcp.solver_trial import Trial
 from rigid_lcp.solver_turns import turns_from_paths
-from validation.rigid_examination_families import family_named
-from validation.rigid_packings import packing
+from validation.bench.rigid.examination import family_named
+from validation.bench.rigid.packings import packing
 
 Floats = NDArray[np.float64]
 

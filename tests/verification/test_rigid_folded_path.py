@@ -14,7 +14,7 @@ from rigid_lcp.folded_path import Border, Curve, Place, Step, curve_begin, folde
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.smoothed_path import smoothed_path
 from tests.verification.test_rigid_smoothed_path import plain_map, units_change_nothing
-from validation.rigid_packings import packing
+from validation.bench.rigid.packings import packing
 
 Floats = NDArray[np.float64]
 SEEDS = range(4)

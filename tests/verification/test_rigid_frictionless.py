@@ -15,7 +15,7 @@ from rigid_lcp.friction_problem import BodySpace, friction_problem
 from rigid_lcp.frictionless import Floats, face_solver, frictionless, lcp, normal_matrix
 from rigid_lcp.normal_sweeps import normal_sweeps
 from tests.rigid_networks import network, network_bodies, stored, tower
-from validation.rigid_packings import packing
+from validation.bench.rigid.packings import packing
 
 TOLERANCE = 1e-12
 

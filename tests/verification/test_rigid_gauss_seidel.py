@@ -15,7 +15,7 @@ from rigid_lcp.errors import UsageError
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import Sweeper, gauss_seidel
 from rigid_lcp.local_contact import local_solution
-from validation.rigid_packings import tower
+from validation.bench.rigid.packings import tower
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,9 @@ import pytest
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
-from validation.rigid_hard_equilibrium import BALANCED, least_that_rests, unbalance
-from validation.rigid_hard_scenes import (
+from tests.rigid_hopper import WALL, jam
+from tests.rigid_motions import stack_drop
+from validation.bench.rigid.hard_scenes import (
     card_storeys,
     card_storeys_friction,
     in_units,
@@ -19,8 +20,8 @@ from validation.rigid_hard_scenes import (
     kicked_tower,
     turned,
 )
-from validation.rigid_hopper import WALL, jam
-from validation.rigid_scenes import (
+from validation.bench.rigid.rest_limit import BALANCED, least_that_rests, unbalance
+from validation.bench.rigid.scenes import (
     DENSITY,
     G,
     arch,
@@ -30,7 +31,6 @@ from validation.rigid_scenes import (
     card_house_friction,
     light_on_heavy,
     stack,
-    stack_drop,
     wedge,
     wedge_acceleration,
 )

@@ -15,8 +15,9 @@ from rigid_lcp.errors import NotConverged
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
+from tests.rigid_motions import rocking_block, rocking_block_answer
 from tests.rigid_networks import tower, tower_bodies
-from validation.rigid_scenes import FLOOR, G, gravity_on, rocking_block, rocking_block_answer
+from validation.bench.rigid.scenes import FLOOR, G, gravity_on
 
 Floats = NDArray[np.float64]
 

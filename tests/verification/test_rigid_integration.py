@@ -1,26 +1,22 @@
-"""Answers and measures of `validation.rigid_integration*`: each against another way to get it."""
+"""Motions with a closed form: a disc that skids and rolls, a rod over an edge, a rocking block."""
 
 from __future__ import annotations
 
-from math import nan, sqrt
+from math import sqrt
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from rigid_lcp.simulation import Simulation
 from rigid_lcp.simulation_input import Method
-from validation import rigid_integration_scenes as motions
-from validation.cases.rigid_integration import trace_checks
-from validation.rigid_integration_impacts import energy_off, impact_ours, impacts
-from validation.rigid_integration_order import (
-    PROBLEMS,
-    OrderRow,
-    coordinates,
-    order_fitted,
-    order_row,
-)
-from validation.rigid_integration_steps import Attempts, drift, traces
-from validation.rigid_integration_zeno import cut_off, rest_time
-from validation.rigid_scenes import G, bouncing_disc, rocking_block_answer
+from tests import rigid_motions as motions
+from tests.rigid_motions import rocking_block_answer
+
+
+def coordinates(run: Simulation) -> NDArray[np.float64]:
+    """Place [m] and angle [rad] of body 0."""
+    return np.append(run.positions[0], run.angles[0])
 
 
 def test_disc_skids_and_rolls() -> None:
@@ -60,80 +56,12 @@ def test_rocking_block_is_upright_when_housner_says() -> None:
     assert x < -0.2
 
 
-def test_order_is_that_of_a_power_law() -> None:
-    """h^2 with round-off at its end, which does not count."""
-    rows = [OrderRow("p", "m", h, max(h * h, 1e-12), 0.0, 1) for h in (1e-1, 1e-2, 1e-3, 1e-7)]
-    assert order_fitted(rows) == pytest.approx(2.0)
-    assert np.isnan(order_fitted([OrderRow("p", "m", 1.0, nan, 0.0, 1)]))
-
-
-def test_an_orientation_is_judged_up_to_its_sign() -> None:
-    """A quaternion and its opposite are one; an error in it is half an angle."""
-    problem = next(each for each in PROBLEMS if each.turned)
-    row = order_row(problem, "acceleration", 4e-3)
-    assert row.error == pytest.approx(3.4e-6, rel=0.05)
-    exact = motions.stone_in_flight_answer(problem.seconds)
-    assert problem.error(-exact) < 1e-15
-
-
-def test_every_attempt_at_a_step_is_noted() -> None:
-    """As many kept and taken back as the step control counts; they follow each other in time."""
-    scene = bouncing_disc(0.05, 0.5).world.scene
-    from rigid_lcp.simulation import Simulation
-
-    noted = Attempts(2)
-    run = Simulation(scene, "acceleration", step=0.01, loads=noted)
-    run.pace.locating = False
-    run.advance(0.15)
-    steps = noted.steps()
-    kept = [(start, length) for start, length, was_kept in steps if was_kept]
-    assert len(kept) == run.pace.accepted
-    assert len(steps) - len(kept) == run.pace.halved > 5
-    ends = [start + length for start, length in kept]
-    assert ends[:-1] == pytest.approx([start for start, _ in kept[1:]], abs=1e-14)
-    assert ends[-1] == pytest.approx(0.15)
-
-
-def test_steps_double_after_three_clean_ones_only() -> None:
-    """Grains in a trough for a moment: what the case checks of a trace holds."""
-    for trace in traces(0.05):
-        checks = trace_checks(trace)
-        assert [check.name for check in checks if not check.holds] == []
-
-
-def test_drift_is_taken_out_of_gaps() -> None:
-    """A disc slides round another: to round-off with the control, the fourth power without."""
-    kept = drift("acceleration", 0.05, 0.0, 0.1, control=True)
-    left = drift("acceleration", 0.05, 0.0, 0.1, control=False)
-    assert kept.gap[-1] < 1e-13 < 1e-10 < left.gap[-1]
-    assert kept.rounds >= 0.1
-
-
-def test_touching_balls_leave_as_the_paper_says() -> None:
-    """The row's note is read off the end: two of five balls in, all at once."""
-    impact = next(each for each in impacts(True) if "touching" in each.case)
-    row = impact_ours(impact, "time-stepping")
-    assert row.ok
-    assert row.why == "leave with -0.2 -0.2 0.8 0.8 0.8"
-
-
-def test_energy_is_told_over_that_of_rest() -> None:
-    """A block that has lost all its height has lost all its energy."""
-    scene = next(each for each in impacts(True) if "flat" in each.case).scene
-    path = np.zeros((1, 2, 6))
-    path[0, 0, 1] = -0.01
-    assert energy_off(scene, path) == pytest.approx(1.0)
-    path[0, 0, 4] = sqrt(2 * G * 0.01)
-    assert energy_off(scene, path) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_time_to_rest() -> None:
-    """Flights of e = 0.5 added up by hand until the speed is a thousandth of the first."""
-    speed = sqrt(2 * G * 0.1)
-    time, flight = speed / G, 0.5
-    while flight >= 1e-3:
-        time += 2 * speed * flight / G
-        flight *= 0.5
-    assert rest_time(0.1, 0.5) == pytest.approx(time, rel=1e-12)
-    # 1e-4 sqrt(g R) over (1 - e) of a flight, over 3 sqrt(2 h / g)
-    assert cut_off(0.1, 0.5) == pytest.approx(4e-4 / (3 * sqrt(2)), rel=1e-12)
+@pytest.mark.parametrize("friction", [0.0, motions.ORBIT_FRICTION])
+def test_a_disc_goes_round_another_at_one_speed(friction: float) -> None:
+    """Sliding without friction or rolling, a tenth of a round at 1 m/s: gap and speed are kept."""
+    run = motions.orbiting_disc("acceleration", 0.02, friction)
+    run.advance(0.1 * 2 * np.pi * sum(motions.ORBIT_RADII))
+    distance = float(np.linalg.norm(run.positions[0]))
+    assert distance == pytest.approx(sum(motions.ORBIT_RADII), abs=1e-13)
+    # the fourth power of the step
+    assert float(np.linalg.norm(run.velocities[0])) == pytest.approx(1.0, abs=1e-6)

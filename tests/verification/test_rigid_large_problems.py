@@ -11,7 +11,7 @@ from rigid_lcp.contact_sweeps import MANY_CONTACTS, carrying
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.solver import solve_friction
-from validation.rigid_packings import crystal, tower
+from validation.bench.rigid.packings import crystal, tower
 
 COPIES, BOXES, HELD = 500, 3, 3
 """So many small towers side by side, of which one of ``HELD`` stands and the others fly up."""

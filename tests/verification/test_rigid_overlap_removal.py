@@ -14,7 +14,7 @@ import rigid_lcp as r
 from rigid_lcp.motion import Motion
 from rigid_lcp.overlap_removal import lift_paid, overlap_removed
 from rigid_lcp.scene import World, world_of
-from validation.rigid_scenes import poured
+from validation.bench.rigid.scenes import poured
 
 Floats = NDArray[np.float64]
 G = 9.81

@@ -10,7 +10,7 @@ import pytest
 
 from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.solver import solve_auto
-from validation.rigid_packings import (
+from validation.bench.rigid.packings import (
     DENSITY,
     GRAVITY,
     TOUCH,

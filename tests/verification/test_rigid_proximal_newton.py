@@ -13,7 +13,7 @@ from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.proximal_newton import hopeless, proximal_newton, proximal_point
-from validation.rigid_packings import tower
+from validation.bench.rigid.packings import tower
 
 Floats = NDArray[np.float64]
 

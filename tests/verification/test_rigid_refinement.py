@@ -14,7 +14,7 @@ from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.refinement import gmres, refined
 from rigid_lcp.sticking import sticking
-from validation.rigid_scenes import light_on_heavy, stack
+from validation.bench.rigid.scenes import light_on_heavy, stack
 
 Floats = NDArray[np.float64]
 

@@ -17,15 +17,17 @@ from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.shapes_3d import box
 from rigid_lcp.simulation import Simulation
 from rigid_lcp.simulation_input import Method
-from validation.rigid_integration_scenes import falling_box
-from validation.rigid_integration_steps import grains_in_a_box
-from validation.rigid_scenes import (
+from tests.rigid_motions import (
+    bouncing_time,
+    disc_on_incline_acceleration,
+    falling_box,
+    grains_in_a_box,
+)
+from validation.bench.rigid.scenes import (
     G,
     block_on_incline,
     bouncing_disc,
-    bouncing_time,
     disc_on_incline,
-    disc_on_incline_acceleration,
     sliding_rod,
     sliding_rod_limit,
     stack,

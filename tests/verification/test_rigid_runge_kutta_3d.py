@@ -15,9 +15,9 @@ from rigid_lcp.shapes_2d import HalfSpace
 from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
 from rigid_lcp.simulation import Simulation
 from rigid_lcp.simulation_input import Method
-from validation import rigid_integration_scenes as motions
-from validation.rigid_integration_scenes import STONE
-from validation.rigid_integration_scenes import STONE_SPIN as SPIN
+from tests import rigid_motions as motions
+from tests.rigid_motions import STONE
+from tests.rigid_motions import STONE_SPIN as SPIN
 
 Floats = NDArray[np.float64]
 G = 9.81

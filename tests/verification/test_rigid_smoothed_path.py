@@ -13,7 +13,7 @@ from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_problem
 from rigid_lcp.interior_point import Path, interior_point
 from rigid_lcp.smoothed_path import path_begin, smoothed_map, smoothed_path, smoothed_point
-from validation.rigid_packings import packing, tower
+from validation.bench.rigid.packings import packing, tower
 
 Floats = NDArray[np.float64]
 

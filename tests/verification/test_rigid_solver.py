@@ -25,7 +25,7 @@ from rigid_lcp.solver_cold import CONVEX_STEPS, convex_path
 from rigid_lcp.solver_order import attempts, fallback_paths, friction_steps
 from rigid_lcp.solver_trial import Trial
 from rigid_lcp.solver_turns import sharp_path, smoothed_further
-from validation.rigid_packings import packing
+from validation.bench.rigid.packings import packing
 
 FOLDER = Path(os.environ.get("TRACKBED_DATA", "")) / "friction_problems"
 STORED = (

@@ -12,7 +12,7 @@ from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_prob
 from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.sticking import HEAVY, heaviness, seem_to_stick, sticking
 from tests.rigid_networks import GRAVITY, STEP, tower
-from validation.rigid_packings import tower as packed_tower
+from validation.bench.rigid.packings import tower as packed_tower
 
 
 @pytest.mark.parametrize("top", [1.0, 1e4])

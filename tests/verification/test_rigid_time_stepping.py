@@ -15,14 +15,17 @@ from rigid_lcp.passed_collisions import Closing, bouncing, contact_shift
 from rigid_lcp.scene import Scene
 from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
-from validation.rigid_integration_impacts import balls_in_a_row, dense_gas
-from validation.rigid_scenes import (
+from tests.rigid_motions import (
+    balls_in_a_row,
+    bouncing_time,
+    dense_gas,
+    disc_on_incline_acceleration,
+)
+from validation.bench.rigid.scenes import (
     G,
     block_on_incline,
     bouncing_disc,
-    bouncing_time,
     disc_on_incline,
-    disc_on_incline_acceleration,
     poured,
     stack,
 )

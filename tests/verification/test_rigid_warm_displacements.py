@@ -21,8 +21,8 @@ from rigid_lcp.motion import motion_with_rates
 from rigid_lcp.scene import Scene, world_of
 from rigid_lcp.shapes_2d import Disc, HalfSpace
 from tests.rigid_static_problems import beam, difference, pyramid, table, tower
-from validation.rigid_indeterminacy import renumbered
-from validation.rigid_indeterminacy_scenes import pyramid as pile
+from validation.bench.rigid.static_grains import pyramid as pile
+from validation.bench.rigid.static_grains import renumbered
 
 
 def box_of_discs(rows: int, friction: float, seed: int) -> FrictionProblem:

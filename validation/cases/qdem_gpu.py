@@ -26,10 +26,10 @@ import qdem_fem as q
 from qdem_fem.assembly import NO_PROBES
 from qdem_fem.errors import LibraryMissing
 from qdem_fem.mesh_generation import box_mesh
+from validation.bench.qdem_gpu.beam import FORCE, MATERIAL, SIZE
+from validation.bench.qdem_gpu.contact import contacts_compare
+from validation.bench.qdem_gpu.packing import packing_checks
 from validation.case import Check
-from validation.qdem_gpu_contact import contacts_compare
-from validation.qdem_gpu_packing import packing_checks
-from validation.qdem_race import FORCE, MATERIAL, SIZE
 
 Floats = NDArray[np.float64]
 Precision = Literal["float64", "float32"]

@@ -1,0 +1,153 @@
+"""What a march on a GPU asks between its steps, in numba's simulator, beside the processor."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+from unittest.mock import patch
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.contact_search import Pairs
+from qdem_fem.contact_spheres import pair_stiffness
+from qdem_fem.contact_step import network_bound
+from qdem_fem.periodic import extents
+from validation.bench.qdem_gpu.contact import STEPS, two_cubes
+from validation.bench.qdem_gpu.search import Cloud, contact_of, lists_gpu
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+def lists_gpu_shuffled(given: Cloud, seed: int) -> Pairs:
+    """`lists_gpu` with every bucket of cells in another order, as hardware may leave it."""
+    from qdem_fem import cuda_cells, cuda_search
+
+    random, in_order = np.random.default_rng(seed), cuda_cells.cells_of
+
+    def shuffled(*asked: Any) -> Any:
+        cells = in_order(*asked)
+        start, order = cells.start.copy_to_host(), cells.order.copy_to_host()
+        for low, high in pairwise(start):
+            order[low:high] = random.permutation(order[low:high])
+        cells.order.copy_to_device(order)
+        return cells
+
+    with patch.object(cuda_search, "cells_of", shuffled):
+        return lists_gpu(given, seed)
+
+
+class Sums(NamedTuple):
+    """What a march asks between its steps."""
+
+    gap: float
+    """Greatest of what touched [m]."""
+    bound: float
+    """On omega^2 of what touches [1/s^2]."""
+    extents: Floats
+    """(b,) of bodies along y [m]"""
+    finite: bool
+    """Whether all spheres are at numbers."""
+
+
+def sums_gpu(given: Cloud, seed: int, first: Integers, lost: bool) -> Sums:
+    """`Sums` on a GPU of bodies that begin at ``first`` (b + 1,); one vertex may be ``lost``."""
+    from qdem_fem.cuda_contact_state import DeviceContact
+    from qdem_fem.cuda_contact_sums import extents_of
+    from qdem_fem.cuda_step import cuda
+
+    there = DeviceContact(contact_of(given, seed), given.side)
+    moved = np.zeros((len(given.radius), 4))
+    moved[:, :3] = given.position - given.before
+    moved[len(moved) // 2, 1] += np.inf if lost else 0.0
+    position, own = cuda.to_device(given.position), np.arange(len(given.radius)) % 3 != 0
+    return Sums(
+        there.gap(position),
+        there.bound(cuda.to_device(1 + given.radius)),
+        extents_of(position, 1, cuda.to_device(own), cuda.to_device(first)),
+        there.positions(cuda.to_device(moved.ravel())) is not None,
+    )
+
+
+def sums_processor(given: Cloud, seed: int, first: Integers) -> Sums:
+    """`sums_gpu`, of no lost vertex, by array."""
+    contact, x = contact_of(given, seed), given.position
+    pairs, walls = contact.pairs, contact.planes.force.any(axis=2)
+    row = np.repeat(np.arange(len(x)), np.diff(pairs.first))
+    ends = np.column_stack([row, pairs.second])[pairs.touching.astype(bool)]
+    between = x[ends[:, 0]] - x[ends[:, 1]]
+    if given.side is not None:
+        between -= pairs.image[pairs.touching.astype(bool)]
+    gaps = [np.linalg.norm(between, axis=1) - given.radius[ends].sum(axis=1)]
+    for held, point, normal in zip(walls, given.point, given.normal, strict=True):
+        gaps.append((x[held] - point) @ normal - given.radius[held])
+    stiffness = contact.spheres.normal
+    return Sums(
+        np.concatenate(gaps).max(initial=0.0),
+        network_bound(
+            ends, pair_stiffness(*stiffness[ends.T]), 2 * stiffness * walls.sum(axis=0),
+            1 + given.radius,
+        ),
+        extents(x[:, 1], np.arange(len(x)) % 3 != 0, first),
+        True,
+    )  # fmt: skip
+
+
+def sums_before(values: Integers) -> Integers:
+    """`qdem_fem.cuda_scan.sums_before` of (n,) on a GPU."""
+    from qdem_fem import cuda_scan
+    from qdem_fem.cuda_step import cuda
+
+    found: Integers = cuda_scan.sums_before(cuda.to_device(values), len(values)).copy_to_host()
+    return found
+
+
+def motion_summed(displacement: Floats, velocity: Floats, mass: Floats, parts: int) -> Floats:
+    """`qdem_fem.cuda_sums.motion_summed` of fields (n, 4) by so many threads on a GPU."""
+    from qdem_fem import cuda_sums
+    from qdem_fem.cuda_step import cuda
+
+    with patch.object(cuda_sums, "PARTS", parts):
+        return cuda_sums.motion_summed(
+            *(cuda.to_device(array.ravel()) for array in (displacement, velocity, mass))
+        )
+
+
+def simulator_begin() -> None:
+    """Small blocks: in numba's simulator every thread of a block costs, at work or not."""
+    from qdem_fem import cuda_step
+
+    cuda_step.BLOCK = 8
+
+
+def steps_launched(look: int) -> list[tuple[int, int]]:
+    """Steps done and launched in each window of contact of a march whose list lasts two steps.
+
+    The host looks every ``look`` steps whether a window has ended.
+    """
+    from qdem_fem import cuda_assembly
+    from qdem_fem.cuda_contact_state import DeviceContact
+
+    windows: list[tuple[int, int]] = []
+    push, run_window = DeviceContact.launch_push, cuda_assembly.CudaAssembly.kernel_run
+
+    def push_counted(*given: Any) -> None:
+        done, launched = windows[-1]
+        windows[-1] = done, launched + 1
+        push(*given)
+
+    def window_counted(*given: Any) -> tuple[int, float]:
+        windows.append((0, 0))
+        done, bad = run_window(*given)
+        windows[-1] = done, windows[-1][1]
+        return done, bad
+
+    with (
+        patch.object(cuda_assembly, "LOOK", look),
+        patch.object(DeviceContact, "launch_push", push_counted),
+        patch.object(cuda_assembly.CudaAssembly, "kernel_run", window_counted),
+    ):
+        run = two_cubes("cuda", skin=2e-6)
+        run.advance(STEPS * run.step)
+    return [window for window in windows if window[1]]  # others are of elements alone

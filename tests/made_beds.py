@@ -1,0 +1,79 @@
+"""Beds that no engine prepared: disordered, at rest, for tests of the relaxation.
+
+A bed's nearest pairs are closed until each grain has the contacts and the overlaps of a ballast bed
+at rest under its own weight (coordination number near 4 with walls, exponential overlaps of 6e-8 m
+in the mean).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from adapters.contact_law import hertz_stiffness
+from adapters.container import Container, Walls
+from adapters.overlaps import Neighbours, behind_discs, neighbours, rows_at
+from adapters.relaxation import relax_bare
+from adapters.relaxation_smallest import smallest_move
+from adapters.state import FloatArray, State
+
+STIFFNESS = hertz_stiffness(46.9e9, 0.25, 210e9, 0.3)
+DENSITY = 2710.0
+OVERLAP = 6e-8
+"""Mean overlap of a made bed [m]."""
+SETTLEMENT = 40e-6
+"""Mean settlement of the jumps [m]."""
+
+
+def state_at_rest(position: FloatArray, radius: FloatArray) -> State:
+    """Grains at rest without any record of contacts; metres."""
+    n = len(radius)
+    mass = 4 / 3 * np.pi * radius**3 * DENSITY
+    return State(np.arange(n), position, radius, mass, np.zeros((n, 3)), np.zeros((n, 3)))
+
+
+def bed_made(count: int, seed: int = 0) -> tuple[State, Walls]:
+    """A bed of ``count`` grains (Karrech's radii) in a square box, two contacts closed a grain."""
+    generator = np.random.default_rng(seed)
+    radius = np.clip(generator.normal(3.2e-3, 5.65e-4, count), 2.07e-3, 4.33e-3)
+    edge = float(4 * 4 / 3 * np.pi * np.mean(radius**3) / 0.54) ** (1 / 3)
+    side = int(np.ceil((count / 4) ** (1 / 3)))
+    cell = np.array(list(np.ndindex(side + 2, side, side)))[:, ::-1]
+    corner = np.array([[1, 1, 1], [3, 3, 1], [3, 1, 3], [1, 3, 3]]) / 4
+    place = (cell[:, None] + corner).reshape(-1, 3)[:count]
+    position = edge * place + 3e-4 * generator.standard_normal((count, 3))
+    walls = Container("box", size_x=side * edge, size_y=side * edge).walls()
+    position = relax_bare(state_at_rest(position, radius), walls, STIFFNESS).position
+    behind = behind_discs(position, walls)
+    near = neighbours(position, radius, walls, 1e-3)
+    closed = np.argsort(-near.overlap)[: 2 * count]
+    none = Neighbours(near.first[:0], near.second[:0], near.normal[:0], near.overlap[:0])
+    network = Neighbours(
+        near.first[closed],
+        near.second[closed],
+        near.normal[closed],
+        OVERLAP * generator.exponential(size=len(closed)),
+    )
+    made = smallest_move(
+        position,
+        position,
+        radius,
+        network,
+        none,
+        5 * OVERLAP,
+        lambda x, first, second: rows_at(x, radius, first, second, walls, behind),
+        lambda x, gap: neighbours(x, radius, walls, gap, behind),
+        keep_height=False,
+        tolerance=0.01 * OVERLAP,
+        accepted=10 * OVERLAP,
+        evaluations_max=40_000,
+    )
+    return state_at_rest(made.position, radius), walls
+
+
+def jump(state: State, seed: int = 1) -> FloatArray:
+    """Estimated positions [m]: settlement that grows with height, and every grain by itself."""
+    generator = np.random.default_rng(seed)
+    move = SETTLEMENT * generator.standard_normal(state.position.shape)
+    height = state.position[:, 2]
+    move[:, 2] -= SETTLEMENT * height / height.mean() + move[:, 2].mean()
+    return state.position + move

@@ -1,0 +1,69 @@
+"""The study of laws: its cases keep the future apart, its rivals are what they are called."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from validation.studies.laws.run import (
+    judge_auto,
+    predict_by_curve_fit,
+    predict_by_law,
+    predict_by_polyfit,
+    summarise_auto,
+)
+from validation.studies.laws.series import (
+    CUTS,
+    REACH,
+    LawCase,
+    cut_cases,
+    family_cases,
+    fast_cases,
+)
+
+pytestmark = pytest.mark.studies
+READ = np.geomspace(1, 1e5, 61)
+"""Twelve a decade: ten times a reading is one."""
+
+
+def one_case(settlement: np.ndarray, name: str = "series") -> LawCase:
+    """Cut at 1,000 cycles."""
+    (found,) = cut_cases("made", name, READ, settlement, (1000.0,))
+    return found
+
+
+def test_a_case_knows_nothing_behind_its_cut() -> None:
+    """Known rows end at N_c, the truth is the series itself at ten times the last of them."""
+    case = one_case(np.log(READ))
+    assert case.cycle[-1] <= 1000
+    assert case.to_cycle == pytest.approx(REACH * case.cycle[-1])
+    assert case.truth == pytest.approx(np.log(case.to_cycle))
+    short = list(cut_cases("made", "series", READ[:20], READ[:20], CUTS))
+    assert not short  # its end lies before ten times any cut
+
+
+def test_families_are_drawn_once_and_for_all() -> None:
+    """The same members every time, twelve families, settling."""
+    first, again = family_cases(1), family_cases(1)
+    assert len({case.name for case in first}) == 12
+    for one, other in zip(first, again, strict=True):
+        np.testing.assert_array_equal(one.settlement, other.settlement)
+        assert one.truth > 0.8 * one.settlement[0]
+    assert len(fast_cases(2)) == 10
+
+
+def test_rivals_recover_their_own_law() -> None:
+    """numpy's line in ln N, scipy's power law, a law of the bank: exact on their own series."""
+    straight, power = one_case(2 + 3 * np.log(READ)), one_case(2 * READ**0.3)
+    assert predict_by_polyfit(straight) == pytest.approx(straight.truth, rel=1e-10)
+    assert predict_by_law("log")(straight) == pytest.approx(straight.truth, rel=1e-10)
+    assert predict_by_curve_fit(power) == pytest.approx(power.truth, rel=1e-6)
+
+
+def test_summary_counts_refusals_apart() -> None:
+    """A refused case is in no error, but in ``all`` and in the count."""
+    rows = judge_auto([one_case(np.log(READ), "slow"), one_case(READ, "fast")])
+    found = summarise_auto(rows)
+    assert (found["cases"], found["refused"], found["all"]["cases"]) == (1, 1, 2)
+    assert found["error"] == abs(rows[0]["error"])
+    assert found["regimes"]["ratcheting"] == 1

@@ -1,0 +1,125 @@
+"""One contact in YADE, under the contact law, walls and settings that every scene gets."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from adapters.dump import dump_frames
+from adapters.engine_yade import PARAMETERS, YadeEngine
+from adapters.scene import Scene
+from adapters.state import FloatArray
+from adapters.window import contacts_of_frame
+from validation.bench.few_grains import RADIUS, Track
+
+SCRIPT = """\
+import os
+import sys
+
+import numpy as np
+from yade import Omega, Vector3
+
+sys.path.insert(0, os.getcwd())
+import bed
+import record
+
+O = Omega()
+parameters = bed.parameters_read()
+few = parameters["few"]
+bed.materials_add(parameters)
+bed.grains_add(parameters)
+bed.walls_add(parameters)
+count = parameters["grain_count"]
+states = [O.bodies[number].state for number in range(count)]
+for state, velocity in zip(states, few["velocity"]):
+    state.vel = Vector3(*velocity)
+    if not few["free"]:
+        state.blockedDOFs = "xyzXYZ"
+if few["push"]:
+    O.forces.setPermF(0, Vector3(*few["push"]))
+bed.engines_set(parameters)
+dumps = record.Dumps(parameters)
+force = open("force.txt", "w")
+
+
+def frame():
+    bed.forces_renew()
+    dumps.frame()
+    np.savetxt(force, [O.forces.f(number, True) for number in range(count)], fmt="%.17g")
+
+
+frame()
+for velocity, steps in few["legs"]:
+    if velocity:
+        states[0].vel = Vector3(*velocity)
+    for _ in range(steps):
+        O.step()
+        if O.iter % few["every"] == 0:
+            frame()
+record.scene_save()
+force.close()
+print(f"COMPLETE step {O.iter}", flush=True)
+"""
+
+
+def track_run(
+    scene: Scene,
+    position: FloatArray,
+    velocity: FloatArray,
+    motion: Sequence[str],
+    *,
+    time_step: float,
+    every: int = 1,
+    materials: Callable[[str], str] = str,
+) -> Track:
+    """Run YADE, without gravity; as `validation.bench.few_grains.track_run`.
+
+    ``motion`` are the same lines of a LIGGGHTS deck: ``fix ... nve/sphere`` frees the grains,
+    ``addforce`` pushes the first one, ``move linear`` drives it, ``run`` steps.  ``materials``
+    may change the parameters' text.  Velocities are those of the half step before an instant.
+    Raises as `YadeEngine.run`.
+    """
+    engine = YadeEngine()
+    with TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        height = float(position[:, 2].max())
+        radius = np.full(len(position), RADIUS)
+        digests = engine.write_preparation(scene, position, radius, height, folder)
+        content = json.loads((folder / PARAMETERS).read_text())
+        content |= {"gravity": 0.0, "time_step": time_step, "grain_count": len(radius)}
+        content["few"] = {"velocity": velocity.tolist(), "every": every, **_motion(motion)}
+        (folder / PARAMETERS).write_text(materials(json.dumps(content)))
+        (folder / "few.py").write_text(SCRIPT)
+        engine.run(scene, "few.py", folder, lambda: None, digests)
+        frames = list(dump_frames(folder / "states.dump"))
+        contacts = tuple(
+            contacts_of_frame(frame) for frame in dump_frames(folder / "contacts.dump")
+        )
+        force = np.loadtxt(folder / "force.txt").reshape(-1, len(radius), 3)
+    position, velocity, spin = (
+        np.array([frame.block(*(letter + axis for axis in "xyz")) for frame in frames])
+        for letter in ("", "v", "omega")
+    )
+    time = time_step * np.array([frame.time_step for frame in frames])
+    return Track(time, position, velocity, spin, force, contacts)
+
+
+def _motion(lines: Sequence[str]) -> dict[str, Any]:
+    """Lines of a LIGGGHTS deck as what the script understands."""
+    free, push, leg, legs = False, [], [], []
+    for line in lines:
+        words = line.split()
+        if "nve/sphere" in words:
+            free = True
+        elif "addforce" in words:
+            push = [float(word) for word in words[-3:]]
+        elif "linear" in words:
+            leg = [float(word) for word in words[5:8]]
+        elif words[0] == "run":
+            legs.append([leg, int(words[1])])
+    return {"free": free, "push": push, "legs": legs}

@@ -1,0 +1,1 @@
+"""QDEM beside scikit-fem and closed forms: the judge, problems that both solve, trials."""

@@ -1,0 +1,190 @@
+"""One packing under the same load: the beds, the ways to compute them, one run of one way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from adapters.checks import check_state, check_window
+from adapters.engine import Engine, EngineStart, engine_named
+from adapters.engine_lammps import LammpsEngine
+from adapters.overlaps import neighbours
+from adapters.radii import radii_sample
+from adapters.sample import SURFACE_SHARE, bed_height, relative_density, sample_start
+from adapters.scene import Scene
+from adapters.scene_file import scene_load
+from adapters.state import FloatArray
+from adapters.window import Window, state_read, window_read
+from scenes import scene_path
+
+CYCLES = 50
+SETTINGS = ("material.grain.young=1e9",)
+"""What differs from ``scenes/karrech-coarse.toml``: softer by ten, for a step longer by three."""
+
+TWIN = 1e-9
+"""By how much the first grain of the twin is aside [m]."""
+
+LAST = 10
+"""Cycle ends at the end of a run over which coordination number and density are averaged."""
+
+NO_PULL = ("damping coeff_restitution", "damping coeff_restitution limit_damping")
+"""Words of LAMMPS' decks, and those with which no contact pulls."""
+
+SEEDS = tuple(range(1, 9))
+
+
+@dataclass(frozen=True)
+class Way:
+    """An engine with its settings."""
+
+    name: str
+    engine: str
+    settings: tuple[str, ...] = ()
+    """Keys of the scene that differ."""
+    rule: str = ""
+    """LAMMPS' tangential rule; empty for the engine's own."""
+    pulls: bool = True
+    """False: contacts end where their force turns to tension, as YADE's always do (LAMMPS)."""
+    aside: float = 0.0
+    """By how much the first grain starts aside [m]."""
+
+    def made(self) -> Engine:
+        """The engine itself."""
+        return LammpsEngine(self.rule) if self.rule else engine_named(self.engine)
+
+    def scene(self, seed: int) -> Scene:
+        """The scene of the bed of a seed, as this way has it."""
+        return bed_scene(seed, f'engine.name="{self.engine}"', *self.settings)
+
+
+WAYS = (
+    Way("liggghts", "liggghts"),
+    Way("lammps", "lammps"),
+    Way("yade", "yade"),
+    Way("lammps, mindlin", "lammps", rule="mindlin"),
+    Way("lammps, mindlin/force", "lammps", rule="mindlin/force"),
+    Way("liggghts, twin", "liggghts", aside=TWIN),
+    Way("liggghts, half the step", "liggghts", ("engine.rayleigh_share=0.1",)),
+    Way("liggghts, walls as grains", "liggghts", ("material.wall.young=1e9",)),
+    Way("liggghts, piston of 0.1 kg", "liggghts", ("loading.piston_mass=0.1",)),
+    Way("lammps, mindlin/force, no pull", "lammps", rule="mindlin/force", pulls=False),
+    Way("yade, rebound e", "yade", ("material.grain.restitution=0.2145",)),
+)
+"""The three engines, then one setting at a time."""
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a run gives."""
+
+    settlement: float
+    """Way down of the grains' mean height in the cycles, from the seated bed [m]."""
+    settlement_after_first: float
+    """The same without the first cycle [m]."""
+    settlement_of_start: float
+    """Way down from the common start until the piston is seated [m]."""
+    coordination: float
+    """Contacts of a grain with others, mean of the last `LAST` cycle ends."""
+    density: float
+    """Relative density below 0.9 of the common start's height, mean of the last cycle ends."""
+    deflection: float
+    """Elastic deflection of the piston in a cycle, mean of the last `LAST` [m]."""
+    curve: tuple[float, ...]
+    """Settlement after cycles 0, 1, ..., `CYCLES` [m]."""
+
+
+def bed_scene(seed: int, *settings: str) -> Scene:
+    """The coarse scene of a seed under `SETTINGS` and more."""
+    return scene_load(scene_path("karrech-coarse"), [*SETTINGS, f"sample.seed={seed}", *settings])
+
+
+def measure_window(window: Window, start: FloatArray, scene: Scene) -> Figures:
+    """The figures of a window that began at the common ``start`` positions [m], shape (n, 3).
+
+    ``scene`` gives container and cycle; a polygon's section counts as the cylinder's.
+    """
+    mean_height = window.position[:, :, 2].mean(axis=1)
+    curve = mean_height[0] - mean_height
+    top = SURFACE_SHARE * bed_height(start, window.radius)
+    walls = scene.container.walls()
+    pairs, density = [], []
+    for position in window.position[-LAST:]:
+        pairs.append(int((neighbours(position, window.radius, walls).second >= 0).sum()))
+        density.append(relative_density(position, window.radius, scene.container, top))
+    deflection = window.piston.elastic_deflection(scene.steps_per_cycle)[-LAST:]
+    return Figures(
+        settlement=float(curve[-1]),
+        settlement_after_first=float(curve[-1] - curve[1]),
+        settlement_of_start=float(start[:, 2].mean() - mean_height[0]),
+        coordination=2 * float(np.mean(pairs)) / len(window.radius),
+        density=float(np.mean(density)),
+        deflection=float(np.mean(deflection)),
+        curve=tuple(curve.tolist()),
+    )
+
+
+def rain_bed(seed: int, folder: Path) -> tuple[FloatArray, FloatArray]:
+    """Positions (n, 3) and radii (n,) [m] of the settled bed of a seed, by LIGGGHTS' rain."""
+    scene = bed_scene(seed, 'engine.name="liggghts"')
+    radius = radii_sample(scene.sample.grain_radius.law, scene.grain_count, seed)
+    position, height = sample_start(
+        radius, scene.container, scene.sample.relative_density_start, seed
+    )
+    engine = engine_named("liggghts")
+    folder.mkdir(parents=True)
+    decks = engine.write_preparation(scene, position, radius, height, folder)
+    engine.run(scene, "in.prepare", folder, lambda: None, decks)
+    return state_read(folder, engine.wall_names(scene, piston=False)).position, radius
+
+
+def run_way(
+    way: Way,
+    seed: int,
+    start: FloatArray,
+    radius: FloatArray,
+    folder: Path,
+    cycles: int = CYCLES,
+) -> tuple[Figures, float]:
+    """One way from the common ``start`` [m], (n, 3): its figures and the engine's CPU time [s].
+
+    ``cycles`` load cycles; ``folder`` is made for it.  Raises `EngineFailed`, `NotCredible`,
+    `NotConverged`.
+    """
+    scene, engine = way.scene(seed), way.made()
+    position = start.copy()
+    position[0, 0] += way.aside
+    settled, loaded = folder / "settled", folder / "loaded"
+    for made in (settled, loaded):
+        made.mkdir(parents=True)
+    top = float((position[:, 2] + radius).max())
+    decks = engine.write_preparation(scene, position, radius, top, settled)
+    leave_out_pull(way, settled)
+    rest = engine.run(scene, "in.prepare", settled, lambda: None, decks)
+    state = state_read(settled, engine.wall_names(scene, piston=False))
+    check_state(scene, state)
+    face = float((state.position[:, 2] + radius).max())
+    begin = EngineStart(settled / "end.restart", state.time_step, 0, face, first=True)
+    decks = engine.write_cycles(scene, begin, cycles, loaded)
+    leave_out_pull(way, loaded)
+    done = engine.run(scene, "in.cycles", loaded, lambda: None, decks)
+    window = window_read(loaded, 0, engine.wall_names(scene, piston=True), face)
+    check_window(scene, window, cycles)
+    common = bed_scene(seed, 'engine.name="liggghts"')
+    figures = measure_window(window, start, common if way.engine == "yade" else scene)
+    return figures, rest.cpu_s + done.cpu_s
+
+
+def leave_out_pull(way: Way, folder: Path) -> None:
+    """Have no contact pull, where the way says so."""
+    if way.pulls:
+        return
+    words, without = NO_PULL
+    edited = 0
+    for path in folder.glob("*.in"):
+        text = path.read_text()
+        if words in text:
+            path.write_text(text.replace(words, without))
+            edited += 1
+    assert edited, words

@@ -1,0 +1,185 @@
+"""The page docs/engines.md and its figure, from the record."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validation.studies.engines.bars import check_bars
+from validation.studies.engines.packing import CYCLES, SEEDS, WAYS
+from validation.studies.engines.reading import (
+    ENGINES,
+    FIGURES,
+    JUDGED,
+    LEVEL,
+    PAIRS,
+    TITLES,
+    by_way,
+    leaves_zero_out,
+    median_speed,
+    pair,
+    tell_mean,
+)
+from validation.study import describe_commits, format_checks, format_table, mean_interval
+
+Row = dict[str, Any]
+COLOURS = {"liggghts": "#0072B2", "lammps": "#E69F00", "yade": "#009E73"}
+"""Told apart by colour-blind readers too (Okabe and Ito)."""
+EARLY = 3
+"""Cycles after which the runs have not strayed far."""
+SHOWN = [(f"{TITLES[b]} less {TITLES[a]}", b, a) for a, b in combinations(ENGINES, 2)]
+
+
+def tabulate_engines(runs: dict[str, dict[int, Row]]) -> str:
+    """Means over the beds, a line for each engine."""
+    lines = []
+    for name in ENGINES:
+        found = list(runs[name].values())
+        cells = [tell_mean(np.array([row[k] for row in found]), k, signed=False) for k in FIGURES]
+        cpu = float(np.median([row["engine_cpu_s"] for row in found]))
+        lines.append([TITLES[name], *cells, str(len(found)), f"{cpu:.0f}"])
+    words = [words for words, _, _ in FIGURES.values()]
+    return format_table(["engine", *words, "beds", "CPU s a run"], lines)
+
+
+def tabulate_differences(runs: dict[str, dict[int, Row]]) -> str:
+    """Engine against engine, bold where the protocol calls it real; then one setting at a time,
+    bold where 95 % leaves out zero."""
+    lines = []
+    for words, way, other in [*SHOWN, *PAIRS]:
+        cells = []
+        for key in FIGURES:
+            values = pair(runs, way, other, key)
+            engines = way in ENGINES and other in ENGINES
+            marked = leaves_zero_out(values, LEVEL if engines else 0.95)
+            text = tell_mean(values, key)
+            cells.append(f"**{text}**" if marked and (key in JUDGED or not engines) else text)
+        early = pair(runs, way, other, "curve")[:, EARLY]
+        text = tell_mean(early, "settlement")
+        cells.append(f"**{text}**" if leaves_zero_out(early) else text)
+        lines.append([words, *cells, str(len(early))])
+    head = ["difference", *(words for words, _, _ in FIGURES.values())]
+    return format_table([*head, f"settlement after {EARLY} cycles, µm", "beds"], lines)
+
+
+def tell_resolution(runs: dict[str, dict[int, Row]]) -> str:
+    """How small a difference the study can see, and how far a run strays from itself."""
+    apart = [1e6 * pair(runs, b, a, "settlement") for a, b in combinations(ENGINES, 2)]
+    halves = [mean_interval(values)[1] for values in apart]
+    scatter = [float(np.std(values, ddof=1)) for values in apart]
+    settled = [row["settlement"] for name in ENGINES for row in runs[name].values()]
+    mean = 1e6 * float(np.mean(settled))
+    twin = float(np.std(1e6 * pair(runs, "liggghts, twin", "liggghts", "settlement"), ddof=1))
+    needed = int(np.ceil((2.8 * max(scatter) / (0.1 * mean)) ** 2))
+    return (
+        f"the 95 % intervals of the settlement's differences reach ± {min(halves):.0f} to "
+        f"± {max(halves):.0f} µm where the beds settle by {mean:.0f} µm: two engines could differ "
+        f"by {100 * max(halves) / mean:.0f} % unseen, and it would take some {needed} beds to see "
+        f"a tenth (at 5 %, power 0.8). A run that differs by 10⁻⁹ m in one grain strays by "
+        f"{twin:.0f} µm (standard deviation), two engines by {np.mean(scatter):.0f} µm: most of "
+        "what lies between two engines lies between two runs of one"
+    )
+
+
+def tabulate_speed(rows: Sequence[Row]) -> str:
+    """Speeds on the settled bed."""
+    lines = []
+    for engine in ENGINES:
+        for grains in sorted({row["grains"] for row in rows if "speed" in row}):
+            middle, least, most = median_speed(rows, engine, grains)
+            beside = middle / median_speed(rows, "lammps", grains)[0]
+            mine = [r for r in rows if r.get("speed") == engine and r["grains"] == grains]
+            start, contacts = (
+                float(np.median([row[key] for row in mine]))
+                for key in ("start_up_s", "contacts_per_grain")
+            )
+            lines.append([
+                TITLES[engine], f"{grains:,}",
+                f"{middle / 1e6:.2f} ({least / 1e6:.2f} to {most / 1e6:.2f})", f"{beside:.2f}",
+                f"{1e6 * grains / middle:,.0f}", f"{start:.2f}", f"{contacts:.3f}", str(len(mine)),
+            ])  # fmt: skip
+    head = [
+        "engine", "grains", "10⁶ grain-steps a CPU second", "LAMMPS = 1", "µs a step",
+        "start-up, s", "contacts a grain at the end", "runs",
+    ]  # fmt: skip
+    return format_table(head, lines)
+
+
+def tell_runs(rows: Sequence[Row]) -> str:
+    """How many of the planned runs are made, what failed."""
+    made = [row for row in rows if "way" in row]
+    spent = sum(row.get("engine_cpu_s", 0.0) for row in made) / 60
+    text = f"{len(made)} of {len(WAYS) * len(SEEDS)} planned packings ({spent:.0f} CPU minutes)"
+    failed = [row for row in made if not row["ok"]]
+    if not failed:
+        return f"{text}; none failed."
+    return f"{text}; {len(failed)} failed, all *{failed[0]['way']}*: {failed[0]['why']}."
+
+
+def describe(rows: Sequence[Row]) -> dict[str, str]:
+    """The text for each mark of the page."""
+    runs = by_way(rows)
+    real = sum(
+        leaves_zero_out(pair(runs, b, a, key), LEVEL)
+        for a, b in combinations(ENGINES, 2)
+        for key in JUDGED
+    )
+    packing = next(row for row in rows if "way" in row)
+    fastest = median_speed(rows, "liggghts", 9999)[0]
+    return {
+        "GRAINS": str(packing["grains"]),
+        "STEPS": f"{packing['steps_per_cycle']:,}",
+        "BEDS": str(len(SEEDS)),
+        "CYCLES": str(CYCLES),
+        "TABLE_ENGINES": tabulate_engines(runs),
+        "TABLE_DIFFERENCES": tabulate_differences(runs),
+        "REAL": "None of the nine" if not real else f"{real} of the nine",
+        "RESOLUTION": tell_resolution(runs),
+        "TABLE_SPEED": tabulate_speed(rows),
+        "CYCLE_MINUTES": f"{37_200 * 1e6 / fastest / 128 / 60:.1f}",
+        "RAIN_HOURS": f"{2e12 / fastest / 128 / 3600:.1f}",
+        "BARS": format_checks(check_bars(rows)),
+        "RUNS": tell_runs(rows),
+        "ORIGIN": f"{rows[0]['origin']['machine']}; "
+        f"{', '.join(dict.fromkeys(row['engine'] for row in rows))}; commits "
+        f"{describe_commits(row['origin']['commit'] for row in rows)}.",
+    }
+
+
+def draw(rows: Sequence[Row], picture: Path) -> None:
+    """Settlement curves of the engines, differences bed by bed, and speeds."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    runs = by_way(rows)
+    figure, (left, middle, right) = plt.subplots(
+        1, 3, figsize=(13, 4), layout="constrained", width_ratios=(3, 3, 2)
+    )
+    cycles = np.arange(CYCLES + 1)
+    for name in ENGINES:
+        curves = 1e6 * np.array([row["curve"] for row in runs[name].values()])
+        mean, half = np.array([mean_interval(column) for column in curves.T]).T
+        left.plot(cycles, mean, color=COLOURS[name], label=TITLES[name])
+        left.fill_between(cycles, mean - half, mean + half, color=COLOURS[name], alpha=0.15, lw=0)
+        speeds = [median_speed(rows, name, grains)[0] / 1e6 for grains in (1111, 9999)]
+        right.plot((1111, 9999), speeds, "o-", color=COLOURS[name])
+    left.set(xlabel="load cycle", ylabel="settlement [µm]", title="mean of the beds, 95 %")
+    left.legend(frameon=False)
+    shown = [*SHOWN, *PAIRS]
+    for height, (_, way, other) in enumerate(shown):
+        values = 1e6 * pair(runs, way, other, "settlement")
+        mean, half = mean_interval(values)
+        middle.plot(values, np.full(len(values), -height), ".", color="0.7", ms=4)
+        middle.errorbar(mean, -height, xerr=half, fmt="o", color="k", capsize=3, ms=4)
+    middle.axvline(0, color="0.5", lw=0.8)
+    middle.set_yticks(-np.arange(len(shown)), [words for words, _, _ in shown], fontsize=7)
+    middle.set(xlabel="difference in settlement [µm]", title="bed by bed, mean and 95 %")
+    right.set(xscale="log", yscale="log", xlabel="grains", title="10⁶ grain-steps a CPU second")
+    figure.savefig(picture, dpi=75)
+    plt.close(figure)

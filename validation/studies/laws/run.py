@@ -1,0 +1,257 @@
+"""Errors and costs of every law and rival on every source of series: ``PARTS``."""
+
+from __future__ import annotations
+
+import os
+import time
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adapters.errors import UsageError
+from adapters.fit_auto import outlook
+from adapters.fit_refusal import UNCERTAIN, failure, refusals
+from adapters.fit_regime import REGIMES
+from adapters.laws import law_named
+from adapters.state import FloatArray
+from validation.studies.laws.series import (
+    OTHER_CUTS,
+    REACH,
+    LawCase,
+    ballast_cases,
+    ballast_series,
+    family_cases,
+    fast_cases,
+    run_cases,
+)
+
+Row = dict[str, Any]
+MEMBERS = 12
+"""Of each family."""
+LAWS = (
+    "linear", "log", "log-linear", "power", "shenton", "hyperbolic", "stretched-exponential",
+    "inverse-log", "sato", "hca", "karrech2007",
+)  # fmt: skip
+REGIME_CUTS = (100.0, 300.0, 1e3, 3e3, 1e4, 1e5, np.inf)
+"""Last known cycle; inf: the whole test."""
+WHOLE_TO, FAIL_AT = 1e6, 0.3
+"""Whole tests are predicted up to here; the strain at which they were stopped, 0.297 to 0.305."""
+
+
+def data_folder() -> Path:
+    """The folder of the real series; raises `UsageError` where TRACKBED_DATA names none."""
+    folder = Path(os.environ.get("TRACKBED_DATA", ""))
+    if not (folder / "full_runs").is_dir():
+        raise UsageError(
+            "the real series are not here",
+            remedy="set TRACKBED_DATA to a folder with ballast_triaxial/*.txt and full_runs/*.npz",
+        )
+    return folder
+
+
+def predict_by_law(name: str) -> Callable[[LawCase], float]:
+    """Last reading and the increment of one law fitted to all readings."""
+    law = law_named(name)
+
+    def predict(case: LawCase) -> float:
+        parameters = law.fit(case.cycle, case.settlement)
+        last = float(case.cycle[-1])
+        return float(case.settlement[-1] + law.increment(parameters, last, case.to_cycle))
+
+    return predict
+
+
+def predict_by_polyfit(case: LawCase) -> float:
+    """What a user would write first: c + a ln N by numpy.polyfit."""
+    line = np.polyfit(np.log(case.cycle), case.settlement, 1)
+    return float(np.polyval(line, np.log(case.to_cycle)))
+
+
+def predict_by_curve_fit(case: LawCase) -> float:
+    """And second: a N^b by scipy.optimize.curve_fit, started at the last reading and b = 0.1."""
+    from scipy import optimize
+
+    def power(n: FloatArray, a: float, b: float) -> FloatArray:
+        return np.asarray(a * n**b)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # its covariance is not used
+        found, _ = optimize.curve_fit(
+            power, case.cycle, case.settlement, p0=(case.settlement[-1], 0.1), maxfev=20000
+        )
+    return float(power(np.array(case.to_cycle), *found))
+
+
+def list_predictors() -> dict[str, Callable[[LawCase], float]]:
+    """Every method but auto."""
+    laws = {name: predict_by_law(name) for name in LAWS}
+    return laws | {"polyfit": predict_by_polyfit, "curve_fit": predict_by_curve_fit}
+
+
+def summarise(errors: Iterable[float]) -> Row:
+    """Median and 90th percentile of absolute errors."""
+    size = np.abs(np.array(list(errors)))
+    return {
+        "cases": len(size),
+        "error": float(np.median(size)),
+        "error_90": float(np.quantile(size, 0.9)),
+    }
+
+
+def judge_auto(cases: Sequence[LawCase]) -> list[Row]:
+    """A row a case: what auto says, its band, its regime, the best candidate in hindsight."""
+    found = []
+    for case in cases:
+        start = time.process_time()
+        said = outlook(case.cycle, case.settlement[:, None], case.to_cycle)
+        cost = time.process_time() - start
+        prediction, low, high = (float(x[0]) for x in (said.prediction, said.low, said.high))
+        (refusal,) = refusals(said)
+        each = case.settlement[-1] + said.candidates.increment[:, 0]
+        found.append(
+            {
+                "name": case.name,
+                "cut": case.cut,
+                "regime": refusal.regime if refusal else said.regime[0].name,
+                "allowed": refusal is None,
+                "error": prediction / case.truth - 1,
+                "inside": low <= case.truth <= high,
+                "half_width": (high - low) / 2 / abs(case.truth),
+                "hindsight": float(np.abs(each / case.truth - 1).min()),
+                "cost_s": cost,
+            }
+        )
+    return found
+
+
+def summarise_auto(rows: Sequence[Row]) -> Row:
+    """Errors and band where auto lets the jump go ahead, and what leaving a series out changes."""
+    allowed = [row for row in rows if row["allowed"]]
+    names = sorted({row["name"] for row in rows})
+    others = [[row["error"] for row in allowed if row["name"] != name] for name in names]
+    without = [summarise(errors)["error_90"] for errors in others if errors]
+    worst = sorted(allowed, key=lambda row: -abs(row["error"]))[:6]
+    return {
+        **summarise(row["error"] for row in allowed),
+        "refused": len(rows) - len(allowed),
+        "error_90_without_one": [min(without), max(without)],
+        "coverage": float(np.mean([row["inside"] for row in allowed])),
+        "half_width": float(np.median([row["half_width"] for row in allowed])),
+        "hindsight": summarise(row["hindsight"] for row in allowed),
+        "all": summarise(row["error"] for row in rows),
+        "regimes": {
+            name: sum(row["regime"] == name for row in rows) for name in (*REGIMES, UNCERTAIN)
+        },
+        "cost_s": float(np.median([row["cost_s"] for row in rows])),
+        "worst": [{key: row[key] for key in ("name", "cut", "regime", "error")} for row in worst],
+    }
+
+
+def summarise_method(
+    predict: Callable[[LawCase], float], cases: Sequence[LawCase], allowed: Sequence[bool]
+) -> Row:
+    """One method on the cases that auto lets go ahead, and on all."""
+    errors, cost = [], []
+    for case in cases:
+        start = time.process_time()
+        try:
+            value = predict(case)
+        except Exception:  # a rival that gives up is a result
+            value = np.inf
+        cost.append(time.process_time() - start)
+        errors.append(value / case.truth - 1)
+    kept = [error for error, good in zip(errors, allowed, strict=True) if good]
+    return {**summarise(kept), "all": summarise(errors), "cost_s": float(np.median(cost))}
+
+
+def measure_source(read: Callable[[], list[LawCase]]) -> Row:
+    """Auto and every other method on the cases of one source."""
+    cases = read()
+    rows = judge_auto(cases)
+    allowed = [row["allowed"] for row in rows]
+    methods = {
+        name: summarise_method(predict, cases, allowed)
+        for name, predict in list_predictors().items()
+    }
+    return {"auto": summarise_auto(rows), "methods": methods}
+
+
+def measure_fast() -> Row:
+    """How many series with a constant or growing rate are refused."""
+    rows = judge_auto(fast_cases(MEMBERS))
+    return {"cases": len(rows), "refused": sum(not row["allowed"] for row in rows)}
+
+
+def tell_regime(cycle: FloatArray, settlement: FloatArray) -> str:
+    """The regime `REACH` times ahead, or that of the refusal."""
+    said = outlook(cycle, settlement[:, None], REACH * float(cycle[-1]))
+    (refusal,) = refusals(said)
+    return refusal.regime if refusal else said.regime[0].name
+
+
+def tell_regimes() -> Row:
+    """What is said of every ballast test from its readings up to `REGIME_CUTS`; None: too few."""
+    regimes: dict[str, list[str | None]] = {}
+    for name, cycle, strain in ballast_series(data_folder()):
+        told: list[str | None] = []
+        for cut in REGIME_CUTS:
+            known = cycle <= cut * (1 + 1e-9)
+            enough = known.sum() >= 5 and (cycle[known][-1] >= cut / 2 or not np.isfinite(cut))
+            told.append(tell_regime(cycle[known], strain[known]) if enough else None)
+        regimes[name] = told
+    return {"regimes": regimes}
+
+
+def predict_whole_tests() -> Row:
+    """Whole ballast tests to a million cycles, and what is said of them with ``--fail-at``."""
+    found = []
+    for name, cycle, strain in ballast_series(data_folder()):
+        said = outlook(cycle, strain[:, None], WHOLE_TO)
+        (refusal,) = refusals(said)
+        failed = refusal or failure(float(said.prediction[0]), FAIL_AT, WHOLE_TO)
+        told = said.regime[0].name
+        found.append(
+            {
+                "name": name,
+                "last_cycle": said.last_cycle,
+                "last": float(said.last[0]),
+                "exponent": [said.regime[0].exponent, said.regime[0].deviation],
+                "prediction": float(said.prediction[0]),
+                "band": [float(said.low[0]), float(said.high[0])],
+                "said": refusal.regime if refusal else told,
+                "said_fail_at": failed.regime if failed else told,
+            }
+        )
+    return {"tests": found}
+
+
+def time_many_grains(grains: int = 1000, cycles: int = 50) -> Row:
+    """CPU time of one fit to noisy logarithms of all axes of all grains, least of three [s]."""
+    cycle = np.arange(1.0, cycles + 1)
+    noise = 0.05 * np.random.default_rng(0).standard_normal((cycles, grains, 3))
+    displacement = np.log(cycle)[:, None, None] + noise
+    cost: dict[str, float] = {}
+    for name in ("log", "hyperbolic", "stretched-exponential"):
+        law, seconds = law_named(name), []
+        for _ in range(3):
+            start = time.process_time()
+            law.fit(cycle, displacement)
+            seconds.append(time.process_time() - start)
+        cost[name] = min(seconds)
+    return {"grains": grains, "cycles": cycles, "cost_s": cost}
+
+
+PARTS: dict[str, Callable[[], Row]] = {
+    "ballast": partial(measure_source, lambda: ballast_cases(data_folder())),
+    "other cuts": partial(measure_source, lambda: ballast_cases(data_folder(), OTHER_CUTS)),
+    "families": partial(measure_source, lambda: family_cases(MEMBERS)),
+    "engine": partial(measure_source, lambda: run_cases(data_folder())),
+    "fast": measure_fast,
+    "regimes": tell_regimes,
+    "whole": predict_whole_tests,
+    "grains": time_many_grains,
+}

@@ -1,0 +1,99 @@
+"""What a bogie does to 300 grains: settlement by axle, lateral motion, spectra."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.errors import UsageError
+from qdem_fem.load_train import Train
+from qdem_fem.mesh_checks import FloatArray
+from qdem_fem.output import table_read
+from qdem_fem.scene_checks import scene_load
+from qdem_fem.spectra import fourier_spectrum, parzen_smoothed
+from qdem_fem.track_figures import BANDWIDTH, GRAINS, HIGHEST, acceleration_spectrum, mobility
+from qdem_fem.track_scene import TrackPrepared, TrackScene
+from qdem_fem.track_table import BogieTable
+from validation.studies.qdem_track.trials import run_scene
+
+SCENE = Path(__file__).parents[3] / "scenes" / "track-small.toml"
+SEEDS, FRICTIONS = (1, 2, 3), (0.577, 1.73)
+POINTS = (*GRAINS, "sleeper")
+APART = 8.0
+"""Of the frequencies kept in the record [Hz]."""
+
+
+def passages(bogie: BogieTable) -> tuple[FloatArray, FloatArray]:
+    """Times at which the two axles are on the sleeper, and at which each passage ends (2,) [s].
+
+    The first ends half-way to the second, the second when that axle is ``lead`` behind.
+    """
+    axles = Train(cars=1, axle_load=bogie.axle_load, speed=bogie.speed).axles[:2]
+    on = (bogie.lead + axles) / bogie.speed
+    return on, np.array([on.mean(), on[1] + bogie.lead / bogie.speed])
+
+
+def settlement_at(time: FloatArray, down: FloatArray, ends: FloatArray) -> list[dict[str, float]]:
+    """Greatest settlement within each passage, and that at its end [m], of a point that is ``down``
+    [m] below where it was at ``time`` [s].
+
+    Raises `UsageError` for a record that ends before the last passage does."""
+    if time[-1] < ends[-1] - (time[-1] - time[0]) / (len(time) - 1):
+        raise UsageError(
+            f"the record ends at {time[-1]:.6g} s, the last passage of an axle at {ends[-1]:.6g} s",
+            where="settlement", remedy="take a run of a longer simulation.duration",
+        )  # fmt: skip
+    found = []
+    for begin, end in zip([0.0, *ends[:-1]], ends, strict=True):
+        within = (time >= begin) & (time <= end)
+        found.append({"greatest": float(down[within].max()), "end": float(down[within][-1])})
+    return found
+
+
+def measure_packing(folder: Path, seed: int, friction: float) -> dict[str, Any]:
+    """One run of a packing: points, and smoothed spectra of load, sleeper and a grain."""
+    path = folder / SCENE.name
+    path.write_text(SCENE.read_text(encoding="utf-8"), encoding="utf-8")
+    prepared = scene_load(path, [
+        f"track.seed={seed}", f"track.bed=bed-{seed}.npz", f"contact.friction={friction}"
+    ])  # fmt: skip
+    assert isinstance(prepared, TrackPrepared)
+    assert isinstance(prepared.scene, TrackScene)
+    trial = run_scene(prepared, folder / f"run-{seed}-{friction}")
+    bogie, rows = prepared.scene.track.bogie, table_read(trial.folder / "probes.csv")
+    assert bogie is not None
+    _, ends = passages(bogie)
+    points = {}
+    for name in POINTS:
+        aside, up = (rows[f"{name}_{axis}"] - rows[f"{name}_{axis}"][0] for axis in "yz")
+        last = settlement_at(rows["time"], -up, ends)
+        points[name] = {
+            "greatest": max(one["greatest"] for one in last), "end": last[-1]["end"],
+            "lateral": float(np.abs(aside).max()),
+            "lateral_over_vertical": float(np.abs(aside).max() / np.abs(up).max()),
+        }  # fmt: skip
+    return {
+        "seed": seed, "friction": friction, "points": points,
+        "imbalance": trial.energy["relative_imbalance"], "cpu_s": trial.cpu, "step": trial.step,
+        "curves": spectra_of(prepared, rows),
+    }  # fmt: skip
+
+
+def spectra_of(prepared: TrackPrepared, rows: dict[str, FloatArray]) -> dict[str, list[float]]:
+    """Every `APART` Hz: the load [N s], acceleration of S2 [m/s], mobility of B2 [m/(s N)]."""
+    time, load = rows["time"], prepared.load
+    frequency, spectrum = fourier_spectrum(time, np.interp(time, load.times, load.values[:, 2]))
+    smooth = parzen_smoothed(frequency, np.abs(spectrum), BANDWIDTH)
+    up = {name: rows[f"{name}_z"] - rows[f"{name}_z"][0] for name in ("S2", "B2")}
+    curves = {
+        "load": (frequency, smooth),
+        "S2": acceleration_spectrum(time, up["S2"]),
+        "B2": mobility(time, up["B2"], load),
+    }
+    grid = np.arange(0.0, HIGHEST, APART)
+    return {
+        name: [float(f"{one:.4g}") for one in np.interp(grid, at, np.nan_to_num(size))]
+        for name, (at, size) in curves.items()
+    }

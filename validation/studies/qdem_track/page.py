@@ -1,0 +1,101 @@
+"""The page and its figure: spectra of three packings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure
+from validation.studies.qdem_track.bars import check_bars
+from validation.studies.qdem_track.bogie import APART, FRICTIONS, POINTS
+from validation.study import Row, format_table, mean_interval
+
+TWENTY = {
+    "unbalanced force over mean contact force, at rest": "equilibrium, unbalanced",
+    "missing in the account of energies, friction 0.577": "friction 0.577: missing",
+    "the same, friction 1.73": "friction 1.73: missing",
+    "greatest settlement, friction 1.73 over 0.577": "friction 1.73 over 0.577: settlement",
+    "greatest lateral motion, the same": "friction 1.73 over 0.577: lateral",
+    "resumed run less uninterrupted one": "resumed run",
+    "processor seconds a simulated second": "friction 0.577: processor",
+}
+LEVERS = {
+    "contacts = 3 in place of near": "three contacts",
+    "mass scaling, elements to 1.2 µs": "mass scaling to 1.2",
+    "to 2 µs": "mass scaling to 2",
+    "springs of 0.1 of Table 1's": "springs times 0.1",
+    "springs of 0.01": "springs times 0.01",
+}
+MEASURES = {"greatest": "settlement, greatest", "end": "settlement behind both axles",
+            "lateral": "lateral motion, greatest"}  # fmt: skip
+PAPER_SCALE = {
+    name: name
+    for name in (
+        "grains", "elements", "step", "processor time of a step",
+        "million element-steps a processor second", "preparation",
+    )
+}  # fmt: skip
+
+
+def describe(rows: Sequence[Row]) -> dict[str, str]:
+    """The text for each mark of the page."""
+    parts = {row["part"]: row for row in rows}
+    checks = {part: check_bars([row]) for part, row in parts.items()}
+    levers = []
+    for words, name in LEVERS.items():
+        found = [check.value for check in checks["twenty"] if check.name.startswith(f"{name}")]
+        step, cost, error = found[:3]
+        levers.append([words, f"{step:.3g}", f"{cost:.2g}", f"{100 * error:+.2g} %"])
+    return {
+        "twenty": describe_checks(checks["twenty"], TWENTY),
+        "levers": format_table(["what", "step", "processor time", "error of settlement"], levers),
+        "packings": describe_packings(parts["packings"]),
+        "scale": describe_checks(checks["paper scale"], PAPER_SCALE),
+        "made": describe_origin(rows),
+    }
+
+
+def describe_packings(row: Row) -> str:
+    """Means over packings and their intervals of 95 %, a column a friction [um]."""
+    lines = []
+    for point in POINTS:
+        for key, words in MEASURES.items():
+            cells = []
+            for friction in FRICTIONS:
+                runs = [run for run in row["runs"] if run["friction"] == friction]
+                mean, half = mean_interval([1e6 * run["points"][point][key] for run in runs])
+                cells.append(f"{mean:.3g} ± {half:.2g}")
+            lines.append([f"{words} of {point}", *cells])
+    for point in POINTS:
+        cells = []
+        for friction in FRICTIONS:
+            ratio = [
+                run["points"][point]["lateral_over_vertical"]
+                for run in row["runs"]
+                if run["friction"] == friction
+            ]
+            cells.append(f"{np.mean(ratio):.2g}")
+        lines.append([f"lateral over vertical motion of {point}", *cells])
+    heads = [f"friction {friction:g}" for friction in FRICTIONS]
+    return format_table(["300 grains [µm]", *heads], lines)
+
+
+def draw(rows: Sequence[Row], picture: Path) -> None:
+    """Spectra of load, sleeper and a grain, a line a packing, at the friction of Table 1."""
+    runs = [run for row in rows for run in row.get("runs", ()) if run["friction"] == FRICTIONS[0]]
+
+    def panels(figure: Any) -> None:
+        shown = {"load": "load [N s]", "S2": "acceleration of the sleeper, S2 [m/s]",
+                 "B2": "mobility of a grain, B2 [m/(s N)]"}  # fmt: skip
+        for axes, (name, words) in zip(figure.subplots(1, 3), shown.items(), strict=True):
+            for run in runs:
+                size = np.array(run["curves"][name])
+                at = APART * np.arange(len(size))
+                axes.semilogy(at, size, lw=0.9, label=f"packing {run['seed']}")
+            axes.set(xlabel="frequency [Hz]", title=words)
+        figure.axes[0].legend(fontsize=7)
+
+    draw_figure((12, 3.6), panels, picture)

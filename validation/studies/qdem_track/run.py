@@ -1,0 +1,75 @@
+"""The parts: 20 grains, three packings of 300, the paper's 5,700 at rest."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+import warnings
+from itertools import product
+from pathlib import Path
+
+from qdem_fem.errors import StepWarning
+from qdem_fem.scene_checks import scene_load
+from qdem_fem.track_bed import STAGES, bed_read
+from qdem_fem.track_scene import TrackPrepared, contact_of
+from qdem_fem.track_stand import bed_begin
+from validation.bench.qdem.checks import figures_row, reported
+from validation.studies.qdem_track.bogie import FRICTIONS, SCENE, SEEDS, measure_packing
+from validation.studies.qdem_track.trials import (
+    blow_checks,
+    lever_checks,
+    resume_check,
+)
+from validation.study import Row
+
+STEPS = 500
+
+
+def twenty() -> Row:
+    """20 grains, in a folder that is thrown away."""
+    with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)  # contact makes the step short: known here
+        folder = Path(name)
+        checks, reference = blow_checks(folder)
+        checks += [resume_check(folder), *lever_checks(folder, reference)]
+    return figures_row(checks)
+
+
+def packings() -> Row:
+    """300 grains under one bogie: 12 minutes of one thread a run, and a bed for each packing."""
+    with tempfile.TemporaryDirectory() as name:
+        pairs = product(SEEDS, FRICTIONS)
+        return figures_row([], runs=[measure_packing(Path(name), *pair) for pair in pairs])
+
+
+def paper_scale() -> Row:
+    """A step of the paper's track from its bed at rest, one thread, all bodies deformable."""
+    prepared = scene_load(SCENE.with_name("track.toml"))
+    assert isinstance(prepared, TrackPrepared)
+    recipe = prepared.recipe
+    bed = bed_read(prepared.bed_file, recipe)
+    if bed.stage != STAGES[-1]:
+        raise SystemExit(
+            f"{prepared.bed_file} is at stage {bed.stage}: trackbed qdem goes on there"
+        )
+    table = prepared.scene.simulation
+    run = bed_begin(
+        recipe, bed, contact_of(prepared), strain=table.strain, step=table.step,
+        safety=table.safety, threads=1, mass_scaling=table.mass_scaling,
+    )[0]  # fmt: skip
+    run.advance(20 * run.step)
+    started = time.process_time()
+    run.advance(STEPS * run.step)
+    spent = (time.process_time() - started) / STEPS
+    elements = sum(len(body.elements) for body in run.bodies)
+    return figures_row([
+        reported("grains", len(run.bodies) - 1),
+        reported("elements", elements),
+        reported("step", run.step, "s"),
+        reported("processor time of a step", spent, "s"),
+        reported("million element-steps a processor second", elements / spent / 1e6),
+        reported("preparation", sum(rest["cpu_s"] for rest in bed.rests.values()), "s CPU"),
+    ])  # fmt: skip
+
+
+PARTS = {"twenty": twenty, "packings": packings, "paper scale": paper_scale}

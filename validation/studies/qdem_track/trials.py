@@ -1,0 +1,141 @@
+"""Tracks of 20 grains under one blow: two frictions, resumption, levers of cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.energy_account import energy_facts
+from qdem_fem.output import table_read
+from qdem_fem.run_folder import RunFolder
+from qdem_fem.scene_build import simulation_of
+from qdem_fem.scene_run import run_dynamic
+from qdem_fem.track_bed import bed_prepare
+from qdem_fem.track_figures import track_facts
+from qdem_fem.track_scene import TrackPrepared
+from validation.bench.qdem.checks import reported
+from validation.bench.track_trials import scene_at
+from validation.case import Check
+
+FRICTIONS = (0.577, 1.73)
+SOFTER = (0.1, 0.01)
+"""Springs of the contacts over Table 1's."""
+HEAVIER = (1.2e-6, 2e-6)
+"""Steps [s] that mass scaling brings every element to."""
+DURATION = 0.015
+"""[s]"""
+
+
+class Quiet:
+    """No progress is told."""
+
+    def at(self, steps: int, total: int, when: float) -> None:
+        """Nothing."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run from a prepared bed to its end."""
+
+    facts: dict[str, Any]
+    """`track_facts`"""
+    energy: dict[str, float]
+    """`energy_facts`"""
+    rests: dict[str, dict[str, float]]
+    step: float
+    """[s]"""
+    cpu: float
+    """Processor time of marching [s]."""
+    folder: Path
+
+
+def run_scene(prepared: TrackPrepared, folder: Path) -> Trial:
+    """Prepare, where that is not done yet, and run."""
+    run, bodies = simulation_of(prepared)
+    place = RunFolder(folder)
+    with place.locked():
+        done = run_dynamic(prepared, run, bodies, place, resume=False, progress=Quiet())
+    return Trial(
+        facts=track_facts(place.path, prepared.load),
+        energy=energy_facts(table_read(place.path / "energy.csv")),
+        rests=bed_prepare(prepared.recipe, prepared.bed_file).rests,
+        step=run.step,
+        cpu=done.cost["cpu_s"],
+        folder=place.path,
+    )
+
+
+def blow_checks(folder: Path) -> tuple[list[Check], Trial]:
+    """Equilibrium, and both frictions of the paper from the same bed."""
+    trials = [
+        run_scene(scene_at(folder, f"contact.friction={f}"), folder / f"friction-{f}")
+        for f in FRICTIONS
+    ]
+    rest = trials[0].rests["rest"]
+    asked = {"unbalanced": 0.1, "kinetic": 0.01, "loose": 0.02}
+    checks = [at_most(f"equilibrium, {name}", rest[name], bar) for name, bar in asked.items()]
+    spent = sum(one["cpu_s"] for one in trials[0].rests.values())
+    checks.append(reported("preparation", spent, "s CPU"))
+    for friction, one in zip(FRICTIONS, trials, strict=True):
+        of, name = one.facts["sleeper"], f"friction {friction}"
+        missing = one.energy["relative_imbalance"]
+        checks += [
+            at_most(f"{name}: missing in the account of energies", missing, 1e-3),
+            reported(f"{name}: greatest settlement", of["settlement_greatest"], "m"),
+            reported(f"{name}: settlement that stays", of["settlement"], "m"),
+            reported(f"{name}: processor time a simulated second", one.cpu / DURATION, "s/s"),
+        ]
+    for key in ("settlement_greatest", "lateral_greatest"):
+        ratio = trials[1].facts["sleeper"][key] / trials[0].facts["sleeper"][key]
+        name = f"friction 1.73 over 0.577: {key.replace('_', ', ')}"
+        checks.append(Check(name, ratio, "< 1", ratio < 1))
+    return checks, trials[0]
+
+
+def at_most(name: str, value: float, bar: float, unit: str = "") -> Check:
+    """A value and its upper bar."""
+    return Check(name, float(value), f"<= {bar:g}", bool(value <= bar), unit)
+
+
+def resume_check(folder: Path) -> Check:
+    """A run that is saved and taken up again beside one that is not: the same to the bit."""
+    runs = [simulation_of(scene_at(folder))[0] for _ in range(2)]
+    half = 1000 * runs[0].step
+    runs[0].advance(half)
+    runs[0].save(folder / "half.npz")
+    runs[1].restore(folder / "half.npz")
+    for run in runs:
+        run.advance(half)
+    fields = [[body.displacement for body in run.bodies] for run in runs]
+    apart = max(float(np.abs(a - b).max()) for a, b in zip(*fields, strict=True))
+    return Check("resumed run less uninterrupted one", apart, "== 0", apart == 0.0, "m")
+
+
+def lever_checks(folder: Path, reference: Trial) -> list[Check]:
+    """What makes a run cheaper, and at what error of the greatest settlement."""
+    levers = {"three contacts": ["contact.contacts=3"]}
+    levers |= {
+        f"mass scaling to {1e6 * step:g} µs": [f"simulation.mass_scaling={step}"]
+        for step in HEAVIER
+    }
+    levers |= {
+        f"springs times {softer}": [
+            "contact.normal_stiffness="
+            f"{{ballast={softer * 1.613e9:g}, sleeper={softer * 2.39e9:g}}}",
+            f"track.bed=bed-{softer}.npz", f"track.softness={1e-4 / softer:g}",
+        ]
+        for softer in SOFTER
+    }  # fmt: skip
+    checks, known = [], reference.facts["sleeper"]["settlement_greatest"]
+    for number, (name, overrides) in enumerate(levers.items()):
+        one = run_scene(scene_at(folder, *overrides), folder / f"lever-{number}")
+        error = one.facts["sleeper"]["settlement_greatest"] / known - 1
+        checks += [
+            reported(f"{name}: step over the reference's", one.step / reference.step),
+            reported(f"{name}: processor time over the reference's", one.cpu / reference.cpu),
+            reported(f"{name}: settlement, greatest, beside the reference's", error),
+        ]
+    return checks

@@ -1,0 +1,109 @@
+"""The page and the figure of the ballast study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from validation.studies.rigid_ballast.bars import Summary, list_ends, runs_of, summarise
+from validation.studies.rigid_ballast.run import Row
+from validation.studies.rigid_ballast.space import CYCLES, STEPS
+from validation.study import describe_commits, format_table, mean_interval
+
+COLOURS = {"rigid": "#0b5fa5", "soft": "#d1495b"}
+
+
+def describe(rows: Sequence[Row]) -> dict[str, str]:
+    """The text for each mark of the page."""
+    return {
+        "LIMITS": _limits(rows),
+        "LEVELS": _levels(rows, summarise(rows)),
+        "SPACE": _space(rows),
+        "COMMITS": describe_commits(row["origin"]["commit"] for row in rows),
+    }
+
+
+def _limits(rows: Sequence[Row]) -> str:
+    rigid, soft = (list_ends(rows, method) for method in ("rigid", "soft"))
+    apart, wide = mean_interval(rigid - soft)
+    mean = float(np.mean((rigid + soft) / 2))
+    verdict = "differ" if abs(apart) > wide else "can not be told apart"
+    return (
+        f"**The two limits {verdict}.** The finest rigid level less the finest soft one is "
+        f"{1e3 * apart:+.2f} ± {1e3 * wide:.2f} mm in the mean of {len(rigid)} beds, that is "
+        f"{100 * apart / mean:+.0f} ± {100 * wide / mean:.0f} % of their mean, "
+        f"{1e3 * mean:.2f} mm."
+    )
+
+
+def _levels(rows: Sequence[Row], found: Sequence[Summary]) -> str:
+    """Settlement, error and cost of every level, the cost also over that of rigid steps of 1 ms."""
+    paper = next(each for each in found if each.level.name == "rigid, h = 1 ms")
+    table = []
+    for each in found:
+        mean, wide = mean_interval(each.settlement[:, -1])
+        middle, half = mean_interval(np.log(each.cost / paper.cost))
+        low, ratio, high = np.exp([middle - half, middle, middle + half])
+        recoil = np.median([run["recoil"] for run in runs_of(rows, each.level)])
+        table.append([
+            each.level.name + " (finest)" * each.is_limit,
+            f"{1e3 * each.settlement[:, 0].mean():.2f}", f"{1e3 * mean:.2f} ± {1e3 * wide:.2f}",
+            f"{100 * each.error[0]:+.0f} ± {100 * each.error[1]:.0f}", f"{1e3 * recoil:.4f}",
+            f"{each.cost.mean():.2g}", f"{each.steps:,.0f}",
+            f"{ratio:.2g} ({low:.2g} to {high:.2g})",
+        ])  # fmt: skip
+    head = ("level", "after 1 cycle [mm]", "after 5 [mm]", "error [%]", "elastic recoil [mm]",
+            "CPU s a run", "steps", "cost over h = 1 ms")  # fmt: skip
+    return format_table(head, table)
+
+
+def _space(rows: Sequence[Row]) -> str:
+    """Settlement in space by the step, and its difference from the finest."""
+    samples = [row["space"] for row in rows if "space" in row]
+    ends = {step: np.array([each[f"{step:g}"]["settlement"][-1] for each in samples])
+            for step in STEPS}  # fmt: skip
+    table = []
+    for step in STEPS:
+        runs = [each[f"{step:g}"] for each in samples]
+        mean, wide = mean_interval(ends[step])
+        apart, half = mean_interval(ends[step] - ends[min(STEPS)])
+        shift = "" if step == min(STEPS) else f"{1e3 * apart:+.3f} ± {1e3 * half:.3f}"
+        table.append([
+            f"{1e3 * step:g} ms", f"{1e3 * mean:.3f} ± {1e3 * wide:.3f}", shift,
+            f"{np.mean([run['cpu_s'] for run in runs]) / CYCLES:.2g}",
+            f"{max(run['residual'] for run in runs):.1e}",
+        ])  # fmt: skip
+    head = ("step", "settlement [mm]", "less that at the finest step [mm]", "CPU s a cycle",
+            "worst residual")  # fmt: skip
+    least, most = 1e3 * min(ends[min(STEPS)]), 1e3 * max(ends[min(STEPS)])
+    words = f"{len(samples)} samples, which settle by {least:.2g} to {most:.2g} mm."
+    return f"{words}\n\n{format_table(head, table)}"
+
+
+def draw(rows: Sequence[Row], picture: Path) -> None:
+    """Error of the mean settlement against cost, and settlement against cycles."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.6, 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for each in summarise(rows):
+        colour, name = COLOURS[each.level.method], each.level.name.partition(", ")[2]
+        error, wide = (100 * value for value in each.error)
+        left.errorbar(each.cost.mean(), error, yerr=wide, color=colour, marker="o", capsize=3,
+                      fillstyle="none" if each.is_limit else "full")  # fmt: skip
+        left.annotate(name, (each.cost.mean(), error), fontsize=7, xytext=(4, 4),
+                      textcoords="offset points", color=colour)  # fmt: skip
+        curve = 1e3 * each.settlement.mean(axis=0)
+        right.plot(np.arange(1, len(curve) + 1), curve, color=colour)
+        right.annotate(name, (len(curve), curve[-1]), fontsize=7, color=colour)
+    left.axhline(0.0, color="0.6", linewidth=0.8)
+    left.set(xscale="log", yscale="symlog", xlabel="processor time of a run, one thread [s]",
+             ylabel="error of the mean settlement [%]",
+             title="blue rigid, red soft; hollow: finest, judged by the other's")  # fmt: skip
+    right.set(xlabel="load cycle", ylabel="mean residual settlement [mm]", yscale="log")
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+        axes.title.set_fontsize(8)
+    figure.savefig(picture, dpi=110)

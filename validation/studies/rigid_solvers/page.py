@@ -1,0 +1,253 @@
+"""The page and the figure of the race."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from validation.bench.rigid.examination import BEYOND, FAMILIES, SAME
+from validation.studies.rigid_solvers import reading
+from validation.studies.rigid_solvers.bars import check_bars
+from validation.studies.rigid_solvers.reading import Row, cost_to
+from validation.studies.rigid_solvers.run import (
+    BUDGET_S,
+    CLARABEL,
+    HYBRID,
+    LADDER,
+    OSQP,
+    OURS,
+    SEEDS,
+    YIELD_S,
+)
+from validation.study import describe_commits, format_table
+
+STYLE = {
+    OURS: ("o", "#0b5394"), HYBRID: ("D", "#cc0000"), CLARABEL: ("s", "#cc7a00"),
+    "Siconos": ("^", "#6aa84f"), OSQP: ("p", "#e06666"),
+}  # fmt: skip
+LEVELS = 10.0 ** np.arange(-2, -16, -1)
+"""Residuals at which costs are compared in the figure."""
+SLOW_S = 1.0
+
+
+def describe(rows: Sequence[Row]) -> dict[str, str]:
+    """The text for each mark of the page."""
+    return {
+        "SUMMARY": _summary(rows),
+        "BARS": _bars(rows),
+        "FAMILIES": _families(reading.races(rows)),
+        "LADDER": _ladder(reading.packings(rows, 500, 5000)),
+        "YIELD": _yield(reading.races(rows, reading.YIELDING)),
+        "EXAMINED": _examined(rows),
+        "UNSOLVED": _unsolved(rows),
+        "BUDGETS": ", ".join(f"{seconds:g} s ({name})" for name, seconds in BUDGET_S.items())
+        + f"; near yield {YIELD_S:g} s",
+        "COMMITS": describe_commits(row["origin"]["commit"] for row in rows),
+    }
+
+
+def _seconds(cost: float) -> str:
+    if not np.isfinite(cost):
+        return "-"
+    return f"{cost:.1g} s" if cost < 0.01 else f"{cost:.2g} s"
+
+
+def _summary(rows: Sequence[Row]) -> str:
+    races = [row for row in reading.races(rows) if row["family"] != reading.YIELDING]
+    costs = [cost for row in races if np.isfinite(cost := cost_to(row, OURS))]
+    ratios = reading.cost_ratios(races)
+    slower = [name for name, value in ratios.items() if value > 1]
+    contacts = [row["contacts"] for row in races]
+    found = reading.examined(rows, seed=SEEDS[0])
+    words = f" ({', '.join(slower)})" if slower else ""
+    return (
+        f"{len(races)} problems with {min(contacts):,} to {max(contacts):,} contacts: "
+        f"`solve_friction` with its default settings brought {len(costs)} to the bar, in "
+        f"{_seconds(float(np.median(costs)))} (median), {_seconds(max(costs))} at most. Of the "
+        f"{len(ratios)} that {HYBRID} brings to it too it is slower on {len(slower)}{words}; the "
+        f"median of the ratios of costs is {np.median(list(ratios.values())):.2g}. "
+        f"**Near yield it is beaten** (below). Of {len(found['ok'])} unseen problems of seed "
+        f"{SEEDS[0]} it solves {sum(found['ok'])}."
+    )
+
+
+def _bars(rows: Sequence[Row]) -> str:
+    barred = [check for check in check_bars(rows) if check.barred]
+    missed = [check for check in barred if not check.holds]
+    words = f"Of {len(barred)} bars {len(barred) - len(missed)} are met."
+    lines = [f"- {check.name}: {check.value:.3g}, bar {check.asked}; {check.why}"
+             for check in missed]  # fmt: skip
+    return "\n".join([words + " Missed:" * bool(missed), *([""] if missed else []), *lines])
+
+
+def _families(rows: Sequence[Row]) -> str:
+    lines = []
+    for family in dict.fromkeys(row["family"] for row in rows):
+        mine = [row for row in rows if row["family"] == family]
+        ours = [cost for row in mine if np.isfinite(cost := cost_to(row, OURS))]
+        cells = [family, str(len(mine)), f"{min(row['contacts'] for row in mine):,} to "
+                 f"{max(row['contacts'] for row in mine):,}", str(len(ours)),
+                 _seconds(float(np.median(ours))), _seconds(max(ours))]  # fmt: skip
+        for rival in (HYBRID, CLARABEL, "Siconos", OSQP):
+            given = [row for row in mine if rival in row["runs"]]
+            reached = sum(np.isfinite(cost_to(row, rival)) for row in given)
+            cells.append(f"{reached} of {len(given)}" if given else "")
+        ratios = list(reading.cost_ratios(mine).values())
+        beside = f"{np.median(ratios):.2g}, {sum(np.array(ratios) > 1)}" if ratios else ""
+        lines.append([*cells, beside])
+    head = ("family", "problems", "contacts", "ours reached", "median", "greatest", HYBRID,
+            CLARABEL, "Siconos", OSQP, "beside")  # fmt: skip
+    return format_table(head, lines)
+
+
+def _ladder(rows: Sequence[Row]) -> str:
+    lines = []
+    for row in rows:
+        if "Siconos" not in row["runs"]:
+            continue
+        cells = []
+        for level in LADDER:
+            ours, theirs = (cost_to(row, solver, level) for solver in (OURS, "Siconos"))
+            times = f", {theirs / ours:.2g} x" if np.isfinite(ours + theirs) else ""
+            cells.append(f"{_seconds(ours)}, {_seconds(theirs)}{times}")
+        lines.append([row["part"], f"{row['contacts']:,}", *cells])
+    return format_table(("packing", "contacts", *(f"{level:.0e}" for level in LADDER)), lines)
+
+
+def _yield(rows: Sequence[Row]) -> str:
+    lines = []
+    for row in rows:
+        cells = []
+        for solver in (OURS, HYBRID):
+            error = reading.least_error(row, solver)
+            reached = cost_to(row, solver)
+            last = row["runs"][solver][-1]
+            if np.isfinite(reached):
+                cells.append(f"{_seconds(reached)} to {error:.0e}")
+            elif last[1] is None:
+                cells.append("out of time")
+            else:
+                cells.append(f"not reached: {error:.0e} after {_seconds(last[1])}")
+        lines.append([row["part"].rpartition("mu")[2], f"{row['contacts']:,}", *cells])
+    return format_table(("friction", "contacts", "`solve_friction`", HYBRID), lines)
+
+
+def _examined(rows: Sequence[Row]) -> str:
+    lines = []
+    for belongs in (SAME, BEYOND):
+        for family in (each for each in FAMILIES if each.belongs == belongs):
+            found = reading.examined(rows, seed=SEEDS[0], family=family.name)
+            if found:
+                lines.append(_examined_line(family.name, found))
+        all_of = reading.examined(rows, seed=SEEDS[0], belongs=belongs)
+        lines.append(_examined_line(f"**{belongs}, all**", all_of))
+    for seed in SEEDS[1:]:
+        title = f"beds kicked, tilted, large packings of seed {seed}"
+        lines.append(_examined_line(title, reading.examined(rows, seed=seed)))
+    head = ("family", "problems", "solved", "over 1 s", "median", "greatest",
+            f"slower than {HYBRID}")  # fmt: skip
+    return format_table(head, lines)
+
+
+def _examined_line(title: str, found: dict[str, list[Any]]) -> list[str]:
+    both = zip(found["cpu_s"], found["ok"], found["rival_s"], found["rival_ok"], strict=True)
+    pairs = [(max(mine, reading.TIE_S), max(theirs, reading.TIE_S))
+             for mine, ok, theirs, theirs_ok in both if ok and theirs_ok]  # fmt: skip
+    costs = [cost for cost, ok in zip(found["cpu_s"], found["ok"], strict=True) if ok]
+    slower = sum(ours > theirs for ours, theirs in pairs)
+    return [
+        title, str(len(found["ok"])), str(len(costs)), str(sum(c > SLOW_S for c in costs) or ""),
+        _seconds(float(np.median(costs))), _seconds(max(costs)),
+        f"{slower} of {len(pairs)}" if pairs else "",
+    ]  # fmt: skip
+
+
+def _unsolved(rows: Sequence[Row]) -> str:
+    """What was not solved, where a solution is known to exist; the rest is counted."""
+    sure = {family.name for family in FAMILIES if family.soluble}
+    lines, others, proved = [], 0, 0
+    for row in reading.examinations(rows):
+        found = reading.examined([row])
+        lost = [k for k, ok in enumerate(found["ok"]) if not ok]
+        if row["family"] not in sure:
+            others += len(lost)
+            proved += sum("no solution" in found["status"][k] or "energy" in found["status"][k]
+                          for k in lost)  # fmt: skip
+        elif lost:
+            told = (f"{row['posed']['index'][k]} ({_left(found, k)})" for k in lost)
+            lines.append(f"- {row['family']} of seed {row['seed']}: {', '.join(told)}")
+    words = (
+        f"Where no solution need exist {others} are not solved; on {proved} of these it is proved "
+        "that there is none, or that W gives energy. Not solved though one exists (contacts, "
+        "residual, cost):"
+    )
+    return "\n".join([words, "", *lines])
+
+
+def _left(found: dict[str, list[Any]], k: int) -> str:
+    if found["residual"][k] is None:
+        return f"{found['contacts'][k]:,}, {found['status'][k]}"
+    return f"{found['contacts'][k]:,}, {found['residual'][k]:.0e}, {_seconds(found['cpu_s'][k])}"
+
+
+# --- the figure -------------------------------------------------------------------------------
+
+
+def draw(rows: Sequence[Row], picture: Path) -> None:
+    """Work and precision on packings, performance profile, and costs near yield."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14, 4.6), layout="constrained")
+    left, middle, right = figure.subplots(1, 3)
+    _draw_precision(left, reading.packings(rows, 0, 10**9))
+    _draw_profile(middle, [r for r in reading.races(rows) if r["family"] != reading.YIELDING])
+    _draw_yield(right, reading.races(rows, reading.YIELDING))
+    for axes in (left, middle, right):
+        axes.grid(True, alpha=0.25)
+        axes.legend(fontsize=8)
+    figure.savefig(picture, dpi=100)
+
+
+def _draw_precision(axes: Any, rows: Sequence[Row]) -> None:
+    """Median over the packings of the cost of each residual, as long as half of them reach it."""
+    for solver, (marker, colour) in STYLE.items():
+        mine = [row for row in rows if solver in row["runs"]]
+        runs = [run for row in mine for run in row["runs"][solver] if run[2] is not None]
+        if not runs:
+            continue
+        cost, error = np.maximum(np.array([run[1:3] for run in runs], dtype=float), 1e-17).T
+        axes.plot(np.maximum(cost, 1e-4), error, marker, color=colour, alpha=0.25, markersize=3)
+        median = np.array([np.median([cost_to(row, solver, level) for row in mine])
+                           for level in LEVELS])  # fmt: skip
+        kept = np.isfinite(median)
+        axes.plot(median[kept], LEVELS[kept], marker=marker, color=colour, label=solver)
+    axes.set(xscale="log", yscale="log", xlabel="processor time of one thread [s]",
+             ylabel="scale-free natural residual", title="settled packings")  # fmt: skip
+
+
+def _draw_profile(axes: Any, rows: Sequence[Row]) -> None:
+    factors = np.logspace(0, 4, 200)
+    for solver, (_, colour) in STYLE.items():
+        among = [row for row in rows if solver in row["runs"]]
+        shares = reading.profile(among, solver, tuple(STYLE), factors)
+        axes.step(factors, shares, where="post", color=colour, label=solver)
+    axes.set(xscale="log", ylim=(0, 1.02), xlabel="cost over the least cost (1 ms at least)",
+             ylabel="share of the problems a solver was given", title="to the bar")  # fmt: skip
+
+
+def _draw_yield(axes: Any, rows: Iterable[Row]) -> None:
+    """Hollow: the bar was not reached."""
+    for solver in (OURS, HYBRID):
+        marker, colour = STYLE[solver]
+        for row in rows:
+            reached = cost_to(row, solver)
+            last = row["runs"][solver][-1][1]
+            cost = reached if np.isfinite(reached) else last or YIELD_S
+            axes.plot(float(row["part"].rpartition("mu")[2]), cost, marker, color=colour,
+                      fillstyle="full" if np.isfinite(reached) else "none")  # fmt: skip
+        axes.plot([], [], marker, color=colour, label=solver)
+    axes.set(yscale="log", xlabel="friction after settling under 0.5",
+             ylabel="processor time [s]", title="near yield (hollow: not solved)")  # fmt: skip
