@@ -1,7 +1,9 @@
 # Every target does its own set-up (setup.sh says what it installs) and is quick when all is there.
-.PHONY: demo demo-rigid test lint bench validate setup
+.PHONY: demo demo-rigid test test-all test-lowest test-rest lint bench validate setup
 
 bin := .venv/bin
+lowest := .venv-lowest
+two := -n 2 --dist worksteal
 
 setup:
 	@./setup.sh
@@ -16,9 +18,28 @@ demo-rigid: setup
 		--set run.duration=0.95 --set run.frames=19
 	@echo "now look at demo-pile/report.html and demo-pile/movie.gif"
 
+# What anyone can run in five minutes: no long test, no study; what is missing is skipped.
 test:
 	@./setup.sh test
-	$(bin)/python -m pytest -n 2 --dist worksteal --long-until 600
+	$(bin)/python -m pytest $(two) -m "not long and not studies and not validate"
+
+# Everything, where a library or an engine that is missing fails its tests.  40 minutes.
+test-all: test test-lowest test-rest
+
+test-lowest: setup $(lowest)/made # some tests with the lowest versions that pyproject.toml allows; on Python 3.11 or 3.12
+	NUMBA_CACHE_DIR=$(lowest)/kernels $(lowest)/bin/python -m pytest $(two) -m lowest \
+		-W ignore::DeprecationWarning # of old libraries against new ones below them
+
+$(lowest)/made: tests/lowest.txt pyproject.toml
+	$${PYTHON:-python3} -m venv --clear $(lowest)
+	$(lowest)/bin/python -m pip install --quiet --disable-pip-version-check \
+		-c tests/lowest.txt -e ".[test]"
+	touch $@
+
+test-rest: # what `make test` left out or skipped, with the newest versions that pip finds
+	@./setup.sh test,peers
+	$(bin)/python -m pytest $(two) --nothing-missing \
+		-m "(long or studies or engine or peer) and not validate"
 
 lint:
 	@./setup.sh lint

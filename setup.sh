@@ -1,8 +1,9 @@
 #!/bin/sh
-# Install what trackbed needs, and only what is missing: the engine (apt) and Python packages
-# (into .venv).  Says first what it will install; a second call takes no time.
+# Installs LIGGGHTS (apt, 420 MB on a bare Debian) and Python packages (.venv, 600 MB): what is missing.
+# Says first what it will install and how large it is; a second call takes no time.
 #   ./setup.sh                  for `make demo`
-#   ./setup.sh test,lint        with these extras of pyproject.toml; `test` adds YADE and Chromium
+#   ./setup.sh test,lint        with these extras of pyproject.toml
+#   ./setup.sh test,peers       for `make test-all`: YADE, Chromium (apt, 2.1 GB), libraries to judge by (.venv, 4 GB)
 # PYTHON=/path/to/python3 chooses the Python that .venv is made with.
 set -eu
 cd "$(dirname "$0")"
@@ -24,7 +25,7 @@ if command -v "$python" >/dev/null; then
         "Install one and run again with PYTHON=/path/to/python3.11."
     "$python" -c 'import ensurepip, venv' 2>/dev/null || lacking="$lacking python3-venv"
 fi
-case ",$extras," in *,test,*)
+case ",$extras," in *,peers,*)
     command -v chromium >/dev/null || lacking="$lacking chromium"
     command -v yade >/dev/null || lacking="$lacking yade"
     # what the Python wheels of gmsh and OVITO (Qt) are linked to
@@ -46,7 +47,8 @@ if [ -n "$lacking" ]; then
         as_root=sudo
         [ -t 0 ] || as_root="sudo -n" # nobody is there to type a password
     fi
-    echo "trackbed setup: installing with ${as_root:+$as_root }apt-get:$lacking"
+    echo "trackbed setup: installing with ${as_root:+$as_root }apt-get:$lacking" \
+        "(of these liggghts is 420 MB on a bare Debian, chromium and yade 2.1 GB)"
     log=$(mktemp)
     $as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q >"$log" 2>&1 ||
         tail -n 3 "$log" >&2 # an unreachable foreign source must not stop us
@@ -66,7 +68,8 @@ stamp=".venv/trackbed-setup-${extras:-base}"
 if [ "$(cat "$stamp" 2>/dev/null)" = "$made_from" ] && .venv/bin/python -c '' 2>/dev/null; then
     exit 0
 fi
-echo "trackbed setup: installing Python packages into .venv: trackbed${extras:+[$extras]} and" \
+case ",$extras," in *,peers,*) size="4 GB" ;; *,bench,*) size="2 GB" ;; *) size="600 MB" ;; esac
+echo "trackbed setup: installing Python packages into .venv, $size: trackbed${extras:+[$extras]} and" \
     "what it depends on (numpy, scipy, numba, matplotlib, ...; a minute or two)"
 .venv/bin/python -m pip --version >/dev/null 2>&1 || "$python" -m venv --clear .venv || stop \
     "could not make .venv with $python (its words are above)."

@@ -8,6 +8,8 @@ first used, so that help texts cost nothing.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from trackbed.cache_folders import provide_cache_folders
+
 if TYPE_CHECKING:
     from qdem_fem.body import Body
     from qdem_fem.contact_spheres import ContactPlane, SphereContact
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     from qdem_fem.periodic import PeriodicWidth
     from qdem_fem.series import Series, ramp
     from qdem_fem.simulation import History, Simulation
+
+provide_cache_folders(__path__[0])
 
 _HOMES = {
     "Body": "body",

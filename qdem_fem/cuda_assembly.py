@@ -30,17 +30,13 @@ Integers = NDArray[np.int64]
 
 def gpu_require() -> None:
     """Raise `LibraryMissing` unless numba.cuda is installed and finds a GPU and its compiler."""
-    where, remedy = 'device="cuda"', "pip install 'trackbed[cuda]'"
-    try:
-        from qdem_fem.cuda_step import cuda
-    except ImportError as error:
-        raise LibraryMissing(
-            f"numba.cuda can not be imported ({error})", where=where, remedy=remedy
-        ) from error
+    from qdem_fem.cuda_step import NO_CUDA, cuda
+
+    where = 'device="cuda"'
     if cuda.is_available():
         return
     if cuda.cuda_error() is None:
-        raise LibraryMissing("CUDA's compiler, NVVM, was not found", where=where, remedy=remedy)
+        raise LibraryMissing("CUDA's compiler, NVVM, was not found", where=where, remedy=NO_CUDA)
     raise LibraryMissing(
         "no GPU was found, or its driver does not answer",
         where=where,

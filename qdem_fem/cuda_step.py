@@ -13,7 +13,8 @@ no gathering of element forces by node: that would write and read twelve numbers
 than the least traffic, while additions in the second-level cache cost none.  The price: the order
 of a node's sum is left to the hardware, and two runs agree to round-off only.
 
-Importing this module imports numba.cuda; `qdem_fem.cuda_assembly` does so when asked for a GPU.
+Importing this module imports numba.cuda, and raises `LibraryMissing` where that fails;
+`qdem_fem.cuda_assembly` does so when asked for a GPU.
 Without fast mathematics: it takes NaN for impossible, and NaN is what the count of bad elements
 must see.  Fused multiply-add is on all the same.
 """
@@ -25,10 +26,21 @@ from importlib import import_module
 from typing import Any
 
 from qdem_fem import stress
+from qdem_fem.errors import LibraryMissing
 from qdem_fem.reference_forces import Strain
 
-cuda: Any = import_module("numba.cuda")
-"""Untyped: what it holds is settled when it is imported (a GPU, its simulator, neither)."""
+NO_CUDA = "pip install 'trackbed[cuda]' beside an NVIDIA GPU, or compute with device=\"cpu\""
+"""What to do where CUDA or its libraries are missing."""
+
+try:
+    cuda: Any = import_module("numba.cuda")
+    """Untyped: what it holds is settled when it is imported (a GPU, its simulator, neither)."""
+except Exception as error:  # without CUDA's runtime numba-cuda raises errors of many kinds
+    raise LibraryMissing(
+        f"numba.cuda can not be imported ({' '.join(str(error).split())})",
+        where='device="cuda"',
+        remedy=NO_CUDA,
+    ) from error
 
 BLOCK = 128
 """Threads of a block."""

@@ -8,6 +8,8 @@ errors a user can act on are in `rigid_lcp.errors`.  A name is loaded when it is
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from trackbed.cache_folders import provide_cache_folders
+
 if TYPE_CHECKING:
     from rigid_lcp.breakage import Breakage
     from rigid_lcp.collisions import collide
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     from rigid_lcp.simulation import Simulation
     from rigid_lcp.solver import solve_friction
     from rigid_lcp.wear import Wear
+
+provide_cache_folders(__path__[0])
 
 _HOMES = {
     "BodySpace": "friction_problem",

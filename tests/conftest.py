@@ -1,11 +1,11 @@
-"""Tests that need an engine, the order of tests, and what several processes may take."""
+"""Tests that need an engine or a library, their order, and what several processes may take."""
 
 from __future__ import annotations
 
 import os
 import shutil
-import time
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -20,14 +20,11 @@ settings.register_profile(  # beside other processes time says nothing
 settings.load_profile("no clock")
 
 
-BEGAN = time.monotonic()  # each process reads this file at its start
-
-
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """``--long-until 600``: a slow machine leaves out long tests and still ends in time."""
+    """``--nothing-missing``: for CI and ``make test-all``, where everything is installed."""
     parser.addoption(
-        "--long-until", type=float, default=float("inf"), metavar="SECONDS",
-        help="skip tests marked long that have not begun when these seconds are over",
+        "--nothing-missing", action="store_true",
+        help="a test whose engine, program or library is missing fails instead of being skipped",
     )  # fmt: skip
 
 
@@ -36,8 +33,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
     A third of a whole run is compiling.  Two processes (``-n 2 --dist worksteal``) begin with one
     half of the tests each and trade what is left later: so hardly a kernel is compiled in both.
-    Tests that lean on their order stand in front, where nothing is traded.  Each process has the
-    long ones last, so that these are what a slow machine leaves out.
+    Tests that lean on their order stand in front, where nothing is traded.
     """
     items.sort(key=_place)
 
@@ -65,19 +61,27 @@ def engine_missing(name: str) -> str:
     return ""
 
 
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Skip what a slow machine has no time for, and what needs an engine that is missing.
+@cache
+def peer_missing(name: str) -> str:
+    """Why a library can not be imported; empty where it can."""
+    try:
+        import_module(name)
+    except Exception as error:  # numba-cuda without CUDA's runtime raises errors of its own kinds
+        return f"{name} can not be imported ({' '.join(str(error).split())})"
+    return ""
 
-    In CI a missing engine (``@pytest.mark.engine``; default: liggghts) fails.
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what needs an engine or a library that is missing; with ``--nothing-missing`` it fails.
+
+    ``@pytest.mark.engine`` (default: liggghts) and ``@pytest.mark.peer("coal")``.
     """
-    seconds = item.config.getoption("--long-until")
-    if item.get_closest_marker("long") and time.monotonic() - BEGAN > seconds:
-        pytest.skip(f"a long test, and {seconds:g} s are over (pytest -m long runs them)")
-    for mark in item.iter_markers("engine"):
-        name = mark.args[0] if mark.args else mark.kwargs.get("name", "liggghts")
-        missing = engine_missing(name)
-        if missing:
-            reason = f"{missing} (./setup.sh test installs it)"
-            if os.environ.get("CI") == "true":
-                pytest.fail(reason, pytrace=False)
-            pytest.skip(reason)
+    engines = [mark.args[0] if mark.args else "liggghts" for mark in item.iter_markers("engine")]
+    peers = [mark.args[0] for mark in item.iter_markers("peer")]
+    missing = [*filter(None, map(engine_missing, engines)), *filter(None, map(peer_missing, peers))]
+    if not missing:
+        return
+    reason = f"{missing[0]} (./setup.sh test,peers installs it)"
+    if item.config.getoption("--nothing-missing"):
+        pytest.fail(reason, pytrace=False)
+    pytest.skip(reason)

@@ -72,8 +72,26 @@ def parser_build(verb: str | None) -> argparse.ArgumentParser:
             "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
         )
         if name == verb:
+            if name == "validate":
+                find_checkout()
             import_module(module).register(name, verb_parser)
     return parser
+
+
+def find_checkout() -> None:
+    """Put the checkout that this file lies in on the path: its studies are in no wheel.
+
+    Raises `ImportError` where trackbed is installed and there is no checkout.
+    """
+    root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    if not all(os.path.exists(os.path.join(root, *it)) for it in CHECKOUT):
+        raise ImportError("the studies are not in this installation", name="validation")
+    if root not in sys.path:
+        sys.path.insert(0, root)
+
+
+CHECKOUT = (("pyproject.toml",), ("validation", "cli.py"))
+"""What tells a checkout from an installation, where `validation` may be another project."""
 
 
 def verb_named(words: Sequence[str]) -> str | None:
@@ -92,13 +110,15 @@ def import_failed(error: ImportError) -> str:
     """Why a package can not be imported, and what to do; empty when the fault is ours."""
     from importlib import metadata
 
+    if error.name == "validation":
+        return (
+            f"validate: {error}\n  -> git clone https://github.com/trackbed/trackbed, then there "
+            "./setup.sh and .venv/bin/trackbed validate"
+        )
     try:
         metadata.distribution("adapters")
     except metadata.PackageNotFoundError:
-        missing = (error.name or "").partition(".")[0]
-        if error.name == "validation":
-            return f"{error}\n  -> studies are not installed: trackbed validate wants a checkout"
-        if missing in ("", "adapters", "validation"):
+        if (error.name or "").partition(".")[0] in ("", "adapters"):
             return ""
         return f"{error}\n  -> install trackbed with its dependencies: pip install -e ."
     return (

@@ -35,9 +35,9 @@ def test_dump_opens_in_meshio(sample: Sample) -> None:
         assert np.array_equal(mesh.point_data[f"f_force_{name}"], force)
 
 
+@pytest.mark.peer("ovito")
 def test_dumps_open_in_ovito(sample: Sample) -> None:
     """Grains with the properties OVITO knows, the rain as a film, contacts as bonds."""
-    pytest.importorskip("ovito")
     from ovito.io import import_file
     from ovito.modifiers import LoadTrajectoryModifier
 
@@ -61,9 +61,11 @@ def test_dumps_open_in_ovito(sample: Sample) -> None:
     assert sample.name == "fake" or rain.source.num_frames > 10
 
 
+@pytest.mark.peer("pyvista")
 def test_export_opens(sample: Sample, tmp_path: Path) -> None:
     """Forces of contacts and places of grains are the engine's own, in VTK's reader."""
-    pyvista = pytest.importorskip("pyvista")
+    import pyvista
+
     export_run(exported_run(sample.run), "vtu", tmp_path, every=5)
     state = sample.window(SECOND).state(-1)
     grains = pyvista.read(tmp_path / "vtu" / f"grains_{state.cycle:06d}.vtu")

@@ -346,10 +346,32 @@ def test_cite_is_bibtex(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_validate_lists_cases(capsys: pytest.CaptureFixture[str]) -> None:
-    """``validate`` without a case lists the files of validation/cases, with dashes."""
+    """``validate`` without a case lists the studies, and what measures now, with dashes."""
     assert main(["validate"]) == 0
-    files = {path.stem for path in (ROOT / "validation" / "cases").glob("[!_]*.py")}
-    assert capsys.readouterr().out.split() == sorted(name.replace("_", "-") for name in files)
+    home = ROOT / "validation"
+    names = {path.parent.name for path in (home / "studies").glob("*/__init__.py")}
+    names |= {path.stem for path in (home / "cases").glob("[!_]*.py")} | {"dump_speed"}
+    assert capsys.readouterr().out.split() == sorted(name.replace("_", "-") for name in names)
+
+
+def test_a_study_is_judged_by_its_record(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Rows of ``record.jsonl`` to the study's ``check_bars``; a line cut off by a kill is none."""
+    from validation import studies, study
+
+    folder = tmp_path / "my_study"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "bars.py").write_text(
+        "from validation.case import Check\ndef check_bars(rows):\n"
+        "    return [Check('a', r['a'], '<= 2', r['a'] <= 2) for r in rows]\n"
+    )
+    (folder / "record.jsonl").write_text('{"a": 1.0}\n{"a": 3.0}\n{"a": 9')
+    monkeypatch.setattr(studies, "__path__", [str(tmp_path)])
+    monkeypatch.setattr(study, "STUDIES", tmp_path)
+    assert main(["validate", "my-study"]) == 6
+    assert "1 of 2 checks do not hold" in capsys.readouterr().err
 
 
 def test_python_m_validation_is_the_verb() -> None:

@@ -104,9 +104,11 @@ def bed(scene_file: Path, friction: float, contacts: bool = True) -> ExportedRun
 # --- VTU ------------------------------------------------------------------------------------
 
 
+@pytest.mark.peer("pyvista")
 def test_paraview_series(run: Path, tmp_path: Path) -> None:
     """VTK's reader: an instant a cycle, only the fields asked for, means those of the table."""
-    pyvista = pytest.importorskip("pyvista")
+    import pyvista
+
     export_run(exported_run(run), "vtu", tmp_path)
     series = pyvista.get_reader(str(tmp_path / "grains.pvd"))
     assert series.time_values == CYCLES
@@ -137,9 +139,11 @@ def test_meshio_reads_the_same(run: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("friction", [0.5, 0.0])
+@pytest.mark.peer("pyvista")
 def test_contacts_are_lines(scene_file: Path, tmp_path: Path, friction: float) -> None:
     """Lines join the centres; pushing is positive; without friction there is no such field."""
-    pyvista = pytest.importorskip("pyvista")
+    import pyvista
+
     export_run(bed(scene_file, friction), "vtu", tmp_path)
     lines = pyvista.read(tmp_path / "vtu" / "contacts_000001.vtu")
     assert lines.n_cells == 2
@@ -153,9 +157,11 @@ def test_contacts_are_lines(scene_file: Path, tmp_path: Path, friction: float) -
     ]  # fmt: skip
 
 
+@pytest.mark.peer("pyvista")
 def test_bed_without_contacts(scene_file: Path, tmp_path: Path) -> None:
     """A gas of grains has a file of contacts without lines, which VTK reads."""
-    pyvista = pytest.importorskip("pyvista")
+    import pyvista
+
     export_run(bed(scene_file, 0.5, contacts=False), "vtu", tmp_path)
     assert pyvista.read(tmp_path / "vtu" / "contacts_000001.vtu").n_cells == 0
     for to in ("ovito", "csv"):
@@ -246,9 +252,11 @@ def test_piston_faces_down(share: float) -> None:
     assert area == pytest.approx(share * container.area, rel=1.1 * (2 * np.pi / sides) ** 2 / 6)
 
 
+@pytest.mark.peer("pyvista")
 def test_stl_opens(run: Path, tmp_path: Path) -> None:
     """VTK's and meshio's readers; the piston is where the table has it."""
-    pyvista = pytest.importorskip("pyvista")
+    import pyvista
+
     export_run(exported_run(run), "stl", tmp_path)
     assert pyvista.read(tmp_path / "container.stl").n_cells > 10
     start = exported_run(run).track.window("window_000000").piston_start
@@ -263,9 +271,9 @@ def test_stl_opens(run: Path, tmp_path: Path) -> None:
 # --- OVITO and CSV --------------------------------------------------------------------------
 
 
+@pytest.mark.peer("ovito")
 def test_ovito(run: Path, tmp_path: Path) -> None:
     """OVITO's reader knows every column, and takes the cycle for the time step."""
-    pytest.importorskip("ovito")
     from ovito.io import import_file
 
     export_run(exported_run(run), "ovito", tmp_path)
@@ -281,9 +289,9 @@ def test_ovito(run: Path, tmp_path: Path) -> None:
     assert np.mean(data.particles["Coordination"]) == table(run)[11]["coordination_number"]
 
 
+@pytest.mark.peer("ovito")
 def test_ovito_bonds(scene_file: Path, tmp_path: Path) -> None:
     """Contacts are bonds between the right grains, with the magnitudes of their forces."""
-    pytest.importorskip("ovito")
     from ovito.io import import_file
     from ovito.modifiers import LoadTrajectoryModifier
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import os
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -44,8 +46,8 @@ def imported(source: str) -> set[str]:
 
 @pytest.mark.parametrize("story", STORIES)
 def test_stories_do_not_import_one_another(story: str) -> None:
-    """A story's package imports neither another story nor what stands above the stories."""
-    strangers = {*STORIES, "validation", "tests", "trackbed"} - {story}
+    """A story's package imports the floor below it, no other story, and nothing above them."""
+    strangers = {*STORIES, "validation", "tests"} - {story}
     for path in (ROOT / story).rglob("*.py"):
         assert not imported(path.read_text()) & strangers, path
 
@@ -82,7 +84,7 @@ def test_no_vague_names() -> None:
 
 
 def test_package_list_is_the_folders() -> None:
-    """Each folder with an ``__init__.py`` is packaged but tests and studies, and nothing else."""
+    """Each folder with an ``__init__.py`` is packaged; tests and studies are a checkout's only."""
     folders = {
         ".".join(path.parent.relative_to(ROOT).parts)
         for path in ROOT.glob("*/**/__init__.py")
@@ -129,18 +131,46 @@ def test_version_is_one() -> None:
     assert f"## [{trackbed.__version__}]" in (ROOT / "CHANGELOG.md").read_text()
 
 
-@pytest.mark.parametrize(("ci", "outcome"), [("true", "error"), ("", "skipped")])
-def test_engine_marker(tmp_path: Path, ci: str, outcome: str) -> None:
-    """A test whose engine is missing fails in CI and is skipped, with the reason, elsewhere."""
+@pytest.mark.parametrize(("option", "outcome"), [(["--nothing-missing"], "error"), ([], "skipped")])
+def test_markers_of_what_may_be_missing(tmp_path: Path, option: list[str], outcome: str) -> None:
+    """Without its engine or library a test is skipped with the reason; in ``test-all`` it fails."""
     (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text())
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = engine\naddopts = -ra\n")
+    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  engine\n  peer\naddopts = -ra\n")
     (tmp_path / "test_one.py").write_text(
         "import pytest\n\n@pytest.mark.engine('no-such-engine')\ndef test_one(): pass\n"
+        "\n@pytest.mark.peer('no_such_library')\ndef test_two(): pass\n"
     )
     run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", str(tmp_path)],
-        capture_output=True, text=True, cwd=tmp_path,
-        env={"PATH": "/usr/bin:/bin", "CI": ci},
+        [sys.executable, "-m", "pytest", "-q", *option, str(tmp_path)],
+        capture_output=True, text=True, cwd=tmp_path, env={"PATH": "/usr/bin:/bin"},
     )  # fmt: skip
-    assert f"1 {outcome}" in run.stdout
+    assert f"2 {outcome}" in run.stdout
     assert "the engine no-such-engine is not installed" in run.stdout
+    assert "no_such_library can not be imported" in run.stdout
+
+
+def test_lowest_versions_are_those_of_pyproject() -> None:
+    """What ``make test-lowest`` installs is what pyproject.toml allows at least."""
+    project = PYPROJECT["project"]
+    asked = [*project["dependencies"], *project["optional-dependencies"]["test"]]
+    least = dict(word.partition(";")[0].split(">=") for word in asked)
+    lines = (ROOT / "tests" / "lowest.txt").read_text().splitlines()
+    pinned = dict(line.split("==") for line in lines if not line.startswith("#"))
+    assert pinned.keys() == least.keys()
+    for name, version in least.items():
+        assert f"{pinned[name]}.".startswith(f"{version}."), name
+
+
+def test_validate_wants_a_checkout(tmp_path: Path) -> None:
+    """An installed trackbed holds no studies, and is not misled by another project's package."""
+    shutil.copytree(ROOT / "trackbed", tmp_path / "trackbed")
+    (tmp_path / "validation").mkdir()
+    (tmp_path / "validation" / "__init__.py").write_text("raise SystemExit('not ours')")
+    run = subprocess.run(
+        [sys.executable, "-m", "trackbed", "validate"], cwd=tmp_path, capture_output=True,
+        text=True, env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )  # fmt: skip
+    assert run.returncode == 4
+    assert "validate: the studies are not in this installation" in run.stderr
+    assert "git clone https://github.com/trackbed/trackbed" in run.stderr
+    assert "Traceback" not in run.stderr

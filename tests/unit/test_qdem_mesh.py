@@ -163,8 +163,10 @@ def test_sets_of_meshio_over_joined_blocks() -> None:
     }
 
 
+@pytest.mark.peer("gmsh")
 def test_physical_groups_of_a_gmsh_file(tmp_path: Path) -> None:
-    gmsh = pytest.importorskip("gmsh")
+    import gmsh
+
     path = tmp_path / "box.msh"
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:

@@ -116,9 +116,12 @@ def test_driver_tells_when_a_function_raises() -> None:
         driver.sample(np.array([1.0, 2.0]))
 
 
+@pytest.mark.peer("pandas")
 def test_a_record_of_pandas_is_no_vector() -> None:
     """Three rows of a record would pass for the three components of a force."""
-    record = pytest.importorskip("pandas").Series([0.0, 1.0, 2.0], index=[0.0, 0.1, 0.2])
+    import pandas
+
+    record = pandas.Series([0.0, 1.0, 2.0], index=[0.0, 0.1, 0.2])
     with pytest.raises(ConditionError, match="pandas object does not say what its times are"):
         Driver(record, 3, "load")
     assert q.Series(record.index, record)(0.05) == pytest.approx(0.5)

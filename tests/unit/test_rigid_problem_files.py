@@ -42,7 +42,8 @@ def npz_write(path: Path, made_in: int = 2, **changed: Any) -> Path:
 
 def fclib_write(path: Path, matrix: Any, q: Any, mu: Any, dim: int, nz: int = -2) -> Path:
     """A file as FCLIB's `fclib_write_local` writes it."""
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     stored = matrix.asformat(FORMATS[nz])
     if nz == 0:
         nz, i, p = stored.nnz, *stored.coords  # as CSparse: rows in i
@@ -114,6 +115,7 @@ def test_npz_bodies(tmp_path: Path) -> None:
     seed=st.integers(0, 10**6),
 )
 @settings(max_examples=25, deadline=None)
+@pytest.mark.peer("h5py")
 def test_fclib_every_storage(
     tmp_path_factory: pytest.TempPathFactory, dim: int, contacts: int, nz: int, seed: int
 ) -> None:
@@ -124,9 +126,11 @@ def test_fclib_every_storage(
     assert read_forces(path).shape == (0, len(q))
 
 
+@pytest.mark.peer("h5py")
 def test_fclib_triplets_add_up(tmp_path: Path) -> None:
     """Two triplets of one place are added, and those beyond nz are not read."""
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     path = fclib_write(tmp_path / "one.h5", sp.eye_array(2), np.ones(2), np.ones(1), 2, nz=0)
     with h5py.File(path, "r+") as file:
         w = file["fclib_local/W"]
@@ -141,9 +145,11 @@ def test_fclib_triplets_add_up(tmp_path: Path) -> None:
     assert (read_problem(path).delassus.toarray() == [[3, 0], [0, 5]]).all()
 
 
+@pytest.mark.peer("h5py")
 def test_fclib_solution(tmp_path: Path) -> None:
     """A stored solution is read, and refused when its length is not that of q."""
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     path = fclib_write(tmp_path / "one.h5", *posed(3, 2), 3)
     with h5py.File(path, "r+") as file:
         file["solution/r"] = np.arange(6.0)
@@ -304,9 +310,11 @@ FCLIB_DAMAGED: dict[str, tuple[Callable[[Any], None], str]] = {
 
 
 @pytest.mark.parametrize("kind", FCLIB_DAMAGED)
+@pytest.mark.peer("h5py")
 def test_damaged_fclib(tmp_path: Path, kind: str) -> None:
     """What is wrong, in which part of the file."""
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     damage, message = FCLIB_DAMAGED[kind]
     path = fclib_write(tmp_path / "bad.hdf5", *posed(2, 3), 2)
     with h5py.File(path, "r+") as file:
@@ -316,9 +324,9 @@ def test_damaged_fclib(tmp_path: Path, kind: str) -> None:
     assert "bad.hdf5" in str(caught.value)
 
 
+@pytest.mark.peer("h5py")
 def test_fclib_pointer_of_git_lfs(tmp_path: Path) -> None:
     """What stands in FCLIB's repository where its files are not fetched."""
-    pytest.importorskip("h5py")
     path = tmp_path / "one.hdf5"
     path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
     with pytest.raises(ProblemError, match=r"can not be read as HDF5(?s:.*)Git LFS"):

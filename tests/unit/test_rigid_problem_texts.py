@@ -135,7 +135,8 @@ def test_damaged_text(tmp_path: Path, kind: str) -> None:
 
 def masses_write(path: Path, blocks: bool, dim: int = 3) -> dict[str, Any]:
     """A file as FCLIB's `fclib_write_global` writes it: two bodies and the ground, triplets."""
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     draw = np.random.default_rng(3)
     size, contacts = {2: 3, 3: 6}[dim], 4
     root = draw.normal(size=(2 * size, 2 * size))
@@ -163,6 +164,7 @@ def masses_write(path: Path, blocks: bool, dim: int = 3) -> dict[str, Any]:
 
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("blocks", [True, False])
+@pytest.mark.peer("h5py")
 def test_problem_by_masses(tmp_path: Path, blocks: bool, dim: int) -> None:
     """``u = W r + q`` is ``H^T v + w`` with ``M v = H r + f``; bodies where M has their blocks.
 
@@ -200,9 +202,11 @@ MASSES_DAMAGED: dict[str, tuple[Callable[[Any], None], str]] = {
 
 
 @pytest.mark.parametrize("kind", MASSES_DAMAGED)
+@pytest.mark.peer("h5py")
 def test_damaged_masses(tmp_path: Path, kind: str) -> None:
     """What is wrong, and in which file."""
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     damage, message = MASSES_DAMAGED[kind]
     path = tmp_path / "one.hdf5"
     masses_write(path, blocks=True)

@@ -73,7 +73,7 @@ def test_second_call_installs_nothing(machine: Machine) -> None:
     """With all in place the second call runs neither pip nor apt-get."""
     first = machine.setup()
     assert first.returncode == 0, first.stderr
-    assert "installing Python packages into .venv" in first.stdout
+    assert "installing Python packages into .venv, 600 MB: trackbed and" in first.stdout
     assert "-m pip install" in machine.called()
     second = machine.setup()
     assert (second.returncode, second.stdout) == (0, "")
@@ -134,12 +134,13 @@ def test_sudo_is_used(machine: Machine) -> None:
     assert "installing with sudo -n apt-get: liggghts" in run.stdout
 
 
-def test_chromium_only_for_tests(machine: Machine) -> None:
-    """The browser is installed for the tests, not for the demo."""
+def test_chromium_only_for_all_tests(machine: Machine) -> None:
+    """The browser is installed for ``make test-all``, not for the demo and ``make test``."""
     machine.program("apt-get", "")
     machine.setup()
+    machine.setup("test")
     assert "apt-get" not in machine.called()
-    machine.setup("test,lint")
+    machine.setup("test,peers")
     assert "--no-install-recommends chromium" in machine.called()
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import inspect
-import sys
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from validation.bench.qdem_gpu.contact import MARCHES
 from validation.bench.qdem_gpu.search import CLOUDS
 from validation.cases.qdem_gpu import STRAINS, twins_in_simulator
 
-pytest.importorskip("numba.cuda")
+pytestmark = pytest.mark.peer("numba.cuda")
 
 VARIANTS = [
     f"{strain}, {precision}{viscous}"
@@ -146,15 +145,6 @@ def test_no_gpu_is_said_in_a_sentence() -> None:
         q.Simulation([q.Body(TETRAHEDRON, CONCRETE)], device="cuda")
     assert caught.value.exit_code == 4
     assert 'device="cpu"' in caught.value.remedy
-
-
-def test_missing_library_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "numba.cuda", None)
-    monkeypatch.delitem(sys.modules, "qdem_fem.cuda_step", raising=False)
-    with pytest.raises(LibraryMissing) as caught:
-        q.Simulation([q.Body(TETRAHEDRON, CONCRETE)], device="cuda")
-    assert caught.value.remedy == "pip install 'trackbed[cuda]'"
-    assert caught.value.exit_code == 4
 
 
 def test_unknown_device_is_refused() -> None:

@@ -30,7 +30,7 @@ from validation.bench.qdem_gpu.search import (
     lists_processor,
 )
 
-pytest.importorskip("numba.cuda")
+pytestmark = pytest.mark.peer("numba.cuda")
 
 EPS = float(np.finfo(float).eps)
 
@@ -76,6 +76,7 @@ def test_lists_are_the_processors(
     assert differing(lists_processor(given, seed), found) == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("axis", ["", "x"])
 def test_order_within_a_bucket_changes_nothing(simulator: Executor, axis: str) -> None:
     """Which is left to the atomics of the hardware; a dense cloud, some spheres in one place."""

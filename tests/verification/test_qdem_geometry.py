@@ -342,9 +342,9 @@ def test_order_of_bodies_in_pieces_and_of_none() -> None:
         np.testing.assert_array_equal(node_order[elements.size :], unused)
 
 
+@pytest.mark.peer("gmsh")
 def test_gmsh_box_with_holes() -> None:
     """Holes become prisms inside their circles: volume between the two; one handle each."""
-    pytest.importorskip("gmsh")
     size, radius = (1.0, 0.5, 0.25), 0.1
     mesh = gmsh_box(size, 0.1, [("y", (0.3, 0.12), radius), ("z", (0.75, 0.25), radius)])
     _, volumes = element_gradients(mesh.nodes, mesh.elements)
@@ -362,8 +362,10 @@ def test_gmsh_box_with_holes() -> None:
     assert np.all(mesh.nodes[mesh.node_sets["z-max"], 2] > 0.25 - 1e-9)
 
 
+@pytest.mark.peer("gmsh")
 def test_gmsh_of_the_user_is_left_as_it_was() -> None:
-    gmsh = pytest.importorskip("gmsh")
+    import gmsh
+
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)

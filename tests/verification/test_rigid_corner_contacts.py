@@ -185,8 +185,8 @@ def test_edges_are_found_whoever_has_the_margin(margins: list[float]) -> None:
     st.sampled_from([1e-3, 0.3]),
 )  # fmt: skip
 @pytest.mark.long
+@pytest.mark.peer("coal")
 def test_gap_and_normal_are_those_of_coal(name: str, seed: int, form: str, share: float) -> None:
-    pytest.importorskip("coal")
     gap = share * min(shape.reach for shape in family(name, np.random.default_rng(seed)))
     (shapes, position, turns, _), _ = nearest_corners(name, seed, form, gap)
     result = coal_distance(shapes, position, turns)

@@ -57,9 +57,11 @@ def test_networks(grains: int) -> None:
 
 
 @pytest.mark.parametrize("grains", [60, 200])
+@pytest.mark.peer("osqp")
 def test_as_good_as_osqp(grains: int) -> None:
     """OSQP, polished, on the same quadratic programme: same accelerations, no worse residual."""
-    osqp = pytest.importorskip("osqp")
+    import osqp
+
     problem = network(grains, 0.0, 1)
     a, b = problem.delassus[::2][:, ::2], problem.offset[::2]
     unit, size, n = a.diagonal().mean(), np.abs(b).max(), problem.contacts

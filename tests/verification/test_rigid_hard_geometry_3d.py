@@ -123,10 +123,10 @@ def test_an_overlap_has_a_contact_with_its_depth(name: str, seed: int, share: fl
 
 @settings(max_examples=40, deadline=None)
 @given(st.sampled_from(FAMILIES), st.integers(0, 10_000), st.sampled_from([1e-6, 1e-3, 3e-2]))
+@pytest.mark.peer("coal")
 def test_the_least_gap_is_the_distance_that_coal_finds(name: str, seed: int, share: float) -> None:
     """No contact is nearer than the distance, and none is missing; the separation along faces and
     pairs of edges bounds it from below."""
-    pytest.importorskip("coal")
     shapes, position, turns, axes = touching(name, seed, share)
     result = coal_distance(shapes, position, turns)
     lower = separation(shapes, position, turns, axes)

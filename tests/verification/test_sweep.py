@@ -25,12 +25,21 @@ from tests.forked_commands import processes_in
 from tests.small_bed import small_bed
 from trackbed import command
 
-pytest.importorskip("distributed", reason="the extra sweep is not installed")
-pytest.importorskip("dask_jobqueue", reason="the extra sweep is not installed")
-parquet = pytest.importorskip("pyarrow.parquet", reason="the extra sweep is not installed")
+pytestmark = [
+    pytest.mark.peer("distributed"),
+    pytest.mark.peer("dask_jobqueue"),
+    pytest.mark.peer("pyarrow.parquet"),
+]
 
 ROOT = Path(__file__).parents[2]
 FREQUENCIES = ("--set", "loading.frequency=10,20")
+
+
+def table_read(path: Path) -> Any:
+    """A table of a sweep."""
+    from pyarrow import parquet
+
+    return parquet.read_table(path)
 
 
 @pytest.fixture
@@ -81,16 +90,16 @@ def test_tables_and_picture(
     assert len(in_process) == 4
     assert (into / "settlement.png").read_bytes().startswith(b"\x89PNG")
     for name, rows in (("members", 4), ("settlement", 4 * 9), ("band", 2 * 9)):
-        table = parquet.read_table(into / f"{name}.parquet")
+        table = table_read(into / f"{name}.parquet")
         with (into / f"{name}.csv").open() as stream:
             lines = list(csv.reader(stream))
         assert table.num_rows == len(lines) - 1 == rows
         assert table.column_names == lines[0]
-    members = parquet.read_table(into / "members.parquet").to_pydict()
+    members = table_read(into / "members.parquet").to_pydict()
     assert members["loading.frequency"] == [10.0, 10.0, 20.0, 20.0]
     assert members["sample.seed"] == [1, 2, 1, 2]
-    curves = parquet.read_table(into / "settlement.parquet").to_pydict()
-    band = parquet.read_table(into / "band.parquet").to_pydict()
+    curves = table_read(into / "settlement.parquet").to_pydict()
+    band = table_read(into / "band.parquet").to_pydict()
     for frequency, cycle, mean in zip(
         band["loading.frequency"], band["cycle"], band["mean_m"], strict=True
     ):
@@ -127,7 +136,7 @@ def test_failed_members_are_named_and_the_others_finish(
     assert [one["exit_code"] for one in told["members"]] == [4, 4, 0, 0]
     assert said.count("engine.name=liggghts,sample.seed=1, exit code 4: ") == 1
     assert "apt-get install" in told["members"][0]["sentence"]
-    members = parquet.read_table(into / "members.parquet").to_pydict()
+    members = table_read(into / "members.parquet").to_pydict()
     assert members["state"] == ["failed", "failed", "finished", "finished"]
     assert [one["seeds"] for one in told["settlements"]] == [2]
 

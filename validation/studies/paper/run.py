@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from adapters.laws import law_named
 from adapters.overlaps import neighbours
-from adapters.relaxation import Method, RelaxationNotConverged, relax
+from adapters.relaxation import RelaxationNotConverged, relax
 from adapters.residual import error_of_coordinates, error_of_displacement
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State
@@ -94,7 +94,7 @@ def relax_cell() -> Row:
 
     held = np.arange(9) > 0
 
-    def relaxed(method: Method) -> float:
+    def relaxed(method: Literal["smallest-move", "karrech2007"]) -> float:
         try:
             found = relax(estimate, before, walls, scene.stiffness, method=method, frontier=held)
         except RelaxationNotConverged as error:  # overlaps of round-off, with no load to close

@@ -97,12 +97,13 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
                       textcoords="offset points", color=colour)  # fmt: skip
         curve = 1e3 * each.settlement.mean(axis=0)
         right.plot(np.arange(1, len(curve) + 1), curve, color=colour)
-        right.annotate(name, (len(curve), curve[-1]), fontsize=7, color=colour)
+        if each.is_limit or each.level.method == "soft":
+            right.annotate(name, (len(curve), curve[-1]), fontsize=7, color=colour)
     left.axhline(0.0, color="0.6", linewidth=0.8)
-    left.set(xscale="log", yscale="symlog", xlabel="processor time of a run, one thread [s]",
+    left.set(xscale="log", xlabel="processor time of a run, one thread [s]",
              ylabel="error of the mean settlement [%]",
              title="blue rigid, red soft; hollow: finest, judged by the other's")  # fmt: skip
-    right.set(xlabel="load cycle", ylabel="mean residual settlement [mm]", yscale="log")
+    right.set(xlabel="load cycle", ylabel="mean residual settlement [mm]")
     for axes in (left, right):
         axes.grid(alpha=0.3)
         axes.title.set_fontsize(8)

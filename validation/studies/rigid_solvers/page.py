@@ -10,7 +10,7 @@ import numpy as np
 
 from validation.bench.rigid.examination import BEYOND, FAMILIES, SAME
 from validation.studies.rigid_solvers import reading
-from validation.studies.rigid_solvers.bars import check_bars
+from validation.studies.rigid_solvers.bars import ENDLESS, check_bars
 from validation.studies.rigid_solvers.reading import Row, cost_to
 from validation.studies.rigid_solvers.run import (
     BUDGET_S,
@@ -78,8 +78,11 @@ def _bars(rows: Sequence[Row]) -> str:
     barred = [check for check in check_bars(rows) if check.barred]
     missed = [check for check in barred if not check.holds]
     words = f"Of {len(barred)} bars {len(barred) - len(missed)} are met."
-    lines = [f"- {check.name}: {check.value:.3g}, bar {check.asked}; {check.why}"
-             for check in missed]  # fmt: skip
+    value = {check.name: f"{check.value:.3g}" for check in missed}
+    value |= {check.name: "ours does not reach it" for check in missed if check.value >= ENDLESS}
+    lines = [
+        f"- {check.name}: {value[check.name]}, bar {check.asked}; {check.why}" for check in missed
+    ]
     return "\n".join([words + " Missed:" * bool(missed), *([""] if missed else []), *lines])
 
 

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from adapters.laws import law_named
 from adapters.procedure import CONTROL, settle
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder
-from adapters.sample import relative_density_profile
+from adapters.sample import relative_density
 from adapters.scene import Scene
 from adapters.stages import Run, Variant, compute, prepare
 from adapters.state import FloatArray
@@ -200,8 +201,10 @@ def measure_layers(run: Run, cycle: int) -> list[float]:
     )
     window = window_load(run.folder.path / name / "states.npz")
     at = int(np.flatnonzero(window.cycle == cycle)[0])
-    container = run.scene.container
-    return relative_density_profile(window.position[at], window.radius, container, edges).tolist()
+    return [
+        relative_density(window.position[at], window.radius, run.scene.container, top, bottom)
+        for bottom, top in pairwise(edges)
+    ]
 
 
 def mean_block(found: Mapping[int, Mapping[str, float]], end: int, column: str) -> float:
