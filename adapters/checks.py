@@ -109,7 +109,7 @@ def check_state(scene: Scene, state: State) -> None:
 def figures_of_window(scene: Scene, window: Window) -> WindowFigures:
     """The figures of `check_bounds`."""
     walls = scene.container.walls()
-    # From the positions, not from the engine's list of contacts: it can not hide one.
+    # From the positions, not from the engine's list of contacts: it cannot hide one.
     overlaps = [
         float(neighbours(position, window.radius, walls).overlap.max(initial=0.0))
         for position in window.position[1:]
@@ -161,7 +161,7 @@ def heavier_piston(scene: Scene) -> str:
 
 
 RISE_FLOOR = 1e-3
-"""A rise below this share of the mean radius hurts nothing, whatever the window told."""
+"""A rise below this share of the mean radius hurts nothing, whatever the window shows."""
 
 
 def check_rise(scene: Scene, height: FloatArray, rise: FloatArray) -> None:

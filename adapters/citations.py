@@ -30,6 +30,6 @@ CITATIONS = (
 
 
 def citations_text(version: str) -> str:
-    """All entries, each under a comment saying what it stands for."""
+    """All entries, each under a comment saying what it is cited for."""
     entries = "\n\n".join(f"% {purpose}\n{entry}" for purpose, entry in CITATIONS)
     return entries.replace("VERSION", version)

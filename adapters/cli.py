@@ -325,7 +325,7 @@ def fit_command(arguments: argparse.Namespace) -> int:
     """Fit a law to a series; print its parameters, a prediction and its band."""
     from adapters.errors import JumpRefused
     from adapters.fit import cycles_needed, fit_auto, fit_series, series_read
-    from adapters.fit_agreement import AGREE
+    from adapters.fit_auto import AGREE
     from adapters.laws import law_named
 
     if (arguments.confidence is None) != (arguments.error is None):
@@ -418,7 +418,7 @@ def relax_register(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--method", default="smallest-move", metavar="NAME",
-        help="smallest-move (default), karrech2007 or proximal",
+        help="smallest-move (default) or karrech2007",
     )  # fmt: skip
     json_flag(parser)
     parser.set_defaults(command=relax_command)

@@ -173,7 +173,7 @@ def restitution_literal(alpha: float) -> float:
 
 
 def damping_of_rebound(restitution: float) -> float:
-    """Damping ratio a of c = 2 a sqrt(m* S_n) with which a contact that can not pull rebounds so.
+    """Damping ratio a of c = 2 a sqrt(m* S_n) with which a contact that cannot pull rebounds so.
 
     For an engine that ends a contact at the first tension; ``restitution`` 0 < e <= 1, the same at
     every speed, stiffness and size.  Without a pull some of the damping is missing, so a is above
@@ -252,13 +252,7 @@ def collision(
 
     parts.terminal, parts.direction = True, -1  # type: ignore[attr-defined]
     solution = solve_ivp(
-        rate,
-        (0.0, 1e3),
-        [0.0, 1.0],
-        method="DOP853",
-        events=(parts, turns),
-        rtol=1e-10,
-        atol=1e-13,
+        rate, (0.0, 1e3), [0.0, 1.0], method="DOP853", events=(parts, turns), rtol=1e-10, atol=1e-13
     )
     overlap_max = float(solution.y_events[1][0][0])
     end_time, end_velocity = float(solution.t_events[0][0]), float(solution.y_events[0][0][1])

@@ -104,7 +104,7 @@ class Container:
 
 
 def sides_needed(radius: float, grain_radius: float) -> int:
-    """Sides of a polygon around a cylinder of ``radius`` [m] whose corners stand out little.
+    """Sides of a polygon around a cylinder of ``radius`` [m] whose corners reach out little.
 
     A corner is radius (1/cos(pi/N) - 1) from the cylinder, at most `SIDES_GAP` times the mean
     ``grain_radius`` [m]; the section exceeds the circle's by a third of (pi/N)^2.

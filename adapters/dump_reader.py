@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import zlib
 from collections.abc import Iterable
 from gzip import GzipFile
 from io import FileIO
@@ -13,12 +12,10 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from adapters import dump_kernel as kernel
-from adapters.dump import Frame, Kind
-from adapters.errors import DumpError
+from adapters.dump_frame import Frame, Kind
+from adapters.dump_text import WRITE_TEXT, DumpText, list_grains
 from adapters.state import FloatArray, IntArray
 
-_BLOCK = 1 << 20
-"""Bytes read at once; also the longest line that is taken for text."""
 _VALUES_AT_FIRST = 1 << 24
 """Values to take memory for before a row is seen: a header may lie about its rows."""
 _WHOLE_LARGEST = 2**53
@@ -34,11 +31,10 @@ _OTHER_FORMATS = {
     b"PK\x03\x04": "a zip or npz archive: give the text dump",
     b"\x89PNG": "a PNG image: give the text dump",
 }
-_WRITE_TEXT = "write text with 'dump ID all custom N FILE id x y z ...' or 'dump ID all local ...'"
 
 
 class Header(NamedTuple):
-    """What stands above the rows of a frame."""
+    """What is above the rows of a frame."""
 
     label: str
     rows: int
@@ -47,98 +43,18 @@ class Header(NamedTuple):
     boundary: str
 
 
-class Reader:
+class Reader(DumpText):
     """A dump on its way: a block of its text, and what the frames so far allow of the next."""
 
     def __init__(
         self, path: Path, stream: FileIO | GzipFile, expected: Iterable[int] | None, allow_nan: bool
     ) -> None:
-        self.path, self.stream, self.allow_nan = path, stream, allow_nan
-        self.block = bytearray(_BLOCK)
-        self.text = np.frombuffer(self.block, np.uint8)
-        self.begin = self.end = 0  # block[begin:end] is read from the file, but not yet used
-        self.line = 0  # lines used so far
-        self.cut = False  # compressed data stopped before their end mark
-        self.step: int | None = None
-        self.step_before: int | None = None
+        super().__init__(path, stream)
+        self.allow_nan = allow_nan
         self.header_before: Header | None = None
-        self.complete = 0
         self.known: IntArray | None = None
         if expected is not None:
             self.known = np.unique(np.fromiter(expected, np.int64))
-
-    # --- text -------------------------------------------------------------------------------
-    def more(self) -> bool:
-        """Read on behind what is not yet used; False at the end of the file."""
-        unused = self.end - self.begin
-        if unused == _BLOCK:
-            self.fault(
-                f"a line is longer than {_BLOCK} bytes: this is no text dump",
-                _WRITE_TEXT,
-                line=self.line + 1,
-            )
-        self.block[:unused] = self.block[self.begin : self.end]
-        self.begin, self.end = 0, unused
-        try:
-            count = self.stream.readinto(memoryview(self.block)[unused:])
-        except EOFError:
-            self.cut, count = True, 0
-        except (OSError, zlib.error) as error:
-            self.fault(
-                f"the file can not be read on ({error})",
-                "copy or write the file again",
-                line=self.line + 1,
-            )
-        self.end += count
-        return bool(count)
-
-    def line_next(self) -> str | None:
-        """The next line; None when the file ends before it does."""
-        while (stop := self.block.find(b"\n", self.begin, self.end)) < 0:
-            if not self.more():
-                return None
-        line = self.block[self.begin : stop].decode(errors="backslashreplace")
-        self.begin, self.line = stop + 1, self.line + 1
-        return line.strip()
-
-    def fault(
-        self,
-        what: str,
-        remedy: str,
-        *,
-        line: int | None = None,
-        incomplete_end: bool = False,
-        lost: IntArray | None = None,
-    ) -> NoReturn:
-        """Raise the error of a fault at a line, else at the last one used."""
-        place = [str(self.path), f"line {self.line if line is None else line}"]
-        if self.step is not None:
-            place.append(f"time step {self.step}")
-        elif self.step_before is not None:
-            place.append(f"after time step {self.step_before}")
-        else:
-            place.append("before the first time step")
-        if lost is not None and len(lost):
-            what += f"; lost grains: {_listed(lost)}"
-        raise DumpError(
-            what,
-            where=", ".join(place),
-            remedy=remedy,
-            complete_frames=self.complete,
-            incomplete_end=incomplete_end,
-            lost_ids=() if lost is None else tuple(lost.tolist()),
-        )
-
-    def fault_incomplete(self, what: str, lost: IntArray | None = None) -> NoReturn:
-        """Raise the error of a file that ends inside a frame."""
-        self.fault(
-            what,
-            f"the engine was stopped or is still writing: keep the {self.complete} whole frames"
-            " before, or run again; a whole file ends with a line end",
-            line=self.line + 1,
-            incomplete_end=True,
-            lost=lost,
-        )
 
     # --- header -----------------------------------------------------------------------------
     def opening(self) -> None:
@@ -159,7 +75,7 @@ class Reader:
         if start != b"ITEM:"[: len(start)]:
             known = [text for mark, text in _OTHER_FORMATS.items() if head.startswith(mark)]
             text = "it begins with " + repr(head[:16])[1:]
-            remedy = known[0] if known else _WRITE_TEXT
+            remedy = known[0] if known else WRITE_TEXT
             self.fault(f"this is no text dump: {text}", remedy, line=1)
 
     def whole(self, item: str) -> int:
@@ -207,7 +123,7 @@ class Reader:
                 self.fault(
                     f"the line {line[:60]!r} has no place here in the header of a frame:"
                     " TIMESTEP, NUMBER OF ..., BOX BOUNDS, then the column names",
-                    _WRITE_TEXT,
+                    WRITE_TEXT,
                 )
         if begun or self.cut or self.block[self.begin : self.end].strip():
             self.header_cut()
@@ -264,17 +180,17 @@ class Reader:
             )
         before = self.header_before
         if before is not None and (before.label, before.columns) != (header.label, header.columns):
-            gone = [name for name in before.columns if name not in header.columns]
+            missing = [name for name in before.columns if name not in header.columns]
             new = [name for name in header.columns if name not in before.columns]
             self.fault(
                 f"the columns change from '{before.label} {' '.join(before.columns)}' to"
                 f" '{header.label} {' '.join(header.columns)}'"
-                f" (gone: {' '.join(gone) or 'none'}; new: {' '.join(new) or 'none'})",
+                f" (missing: {' '.join(missing) or 'none'}; new: {' '.join(new) or 'none'})",
                 "give each dump command a file of its own",
             )
         if header.label == "ATOMS" and self.known is not None and "id" not in header.columns:
             self.fault(
-                f"grains can not be told apart: no column id in {' '.join(header.columns)}",
+                f"grains cannot be distinguished: no column id in {' '.join(header.columns)}",
                 "add id to the engine's dump command",
             )
         return header
@@ -386,7 +302,7 @@ class Reader:
             if before is not None and header.rows < before.rows:
                 self.fault(
                     f"grains are lost: {before.rows} before, {header.rows} here; no column id"
-                    " tells which",
+                    " says which",
                     "add id to the dump command; use a smaller time step",
                     line=self.line - header.rows,
                 )
@@ -406,7 +322,7 @@ class Reader:
             twice = np.flatnonzero(identifier[1:] == identifier[:-1])
             if len(twice):
                 self.fault(
-                    f"grains are there twice: {_listed(np.unique(identifier[twice]))}",
+                    f"grains are there twice: {list_grains(np.unique(identifier[twice]))}",
                     "the dump is damaged, or two runs wrote to it: give each a file of its own",
                     line=self.line - header.rows + 1 + int(max(order[twice[0] : twice[0] + 2])),
                 )
@@ -422,9 +338,3 @@ class Reader:
             )
         self.known = identifier
         return values
-
-
-def _listed(identifiers: IntArray) -> str:
-    """At most ten identifiers as text, and how many there are."""
-    text = ", ".join(map(str, identifiers[:10].tolist()))
-    return text if len(identifiers) <= 10 else f"{text}, ... ({len(identifiers)} in all)"

@@ -1,4 +1,6 @@
-"""The contract of an engine; `adapters.engine_process` runs a process of one.
+"""The contract of an engine, and how one is found; `adapters.engine_process` runs a process.
+
+A file beside this one that sets ``ENGINE`` is an engine, and needs to be named nowhere.
 
 An engine reads input files from a folder and leaves, in the same folder:
 
@@ -12,18 +14,16 @@ Its exit code proves nothing: `adapters.checks` judges what it left.
 
 from __future__ import annotations
 
-import resource
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Protocol
 
-from adapters.engine_names import ENGINES, REAL_ENGINES
-from adapters.errors import EngineFailed, EngineMissing, Interrupted
+from adapters.errors import EngineMissing, Interrupted
+from adapters.named_files import find_choice, find_choices
 from adapters.scene import Scene
 from adapters.state import FloatArray, State
 
@@ -84,6 +84,10 @@ class Engine(Protocol):
 
     name: str
 
+    @property
+    def auto_order(self) -> int | None:
+        """Place among those that ``auto`` tries, lowest first; None: never, without mechanics."""
+
     def version(self) -> str:
         """The engine's own version banner; raises `EngineMissing`."""
 
@@ -120,58 +124,32 @@ class Engine(Protocol):
         """Run ``deck`` in ``folder``; ``watch`` is called now and then.  Raises `EngineFailed`."""
 
 
-CRASHES = (signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGBUS, signal.SIGILL)
-"""Signals by which a program ends itself; all others come from outside."""
+def engines_known() -> tuple[str, ...]:
+    """Names of all engines, sorted."""
+    return tuple(find_choices(__name__, "ENGINE"))
 
 
-def python_cpu_s() -> float:
-    """CPU time of this Python process so far, user and system [s], without its children."""
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    return usage.ru_utime + usage.ru_stime
-
-
-def cycles_in_track(scene: Scene, folder: Path) -> int:
-    """Load cycles done so far, from the first and the last whole line of ``piston.txt``."""
-    try:
-        with (folder / "piston.txt").open("rb") as stream:
-            stream.readline()
-            first = int(stream.readline().split()[0])
-            stream.seek(max(stream.seek(0, 2) - 400, 0))
-            last = int(stream.read().splitlines()[-2].split()[0])
-        return (last - first) // scene.steps_per_cycle
-    except (OSError, IndexError, ValueError):
-        return 0
-
-
-def restart_check(folder: Path) -> None:
-    """Raise `EngineFailed` when a finished run left no restart file, as on a full disk."""
-    path = folder / "end.restart"
-    if not path.exists() or path.stat().st_size == 0:
-        raise EngineFailed(
-            "the engine left no restart file",
-            where=str(path),
-            remedy="look whether the disk is full; resume computes it again",
-        )
+def real_engines() -> tuple[str, ...]:
+    """Names of the engines with mechanics, in the order in which ``auto`` asks for them."""
+    engines = [engine_named(name) for name in engines_known()]
+    ordered = sorted((e.auto_order, e.name) for e in engines if e.auto_order is not None)
+    return tuple(name for _, name in ordered)
 
 
 def engine_named(name: str) -> Engine:
-    """The engine of a name of `adapters.engine_names.ENGINES`; ``auto`` as `engine_found`.
-
-    Raises `EngineMissing` for a name that is none.
-    """
+    """The engine of a name; ``auto`` as `engine_found`.  Raises `EngineMissing` for no name."""
     if name == "auto":
         return engine_found()
-    if name not in ENGINES:
-        known = ", ".join(REAL_ENGINES)
+    if name not in engines_known():
+        known = ", ".join(real_engines())
         raise EngineMissing(f"there is no engine {name}", remedy=f"name one of {known}, or auto")
-    module = import_module(f"adapters.engine_{name}")
-    engine: Engine = getattr(module, f"{name.capitalize()}Engine")()
+    engine: Engine = find_choice(__name__, "ENGINE", name, "there is no engine")
     return engine
 
 
 def engine_found() -> Engine:
-    """The first of `REAL_ENGINES` that is installed; raises `EngineMissing` when none is."""
-    for name in REAL_ENGINES:
+    """The first of `real_engines` that is installed; raises `EngineMissing` when none is."""
+    for name in real_engines():
         engine = engine_named(name)
         try:
             engine.version()
@@ -202,45 +180,3 @@ def _raise_interrupted(number: int, _frame: object) -> None:
         f"stopped by {signal.Signals(number).name}; every finished window is saved"
         "\n  -> go on with: trackbed resume RUN"
     )
-
-
-def screen_tail(folder: Path, lines: int = 3) -> str:
-    """The engine's own error line, or the last lines it printed."""
-    try:
-        text = (folder / "screen.txt").read_text(errors="replace").splitlines()
-    except OSError:
-        return ""
-    errors = [line.strip() for line in text if line.startswith("ERROR")]
-    errors += [line.strip() for line in text if "Segmentation fault" in line]
-    return errors[-1] if errors else " | ".join(line.strip() for line in text[-lines:])
-
-
-SAID = {
-    "Lost atoms": "grains left the box, thrown out: a smaller load, a shorter time step, or a "
-    "piston that is not so light (loading.piston_mass)",
-    "Mesh elements have been lost": "the piston left the box, thrown off by the bed: a heavier "
-    "piston (loading.piston_mass), or a smaller load",
-}
-"""What an engine says when the physics of a scene ended it, and what that means."""
-
-
-def engine_failure(status: int, folder: Path) -> EngineFailed:
-    """The error for a process that ended badly, with the engine's own words.
-
-    ``status`` is its exit code, or minus the signal that ended it; shells and mpirun say
-    128 + signal.
-    """
-    number = -status if status < 0 else status - 128
-    if number in signal.valid_signals():
-        how = f"was ended by {signal.Signals(number).name}"
-    else:
-        how = f"ended with exit code {status} and no sentinel line"
-    tail = screen_tail(folder)
-    meant = (meaning for words, meaning in SAID.items() if words in tail)
-    error = EngineFailed(
-        f"the engine {how}: {tail}",
-        where=str(folder),
-        remedy=next(meant, "mend the cause and go on with: trackbed resume RUN"),
-    )
-    error.from_outside = number in signal.valid_signals() and number not in CRASHES
-    return error

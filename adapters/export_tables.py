@@ -22,7 +22,7 @@ def ovito_export(run: ExportedRun, into: Path, every: int) -> list[Path]:
     """``grains.dump`` and ``contacts.dump``: text dumps whose time step is the number of cycles.
 
     OVITO knows every column of the grains by its name.  Its modifier "Load trajectory" takes the
-    contacts for bonds when told that the first two columns are "Particle Identifiers"; the
+    contacts for bonds when it is set that the first two columns are "Particle Identifiers"; the
     forces are magnitudes there, as a bond's colour and width ask for.
     """
     box = _box(run)

@@ -27,7 +27,7 @@ ROWS_PER_DECADE = 24
 """Cycles are averaged to so many a decade: each decade weighs the same, and a fit costs the same,
 whether a laboratory read 30 values or an engine computed every cycle."""
 ROWS_FEWEST = 4
-"""Rows that a regime can be told from."""
+"""Fewest rows that show a regime."""
 VETO = 3.0
 """A candidate that missed the held-out block by so many times the median miss has no vote."""
 

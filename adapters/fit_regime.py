@@ -1,6 +1,6 @@
 """Which way a settlement series goes: shakedown, steady, ratcheting or collapse.
 
-Told from the rate of the rate.  With v = du/dN, q = d ln v / d ln N is -1 for the logarithm, 0 for
+From the rate of the rate.  With v = du/dN, q = d ln v / d ln N is -1 for the logarithm, 0 for
 a constant rate; beta = q + 1 is the exponent of the tail u = c + a (N^beta - 1) / beta.
 """
 
@@ -36,12 +36,12 @@ SHAKEDOWN, STEADY, RATCHETING, COLLAPSE = REGIMES = (
     "collapse",
 )
 WHY_NOT = {
-    RATCHETING: "the settlement rate hardly falls (ratcheting)",
+    RATCHETING: "the settlement rate falls too slowly (ratcheting)",
     COLLAPSE: "the settlement rate grows (collapse)",
 }
 """Regimes in which nothing bounds what comes after the data, and the words for it."""
 WHY_NOT_PISTON = {
-    RATCHETING: "the rate at which the piston sinks hardly falls (ratcheting)",
+    RATCHETING: "the rate at which the piston sinks falls too slowly (ratcheting)",
     COLLAPSE: "the rate at which the piston sinks grows (collapse)",
 }
 """The same of a piston that breaks into a bed whose mean grain may even rise."""
@@ -49,7 +49,7 @@ WHY_NOT_PISTON = {
 
 @dataclass(frozen=True)
 class Regime:
-    """Regime of one series, and the exponent it was told from."""
+    """Regime of one series, and the exponent it follows from."""
 
     name: str
     exponent: float

@@ -53,7 +53,7 @@ class Band:
 
 
 def band_of(cycle: int, settlement: float, checks: Sequence[Mapping[str, Any]]) -> Band:
-    """The band of a run at ``cycle`` [m]; ``checks``: `Check` of each jump that stands, in order.
+    """The band of a run at ``cycle`` [m]; ``checks``: `Check` of each jump that was kept, in order.
 
     Each with ``jump`` and ``window``, the cycles h jumped and m + k computed behind it.
     """

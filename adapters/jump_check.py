@@ -1,4 +1,4 @@
-"""Whether a jump stands: what it gained beside the rates computed behind it, and what follows."""
+"""Whether a jump is kept: what it gained beside the rates computed behind it, and what follows."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Check:
     form: float
     """Standard deviation of ``expected`` from the unknown exponent, and from that of kappa."""
     error: float
-    """``gained`` less ``expected`` and what was to be made good, over the total settlement."""
+    """``gained`` less ``expected`` and ``Decision.correction``, over the total settlement."""
     reseated: float
     """What the bed settled more behind the jump because it was moved."""
     kappa: float
@@ -102,7 +102,7 @@ def judge(
     gained = settlement - float(window.gain.sum()) - control.settlement
     healed = float(both.gain(float(landings[-1].cycle), end))
     total = abs(control.settlement + gained)
-    error = gained - expected.mean - decision.made_good
+    error = gained - expected.mean - decision.correction
     relative = error / total if total > 0 else (inf if error else 0.0)
     return Check(
         accepted=abs(relative) <= ROLL_BACK * settings.tolerance,
@@ -233,7 +233,7 @@ def accept(
     stretch: Stretch,
     settlement: float,
 ) -> Control:
-    """The state after a jump that stands.
+    """The state after a jump that is kept.
 
     The next one may be longer by a step-size controller's factor (proportional and integral),
     0.9 (tol / e)^(0.7/2) (e_last / tol)^(0.4/2), between 1/5 and `GROWTH`, where e is what the

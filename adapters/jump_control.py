@@ -1,6 +1,6 @@
-"""Which jump comes next, and whether one that was made stands: the controller, without an engine.
+"""Which jump comes next, and whether one that was made is kept: the controller, without an engine.
 
-Every function is pure; a run is the sequence of what it observed, so a run that was killed comes to
+Every function is pure; a run is the sequence of what it observed, so a run that was killed takes
 the same decisions again (`adapters.jump_run` carries them out).
 
 `tolerance` bounds the error of the settlement that the bed gains from the start of a jump of h
@@ -10,7 +10,7 @@ cycles at N to the end of the m healing cycles behind it, over the total settlem
 
 u counted from the prepared bed, before its first load cycle; "true" is what the bed would have
 gained on the mean, had every cycle been computed.  It is a bound a jump; how errors of several
-jumps add up is told by `adapters.jump_band`.
+jumps add up is estimated by `adapters.jump_band`.
 
 A bed that was moved settles more than it would have (`adapters.jump_slopes`): rates are those of
 the bed itself, and what it is ahead of them by, all earlier jumps and the cycles behind them
@@ -29,16 +29,9 @@ from scipy.special import stdtrit
 from adapters.fit_candidates import BoolArray
 from adapters.fit_regime import WHY_NOT, WHY_NOT_PISTON, Regime
 from adapters.jump_forecast import Forecast, forecast_of, laws_gain
-from adapters.jump_rates import (
-    Stretch,
-    cycles_bound,
-    noise_of,
-    rates_of,
-    slope_trend,
-    state_trend,
-)
+from adapters.jump_rates import Stretch, cycles_bound, noise_of, rates_of, slope_trend, state_trend
 from adapters.jump_slopes import Landing, reseating, slopes_of, unmoved
-from adapters.scene import FIRST_WINDOW
+from adapters.residual import FIRST_WINDOW
 from adapters.state import FloatArray
 
 PROBABILITY = 0.9
@@ -46,7 +39,7 @@ PROBABILITY = 0.9
 SHORTEST_WINDOW, LONGEST_WINDOW = 10, 100
 """Fewest and most cycles k of a window: grains are fitted on the one, a kill loses the other."""
 GROWTH = 2.0
-"""Longest jump over the last one that held."""
+"""Longest jump over the last one that was kept."""
 REACH = 2.0
 """Greatest ratio of the cycles after a jump to those before."""
 STATE_CHANGE = 0.05
@@ -88,9 +81,9 @@ class Control:
     windows: tuple[Stretch, ...] = ()
     """Computed cycles that still count, healing ones left out."""
     behind: tuple[Stretch, ...] = ()
-    """The same with healing cycles from the second on, which tell kappa best."""
+    """The same with healing cycles from the second on, which show kappa best."""
     landings: tuple[Landing, ...] = ()
-    """Jumps that stand."""
+    """Jumps that were kept."""
     kappa: float = 0.0
     """Of `adapters.jump_slopes`."""
     ahead: float = 0.0
@@ -101,7 +94,7 @@ class Control:
     curve_settlement: tuple[float, ...] = ()
     """The run's own curve since the past was forgotten last [m]."""
     last_jump: int = 0
-    """Length of the last jump that held; 0 before the first."""
+    """Length of the last jump that was kept; 0 before the first."""
     longest: float = inf
     """Longest jump by the errors observed."""
     last_error: float = 1.0
@@ -145,8 +138,8 @@ class Decision:
     """Settlement expected over the h cycles [m]."""
     moved: float = 0.0
     """Settlement that the mean grain is moved by [m]."""
-    made_good: float = 0.0
-    """What is to be gained beyond ``gain``, for the sake of earlier jumps [m]."""
+    correction: float = 0.0
+    """What is to be gained beyond ``gain``, for the errors of earlier jumps [m]."""
     half_width: float = 0.0
     """How far that can be off with `PROBABILITY`, before it is tried [m]."""
     limits: tuple[tuple[str, float], ...] = ()
@@ -219,7 +212,7 @@ def curve_of(stretch: Stretch, settlement: float) -> tuple[tuple[float, ...], tu
 def decide(control: Control, settings: Settings, piston: Regime | None = None) -> Decision:
     """Jump, compute, refuse or end; a pure function of what was observed.
 
-    ``piston``: regime of a piston that can sink into the bed; None where it stands on all of it.
+    ``piston``: regime of a piston that can sink into the bed; None where it covers all of it.
     """
     left = settings.total_cycles - control.cycle
     if left <= 0:
@@ -283,7 +276,7 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
         window=min(window, left - jump - settings.healing),
         gain=gain,
         moved=moved,
-        made_good=moved * (1 + control.share) - gain,
+        correction=moved * (1 + control.share) - gain,
         half_width=width,
         why=f"{binding} allows {jump} cycles",
     )
@@ -304,13 +297,13 @@ def limits_of(
       holding it errs by g x^2 / 2, x = ln((N + h) / N).  Only what g exceeds its standard error by
       counts: a noisy slope is no curvature.
     - *noise*, *laws*: half-width of the gain from the noise of the rates, and from the exponent
-      and the slow laws' spread; both together within the tolerance.  The limit is told under the
+      and the slow laws' spread; both together within the tolerance.  The limit has the
       name of the greater part.  And a rate that noise hides, so that its sign is not known, is not
-      extrapolated, for many such jumps would add up; unless all cycles left come to too little.
+      extrapolated, for many such jumps would add up; unless all cycles left gain too little.
     - *state*: coordination number and elastic deflection change by their trend, beyond its
       standard error, no more than `STATE_CHANGE`.
     - *observed*: by the errors of the jumps before, see `accept` and `reject`.
-    - *growth*: `GROWTH` times the last jump that held; the first one as long as its window.
+    - *growth*: `GROWTH` times the last jump that was kept; the first one as long as its window.
     - *reach*: `REACH` times the cycles done.
     """
     here = float(control.cycle)
@@ -336,11 +329,11 @@ def limits_of(
     }
 
 
-def _longest(grid: FloatArray, held: BoolArray) -> float:
-    """Last of the ``grid`` up to which all are ``held``; infinite where all are, 0 where none."""
-    if held.all():
+def _longest(grid: FloatArray, allowed: BoolArray) -> float:
+    """Last of the ``grid`` up to which all are ``allowed``; inf where all are, 0 where none."""
+    if allowed.all():
         return inf
-    first = int(np.argmin(held))
+    first = int(np.argmin(allowed))
     return float(grid[first - 1]) if first else 0.0
 
 
@@ -389,8 +382,8 @@ def window_of(
         error = 1 / np.sqrt(known + sizes / variance)
         allowed = SAFETY * settings.tolerance * abs(control.settlement)
         reach = np.minimum(allowed / np.maximum(student * error * here, 1e-300), 50.0)
-        told = student * error <= abs(float(forecast.rate @ forecast.weight))
-        jumps = np.where(told, np.minimum(here * np.expm1(reach), GROWTH * others), 0.0)
+        certain = student * error <= abs(float(forecast.rate @ forecast.weight))
+        jumps = np.where(certain, np.minimum(here * np.expm1(reach), GROWTH * others), 0.0)
     else:
         jumps = np.full_like(sizes, others)
     pays = jumps >= settings.shortest_jump

@@ -60,8 +60,8 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
     """A jump of ``h`` cycles and the window after it; a failed jump is tried again.
 
     By its law half as long.  By history with one of `SHARES` of the move, or of the room that jumps
-    before it found: what lacks is known to the next jump, which makes it good.  Where the jump and
-    its retries failed: `compute_on` if the run may compute what it can not jump, else raises
+    before it found: the next jump knows the rest and adds it.  Where the jump and
+    its retries failed: `compute_on` if the run may compute what it cannot jump, else raises
     `NotCredible`.
     """
     p = run.scene.procedure
@@ -81,7 +81,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                     new = run.folder.outcome(name) is None
                     moved = stages.jump(run, bed, h, attempt, gain, share)
                     if new and gain:
-                        told(run, name, gain, share)
+                        say_settled(run, name, gain, share)
                     cycles = p.healing_cycles + p.window_cycles
                     return stages.compute(run, moved, cycles, p.healing_cycles)
             except (EngineFailed, NotCredible, NotConverged) as error:
@@ -104,7 +104,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
     )
 
 
-def told(run: Run, name: str, asked: float, share: float) -> None:
+def say_settled(run: Run, name: str, asked: float, share: float) -> None:
     """Say where a jump settled the bed by other than ``asked`` [m], a ``share`` of which it tried.
 
     Smallest moves settle by what they try; grains that change places by some more or less.
@@ -184,7 +184,7 @@ def room_known(outcomes: Sequence[Outcome], end: int) -> float:
 
 
 def jumps_of(outcomes: Sequence[Outcome], end: int) -> list[Jumped]:
-    """Jumps that stand up to cycle ``end``, each with the window behind it."""
+    """Jumps kept up to cycle ``end``, each with the window behind it."""
     outcomes = [one for one in outcomes if one.last_cycle <= end]
     found = []
     for before, jump, behind in zip(outcomes, outcomes[1:], outcomes[2:], strict=False):

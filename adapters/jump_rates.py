@@ -268,7 +268,7 @@ def cycles_bound(stretch: Stretch, error: float, probability: float) -> int | No
     """Cycles k of the paper's bound (eq. 15) that keep the mean increment within ``error`` [m].
 
     For independent increments in the range seen; None where ``error`` is not positive or the bound
-    gives no number.  The controller does not use it: it is told beside k.
+    gives no number.  The controller does not use it: it is shown beside k.
     """
     try:
         low, high = float(stretch.gain.min()), float(stretch.gain.max())

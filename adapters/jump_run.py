@@ -20,10 +20,10 @@ from adapters.jump_check import accept, judge, reject
 from adapters.jump_control import Control, Decision, Settings, begin, decide, joined, observe
 from adapters.jump_forecast import forecast_of
 from adapters.jump_rates import Stretch, rates_of
-from adapters.jump_record import CHECK, DECISION
 from adapters.jump_seating import seat, warn_if_hung
 from adapters.jump_slopes import Landing, slopes_of, unmoved
 from adapters.report_history import cost_total
+from adapters.report_record import CHECK, DECISION
 from adapters.run_folder import Outcome, disk_full_named
 from adapters.stages import Bed, Run
 
@@ -98,8 +98,8 @@ def jump_and_check(
 ) -> tuple[Bed, Control]:
     """The jump, the window behind it, and the verdict; a jump taken back leaves the bed before it.
 
-    The bed before a jump is a finished stage and stays; the window behind a jump that does not
-    stand goes to ``discarded/``, what it cost to the jump's record.
+    The bed before a jump is a finished stage and stays; the window behind a jump that is not
+    kept goes to ``discarded/``, what it cost to the jump's record.
     """
     name = f"jump_{bed.cycle:06d}_{decision.attempt}"
     if run.folder.failure(name):
@@ -120,8 +120,8 @@ def jump_and_check(
     settlement = float(rows[-1]["settlement"])
     stretch = stretch_of(rows, float(_jump_row(run, name)["settlement"]))
     check = judge(control, decision, settings, stretch, settlement)
-    told = {"jump": decision.jump, "window": healing + decision.window, **asdict(check)}
-    journal.write(CHECK, decision.cycle, decision.attempt, told)
+    record = {"jump": decision.jump, "window": healing + decision.window, **asdict(check)}
+    journal.write(CHECK, decision.cycle, decision.attempt, record)
     if check.accepted:
         return after, accept(control, decision, check, settings, stretch, settlement)
     why = (
@@ -197,7 +197,7 @@ class Journal:
         self._silent: set[str] = set()
 
     def write(self, what: str, cycle: int, attempt: int, content: Mapping[str, Any]) -> None:
-        """One event, unless it is there; a run that can not jump says so on the screen, once."""
+        """One event, unless it is there; a run that cannot jump says so on the screen, once."""
         key = (what, cycle, attempt, content.get("action"))
         if key in self._known:
             return

@@ -1,9 +1,9 @@
 """Whether the bed carries the piston, or the piston hangs on a grain or two: no jump before.
 
 The rain may leave a piston on grains that stand beside it, under its rim.  It then settles by next
-to nothing until they give way, which no law of the cycles before can tell.  Its elastic deflection
-tells: under one load it is many times that of a bed of such grains, whose stiffness is known to a
-factor of two from the mean field of Walton (1987).
+to nothing until they give way, which no law of the cycles before can predict.  Its elastic
+deflection shows it: under one load it is many times that of a bed of such grains, whose stiffness
+is known to a factor of two from the mean field of Walton (1987).
 
 With ``procedure.seating = "waits"`` the k_i first cycles, or ``seating_cycles`` in their place,
 count from the last one in which the piston hung, and so do the cycles N by which jumps by history
@@ -137,8 +137,8 @@ def warn_if_hung(run: Run, bed: Bed) -> None:
     if hung and bed.cycle < hung + p.k_i:
         run.progress.say(
             f"warning: the piston hung on few grains until cycle {hung}: it gave way by more than "
-            f"{HUNG:g} times what a bed of such grains does; a jump from cycle {bed.cycle} can not "
-            'tell when they let it go. procedure.seating = "waits" computes on instead'
+            f"{HUNG:g} times what a bed of such grains does; a jump from cycle {bed.cycle} cannot "
+            'predict when they let it go. procedure.seating = "waits" computes on instead'
         )
 
 

@@ -12,7 +12,7 @@ of them where they are not.
 A bed that was moved by G may settle more than it would have: in the first cycle, as contacts that
 were moved do not bear yet, and by some kappa G / n in the n-th (docs/jumps.md).
 kappa is one number for a run, 0 with standard deviation `RESEATING` before any cycle is seen; the
-blocks behind jumps tell it, since 1 / n falls much faster than 1 / N.
+blocks behind jumps show it, since 1 / n falls much faster than 1 / N.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ RESEATING = 0.1
 LONGEST_BLOCK = 0.35
 """Greatest ln(end / start) of a block, so that it has one slope."""
 LONGEST_RESEATING = 1.1
-"""The same of cycles n since a jump, so that kappa can be told from the slope."""
+"""The same of cycles n since a jump, so that kappa is separable from the slope."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ class Slopes:
             return 0.0, RESEATING
         known = np.append(RESEATING**2 / self.walk * self.reseated, 0.0)
         weights = np.linalg.solve(self.system, known)[:-1]
-        told = float(weights @ self.reseated)  # share of the variance before that is known now
-        error = RESEATING * sqrt(min(max(1 - told, 0.0), 1.0))
+        explained = float(weights @ self.reseated)  # share of the prior variance
+        error = RESEATING * sqrt(min(max(1 - explained, 0.0), 1.0))
         return float(self.slope @ weights), error
 
 

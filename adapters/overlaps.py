@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 
 from adapters.container import Walls
 from adapters.errors import UsageError
-from adapters.relaxation_kernel import BoolArray, rows_geometry, rows_of_walls
-from adapters.state import FloatArray, IntArray
+from adapters.overlap_kernel import rows_geometry, rows_of_walls
+from adapters.state import BoolArray, FloatArray, IntArray
 
 CYLINDER = "cylinder"
 """Name of the cylinder among the walls; its number comes after those of the planes."""

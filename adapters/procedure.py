@@ -10,13 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from adapters import stages
-from adapters.engine import engine_found, engine_named, interruptible
-from adapters.engine_names import REAL_ENGINES
-from adapters.errors import (
-    EngineMissing,
-    SceneError,
-    UsageError,
-)
+from adapters.engine import engine_found, engine_named, interruptible, real_engines
+from adapters.errors import EngineMissing, SceneError, UsageError
 from adapters.jump_fixed import settle_fixed
 from adapters.jump_run import settle_controlled
 from adapters.progress import Progress
@@ -26,7 +21,7 @@ from adapters.scene_file import scene_load
 from adapters.stages import Bed, Clock, Run, Variant
 
 OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
-"""What may stand in a run folder before its manifest is written."""
+"""What may be in a run folder before its manifest is written."""
 
 CONTROL = Variant("control", jumps=False)
 CONTROL_STILL = Variant("control_still", still=True)
@@ -73,7 +68,7 @@ def run_scene(
         except EngineMissing:
             if not dry_run:
                 raise
-            name = REAL_ENGINES[0]  # decks can be looked at without it
+            name = real_engines()[0]  # decks can be looked at without it
         overrides = [*overrides, f'engine.name="{name}"']
         scene = scene_load(scene_path, overrides)
         progress.say(f"engine: {scene.engine.name}")
@@ -143,7 +138,7 @@ def run_variant(
         stages.prepare(run)
     else:
         settle(run)
-    here.settlement_write()  # a run killed after its last stage may lack a row
+    here.settlement_write()  # a run killed after its last stage may miss a row
     return here
 
 

@@ -22,7 +22,7 @@ class Progress:
         self._first: tuple[float, int] | None = None
 
     def start(self) -> None:
-        """Begin to count time and cycles anew, for another run."""
+        """Start to count time and cycles again, for another run."""
         self._first = None
 
     def say(self, text: str) -> None:
@@ -40,7 +40,7 @@ class Progress:
         computed_here: int,
         to_compute: int,
     ) -> None:
-        """Where the run stands.
+        """How far the run is.
 
         ``done`` and ``computed`` cycles of ``total``; mean ``settlement`` [m];
         ``computed_here`` by this process, ``to_compute`` still.

@@ -19,7 +19,7 @@ class RadiusDistribution:
     """A distribution of radii.
 
     ``normal`` is cut at ``truncation`` standard deviations on either side of the mean and drawn
-    anew outside; ``uniform`` spans mean -+ sqrt(3) standard deviations, so that the standard
+    again outside; ``uniform`` spans mean -+ sqrt(3) standard deviations, so that the standard
     deviation is what it says; ``constant`` is the mean.
     """
 

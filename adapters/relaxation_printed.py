@@ -1,4 +1,4 @@
-"""Relaxation by energy: eq. 29 of Karrech et al. (2007) as printed, and its proximal variant.
+"""Relaxation by energy: eq. 29 of Karrech et al. (2007) as printed.
 
     F(u) = sum_pairs psi(delta) - sum_beta F_beta . u_beta - sum_beta m_beta g . u_beta,
     psi  = lambda/(gamma + 1) delta^(gamma + 1),  gamma = 3/2,  lambda = 4/3 E* sqrt(R*).
@@ -17,9 +17,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from adapters.overlaps import Neighbours
-from adapters.relaxation_kernel import BoolArray, hertz_energy_gradient
+from adapters.relaxation_kernel import hertz_energy_gradient
 from adapters.relaxation_smallest import Geometry, Search
-from adapters.state import FloatArray
+from adapters.state import BoolArray, FloatArray
 
 Stiffness = Callable[[Neighbours], FloatArray]
 """lambda of each row [N/m^1.5]."""
@@ -34,9 +34,7 @@ class Energy:
     force: FloatArray
     """Weight and external force of each grain [N], (n, 3)."""
     anchor: FloatArray
-    """Estimated centres [m], (n, 3): where the proximal term is zero, and the zero of work."""
-    proximal: float
-    """Stiffness lambda_p of 1/2 lambda_p |x - anchor|^2 [N/m]; 0 for eq. 29."""
+    """Estimated centres [m], (n, 3): the zero of work."""
     geometry: Geometry
     search: Search
     stiffness: Stiffness
@@ -62,13 +60,12 @@ class EnergyRows:
         self.evaluations += 1
         energy, rows = self.energy, self.rows
         near = energy.geometry(position, rows.first, rows.second)
-        move = position - energy.anchor
-        gradient = energy.proximal * move - energy.force
+        gradient = -energy.force
         value = hertz_energy_gradient(
             near.first, near.second, near.normal, near.overlap, self.stiffness, gradient
         )
-        work = np.sum(energy.force * move)
-        return value + 0.5 * energy.proximal * float(np.sum(move**2)) - float(work), gradient
+        work = np.sum(energy.force * (position - energy.anchor))
+        return value - float(work), gradient
 
 
 def energy_minimise(

@@ -6,7 +6,7 @@ run makes it: whenever its cycles double, its grains part from the mean profile 
 hops from one state near equilibrium to the next (basin hopping: Wales and Doye, J. Phys. Chem. A
 101 (1997) 5111, where a state is kept only if its energy is lower).  A hop kicks every grain at
 random and lets the bed flow, without friction and under its weight, towards a minimum of the energy
-of eq. 29.  The piston stands still meanwhile, where the jump lowered it to.
+of eq. 29.  The piston rests meanwhile, where the jump lowered it to.
 
 The contacts are those of a bed without friction, more than before; from the first load on friction
 has them back at what they were.
@@ -20,7 +20,7 @@ import numpy as np
 
 from adapters.contact_law import HertzStiffness
 from adapters.container import Walls
-from adapters.relaxation import (
+from adapters.relaxation_measured import (
     Estimated,
     Relaxation,
     RelaxationNotConverged,
@@ -62,8 +62,8 @@ def rearrange(
 
     ``walls`` are those that ``before`` touches, ``walls_after`` the same with the piston where it
     is to be; ``gravity`` [m/s^2] acts along -z.  Returns, of the states visited, the one whose mean
-    grain has settled by most, between `LEAST` and `MOST` of what is asked (what it lacks or has too
-    much, the caller makes good), and the number of hops made.  On one machine the same
+    grain has settled by most, between `LEAST` and `MOST` of what is asked (the caller corrects the
+    difference), and the number of hops made.  On one machine the same
     ``generator`` gives the same bed.
 
     Raises `UsageError` for input that is no bed, and `RelaxationNotConverged`, with the state of

@@ -24,14 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from adapters.overlaps import Neighbours
-from adapters.relaxation_kernel import (
-    BoolArray,
-    multipliers_solve,
-    rows_change,
-    rows_move,
-    rows_norm,
-)
-from adapters.state import FloatArray, IntArray
+from adapters.relaxation_kernel import multipliers_solve, rows_change, rows_move, rows_norm
+from adapters.state import BoolArray, FloatArray, IntArray
 
 SLACK = 1e-5
 """Weight of the multipliers in their own equations: keeps redundant contacts solvable."""
@@ -42,7 +36,7 @@ SKIN = 0.2
 NEAREST_ITERATIONS = 20
 """Iterations that look for the nearest positions; later ones only for the next that fit."""
 OPEN_ITERATIONS, OPEN_SHARE = 25, 0.1
-"""Iterations after which contacts of the network that can not be closed are let go, and the
+"""Iterations after which contacts of the network that cannot be closed are let go, and the
 share of them each time."""
 ACCEPT_ITERATIONS, ITERATIONS_MAX = 45, 100
 """Iterations after which any bed without overlaps beyond those of the network will do, and the

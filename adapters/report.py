@@ -1,6 +1,6 @@
 """The report of a run: ``report.html``, ``report.json`` and ``figures/`` in its folder.
 
-The page is one file that loads nothing.  It begins with one claim and where it fails, and tells
+The page is one file that loads nothing.  It begins with one claim and where it fails, and gives
 the error beside the cost it saved; `adapters.report_error` defines both.
 """
 
@@ -50,8 +50,8 @@ def report_write(run_folder: Path) -> Path:
 
 
 def figures_write(record: Record, numbers: Numbers) -> dict[str, Path]:
-    """Draw every figure that the run has come to; their files by name."""
-    from adapters.report_figures import figure_save
+    """Draw every figure that the run has reached; their files by name."""
+    from adapters.report_drawing import figure_save
 
     folder = record.path / "figures"
     folder.mkdir(exist_ok=True)
@@ -98,7 +98,7 @@ def _figures(record: Record, numbers: Numbers) -> Iterator[tuple[str, Callable[[
 
 
 def _scatter(record: Record, numbers: Numbers) -> tuple[float, str]:
-    """Error below which two full runs can not be told apart, and how it is known; nan when not."""
+    """Error below which two full runs do not differ, and how it is known; nan when not."""
     if (floor := numbers.floor) is not None:
         return floor, "h = 0 and perturbed full runs"
     if karrech(record):

@@ -157,9 +157,9 @@ def hung(record: Record) -> str:
         for _, jump in record.run.jumps
     )
     behind = f"then or within k<sub>i</sub> = {procedure.k_i} cycles behind"
-    told = (
+    advice = (
         f"{early} of the {len(record.run.jumps)} jumps were made {behind}: when the grains let go "
-        "no cycle before tells, so they may miss most of what the bed settles. "
+        "no cycle before shows, so they may miss most of what the bed settles. "
         '<code>procedure.seating = "waits"</code> computes on instead.'
         if early
         else f"No jump was made {behind}."
@@ -167,7 +167,7 @@ def hung(record: Record) -> str:
     return paragraph(
         f"<strong>The piston hung on few grains in cycles {spans(cycles)}:</strong> it gave way by "
         f"more than {HUNG:g} times what the mean field of Walton (1987) gives a bed of such "
-        f"grains. {told}"
+        f"grains. {advice}"
     )
 
 
@@ -181,7 +181,7 @@ def owed(record: Record) -> str:
     if left < 0:
         return paragraph(
             f"<strong>The last jump settled the bed by {micrometres(-left)} µm more than asked:"
-            "</strong> grains changed places. The settlement foretold is that much smaller."
+            "</strong> grains changed places. The settlement predicted is that much smaller."
         )
     jammed = record.scene.procedure is not None and record.scene.procedure.jammed == "less"
     places = (
@@ -191,7 +191,7 @@ def owed(record: Record) -> str:
     )
     return paragraph(
         f"<strong>The bed has settled {micrometres(left)} µm less than its jumps were to move it:"
-        "</strong> no room for more was found without overlaps. The settlement foretold is that "
+        "</strong> no room for more was found without overlaps. The settlement predicted is that "
         "much greater; shorter jumps, or more of them, leave the bed the cycles to make room"
         f"{places}."
     )

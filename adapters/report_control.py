@@ -6,9 +6,8 @@ from html import escape
 from math import inf
 
 from adapters.jump_band import PROBABILITY
-from adapters.jump_record import band_of_run, checks_of, decisions_of
 from adapters.report_html import micrometres, paragraph, per_cent, plain, section, table
-from adapters.report_record import Record
+from adapters.report_record import Record, band_of_run, checks_of, decisions_of
 
 
 def control(record: Record) -> str:
@@ -24,7 +23,7 @@ def control(record: Record) -> str:
         check = check if decision["action"] == "jump" else {}
         limits = [(name, inf if value is None else value) for name, value in decision["limits"]]
         others = ", ".join(f"{name} {value:.0f}" for name, value in limits if value < 1e6)
-        moved = "moved" if "moved" in decision else "gain"  # the same before they were told apart
+        moved = "moved" if "moved" in decision else "gain"  # older runs have one for both
         bound = "" if decision["bound"] is None else plain(decision["bound"], "d")
         rows.append(
             (
@@ -38,7 +37,7 @@ def control(record: Record) -> str:
                 micrometres(decision["half_width"]) if decision["jump"] else "",
                 per_cent(check["error"], "+.2f") if check else "",
                 plain(check["deviation"], "+.1f") if check else "",
-                ("stands" if check["accepted"] else "taken back") if check else "",
+                ("kept" if check["accepted"] else "taken back") if check else "",
                 escape(decision["why"]) + (f" ({escape(others)})" if others else ""),
             )
         )
@@ -49,12 +48,12 @@ def control(record: Record) -> str:
         "sides of the jump; above twice the tolerance the jump is taken back. Jumps taken back: "
         f"{sum(not check['accepted'] for check in checks.values())}."
     )
-    held = [check for check in checks.values() if check["accepted"] and "kappa" in check]
-    if held:  # runs of before this was told apart have none
+    kept = [check for check in checks.values() if check["accepted"] and "kappa" in check]
+    if kept:  # older runs have no kappa
         definition += paragraph(
-            f"Behind its {len(held)} jumps the bed settled by "
-            f"{micrometres(sum(check['reseated'] for check in held))} µm more because it was moved "
-            f"(in the n-th cycle {held[-1]['kappa']:.3f} / n of what it was moved by)."
+            f"Behind its {len(kept)} jumps the bed settled by "
+            f"{micrometres(sum(check['reseated'] for check in kept))} µm more because it was moved "
+            f"(in the n-th cycle {kept[-1]['kappa']:.3f} / n of what it was moved by)."
         )
     ends = f"{micrometres(band.low)} to {micrometres(band.high)} µm"
     mean = f"{micrometres(band.mean_low)} to {micrometres(band.mean_high)} µm"

@@ -17,9 +17,9 @@ from math import nan
 import numpy as np
 
 from adapters.laws import Law
-from adapters.report_history import History, cost_total, history_read
+from adapters.report_history import History
 from adapters.residual import error_of_coordinates, error_of_displacement
-from adapters.run_folder import Outcome, RunFolder
+from adapters.run_folder import Outcome
 from adapters.state import FloatArray, IntArray
 
 COORDINATION_BAR = 0.03
@@ -92,7 +92,7 @@ class Beds:
     full: FloatArray
     """The full run at the cycle of comparison."""
     own: FloatArray
-    """What stands for it."""
+    """What is compared with it."""
 
 
 def comparison(
@@ -146,18 +146,6 @@ def _displacement_error(start: FloatArray | None, beds: Beds) -> float:
     if start is None or np.array_equal(start, beds.full):
         return nan
     return error_of_displacement(start, beds.full, beds.own)
-
-
-def compare(own: RunFolder, full: RunFolder) -> Comparison:
-    """The run in ``own`` against the full run in ``full``, at the last cycle that both have.
-
-    Raises `UsageError` when they have none.
-    """
-    mine, truth = history_read(own), history_read(full)
-    cycle = last_common_cycle(mine, truth)
-    prepared = full.outcome("preparation")
-    preparation_s = nan if prepared is None else cost_total(prepared.cost)
-    return comparison(own.path.name, mine, cycle, truth, cycle, preparation_s)
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,29 @@
 """The figures of a report, one function each; matplotlib is loaded when one is drawn.
 
-Every function returns a figure that `figure_save` writes.  Lengths come in m and are shown in
-um or mm, shares in per cent.
+Every function returns a figure that `report_drawing.figure_save` writes.  Lengths come in m and are
+shown in um or mm, shares in per cent.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from adapters.checks import FORCE_ERROR_GOAL, FORCE_START_CYCLES
+from adapters.report_drawing import (
+    COMPUTED,
+    CONTROL,
+    HEALING,
+    JUMPED,
+    OTHER,
+    SPAN,
+    WIDTH,
+    figure_panels,
+    set_logarithmic,
+    shade_spans,
+)
 from adapters.report_error import Comparison, CostLine
 from adapters.report_history import History
 from adapters.report_preparation import PreparationSeries
@@ -22,82 +33,11 @@ from adapters.state import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-COMPUTED, HEALING, JUMPED, CONTROL, OTHER = "#0b5fa5", "#e07b00", "#8c8c8c", "#111111", "#2a9d6f"
-"""Colours of computed, healing and jumped cycles, of the full run, and of anything else."""
-
-SPAN = "#e9e9e9"
-"""Shade of a jumped span."""
 
 ERROR_SHOWN = 0.05
 """Least error of a settlement shown [%]: no single run of a chaotic bed says anything below."""
-
-WIDTH = 7.2
-"""Width of a figure [inch]."""
-
-STYLE: Any = {
-    "font.size": 9.5,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e3e3e3",
-    "grid.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "axes.edgecolor": "#555555",
-    "axes.linewidth": 0.8,
-    "xtick.color": "#333333",
-    "ytick.color": "#333333",
-    "lines.linewidth": 1.5,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "savefig.dpi": 170,
-    "svg.hashsalt": "trackbed",
-    "svg.fonttype": "path",
-    "figure.constrained_layout.use": True,
-}
-
-
-def figure_save(draw: Callable[[], Figure], path: Path) -> Path:
-    """Draw a figure and write it to ``path`` (svg or png), atomically; the same bytes each time."""
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):
-        figure = draw()
-        temporary = path.with_name(f".{path.stem}.partial{path.suffix}")
-        plain = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-        figure.savefig(temporary, metadata=plain)
-    temporary.replace(path)
-    return path
-
-
-def _panels(rows: int, columns: int, height: float, **keywords: Any) -> tuple[Figure, Any]:
-    """A figure of the report's width and its array of axes."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH, height))
-    return figure, figure.subplots(rows, columns, squeeze=False, **keywords)
-
-
-def _logarithmic(panel: Axes, name: Literal["x", "y"]) -> None:
-    """A logarithmic axis with plain numbers at 1, 2 and 5 where there is room, else at decades."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    panel.set(**{f"{name}scale": "log"})
-    axis: Axis = panel.xaxis if name == "x" else panel.yaxis
-    low, high = panel.get_xlim() if name == "x" else panel.get_ylim()
-    roomy = abs(np.log10(high / low)) < 2.2
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if roomy else (1,)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def _spans_shade(axes: Axes, spans: Sequence[tuple[int, int]]) -> None:
-    for first, last in spans:
-        axes.axvspan(first, last, color=SPAN, lw=0, zorder=0)
 
 
 def settlement_figure(
@@ -108,12 +48,12 @@ def settlement_figure(
     title: str,
 ) -> Figure:
     """Settlement against load cycles, linear and logarithmic: the picture of the report."""
-    figure, axes = _panels(1, 2, 3.7, sharey=True)
+    figure, axes = figure_panels(1, 2, 3.7, sharey=True)
     for panel in axes[0]:
         _settlement_panel(panel, run, control, others, spans)
     axes[0, 0].set_ylabel("mean settlement of the grains (µm)")
     axes[0, 0].invert_yaxis()
-    _logarithmic(axes[0, 1], "x")
+    set_logarithmic(axes[0, 1], "x")
     axes[0, 0].set_xlim(left=0)
     axes[0, 1].set_title(title, loc="right")
     axes[0, 0].set_xlabel("load cycles")
@@ -130,7 +70,7 @@ def _settlement_panel(
     others: Sequence[tuple[str, History]],
     spans: Sequence[tuple[int, int]],
 ) -> None:
-    _spans_shade(panel, spans)
+    shade_spans(panel, spans)
     for name, other in others:
         panel.plot(other.cycle, 1e6 * other.settlement, color=OTHER, lw=0.9, label=name)
     if control is not None:
@@ -179,9 +119,9 @@ def error_cost_figure(
 ) -> Figure:
     """Work against precision: error of the settlement against CPU time, both logarithmic.
 
-    ``scatter``: relative error below which two full runs can not be told apart; nan for unknown.
+    ``scatter``: relative error below which two full runs are not distinguishable; nan for unknown.
     """
-    figure, axes = _panels(1, 1, 3.6)
+    figure, axes = figure_panels(1, 1, 3.6)
     panel = axes[0, 0]
     for (name, line), (style, colour) in zip(lines, (("-", JUMPED), (".-", OTHER)), strict=False):
         seen = np.abs(line.settlement_error) > 0
@@ -212,8 +152,8 @@ def error_cost_figure(
     panel.axvline(full, color=CONTROL, lw=1.1, label="cost of the full run")
     panel.set_xlim(left=full / 20)
     panel.set_ylim(bottom=ERROR_SHOWN)
-    _logarithmic(panel, "x")
-    _logarithmic(panel, "y")
+    set_logarithmic(panel, "x")
+    set_logarithmic(panel, "y")
     panel.set_xlabel("CPU time from the start of loading (s)")
     panel.set_ylabel("|error of the settlement| (%)")
     figure.legend(loc="outside right upper")
@@ -228,9 +168,9 @@ def coordination_figure(
         ("coordination_number", "coordination number\n(contacts with grains)"),
         ("relative_density", "relative density"),
     )
-    figure, axes = _panels(2, 1, 4.4, sharex=True)
+    figure, axes = figure_panels(2, 1, 4.4, sharex=True)
     for panel, (column, label) in zip(axes[:, 0], columns, strict=True):
-        _spans_shade(panel, spans)
+        shade_spans(panel, spans)
         if control is not None:
             panel.plot(
                 control.cycle,
@@ -266,7 +206,7 @@ def coordination_figure(
 
 def penetration_figure(jumps: Sequence[tuple[str, dict[str, FloatArray]]]) -> Figure:
     """Histograms of the penetrations before each jump, as estimated, and relaxed [m]."""
-    figure, axes = _panels(len(jumps), 1, 0.9 + 1.75 * len(jumps), sharex=True)
+    figure, axes = figure_panels(len(jumps), 1, 0.9 + 1.75 * len(jumps), sharex=True)
     known = np.concatenate([each for _, beds in jumps for each in beds.values()])
     low = max(float(np.quantile(known, 0.005)), 1e-12)
     bins = np.geomspace(low, max(1.1 * float(known.max()), 10 * low), 45)
@@ -284,7 +224,7 @@ def penetration_figure(jumps: Sequence[tuple[str, dict[str, FloatArray]]]) -> Fi
             )
         panel.set_title(name)
         panel.set_ylabel("contacts")
-    _logarithmic(axes[-1, 0], "x")
+    set_logarithmic(axes[-1, 0], "x")
     axes[-1, 0].set_xlabel("penetration (µm)")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
@@ -305,7 +245,7 @@ def sample_figure(
     norm = PowerNorm(0.5, 0.0, 1e6 * longest if longest > 0 else 1.0)
     extent = extent_of([position for _, position, _ in panels], radius)
     aspect = (extent[3] - extent[2]) / (extent[1] - extent[0])
-    figure, axes = _panels(1, len(panels), 1.0 + WIDTH / len(panels) * min(aspect, 2.0))
+    figure, axes = figure_panels(1, len(panels), 1.0 + WIDTH / len(panels) * min(aspect, 2.0))
     for panel, (title, position, displacement) in zip(axes[0], panels, strict=True):
         colour = colormaps["viridis"](norm(1e6 * displacement))[:, :3]
         panel.imshow(
@@ -344,7 +284,7 @@ def preparation_figure(
     series: PreparationSeries, paper_density: float | None, paper_coordination: float | None
 ) -> Figure:
     """The rain of grains in time, as Fig. 3 of the paper (a to d)."""
-    figure, axes = _panels(2, 2, 4.8, sharex=True)
+    figure, axes = figure_panels(2, 2, 4.8, sharex=True)
     mark = "." if len(series.time) < 40 else ""
     panels = axes.ravel()
     panels[0].plot(series.time, series.apparent_weight, mark + "-", color=COMPUTED)
@@ -381,9 +321,9 @@ def piston_figure(
     contact: FloatArray,
 ) -> Figure:
     """Force error of every cycle; target and contact force [N] over one ``cycle`` (phase 0-1)."""
-    figure, axes = _panels(1, 2, 3.2)
+    figure, axes = figure_panels(1, 2, 3.2)
     panel = axes[0, 0]
-    _spans_shade(panel, spans)
+    shade_spans(panel, spans)
     rows = np.isfinite(run.force_error) & (run.force_error > 0)
     early = run.cycle <= FORCE_START_CYCLES
     for which, colour, name in (
@@ -396,7 +336,7 @@ def piston_figure(
             )
     bar = 100 * FORCE_ERROR_GOAL
     panel.axhline(bar, color=CONTROL, ls="--", lw=1, label=f"bar {bar:g} %")
-    _logarithmic(panel, "y")
+    set_logarithmic(panel, "y")
     panel.set_xlabel("load cycles")
     panel.set_ylabel("rms force error over peak (%)")
     panel.legend()
@@ -421,7 +361,7 @@ def cost_figure(costs: Sequence[CostSplit]) -> Figure:
         ("relax", "relax", "#7b3fa0"),
         ("other_python", "other Python", "#c9c9c9"),
     )
-    figure, axes = _panels(1, 1, 1.5 + 0.45 * len(costs))
+    figure, axes = figure_panels(1, 1, 1.5 + 0.45 * len(costs))
     panel = axes[0, 0]
     left = np.zeros(len(costs))
     names = [cost.name for cost in costs]

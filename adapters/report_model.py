@@ -73,7 +73,7 @@ def _bed(scene: Scene) -> Iterator[str]:
         part = {1: "half", 2: "a quarter"}[len(scene.sample.symmetry)]
         yield (
             f"The other sectors: {part} of the container is computed between rigid, frictionless "
-            "mirror planes, at which grains can not cross."
+            "mirror planes, at which grains cannot cross."
         )
     yield "Sleepers, subgrade and the track's stiffness: floor, walls and piston are rigid."
     share = scene.time_step / scene.rayleigh_time

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from adapters.jump_band import Band
-from adapters.jump_record import band_of_run
 from adapters.laws import law_named
 from adapters.procedure import CONTROL_STILL
 from adapters.report_error import (
@@ -28,7 +27,7 @@ from adapters.report_error import (
 from adapters.report_history import cost_total, cycles_computed, jumped_spans
 from adapters.report_model import left_out
 from adapters.report_preparation import PreparationFigures, preparation_figures
-from adapters.report_record import Record, Track
+from adapters.report_record import Record, Track, band_of_run
 from adapters.report_verdict import (
     FITTED,
     FULL,

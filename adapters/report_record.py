@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from adapters.errors import UsageError
+from adapters.jump_band import Band, band_of
 from adapters.report_history import FailedJump, History, failed_jumps, history_of
 from adapters.run_folder import Outcome, RunFolder
 from adapters.scene import Scene
@@ -90,7 +92,7 @@ class Track:
 
 @dataclass(frozen=True)
 class Record:
-    """All that the report tells of."""
+    """All that the report shows."""
 
     path: Path
     manifest: dict[str, Any]
@@ -137,3 +139,29 @@ def track_read(name: str, folder: RunFolder) -> Track:
         discarded=tuple(discarded),
         events=tuple(folder.events()),
     )
+
+
+Event = dict[str, Any]
+
+
+DECISION, CHECK = "decision", "jump checked"
+"""Events of a controlled run: what was decided and why; a jump beside what was computed behind."""
+
+
+def decisions_of(events: Sequence[Event]) -> list[Event]:
+    """Decisions in the order of the run, each once; fields of `jump_control.Decision`."""
+    found = {(e["cycle"], e["attempt"], e["action"]): e for e in events if e["event"] == DECISION}
+    return list(found.values())
+
+
+def checks_of(events: Sequence[Event]) -> dict[tuple[int, int], Event]:
+    """Checks by the cycle a jump started from and its attempt; fields of `jump_check.Check`."""
+    return {(e["cycle"], e["attempt"]): e for e in events if e["event"] == CHECK}
+
+
+def band_of_run(track: Track) -> Band | None:
+    """Settlement where the run is, with its band; None for a run without a tolerance."""
+    if not decisions_of(track.events) or not len(track.history.cycle):
+        return None
+    kept = [check for check in checks_of(track.events).values() if check["accepted"]]
+    return band_of(int(track.history.cycle[-1]), float(track.history.settlement[-1]), kept)

@@ -6,15 +6,7 @@ from collections.abc import Iterator
 from html import escape
 from math import isfinite
 
-from adapters.report_bed import (
-    Figures,
-    cost,
-    penetration,
-    piston,
-    preparation,
-    sample,
-    structure,
-)
+from adapters.report_bed import Figures, cost, penetration, piston, preparation, sample, structure
 from adapters.report_control import control
 from adapters.report_error import Comparison
 from adapters.report_history import AVERAGED
@@ -39,7 +31,7 @@ from adapters.scene import Procedure
 
 
 def body(record: Record, numbers: Numbers, figures: Figures) -> Iterator[str]:
-    """All sections; those that the run has not come to are left out."""
+    """All sections; those that the run has not reached are left out."""
     yield f'<h1>Settlement under cyclic load</h1><p class="scene">{escape(numbers.scene)}</p>'
     yield from _claim(record, numbers)
     if numbers.cycle:
@@ -59,9 +51,7 @@ def body(record: Record, numbers: Numbers, figures: Figures) -> Iterator[str]:
     yield _provenance(numbers)
     yield _fairness(record, numbers)
     yield section(
-        "Make it again",
-        paragraph("In this run folder:"),
-        f"<pre>{escape(numbers.reproduce)}</pre>",
+        "Make it again", paragraph("In this run folder:"), f"<pre>{escape(numbers.reproduce)}</pre>"
     )
 
 
@@ -108,10 +98,10 @@ def _claim(record: Record, numbers: Numbers) -> Iterator[str]:
 
 
 def _why_unknown(record: Record) -> str:
-    """Why there is no error to tell."""
+    """Why the error is unknown."""
     if record.manifest.get("control"):
-        return "the full run beside has not gone past the first jump yet"
-    return "no full run stands beside (<code>trackbed run … --control</code> adds it)"
+        return "the full run beside it is not past the first jump yet"
+    return "there is no full run beside it (<code>trackbed run … --control</code> adds it)"
 
 
 def _settlement(numbers: Numbers, figures: Figures) -> str:
@@ -309,7 +299,7 @@ def _setting(procedure: Procedure) -> str:
 
 
 def _fairness(record: Record, numbers: Numbers) -> str:
-    """What the comparison can not show."""
+    """What the comparison cannot show."""
     items = [
         "One run beside one run. A bed of grains is chaotic: two full runs of 1,085 grains, one "
         "grain of the second moved by 1e-10 m at the start, differed by 7 % in settlement after 60 "
@@ -324,7 +314,7 @@ def _fairness(record: Record, numbers: Numbers) -> str:
     ]
     if record.others:
         names = ", ".join(escape(variant_name(track.name)) for track in record.others)
-        items.insert(1, f"Further runs of this scene stand in the table: {names}.")
+        items.insert(1, f"Further runs of this scene are in the table: {names}.")
     procedure = record.scene.procedure
     if procedure is not None and isfinite(numbers.settlement):
         items.append(

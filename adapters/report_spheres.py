@@ -53,7 +53,7 @@ def spheres_draw(
         here = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         nearer = (square > 0) & (z + rise > depth[here])
         shade = (light[0] * across + light[1] * upward + light[2] * rise) / r
-        # A dark rim tells one grain from the next where their colours agree.
+        # A dark rim separates one grain from the next where their colours agree.
         brightness = (0.52 + 0.62 * np.maximum(shade, 0.0)) * (0.6 + 0.4 * (rise / r) ** 0.5)
         painted = np.minimum(brightness[..., None] * rgb, 1.0)
         image[here] = np.where(nearer[..., None], painted, image[here])

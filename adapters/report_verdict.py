@@ -10,13 +10,7 @@ from typing import Any
 import numpy as np
 
 from adapters.checks import FORCE_ERROR_GOAL, FORCE_START_CYCLES
-from adapters.report_error import (
-    COORDINATION_BAR,
-    HEIGHT_BAR,
-    PYTHON_BAR,
-    Comparison,
-    JumpFigures,
-)
+from adapters.report_error import COORDINATION_BAR, HEIGHT_BAR, PYTHON_BAR, Comparison, JumpFigures
 from adapters.report_history import cost_total
 from adapters.report_record import Record, Track
 
@@ -29,7 +23,7 @@ PROCEDURE, NOTHING, FITTED, FULL = (
 """Names of the rows of the error table."""
 
 FEW_GRAINS = 500
-"""Fewer grains than this settle in bursts: one such bed can not judge a law."""
+"""Fewer grains than this settle in bursts: one such bed cannot judge a law."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +169,7 @@ def fails_of(record: Record, rows: tuple[Comparison, ...], bars: tuple[Bar, ...]
     if record.scene.grain_count < FEW_GRAINS:
         yield (
             f"a bed of {record.scene.grain_count} grains settles in bursts: it shows the machinery "
-            "and can not judge a law"
+            "and cannot judge a law"
         )
 
 

@@ -1,4 +1,4 @@
-"""Residual displacement of grains, how well a trend describes it, and how many cycles that takes.
+"""How well a trend describes residual displacements, and how many cycles that takes.
 
 All functions take one state a cycle end: row p is the state at t + p T, row 0 the one before the
 window (Karrech et al. 2007, section 3.1).
@@ -6,7 +6,7 @@ window (Karrech et al. 2007, section 3.1).
 
 from __future__ import annotations
 
-from math import ceil, isfinite, log, sqrt
+from math import ceil, isfinite, log
 
 import numpy as np
 
@@ -14,21 +14,8 @@ from adapters.errors import UsageError
 from adapters.laws.law import Law
 from adapters.state import FloatArray
 
-
-def residual_displacement(position: FloatArray) -> FloatArray:
-    """u^r(t + p T) = x(t + p T) - x(t) [m], shape (k+1, n, 3), as ``position`` [m] (eqs 8, 9).
-
-    At a cycle's end the load is that of its start, so the reversible part of eq. 8 is the same
-    and drops out.  What eq. 9 lets die away first, the motion that outlasts the load, is kept:
-    small when the kinetic energy at the cycle's end is.
-    """
-    position = np.asarray(position, float)
-    return np.asarray(position - position[0])
-
-
-def residual_increment(position: FloatArray) -> FloatArray:
-    """u^r(t + p T) - u^r(t + (p-1) T) [m], p = 1 ... k, shape (k, n, 3) (eqs 10, 12)."""
-    return np.diff(np.asarray(position, float), axis=0)
+FIRST_WINDOW = 20
+"""Cycles that are fitted first where no k is given: the paper finds k > 20 enough."""
 
 
 def error_term(law: Law, cycle: FloatArray, displacement: FloatArray) -> FloatArray:
@@ -39,33 +26,6 @@ def error_term(law: Law, cycle: FloatArray, displacement: FloatArray) -> FloatAr
     """
     parameters = law.fit(cycle, displacement)
     return np.asarray(displacement - law.value(parameters, np.asarray(cycle, float)))
-
-
-def stability_of_displacement(position: FloatArray) -> FloatArray:
-    """g_u(k) = 1/k (sum over grains, p <= k, axes of increment^2)^(1/2) [m] (eq. 13).
-
-    For k = 1 ... K, shape (K,), from ``position`` [m], shape (K+1, n, 3).  It falls as k^(-1/2)
-    for a steady settlement: a small g_u says that k is large, not that a law holds.
-    """
-    increment = residual_increment(position)
-    square = (increment**2).reshape(len(increment), -1).sum(axis=1)
-    return np.asarray(np.sqrt(np.cumsum(square)) / np.arange(1, len(square) + 1))
-
-
-def stability_of_error(law: Law, cycle: FloatArray, displacement: FloatArray) -> FloatArray:
-    """f_xi(k) = 1/k (sum over grains, p <= k, axes of xi^2)^(1/2) [m] (eq. 14).
-
-    For every k from the fewest states the law needs to K, the law fitted to the first k cycles.
-    ``cycle``, shape (K+1,); ``displacement`` [m], shape (K+1, n, 3); K refits.  The last entry
-    is k = K, so entry -1-j is k = K - j.
-    """
-    first = law.first_state
-    return np.array(
-        [
-            np.linalg.norm(error_term(law, cycle[first:end], displacement[first:end])) / (end - 1)
-            for end in range(first + law.minimum_cycles, len(cycle) + 1)
-        ]
-    )
 
 
 def error_of_displacement(start: FloatArray, computed: FloatArray, estimated: FloatArray) -> float:
@@ -109,7 +69,10 @@ def cycles_for_error(low: float, high: float, error: float, probability: float) 
     cycles is not the range); and it bounds the mean error inside the window, not the error of
     an extrapolation.  Read it as a lower limit of k.
     """
-    _bound_arguments(low, high, probability)
+    if not 0 < probability < 1:
+        raise UsageError(f"a probability lies between 0 and 1, not at {probability:g}")
+    if not (high >= low and isfinite(high - low)):
+        raise UsageError(f"error terms cannot lie between {low:g} and {high:g}")
     if not (error > 0 and isfinite(error)):
         raise UsageError(f"the error level must be positive and finite, is {error:g}")
     ratio = (high - low) / error
@@ -117,21 +80,3 @@ def cycles_for_error(low: float, high: float, error: float, probability: float) 
     if not isfinite(cycles):
         raise UsageError(f"no number of cycles brings the mean error term below {error:g}")
     return max(1, ceil(cycles))
-
-
-def error_for_cycles(low: float, high: float, cycles: int, probability: float) -> float:
-    """The error level eps that ``cycles`` reach: the inverse of `cycles_for_error`.
-
-    eps = (b - a) (ln(2 / p) / (2 k))^(1/2), in the unit of ``low`` and ``high``; holds as little.
-    """
-    _bound_arguments(low, high, probability)
-    if cycles < 1:
-        raise UsageError(f"at least one cycle is needed, not {cycles}")
-    return (high - low) * sqrt(log(2 / probability) / (2 * cycles))
-
-
-def _bound_arguments(low: float, high: float, probability: float) -> None:
-    if not 0 < probability < 1:
-        raise UsageError(f"a probability lies between 0 and 1, not at {probability:g}")
-    if not (high >= low and isfinite(high - low)):
-        raise UsageError(f"error terms can not lie between {low:g} and {high:g}")

@@ -9,7 +9,6 @@ normal radii.  Our scene's 1,085, which follow from the volume of the mean radiu
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -33,7 +32,7 @@ SURFACE_SHARE = 0.9
 """Part of a bed's height, from the floor, that lies below the uneven free surface."""
 
 START_ROUNDS = 1000
-"""Rounds of drawing overlapping grains anew before a random start is given up."""
+"""Rounds of drawing overlapping grains again before a random start is given up."""
 
 
 def sample_mass(radius: FloatArray, density: float) -> FloatArray:
@@ -49,7 +48,8 @@ def sample_start(
     Every grain, of ``radius`` [m], shape (n,), lies between the floor, the walls, the mirror planes
     and the height, which follows from ``relative_density`` but is at least two grains.  Random
     sequential addition in rounds: all grains are drawn at once, uniformly; those that overlap a
-    settled grain, or a lower index of their own round, are drawn anew.  The same for the same seed.
+    settled grain, or a lower index of their own round, are drawn again.
+    The same for the same seed.
 
     Not for dense samples: raises `NotConverged` when no place is found, from about 0.2 on, and
     `SceneError` when a grain is wider than the container.
@@ -137,18 +137,6 @@ def relative_density(
     """
     volume = volume_below(position, radius, height) - volume_below(position, radius, bottom)
     return volume / (container.area * (height - bottom))
-
-
-def relative_density_profile(
-    position: FloatArray, radius: FloatArray, container: Container, edges: FloatArray
-) -> FloatArray:
-    """Relative density of each layer between consecutive ``edges`` [m], shape (len(edges) - 1,)."""
-    return np.array(
-        [
-            relative_density(position, radius, container, top, bottom)
-            for bottom, top in pairwise(edges)
-        ]
-    )
 
 
 def bed_height(position: FloatArray, radius: FloatArray) -> float:

@@ -24,15 +24,12 @@ from pydantic_core import PydanticCustomError
 
 from adapters import contact_law
 from adapters.container import Container, sides_needed
-from adapters.engine_names import EngineName
 from adapters.load_series import LoadSeries, load_series_read
 from adapters.moves import DEFAULT as MOVE_DEFAULT
 from adapters.radii import RadiusDistribution, grain_count_expected
+from adapters.residual import FIRST_WINDOW
 from adapters.scene_checks import COUNT_GREATEST, scene_problems, scene_warnings
 from adapters.state import FloatArray
-
-FIRST_WINDOW = 20
-"""Cycles that are fitted first where no k is given: the paper finds k > 20 enough."""
 
 TRACK_SAMPLES = 100
 """Least number of samples of the piston's record in a cycle."""
@@ -217,10 +214,11 @@ class Procedure(Table):
     seating: Literal["any", "waits"] = "any"
     """Whether the k_i first cycles count from where the bed carries the piston."""
     seating_cycles: Annotated[int, Field(ge=1)] | None = None
-    """Where they do and a piston hung: cycles that count in place of k_i; k_i unless told."""
+    """Where they do and a piston hung: cycles that count in place of k_i; k_i where not given."""
     jammed: Literal["less", "rearranged"] = "less"
     """Where a jump by history finds no room: it moves the bed by less, or grains change places."""
-    relaxation: Literal["smallest-move", "karrech2007", "proximal", "none"] = "smallest-move"
+    relaxation: str = "smallest-move"
+    """How a moved bed gets rid of its overlaps: of `adapters.relaxation.METHODS`, or "none"."""
     total_cycles: Count
     """Cycles computed and jumped at the end."""
 
@@ -252,8 +250,9 @@ class Procedure(Table):
 class Engine(Table):
     """The engine and its time step."""
 
-    name: EngineName = "auto"
-    """Engine; ``auto`` is the first that is installed: liggghts, lammps, yade."""
+    name: str = "auto"
+    """Engine; ``auto`` is the first that is installed: liggghts, lammps, yade; ``fake`` writes
+    analytic states, for tests."""
     time_step: Positive | None = None
     """Longest time step [s]."""
     rayleigh_share: Share | None = None

@@ -21,6 +21,7 @@ from adapters.contact_law import (
 from adapters.container import Container
 from adapters.errors import SceneError
 from adapters.load_series import load_series_read
+from adapters.named_files import find_choices, tell_retired
 from adapters.radii import RadiusDistribution, grain_count_expected, radius_that_fits
 
 ALTERNATIVES = (
@@ -35,6 +36,9 @@ JUMP_KEYS, TOLERANCE_KEY = ("procedure.k", "procedure.h"), "procedure.tolerance"
 
 COUNT_GREATEST = 10**8
 """Most grains a scene may have."""
+
+AN_ENGINE = "adapters.engine_fake"
+"""A file beside which the engines are; only looked for, as they import the scene."""
 
 MPI_STARTERS = {"mpirun", "mpiexec", "mpiexec.hydra", "orterun", "srun"}
 """Programs that start the program behind them several times."""
@@ -276,6 +280,12 @@ def _launcher(scene: _Values) -> Iterator[Problem]:
         )
 
 
+def _engine(scene: _Values) -> Iterator[Problem]:
+    name, known = scene.need("engine.name"), ("auto", *find_choices(AN_ENGINE, "ENGINE"))
+    if name not in known:
+        yield Problem("engine.name", f"unknown engine {name!r}{did_you_mean(name, known)}")
+
+
 def _law(scene: _Values) -> Iterator[Problem]:
     from adapters.laws import laws_known
 
@@ -285,11 +295,22 @@ def _law(scene: _Values) -> Iterator[Problem]:
 
 
 def _move(scene: _Values) -> Iterator[Problem]:
-    from adapters.moves import moves_known
+    from adapters.moves import RETIRED, moves_known
 
     move, known = scene.need("procedure.move"), moves_known()
     if move not in known:
-        yield Problem("procedure.move", f"unknown way {move!r}{did_you_mean(move, known)}")
+        hint = tell_retired(move, RETIRED) or did_you_mean(move, known)
+        yield Problem("procedure.move", f"unknown way {move!r}{hint}")
+
+
+def _relaxation(scene: _Values) -> Iterator[Problem]:
+    method = scene.need("procedure.relaxation")
+    if method not in ("smallest-move", "none"):  # what others ask loads the compiler
+        from adapters.relaxation import METHODS, RETIRED
+
+        if method not in METHODS:
+            hint = tell_retired(method, RETIRED) or did_you_mean(method, (*METHODS, "none"))
+            yield Problem("procedure.relaxation", f"unknown relaxation {method!r}{hint}")
 
 
 def _rayleigh_time(scene: _Values) -> float:
@@ -380,8 +401,10 @@ CHECKS: tuple[Check, ...] = (
     _seating,
     _jammed,
     _launcher,
+    _engine,
     _law,
     _move,
+    _relaxation,
     _time_step,
     _great_load,
 )

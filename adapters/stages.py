@@ -91,7 +91,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Bed:
-    """Where a run stands: the saved state the next window starts from."""
+    """Where a run is: the saved state the next window starts from."""
 
     cycle: int
     """Cycles done, jumped ones included."""
@@ -250,7 +250,7 @@ def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, Flo
     """State before a jump, estimated positions after it (n, 3) and the piston's height, in metres.
 
     The grains move as ``procedure.move`` says, by a window without its ``healing`` first cycles.
-    The piston follows the law of its own heights, so that a loose grain can not lift it; it is
+    The piston follows the law of its own heights, so that a loose grain cannot lift it; it is
     never placed above where it is.
     """
     procedure = run.scene.procedure
@@ -271,16 +271,16 @@ def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, Flo
 def settled_by(gain: float, before: State, target: FloatArray) -> tuple[FloatArray, float]:
     """Estimated positions (n, 3) and piston height whose mean grain has settled by ``gain``, in m.
 
-    What lacks is a uniform vertical strain, zero at the lowest grain.  The piston goes down as a
+    The rest is a uniform vertical strain, zero at the lowest grain.  The piston goes down as a
     bed does that is strained evenly by the whole gain, and is never placed above where it is.  A
     law of its own heights in the window is left aside as that of the grains is: in a long jump from
     a short window its noise would press the piston into the grains by a part of a radius.
     """
-    lacking = before.position[:, 2].mean() - target[:, 2].mean() - gain
+    rest = before.position[:, 2].mean() - target[:, 2].mean() - gain
     height = before.position[:, 2] - before.position[:, 2].min()
     mean = float(height.mean()) or 1.0
     target = target.copy()
-    target[:, 2] += lacking * height / mean if height.any() else lacking
+    target[:, 2] += rest * height / mean if height.any() else rest
     above = before.piston_height - float(before.position[:, 2].min())
     return target, before.piston_height - max(gain, 0.0) * above / mean
 

@@ -12,6 +12,7 @@ from adapters.errors import UsageError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 
 GRAIN_ARRAYS = ("identifier", "position", "radius", "mass", "velocity", "spin")

@@ -11,14 +11,13 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from adapters.jump_record import band_of_run
 from adapters.report_history import cost_total
-from adapters.report_record import Record, Track, record_read
+from adapters.report_record import Record, Track, band_of_run, record_read
 
 
 @dataclass(frozen=True)
 class Status:
-    """Where a run stands; SI units, None for what is not known yet."""
+    """How far a run is; SI units, None for what is not known yet."""
 
     run_folder: str
     state: str

@@ -60,7 +60,7 @@ class Sweep:
 
     @property
     def stop_file(self) -> Path:
-        """Its existence tells the members, wherever they run, to stop."""
+        """Where it exists, the members stop, wherever they run."""
         return self.folder / "stop"
 
     def groups(self) -> dict[str, list[Member]]:
@@ -115,7 +115,7 @@ def axes_of(assignments: Sequence[str]) -> dict[str, list[str]]:
         key, equals, text = (part.strip() for part in assignment.partition("="))
         if not equals or not key:
             raise UsageError(
-                f"can not read {assignment!r}", where="--set",
+                f"cannot read {assignment!r}", where="--set",
                 remedy="write table.key=value,value, such as --set loading.frequency=10,20,50",
             )  # fmt: skip
         if key in axes:
@@ -127,7 +127,7 @@ def axes_of(assignments: Sequence[str]) -> dict[str, list[str]]:
 
 
 def member_name(settings: Mapping[str, str], seed: int) -> str:
-    """A folder's name: the settings, with a digest where they can not all be part of it."""
+    """A folder's name: the settings, with a digest where they cannot all be part of it."""
     text = ",".join([*(f"{key}={value}" for key, value in settings.items()), f"{SEED}={seed}"])
     name = re.sub(r"[^\w.,=+-]", "-", text)[:NAME_LONGEST]
     return name if name == text else f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
@@ -200,7 +200,7 @@ def _refuse_twins(members: Sequence[Member]) -> None:
 
 
 def folder_check(sweep: Sweep) -> None:
-    """Raise when the folder can not be that of this sweep, or holds members that differ.
+    """Raise when the folder cannot be that of this sweep, or holds members that differ.
 
     `UsageError` for a folder of something else, `SceneError` with the differences where the scene
     was changed since a member was started.

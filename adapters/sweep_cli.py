@@ -24,7 +24,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--into", type=Path, required=True, metavar="FOLDER",
-        help="members, tables and picture; a sweep that is there is gone on with",
+        help="members, tables and picture; a sweep that is there is continued",
     )  # fmt: skip
     parser.add_argument(
         "--scheduler", default="local", metavar="WHERE",
@@ -99,7 +99,7 @@ def sweep_command(arguments: argparse.Namespace) -> int:
             f"{len(failed)} of {len(results)} members failed, the others are finished:\n"
             + "\n".join(lines),
             where=str(arguments.into),
-            remedy="mend the cause and give the same command again: it runs only these",
+            remedy="remove the cause and give the same command again: it runs only these",
         )
     return 0
 

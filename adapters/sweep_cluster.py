@@ -80,7 +80,7 @@ def _slurm(config: Path | None) -> Any:
         try:
             keywords = tomllib.loads(config.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            raise UsageError(f"can not read it as TOML ({error})", where=str(config)) from error
+            raise UsageError(f"cannot read it as TOML ({error})", where=str(config)) from error
     try:
         return SLURMCluster(**keywords)
     except (TypeError, ValueError) as error:

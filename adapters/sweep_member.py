@@ -27,7 +27,7 @@ COMMAND = (sys.executable, "-m", "trackbed")
 
 
 class SweepStopped(Exception):
-    """The sweep was told to stop while this member ran."""
+    """The sweep was stopped while this member ran."""
 
 
 @dataclass(frozen=True)

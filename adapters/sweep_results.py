@@ -112,9 +112,9 @@ def results_write(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
         rows = settlement_rows(sweep, member)
         curve_rows += [key | {name: row.get(name) for name in COLUMNS} for row in rows]
         figures = {name: rows[-1].get(name) if rows else None for name in SAMPLE_FIGURES}
-        told = vars(by_name[member.name]).items()
-        told_row = {name: value for name, value in told if name not in ("member", "seed")}
-        member_rows.append(key | told_row | figures)
+        result = vars(by_name[member.name]).items()
+        result_row = {name: value for name, value in result if name not in ("member", "seed")}
+        member_rows.append(key | result_row | figures)
     band_rows = [
         {
             **band.settings, "cycle": int(cycle), "seeds": band.seeds, "mean_m": float(mean),
@@ -128,7 +128,7 @@ def results_write(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
     for name, rows in tables.items():
         paths |= table_write(sweep.folder / name, rows)
     if bands:
-        from adapters.report_figures import figure_save
+        from adapters.report_drawing import figure_save
 
         picture = figure_save(lambda: bands_figure(bands), sweep.folder / "settlement.png")
         paths["picture"] = str(picture)
@@ -171,7 +171,7 @@ def bands_figure(bands: Sequence[Band]) -> Figure:
     from matplotlib import colormaps
     from matplotlib.figure import Figure
 
-    from adapters.report_figures import WIDTH
+    from adapters.report_drawing import WIDTH
 
     figure = Figure(figsize=(WIDTH, 3.9))
     linear, logarithmic = figure.subplots(1, 2, sharey=True)

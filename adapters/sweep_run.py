@@ -23,7 +23,7 @@ STOP_S = 30
 
 @dataclass(frozen=True)
 class Result:
-    """Where a member stands; SI units, None for what is not known."""
+    """How far a member is; SI units, None for what is not known."""
 
     member: str
     seed: int
@@ -57,7 +57,7 @@ class Cluster:
 
 
 def result_of(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
-    """Where a member stands, from its run folder and how its command ended, if it ran."""
+    """How far a member is, from its run folder and how its command ended, if it ran."""
     folder = sweep.run_folder(member)
     here = None
     try:
@@ -87,7 +87,7 @@ def result_of(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
 
 
 def sweep_run(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result]:
-    """Run every member that is not finished; where each stands afterwards, in the sweep's order.
+    """Run every member that is not finished; how far each is afterwards, in the sweep's order.
 
     A member that fails is named at once and holds no other up.  Raises `Interrupted` on SIGTERM
     and Ctrl-C, when all members are stopped.
@@ -144,7 +144,7 @@ def _run(
             _record(sweep, cluster, results)
             done = sum(one.state in ("finished", "failed") for one in results.values())
             if result.state != "stopped":
-                progress.say(f"{done} of {len(results)}: {_told(result)}")
+                progress.say(f"{done} of {len(results)}: {_summed_up(result)}")
 
         taken = set()
         try:
@@ -186,7 +186,7 @@ def _ended(future: Any) -> Ended:
         return Ended(5, f"its worker failed: {error or type(error).__name__}")
 
 
-def _told(result: Result) -> str:
+def _summed_up(result: Result) -> str:
     """A member's end in one line."""
     if result.state == "finished" and result.settlement_m is not None:
         return f"{result.member}: settlement {1e6 * result.settlement_m:.2f} um"
@@ -195,7 +195,7 @@ def _told(result: Result) -> str:
 
 
 def _record(sweep: Sweep, cluster: Cluster, results: dict[str, Result]) -> None:
-    """Write ``sweep.json``: where every member stands."""
+    """Write ``sweep.json``: how far every member is."""
     content = record_of(sweep, cluster, list(results.values()))
     write_atomically(sweep.folder / "sweep.json", json.dumps(content, indent=1) + "\n")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from pathlib import Path
@@ -253,8 +252,3 @@ def window_load(path: Path) -> Window:
         piston=PistonTrack(*(arrays[f"piston_{c.name}"] for c in fields(PistonTrack))),
         piston_start=float(arrays["piston_start"]),
     )
-
-
-def states(window: Window) -> Iterator[State]:
-    """All states of a window, the one before the first cycle included."""
-    return (window.state(index) for index in range(len(window.position)))

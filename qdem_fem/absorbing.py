@@ -22,17 +22,17 @@ took closes the account of energies.  The springs are forces as others and short
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.absorbing_step import Absorber
+from qdem_fem.assembly import Assembly
+from qdem_fem.body import Body
+from qdem_fem.conditions import Absorbing
+from qdem_fem.kernel_arrays import Constraints
 from qdem_fem.surface import face_area_vectors
-
-if TYPE_CHECKING:
-    from qdem_fem.body import Body
-    from qdem_fem.simulation import Simulation
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -89,13 +89,14 @@ def directions(tensor: Floats, free: Floats) -> tuple[Integers, Floats, Floats]:
 
 
 class Absorbers:
-    """Dashpots and springs at the nodes of a simulation's absorbing faces."""
+    """Dashpots and springs at the nodes of absorbing faces."""
 
-    def __init__(self, run: Simulation) -> None:
-        self.run = run
-        assembly, (_, held) = run.assembly, run.packed_lists()
+    def __init__(
+        self, assembly: Assembly, held: Constraints, absorbing: Sequence[Absorbing]
+    ) -> None:
+        self.assembly = assembly
         total = np.zeros((2, assembly.n_nodes, 3, 3))
-        for condition in run.conditions.absorbing:
+        for condition in absorbing:
             place = assembly.place[condition.nodes]
             np.add.at(total[0], place, condition.damping)
             np.add.at(total[1], place, condition.stiffness)
@@ -115,18 +116,18 @@ class Absorbers:
 
     def _along(self, field: Floats, at: Integers, direction: Floats) -> Floats:
         """Components along the directions of a field (n, 3)."""
-        flat = np.zeros((self.run.assembly.n_nodes, 3))
-        flat[self.run.assembly.place] = field
+        flat = np.zeros((self.assembly.n_nodes, 3))
+        flat[self.assembly.place] = field
         return np.asarray(np.einsum("dc,dc->d", flat[at // 4], direction))
 
     def _field(self, values: Floats, at: Integers, direction: Floats) -> Floats:
         """Values along the directions as a field (n, 3)."""
-        flat = np.zeros((self.run.assembly.n_nodes, 3))
+        flat = np.zeros((self.assembly.n_nodes, 3))
         np.add.at(flat, at // 4, values[:, None] * direction)
-        return np.asarray(flat[self.run.assembly.place])
+        return np.asarray(flat[self.assembly.place])
 
     def _rate(self, at: Integers, coefficient: Floats) -> Floats:
-        inverse = np.asarray(self.run.assembly.state.inverse_mass, dtype=float)
+        inverse = np.asarray(self.assembly.state.inverse_mass, dtype=float)
         return coefficient * inverse[at // 4]
 
     def spring_accelerations(self, displacement: Floats) -> Floats:
@@ -142,10 +143,10 @@ class Absorbers:
         stretch = self._along(displacement, a.spring_at, a.spring_direction)
         return 0.5 * float((a.stiffness * stretch**2).sum())
 
-    def slowed(self, velocity: Floats) -> Floats:
-        """Velocity now, of what half a step without dashpots would make it (n, 3) [m/s]."""
+    def slowed(self, velocity: Floats, step: float) -> Floats:
+        """Velocity now, of what half a ``step`` [s] without dashpots would make it (n, 3) [m/s]."""
         a = self.kernel
-        half = 0.5 * self.run.step * self._rate(a.at, a.damping)
+        half = 0.5 * step * self._rate(a.at, a.damping)
         lost = half / (1 + half) * self._along(velocity, a.at, a.direction)
         return velocity - self._field(lost, a.at, a.direction)
 
@@ -155,15 +156,8 @@ class Absorbers:
         speed = self._along(velocity, a.at, a.direction)
         return self._field(self._rate(a.at, a.damping) * speed, a.at, a.direction)
 
-    def half_taken(self, behind: Floats, level: Floats) -> float:
-        """Energy that the dashpots take in the half step up to now [J]."""
+    def half_taken(self, behind: Floats, level: Floats, step: float) -> float:
+        """Energy that the dashpots take in the half of a ``step`` [s] up to now [J]."""
         a = self.kernel
         before, now = (self._along(v, a.at, a.direction) for v in (behind, level))
-        return 0.25 * self.run.step * float((a.damping * now * (before + now)).sum())
-
-    def window(self, *words: Any) -> tuple[int, float]:
-        """`Assembly.window` of bodies that touch nothing."""
-        from qdem_fem.contact_window import window_run
-
-        done, bad, _ = window_run(self.run, None, *words)
-        return done, bad
+        return 0.25 * step * float((a.damping * now * (before + now)).sum())

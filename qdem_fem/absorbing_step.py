@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from qdem_fem.contact_kernel import exact, inlined
+from qdem_fem.compiling import exact, inlined
 
 
 class Absorber(NamedTuple):

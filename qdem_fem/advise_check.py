@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from qdem_fem.advise import Advice, advise, error_together
 from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import Prepared, scene_load
+from qdem_fem.scene_checks import scene_load
+from qdem_fem.scene_prepared import Prepared
 from qdem_fem.track_recipe import SLEEPER
 
 SAMPLES = 200

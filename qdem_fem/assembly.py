@@ -13,8 +13,9 @@ from qdem_fem import kernel
 from qdem_fem.body import Body
 from qdem_fem.body_frames import BodyFrames
 from qdem_fem.conditions import Conditions
+from qdem_fem.kernel_arrays import Constraints, Fields, Loads, Probes
 from qdem_fem.layout import aligned_zeros, layout_build
-from qdem_fem.reference_forces import Strain
+from qdem_fem.strain_measures import Strain
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,11 +28,11 @@ FRAME_ARRAYS = ("rotation", "shift", "velocity")
 EDGE = 2.0
 """Edge of a regular tetrahedron over the cube root of its volume."""
 
-NO_LOADS = kernel.Loads(*(np.zeros(0, np.int64),) * 3, np.zeros(0))
-NO_CONSTRAINTS = kernel.Constraints(
+NO_LOADS = Loads(*(np.zeros(0, np.int64),) * 3, np.zeros(0))
+NO_CONSTRAINTS = Constraints(
     *(np.zeros(0, np.int64),) * 2, np.zeros(0), np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 3))
 )
-NO_PROBES = kernel.Probes(np.zeros(0, np.int64), np.zeros((0, 0, 3)), 1, 1)
+NO_PROBES = Probes(np.zeros(0, np.int64), np.zeros((0, 0, 3)), 1, 1)
 
 EVERY = slice(None)
 """Of all nodes."""
@@ -98,7 +99,7 @@ class Assembly:
         used = self.mass > 0
         inverse[self.packed.node_place[used]] = 1 / self.mass[used]
         self.state = self._state(inverse)
-        self._scratch: kernel.State | None = None
+        self._scratch: Fields | None = None
         self.frames: BodyFrames | None = None
         """Of free bodies in single precision."""
         self._nodes = np.concatenate([body.nodes for body in bodies])
@@ -107,11 +108,11 @@ class Assembly:
         self._joined = master != np.arange(self.n_nodes)
         self._joined[master[self._joined]] = True
 
-    def _state(self, inverse_mass: Floats) -> kernel.State:
+    def _state(self, inverse_mass: Floats) -> Fields:
         numbers = 4 * self.n_nodes
         inverse = aligned_zeros(self.n_nodes, self.dtype)
         inverse[:] = inverse_mass
-        return kernel.State(
+        return Fields(
             aligned_zeros(numbers, self.dtype),
             aligned_zeros(numbers, self.dtype),
             aligned_zeros(self.packed.window_count, self.dtype),
@@ -227,9 +228,9 @@ class Assembly:
         self,
         steps: int,
         step: float,
-        loads: kernel.Loads,
-        held: kernel.Constraints,
-        probes: kernel.Probes,
+        loads: Loads,
+        held: Constraints,
+        probes: Probes,
         table: Floats,
         gravity: Floats | None,
         work: Floats,
@@ -260,12 +261,12 @@ class Assembly:
 
     def kernel_run(
         self,
-        state: kernel.State,
+        state: Fields,
         steps: int,
         step: float,
-        loads: kernel.Loads,
-        held: kernel.Constraints,
-        probes: kernel.Probes,
+        loads: Loads,
+        held: Constraints,
+        probes: Probes,
         table: Floats,
         gravity: Floats | None,
         work: Floats,
@@ -287,7 +288,7 @@ class Assembly:
         self,
         displacement: Floats,
         velocity: Floats,
-        loads: kernel.Loads,
+        loads: Loads,
         table: Floats,
         gravity: Floats | None,
     ) -> Floats:
@@ -307,7 +308,7 @@ class Assembly:
         self,
         displacement: Floats,
         velocity: Floats,
-        loads: kernel.Loads,
+        loads: Loads,
         table: Floats,
         gravity: Floats | None,
     ) -> Floats:
@@ -325,7 +326,7 @@ class Assembly:
         return self._read(scratch.velocity) - before
 
     @property
-    def scratch(self) -> kernel.State:
+    def scratch(self) -> Fields:
         """A state beside that of the bodies, with their masses."""
         if self._scratch is None:
             self._scratch = self._state(np.asarray(self.state.inverse_mass, dtype=float))
@@ -345,7 +346,7 @@ class Assembly:
         self.scratch.forces[:] = 0.0
         return float(work[2])
 
-    def hold(self, values: Floats, held: kernel.Constraints) -> Floats:
+    def hold(self, values: Floats, held: Constraints) -> Floats:
         """``values`` (n, 3) without their parts along held components and roller normals."""
         flat = np.zeros(4 * self.n_nodes)
         flat.reshape(-1, 4)[self.place, :3] = values
@@ -356,9 +357,7 @@ class Assembly:
         flat[held.node_at] = 0.0
         return flat.reshape(-1, 4)[self.place, :3]
 
-    def lists(
-        self, conditions: Conditions, gravity: bool
-    ) -> tuple[kernel.Loads, kernel.Constraints]:
+    def lists(self, conditions: Conditions, gravity: bool) -> tuple[Loads, Constraints]:
         """The kernel's lists of loads and constraints; in single precision, frames to suit."""
         if self.dtype == np.float32:
             self._frames_choose(conditions, gravity)

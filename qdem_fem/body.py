@@ -2,32 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qdem_fem.errors import ConditionError, MaterialError
+from qdem_fem.kinematics import displacement_gradient, von_mises
 from qdem_fem.material import Material
 from qdem_fem.mesh import TetMesh, element_gradients, mesh_read
-from qdem_fem.reference_forces import (
-    STRESS,
-    Strain,
-    displacement_gradient,
-    stress_cauchy,
-    von_mises,
-)
 from qdem_fem.rigid_mass import RigidMass, rigid_mass
+from qdem_fem.strain_measures import MEASURES, Strain, stress_cauchy
 from qdem_fem.surface import surface_faces
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Rigid = bool | Literal["lumped"]
 """Whether a body is rigid, and with which inertia; `Body` says what each means."""
+
+
+class Mover(Protocol):
+    """What moves a body: it has the body's fields while it does."""
+
+    strain: Strain
+
+    def field_of(self, body: Body, name: str) -> Floats:
+        """``displacement`` [m] or ``velocity`` [m/s] of the body's nodes now, (n, 3)."""
+
+    def field_set(self, body: Body, name: str, values: Floats) -> None:
+        """Set one of them."""
+
+    def velocities(self, bodies: Sequence[Body]) -> Floats:
+        """Velocities of some bodies, one after the other [m/s], (n, 3)."""
 
 
 class Body:
@@ -67,7 +75,8 @@ class Body:
         self.material = material.per_element(len(self.mesh.elements))
         self._displacement = np.zeros_like(self.mesh.nodes)
         self._velocity = np.zeros_like(self.mesh.nodes)
-        self._simulation: Simulation | None = None
+        self.mover: Mover | None = None
+        """The simulation that the body is in."""
 
     @property
     def nodes(self) -> Floats:
@@ -101,42 +110,44 @@ class Body:
 
         Set all of it, before or between advances: ``body.displacement = ...``.
         """
-        if self._simulation is not None:
-            return self._simulation._field_of(self, "displacement")
+        if self.mover is not None:
+            return self.mover.field_of(self, "displacement")
         return self._displacement.copy()
 
     @displacement.setter
     def displacement(self, value: ArrayLike) -> None:
         field = self._checked(value, "displacement")
-        if self._simulation is not None:
-            self._simulation._field_set(self, "displacement", field)
+        if self.mover is not None:
+            self.mover.field_set(self, "displacement", field)
         self._displacement = field
 
     @property
     def velocity(self) -> Floats:
         """Velocity of the nodes [m/s], (n, 3), at the time of the displacement, a copy."""
-        if self._simulation is not None:
-            return self._simulation._field_of(self, "velocity")
+        if self.mover is not None:
+            return self.mover.field_of(self, "velocity")
         return self._velocity.copy()
 
     @velocity.setter
     def velocity(self, value: ArrayLike) -> None:
         field = self._checked(value, "velocity")
-        if self._simulation is not None:
-            self._simulation._field_set(self, "velocity", field)
+        if self.mover is not None:
+            self.mover.field_set(self, "velocity", field)
         self._velocity = field
 
     @property
     def strain(self) -> Strain:
         """The strain measure of the simulation the body is in; the paper's outside of one."""
-        return self._simulation.strain if self._simulation is not None else "finger"
+        return self.mover.strain if self.mover is not None else "finger"
 
     def stress(self) -> Floats:
         """Elastic Cauchy stress of the elements [Pa], (m, 3, 3) (eq. 2); zero of a rigid body."""
         if self.rigid:
             return np.zeros((len(self.elements), 3, 3))
         gradient = displacement_gradient(self.gradients[0], self.elements, self.displacement)
-        nominal = STRESS[self.strain](gradient, self.material.lame_first, self.material.lame_second)
+        nominal = MEASURES[self.strain].stress_nominal(
+            gradient, self.material.lame_first, self.material.lame_second
+        )
         return stress_cauchy(gradient, nominal, self.strain)
 
     def von_mises(self) -> Floats:

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem import kernel
+from qdem_fem.kernel_arrays import Loads, Probes
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -136,7 +136,7 @@ class BodyFrames:
         """Vectors of the frames (n, 3), at all nodes or some, as the laboratory sees them."""
         return np.einsum("nij,nj->ni", self.rotation[self.of_node[nodes]], own)
 
-    def loads_turned(self, loads: kernel.Loads, user_node: Integers) -> kernel.Loads:
+    def loads_turned(self, loads: Loads, user_node: Integers) -> Loads:
         """Loads in the directions of the frames; ``user_node`` (n,): number by kernel number.
 
         Each component that acts on a node of a turned frame becomes three.
@@ -148,7 +148,7 @@ class BodyFrames:
         first = loads.node_at - component
         window = (loads.force_at - loads.node_at)[:, None]
         at = first[:, None] + np.arange(3)
-        return kernel.Loads(
+        return Loads(
             force_at=(at + window).ravel(),
             node_at=at.ravel(),
             series=np.repeat(loads.series, 3),
@@ -174,7 +174,7 @@ class BodyFrames:
         self.velocity = self.velocity + faster
 
     def probes_world(
-        self, probes: kernel.Probes, user_node: Integers, done: int, step: float, journey: Journey
+        self, probes: Probes, user_node: Integers, done: int, step: float, journey: Journey
     ) -> None:
         """Turn the samples of a window of ``done`` steps into displacements of the laboratory."""
         nodes = user_node[probes.node_at // 4]
@@ -186,7 +186,7 @@ class BodyFrames:
             probes.record[sample] = self._displacement_at(nodes, probes.record[sample], shift)
 
     def carried_work(
-        self, loads: kernel.Loads, user_node: Integers, table: Floats, step: float, journey: Journey
+        self, loads: Loads, user_node: Integers, table: Floats, step: float, journey: Journey
     ) -> float:
         """Work of the loads along the frames' own way [J]: ``dt sum_k F(t_k) (V- + V+)/2``.
 

@@ -13,7 +13,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,7 @@ from qdem_fem.errors import CheckpointError
 from qdem_fem.motion import Motion
 from qdem_fem.output import write_whole
 from qdem_fem.series import Driver, Series
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.state import State
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -38,7 +36,7 @@ FUNCTION = "a function, not compared"
 
 
 def checkpoint_write(
-    simulation: Simulation, path: str | Path, beside: Mapping[str, NDArray[Any]] | None = None
+    simulation: State, path: str | Path, beside: Mapping[str, NDArray[Any]] | None = None
 ) -> None:
     """Write the state of ``simulation`` to ``path``; a kill leaves the old file or the new one.
 
@@ -73,7 +71,7 @@ def checkpoint_write(
     write_whole(Path(path), _sealed(stream.getvalue()))
 
 
-def checkpoint_read(simulation: Simulation, path: str | Path) -> Arrays:
+def checkpoint_read(simulation: State, path: str | Path) -> Arrays:
     """Give ``simulation`` the state in ``path``; it then goes on as the one that was saved.
 
     Returns what was saved beside it.
@@ -101,7 +99,7 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> Arrays:
     except (KeyError, TypeError) as error:
         raise CheckpointError(f"a part of the state is not there ({error})", where=where) from error
     held.previous[:] = previous
-    simulation._critical = critical
+    simulation.elements_critical_step = critical
     simulation.motion = motion
     return {
         name.removeprefix(BESIDE): array
@@ -110,15 +108,15 @@ def checkpoint_read(simulation: Simulation, path: str | Path) -> Arrays:
     }
 
 
-def fingerprint(simulation: Simulation) -> dict[str, str]:
+def fingerprint(simulation: State) -> dict[str, str]:
     """What makes a simulation this one and no other, by names a user knows."""
     conditions = simulation.conditions
     marks = {
         "bodies": ", ".join(body.name for body in simulation.bodies),
         "strain": simulation.strain,
         "precision": simulation.precision,
-        "step": f"given, {simulation._given_step!r} s"
-        if simulation._given_step is not None
+        "step": f"given, {simulation.given_step!r} s"
+        if simulation.given_step is not None
         else f"{simulation.safety!r} of the critical one",
         "mass_scaling": repr(simulation.mass_scaling),
         "gravity": "none" if simulation.gravity is None else _driver_mark(simulation.gravity),

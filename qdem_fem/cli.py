@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
-    from qdem_fem.scene_checks import Prepared
+    from qdem_fem.scene_prepared import Prepared
 
 TRIAL = 0.5
 """Time that a dry run may spend on trial steps to tell the cost [s]."""

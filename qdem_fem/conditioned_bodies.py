@@ -2,42 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from qdem_fem.body import Body
-from qdem_fem.conditions import COMPONENTS, Absorbing, Conditions, Held, NodalLoad, Roller
+from qdem_fem.conditions import COMPONENTS, Absorbing, Held, NodalLoad, Roller
 from qdem_fem.errors import ConditionError
+from qdem_fem.leapfrog import velocities_level
+from qdem_fem.periodic import partners
 from qdem_fem.series import Driver, Value, is_real
-from qdem_fem.simulation_options import bodies_check, bodies_number
+from qdem_fem.state import State
 from qdem_fem.surface import faces_within, pressure_forces
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-class ConditionedBodies:
-    """Bodies side by side, numbered through, and what holds, moves and loads them.
+class ConditionedBodies(State):
+    """The words that give bodies conditions: what holds, moves and loads them.
 
     Base of `qdem_fem.Simulation`.  A selection of nodes is a mask (n,), an index or indices.
     """
-
-    def __init__(self, bodies: Sequence[Body]) -> None:
-        if not isinstance(bodies, Iterable):
-            raise ConditionError(f"{bodies!r} is no list of bodies", where="simulation")
-        self.bodies = list(bodies)
-        bodies_check(self.bodies)
-        bodies_number(self.bodies)
-        self.conditions = Conditions()
-        counts = [len(body.nodes) for body in self.bodies]
-        self.first_node = np.concatenate([[0], np.cumsum(counts)])
-        """First node of every body in the numbers of all, and their count, (bodies + 1,)."""
-        self._starts = {id(b): int(at) for b, at in zip(self.bodies, self.first_node, strict=False)}
-        self.master = np.arange(self.first_node[-1])
-        """The node that a node moves with: itself unless periodic, (n,)."""
 
     def fix(self, body: Body, nodes: Any, components: str = "xyz") -> Held:
         """Hold components of nodes where they are in the reference configuration."""
@@ -75,9 +62,9 @@ class ConditionedBodies:
             )
         self._deformable_check(body, "roller", "fix components of its nodes")
         roller = Roller(self._nodes(body, nodes, "roller"), direction / length)
-        self._before_change()
+        velocities_level(self)
         self.conditions.rollers.append(roller)
-        self._changed(ties=True)
+        self.conditions_changed(ties=True)
         return roller
 
     def load(
@@ -108,15 +95,21 @@ class ConditionedBodies:
         """
         from qdem_fem.absorbing import face_tensors
 
+        if self.precision != "float64" or self.device != "cpu":
+            raise ConditionError(
+                "absorbing faces are computed in double precision on the processor",
+                where="absorb",
+                remedy='take precision="float64" and device="cpu"',
+            )
         if depth is not None and not (is_real(depth) and np.isfinite(depth) and depth > 0):
             raise ConditionError(f"a depth of {depth!r} m is not above zero", where="absorb")
         self._deformable_check(body, "absorb", "leave it deformable")
         local, faces = self._faces(body, nodes, "absorb")
         damping, stiffness = (part[local] for part in face_tensors(body, faces, depth))
         absorbing = Absorbing(self._nodes(body, local, "absorb"), damping, stiffness)
-        self._before_change()
+        velocities_level(self)
         self.conditions.absorbing.append(absorbing)
-        self._changed(ties=True)
+        self.conditions_changed(ties=True)
         return absorbing
 
     def periodic(self, body: Body, nodes_a: Any, nodes_b: Any, tolerance: float = 1e-6) -> None:
@@ -125,9 +118,7 @@ class ConditionedBodies:
         The faces differ by one shift along an axis; partners are found by the other two
         coordinates within ``tolerance`` of the body's size.  Before the first advance only.
         """
-        from qdem_fem.periodic import partners
-
-        if self._begun():
+        if self.begun:
             raise ConditionError(
                 "the simulation has begun",
                 where="periodic",
@@ -149,14 +140,14 @@ class ConditionedBodies:
         )  # fmt: skip
         for conditions in lists:
             if condition in conditions:
-                self._before_change()
+                velocities_level(self)
                 conditions.remove(condition)
-                self._changed(ties=not isinstance(condition, NodalLoad))
+                self.conditions_changed(ties=not isinstance(condition, NodalLoad))
                 return
         raise ConditionError("it is none of the simulation's conditions", where="remove")
 
     def _offset(self, body: Body) -> int:
-        start = self._starts.get(id(body))
+        start = self.starts.get(id(body))
         if start is None:
             name = body.name if isinstance(body, Body) else f"a {type(body).__name__}"
             raise ConditionError(
@@ -217,28 +208,18 @@ class ConditionedBodies:
         return every[nodes - self._offset(body)]
 
     def _hold(self, held: Held) -> Held:
-        self._before_change()
+        velocities_level(self)
         self.conditions.held.append(held)
-        self._changed(ties=True)
+        self.conditions_changed(ties=True)
         return held
 
     def _load(self, load: NodalLoad) -> NodalLoad:
-        self._before_change()
+        velocities_level(self)
         self.conditions.loads.append(load)
-        self._changed(ties=False)
+        self.conditions_changed(ties=False)
         return load
 
     @staticmethod
     def _deformable_check(body: Body, where: str, remedy: str) -> None:
         if body.rigid:
             raise ConditionError(f"{body.name} is rigid", where=where, remedy=remedy)
-
-    def _begun(self) -> bool:
-        """Whether nodes can no longer be joined."""
-        return False
-
-    def _before_change(self) -> None:
-        """Called before the conditions change."""
-
-    def _changed(self, ties: bool) -> None:
-        """Called when they have changed; ``ties``: in what is held."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.errors import ConditionError
-from qdem_fem.kernel import Constraints, Loads
+from qdem_fem.kernel_arrays import Constraints, Loads
 from qdem_fem.layout import Packed
 from qdem_fem.series import Driver
 

@@ -8,15 +8,14 @@ No fast mathematics here: a force and its reaction are the same number.
 
 from __future__ import annotations
 
-import hashlib
 from math import sqrt
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
 from numba.extending import overload
 
+from qdem_fem.compiling import exact, inlined
 from qdem_fem.contact_search import Pairs
 
 BLOCK = 512
@@ -26,18 +25,6 @@ GO_ON, LOOK_ANEW, TOO_DEEP = 0, 1, 2
 spheres are too deep in each other."""
 DEEPEST = 1.0
 """Overlap over the smaller radius at which the model ends: a centre lies in the other sphere."""
-
-
-def sources_digest(*names: str) -> str:
-    """SHA-256 of files of this folder: a part of the key of what is compiled from them."""
-    digest = hashlib.sha256()
-    for name in names:
-        digest.update(Path(__file__).with_name(name).read_bytes())
-    return digest.hexdigest()
-
-
-exact: Any = njit(error_model="numpy")
-inlined: Any = njit(error_model="numpy", forceinline=True)
 
 
 class Spheres(NamedTuple):

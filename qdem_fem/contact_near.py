@@ -17,7 +17,7 @@ elements with `qdem_fem.contact_step.network_bound` of the springs near: lower, 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,32 +25,40 @@ from numpy.typing import NDArray
 from qdem_fem.contact_step import network_bound, step_with_contact
 from qdem_fem.critical_step import critical_step_find
 from qdem_fem.errors import Unstable
-
-if TYPE_CHECKING:
-    from qdem_fem.contact_state import Contacts
+from qdem_fem.system import System
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
-def near_step(contacts: Contacts) -> float:
-    """Critical step [s] for any contacts there can be before pairs are looked for anew."""
-    ends, stiffness, wall = contacts.springs_near()
-    run = contacts.run
+def near_step(
+    run: System,
+    near: tuple[Integers, Floats, Floats],
+    nodes: Integers,
+    inverse_mass: Floats,
+    rigid: Callable[[Floats], Floats],
+    elements: float,
+) -> float:
+    """Critical step [s] for any contacts there can be before pairs are looked for anew.
+
+    ``near``: ends (p, 2) and stiffness (p,) of springs between vertices, stiffness (c,) of those
+    to walls [N/m]; ``nodes`` (c,), ``inverse_mass`` (c,) [1/kg]: of the vertices; ``rigid``: as in
+    `network_bound`; ``elements``: critical step of bodies that touch nothing [s].
+    """
+    ends, stiffness, wall = near
     if run.rigid is not None:
-        inverse_mass, rigid = contacts.inverse_mass, contacts.rigid_bound
         bound = network_bound(ends, stiffness, wall, inverse_mass, rigid)
-        elements = run.elements_critical_step.value
         return step_with_contact(elements, bound, viscous=run.viscous)
 
     def springs(u: Floats) -> Floats:
         """``-M^-1 K_near u`` [m/s^2], (n, 3)."""
-        moved = u[contacts.nodes]
+        moved = u[nodes]
         pull = -wall[:, None] * moved
         of_pairs = stiffness[:, None] * (moved[ends[:, 1]] - moved[ends[:, 0]])
         np.add.at(pull, ends[:, 0], of_pairs)
         np.subtract.at(pull, ends[:, 1], of_pairs)
         change = np.zeros_like(u)
-        change[contacts.nodes] = pull * contacts.inverse_mass[:, None]
+        change[nodes] = pull * inverse_mass[:, None]
         return change
 
     return critical_step_find(run, springs).value

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 from qdem_fem.contact_spheres import SphereContact
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.errors import ConditionError
+from qdem_fem.system import System
 
 if TYPE_CHECKING:
     from qdem_fem.contact_state import Contacts
-    from qdem_fem.simulation import Simulation
 
 Contact = SphereContact | SurfaceContact
 
@@ -39,7 +39,7 @@ def contact_options_check(contact: Any, precision: str, device: str) -> None:
         )
 
 
-def contacts_of(run: Simulation, contact: Contact) -> Contacts:
+def contacts_of(run: System, contact: Contact) -> Contacts:
     """What computes a contact; its kernels are loaded when a simulation first needs them."""
     if isinstance(contact, SphereContact):
         if run.device != "cpu":

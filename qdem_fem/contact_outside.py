@@ -8,15 +8,12 @@ other, as images of the same nodes, so that what slides over the side stays on a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.periodic import PeriodicWidth, twins_joined
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.system import System
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -74,7 +71,7 @@ def outside_of(
     )  # fmt: skip
 
 
-def outsides_of(run: Simulation, side: PeriodicWidth | None, reach: float) -> list[Outside]:
+def outsides_of(run: System, side: PeriodicWidth | None, reach: float) -> list[Outside]:
     """`outside_of` every body; of slabs, images of faces up to ``reach`` [m] beyond a side."""
     found = []
     for body, start in zip(run.bodies, run.first_node, strict=False):

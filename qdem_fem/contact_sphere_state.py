@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,7 @@ from qdem_fem.contact_state import (
     Integers,
 )
 from qdem_fem.contact_step import network_bound
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.system import System
 
 PARTED = 1 + 1e-9
 """By how much a list reaches farther than what has parted, for round-off."""
@@ -43,7 +41,7 @@ class SphereContacts(Contacts):
 
     kernel: Contact
 
-    def __init__(self, run: Simulation, asked: SphereContact) -> None:
+    def __init__(self, run: System, asked: SphereContact) -> None:
         outside = [
             replace(o, node=o.node[o.own], reference=o.reference[o.own], own=o.own[o.own])
             for o in outsides_of(run, asked.periodic, 0.0)

@@ -7,12 +7,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem import kernel
 from qdem_fem.contact_inside import inside_check
 from qdem_fem.contact_kernel import LOOK_ANEW, TOO_DEEP
 from qdem_fem.contact_near import near_check, near_step
@@ -21,12 +20,11 @@ from qdem_fem.contact_spheres import NEAR, SphereContact
 from qdem_fem.contact_step import allowed_bound, no_rigid, step_with_contact
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.contact_window import advance_of, window_run
+from qdem_fem.critical_step import CriticalStep
 from qdem_fem.errors import ConditionError, ContactTooDeep, StepWarning
+from qdem_fem.kernel_arrays import Constraints, Loads, Probes
 from qdem_fem.periodic import PeriodicWidth, extents, extents_check, joined_check
-
-if TYPE_CHECKING:
-    from qdem_fem.critical_step import CriticalStep
-    from qdem_fem.simulation import Simulation
+from qdem_fem.system import System
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -73,7 +71,7 @@ class Contacts(ABC):
     """By how much that may be more for no body to meet its own image across the width [m]."""
 
     def __init__(
-        self, run: Simulation, asked: SphereContact | SurfaceContact, outside: Sequence[Outside]
+        self, run: System, asked: SphereContact | SurfaceContact, outside: Sequence[Outside]
     ) -> None:
         self.run, self.asked, self.contacts = run, asked, asked.contacts
         self.outside = outside
@@ -167,15 +165,21 @@ class Contacts(ABC):
             return no_rigid(stiffness)
         return self.run.rigid.frequency_bound(self.nodes, stiffness)
 
-    def held_anew(self) -> None:
-        """What is held has changed."""
+    def bounds_forget(self) -> None:
+        """What is held has changed: find the bounds on the step again when they are needed."""
         self._allowed = self._near = None
 
-    def near_step(self) -> float:
-        """`qdem_fem.contact_near.near_step` of the present list of pairs [s]."""
+    def near_step(self, elements: float) -> float:
+        """`qdem_fem.contact_near.near_step` of the present list of pairs [s].
+
+        ``elements``: critical step of bodies that touch nothing [s].
+        """
         self.refresh()
         if self._near is None:
-            self._near = near_step(self)
+            self._near = near_step(
+                self.run, self.springs_near(), self.nodes, self.inverse_mass, self.rigid_bound,
+                elements,
+            )  # fmt: skip
         return self._near
 
     # --- in a march ----------------------------------------------------------------------------
@@ -234,8 +238,8 @@ class Contacts(ABC):
         return self.when if self.run.steps_done else "contact.periodic.width"
 
     def window(
-        self, steps: int, step: float, loads: kernel.Loads, held: kernel.Constraints,
-        probes: kernel.Probes, table: Floats, gravity: Floats | None, work: Floats,
+        self, steps: int, step: float, loads: Loads, held: Constraints,
+        probes: Probes, table: Floats, gravity: Floats | None, work: Floats,
     ) -> tuple[int, float]:  # fmt: skip
         """`Assembly.window` with contact; comes back early where pairs have to be looked for."""
         done, bad, said = self.march(steps, step, loads, held, probes, table, gravity, work)
@@ -261,8 +265,7 @@ class Contacts(ABC):
     @property
     def when(self) -> str:
         """The time, for messages; at the start without the step, which may ask for the contacts."""
-        done = self.run.steps_done
-        return f"t = {self.run.time if done else 0:.6g} s, step {done}"
+        return f"t = {self.run.motion.time:.6g} s, step {self.run.steps_done}"
 
     def deep_check(self, said: int) -> None:
         """Raise `ContactTooDeep` with the deepest contact where a step said so."""
@@ -275,13 +278,14 @@ class Contacts(ABC):
         body = int(np.searchsorted(self.run.first_node, node, side="right")) - 1
         return f"node {node - self.run.first_node[body]} of {self.run.bodies[body].name}"
 
-    def step_check(self, last: bool) -> None:
-        """Warn where the contacts there are now make the step too long; ``last``: of a march.
+    def step_check(self, step: float, elements: float, last: bool) -> None:
+        """Warn where the contacts there are now make a ``step`` [s] too long.
 
+        ``elements``: critical step of bodies that touch nothing [s]; ``last``: step of a march.
         Raises `Unstable` where those near now would, if the step was made for those near once.
         """
         if self.contacts == NEAR:
-            near_check(self.run.step, self.near_step(), self.where)
+            near_check(step, self.near_step(elements), self.where)
             return
         if not last and self.run.steps_done < self.checked + CHECKED:
             return
@@ -289,13 +293,12 @@ class Contacts(ABC):
         bound = self.stiffness_now()
         if bound <= max(self.allowed, self.warned):
             return
-        elements = self.run.elements_critical_step.value
         own = step_with_contact(elements, bound, viscous=self.run.viscous)
-        if self.run.step > own:
+        if step > own:
             self.warned = bound
             warnings.warn(
-                f"t = {self.run.time:.6g} s: a vertex has more contacts than the step allows for; "
-                f"it is {self.run.step:.4g} s, and only {own:.4g} s is sure to be stable; name "
+                f"t = {self.run.motion.time:.6g} s: a vertex has more contacts than the step "
+                f"allows for; it is {step:.4g} s, and only {own:.4g} s is sure to be stable; name "
                 f"more contacts than {self.contacts:g}",
                 StepWarning,
                 stacklevel=5,
@@ -304,7 +307,7 @@ class Contacts(ABC):
     def critical_step(self, elements: CriticalStep) -> CriticalStep:
         """The critical step of the elements, made shorter by the contacts it allows for."""
         if self.contacts == NEAR:
-            return replace(elements, value=min(elements.value, self.near_step()))
+            return replace(elements, value=min(elements.value, self.near_step(elements.value)))
         value = step_with_contact(elements.value, self.allowed, viscous=self.run.viscous)
         remark = elements.remark
         if isfinite(elements.value) and value < elements.value * SHORTER:

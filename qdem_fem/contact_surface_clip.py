@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact_kernel import exact, inlined
+from qdem_fem.compiling import exact, inlined
 from qdem_fem.contact_surface_geometry import cross, dot, less, scaled
 
 CORNERS = 8

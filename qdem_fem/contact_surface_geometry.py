@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact_kernel import exact, inlined, minus, row
+from qdem_fem.compiling import exact, inlined
+from qdem_fem.contact_kernel import minus, row
 
 TIE = 1e-9
 """Relative difference of squared distances below which two faces are equally near."""

@@ -10,19 +10,23 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from qdem_fem import (
+    contact_kernel,
+    contact_surface_clip,
+    contact_surface_geometry,
+    contact_surface_overlaps,
+)
+from qdem_fem.compiling import exact, inlined, sources_digest
 from qdem_fem.contact_kernel import (
     GO_ON,
     LOOK_ANEW,
     TOO_DEEP,
-    exact,
     image_less,
-    inlined,
     minus,
     row,
     row_put,
     series,
     slider,
-    sources_digest,
 )
 from qdem_fem.contact_surface_geometry import (
     blend,
@@ -41,13 +45,7 @@ FLAT = 50
 """Power of a cosine: a vertex or an edge 1 degree from flat bears under 1 %, 10 degrees, half."""
 PARALLEL = 1e-6
 """Square of the sine of the angle between edges below which they do not cross."""
-SOURCES = (
-    "contact_kernel.py",
-    "contact_surface_geometry.py",
-    "contact_surface_clip.py",
-    "contact_surface_overlaps.py",
-    "contact_surface_kernel.py",
-)
+SOURCES = contact_kernel, contact_surface_geometry, contact_surface_clip, contact_surface_overlaps
 
 
 @inlined
@@ -274,4 +272,4 @@ def surface_step_build(made_from: str) -> Any:
     return surface_advance
 
 
-surface_step: Any = surface_step_build(sources_digest(*SOURCES))
+surface_step: Any = surface_step_build(sources_digest(__file__, *SOURCES))

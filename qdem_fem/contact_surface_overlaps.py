@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact_kernel import exact, image_less, inlined, row, row_put, series, slider
+from qdem_fem.compiling import exact, inlined
+from qdem_fem.contact_kernel import image_less, row, row_put, series, slider
 from qdem_fem.contact_surface_clip import (
     COLUMNS,
     CORNERS,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,7 @@ from qdem_fem.contact_surface_search import (
     overlaps_renew,
 )
 from qdem_fem.surface import face_area_vectors
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.system import System
 
 TOUCH_ARRAYS = ("start", "position", "force", "account")
 WALL_ARRAYS = ("weight", "spring", "force")
@@ -34,7 +32,7 @@ class SurfaceContacts(Contacts):
 
     kernel: SurfaceTouch
 
-    def __init__(self, run: Simulation, asked: SurfaceContact) -> None:
+    def __init__(self, run: System, asked: SurfaceContact) -> None:
         edge = [
             np.linalg.norm(np.diff(body.nodes[body.surface[:, :2]], axis=1), axis=2)
             for body in run.bodies

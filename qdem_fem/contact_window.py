@@ -7,31 +7,30 @@ displacement is, and wait for the next step; so the springs and the fields are o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numba
+import numpy as np
 from numba import njit
 from numba.core import types
 from numba.extending import overload
 
-from qdem_fem import kernel
+from qdem_fem import absorbing_step, contact_surface_kernel, kernel, lanes, rigid_step, stress
 from qdem_fem.absorbing_step import Absorber, absorber_begin, absorber_end
+from qdem_fem.compiling import exact, sources_digest
 from qdem_fem.contact_kernel import (
     GO_ON,
     Contact,
     advance_one,
     advance_threads,
-    exact,
-    sources_digest,
 )
-from qdem_fem.contact_surface_kernel import SOURCES as SURFACE_SOURCES
 from qdem_fem.contact_surface_kernel import surface_step
+from qdem_fem.kernel_arrays import Constraints, Loads, Probes
 from qdem_fem.rigid_step import Rigid, rigid_advance
+from qdem_fem.strain_measures import MEASURES
+from qdem_fem.system import System
 
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
-
-SOURCES = "kernel.py", "stress.py", "lanes.py", "rigid_step.py", "absorbing_step.py"
+SOURCES = kernel, stress, lanes, rigid_step, absorbing_step, contact_surface_kernel
 THREAD_SPHERES = 16_384
 """Fewer spheres than this for each thread lose more at barriers than they gain."""
 WINDOW_ONE: Any = kernel.window_kernel(1)
@@ -118,7 +117,7 @@ def probes_of(absorber: Any, probes: Any) -> Any:
 def _probes_of(absorber: Any, probes: Any) -> Any:
     if isinstance(absorber, types.NoneType):
         return lambda absorber, probes: probes
-    return lambda absorber, probes: kernel.Probes(probes.node_at, probes.record, probes.stride, 2)
+    return lambda absorber, probes: Probes(probes.node_at, probes.record, probes.stride, 2)
 
 
 def absorb_behind(
@@ -199,7 +198,7 @@ def contact_window_build(made_from: str) -> Any:
             for i in acting:
                 for c in range(3):
                     forces[force_at[i] + c] += pull[i, c]
-            ahead = kernel.Probes(probes.node_at, probes.record, probes.stride, probes.first - k)
+            ahead = Probes(probes.node_at, probes.record, probes.stride, probes.first - k)
             row, fall = table[k : k + 2], gravity_from(gravity, k)
             absorb_before(absorber, forces, state)
             rigid_of(rigid, forces, state, row, fall, work, step)
@@ -223,10 +222,12 @@ def contact_window_build(made_from: str) -> Any:
     return contact_window
 
 
-contact_window: Any = contact_window_build(sources_digest(*SOURCES, *SURFACE_SOURCES))
+contact_window: Any = contact_window_build(
+    sources_digest(*SOURCES, *contact_surface_kernel.SOURCES, *MEASURES.values())
+)
 
 
-def threads_of(run: Simulation, contact: Any) -> int:
+def threads_of(run: System, contact: Any) -> int:
     """Threads that share a step: as many as the elements or the spheres are worth."""
     if not isinstance(contact, Contact):
         return run.assembly.threads
@@ -234,16 +235,25 @@ def threads_of(run: Simulation, contact: Any) -> int:
     return max(run.assembly.threads, min(spheres, numba.get_num_threads()))
 
 
+def vertices_at(contact: Any) -> Any:
+    """4 x kernel number of the node of each vertex of a contact's arrays, (c,)."""
+    if contact is None:
+        return np.zeros(0, np.int64)
+    return (contact.spheres if isinstance(contact, Contact) else contact.surface).place
+
+
 def window_run(
-    run: Simulation, contact: Any, steps: int, step: float, loads: kernel.Loads,
-    held: kernel.Constraints, probes: kernel.Probes, table: Any, gravity: Any, work: Any,
+    run: System, contact: Any, steps: int, step: float, loads: Loads,
+    held: Constraints, probes: Probes, table: Any, gravity: Any, work: Any,
 ) -> tuple[int, float, int]:  # fmt: skip
     """Run the loop on a simulation: steps done, bad elements, what the last contact said.
 
     Arguments as of `qdem_fem.assembly.Assembly.window`; ``contact``: arrays of its model, or None.
     """
     assembly = run.assembly
-    rigid: Rigid | None = None if run.rigid is None else run.rigid.kernel_of(probes.node_at)
+    rigid: Rigid | None = None
+    if run.rigid is not None:
+        rigid = run.rigid.kernel_of(probes.node_at, vertices_at(contact))
     absorber: Absorber | None = None if run.absorbers is None else run.absorbers.kernel
     before, threads = numba.get_num_threads(), threads_of(run, contact)
     numba.set_num_threads(threads)

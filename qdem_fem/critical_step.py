@@ -6,18 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from math import inf, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.assembly import NO_LOADS
 from qdem_fem.body import Body
+from qdem_fem.kinematics import displacement_gradient
 from qdem_fem.mass_scaling import element_step
-from qdem_fem.reference_forces import displacement_gradient, elastic_energy
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.strain_measures import elastic_energy
+from qdem_fem.system import System
 
 Floats = NDArray[np.float64]
 LANCZOS_TOLERANCE = 1e-3
@@ -121,7 +119,7 @@ def highest_mode(
 
 
 def critical_step_find(
-    run: Simulation, springs: Callable[[Floats], Floats] | None = None
+    run: System, springs: Callable[[Floats], Floats] | None = None
 ) -> CriticalStep:
     """`highest_mode` of the kernel's own forces for small motions of a simulation as it is held.
 
@@ -165,7 +163,7 @@ def critical_step_find(
     )
 
 
-def short_step_remark(run: Simulation, stiffness: float, governing: Body, element: int) -> str:
+def short_step_remark(run: System, stiffness: float, governing: Body, element: int) -> str:
     """Which element makes the step short, where ``2/sqrt(stiffness)`` is `SHORT`; else nothing.
 
     ``stiffness`` [1/s^2]: of the governing motion, without what viscosity takes from the step.
@@ -186,7 +184,7 @@ def short_step_remark(run: Simulation, stiffness: float, governing: Body, elemen
     )
 
 
-def governing_element(run: Simulation, mode: Floats) -> tuple[Body, int]:
+def governing_element(run: System, mode: Floats) -> tuple[Body, int]:
     """The element with most energy in a motion (n, 3), and its body."""
     found: list[tuple[float, Body, int]] = []
     for body, start in zip(run.bodies, run.first_node, strict=False):

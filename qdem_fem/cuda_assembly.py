@@ -9,7 +9,7 @@ the samples of the probes and the work of the few nodes with loads and constrain
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -18,11 +18,9 @@ from qdem_fem import kernel
 from qdem_fem.assembly import EVERY, Assembly
 from qdem_fem.body import Body
 from qdem_fem.errors import LibraryMissing
+from qdem_fem.kernel_arrays import Constraints, Fields, Loads, Probes
 from qdem_fem.lanes import lane_count
-from qdem_fem.reference_forces import Strain
-
-if TYPE_CHECKING:
-    from qdem_fem.cuda_contact_state import DeviceContact
+from qdem_fem.strain_measures import Strain
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -70,9 +68,7 @@ class NodeActions(NamedTuple):
         return found, self.actions[found, 3]
 
 
-def node_actions(
-    n_nodes: int, loads: kernel.Loads, held: kernel.Constraints, probes: kernel.Probes
-) -> NodeActions:
+def node_actions(n_nodes: int, loads: Loads, held: Constraints, probes: Probes) -> NodeActions:
     """Sort the kernel's lists by node, so that one thread does all that happens to a node."""
     from qdem_fem import cuda_step
 
@@ -108,7 +104,7 @@ def node_actions(
     return NodeActions(first, actions[order], weights[order], memory[order])
 
 
-def sample_numbers(steps: int, probes: kernel.Probes) -> Integers:
+def sample_numbers(steps: int, probes: Probes) -> Integers:
     """Where in the record the samples of the window's steps are written, (steps,), or -1."""
     since = np.arange(1, steps + 1) - probes.first
     numbers = np.where((since >= 0) & (since % probes.stride == 0), since // probes.stride, -1)
@@ -168,14 +164,14 @@ class CudaAssembly(Assembly):
 
         return motion_summed(self.state.displacement, self.state.velocity, self._mass)
 
-    def _state(self, inverse_mass: Floats) -> kernel.State:
+    def _state(self, inverse_mass: Floats) -> Fields:
         from qdem_fem.cuda_step import cuda
 
         def zeros() -> Any:
             return cuda.to_device(np.zeros(4 * self.n_nodes, self.dtype))
 
         masses = cuda.to_device(inverse_mass.astype(self.dtype))
-        return kernel.State(zeros(), zeros(), zeros(), masses)
+        return Fields(zeros(), zeros(), zeros(), masses)
 
     def _read(self, flat: Any, nodes: slice = EVERY) -> Floats:
         return flat.copy_to_host().reshape(-1, 4)[self.place[nodes], :3].astype(float)
@@ -187,21 +183,22 @@ class CudaAssembly(Assembly):
 
     def kernel_run(
         self,
-        state: kernel.State,
+        state: Fields,
         steps: int,
         step: float,
-        loads: kernel.Loads,
-        held: kernel.Constraints,
-        probes: kernel.Probes,
+        loads: Loads,
+        held: Constraints,
+        probes: Probes,
         table: Floats,
         gravity: Floats | None,
         work: Floats,
-        contact: DeviceContact | None = None,
+        contact: Any = None,
     ) -> tuple[int, float]:
         """Launch the steps and wait once, at the end; arguments as of `Assembly.kernel_run`.
 
-        ``contact``: of spheres, whose steps follow those of the bodies; its ``said`` is set.  Its
-        list may end the window early: then the host waits every `LOOK` steps.
+        ``contact``: a `qdem_fem.cuda_contact_state.DeviceContact`, whose steps follow those of the
+        bodies; its ``said`` is set.  Its list may end the window early: then the host waits
+        every `LOOK` steps.
         """
         from qdem_fem import cuda_step
         from qdem_fem.cuda_step import cuda

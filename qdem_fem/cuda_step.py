@@ -27,7 +27,7 @@ from typing import Any
 
 from qdem_fem import stress
 from qdem_fem.errors import LibraryMissing
-from qdem_fem.reference_forces import Strain
+from qdem_fem.strain_measures import MEASURES, Strain
 
 NO_CUDA = "pip install 'trackbed[cuda]' beside an NVIDIA GPU, or compute with device=\"cpu\""
 """What to do where CUDA or its libraries are missing."""
@@ -53,12 +53,6 @@ BAD, LIMIT, ANEW, DEEP = range(4)
 a vertex has left the skin of its pairs; whether two spheres are too deep in each other."""
 
 
-STRESS = {
-    "finger": stress.stress_finger,
-    "small": stress.stress_small,
-    "svk": stress.stress_svk,
-    "corotational": stress.stress_corotational,
-}
 element_gradient = cuda.jit(device=True)(stress.element_gradient)
 element_pulls = cuda.jit(device=True)(stress.element_pulls)
 matrix_product = cuda.jit(device=True)(stress.matrix_product)
@@ -93,7 +87,8 @@ def pulls_function(strain: Strain, viscous: bool) -> Any:
 
     The same composition as `qdem_fem.kernel.elastic_stress` and `qdem_fem.kernel.viscous_pulls`.
     """
-    elastic = cuda.jit(device=True)(STRESS[strain])
+    measure = MEASURES[strain]
+    elastic = cuda.jit(device=True)(measure.stress_numbers)
     if not viscous:
 
         @cuda.jit(device=True)
@@ -103,8 +98,8 @@ def pulls_function(strain: Strain, viscous: bool) -> Any:
 
         return pulls_elastic
 
-    if strain == "finger":
-        fused = cuda.jit(device=True)(stress.pulls_finger_viscous)
+    if hasattr(measure, "pulls_viscous"):
+        fused = cuda.jit(device=True)(measure.pulls_viscous)
 
         @cuda.jit(device=True)
         def pulls_fused(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:
@@ -112,9 +107,7 @@ def pulls_function(strain: Strain, viscous: bool) -> Any:
 
         return pulls_fused
 
-    dashpot = cuda.jit(device=True)(
-        stress.viscous_small if strain == "small" else stress.viscous_current
-    )
+    dashpot = cuda.jit(device=True)(measure.viscous_numbers)
 
     @cuda.jit(device=True)
     def pulls_composed(h: Any, w: Any, g: Any, rows: Any, e: Any, half: Any) -> Any:

@@ -22,20 +22,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.body import Body
+from qdem_fem.energies import energy_now
 from qdem_fem.errors import ConditionError, ElementInverted, NotConverged
 from qdem_fem.march import inverted_find
 from qdem_fem.rigid_motions import held_check
 from qdem_fem.series import is_real
+from qdem_fem.state import State
 from qdem_fem.static_problem import StaticProblem
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
 
 Floats = NDArray[np.float64]
 
@@ -70,7 +68,7 @@ class StaticAnswer:
     """Processor time [s]."""
 
 
-def relax(simulation: Simulation, tolerance: float, max_steps: int) -> StaticAnswer:
+def relax(simulation: State, tolerance: float, max_steps: int) -> StaticAnswer:
     """Bring ``simulation`` to rest under its loads and given displacements of the present time.
 
     Begins at the present displacement, works in double precision in any case, and leaves the
@@ -85,11 +83,11 @@ def relax(simulation: Simulation, tolerance: float, max_steps: int) -> StaticAns
         raise ConditionError(f"max_steps of {max_steps!r}", where="relax", remedy="take 100000")
     started = time.process_time()
     held_check(simulation)
-    before = simulation.energy()
+    before = energy_now(simulation)
     problem = StaticProblem(simulation)
     found = _conjugate(problem, simulation.bodies, tolerance, max_steps)
     problem.finish(simulation, found.displacement)
-    after = simulation.energy()
+    after = energy_now(simulation)
     simulation.motion.work[0] += after.elastic - before.elastic - before.kinetic
     if not found.residual <= tolerance:
         raise NotConverged(

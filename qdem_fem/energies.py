@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.kinematics import displacement_gradient
 from qdem_fem.leapfrog import half_work, velocity_now, viscous_half
-from qdem_fem.reference_forces import displacement_gradient, elastic_energy
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.state import State
+from qdem_fem.strain_measures import elastic_energy
 
 Floats = NDArray[np.float64]
 
@@ -39,12 +37,12 @@ class Energy:
     """In the springs of absorbing faces."""
 
 
-def energy_now(run: Simulation) -> Energy:
-    """Energies now [J]; elastic energy as `qdem_fem.reference_forces.elastic_energy`."""
+def energy_now(run: State) -> Energy:
+    """Energies now [J]; elastic energy as `qdem_fem.strain_measures.elastic_energy`."""
     velocity, motion = velocity_now(run), run.motion
     kinetic = 0.5 * float((run.assembly.mass * (velocity**2).sum(axis=1)).sum())
     if run.rigid is not None:
-        kinetic += run.rigid.kinetic(run.rigid.now())
+        kinetic += run.rigid.kinetic(run.rigid.now(run.acting()))
     elastic = sum(
         elastic_energy(
             displacement_gradient(body.gradients[0], body.elements, body.displacement),
@@ -58,17 +56,17 @@ def energy_now(run: Simulation) -> Energy:
         external += float(half_work(run, run.assembly.field("velocity"), velocity).sum())
         viscous += viscous_half(run)
         if run.rigid is not None:
-            external += float(run.rigid.half_work().sum())
+            external += float(run.rigid.half_work(run.acting()).sum())
     touching = (0.0, 0.0) if run.contacts is None else run.contacts.energy()
     ground = ground_energies(run, velocity)
     return Energy(kinetic, float(elastic), external, *touching, viscous, *ground)
 
 
-def ground_energies(run: Simulation, velocity: Floats) -> tuple[float, float]:
+def ground_energies(run: State, velocity: Floats) -> tuple[float, float]:
     """Taken by absorbing faces, and in their springs [J]; ``velocity`` (n, 3) [m/s]: of now."""
     if run.absorbers is None:
         return 0.0, 0.0
     absorbed = run.motion.absorbed
     if run.motion.behind:
-        absorbed += run.absorbers.half_taken(run.assembly.field("velocity"), velocity)
+        absorbed += run.absorbers.half_taken(run.assembly.field("velocity"), velocity, run.step)
     return absorbed, run.absorbers.spring_energy(run.assembly.field("displacement"))

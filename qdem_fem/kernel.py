@@ -10,18 +10,17 @@ argument that is ``None`` (viscosity, gravity) takes its branch out of the compi
 
 from __future__ import annotations
 
-import hashlib
 import os
 from functools import cache, partial
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import config, njit, prange
 from numba.core import types
 from numba.extending import overload
 
-from qdem_fem import stress
+from qdem_fem import lanes, stress
+from qdem_fem.compiling import sources_digest
 from qdem_fem.lanes import (
     gather_edges,
     lane_count,
@@ -35,6 +34,7 @@ from qdem_fem.lanes import (
     scatter_pulls,
     stack_align,
 )
+from qdem_fem.strain_measures import MEASURES
 
 MATHEMATICS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "reassoc"}}
 """Fused multiply-add and reassociation are allowed; NaN and infinity keep their meaning."""
@@ -51,39 +51,8 @@ ROWS_ELASTIC, ROWS_VISCOUS = 11, 13
 """Numbers an element brings: nine gradients, lambda V, mu V; with viscosity also those of it."""
 
 
-class Finger(NamedTuple):
-    """The paper's strain; ``half`` is 0.5 in the kernel's precision."""
-
-    half: Any
-
-
-class Small(NamedTuple):
-    """Linear elasticity."""
-
-    half: Any
-
-
-class Svk(NamedTuple):
-    """St. Venant-Kirchhoff."""
-
-    half: Any
-
-
-class Corotational(NamedTuple):
-    """Hooke's law in the element's turned frame."""
-
-    half: Any
-
-
-LAWS: dict[str, type] = {
-    "finger": Finger, "small": Small, "svk": Svk, "corotational": Corotational,
-}  # fmt: skip
-STRESS = {
-    Finger: stress.stress_finger,
-    Small: stress.stress_small,
-    Svk: stress.stress_svk,
-    Corotational: stress.stress_corotational,
-}
+LAWS: dict[str, type] = {name: measure.LAW for name, measure in MEASURES.items()}
+BY_LAW = {measure.LAW: measure for measure in MEASURES.values()}
 element_gradient = inlined(stress.element_gradient)
 element_pulls = inlined(stress.element_pulls)
 matrix_product = inlined(stress.matrix_product)
@@ -91,31 +60,29 @@ matrix_product = inlined(stress.matrix_product)
 
 def elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
     """``(P V, J)`` of the strain measure that the type of ``law`` names."""
-    return STRESS[type(law)](h, lame_first, lame_second, law.half)
+    return BY_LAW[type(law)].stress_numbers(h, lame_first, lame_second, law.half)
 
 
 def viscous_pulls(
     law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
 ) -> Any:
-    """``(pulls, J, power)`` with viscosity, linear beside `Small`, else current (eq. 7).
+    """``(pulls, J, power)`` with viscosity, linear beside ``small``, else current (eq. 7).
 
     The power is what viscosity takes of the motion [W].
     """
-    if isinstance(law, Finger):
-        return stress.pulls_finger_viscous(
-            h, w, g, lame_first, lame_second, first, second, law.half
-        )
-    viscous = stress.viscous_small if isinstance(law, Small) else stress.viscous_current
+    measure = BY_LAW[type(law)]
+    if hasattr(measure, "pulls_viscous"):
+        return measure.pulls_viscous(h, w, g, lame_first, lame_second, first, second, law.half)
     p, jacobian = elastic_stress(law, h, lame_first, lame_second)
     rate = stress.element_gradient(w, g)
-    q = viscous(h, rate, first, second, law.half)
+    q = measure.viscous_numbers(h, rate, first, second, law.half)
     pulls = stress.element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g)
     return pulls, jacobian, stress.matrix_product(q, rate)
 
 
 @overload(elastic_stress, strict=False, jit_options=INLINED)
 def _elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
-    chosen = inlined(STRESS[law.instance_class])
+    chosen = inlined(BY_LAW[law.instance_class].stress_numbers)
     return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
 
 
@@ -123,14 +90,13 @@ def _elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
 def _viscous_pulls(
     law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
 ) -> Any:
-    if law.instance_class is Finger:
-        fused = inlined(stress.pulls_finger_viscous)
+    measure = BY_LAW[law.instance_class]
+    if hasattr(measure, "pulls_viscous"):
+        fused = inlined(measure.pulls_viscous)
         return lambda law, h, w, g, lame_first, lame_second, first, second: fused(
             h, w, g, lame_first, lame_second, first, second, law.half
         )
-    small = law.instance_class is Small
-    elastic = inlined(STRESS[law.instance_class])
-    viscous = inlined(stress.viscous_small if small else stress.viscous_current)
+    elastic, viscous = inlined(measure.stress_numbers), inlined(measure.viscous_numbers)
 
     def composed(
         law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any,
@@ -242,81 +208,6 @@ def piece_motion(
         row_store(displacement, at, row_load(displacement, at) + faster * step)
 
 
-class Layout(NamedTuple):
-    """Where the elements' data lie (`qdem_fem.layout.layout_build`); integers are int64."""
-
-    corners: Any
-    """4 x node number of the corners, (blocks x 4 x lanes,) int32."""
-    rows: Any
-    """Gradients [1/m] and Lame constants times volume [N m], (blocks x rows x lanes,)."""
-    chunk_block: Any
-    """First block of every chunk, and the end, (chunks + 1,)."""
-    chunk_shift: Any
-    """Place of a node's force in the chunk's window, less 4 x its number, (chunks,)."""
-    piece_first: Any
-    """First node of every piece of the motion, (pieces,)."""
-    piece_stop: Any
-    """The node after its last, (pieces,)."""
-    chunk_piece: Any
-    """First of the pieces whose forces are in this chunk's window alone, (chunks + 1,); the
-    pieces from the last entry on are in several windows."""
-    piece_window: Any
-    """First of the piece's entries in ``window_shift``, and the end, (pieces + 1,)."""
-    window_shift: Any
-    """Shifts of the windows that hold the piece's nodes."""
-
-
-class State(NamedTuple):
-    """What moves: flat arrays of four numbers a node, in the kernel's precision."""
-
-    displacement: Any
-    """[m]"""
-    velocity: Any
-    """Half a step behind the displacement [m/s]."""
-    forces: Any
-    """The windows of the chunks, zero between steps [N]."""
-    inverse_mass: Any
-    """(n,) [1/kg]"""
-
-
-class Loads(NamedTuple):
-    """Nodal forces: ``weight x table[k, series]`` [N] at one place of ``State.forces``."""
-
-    force_at: Any
-    """(L,) int64, in the windows."""
-    node_at: Any
-    """(L,) int64, in ``State.velocity``."""
-    series: Any
-    weight: Any
-
-
-class Constraints(NamedTuple):
-    """Components whose displacement is ``weight x table[k, series]`` [m]."""
-
-    node_at: Any
-    """(C,) int64, in ``State.displacement``."""
-    series: Any
-    weight: Any
-    previous: Any
-    """(C,) velocity given in the last step [m/s], to count the work of the motion."""
-    roller_at: Any
-    """(R,) 4 x number of the nodes that stay in an oblique plane."""
-    roller_normal: Any
-    """(R, 3) unit normals."""
-
-
-class Probes(NamedTuple):
-    """Nodes whose displacement is recorded every ``stride`` steps."""
-
-    node_at: Any
-    """(Q,) 4 x node number."""
-    record: Any
-    """(samples, Q, 3) [m]"""
-    stride: int
-    first: int
-    """Steps of the window before its first sample."""
-
-
 @compiled()
 def loads_apply(loads: Any, table_row: Any, forces: Any) -> None:
     """Add the loads to the forces."""
@@ -376,8 +267,7 @@ def window_build(variant: str) -> Any:
     Its compiled form is kept on disk.  ``made_from`` is a part of its key there, so that a change
     of the stress or of the lanes, which are other files, is never answered by an old kernel.
     """
-    sources = (Path(__file__).with_name(name).read_bytes() for name in ("stress.py", "lanes.py"))
-    made_from = variant + hashlib.sha256(b"".join(sources)).hexdigest()
+    made_from = variant + sources_digest(stress, lanes, *MEASURES.values())
 
     @compiled(parallel=variant == "threads", cache=True)
     def window(

@@ -19,17 +19,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from qdem_fem.energies import energy_now
 from qdem_fem.errors import ConditionError, NotConverged
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.march import march
+from qdem_fem.state import State
 
 Floats = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ class Rest:
     """Simulated [s]."""
 
 
-def resultants(run: Simulation) -> Floats:
+def resultants(run: State) -> Floats:
     """Contact force, weight and loads on each body now [N], (bodies, 3); zero along what is held.
 
     Zero in equilibrium: elastic and viscous forces cancel within a body and are not in it.
@@ -94,26 +94,26 @@ def resultants(run: Simulation) -> Floats:
     return total
 
 
-def bodies_of(run: Simulation, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+def bodies_of(run: State, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
     """Numbers of the bodies that nodes, in the numbers of all bodies, belong to."""
     return np.asarray(np.searchsorted(run.first_node, nodes, side="right") - 1)
 
 
-def masses(run: Simulation) -> Floats:
+def masses(run: State) -> Floats:
     """Mass of each body [kg], (bodies,)."""
     return np.array(
         [float((b.material.density * b.gradients[1]).sum()) for b in run.bodies], dtype=float
     )
 
 
-def contact_forces(run: Simulation) -> Floats:
+def contact_forces(run: State) -> Floats:
     """Sizes of the contact forces on vertices that touch something, walls included [N], (t,)."""
     assert run.contacts is not None
     size = np.linalg.norm(run.contacts.kernel.force, axis=1)
     return np.asarray(size[size > 0])
 
 
-def kinetic_each(run: Simulation) -> Floats:
+def kinetic_each(run: State) -> Floats:
     """Kinetic energy of each body by the velocities as they are, half a step behind [J], (b,)."""
     own = np.asarray(run.assembly.state.velocity).reshape(-1, 4)[run.assembly.place, :3]
     nodal = 0.5 * run.assembly.mass * np.einsum("nc,nc->n", own, own)
@@ -123,7 +123,7 @@ def kinetic_each(run: Simulation) -> Floats:
     return np.asarray(each)
 
 
-def stop(run: Simulation, bodies: NDArray[np.bool_]) -> None:
+def stop(run: State, bodies: NDArray[np.bool_]) -> None:
     """Set the velocities of some bodies (b,) to zero; the account of energies is not told."""
     still = np.repeat(bodies, np.diff(run.first_node))
     at = run.assembly.place[still]
@@ -132,7 +132,7 @@ def stop(run: Simulation, bodies: NDArray[np.bool_]) -> None:
         run.rigid.stop(bodies[[body.rigid is not False for body in run.bodies]])
 
 
-def grounded(run: Simulation) -> NDArray[np.bool_]:
+def grounded(run: State) -> NDArray[np.bool_]:
     """Which bodies stand on a wall, or on one held against gravity, over any number of others (b,).
 
     All of them without gravity: nothing falls there.
@@ -181,7 +181,7 @@ class Damping:
         return WAIT if self.judged % 2 else self.wait
 
     @classmethod
-    def begin(cls, run: Simulation) -> Damping:
+    def begin(cls, run: State) -> Damping:
         """Of a simulation that is not damped yet."""
         count = len(run.bodies)
         return cls(
@@ -202,7 +202,7 @@ class Damping:
 
 
 def rest_find(
-    run: Simulation, unbalanced: float, kinetic: float, loose: float, most: float,
+    run: State, unbalanced: float, kinetic: float, loose: float, most: float,
     progress: Callable[[Rest], None] | None = None, look: int = LOOK, each: bool = True,
     damping: Damping | None = None, keep: Callable[[Damping], None] | None = None,
     fall: bool = False,
@@ -221,7 +221,7 @@ def rest_find(
     greatest, looks = 0.0, 0
     every = np.ones(len(run.bodies), bool)
     while True:
-        run.advance(look * run.step)
+        march(run, look, look, np.zeros(0, np.int64), None)
         now = kinetic_each(run)
         greatest, looks = max(greatest, float(now.sum())), looks + 1
         alone = state.alone(each)
@@ -267,8 +267,8 @@ def rest_find(
             )
 
 
-def _judged(run: Simulation, greatest: float, peaks: int, steps: int, time: float) -> Rest:
-    energy = run.energy()
+def _judged(run: State, greatest: float, peaks: int, steps: int, time: float) -> Rest:
+    energy = energy_now(run)
     stored = energy.elastic + energy.contact
     forces = contact_forces(run)
     size = np.linalg.norm(resultants(run), axis=1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from qdem_fem.kernel import Layout
+from qdem_fem.kernel_arrays import Layout
 from qdem_fem.lanes import lane_count
 from qdem_fem.ordering import order_for_locality
 

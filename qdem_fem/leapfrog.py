@@ -6,18 +6,15 @@ user sets and sees is ``v(k)``; `velocities_behind` and `velocities_level` go fr
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.state import State
 
 Floats = NDArray[np.float64]
 
 
-def velocity_now(run: Simulation) -> Floats:
+def velocity_now(run: State) -> Floats:
     """Velocity at the time of the displacement [m/s], (n, 3)."""
     velocity = run.assembly.field("velocity")
     if run.motion.behind:
@@ -28,16 +25,16 @@ def velocity_now(run: Simulation) -> Floats:
         ahead = held.weight * (table[1] - table[0])[held.series] / run.step
         ahead_free = velocity + change
         if run.absorbers is not None:
-            ahead_free = run.absorbers.slowed(ahead_free)
+            ahead_free = run.absorbers.slowed(ahead_free, run.step)
         flat = _by_place(run, ahead_free)
         flat[held.node_at] = 0.5 * (_by_place(run, velocity)[held.node_at] + ahead)
         velocity = flat.reshape(-1, 4)[run.assembly.place, :3]
     if run.rigid is not None:
-        velocity[run.rigid.nodes] = run.rigid.velocity_field()
+        velocity[run.rigid.nodes] = run.rigid.velocity_field(run.acting())
     return velocity
 
 
-def velocities_behind(run: Simulation) -> None:
+def velocities_behind(run: State) -> None:
     """Take the velocities half a step back, if they are not there yet."""
     if not run.motion.behind:
         displacement = run.assembly.field("displacement")
@@ -48,9 +45,9 @@ def velocities_behind(run: Simulation) -> None:
         behind = velocity - 0.5 * run.step * change
         run.motion.work[:2] -= half_work(run, behind, velocity)
         if run.absorbers is not None:
-            run.motion.absorbed -= run.absorbers.half_taken(behind, velocity)
+            run.motion.absorbed -= run.absorbers.half_taken(behind, velocity, run.step)
         if run.rigid is not None:
-            run.rigid.half_kick(-1)
+            run.rigid.half_kick(-1, run.acting(), run.motion.work)
         _, held = run.packed_lists()
         held.previous[:] = _by_place(run, behind)[held.node_at]
         run.assembly.field_set("velocity", behind)
@@ -58,21 +55,21 @@ def velocities_behind(run: Simulation) -> None:
         run.motion.behind = True
 
 
-def velocities_level(run: Simulation) -> None:
+def velocities_level(run: State) -> None:
     """Bring the velocities to the time of the displacements, if they are behind."""
     if run.motion.behind:
         behind, level = run.assembly.field("velocity"), velocity_now(run)
         run.motion.work[:2] += half_work(run, behind, level)
         run.motion.work[2] += viscous_half(run)
         if run.absorbers is not None:
-            run.motion.absorbed += run.absorbers.half_taken(behind, level)
+            run.motion.absorbed += run.absorbers.half_taken(behind, level, run.step)
         if run.rigid is not None:
-            run.rigid.half_kick(1)
+            run.rigid.half_kick(1, run.acting(), run.motion.work)
         run.assembly.field_set("velocity", level)
         run.motion.behind = False
 
 
-def state_admit(run: Simulation) -> None:
+def state_admit(run: State) -> None:
     """Put a displacement that the user set where the conditions allow: else they would in a step.
 
     Velocities are left to the first step, which counts the work of giving them.
@@ -87,7 +84,7 @@ def state_admit(run: Simulation) -> None:
         run.assembly.field_set("displacement", admitted)
 
 
-def half_work(run: Simulation, behind: Floats, level: Floats) -> Floats:
+def half_work(run: State, behind: Floats, level: Floats) -> Floats:
     """Work in the half step up to now [J], (2,): of loads, of prescribed motion; not on rigid ones.
 
     ``behind`` and ``level``: velocities (n, 3) [m/s] half a step ago and now.
@@ -106,7 +103,7 @@ def half_work(run: Simulation, behind: Floats, level: Floats) -> Floats:
     return work
 
 
-def viscous_half(run: Simulation) -> float:
+def viscous_half(run: State) -> float:
     """What viscosity takes up to now beyond what the steps have counted [J]; velocities are behind.
 
     A step counts ``dt f_D(u(k), v(k-1/2)) v(k-1/2)``, and the force does ``dt f_D (v(k-1/2) +
@@ -116,7 +113,7 @@ def viscous_half(run: Simulation) -> float:
     return 0.75 * run.step * run.assembly.viscous_power() if run.viscous else 0.0
 
 
-def accelerations_free(run: Simulation, displacement: Floats, velocity: Floats) -> Floats:
+def accelerations_free(run: State, displacement: Floats, velocity: Floats) -> Floats:
     """What the forces would make of all nodes now if none were held [m/s^2], (n, 3)."""
     loads, _ = run.packed_lists()
     now = np.full(2, run.time)
@@ -128,13 +125,13 @@ def accelerations_free(run: Simulation, displacement: Floats, velocity: Floats) 
     return free if run.contacts is None else free + run.contacts.accelerations()
 
 
-def _accelerations(run: Simulation, displacement: Floats, velocity: Floats) -> Floats:
+def _accelerations(run: State, displacement: Floats, velocity: Floats) -> Floats:
     """Accelerations now [m/s^2], (n, 3), zero where held."""
     change = accelerations_free(run, displacement, velocity)
     return run.assembly.hold(change, run.packed_lists()[1])
 
 
-def _by_place(run: Simulation, field: Floats) -> Floats:
+def _by_place(run: State, field: Floats) -> Floats:
     """A nodal field (n, 3) in the kernel's order, four numbers a node."""
     flat = np.zeros((run.assembly.n_nodes, 4))
     flat[run.assembly.place, :3] = field

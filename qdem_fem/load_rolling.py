@@ -25,6 +25,7 @@ from math import pi
 import numpy as np
 
 from qdem_fem.errors import ConditionError
+from qdem_fem.load_rail import QUIET, Track, refuse_unless_positive
 from qdem_fem.load_roughness import (
     RAIL,
     WHEEL,
@@ -33,7 +34,6 @@ from qdem_fem.load_roughness import (
     contact_filter,
     roughness_lines,
 )
-from qdem_fem.load_train import QUIET, Track, refuse_unless_positive
 from qdem_fem.mesh_checks import FloatArray
 
 Response = Callable[[FloatArray], ComplexArray]

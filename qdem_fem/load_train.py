@@ -12,21 +12,19 @@ a `qdem_fem.load_roughness.Roughness` names.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import inf, isfinite, pi
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from qdem_fem.errors import ConditionError
+from qdem_fem.load_rail import QUIET, Track, refuse_unless_positive, seat_share
 from qdem_fem.load_record import RATE, LoadRecord
+from qdem_fem.load_rolling import rolling_forces
+from qdem_fem.load_roughness import Roughness
 from qdem_fem.mesh_checks import FloatArray
 
-if TYPE_CHECKING:
-    from qdem_fem.load_roughness import Roughness
-
-QUIET = 12.0
-"""Distance from the sleeper, over the elastic length, within which an axle counts: e^-12."""
 LONGEST = 10_000_000
 """Samples of a record: 17 minutes at 10 kHz."""
 
@@ -88,26 +86,6 @@ class Train:
 
 
 @dataclass(frozen=True)
-class Track:
-    """A rail on its foundation, one of two; a 50N rail, the paper's 0.6 m a sleeper."""
-
-    rail_stiffness: float = 206e9 * 1.96e-5
-    """E I of one rail [N m^2]."""
-    modulus: float = 30e6
-    """Track modulus u: force a metre of one rail over its deflection [N/m^2]; assumed."""
-    spacing: float = 0.6
-    """From sleeper to sleeper [m]."""
-
-    def __post_init__(self) -> None:
-        refuse_unless_positive(self, "track")
-
-    @property
-    def elastic_length(self) -> float:
-        """L = (4 E I/u)^(1/4) [m]."""
-        return float((4 * self.rail_stiffness / self.modulus) ** 0.25)
-
-
-@dataclass(frozen=True)
 class WheelFlat:
     """A flat on both wheels of one axle: a half-sine of force at every turn of the wheel.
 
@@ -126,35 +104,6 @@ class WheelFlat:
     place: float = 0.0
     """Where on the rail one of the impacts begins, from the sleeper [m]; others follow at
     multiples of 2 pi times the radius."""
-
-
-def refuse_unless_positive(thing: Any, where: str) -> None:
-    """Raise `ConditionError` unless every field of a dataclass is a number above zero."""
-    for field in fields(thing):
-        value = getattr(thing, field.name)
-        if not (isfinite(value) and value > 0):
-            raise ConditionError(
-                f"{field.name} = {value}", where=where, remedy="give numbers above zero, in SI"
-            )
-
-
-def seat_share(distance: FloatArray, track: Track) -> FloatArray:
-    """Share of a wheel load that a rail seat takes from a wheel at ``distance`` x from it [m].
-
-    The foundation carries p = P/(2 L) e^-s (cos s + sin s) a metre, s = |x|/L; over the spacing a
-
-        share = (Q((x + a/2)/L) - Q((x - a/2)/L))/2,   Q(s) = sign(s) (1 - e^-|s| cos s).
-
-    The shares of all sleepers add up to 1 at any moment; beyond 3 pi/4 L a share is negative.
-    """
-    x, half = np.asarray(distance, float), track.spacing / 2
-
-    def carried(s: FloatArray) -> FloatArray:
-        size = np.abs(s)
-        return np.asarray(np.sign(s) * (1 - np.exp(-size) * np.cos(size)))
-
-    length = track.elastic_length
-    return (carried((x + half) / length) - carried((x - half) / length)) / 2
 
 
 def seat_forces(
@@ -239,8 +188,6 @@ def train_record(
     time = np.arange(int(np.ceil(last * rate)) + 1) / rate
     force = seat_forces(time - lead, train, track, flats)
     if roughness is not None:
-        from qdem_fem.load_rolling import rolling_forces
-
         force += rolling_forces(
             time - lead, train.speed, train.axles, train.wheel_loads, track, roughness
         )

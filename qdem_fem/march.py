@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import isnan
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem import kernel
 from qdem_fem.body import Body
+from qdem_fem.energies import energy_now
 from qdem_fem.errors import ElementInverted, StepWarning, Unstable
+from qdem_fem.kernel_arrays import Probes
+from qdem_fem.kinematics import displacement_gradient, volume_change
 from qdem_fem.leapfrog import state_admit, velocities_behind
-from qdem_fem.reference_forces import displacement_gradient, volume_change
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.state import State
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -30,7 +30,7 @@ GROWTH = 10.0
 
 
 def march(
-    run: Simulation,
+    run: State,
     steps: int,
     stride: int,
     nodes: Integers,
@@ -42,6 +42,8 @@ def march(
     `ElementInverted`; `StepWarning` when an element makes the step short, or it is too long.
     """
     motion, assembly = run.motion, run.assembly
+    if steps:
+        motion.step = run.step
     if motion.displacement_set:
         state_admit(run)
         motion.displacement_set = False
@@ -59,7 +61,11 @@ def march(
     if run.gravity is not None and run.gravity.varying is not None:
         most = GRAVITY_STEPS
     end = motion.steps_done + steps
-    window = (run.contacts or run.rigid or run.absorbers or assembly).window
+    window = assembly.window
+    if run.contacts is not None:
+        window = run.contacts.window
+    elif run.rigid is not None or run.absorbers is not None:
+        window = partial(window_alone, run)
     try:
         while motion.steps_done < end:
             assembly.frames_renew()
@@ -78,13 +84,23 @@ def march(
                 motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
             motion_check(run, bad)
             if run.contacts is not None:
-                run.contacts.step_check(last=motion.steps_done == end)
+                run.contacts.step_check(
+                    run.step, run.elements_critical_step.value, last=motion.steps_done == end
+                )
             if progress is not None:
                 progress(run.time)
     finally:
         if run.rigid is not None:
             run.rigid.follow()
     return samples
+
+
+def window_alone(run: State, *given: Any) -> tuple[int, float]:
+    """`Assembly.window` of a system with rigid bodies or absorbing faces that touch nothing."""
+    from qdem_fem.contact_window import window_run
+
+    done, bad, _ = window_run(run, None, *given)
+    return done, bad
 
 
 class Samples:
@@ -105,17 +121,17 @@ class Samples:
         """(samples,)"""
         return self.first_step + self.stride * np.arange(len(self.record), dtype=float)
 
-    def probes(self, node_at: Integers, steps_done: int) -> kernel.Probes:
+    def probes(self, node_at: Integers, steps_done: int) -> Probes:
         """What the kernel writes from step ``steps_done`` on: the samples after it."""
         taken = max(0, (steps_done - self.first_step) // self.stride + 1)
         ahead = self.first_step + taken * self.stride - steps_done
-        return kernel.Probes(node_at, self.record[taken:], self.stride, ahead)
+        return Probes(node_at, self.record[taken:], self.stride, ahead)
 
 
-def step_check(run: Simulation) -> None:
+def step_check(run: State) -> None:
     """Warn, once for the present conditions, of a step that is above the critical one or short."""
     critical = run.critical_step
-    remark = "" if run.step_is_given else critical.remark
+    remark = "" if run.given_step is not None else critical.remark
     if run.step > critical.value:
         remark = (
             f"the step of {run.step:.4g} s is {run.step / critical.value:.4g} times the critical "
@@ -126,21 +142,21 @@ def step_check(run: Simulation) -> None:
         warnings.warn(remark, StepWarning, stacklevel=4)
 
 
-def energy_set(run: Simulation) -> float:
+def energy_set(run: State) -> float:
     """Energy of the state that the march begins with [J]."""
     still = not any(run.assembly.field(name).any() for name in ("displacement", "velocity"))
     if still and run.contacts is None:
         return 0.0
-    energy = run.energy()
+    energy = energy_now(run)
     return energy.kinetic + abs(energy.elastic) + energy.contact + energy.foundation
 
 
-def energy_put_in(run: Simulation) -> float:
+def energy_put_in(run: State) -> float:
     """All energy that was ever put in [J]."""
     return run.motion.put_in + abs(run.motion.work[:2]).sum() + abs(run.motion.gravity_work)
 
 
-def moment(run: Simulation) -> tuple[Floats, Floats]:
+def moment(run: State) -> tuple[Floats, Floats]:
     """``sum m u`` [kg m] and ``sum m v`` [kg m/s] half a step before, (3,) each."""
     place, speed = run.assembly.moment()
     if run.rigid is not None:
@@ -173,7 +189,7 @@ def gravity_work(
     return work + float(step * ((acting - mean) * momentum).sum())
 
 
-def motion_check(run: Simulation, bad: float) -> None:
+def motion_check(run: State, bad: float) -> None:
     """Raise when the state can not be right: energy from nothing, or ``bad`` elements."""
     kinetic = run.assembly.kinetic() + (0.0 if run.rigid is None else run.rigid.kinetic())
     put_in = energy_put_in(run)
@@ -191,7 +207,7 @@ def motion_check(run: Simulation, bad: float) -> None:
         inverted_raise(run)
 
 
-def inverted_raise(run: Simulation) -> None:
+def inverted_raise(run: State) -> None:
     """Raise `ElementInverted` with the element that is most inside out.
 
     The kernel met it at the displacement before the last step, and may have left it sound.

@@ -30,3 +30,8 @@ class Motion:
     """Whether the user set a displacement since the last step."""
     put_in: float = nan
     """Energy of the state that the user set [J]; NaN: not known yet."""
+
+    @property
+    def time(self) -> float:
+        """Time reached [s]."""
+        return self.steps_done * (self.step or 0.0)

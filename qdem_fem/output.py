@@ -172,7 +172,7 @@ def bodies_vtu_write(
 
 def velocities_of(bodies: Sequence[Any]) -> Any:
     """`Body.velocity` of bodies of one simulation or of none, one after the other, (n, 3) [m/s]."""
-    run = bodies[0]._simulation
+    run = bodies[0].mover
     if run is None:
         return np.concatenate([body.velocity for body in bodies])
     return run.velocities(bodies)

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.pictures import figure_written, round_below, unit_of
+from qdem_fem.state import State
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from qdem_fem.simulation import Simulation
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -60,7 +60,7 @@ class Extent(NamedTuple):
     """Greatest one."""
 
 
-def spheres_bearing(run: Simulation, bears: npt.NDArray[np.bool_] | None = None) -> Bearing | None:
+def spheres_bearing(run: State, bears: npt.NDArray[np.bool_] | None = None) -> Bearing | None:
     """Which spheres of a simulation bear, on others or on a wall; None in other contact models.
 
     ``bears`` (n,): of all nodes, where that is known from before; by default as it is now."""

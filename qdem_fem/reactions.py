@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from qdem_fem.conditions import Held, Roller
 from qdem_fem.errors import ConditionError
 from qdem_fem.leapfrog import accelerations_free, velocity_now
+from qdem_fem.series import Driver
+from qdem_fem.state import State
 
 if TYPE_CHECKING:
     from qdem_fem.rigid_bodies import RigidBodies
-    from qdem_fem.series import Driver
-    from qdem_fem.simulation import Simulation
 
 Floats = NDArray[np.float64]
 
 
-def reaction(run: Simulation, condition: Held | Roller) -> Floats:
+def reaction(run: State, condition: Held | Roller) -> Floats:
     """Total force of a support on the body now [N], (3,): ``sum m a - f`` over what it holds.
 
     ``f``: what elements, loads and gravity do to its nodes; ``a``: of the motion it prescribes.
@@ -34,7 +34,7 @@ def reaction(run: Simulation, condition: Held | Roller) -> Floats:
         )
     if run.rigid is not None and (b := run.rigid.number_of(condition.nodes[0])) >= 0:
         assert isinstance(condition, Held)
-        return _rigid_reaction(run.rigid, b, condition)
+        return _rigid_reaction(run, run.rigid, b, condition)
     # the kernel's accelerations of what no element moves are none
     forces = run.assembly.mass[:, None] * accelerations_free(
         run, run.assembly.field("displacement"), velocity_now(run)
@@ -53,17 +53,17 @@ def reaction(run: Simulation, condition: Held | Roller) -> Floats:
     return total
 
 
-def _bend(run: Simulation, driver: Driver) -> float:
+def _bend(run: State, driver: Driver) -> float:
     """Acceleration that a driver prescribes now [m/s^2], for a factor of one."""
     before, now, after = driver.sample(run.time + run.step * np.arange(-1.0, 2.0))[:, 0]
     return float((after - 2 * now + before) / run.step**2)
 
 
-def _rigid_reaction(rigid: RigidBodies, b: int, condition: Held) -> Floats:
+def _rigid_reaction(run: State, rigid: RigidBodies, b: int, condition: Held) -> Floats:
     """The same for what holds rigid body b: ``M a - F`` of its components, without the couple."""
     chosen, total = list(condition.components), np.zeros(3)
-    total[chosen] = -rigid.forces()[0][b][chosen]
+    total[chosen] = -rigid.forces(run.acting())[0][b][chosen]
     if condition.driver is not None:
         factor = 1.0 if condition.factor is None else float(condition.factor[0])
-        total[chosen] += rigid.mass[b] * factor * _bend(rigid.run, condition.driver)
+        total[chosen] += rigid.mass[b] * factor * _bend(run, condition.driver)
     return total

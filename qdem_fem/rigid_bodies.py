@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem import kernel
 from qdem_fem.errors import ConditionError
+from qdem_fem.kernel_arrays import Constraints, Loads
 from qdem_fem.rigid_conditions import conditions_split, hold_of
 from qdem_fem.rigid_mass import stiffness_six
 from qdem_fem.rigid_state import RigidNow, RigidState
@@ -16,43 +18,55 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class Acting:
+    """What acts on the rigid bodies of a simulation now, and where its march is."""
+
+    behind: bool
+    """Whether velocities are half a step behind the displacements."""
+    step: float
+    """[s]"""
+    table: Floats
+    """(2, series) what loads and given displacements are times, now and a step later"""
+    gravity: Floats | None
+    """(3,) [m/s^2]"""
+    place: Integers
+    """(c,) the kernel's numbers of vertices that contact acts on"""
+    force: Floats
+    """(c, 3) of contact on them [N]"""
+
+
 class RigidBodies(RigidState):
     """Bodies with six freedoms each among those of a simulation.
 
     Made with the simulation's assembly, whose fields have the displacement of all their nodes.
     """
 
-    def now(self) -> RigidNow:
+    def now(self, acting: Acting) -> RigidNow:
         """The motion at the time of the displacements."""
-        run = self.run
-        force, torque = self.forces()
-        state = self._every
-        if not run.motion.behind:
+        state, step = self._every, acting.step
+        if not acting.behind:
             return RigidNow(state.velocity.copy(), state.spin.copy())
-        velocity = state.velocity + 0.5 * run.step * force / self.mass[:, None]
-        ahead = run.conditions.table(run.time + run.step * np.arange(2.0))
-        moved = state.given_weight * (ahead[1] - ahead[0])[state.given] / run.step
+        force, torque = self.forces(acting)
+        velocity = state.velocity + 0.5 * step * force / self.mass[:, None]
+        moved = state.given_weight * (acting.table[1] - acting.table[0])[state.given] / step
         velocity = np.where(state.given < 0, velocity, 0.5 * (state.velocity + moved))
-        return RigidNow(velocity, state.spin + 0.5 * run.step * torque)
+        return RigidNow(velocity, state.spin + 0.5 * step * torque)
 
-    def forces(self) -> tuple[Floats, Floats]:
+    def forces(self, acting: Acting) -> tuple[Floats, Floats]:
         """Force [N] and torque about the centre [N m] on each body now, (b, 3) each."""
-        run, pulls = self.run, np.zeros((len(self.nodes), 3))
-        if run.contacts is not None:
-            run.contacts.refresh()
-            row = self.of_place[run.contacts.place]
-            pulls[row[row >= 0]] = run.contacts.kernel.force[row >= 0]
+        pulls, row = np.zeros((len(self.nodes), 3)), self.of_place[acting.place]
+        pulls[row[row >= 0]] = acting.force[row >= 0]
         force, torque = self._resultant(self.body, self.arm_now(), pulls)
-        if (gravity := run.gravity_at(np.array([run.time]))) is not None:
-            force = force + self.mass[:, None] * gravity[0]
-        loads, levers = self.loads_now()
+        if acting.gravity is not None:
+            force = force + self.mass[:, None] * acting.gravity
+        loads, levers = self.loads_now(acting)
         return force + loads, torque + levers
 
-    def loads_now(self) -> tuple[Floats, Floats]:
+    def loads_now(self, acting: Acting) -> tuple[Floats, Floats]:
         """Force [N] and torque [N m] of the loads on each body now, (b, 3) each."""
-        self.run.packed_lists()
-        state, run = self._every, self.run
-        size = state.load_weight * run.conditions.table(np.array([run.time]))[0][state.load_series]
+        state = self._every
+        size = state.load_weight * acting.table[0][state.load_series]
         body = np.repeat(np.arange(len(self.bodies)), np.diff(state.load_first))
         pulls = size[:, None] * np.eye(3)[state.load_component]
         arm = self._turned(body, state.load_arm)
@@ -64,18 +78,21 @@ class RigidBodies(RigidState):
         np.add.at(torque, body, np.cross(arm, pulls))
         return force, torque
 
-    def velocity_field(self) -> Floats:
+    def velocity_field(self, acting: Acting) -> Floats:
         """Velocity of all nodes at the time of the displacements [m/s], (v, 3)."""
-        now = self.now()
+        now = self.now(acting)
         across = np.cross(self.omega(now.spin)[self.body], self.arm_now())
         return np.asarray(now.velocity[self.body] + across)
 
     # --- in a march ----------------------------------------------------------------------------
 
     def lists_split(
-        self, loads: kernel.Loads, held: kernel.Constraints
-    ) -> tuple[kernel.Loads, kernel.Constraints]:
-        """Take from the lists what is on rigid bodies; returns the rest."""
+        self, loads: Loads, held: Constraints, work: Floats
+    ) -> tuple[Loads, Constraints]:
+        """Take from the lists what is on rigid bodies; returns the rest.
+
+        ``work`` (3,) [J]: the account of a march, to which stopping a turn adds.
+        """
         loads, held, mine, holds = conditions_split(loads, held, self.of_place >= 0)
         row, component = self.of_place[mine.node_at // 4], mine.node_at % 4
         order = np.argsort(self.body[row], kind="stable")
@@ -93,11 +110,11 @@ class RigidBodies(RigidState):
             arm, series, weight = self.arm[row[on]], holds.series[on], holds.weight[on]
             hold = hold_of(self.own[b], arm, component[on], series, weight, body.name)
             self._every.given[b], self._every.given_weight[b] = hold.given, hold.weight
-            self._turning_set(b, hold.turning)
+            self._turning_set(b, hold.turning, work)
         self._seen = None
         return loads, held
 
-    def _turning_set(self, b: int, turning: int) -> None:
+    def _turning_set(self, b: int, turning: int, work: Floats) -> None:
         """Hold or free the turns of a body; what stops them does work, as it does on shifts."""
         if turning == self._every.turning[b] == FREE:
             return
@@ -113,50 +130,49 @@ class RigidBodies(RigidState):
             )
         omega[held] = 0.0
         self._every.spin[b] = self._inertia_of(b) @ omega
-        self.run.motion.work[1] += self.kinetic() - before
+        work[1] += self.kinetic() - before
 
-    def half_kick(self, sign: int) -> None:
-        """Take the motion half a step on (``sign`` 1) or back (-1), with its account of work."""
-        behind, now = self._ends()
+    def half_kick(self, sign: int, acting: Acting, work: Floats) -> None:
+        """Take the motion half a step on (``sign`` 1) or back (-1), and note its ``work`` [J]."""
+        behind, now = self._ends(acting)
         to = now if sign > 0 else behind
-        self.run.motion.work[:2] += sign * self.half_work()
+        work[:2] += sign * self.half_work(acting)
         self._every.velocity[:], self._every.spin[:] = to.velocity, to.spin
 
-    def _ends(self) -> tuple[RigidNow, RigidNow]:
+    def _ends(self, acting: Acting) -> tuple[RigidNow, RigidNow]:
         """The motion half a step ago, and now."""
-        state, now = self._every, self.now()
-        if self.run.motion.behind:
+        state, now = self._every, self.now(acting)
+        if acting.behind:
             return RigidNow(state.velocity.copy(), state.spin.copy()), now
-        force, torque = self.forces()
-        half = 0.5 * self.run.step
+        force, torque = self.forces(acting)
+        half = 0.5 * acting.step
         change = np.where(self._every.given < 0, half * force / self.mass[:, None], 0.0)
         return RigidNow(now.velocity - change, now.spin - half * torque), now
 
-    def half_work(self) -> Floats:
+    def half_work(self, acting: Acting) -> Floats:
         """Work in the half step up to now [J], (2,): of loads, of prescribed motion."""
-        behind, now = self._ends()
-        state, half = self._every, 0.5 * self.run.step
+        behind, now = self._ends(acting)
+        state, half = self._every, 0.5 * acting.step
         mean = 0.5 * (behind.velocity + now.velocity)
         turn = 0.5 * (self.omega(behind.spin) + self.omega(now.spin))
-        loads, levers = self.loads_now()
-        missing = self.mass[:, None] * (now.velocity - behind.velocity) - half * self.forces()[0]
+        loads, levers = self.loads_now(acting)
+        force = self.forces(acting)[0]
+        missing = self.mass[:, None] * (now.velocity - behind.velocity) - half * force
         held = state.given >= 0
         of_loads = half * (loads * mean + levers * turn).sum()
         return np.array([of_loads, (missing * mean)[held].sum()])
 
-    def kernel_of(self, probed: Integers) -> Rigid:
+    def kernel_of(self, probed: Integers, touching: Integers) -> Rigid:
         """What a step of a march reads: vertices that may touch, and nodes that are probed.
 
-        ``probed``: 4 x kernel number of nodes of any bodies.  Other nodes follow when the march
-        comes back, by `follow`.
+        ``probed``, ``touching``: 4 x kernel number of nodes of any bodies.  Other nodes follow when
+        the march comes back, by `follow`.
         """
         if self._seen is None or not np.array_equal(self._seen, probed):
             needed = np.zeros(len(self.nodes), dtype=bool)
-            if self.run.contacts is not None:
-                row = self.of_place[self.run.contacts.place]
+            for nodes in (touching, probed):
+                row = self.of_place[nodes // 4]
                 needed[row[row >= 0]] = True
-            row = self.of_place[probed // 4]
-            needed[row[row >= 0]] = True
             names = ("node_first", "node_at", "force_at", "arm")
             vertices = self._vertices(np.flatnonzero(needed))
             self._following = np.flatnonzero(~needed)
@@ -164,24 +180,12 @@ class RigidBodies(RigidState):
             self._seen = probed.copy()
         return self.kernel
 
-    def window(
-        self, steps: int, step: float, loads: kernel.Loads, held: kernel.Constraints,
-        probes: kernel.Probes, table: Floats, gravity: Floats | None, work: Floats,
-    ) -> tuple[int, float]:  # fmt: skip
-        """`Assembly.window` with rigid bodies that touch nothing."""
-        from qdem_fem.contact_window import window_run
-
-        done, bad, _ = window_run(
-            self.run, None, steps, step, loads, held, probes, table, gravity, work
-        )
-        return done, bad
-
     def follow(self) -> None:
         """Put the nodes that no step moves where their bodies are."""
         at = 4 * self.place[self._following][:, None] + np.arange(3)
         body, arm = self.body[self._following], self.arm[self._following]
         moved = self._every.shift[body] + (self._turned(body, arm) - arm)
-        self.run.assembly.state.displacement[at] = moved
+        self.assembly.state.displacement[at] = moved
 
     # --- for the step and the files ------------------------------------------------------------
 
@@ -191,7 +195,7 @@ class RigidBodies(RigidState):
         ``nodes`` (c,) in the numbers of all bodies, ``stiffness`` (c,) [N/m] of all springs of a
         node; zero for nodes of deformable bodies.
         """
-        row = self.of_place[self.run.assembly.place[nodes]]
+        row = self.of_place[self.assembly.place[nodes]]
         mine = row >= 0
         body = self.body[row[mine]]
         spring = stiffness_six(body, self.arm[row[mine]], stiffness[mine], len(self.bodies))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem import kernel
 from qdem_fem.errors import ConditionError
+from qdem_fem.kernel_arrays import Constraints, Loads
 from qdem_fem.rigid_mass import RigidMass, cross_matrix
 from qdem_fem.rigid_step import FREE, STILL
 
@@ -80,8 +80,8 @@ def hold_of(
 
 
 def conditions_split(
-    loads: kernel.Loads, held: kernel.Constraints, is_rigid: NDArray[np.bool_]
-) -> tuple[kernel.Loads, kernel.Constraints, kernel.Loads, kernel.Constraints]:
+    loads: Loads, held: Constraints, is_rigid: NDArray[np.bool_]
+) -> tuple[Loads, Constraints, Loads, Constraints]:
     """The lists of deformable bodies, and those of rigid ones.
 
     ``is_rigid`` (n,) by the kernel's number of a node.
@@ -92,14 +92,14 @@ def conditions_split(
         roller_at=np.zeros(0, np.int64), roller_normal=np.zeros((0, 3))
     )
     return (
-        kernel.Loads(*(entry[~of_loads] for entry in loads)),
+        Loads(*(entry[~of_loads] for entry in loads)),
         _part(held, ~of_held),
-        kernel.Loads(*(entry[of_loads] for entry in loads)),
+        Loads(*(entry[of_loads] for entry in loads)),
         mine,
     )
 
 
-def _part(held: kernel.Constraints, mask: NDArray[np.bool_]) -> kernel.Constraints:
+def _part(held: Constraints, mask: NDArray[np.bool_]) -> Constraints:
     """Some of the held components, and all rollers."""
     return held._replace(
         node_at=held.node_at[mask],

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.errors import ConditionError
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.state import State
 
 Floats = NDArray[np.float64]
 
@@ -18,7 +14,7 @@ HELD_SHARE = 1e-9
 """A rigid motion held by less than this share of a body's nodes' mean motion is called free."""
 
 
-def held_check(simulation: Simulation) -> None:
+def held_check(simulation: State) -> None:
     """Raise `ConditionError` naming a part that can move as a rigid body."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components

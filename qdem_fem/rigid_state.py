@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from qdem_fem.assembly import Assembly
 from qdem_fem.body import Body
 from qdem_fem.rigid_mass import (
     RigidMass,
@@ -17,9 +18,6 @@ from qdem_fem.rigid_mass import (
     turn_matrix,
 )
 from qdem_fem.rigid_step import FREE, Rigid
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -43,11 +41,11 @@ class RigidState:
     Base of `qdem_fem.rigid_bodies.RigidBodies`.
     """
 
-    def __init__(self, run: Simulation) -> None:
-        self.run = run
-        self.number = np.array([i for i, body in enumerate(run.bodies) if body.rigid])
+    def __init__(self, bodies: Sequence[Body], first_node: Integers, assembly: Assembly) -> None:
+        self.assembly = assembly
+        self.number = np.array([i for i, body in enumerate(bodies) if body.rigid])
         """Place of each among the bodies, (b,)."""
-        self.bodies: list[Body] = [run.bodies[i] for i in self.number]
+        self.bodies: list[Body] = [bodies[i] for i in self.number]
         self.own: list[RigidMass] = [body.rigid_mass for body in self.bodies]
         self.mass = np.array([own.mass for own in self.own])
         self._tensor = np.array([own.tensor for own in self.own])
@@ -56,7 +54,7 @@ class RigidState:
         inertia[:, 3:, 3:] = self._tensor
         self._root = np.linalg.inv(np.linalg.cholesky(inertia))
         """Of the inertia, such that ``root K root^T`` has the squared frequencies, (b, 6, 6)."""
-        starts = run.first_node[self.number]
+        starts = first_node[self.number]
         self.nodes = np.concatenate(
             [start + np.arange(len(b.nodes)) for b, start in zip(self.bodies, starts, strict=True)]
         )
@@ -68,9 +66,9 @@ class RigidState:
         """The rigid body that each is of, (v,)."""
         centre = np.array([own.centre for own in self.own])
         self.arm = np.concatenate([body.nodes for body in self.bodies]) - centre[self.body]
-        self.place = run.assembly.place[self.nodes]
+        self.place = assembly.place[self.nodes]
         """Their numbers in the kernel, (v,)."""
-        self.of_place = np.full(run.assembly.n_nodes, -1)
+        self.of_place = np.full(assembly.n_nodes, -1)
         self.of_place[self.place] = np.arange(len(self.nodes))
         count = len(counts)
         still = np.zeros((count, 3))
@@ -103,13 +101,13 @@ class RigidState:
         return (
             np.searchsorted(self.body[chosen], np.arange(len(self.bodies) + 1)),
             4 * place,
-            4 * place + self.run.assembly.packed.node_window[place],
+            4 * place + self.assembly.packed.node_window[place],
             np.ascontiguousarray(self.arm[chosen]),
         )
 
     def number_of(self, node: int) -> int:
         """The rigid body that a node is of, in the numbers of all bodies; -1: none."""
-        row = int(self.of_place[self.run.assembly.place[node]])
+        row = int(self.of_place[self.assembly.place[node]])
         return int(self.body[row]) if row >= 0 else -1
 
     def field_set(self, body: Body, name: str, values: Floats) -> None:

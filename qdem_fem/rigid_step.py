@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from qdem_fem.contact_kernel import exact, inlined
+from qdem_fem.compiling import exact, inlined
 
 FREE, STILL = 3, -1
 """Of ``Rigid.turning``; 0, 1, 2: turns about that axis of the laboratory alone."""

@@ -29,6 +29,7 @@ from qdem_fem.scene_types import (
     number_or_table,
     vector_or_table,
 )
+from qdem_fem.strain_measures import Strain
 
 AUDIT = 1e-3
 """Of `Output.audit`, where bodies touch."""
@@ -240,7 +241,7 @@ class SimulationTable(Table):
     """Simulated time [s] of a dynamic run."""
     tolerance: Annotated[float, Field(ge=1e-14, le=0.1, allow_inf_nan=False)] = 1e-8
     """Of a static answer: residual force over the load."""
-    strain: Literal["finger", "small", "svk", "corotational"] = "finger"
+    strain: Strain = "finger"
     precision: Literal["float64", "float32"] = "float64"
     step: Positive | None = None
     """Time step [s]; by default the critical one times ``safety``."""

@@ -2,52 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from qdem_fem.contact_scene import contact_of
 from qdem_fem.errors import ConditionError, QdemError
-from qdem_fem.scene import BodyTable, Mesh
+from qdem_fem.scene import BodyTable
 from qdem_fem.scene_file import Problem, error_told
-from qdem_fem.scene_nodes import NoNodes
 from qdem_fem.scene_series import TimeSeries
 
 if TYPE_CHECKING:
     from qdem_fem.body import Body
     from qdem_fem.mesh import TetMesh
-    from qdem_fem.scene_checks import Prepared
-
-CELLS_MOST = 4_000_000
-"""Most cells of a generated mesh: what 128 GB of memory hold."""
-
-
-def mesh_of(table: Mesh, folder: Path, key: str) -> TetMesh:
-    """The mesh of a body; a relative path counts from ``folder``.
-
-    Raises `MeshError`, or `NoNodes` with the key for measures that make no mesh.
-    """
-    from qdem_fem.mesh import mesh_read
-    from qdem_fem.mesh_generation import box_mesh, ring_mesh
-
-    given = [name for name in ("file", "box", "ring") if getattr(table, name) is not None]
-    if len(given) != 1:
-        raise NoNodes(Problem(key, "give exactly one of file, box, ring"))
-    if table.file is not None:
-        return mesh_read(folder / table.file)
-    shape = table.box or table.ring
-    assert shape is not None
-    count = int(np.prod(shape.cells))
-    if count > CELLS_MOST:
-        what = f"{count} cells are too many; at most {CELLS_MOST}"
-        raise NoNodes(Problem(f"{key}.{given[0]}.cells", what))
-    if table.box is not None:
-        box = table.box
-        return mesh_read(box_mesh(box.size, box.cells, box.pattern, box.origin))
-    ring = table.ring
-    assert ring is not None
-    return mesh_read(ring_mesh(ring.inner_radius, ring.outer_radius, ring.height, ring.cells))
+    from qdem_fem.scene_prepared import Prepared
 
 
 def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
@@ -56,8 +24,9 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
     In a static scene each series gives its last value.  Raises `SceneError` with every condition
     that the simulation refuses.
     """
-    import qdem_fem
+    from qdem_fem.body import Body
     from qdem_fem.rigid_motions import held_check
+    from qdem_fem.simulation import Simulation
 
     if "track" in prepared.text.data:  # other scenes do not pay for its import
         from qdem_fem.track_scene import TrackPrepared, track_enter
@@ -66,7 +35,7 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         return track_enter(prepared)
     scene, table = prepared.scene, prepared.scene.simulation
     bodies = {
-        body.name: qdem_fem.Body(
+        body.name: Body(
             prepared.meshes[body.name],
             _material(body, prepared.meshes[body.name]),
             name=body.name,
@@ -74,7 +43,7 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         )
         for body in scene.body
     }
-    run = qdem_fem.Simulation(
+    run = Simulation(
         list(bodies.values()),
         strain=table.strain,
         precision=table.precision,
@@ -129,18 +98,18 @@ def motion_begin(body: Body, table: BodyTable) -> None:
 
 def _argument(value: Any, method: str) -> Any:
     """What the simulation takes for an argument: a series becomes its own kind of series."""
-    import qdem_fem
+    from qdem_fem.series import Series
 
     if not isinstance(value, TimeSeries):
         return value
     if method == "static" or len(value.times) == 1:
         return value.end()
-    return qdem_fem.Series(value.times, value.values)
+    return Series(value.times, value.values)
 
 
 def _material(body: BodyTable, mesh: TetMesh) -> Any:
     """Material of a body: uniform, or by element where regions differ."""
-    import qdem_fem
+    from qdem_fem.material import Material
 
     values: dict[str, Any] = body.material.model_dump()
     for name, region in body.regions.items():
@@ -148,4 +117,4 @@ def _material(body: BodyTable, mesh: TetMesh) -> Any:
             if np.ndim(values[key]) == 0:
                 values[key] = np.full(len(mesh.elements), values[key])
             values[key][mesh.element_sets[name]] = value
-    return qdem_fem.Material(**values)
+    return Material(**values)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,48 +28,17 @@ from qdem_fem.scene import (
     Probe,
     Roller,
     Scene,
-    SeriesTable,
     SimulationTable,
 )
-from qdem_fem.scene_build import mesh_of
 from qdem_fem.scene_file import Problem, SceneText, did_you_mean, error_told, scene_read
-from qdem_fem.scene_nodes import NoNodes, nodes_named, unit_vector
+from qdem_fem.scene_nodes import NoNodes, mesh_of, nodes_named, unit_vector
+from qdem_fem.scene_prepared import Prepared, Step, files_named, output_faults, tables_in
 from qdem_fem.scene_series import WrongSeries, series_of
-from qdem_fem.scene_types import Table
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
 
 IntArray = npt.NDArray[np.int64]
-
-ROWS_MOST = 100_000_000
-"""Most rows of a table that is written."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """One call that puts a condition on the simulation."""
-
-    key: str
-    verb: str
-    """Method of `qdem_fem.Simulation`."""
-    body: str
-    arguments: tuple[Any, ...]
-    """Behind the body; series are `TimeSeries`."""
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """A scene without a fault, and what it was checked with."""
-
-    scene: Scene
-    text: SceneText
-    meshes: dict[str, TetMesh]
-    conditions: list[Step]
-    probes: dict[str, tuple[str, IntArray]]
-    """Name -> body and nodes."""
-    files: dict[str, str]
-    """Each file that the scene names, as it is written there, and its SHA-256."""
 
 
 def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
@@ -80,7 +47,7 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     Raises `SceneError` with all that is wrong (file, line, key and sentence of each), `UsageError`
     when the scene or an override can not be read.
     """
-    text = scene_read(path, overrides)
+    text = scene_read(path, overrides, model_of)
     if "track" in text.data:
         from qdem_fem.track_scene import track_load
 
@@ -91,7 +58,7 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     problems += found
     names = _body_names(text)
     conditions: list[Step] = []
-    for key, table in _tables(text, Condition, Periodic):
+    for key, table in tables_in(text, Condition, Periodic):
         if names and table.body not in names:
             near = did_you_mean(table.body, names)
             problems.append(Problem(f"{key}.body", f"there is no body {table.body!r}{near}"))
@@ -102,12 +69,12 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
             else:
                 conditions.append(step)
     probes: dict[str, tuple[str, IntArray]] = {}
-    for _, output in _tables(text, Output):
+    for _, output in tables_in(text, Output):
         found = list(_probes(output, names, meshes, probes))
         problems += found
     problems += output_faults(text)
     problems += motion_faults(text)
-    for _, contact in _tables(text, ContactTable):
+    for _, contact in tables_in(text, ContactTable):
         faults = contact_faults(contact, text.tables.get("simulation"), names)
         problems += [Problem(*fault) for fault in faults]
     text.refuse(problems)
@@ -115,10 +82,13 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     return Prepared(scene, text, meshes, conditions, probes, dict(files_named(text, folder)))
 
 
-def _tables(text: SceneText, *kinds: Any) -> Iterator[tuple[str, Any]]:
-    for key, table in text.tables.items():
-        if isinstance(table, kinds):
-            yield key, table
+def model_of(data: Mapping[str, Any]) -> type[Scene]:
+    """The tables that a scene may have: those of a track where it names one."""
+    if "track" not in data:
+        return Scene
+    from qdem_fem.track_scene import TrackScene  # other scenes do not pay for its import
+
+    return TrackScene
 
 
 def _body_names(text: SceneText) -> list[str]:
@@ -134,7 +104,7 @@ def _meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Pro
     meshes: dict[str, TetMesh] = {}
     problems: list[Problem] = []
     seen: dict[str, str] = {}
-    for key, name, table, regions in _mesh_tables(text):
+    for key, name, table, regions in _meshtables_in(text):
         if name in seen:
             what = f"{seen[name]} has this name already"
             problems.append(Problem(f"{key}.name", what))
@@ -157,7 +127,7 @@ def _meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Pro
     return meshes, problems
 
 
-def _mesh_tables(text: SceneText) -> Iterator[tuple[str, str, Mesh, list[str]]]:
+def _meshtables_in(text: SceneText) -> Iterator[tuple[str, str, Mesh, list[str]]]:
     """Key, name, mesh and regions of each body whose mesh is sound, whatever else is wrong."""
     bodies = text.data.get("body")
     for index, entry in enumerate(bodies if isinstance(bodies, list) else []):
@@ -243,41 +213,13 @@ def _without_body(probe: Probe) -> Nodes:
     return Nodes(**probe.model_dump(exclude={"body"}))
 
 
-def output_faults(text: SceneText) -> Iterator[Problem]:
-    """What duration, step and intervals demand of one another."""
-    simulation = text.tables.get("simulation")
-    output = text.tables.get("output", Output())
-    if not isinstance(simulation, SimulationTable) or not isinstance(output, Output):
-        return
-    if output.video is not None and output.magnification is None:
-        yield Problem("output.video", "there are no pictures to show: give magnification, too")
-    duration = simulation.duration
-    if simulation.method == "static":
-        return
-    if duration is None:
-        yield Problem("simulation.duration", "missing: a dynamic run needs it")
-        return
-    if simulation.step is not None and simulation.step > duration:
-        yield Problem("simulation.step", f"must not exceed the duration, {duration:g} s")
-    for name in ("sampling", "energy_interval", "vtu_interval"):
-        interval = getattr(output, name)
-        if interval is None:
-            continue
-        most = 1e6 if name == "vtu_interval" else ROWS_MOST
-        if interval > duration:
-            yield Problem(f"output.{name}", f"must not exceed the duration, {duration:g} s")
-        elif duration / interval > most:
-            what = f"too short: it would be met {duration / interval:.3g} times"
-            yield Problem(f"output.{name}", what)
-
-
 def motion_faults(text: SceneText) -> Iterator[Problem]:
     """Bodies said to move at the start of what has no motion, or to turn in what can not."""
     simulation = text.tables.get("simulation")
     if not isinstance(simulation, SimulationTable):
         return
-    joined = {table.body for _, table in _tables(text, Periodic)}
-    for key, body in _tables(text, BodyTable):
+    joined = {table.body for _, table in tables_in(text, Periodic)}
+    for key, body in tables_in(text, BodyTable):
         if simulation.method == "static" and body.moves:
             name = "velocity" if body.velocity is not None else "spin"
             yield Problem(f"{key}.{name}", 'a static answer has no motion: method = "dynamic"')
@@ -288,22 +230,3 @@ def motion_faults(text: SceneText) -> Iterator[Problem]:
             yield Problem(
                 f"{key}.spin", "a body that [[periodic]] joins to its images can not turn"
             )
-
-
-def files_named(text: SceneText, folder: Path) -> Iterator[tuple[str, str]]:
-    """Files that a sound scene names, and their SHA-256."""
-    for name in sorted(_file_names(text)):
-        digest = hashlib.sha256()
-        with (folder / name).open("rb") as stream:
-            while block := stream.read(1 << 20):
-                digest.update(block)
-        yield name, digest.hexdigest()
-
-
-def _file_names(text: SceneText) -> set[str]:
-    names = {body.mesh.file for _, body in _tables(text, BodyTable) if body.mesh.file}
-    for _, table in _tables(text, Table):
-        for series in dict(table).values():
-            if isinstance(series, SeriesTable) and series.csv:
-                names.add(series.csv)
-    return names

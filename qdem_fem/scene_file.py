@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
@@ -91,11 +91,16 @@ class SceneText:
         return str(self.path)
 
 
-def scene_read(path: Path | str, overrides: Sequence[str] = ()) -> SceneText:
+def scene_read(
+    path: Path | str,
+    overrides: Sequence[str] = (),
+    model_of: Callable[[Mapping[str, Any]], type[Scene]] = lambda data: Scene,
+) -> SceneText:
     """Read a scene file and check every table by itself; nothing that needs a mesh.
 
     ``overrides`` such as ``simulation.duration=0.1``, ``load.0.force=[0, 0, -1]`` or
     ``body.beam.material.young=1e9`` replace or add keys; values in TOML, a bare word is a string.
+    ``model_of`` tells the tables that a scene may have by its data.
     What is wrong with the keys is in ``problems`` of the answer, not raised: `refuse` does.
 
     Raises `UsageError` when the file or an override can not be read, `SceneError` for no TOML.
@@ -109,18 +114,13 @@ def scene_read(path: Path | str, overrides: Sequence[str] = ()) -> SceneText:
     scene = SceneText(path, text, data)
     for override in overrides:
         scene.overrides[_override(data, override)] = override
-    _tables_check(scene)
+    _tables_check(scene, model_of(data).model_fields)
     return scene
 
 
-def _tables_check(scene: SceneText) -> None:
+def _tables_check(scene: SceneText, known: Mapping[str, Any]) -> None:
     """Check each table on its own, so that a wrong one never hides what is wrong elsewhere."""
     data = scene.data
-    known = Scene.model_fields
-    if "track" in data:
-        from qdem_fem.track_scene import TrackScene
-
-        known = TrackScene.model_fields
     for name in data:
         if name not in known:
             near = did_you_mean(name, known)

@@ -1,13 +1,14 @@
-"""Which nodes of a mesh a scene names."""
+"""The mesh of a body of a scene, and which of its nodes the scene names."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.scene import Nodes
+from qdem_fem.scene import Mesh, Nodes
 from qdem_fem.scene_file import Problem, did_you_mean
 
 if TYPE_CHECKING:
@@ -22,12 +23,43 @@ single precision or a few digits."""
 KINDS = ("set", "box", "plane", "nearest", "all")
 
 
+CELLS_MOST = 4_000_000
+"""Most cells of a generated mesh: what 128 GB of memory hold."""
+
+
 class NoNodes(Exception):
     """A selection can not be used; ``problem`` says why."""
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem.what)
         self.problem = problem
+
+
+def mesh_of(table: Mesh, folder: Path, key: str) -> TetMesh:
+    """The mesh of a body; a relative path counts from ``folder``.
+
+    Raises `MeshError`, or `NoNodes` with the key for measures that make no mesh.
+    """
+    from qdem_fem.mesh import mesh_read
+    from qdem_fem.mesh_generation import box_mesh, ring_mesh
+
+    given = [name for name in ("file", "box", "ring") if getattr(table, name) is not None]
+    if len(given) != 1:
+        raise NoNodes(Problem(key, "give exactly one of file, box, ring"))
+    if table.file is not None:
+        return mesh_read(folder / table.file)
+    shape = table.box or table.ring
+    assert shape is not None
+    count = int(np.prod(shape.cells))
+    if count > CELLS_MOST:
+        what = f"{count} cells are too many; at most {CELLS_MOST}"
+        raise NoNodes(Problem(f"{key}.{given[0]}.cells", what))
+    if table.box is not None:
+        box = table.box
+        return mesh_read(box_mesh(box.size, box.cells, box.pattern, box.origin))
+    ring = table.ring
+    assert ring is not None
+    return mesh_read(ring_mesh(ring.inner_radius, ring.outer_radius, ring.height, ring.cells))
 
 
 def node_sets(mesh: TetMesh) -> dict[str, IntArray]:

@@ -19,7 +19,7 @@ from qdem_fem.energy_account import EnergyAccount
 from qdem_fem.errors import EnergyLost, Interrupted
 from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, write_whole
 from qdem_fem.run_folder import RunFolder
-from qdem_fem.scene_checks import Prepared
+from qdem_fem.scene_prepared import Prepared
 
 CHUNK_WORK = 50_000_000
 """Element-steps between two looks at the clock and the signals: a second or a few."""

@@ -2,49 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, isfinite, nan
+from math import ceil, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem import kernel
-from qdem_fem.assembly import Assembly
 from qdem_fem.body import Body
 from qdem_fem.checkpoint import checkpoint_read, checkpoint_write
 from qdem_fem.conditioned_bodies import ConditionedBodies
-from qdem_fem.conditions import Absorbing, Held, Roller
-from qdem_fem.contact_options import Contact, contact_options_check, contacts_of
-from qdem_fem.critical_step import CriticalStep, critical_step_find
+from qdem_fem.conditions import Held, Roller
+from qdem_fem.contact_options import Contact, contact_options_check
 from qdem_fem.dynamic_relaxation import StaticAnswer, relax
 from qdem_fem.energies import Energy, energy_now
 from qdem_fem.errors import ConditionError
 from qdem_fem.leapfrog import velocities_level, velocity_now
 from qdem_fem.march import march
-from qdem_fem.mass_scaling import mass_scaling_factor
-from qdem_fem.motion import Motion
 from qdem_fem.reactions import reaction
-from qdem_fem.reference_forces import Strain
 from qdem_fem.series import Driver, Value, is_real
 from qdem_fem.simulation_options import (
+    bodies_check,
+    bodies_number,
     bounds_check,
     numbers_check,
     rigid_options_check,
     words_check,
 )
-
-if TYPE_CHECKING:
-    from qdem_fem.absorbing import Absorbers
-    from qdem_fem.contact_state import Contacts
-    from qdem_fem.rigid_bodies import RigidBodies
+from qdem_fem.state import SAFETY
+from qdem_fem.strain_measures import Strain
+from qdem_fem.system import assembly_class
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-SAFETY = 0.9
 STEPS_MOST = 2**53
 """Numbers of steps are exact as floats up to here."""
 SAMPLES = 1000
@@ -61,16 +54,6 @@ class History:
 
     def __getitem__(self, name: str) -> Floats:
         return self.values[name]
-
-
-def assembly_class(device: str) -> type[Assembly]:
-    """The class that computes on a device; raises `LibraryMissing` where there is no GPU."""
-    if device == "cpu":
-        return Assembly
-    from qdem_fem.cuda_assembly import CudaAssembly, gpu_require
-
-    gpu_require()
-    return CudaAssembly
 
 
 class Simulation(ConditionedBodies):
@@ -107,62 +90,24 @@ class Simulation(ConditionedBodies):
         device: Literal["cpu", "cuda"] = "cpu",
         contact: Contact | None = None,
     ) -> None:
-        super().__init__(bodies)
+        if not isinstance(bodies, Iterable):
+            raise ConditionError(f"{bodies!r} is no list of bodies", where="simulation")
+        own = list(bodies)
+        bodies_check(own)
+        bodies_number(own)
         words_check(strain=strain, precision=precision, device=device)
         numbers_check(step=step, safety=safety, threads=threads, mass_scaling=mass_scaling)
         bounds_check(safety=safety, threads=threads)
         contact_options_check(contact, precision, device)
-        self.device, self._assembly_class = device, assembly_class(device)
-        self.contact = contact
-        rigid_options_check(self.bodies, precision, device)
-        self._contacts: Contacts | None = None
-        self._rigid: RigidBodies | None = None
-        self._absorbers: Absorbers | None = None
-        self.strain, self.precision, self.safety = strain, precision, safety
-        self.threads, self.mass_scaling = threads, mass_scaling
-        self.gravity = None if gravity is None else Driver(gravity, 3, "gravity")
-        self._given_step = None if step is None else float(step)
-        self.motion = Motion()
-        self.viscous = any(b.material.is_viscous for b in self.bodies if not b.rigid)
-        self._assembly: Assembly | None = None
-        self._lists: tuple[kernel.Loads, kernel.Constraints] | None = None
-        self._critical: CriticalStep | None = None
-        self.warned = nan
-        """The critical step of which a warning was given [s]."""
+        assembly_class(device)
+        rigid_options_check(own, precision, device)
+        super().__init__(
+            own, strain, precision, threads, mass_scaling, device,
+            None if gravity is None else Driver(gravity, 3, "gravity"),
+            contact=contact, given_step=None if step is None else float(step), safety=safety,
+        )  # fmt: skip
         for body in self.bodies:
-            body._simulation = self
-
-    # --- time ----------------------------------------------------------------------------------
-
-    @property
-    def steps_done(self) -> int:
-        """Time steps since the start."""
-        return self.motion.steps_done
-
-    @property
-    def time(self) -> float:
-        """Time reached [s]."""
-        return self.steps_done * self.step
-
-    @property
-    def step(self) -> float:
-        """Time step [s]; once steps were done it stays, as time is counted in steps."""
-        for step in (self._given_step, self.motion.step):
-            if step is not None:
-                return step
-        step = self.safety * self.critical_step.value
-        if not isfinite(step):
-            raise ConditionError(
-                "every component of every node is held, or rigid: no motion limits the step",
-                where="simulation, step",
-                remedy="give step=",
-            )
-        return step
-
-    @property
-    def step_is_given(self) -> bool:
-        """Whether the user gave the step."""
-        return self._given_step is not None
+            body.mover = self
 
     @property
     def added_mass(self) -> dict[str, float]:
@@ -177,19 +122,6 @@ class Simulation(ConditionedBodies):
             nodes = np.unique(self.master[start : start + len(body.nodes)])
             added[body.name] = float(mass[nodes].sum()) / own - 1 if self.mass_scaling else 0.0
         return added
-
-    @property
-    def critical_step(self) -> CriticalStep:
-        """The largest stable step, for small motions about the reference configuration."""
-        elements = self.elements_critical_step
-        return elements if self.contacts is None else self.contacts.critical_step(elements)
-
-    @property
-    def elements_critical_step(self) -> CriticalStep:
-        """The critical step of bodies that touch nothing."""
-        if self._critical is None:
-            self._critical = critical_step_find(self)
-        return self._critical
 
     def advance(
         self,
@@ -217,8 +149,6 @@ class Simulation(ConditionedBodies):
             )
         steps = ceil(duration / self.step * (1 - 1e-12) - 1e-9)
         stride = max(1, round((sampling or duration / SAMPLES) / self.step)) if steps else 1
-        if steps:
-            self.motion.step = self.step
         chosen = {name: self._probe(name, probe) for name, probe in (probes or {}).items()}
         every = np.concatenate([*chosen.values(), np.zeros(0, int)])
         samples = march(self, steps, stride, every, progress)
@@ -227,16 +157,6 @@ class Simulation(ConditionedBodies):
             values[name] = samples.record[:, column : column + len(nodes)].mean(axis=1)
             column += len(nodes)
         return History(samples.step_numbers * self.step, values)
-
-    def absorb(self, body: Body, nodes: Any, depth: float | None = None) -> Absorbing:
-        """`ConditionedBodies.absorb`, in double precision on the processor."""
-        if self.precision != "float64" or self._assembly_class is not Assembly:
-            raise ConditionError(
-                "absorbing faces are computed in double precision on the processor",
-                where="absorb",
-                remedy='take precision="float64" and device="cpu"',
-            )
-        return super().absorb(body, nodes, depth)
 
     def relax(self, tolerance: float = 1e-8, max_steps: int = 100_000) -> StaticAnswer:
         """Bring deformable bodies to rest in equilibrium with the loads of the present time.
@@ -287,91 +207,26 @@ class Simulation(ConditionedBodies):
         """
         checkpoint_read(self, path)
 
-    @property
-    def assembly(self) -> Assembly:
-        """The kernel's arrays, built when first needed."""
-        if self._assembly is None:
-            factor = None
-            if self.mass_scaling is not None:
-                soft = [body for body in self.bodies if not body.rigid]
-                factor = mass_scaling_factor(soft, self.mass_scaling)
-            self._assembly = self._assembly_class(
-                self.bodies, self.master, self.strain, self.precision, self.threads, factor
-            )
-            for name in ("displacement", "velocity"):
-                fields = [getattr(body, f"_{name}") for body in self.bodies]
-                self._assembly.field_set(name, np.concatenate(fields))
-            self.motion.displacement_set = any(body._displacement.any() for body in self.bodies)
-            if any(body.rigid for body in self.bodies):
-                from qdem_fem.rigid_bodies import RigidBodies
+    # --- what the bodies ask for ---------------------------------------------------------------
 
-                self._rigid = RigidBodies(self)
-        return self._assembly
-
-    @property
-    def rigid(self) -> RigidBodies | None:
-        """The rigid bodies; None where there are none."""
-        return self._rigid if self.assembly is not None else None
-
-    @property
-    def contacts(self) -> Contacts | None:
-        """The contacts of the bodies; None where they have none."""
-        if self.contact is not None and self._contacts is None:
-            self._contacts = contacts_of(self, self.contact)
-        return self._contacts
-
-    @property
-    def absorbers(self) -> Absorbers | None:
-        """Dashpots and springs of absorbing faces; None where there are none."""
-        if self._absorbers is None and self.conditions.absorbing:
-            from qdem_fem.absorbing import Absorbers
-
-            self._absorbers = Absorbers(self)
-        return self._absorbers
-
-    # --- for the march and the files -----------------------------------------------------------
-
-    def packed_lists(self) -> tuple[kernel.Loads, kernel.Constraints]:
-        """The kernel's lists of the present conditions."""
-        if self._lists is None:
-            self._lists = self.assembly.lists(self.conditions, self.gravity is not None)
-            if self.rigid is not None:
-                self._lists = self.rigid.lists_split(*self._lists)
-        return self._lists
-
-    def gravity_at(self, times: Floats) -> Floats | None:
-        """Gravity [m/s^2], (k, 3), at ``times`` (k,) [s]; None without."""
-        return None if self.gravity is None else self.gravity.sample(times)
-
-    def _begun(self) -> bool:
-        return self._assembly is not None
-
-    def _before_change(self) -> None:
-        velocities_level(self)
-
-    def _changed(self, ties: bool) -> None:
-        self._lists = self._absorbers = None
-        if ties:
-            self._critical = None
-            if self._contacts is not None:
-                self._contacts.held_anew()
-
-    def _own(self, body: Body) -> slice:
-        start = self._offset(body)
-        return slice(start, start + len(body.nodes))
-
-    def _field_of(self, body: Body, name: str) -> Floats:
+    def field_of(self, body: Body, name: str) -> Floats:
+        """``displacement`` [m] or ``velocity`` [m/s] of a body's nodes now, (n, 3)."""
         own = self._own(body)
         return velocity_now(self)[own] if name == "velocity" else self.assembly.field(name, own)
 
-    def _field_set(self, body: Body, name: str, values: Floats) -> None:
-        if self._assembly is None:
+    def field_set(self, body: Body, name: str, values: Floats) -> None:
+        """Set one of them; before the arrays are made the body keeps it."""
+        if not self.begun:
             return
         velocities_level(self)
         if self.rigid is not None and body.rigid:
             self.rigid.field_set(body, name, values)
         self.assembly.field_set(name, values, self._own(body))
-        self.motion.displacement_set |= name == "displacement"
         self.motion.put_in = nan
-        if self._contacts is not None and name == "displacement":
-            self._contacts.stale = True
+        if name == "displacement":
+            self.motion.displacement_set = True
+            self.displacement_changed()
+
+    def _own(self, body: Body) -> slice:
+        start = self._offset(body)
+        return slice(start, start + len(body.nodes))

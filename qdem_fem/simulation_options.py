@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from qdem_fem import kernel
 from qdem_fem.body import Body
 from qdem_fem.errors import ConditionError
 from qdem_fem.series import is_real
+from qdem_fem.strain_measures import MEASURES
 
 PRECISIONS = ("float64", "float32")
 DEVICES = ("cpu", "cuda")
@@ -21,7 +21,7 @@ def bodies_check(bodies: Sequence[Body]) -> None:
     if len({id(body) for body in bodies}) < len(bodies):
         raise ConditionError("a body is listed twice", where="simulation")
     for body in bodies:
-        if body._simulation is not None:
+        if body.mover is not None:
             raise ConditionError(
                 f"{body.name} is in another simulation, which moves it",
                 where="simulation",
@@ -39,7 +39,7 @@ def bodies_number(bodies: Sequence[Body]) -> None:
 
 def words_check(**given: Any) -> None:
     """Raise `ConditionError` for a ``strain``, ``precision`` or ``device`` that there is not."""
-    known = {"strain": tuple(kernel.LAWS), "precision": PRECISIONS, "device": DEVICES}
+    known = {"strain": tuple(MEASURES), "precision": PRECISIONS, "device": DEVICES}
     for name, value in given.items():
         if value not in known[name]:
             raise ConditionError(

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.assembly import NO_CONSTRAINTS, NO_LOADS, NO_PROBES, Assembly
-from qdem_fem.kernel import Constraints
-
-if TYPE_CHECKING:
-    from qdem_fem.simulation import Simulation
+from qdem_fem.kernel_arrays import Constraints
+from qdem_fem.state import State
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -23,7 +19,7 @@ FREE_SHARE = 1e-9
 class StaticProblem:
     """Forces, constraints and fictitious masses in the kernel's order, four numbers a node."""
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: State) -> None:
         own = simulation.assembly
         conditions, now = simulation.conditions, np.full(1, simulation.time)
         self.assembly = own
@@ -59,7 +55,7 @@ class StaticProblem:
         u[self.held_at] = self.target
         return u
 
-    def finish(self, simulation: Simulation, u: Floats) -> None:
+    def finish(self, simulation: State, u: Floats) -> None:
         """Leave the bodies of the simulation at rest at ``u``."""
         moved = u.reshape(-1, 4)[self.assembly.place, :3]
         simulation.assembly.field_set("displacement", moved)
@@ -113,7 +109,7 @@ def roller_projections(held: Constraints) -> tuple[Integers, Floats]:
     return nodes[:, None] + np.arange(3), vectors @ vectors.transpose(0, 2, 1)
 
 
-def inverse_stiffness(simulation: Simulation, assembly: Assembly) -> Floats:
+def inverse_stiffness(simulation: State, assembly: Assembly) -> Floats:
     """``1/M`` with fictitious masses M: a third of the trace of ``K_aa`` at every node [N/m].
 
     ``tr K_aa = sum_e V (lambda + 4 mu) |grad N_a|^2``.

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from qdem_fem.energy_account import energy_facts
 from qdem_fem.output import table_read
 from qdem_fem.run_folder import RunFolder
-from qdem_fem.scene_checks import Prepared
+from qdem_fem.scene_prepared import Prepared
 from qdem_fem.scene_run import Done
 from qdem_fem.scene_series import TimeSeries
 from qdem_fem.spectra import Mode, peak_frequencies

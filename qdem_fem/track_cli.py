@@ -76,9 +76,10 @@ def grains_command(arguments: argparse.Namespace) -> int:
 def train_command(arguments: argparse.Namespace) -> int:
     """Write the made-up record of a passing train."""
     from qdem_fem.errors import UsageError
+    from qdem_fem.load_rail import Track
     from qdem_fem.load_record import load_record_write
     from qdem_fem.load_roughness import Roughness
-    from qdem_fem.load_train import Track, Train, WheelFlat, train_record
+    from qdem_fem.load_train import Train, WheelFlat, train_record
 
     _refuse_no_folder(arguments.out)
     train = Train(**_given(arguments, "cars", "speed", "axle_load", "first_share"))

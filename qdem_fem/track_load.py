@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from qdem_fem.errors import ConditionError
+from qdem_fem.load_rail import Track, seat_share
 from qdem_fem.load_record import RATE
 from qdem_fem.load_rolling import rolling_forces
 from qdem_fem.load_roughness import Roughness
-from qdem_fem.load_train import LONGEST, Track, Train, WheelFlat, flat_forces, seat_share
+from qdem_fem.load_train import LONGEST, Train, WheelFlat, flat_forces
 from qdem_fem.mesh_checks import FloatArray
 from qdem_fem.scene_series import TimeSeries
 

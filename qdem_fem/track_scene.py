@@ -23,8 +23,8 @@ from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
 from qdem_fem.mesh_checks import FloatArray, IntArray
 from qdem_fem.scene import BodyTable, Scene
-from qdem_fem.scene_checks import Prepared, Step, files_named, output_faults
 from qdem_fem.scene_file import Problem, SceneText, error_told
+from qdem_fem.scene_prepared import Prepared, Step, files_named, output_faults
 from qdem_fem.scene_series import TimeSeries, WrongSeries
 from qdem_fem.sleeper_mesh import SleeperShape
 from qdem_fem.track_bed import Bed, bed_prepare, stages_ahead

@@ -12,8 +12,9 @@ from typing import Annotated
 from pydantic import Field
 
 from qdem_fem.body import Rigid
+from qdem_fem.load_rail import Track
 from qdem_fem.load_roughness import RailKind, Roughness, WheelKind
-from qdem_fem.load_train import Track, Train, WheelFlat
+from qdem_fem.load_train import Train, WheelFlat
 from qdem_fem.scene import MaterialTable, SeriesTable
 from qdem_fem.scene_file import Problem
 from qdem_fem.scene_series import TimeSeries, series_of

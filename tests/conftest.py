@@ -6,7 +6,6 @@ import os
 import shutil
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -49,10 +48,11 @@ def _place(item: pytest.Item) -> tuple[int, bool, int]:
 @cache
 def engine_missing(name: str) -> str:
     """Why an engine, or a program such as ``chromium``, can not be used; empty where it can."""
-    if not (Path(__file__).parents[1] / "adapters" / f"engine_{name}.py").exists():
-        return "" if shutil.which(name) else f"the engine {name} is not installed"
-    from adapters.engine import engine_named
+    from adapters.engine import engine_named, engines_known
     from adapters.errors import EngineMissing
+
+    if name not in engines_known():
+        return "" if shutil.which(name) else f"the engine {name} is not installed"
 
     try:
         engine_named(name).version()

@@ -13,9 +13,15 @@ from pathlib import Path
 
 import pytest
 
-from adapters.engine import Engine, EngineRun, EngineStart, engine_named
+from adapters.engine import (
+    Engine,
+    EngineRun,
+    EngineStart,
+    engine_named,
+    engines_known,
+    real_engines,
+)
 from adapters.engine_fake import FakeEngine
-from adapters.engine_names import REAL_ENGINES
 from adapters.procedure import run_scene
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder
@@ -24,9 +30,9 @@ from adapters.scene_file import scene_load
 from adapters.window import Window, window_load, window_read
 from scenes import scene_template
 
-REAL = [pytest.param(name, marks=pytest.mark.engine(name)) for name in REAL_ENGINES]
+REAL = [pytest.param(name, marks=pytest.mark.engine(name)) for name in real_engines()]
 """Engines with mechanics, and with a process to kill."""
-ENGINES = [*REAL, "fake"]
+ENGINES = [*REAL, *(name for name in engines_known() if name not in real_engines())]
 
 QUIET = Progress(quiet=True)
 TINY = (

@@ -9,11 +9,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from adapters.engine_yade import PARAMETERS, YadeEngine
+from adapters.engine_yade import PARAMETERS, YadeEngine, piston_face
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
-from adapters.yade_parameters import piston_face
 from scenes import scene_path
 
 SCRIPT = """\

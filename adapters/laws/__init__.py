@@ -1,19 +1,19 @@
-"""Laws of residual displacement, one file each: ``law_NAME.py`` with an object ``LAW``."""
+"""Laws of residual displacement: each is a file here with an object ``LAW``."""
 
 from __future__ import annotations
 
 from adapters.laws.law import Law
-from adapters.named_files import file_named, names_known
+from adapters.named_files import find_choice, find_choices
 
 __all__ = ["Law", "law_named", "laws_known"]
 
 
 def laws_known() -> tuple[str, ...]:
-    """Names of all laws, sorted: the files ``law_*.py`` of this package."""
-    return names_known(__path__, "law")
+    """Names of all laws, sorted."""
+    return tuple(find_choices(__name__, "LAW"))
 
 
 def law_named(name: str) -> Law:
     """The law of this name; raises `UsageError` with the nearest name when there is none."""
-    law: Law = file_named(__name__, __path__, "law", name, "there is no law").LAW
+    law: Law = find_choice(__name__, "LAW", name, "there is no law")
     return law

@@ -13,8 +13,8 @@ from adapters.state import FloatArray
 class Law(Protocol):
     """A trend u(N) of residual displacement with load cycles N, of p parameters.
 
-    A file ``law_NAME.py`` of this package with an object ``LAW`` of this kind is a law; nothing
-    else has to be told of it.  Displacements may have any shape behind their first axis (grains
+    A file beside the other laws with an object ``LAW`` of this kind is a law, and is named nowhere
+    else.  Displacements may have any shape behind their first axis (grains
     and axes): each column is fitted by itself, all at once.
     """
 

@@ -15,7 +15,7 @@ class HighCycleAccumulation(ShapedLaw):
     Their f_N = C1 [ln(1 + C2 N) + C3 N] with a = C1, tau = 1 / C2, b = C1 C3.  Unlike the law
     `log-linear` it has a value at N = 0.
 
-    Do not use it to predict far from a short window: a small b that the window hardly shows rules
+    Do not use it to predict far from a short window: a small b that the window barely shows rules
     the prediction.
     """
 

@@ -33,7 +33,7 @@ class LogLinear:
         """Parameters c, a [m] and b [m/cycle], shape (3, ...); see `Law.fit`.
 
         Both columns are counted from the first cycle: at a million cycles they differ by 1e-5 of
-        themselves only.  Raises `UsageError` also where they can not be told apart.
+        themselves only.  Raises `UsageError` also where they cannot be separated.
         """
         cycle, displacement = training_data(self, cycle, displacement)
         columns = np.stack([(cycle - cycle[0]) / cycle[0], log_ratio(cycle[0], cycle)])

@@ -15,7 +15,7 @@ class StretchedExponential(ShapedLaw):
     Compaction of tapped grains reaches its steady state so (Philippe and Bideau 2002); b = 1 is
     one time scale, a small b a long tail that looks like ln N over many decades.
 
-    Do not use it on fewer than about ten cycles: tau, b and a are hardly told apart before the
+    Do not use it on fewer than about ten cycles: tau, b and a are not separable before the
     bend is seen.
     """
 

@@ -1,26 +1,34 @@
-"""What a jump moves, one file a way: ``move_NAME.py`` with an object ``MOVE``."""
+"""What a jump moves: each way is a file here with an object ``MOVE``."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from adapters.named_files import file_named, names_known
+from adapters.named_files import find_choice, find_choices
 
 if TYPE_CHECKING:  # a scene asks for names only; the ways themselves load scipy
     from adapters.moves.move import Move
 
-__all__ = ["DEFAULT", "move_named", "moves_known"]
+__all__ = ["DEFAULT", "RETIRED", "move_named", "moves_known"]
 
 DEFAULT = "smoothed"
 """The way of a scene that names none."""
 
+RETIRED = {
+    "robust": "smoothed",
+    "shrunk": "smoothed",
+    "modes": "profile",
+    "smooth-field": "profile",
+}
+"""Ways that left trackbed, and the nearest one that is here."""
+
 
 def moves_known() -> tuple[str, ...]:
-    """Names of all ways to move grains in a jump, sorted: the files ``move_*.py`` here."""
-    return names_known(__path__, "move")
+    """Names of all ways to move grains in a jump, sorted."""
+    return tuple(find_choices(__name__, "MOVE"))
 
 
 def move_named(name: str) -> Move:
     """The way of this name; raises `UsageError` with the nearest name when there is none."""
-    move: Move = file_named(__name__, __path__, "move", name, "no jump moves grains by").MOVE
+    move: Move = find_choice(__name__, "MOVE", name, "no jump moves grains by", RETIRED)
     return move

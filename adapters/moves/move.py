@@ -1,19 +1,16 @@
-"""What a way to move grains in a jump is, and what several of them ask of a window."""
+"""What a way to move grains in a jump is, and what several of them ask of a window of cycles."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
 from adapters.container import Container
+from adapters.errors import UsageError
 from adapters.laws.law import Law
 from adapters.state import FloatArray
-
-BLOCKS_MOST = 4
-"""Parts of a window from which the scatter of a grain's move is taken, at most."""
 
 
 class Displacement(Protocol):
@@ -38,13 +35,15 @@ class Displacement(Protocol):
 
 @dataclass(frozen=True)
 class Move:
-    """A way to move grains in a jump; a file ``move_NAME.py`` with an object ``MOVE`` is one."""
+    """A way to move grains in a jump; a file with an object ``MOVE`` is one."""
 
     name: str
     """The name in scenes: that of the file, dashes for its underscores."""
     displacement: Displacement
     moves_piston: bool = True
     """False leaves the piston where it is, beside grains that stay where they are."""
+    tames_loose: bool = True
+    """False throws a loose grain as far as its own law says, as the paper's estimate does."""
 
 
 def law_moves(cycle: FloatArray, position: FloatArray, law: Law, h: float) -> FloatArray:
@@ -58,50 +57,38 @@ def law_moves(cycle: FloatArray, position: FloatArray, law: Law, h: float) -> Fl
     return np.asarray(law.increment(law.fit(cycle[rows], path), start, start + h))
 
 
-def block_moves(cycle: FloatArray, position: FloatArray, law: Law, h: float) -> FloatArray:
-    """The same jump as each of ``b`` equal parts of the window predicts it [m], shape (b, n, 3).
+def mean_drop(cycle: FloatArray, position: FloatArray, law: Law, h: float) -> float:
+    """Mean vertical move [m] over ``h`` cycles by the law of the mean path; see `Displacement`."""
+    rows = slice(law.first_state, None)
+    path = (position[rows, :, 2] - position[0, :, 2]).mean(axis=1)
+    start = float(cycle[-1])
+    return float(law.increment(law.fit(cycle[rows], path), start, start + h))
 
-    Parts share the states between them.  ``b`` is `BLOCKS_MOST`, less where a part would be shorter
-    than the law wants it; 0 where not even two parts are long enough.
+
+def height_share(place: FloatArray) -> FloatArray:
+    """Vertical move of each grain under a uniform strain of mean move 1, shape (n,).
+
+    Heights above the lowest grain of ``place`` (n, 3) [m] over their mean; 1 in a flat layer.
     """
-    first, start = law.first_state, float(cycle[-1])
-    spans = len(cycle) - 1 - first
-    blocks = min(BLOCKS_MOST, spans // max(law.minimum_cycles - 1, 1))
-    if blocks < 2:
-        return np.empty((0, *position.shape[1:]))
-    ends = first + np.linspace(0, spans, blocks + 1).round().astype(int)
-    parts = [slice(a, b + 1) for a, b in pairwise(ends)]
-    return np.stack(
-        [
-            law.increment(law.fit(cycle[part], position[part] - position[0]), start, start + h)
-            for part in parts
-        ]
-    )
+    height = place[:, 2] - place[:, 2].min()
+    return np.asarray(height / height.mean() if height.any() else np.ones_like(height))
 
 
-def within_variance(moves: FloatArray) -> FloatArray:
-    """Variance s_i^2 of the mean of a grain's ``moves`` [m^2] per axis, shape (n,).
-
-    ``moves`` [m], shape (b, n, 3), b >= 2: what the parts of a window say.  The scatter between
-    them, over their number: parts so long that they hardly depend on one another.
-    """
-    blocks = len(moves)
-    scatter = ((moves - moves.mean(axis=0)) ** 2).sum(axis=(0, 2))
-    return np.asarray(scatter / (3 * (blocks - 1) * blocks))
+def mean_restored(place: FloatArray, move: FloatArray, drop: float) -> FloatArray:
+    """``move`` (n, 3) [m] with the uniform vertical strain that makes its mean height ``drop``."""
+    move = move.copy()
+    move[:, 2] += (drop - move[:, 2].mean()) * height_share(place)
+    return move
 
 
-def grain_weights(moves: FloatArray) -> FloatArray:
-    """Weights 1 / (s_i^2 + median s^2) of the grains in a mean over grains, shape (n,), mean 1.
-
-    From ``moves`` of shape (b, n, 3) [m].  A loose grain, whose parts of the window disagree,
-    counts little; none counts more than twice the median one.  All alike without two parts.
-    """
-    n = moves.shape[1]
-    if len(moves) < 2:
-        return np.ones(n)
-    variance = within_variance(moves)
-    middle = float(np.median(variance))
-    if middle == 0:
-        middle = float(variance.mean())
-    weight = 1 / (variance + middle) if middle > 0 else np.ones(n)
-    return np.asarray(weight / weight.mean())
+def jump_arguments_check(position: FloatArray, radius: FloatArray, h: float) -> None:
+    """Raise `UsageError` unless these are the states (k+1, n, 3) of n grains and a jump h >= 0."""
+    if position.ndim != 3 or position.shape[2] != 3 or np.shape(radius) != position.shape[1:2]:
+        raise UsageError(
+            f"positions of shape {position.shape} and radii of shape {np.shape(radius)} are not "
+            "those of states of the same grains"
+        )
+    if not position.shape[1]:
+        raise UsageError("there are no grains to move")
+    if not (np.isfinite(h) and h >= 0):
+        raise UsageError(f"a jump of {h:g} cycles is none", remedy="give h >= 0")

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from adapters.container import Container
-from adapters.jump_field import jump_arguments_check
 from adapters.laws.law import Law
-from adapters.moves.move import Move, law_moves
+from adapters.moves.move import Move, jump_arguments_check, law_moves
 from adapters.state import FloatArray
 
 
@@ -26,4 +25,4 @@ def displacement(
     return law_moves(cycle, position, law, h)
 
 
-MOVE = Move("per-grain", displacement)
+MOVE = Move("per-grain", displacement, tames_loose=False)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from adapters.container import Container
-from adapters.jump_field import jump_arguments_check
 from adapters.laws.law import Law
-from adapters.moves.move import Move
+from adapters.moves.move import Move, jump_arguments_check
 from adapters.state import FloatArray
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from adapters import contact_law as law
+from tests.tangential_rules import LOOPS, force_secant, work
 from validation.bench.few_grains import (
     RADIUS,
     driven_contact,
@@ -19,7 +20,6 @@ from validation.bench.few_grains import (
     shear_modulus,
     table_1,
 )
-from validation.bench.tangential_rules import LOOPS, force_secant, work
 
 pytestmark = pytest.mark.engine("liggghts")
 

@@ -1,6 +1,6 @@
 """What every engine promises: one suite, one tiny scene, each engine in turn.
 
-A new engine is added in `adapters.engine_names`; what it is allowed to differ in is said in its own
+A new engine is a file that sets ``ENGINE``; what it is allowed to differ in is said in its own
 tests.  Faults of its process are in ``test_faults.py``.
 """
 

@@ -288,7 +288,7 @@ def test_wrong_version(
 @pytest.mark.parametrize(
     ("launcher", "code", "said"),
     [
-        ("no-such-mpirun -np 2", 4, "can not start no-such-mpirun"),
+        ("no-such-mpirun -np 2", 4, "cannot start no-such-mpirun"),
         ("sh -c 'echo not enough slots; exit 1' sh", 5, "not enough slots"),
         ("sh -c 'exit 0' sh", 5, "no sentinel line"),
     ],

@@ -9,6 +9,13 @@ import pytest
 
 from adapters import contact_law as law
 from adapters.lammps_decks import TANGENTIAL_RULES
+from tests.tangential_rules import (
+    LOOPS,
+    force_incremental,
+    force_rescaled,
+    force_secant,
+    work,
+)
 from validation.bench.few_grains import (
     PLACE,
     RADIUS,
@@ -21,13 +28,6 @@ from validation.bench.few_grains import (
     table_1,
 )
 from validation.bench.few_grains_lammps import track_run, track_run_under
-from validation.bench.tangential_rules import (
-    LOOPS,
-    force_incremental,
-    force_rescaled,
-    force_secant,
-    work,
-)
 
 pytestmark = pytest.mark.engine("lammps")
 

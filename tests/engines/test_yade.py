@@ -12,14 +12,15 @@ import pytest
 
 from adapters import contact_law as law
 from adapters.engine import EngineStart
-from adapters.engine_yade import YadeEngine
+from adapters.engine_yade import YadeEngine, damping_ratio
 from adapters.sample import GRAVITY
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
 from adapters.window import Window, state_read, window_read
-from adapters.yade_parameters import damping_ratio
 from scenes import scene_template
+from tests.tangential_rules import LOOPS, force_incremental, work
+from tests.yade_few_grains import track_run
 from validation.bench.few_grains import (
     RADIUS,
     Track,
@@ -30,8 +31,6 @@ from validation.bench.few_grains import (
     shear_modulus,
     table_1,
 )
-from validation.bench.few_grains_yade import track_run
-from validation.bench.tangential_rules import LOOPS, force_incremental, work
 
 pytestmark = pytest.mark.engine("yade")
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from adapters import contact_law as law
-from adapters.yade_parameters import DISC_CORNERS
+from adapters.engine_yade import DISC_CORNERS
 from tests.engines.test_yade import ALPHA, Bed
+from tests.yade_few_grains import track_run
 from tests.yade_piston import piston_forces, scene_partial
 from tests.yade_seams import SEAM_MEAN, seam_force, seam_length
 from validation.bench.few_grains import RADIUS, table_1
-from validation.bench.few_grains_yade import track_run
 
 SCRIPTS = [path for path in files("yade_scripts").iterdir() if path.name.endswith(".py")]
 

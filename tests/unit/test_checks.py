@@ -168,6 +168,18 @@ def test_force_error(cycle: int) -> None:
     assert figures.force_error == pytest.approx(expected, rel=1e-12)
 
 
+def test_elastic_deflection_is_what_the_piston_comes_back_by() -> None:
+    """Each cycle begins 30 um above its end and dips 100 um below its start: 70 um come back.
+
+    What stays is settlement, and no part of the deflection.
+    """
+    phase = np.arange(1, SAMPLES + 1) / SAMPLES
+    dip = np.interp(phase, [0.0, 0.5, 1.0], [0.0, -100e-6, -30e-6])
+    height = np.concatenate([0.01 + c * -30e-6 + dip for c in range(4)])
+    found = tracked(height=height).piston.elastic_deflection(STEPS)
+    np.testing.assert_allclose(found, 70e-6, atol=1e-12)
+
+
 def test_short_window_has_no_force_error() -> None:
     """With no cycle behind the first three the figure is nan, and that is no fault."""
     figures = figures_of_window(SCENE, window(3))

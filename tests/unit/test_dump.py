@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from adapters import dump_kernel, dump_reader
+from adapters import dump_kernel, dump_reader, dump_text
 from adapters.dump import Frame, dump_frames, dump_write
 from adapters.errors import DumpError, UsageError
 
@@ -287,7 +287,7 @@ def test_blocks_of_text_do_not_matter(tmp_path: Path, frames: list[Frame], block
     dump_write(path, frames)
     whole = list(dump_frames(path))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dump_reader, "_BLOCK", block)
+        patch.setattr(dump_text, "BLOCK", block)
         patch.setattr(dump_reader, "_VALUES_AT_FIRST", 1)
         assert_frames_equal(list(dump_frames(path)), whole)
 
@@ -406,7 +406,7 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
     assert sum(len(frame.values) for frame in dump_frames(path)) == 250_000
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 5 * values.nbytes + 2 * dump_reader._BLOCK
+    assert peak < 5 * values.nbytes + 2 * dump_text.BLOCK
 
 
 # --- faults -------------------------------------------------------------------------------------
@@ -445,7 +445,7 @@ ROW_END = GRAINS[: GRAINS.index("5 1 -0.009 1e-3")]
         (GRAINS.replace("1e-3", "1e999"), 23, 10, "column vx of grain 5 is 1e999", (), 1),
         (GRAINS.replace("1e-3", "1.8e308"), 23, 10, "column vx of grain 5 is 1.8e308", (), 1),
         (GRAINS.replace("1e-3", "-3.5e308"), 23, 10, "column vx of grain 5 is -3.5e308", (), 1),
-        (GRAINS.replace("x vx \n7", "x vy \n7"), 21, 10, "gone: vx; new: vy", (), 1),
+        (GRAINS.replace("x vx \n7", "x vy \n7"), 21, 10, "missing: vx; new: vy", (), 1),
         (GRAINS.replace("x vx \n7", "vx x \n7"), 21, 10, "the columns change", (), 1),
         (GRAINS + CONTACTS.replace("P\n0", "P\n30"), 45, 30, "to 'ENTRIES c_pl[1]", (), 3),
         (GRAINS.replace("7 1 0.03", "5 1 0.03"), 23, 10, "there twice: 5", (), 1),
@@ -582,7 +582,7 @@ def test_cut_compressed_dump(tmp_path: Path) -> None:
         assert error.incomplete_end
     for content in (b"ITEM: TIMESTEP\n", data[:40] + b"damage" + data[46:]):
         path.write_bytes(content)
-        assert "can not be read" in str(frames_and_error(path)[1])
+        assert "cannot be read" in str(frames_and_error(path)[1])
 
 
 @FILES

@@ -18,6 +18,8 @@ from adapters import meshio_dump
 from adapters.dump import Frame, dump_frames, dump_write
 from adapters.errors import DumpError, UsageError
 
+pytestmark = pytest.mark.lowest
+
 ROOT = Path(__file__).parents[2]
 COLUMNS = ["id", "type", "x", "y", "z", "vx", "vy", "vz", "radius"]
 COLUMNS += ["f_floor[1]", "f_floor[2]", "f_floor[3]", "c_coord", "ix"]

@@ -11,9 +11,9 @@ from adapters import contact_law
 from adapters.dump import Frame
 from adapters.engine import EngineStart
 from adapters.engine_lammps import LammpsEngine
-from adapters.lammps_contacts import contact_values
 from adapters.lammps_decks import (
     contact_text,
+    contact_values,
     dump_states_text,
     moved_write,
     piston_wall_text,

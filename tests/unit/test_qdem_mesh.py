@@ -21,6 +21,8 @@ from qdem_fem.mesh import TetMesh, element_gradients, mesh_read
 from qdem_fem.mesh_checks import FLAT
 from qdem_fem.mesh_generation import box_mesh, gmsh_box, jitter, ring_mesh
 
+pytestmark = pytest.mark.lowest
+
 BOX = box_mesh((0.4, 0.3, 0.2), (2, 2, 2))
 NODES, ELEMENTS = BOX.nodes, BOX.elements
 UNIT = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])

@@ -23,6 +23,8 @@ from qdem_fem.pictures_series import Shown, inside, picture_beside, series_draw
 from qdem_fem.surface import surface_faces
 from trackbed.command import main
 
+pytestmark = pytest.mark.lowest
+
 SCENE = """
 [[body]]
 name = "lower"

@@ -21,9 +21,12 @@ from qdem_fem.errors import LibraryMissing, QdemError, SceneError, UsageError
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.scene import Scene
 from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import Prepared, scene_load
+from qdem_fem.scene_checks import scene_load
 from qdem_fem.scene_lines import key_lines
+from qdem_fem.scene_prepared import Prepared
 from qdem_fem.scene_series import TimeSeries
+
+pytestmark = pytest.mark.lowest
 
 SCENES = Path(__file__).parents[2] / "scenes"
 CANTILEVER = (SCENES / "cantilever.toml").read_text(encoding="utf-8")

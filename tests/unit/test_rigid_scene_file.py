@@ -14,6 +14,8 @@ from rigid_lcp.pouring import stone_2d
 from rigid_lcp.scene_file import force_at, key_line, loads_of, scene_build, scene_read
 from rigid_lcp.scene_types import Load
 
+pytestmark = pytest.mark.lowest
+
 PILE = Path(__file__).parents[2] / "scenes" / "pile.toml"
 SMALL = """\
 dimensions = 2

@@ -15,6 +15,8 @@ from adapters.dump import Frame, dump_write
 from adapters.errors import TrackbedError, UsageError
 from adapters.settlement_series import Series, series_read
 
+pytestmark = pytest.mark.lowest
+
 
 def written(path: Path, text: str) -> Path:
     """``path`` with this text in it."""

@@ -111,8 +111,8 @@ def test_names_are_folders_and_differ(first: str, second: str) -> None:
         (["loading.amplitude=1e4,3e4"], SceneError, "can not pull"),
         (["loading.frequency=10,10.0"], UsageError, "are the same scene"),
         (["loading.frequency=10", "loading.frequency=20"], UsageError, "given twice"),
-        (["loading.frequency"], UsageError, "can not read"),
-        (["=10"], UsageError, "can not read"),
+        (["loading.frequency"], UsageError, "cannot read"),
+        (["=10"], UsageError, "cannot read"),
     ],
 )
 def test_wrong_values_are_refused_before_anything_starts(

@@ -15,18 +15,18 @@ from adapters import contact_law as law
 from adapters.container import Container, sides_needed
 from adapters.decks import PISTON_MARGIN
 from adapters.engine import EngineStart
-from adapters.engine_yade import YadeEngine
-from adapters.errors import EngineFailed, EngineMissing, NotConverged, SceneError
-from adapters.scene import GrainRadius, Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray, State
-from adapters.yade_parameters import (
+from adapters.engine_yade import (
+    YadeEngine,
     damping_ratio,
     piston_face,
     rim_triangles,
     shared_parameters,
     side_triangle,
 )
+from adapters.errors import EngineFailed, EngineMissing, NotConverged, SceneError
+from adapters.scene import GrainRadius, Scene
+from adapters.scene_file import scene_load
+from adapters.state import FloatArray, State
 from scenes import scene_path
 from trackbed import command
 

@@ -15,8 +15,9 @@ import pytest
 
 from adapters import procedure, stages
 from adapters.dump import Frame, dump_frames, dump_write
-from adapters.engine import EngineRun, engine_failure
+from adapters.engine import EngineRun
 from adapters.engine_fake import FakeEngine
+from adapters.engine_process import engine_failure
 from adapters.errors import EngineFailed, NotCredible
 from adapters.progress import Progress
 from adapters.run_folder import RunFolder
@@ -610,7 +611,7 @@ def test_launcher_missing(scene: Path, programs: Path, capsys: pytest.CaptureFix
     install(programs, GOOD)
     words = ["run", str(scene), "--engine", "liggghts", "--launcher", "no-such-launcher -np 2"]
     assert command.main(words) == 4
-    assert "can not start no-such-launcher" in capsys.readouterr().err
+    assert "cannot start no-such-launcher" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

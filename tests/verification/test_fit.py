@@ -9,19 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters import fit
+from adapters import fit_band
 from adapters.errors import JumpRefused, NotConverged, UsageError
-from adapters.fit import (
-    Series,
-    autoregression,
-    cycles_needed,
-    fit_noise,
-    fit_series,
-    prediction_band,
-)
+from adapters.fit import Series, cycles_needed, fit_series
+from adapters.fit_band import autoregression, fit_noise, prediction_band
 from adapters.laws import Law, law_named
 from adapters.residual import error_term
 from adapters.state import FloatArray
+
+pytestmark = pytest.mark.lowest
 
 LOG = law_named("log")
 every_law = pytest.mark.parametrize(
@@ -157,7 +153,7 @@ def test_noise_of_a_long_series_is_that_of_every_cycle(
     trend = law.value(np.array([0.0, 300.0, 3e4][: len(law.parameter_names)]), cycle)
     settlement = trend + correlated_noise(11, 6000, correlation, 1)[:, 0]
     every = fit_noise(law, cycle, settlement, 1e9, 0.9)
-    monkeypatch.setattr(fit, "NOISE_ROWS", 400)
+    monkeypatch.setattr(fit_band, "NOISE_ROWS", 400)
     assert fit_noise(law, cycle, settlement, 1e9, 0.9) == pytest.approx(every, rel=0.15)
 
 

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from adapters.errors import JumpRefused, NotConverged, TrackbedError, UsageError
 from adapters.fit import Prediction, Series, fit_auto, fit_series, regime_of
-from adapters.fit_agreement import AGREE, laws_said
-from adapters.fit_auto import outlook
+from adapters.fit_auto import AGREE, laws_said, outlook
 from adapters.fit_candidates import (
     SLOW_LAWS,
     candidates_of,
@@ -229,7 +228,7 @@ def test_sentences_count_as_the_user_does() -> None:
         return found
 
     (ratcheting,) = said(READ, 1e4)
-    assert ratcheting.startswith("up to cycle 21000 the settlement rate hardly falls")
+    assert ratcheting.startswith("up to cycle 21000 the settlement rate falls too slowly")
     assert "N counted from cycle 20000" in ratcheting
     (uncertain,) = said(READ**0.45, 1e5)
     assert "at cycle 120000: " in uncertain
@@ -415,7 +414,7 @@ def test_a_bed_at_rest_stays(level: float) -> None:
 
 def test_hard_series() -> None:
     """Two points, cycle 0, nan, disorder, a billion cycles, heave."""
-    with pytest.raises(UsageError, match="2 cycles are too few to tell a regime"):
+    with pytest.raises(UsageError, match="2 cycles are too few to see a regime"):
         fit_auto(Series(READ[:2], READ[:2]), 1e4)
     with pytest.raises(UsageError, match="cycles"):
         fit_auto(Series(np.zeros(1), np.zeros(1)), 1e4)
@@ -453,7 +452,7 @@ def test_command_refuses_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixtu
     content = json.loads(printed.out)
     assert set(content) == keys
     assert (content["regime"], content["prediction"], content["unit"]) == ("ratcheting", None, "mm")
-    assert "hardly falls" in printed.err
+    assert "falls too slowly" in printed.err
     assert set(content["laws"]) == set(SLOW_LAWS)
     assert all(said["inside"] is None for said in content["laws"].values())
     write(np.log(READ))

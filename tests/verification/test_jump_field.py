@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from adapters.errors import UsageError
-from adapters.jump_field import clipped, jump_field, smoothed
 from adapters.laws import Law, law_named
 from adapters.laws.law_karrech2007 import Karrech2007
+from adapters.moves.move_smoothed import clipped, jump_field, smoothed
 from adapters.state import FloatArray
 
 LOG = law_named("log")

@@ -18,7 +18,6 @@ from adapters.engine_fake import SETTLEMENT, FakeBed
 from adapters.errors import SceneError
 from adapters.jump_history import Jumped
 from adapters.jump_rates import Stretch
-from adapters.jump_record import DECISION
 from adapters.jump_seating import (
     CONSTRAINED,
     cycles_hung,
@@ -27,6 +26,7 @@ from adapters.jump_seating import (
     spans,
 )
 from adapters.progress import Progress
+from adapters.report_record import DECISION
 from adapters.run_folder import Outcome, RunFolder
 from adapters.scene import Scene
 from adapters.scene_file import scene_load

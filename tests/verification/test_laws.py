@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import adapters.laws
 from adapters.errors import UsageError
 from adapters.laws import Law, law_named, laws_known
 from adapters.laws.law_karrech2007 import Karrech2007
+from adapters.named_files import find_choice, find_choices
 from adapters.state import FloatArray
 
 LAWS = [law_named(name) for name in ("karrech2007", "linear", "log")]
@@ -279,19 +279,18 @@ def test_laws_break_down_with_a_sentence() -> None:
             law_named(name).fit(cycle, np.zeros(4))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "log", "linear", "log-linear", "karrech2007", "power", "shenton", "hyperbolic",
-        "stretched-exponential", "inverse-log", "sato", "hca",
-    ],
-)  # fmt: skip
-def test_shipped_laws_are_found(name: str) -> None:
-    """The eleven laws are known by their names, and describe all of their parameters."""
-    law = law_named(name)
+@pytest.mark.parametrize("name", laws_known())
+def test_every_law_keeps_the_contract(name: str) -> None:
+    """Whatever file is a law: it has its name, describes all of its parameters, leaves a bed at
+    rest where it is, and lets one that settles by ln N settle on, by a finite length."""
+    law, cycle = law_named(name), np.arange(1.0, 41.0)
     assert law.name == name
     assert len(law.parameter_names) == len(law.parameter_units)
-    assert len(law.fit(np.arange(1.0, 9.0), np.zeros(8))) == len(law.parameter_names)
+    still = law.fit(cycle, np.zeros((40, 2)))
+    assert still.shape == (len(law.parameter_names), 2)
+    assert not law.increment(still, 40.0, 80.0).any()
+    settling = law.fit(cycle, -1e-5 * np.log(cycle))
+    assert -1e-3 < float(law.increment(settling, 40.0, 80.0)) < 0
 
 
 @pytest.mark.parametrize(("wrong", "meant"), [("Log", "log"), ("log_linear", "log-linear")])
@@ -305,12 +304,16 @@ def test_unknown_law_names_the_nearest(wrong: str, meant: str) -> None:
     assert raised.value.what == "there is no law 'quadratic'"
 
 
-def test_a_law_is_added_by_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A new file law_NAME.py is a law; no list has to be kept."""
-    (tmp_path / "law_square_root.py").write_text("LAW = 'the law'\n")
-    monkeypatch.setattr(adapters.laws, "__path__", [*adapters.laws.__path__, str(tmp_path)])
-    assert "square-root" in laws_known()
-    assert str(law_named("square-root")) == "the law"
+def test_a_choice_is_added_by_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that sets the word of its folder is a choice; others are none, and no list is kept."""
+    folder = tmp_path / "more_laws"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "square_root.py").write_text("LAW = 'the law'\n")
+    (folder / "contract.py").write_text("class Law:\n    LAW = 1\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert find_choices("more_laws", "LAW") == {"square-root": "more_laws.square_root"}
+    assert find_choice("more_laws", "LAW", "square-root", "there is no law") == "the law"
 
 
 def test_hundred_thousand_grains_take_less_than_a_second() -> None:

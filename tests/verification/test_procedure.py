@@ -17,13 +17,17 @@ import pytest
 from adapters import jump_fixed, jump_room, procedure, stages
 from adapters.contact_law import HertzStiffness
 from adapters.container import Walls
+from adapters.engine import engine_named
 from adapters.engine_fake import SETTLEMENT
 from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
 from adapters.jump_fixed import room_known
 from adapters.progress import Progress
-from adapters.relaxation import Relaxation, relax
+from adapters.relaxation import relax
+from adapters.relaxation_measured import Relaxation
 from adapters.run_folder import Outcome, RunFolder
 from adapters.scene import Scene
+from adapters.scene_file import scene_load
+from adapters.stages import Run, Variant
 from adapters.state import FloatArray, State, state_load
 from adapters.window import Window, window_load
 from scenes import scene_path
@@ -380,6 +384,51 @@ def test_piston_is_never_lifted_by_a_jump(tmp_path: Path) -> None:
     assert after <= before
     drop = SETTLEMENT * np.log(61 / 41)
     assert before - after == pytest.approx(drop, rel=0.05)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Window]:
+    """A finished run on the fake engine, and its window from cycle 20 to 40."""
+    path = tmp_path_factory.mktemp("finished") / "run"
+    settle(path)
+    manifest = RunFolder(path).manifest()
+    scene = scene_load(path / "scene.toml", manifest["overrides"])
+    run = Run(scene, RunFolder(path), engine_named("fake"), Variant(), QUIET)
+    return run, window_load(path / "window_000020" / "states.npz")
+
+
+@pytest.mark.parametrize("per_cycle", [-2e-6, 0.0, 3e-6])
+def test_a_jump_lowers_the_piston_by_its_law_and_never_lifts_it(
+    finished: tuple[Run, Window], per_cycle: float
+) -> None:
+    """Heights that go as a ln N give a drop of a ln(60 / 40) over 20 cycles where they fall; a
+    piston that rose in the window, as a loose grain may lift it, is placed where it is."""
+    run, window = finished
+    heights = 0.05 + per_cycle * np.log(window.cycle[1:])
+    at_ends = np.searchsorted(window.piston.time_step, window.time_step[1:])
+    height = window.piston.height.copy()
+    height[at_ends] = heights
+    seen = replace(window, piston=replace(window.piston, height=height), piston_start=0.05)
+    _, _, placed = stages.estimate(run, seen, 0, 20)
+    expected = heights[-1] + min(per_cycle, 0.0) * np.log(60 / 40)
+    assert placed == pytest.approx(expected, abs=1e-15)
+    assert placed <= heights[-1]
+
+
+def test_rolling_spheres_have_two_fifths_of_their_motion_in_their_spin(
+    finished: tuple[Run, Window],
+) -> None:
+    """A solid sphere has I = 2/5 m r^2: where v = omega r, of any radius, a row of settlement.csv
+    has kinetic energies in the ratio 2/5."""
+    run, window = finished
+    assert np.ptp(window.radius) > 0
+    spin = np.random.default_rng(0).standard_normal(window.spin.shape)
+    rolling = replace(window, spin=spin, velocity=spin * window.radius[:, None])
+    rows = stages.settlement_rows(run, rolling, 0)
+    for row in rows:
+        assert row["kinetic_rotational"] / row["kinetic_translational"] == pytest.approx(0.4)
+    linear = 0.5 * np.einsum("n,ni->", window.mass * window.radius**2, spin[1] ** 2)
+    assert rows[0]["kinetic_translational"] == pytest.approx(float(linear), rel=1e-12)
 
 
 def test_another_scene_is_refused_with_the_difference(tmp_path: Path) -> None:

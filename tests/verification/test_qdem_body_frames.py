@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
 from qdem_fem.body_frames import BodyFrames
+from qdem_fem.kinematics import displacement_gradient
 from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.reference_forces import displacement_gradient
 
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2600.0)

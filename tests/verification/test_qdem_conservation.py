@@ -273,7 +273,7 @@ def creep_uniaxial_strain(time: ArrayLike, stress: float, young: float, viscosit
 
 
 def creep_uniaxial_stress(time: ArrayLike, stress: float, young: float, viscosity: float) -> Any:
-    """Axial strain at ``time`` [s] under ``stress`` [Pa], sides free, ends slipping, nu = 0.
+    """Axial strain at ``time`` [s] under ``stress`` [Pa], the sides and ends free to slip, nu = 0.
 
     Without bulk viscosity the volume follows at once: a jump to 1/3 of the strain, then
     2/3 (1 - exp(-t E / 2 mu_D)).

@@ -7,9 +7,8 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from qdem_fem import construction as c
-from qdem_fem.construction import FloatArray
-from qdem_fem.reference_forces import cofactor
+from qdem_fem.kinematics import FloatArray, cofactor
+from tests import qdem_construction as c
 
 ROUND_OFF = np.finfo(float).eps
 

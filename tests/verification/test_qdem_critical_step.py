@@ -14,7 +14,7 @@ from qdem_fem.critical_step import lagged_viscous_step
 from qdem_fem.errors import StepWarning, Unstable
 from qdem_fem.mass_scaling import element_step, mass_scaling_factor
 from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.reference_forces import Strain
+from qdem_fem.strain_measures import Strain
 from validation.bench.qdem.judge import lumped_mass, stiffness, stiffness_lame
 from validation.bench.qdem.meshes import SLIVER_STEP, box_with_sliver, delaunay_mesh
 

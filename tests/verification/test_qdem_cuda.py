@@ -12,6 +12,7 @@ import qdem_fem as q
 from qdem_fem import kernel, stress
 from qdem_fem.cuda_assembly import node_actions, sample_numbers
 from qdem_fem.errors import ConditionError, LibraryMissing
+from qdem_fem.kernel_arrays import Constraints, Loads, Probes
 from validation.bench.qdem_gpu.contact import MARCHES
 from validation.bench.qdem_gpu.search import CLOUDS
 from validation.cases.qdem_gpu import STRAINS, twins_in_simulator
@@ -108,13 +109,13 @@ def literals(source: str) -> list[float]:
 
 def test_actions_of_a_node_keep_the_order_of_the_step() -> None:
     """Of one node: loads, rollers as given, held components, probes; the others have none."""
-    loads = kernel.Loads(np.array([0]), np.array([13]), np.array([2]), np.array([5.0]))
-    held = kernel.Constraints(
+    loads = Loads(np.array([0]), np.array([13]), np.array([2]), np.array([5.0]))
+    held = Constraints(
         node_at=np.array([6, 14]), series=np.array([0, 1]), weight=np.array([0.0, 1.0]),
         previous=np.array([3.0, 4.0]), roller_at=np.array([12, 12]),
         roller_normal=np.array([[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]]),
     )  # fmt: skip
-    probes = kernel.Probes(np.array([12, 4]), np.zeros((1, 2, 3)), 1, 1)
+    probes = Probes(np.array([12, 4]), np.zeros((1, 2, 3)), 1, 1)
     found = node_actions(5, loads, held, probes)
     assert found.first.tolist() == [0, 0, 2, 2, 7, 7]
     assert found.actions[:7].tolist() == [
@@ -127,7 +128,7 @@ def test_actions_of_a_node_keep_the_order_of_the_step() -> None:
 
 @pytest.mark.parametrize(("stride", "first", "rows"), [(1, 1, 9), (3, 2, 9), (4, 9, 1), (2, 1, 2)])
 def test_samples_are_those_of_the_cpu_kernel(stride: int, first: int, rows: int) -> None:
-    probes = kernel.Probes(np.array([4]), np.zeros((rows, 1, 3)), stride, first)
+    probes = Probes(np.array([4]), np.zeros((rows, 1, 3)), stride, first)
     numbers = sample_numbers(8, probes)
     for done in range(1, 9):
         probes.record[:] = np.nan

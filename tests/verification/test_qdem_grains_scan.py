@@ -154,6 +154,8 @@ def test_cuts_are_found_as_by_every_pair(seed: int) -> None:
     assert got == expected
 
 
+@pytest.mark.peer("pyvista")
+@pytest.mark.peer("gmsh")
 def test_a_thinned_stone_keeps_its_volume_and_takes_a_hundred_tetrahedra() -> None:
     """Thinned to 50 triangles, then filled by gmsh: same volume, no flat tetrahedra."""
     nodes, faces = stone()

@@ -118,7 +118,7 @@ def test_lumped_mass_is_the_whole_mass_about_its_centre() -> None:
     assert mass @ nodes / mass.sum() == pytest.approx(np.array(SIZE) / 2, rel=1e-13)
 
 
-@pytest.mark.parametrize("method", ["amg", "direct"])
+@pytest.mark.parametrize("method", [pytest.param("amg", marks=pytest.mark.peer("pyamg")), "direct"])
 def test_patch(method: Any) -> None:
     """Inner nodes follow a linear field on the boundary exactly, with one stress everywhere."""
     nodes, elements = kuhn((4, 3, 3))
@@ -154,6 +154,7 @@ def test_cantilever_of_46080_elements() -> None:
 
 
 @pytest.mark.long
+@pytest.mark.peer("pyamg")
 def test_linear_elements_converge_at_order_two_to_quadratic_ones() -> None:
     """Linear elements are too stiff, by C h^2 against P2: a ratio near 4 as sides are halved."""
     reference = judge.cantilever_p2((32, 4, 4))
@@ -167,6 +168,7 @@ def test_linear_elements_converge_at_order_two_to_quadratic_ones() -> None:
     assert order == pytest.approx(2, abs=0.1)
 
 
+@pytest.mark.peer("pyamg")
 def test_quadratic_elements_and_beams() -> None:
     """P2 meets Timoshenko to what a clamp's hindered contraction makes, 0.3 %; eq. 12 as printed.
 
@@ -178,6 +180,7 @@ def test_quadratic_elements_and_beams() -> None:
     assert closed.timoshenko_tip(200) == pytest.approx(92.858e-6, rel=1e-5)
 
 
+@pytest.mark.peer("pyamg")
 def test_multigrid_and_direct_agree_far_beyond_a_pass_of_conjugate_gradients() -> None:
     """Two solvers, refined with extended residuals: the same field to 1e-11, asked 1e-7."""
     nodes, _, matrix, _, free, load, _ = cantilever((24, 4, 4))
@@ -226,6 +229,7 @@ def test_what_can_not_be_solved_is_said(monkeypatch: pytest.MonkeyPatch) -> None
 # --- modes ------------------------------------------------------------------------------------
 
 
+@pytest.mark.peer("pyamg")
 def test_modes_by_two_methods() -> None:
     """LOBPCG with multigrid and inversion about zero: the same five modes, M-orthonormal."""
     nodes, _, matrix, mass, free, _, _ = cantilever((24, 4, 4))

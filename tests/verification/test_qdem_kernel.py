@@ -16,10 +16,13 @@ import pytest
 from numba.core import types
 
 import qdem_fem as q
-from qdem_fem import kernel, lanes, reference_forces, stress
+from qdem_fem import kernel, lanes, measure_finger, measure_small, stress
 from qdem_fem.assembly import NO_LOADS
+from qdem_fem.kinematics import displacement_gradient, volume_change
 from qdem_fem.layout import layout_build
-from qdem_fem.reference_forces import Elements, Strain, displacement_gradient, volume_change
+from qdem_fem.strain_measures import MEASURES, Strain
+from tests import qdem_reference_forces as reference_forces
+from tests.qdem_reference_forces import Elements
 from validation.bench.qdem.meshes import delaunay_mesh
 
 LAWS: tuple[Strain, ...] = get_args(Strain)
@@ -169,7 +172,7 @@ def test_stress_of_arrays_and_of_numbers(law: Strain, scale: float) -> None:
     first, second = 0.7, 1.3
     expected = reference_forces.STRESS[law](H, first, second)
     nine = tuple(H.reshape(-1, 9).T)
-    function = kernel.STRESS[kernel.LAWS[law]]
+    function = MEASURES[law].stress_numbers
     found, jacobian = function(nine, first, second, 0.5)
     size = np.linalg.norm(H, axis=(1, 2))
     bound = 100 * np.finfo(float).eps * (first + 2 * second) * size * (1 + size) ** 3
@@ -188,14 +191,14 @@ def test_viscous_stress_of_arrays(law: Strain) -> None:
     rate, G = generator.uniform(-9, 9, (2, 100, 3, 3))
     h, d, g = (tuple(A.reshape(-1, 9).T) for A in (H, rate, G))
     if law == "small":
-        found = stress.viscous_small(h, d, -0.4, 0.6, 0.5)
+        found = measure_small.viscous_numbers(h, d, -0.4, 0.6, 0.5)
         expected = reference_forces.stress_viscous_small(rate, -0.4, 0.6)
     else:
         found = stress.viscous_current(h, d, -0.4, 0.6, 0.5)
         expected = reference_forces.stress_viscous(H, rate, -0.4, 0.6)
         # the velocity edges that go with the rate: Hdot = sum w_a (x) g_a
         w = tuple((rate @ np.linalg.inv(G)).transpose(0, 2, 1).reshape(-1, 9).T)
-        both, _, power = stress.pulls_finger_viscous(h, w, g, 0.7, 1.3, -0.4, 0.6, 0.5)
+        both, _, power = measure_finger.pulls_viscous(h, w, g, 0.7, 1.3, -0.4, 0.6, 0.5)
         total = reference_forces.stress_finger(H, 0.7, 1.3) + expected
         pulls = (total @ G.transpose(0, 2, 1)).transpose(0, 2, 1)
         scale = np.linalg.cond(G)[:, None, None] * abs(pulls).max()
@@ -324,7 +327,8 @@ def test_registers_are_spilled_to_an_aligned_stack(precision: str, viscous: bool
 def test_a_scalar_kernel_would_be_seen() -> None:
     """The same element functions in a loop over plain numbers do not pass the test above."""
     gradient, stress_of = (
-        numba.njit(**kernel.MATHEMATICS)(f) for f in (stress.element_gradient, stress.stress_finger)
+        numba.njit(**kernel.MATHEMATICS)(function)
+        for function in (stress.element_gradient, measure_finger.stress_numbers)
     )
 
     @numba.njit(**kernel.MATHEMATICS)
@@ -349,7 +353,7 @@ def cache_key() -> Any:
     return dispatcher._cache._index_key((types.int64,), dispatcher.targetctx.codegen())
 
 
-@pytest.mark.parametrize("name", ["stress.py", "lanes.py"])
+@pytest.mark.parametrize("name", ["stress.py", "lanes.py", "measure_finger.py"])
 def test_a_changed_source_has_another_cache_key(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The stress lies in another file than the cached function: its text is in the key."""
     assert cache_key() == cache_key()

@@ -16,16 +16,9 @@ from qdem_fem import Body, Simulation
 from qdem_fem.errors import ConditionError, MeshError, NotConverged
 from qdem_fem.grain_form import GrainRecipe, grain_random
 from qdem_fem.grain_mesh import grain_tetrahedra
+from qdem_fem.load_rail import Track, seat_share
 from qdem_fem.load_record import LoadRecord, load_record_read, load_record_write
-from qdem_fem.load_train import (
-    Track,
-    Train,
-    WheelFlat,
-    seat_forces,
-    seat_share,
-    train_record,
-    train_spectrum,
-)
+from qdem_fem.load_train import Train, WheelFlat, seat_forces, train_record, train_spectrum
 from qdem_fem.material import Material
 from qdem_fem.mesh import TetMesh, element_gradients, lumped_mass
 from qdem_fem.sleeper_mesh import SleeperShape, sleeper_mesh

@@ -13,9 +13,11 @@ import skfem
 from scipy.spatial.transform import Rotation
 from skfem.models.elasticity import linear_elasticity
 
-from qdem_fem import reference_forces as r
-from qdem_fem.construction import edge_vectors, internal_forces_constructed, volume
-from qdem_fem.reference_forces import Elements, FloatArray, Strain
+from qdem_fem.kinematics import FloatArray
+from qdem_fem.strain_measures import Strain
+from tests import qdem_reference_forces as r
+from tests.qdem_construction import edge_vectors, internal_forces_constructed, volume
+from tests.qdem_reference_forces import Elements
 
 ROUND_OFF = np.finfo(float).eps
 LAWS: tuple[Strain, ...] = get_args(Strain)

@@ -10,6 +10,7 @@ import pytest
 
 from qdem_fem import load_roughness
 from qdem_fem.errors import ConditionError, SceneError
+from qdem_fem.load_rail import Track, seat_share
 from qdem_fem.load_record import load_record_read
 from qdem_fem.load_rolling import (
     STEEL_MODULUS,
@@ -31,7 +32,7 @@ from qdem_fem.load_roughness import (
     roughness_lines,
     roughness_power,
 )
-from qdem_fem.load_train import Track, Train, seat_share, train_record
+from qdem_fem.load_train import Train, train_record
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.track_cli import SEAT_AREA
 from qdem_fem.track_load import bogie_series

@@ -19,7 +19,8 @@ from qdem_fem.energy_account import EnergyAccount, energy_facts
 from qdem_fem.errors import CheckpointError, EnergyLost, NotConverged, SceneError
 from qdem_fem.grain_grading import Grading
 from qdem_fem.grain_set import grains_make
-from qdem_fem.load_train import Track, Train, seat_share
+from qdem_fem.load_rail import Track, seat_share
+from qdem_fem.load_train import Train
 from qdem_fem.material import Material
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.pictures_bodies import picture_deformed, spheres_bearing

@@ -9,8 +9,9 @@ import pytest
 
 from qdem_fem import track_scene, track_stand
 from qdem_fem.errors import SceneError
+from qdem_fem.load_rail import QUIET, Track, seat_share
 from qdem_fem.load_record import load_record_read
-from qdem_fem.load_train import QUIET, Track, Train, seat_share
+from qdem_fem.load_train import Train
 from qdem_fem.scene_checks import scene_load
 from qdem_fem.track_cli import SEAT_AREA
 from qdem_fem.track_load import RISE, bogie_series

@@ -14,7 +14,8 @@ import pytest
 
 from adapters.container import Container, Walls
 from adapters.errors import UsageError
-from adapters.relaxation import RelaxationNotConverged, relax
+from adapters.relaxation import relax
+from adapters.relaxation_measured import RelaxationNotConverged
 from adapters.relaxation_rearranged import ENOUGH, LEAST, MOST, OVERLAP_MAX, rearrange
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State

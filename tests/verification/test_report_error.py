@@ -16,7 +16,6 @@ from adapters.errors import UsageError
 from adapters.laws import law_named
 from adapters.report_error import (
     Beds,
-    compare,
     comparison,
     curve_fitted,
     gained_time,
@@ -33,6 +32,7 @@ from adapters.report_history import (
     cycles_computed,
     failed_jumps,
     history_of,
+    history_read,
     jumped_spans,
 )
 from adapters.run_folder import Outcome, RunFolder
@@ -324,11 +324,16 @@ def test_two_folders_are_compared(tmp_path: Path) -> None:
     own = folder_of(tmp_path / "own", PROCEDURE)
     stages = (PROCEDURE[0], *(window(first, first + 25) for first in range(0, 100, 25)))
     full = folder_of(tmp_path / "full", stages)
-    assert compare(own, full).speed_up == pytest.approx(400 / 323)
-    assert compare(own, full).settlement_error == 0
-    assert compare(own, full).speed_up_with_preparation == pytest.approx(1400 / 1323)
+    mine, truth = history_read(own), history_read(full)
+    cycle = last_common_cycle(mine, truth)
+    found = comparison("own", mine, cycle, truth, cycle, 1000.0)
+    assert found.speed_up == pytest.approx(400 / 323)
+    assert found.settlement_error == 0
+    assert found.speed_up_with_preparation == pytest.approx(1400 / 1323)
+    none = history_read(folder_of(tmp_path / "none", PROCEDURE[:1]))
+    assert last_common_cycle(mine, none) == 0
     with pytest.raises(UsageError):
-        compare(own, folder_of(tmp_path / "none", PROCEDURE[:1]))
+        comparison("own", mine, 0, none, 0, 1000.0)
 
 
 def test_a_failed_jump_is_charged(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import pairwise, product
 from math import pi, sqrt
 
 import numpy as np
@@ -26,7 +26,6 @@ from adapters.sample import (
     coordination_number,
     pairs_in_contact,
     relative_density,
-    relative_density_profile,
     sample_figures,
     sample_mass,
     sample_start,
@@ -268,8 +267,9 @@ def test_cubic_lattice() -> None:
     radius = np.full(len(position), 0.5)
     for top in (1.0, 2.5, 5.0):
         assert relative_density(position, radius, box, top) == pytest.approx(pi / 6, rel=1e-14)
-    profile = relative_density_profile(position, radius, box, np.array([0.5, 1.0, 2.5, 5.0]))
-    assert profile == pytest.approx([pi / 6] * 3, rel=1e-13)
+    for bottom, top in ((0.5, 1.0), (1.0, 2.5), (2.5, 5.0)):
+        layer = relative_density(position, radius, box, top, bottom)
+        assert layer == pytest.approx(pi / 6, rel=1e-13)
     assert bed_height(position, radius) == pytest.approx(5.0, rel=1e-14)
 
 
@@ -282,7 +282,9 @@ def test_layers_add_up(millimetres: list[int], seed: int) -> None:
     edges = np.array(millimetres) / 1000
     radius = radii_sample(TABLE_1, 50, seed)
     position = np.random.default_rng(seed).uniform(0, 1, (50, 3))
-    layers = relative_density_profile(position, radius, QUARTER, edges)
+    layers = np.array(
+        [relative_density(position, radius, QUARTER, b, a) for a, b in pairwise(edges)]
+    )
     whole = relative_density(position, radius, QUARTER, edges[-1], edges[0])
     assert layers @ np.diff(edges) == pytest.approx(
         whole * (edges[-1] - edges[0]), rel=1e-9, abs=1e-12

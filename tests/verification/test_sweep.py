@@ -181,7 +181,7 @@ def test_dry_run_starts_nothing(
         (["--scheduler", "somewhere"], "no Dask scheduler answers"),
         (["--workers", "0"], "a worker at least"),
         (["--cluster-config", "x.toml"], "for --scheduler slurm only"),
-        (["--scheduler", "slurm", "--cluster-config", "x.toml"], "can not read it as TOML"),
+        (["--scheduler", "slurm", "--cluster-config", "x.toml"], "cannot read it as TOML"),
     ],
 )
 def test_wrong_use(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from adapters import contact_law as law
 from adapters.state import FloatArray
-from validation.bench.tangential_rules import (
+from tests.tangential_rules import (
     LOOPS,
     force_incremental,
     force_mindlin_deresiewicz,

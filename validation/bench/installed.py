@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from adapters.engine import engine_named
-from adapters.engine_names import REAL_ENGINES
+from adapters.engine import engine_named, real_engines
 from adapters.errors import EngineMissing
 
 
 def list_installed() -> list[str]:
     """Their names; raises `EngineMissing` if there is none."""
     present = []
-    for name in REAL_ENGINES:
+    for name in real_engines():
         try:
             engine_named(name).version()
         except EngineMissing:

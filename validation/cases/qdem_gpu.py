@@ -172,8 +172,8 @@ def twins_apart(strain: Any, precision: Precision, viscous: bool, conditions: Co
     critical = None
     for device in DEVICES:
         run, body = twin(device, strain, precision, viscous, conditions)
-        run._critical = critical or run.critical_step  # found once, on the processor
-        critical = run._critical
+        run.elements_critical_step = critical or run.critical_step  # found once, on the processor
+        critical = run.elements_critical_step
         ratio = run.step / critical.value
         if not 0.1 < ratio < 0.9:
             raise ValueError(f"the step is {ratio:.2f} of the critical one: choose another")

@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from adapters.dump import dump_frames
-from adapters.engine import engine_failure, engine_named
-from adapters.engine_process import process_run
+from adapters.engine import engine_named
+from adapters.engine_process import engine_failure, process_run
 from adapters.errors import NotCredible
 from adapters.procedure import run_scene
 from adapters.progress import Progress

@@ -10,7 +10,8 @@ import numpy as np
 
 from adapters.laws import law_named
 from adapters.overlaps import neighbours
-from adapters.relaxation import RelaxationNotConverged, relax
+from adapters.relaxation import relax
+from adapters.relaxation_measured import RelaxationNotConverged
 from adapters.residual import error_of_coordinates, error_of_displacement
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State

@@ -159,7 +159,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(2, len(KINDS), figsize=(12, 8), layout="constrained")
+    figure, axes = plt.subplots(2, len(KINDS), figsize=(12, 10), layout="constrained")
     for column, kind in enumerate(KINDS.values()):
         over, below = axes[0, column], axes[1, column]
         for row in select_rows(rows, kind, EVERY):
@@ -195,4 +195,4 @@ def draw_errors(axis: Any, rows: Sequence[Row], kind: Kind) -> None:
     axis.set_yscale("symlog", linthresh=50)
     axis.set(xscale="log", xlabel="CPU time over that of every cycle")
     axis.set_ylabel("error of the mean grain's settlement since kᵢ [%]")
-    axis.legend(fontsize=5, ncols=2, loc="best")
+    axis.legend(fontsize=6, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))

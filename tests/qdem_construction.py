@@ -6,7 +6,7 @@ quarter of its volume, one for each particle; the stress pulls at the triangles 
 sums its triangles (eq. 10), each particle its cells (eq. 11).
 
 This module is for reading and checking: it forms every triangle.  What a simulation uses is the
-same force in closed form, f_a = -V0 T cof(F) grad_X N_a (`qdem_fem.reference_forces`): QDEM's
+same force in closed form, f_a = -V0 T cof(F) grad_X N_a (`tests.qdem_reference_forces`): QDEM's
 particles are the nodes, its cells the dual cells, of linear finite elements with lumped mass.
 
 Two traps in the printed text.
@@ -26,10 +26,9 @@ the order that gives a positive volume; material constants are floats or (m,) ar
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from qdem_fem.kinematics import FloatArray, IntArray, isotropic
 
 INTERFACES = (
     (0, 1, 2, 3),
@@ -63,17 +62,10 @@ def deformation_gradient(reference: FloatArray, current: FloatArray) -> FloatArr
 def strain_finger(deformation: FloatArray) -> FloatArray:
     """eps = (B - I)/2 [-], (..., 3, 3), with B = F F^T (eqs 3, 4): the left Green strain.
 
-    Below strains of 1e-8 the difference B - I loses its digits; `qdem_fem.reference_forces` has
+    Below strains of 1e-8 the difference B - I loses its digits; `tests.qdem_reference_forces` has
     the form without cancellation.
     """
     return (deformation @ np.swapaxes(deformation, -1, -2) - np.eye(3)) / 2
-
-
-def isotropic(tensor: FloatArray, first: ArrayLike, second: ArrayLike) -> FloatArray:
-    """first tr(A) I + 2 second A of a symmetric A (..., 3, 3): the common form of eqs 2 and 7."""
-    trace = np.trace(tensor, axis1=-2, axis2=-1)[..., None, None]
-    one, two = (np.asarray(value, float)[..., None, None] for value in (first, second))
-    return one * trace * np.eye(3) + 2 * two * tensor
 
 
 def stress_elastic(strain: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike) -> FloatArray:
