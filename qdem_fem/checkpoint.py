@@ -191,7 +191,7 @@ def _compare(saved: Mapping[str, str], here: Mapping[str, str], where: str) -> N
     if all(len(text) < DIGEST for text in told):
         what += f" ({name}: {told[0]!r} in the file, {told[1]!r} here)"
     raise CheckpointError(
-        what, where=where, remedy="make the simulation as it was when it was saved, or start anew"
+        what, where=where, remedy="make the simulation as it was when it was saved, or start again"
     )
 
 
@@ -208,7 +208,7 @@ def _opened(content: bytes, where: str) -> tuple[dict[str, Any], Arrays]:
         raise CheckpointError(
             f"this is no whole checkpoint ({len(content)} bytes, and their checksum is wrong)",
             where=where,
-            remedy="take an earlier checkpoint, or start anew",
+            remedy="take an earlier checkpoint, or start again",
         )
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:

@@ -3,7 +3,7 @@
 A sphere of a grain has some four hundred others in the cells around it, most of them of its own
 body or on the far side of a neighbour.  So what is looked for first are patches that are near: all
 spheres of a body in a cell of three reaches, a ballast grain as a whole.  Of two such patches only
-those spheres are compared that lie in the box around the other one.  Patches are made anew for
+those spheres are compared that lie in the box around the other one.  Patches are made again for
 every list, from where the spheres are; their cells are hashed, so that memory goes with the number
 of spheres and not with the room they are in.
 """

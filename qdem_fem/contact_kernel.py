@@ -20,7 +20,7 @@ from qdem_fem.contact_search import Pairs
 
 BLOCK = 512
 """Spheres that one thread takes at a time."""
-GO_ON, LOOK_ANEW, TOO_DEEP = 0, 1, 2
+GO_ON, LOOK_AGAIN, TOO_DEEP = 0, 1, 2
 """What a step says: go on; a vertex has left the skin, so that its forces wait for new pairs; two
 spheres are too deep in each other."""
 DEEPEST = 1.0
@@ -70,7 +70,7 @@ class Contact(NamedTuple):
     friction: Any
     """Coulomb's coefficient between bodies."""
     half_skin: Any
-    """Way of a vertex after which pairs are looked for anew [m]."""
+    """Way of a vertex after which pairs are looked for again [m]."""
     start: Any
     """(c, 3) positions when pairs were last looked for [m]"""
     position: Any
@@ -256,11 +256,11 @@ def advance_build(threads: bool) -> Any:
         """Contact at the new displacement; ``velocity`` times ``step`` [s] is the way to it.
 
         Writes forces, springs and losses of ``c``, a `Contact`.  ``step`` zero gives the forces
-        of a state that no step led to.  Returns `GO_ON`, `TOO_DEEP`, or `LOOK_ANEW` and has then
+        of a state that no step led to.  Returns `GO_ON`, `TOO_DEEP`, or `LOOK_AGAIN` and has then
         moved the spheres and nothing else: it is to be called again with new pairs.
         """
         stamp = threads  # noqa: F841  (makes it a part of the key: the two are one source)
-        # a parallel loop of numba takes arrays only: tuples are taken apart, and made anew within
+        # a parallel loop of numba takes arrays only: tuples are taken apart, and made again within
         (a0, a1, a2, a3, a4, a5, a6), pairs, (w0, w1, w2, w3, w4) = c[:3]
         p0, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10 = pairs
         friction, half_skin, start, position, force, slid = c[3:]
@@ -286,7 +286,7 @@ def advance_build(threads: bool) -> Any:
                 else:
                     reactions_add(own, low, high)
             if stage == 0 and far.max() > half_skin**2:
-                return LOOK_ANEW
+                return LOOK_AGAIN
         return TOO_DEEP if deep.max() >= DEEPEST else GO_ON
 
     return advance

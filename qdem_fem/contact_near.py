@@ -3,15 +3,15 @@
 `qdem_fem.contact_step.allowed_bound` holds for any contacts there may ever be, and pays for it: it
 gives the lightest vertex of all as many as the scene allows, to another as light, and adds what
 elements do to what contact does, though they do it elsewhere.  Bodies that lie together in a bed
-touch where they touch.  Until pairs are looked for anew, no contact acts that is not in the list of
-pairs; and a spring of ``k_n`` along n and ``k_t < k_n`` across is at most one of ``k_n`` in all
+touch where they touch.  Until pairs are looked for again, no contact acts that is not in the list
+of pairs; and a spring of ``k_n`` along n and ``k_t < k_n`` across is at most one of ``k_n`` in all
 directions:
 
     k_n n n^T + k_t (1 - n n^T) <= k_n 1,   so   K_c <= K_near
 
 for any of the listed pairs that touch, and any directions.  The critical step with ``K + K_near``
 is found as that of the elements is, by Lanczos iterations.  It holds until the list is renewed, and
-is found anew then.  With rigid bodies, whose vertices have no mass of their own, it is that of the
+is found again then.  With rigid bodies, whose vertices have no mass of their own, it is that of the
 elements with `qdem_fem.contact_step.network_bound` of the springs near: lower, by no iterations.
 """
 
@@ -39,7 +39,7 @@ def near_step(
     rigid: Callable[[Floats], Floats],
     elements: float,
 ) -> float:
-    """Critical step [s] for any contacts there can be before pairs are looked for anew.
+    """Critical step [s] for any contacts there can be before pairs are looked for again.
 
     ``near``: ends (p, 2) and stiffness (p,) of springs between vertices, stiffness (c,) of those
     to walls [N/m]; ``nodes`` (c,), ``inverse_mass`` (c,) [1/kg]: of the vertices; ``rigid``: as in

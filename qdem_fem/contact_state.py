@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from qdem_fem.contact_inside import inside_check
-from qdem_fem.contact_kernel import LOOK_ANEW, TOO_DEEP
+from qdem_fem.contact_kernel import LOOK_AGAIN, TOO_DEEP
 from qdem_fem.contact_near import near_check, near_step
 from qdem_fem.contact_outside import Outside
 from qdem_fem.contact_spheres import NEAR, SphereContact
@@ -109,7 +109,7 @@ class Contacts(ABC):
 
     @abstractmethod
     def lists_renew(self, position: Floats) -> None:
-        """Look for what may touch around vertices at (c, 3) [m], where ways begin anew; what
+        """Look for what may touch around vertices at (c, 3) [m], where ways begin again; what
         touches keeps its springs."""
 
     @abstractmethod
@@ -118,7 +118,7 @@ class Contacts(ABC):
 
     def springs_near(self) -> tuple[Integers, Floats, Floats]:
         """Ends (p, 2), k_n (p,) and k_n to walls (c,) [N/m] of all contacts there can be before
-        pairs are looked for anew: no vertex then is half a skin from where it was."""
+        pairs are looked for again: no vertex then is half a skin from where it was."""
         raise ConditionError(
             "what is near is told of spheres", where="contact, contacts", remedy="give a number"
         )
@@ -185,7 +185,7 @@ class Contacts(ABC):
     # --- in a march ----------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Find the contacts of a displacement that the user set: springs begin anew there."""
+        """Find the contacts of a displacement that the user set: springs begin again there."""
         if not self.stale:
             return
         self.forget()
@@ -198,7 +198,7 @@ class Contacts(ABC):
             inside_check(self.run.bodies, moved, self.deep, self.asked.periodic, self.when)
 
     def pairs_find(self) -> None:
-        """Look for pairs anew; those that touch keep their springs."""
+        """Look for pairs again; those that touch keep their springs."""
         position = self.positions()
         if position is None:
             return  # what made it so is told by the march
@@ -244,7 +244,7 @@ class Contacts(ABC):
         """`Assembly.window` with contact; comes back early where pairs have to be looked for."""
         done, bad, said = self.march(steps, step, loads, held, probes, table, gravity, work)
         self.lasted += done
-        if said == LOOK_ANEW:
+        if said == LOOK_AGAIN:
             self.pairs_find()
             said = self.step_now(step)
         if said == TOO_DEEP and not bad:

@@ -1,6 +1,6 @@
 """Contact of element surfaces: vertex on face and edge on edge, weighted by area.
 
-What the paper lists as its first disadvantage, made good: bodies touch where their meshes do.  A
+What the paper lists as its first disadvantage, repaired: bodies touch where their meshes do.  A
 point of a surface that is inside another body by a depth ``g`` presses with ``p A g`` along the
 normal n of the nearest face: the gradient of
 

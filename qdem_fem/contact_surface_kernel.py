@@ -19,7 +19,7 @@ from qdem_fem import (
 from qdem_fem.compiling import exact, inlined, sources_digest
 from qdem_fem.contact_kernel import (
     GO_ON,
-    LOOK_ANEW,
+    LOOK_AGAIN,
     TOO_DEEP,
     image_less,
     minus,
@@ -256,7 +256,7 @@ def surface_step_build(made_from: str) -> Any:
                 moved += (c.position[i, k] - c.start[i, k]) ** 2
             far = max(far, moved)
         if far > c.half_skin**2:
-            return LOOK_ANEW
+            return LOOK_AGAIN
         c.account[0] = 0.0
         moved = np.sqrt(far)
         deepest = max(points_forces(c, velocity, step, moved), walls_forces(c, velocity, step))

@@ -179,7 +179,7 @@ def short_step_remark(run: System, stiffness: float, governing: Body, element: i
         return ""
     return (
         f"element {element} of {governing.name} makes the critical step {own / usual:.2g} times "
-        "what the median element would allow; mesh anew there if it is a sliver, see "
+        "what the median element would allow; mesh again there if it is a sliver, see "
         "mass_scaling if it is stiff or light"
     )
 

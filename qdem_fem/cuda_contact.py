@@ -4,7 +4,7 @@ A step of contact is three launches behind those of the elements and the motion,
 positions, pairs, walls, reactions; one before them adds the forces found to the nodes.  A sphere's
 force is summed over its own row, then over the pairs in which it is the second, in their order, as
 on the processor: no atomics but where the forces reach the nodes.  A vertex that leaves the skin
-ends the window (`ANEW`) before any force of its step is computed; pairs are looked for, and then
+ends the window (`AGAIN`) before any force of its step is computed; pairs are looked for, and then
 that one step is computed (`qdem_fem.cuda_contact_state`).  Contact is in double precision.
 """
 
@@ -16,7 +16,7 @@ from typing import Any
 
 from qdem_fem import contact_kernel
 from qdem_fem.contact_kernel import DEEPEST
-from qdem_fem.cuda_step import ANEW, DEEP, LIMIT, cuda
+from qdem_fem.cuda_step import AGAIN, DEEP, LIMIT, cuda
 
 slider: Any = cuda.jit(device=True)(contact_kernel.slider.py_func)
 series: Any = cuda.jit(device=True)(contact_kernel.series.py_func)
@@ -48,7 +48,7 @@ def spheres_move(
         position[i, c] = reference[i, c] + displacement[place[i] + c]
         moved += (position[i, c] - start[i, c]) ** 2
     if moved > half_skin * half_skin:
-        status[ANEW] = 1
+        status[AGAIN] = 1
         status[LIMIT] = k + 1  # of this step nothing else is computed, and no other one
 
 
@@ -64,7 +64,7 @@ def pairs_forces_kernel(periodic: bool) -> Any:
     ) -> None:  # fmt: skip
         """`qdem_fem.contact_kernel.pairs_forces`, of one sphere."""
         q = cuda.grid(1)
-        if q >= count or k >= status[LIMIT] or status[ANEW] > 0:
+        if q >= count or k >= status[LIMIT] or status[AGAIN] > 0:
             return
         i = acting[q]
         fx, fy, fz = 0.0, 0.0, 0.0
@@ -116,7 +116,7 @@ def walls_forces(
 ) -> None:  # fmt: skip
     """`qdem_fem.contact_kernel.planes_forces`, of one sphere."""
     q = cuda.grid(1)
-    if q >= count or k >= status[LIMIT] or status[ANEW] > 0:
+    if q >= count or k >= status[LIMIT] or status[AGAIN] > 0:
         return
     i = acting[q]
     for entry in range(wall_first[i], wall_first[i + 1]):
@@ -151,7 +151,7 @@ def reactions_add(
 ) -> None:  # fmt: skip
     """Take from each acting sphere what its pairs did to the first one of them."""
     q = cuda.grid(1)
-    if q >= count or k >= status[LIMIT] or status[ANEW] > 0:
+    if q >= count or k >= status[LIMIT] or status[AGAIN] > 0:
         return
     j = acting[q]
     for entry in range(back_first[j], back_first[j + 1]):

@@ -1,4 +1,4 @@
-"""What contact of spheres remembers on a GPU, the launches of a step, and its lists made anew.
+"""What contact of spheres remembers on a GPU, the launches of a step, and its lists made again.
 
 Arrays are those of `qdem_fem.contact_kernel.Contact`, and stay on the GPU: neither a step nor a
 look for pairs moves one to the host, which reads counts and greatest values alone.
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.contact_kernel import GO_ON, LOOK_ANEW, TOO_DEEP, Contact, Planes, Spheres
+from qdem_fem.contact_kernel import GO_ON, LOOK_AGAIN, TOO_DEEP, Contact, Planes, Spheres
 from qdem_fem.contact_search import Pairs
 from qdem_fem.cuda_contact import (
     forces_push,
@@ -21,7 +21,7 @@ from qdem_fem.cuda_contact import (
 )
 from qdem_fem.cuda_contact_sums import bound_of, gap_of, idle_of, positions_find
 from qdem_fem.cuda_search import pairs_renew
-from qdem_fem.cuda_step import ANEW, DEEP, cuda, grid
+from qdem_fem.cuda_step import AGAIN, DEEP, cuda, grid
 from qdem_fem.periodic import PeriodicWidth
 
 
@@ -89,7 +89,7 @@ class DeviceContact:
 
     def end(self, status: list[int]) -> None:
         """What the last step of a window said, from its status."""
-        self.said = TOO_DEEP if status[DEEP] else LOOK_ANEW if status[ANEW] else GO_ON
+        self.said = TOO_DEEP if status[DEEP] else LOOK_AGAIN if status[AGAIN] else GO_ON
 
     def step_now(self, displacement: Any, velocity: Any, step: float) -> int:
         """Contact at a displacement to which a ``step`` [s] led; what it says."""

@@ -48,7 +48,7 @@ LOAD, ROLLER, HELD, PROBE = range(4)
 """Kinds of actions on a node, in the order in which a step does them."""
 KIND, COMPONENT, SERIES, SLOT = range(4)
 """Columns of ``actions``."""
-BAD, LIMIT, ANEW, DEEP = range(4)
+BAD, LIMIT, AGAIN, DEEP = range(4)
 """Places of ``status``: elements found bad; steps to do, lowered to those done when one is; whether
 a vertex has left the skin of its pairs; whether two spheres are too deep in each other."""
 

@@ -1,7 +1,7 @@
 """Static answers with the explicit kernel alone: dynamic relaxation by conjugate gradients.
 
 Dynamic relaxation marches a damped motion with fictitious masses until it rests.  Damping and
-step are free; chosen anew in every step from the forces, so that each direction is conjugate to
+step are free; chosen again in every step from the forces, so that each direction is conjugate to
 all before, they make the method of conjugate gradients (Papadrakakis 1981, CMAME 25, section 4).
 Nothing is assembled: a step costs one evaluation of the forces, as a time step does.  On the
 paper's cantilever (six tetrahedra a cell), steps until the tip is right to 1e-5, by the rule for
@@ -14,7 +14,7 @@ the damping:
 | 96 x 10 x 8 |           11480 |                         21200 |      1100 |
 
 Where forces are not linear the step is found by secants along the direction, and directions
-begin anew when they no longer descend (Polak and Ribiere's rule, cut at zero).
+begin again when they no longer descend (Polak and Ribiere's rule, cut at zero).
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def relax(simulation: State, tolerance: float, max_steps: int) -> StaticAnswer:
 
 @dataclass
 class _Found:
-    """Where an iteration has come to, and what it learned of the stiffness."""
+    """Where an iteration is, and what it learned of the stiffness."""
 
     displacement: Floats
     residual: float = np.inf

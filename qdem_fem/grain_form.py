@@ -41,13 +41,13 @@ HALVINGS_MOST = 8
 BENT_INWARD = 1e-9
 """Angle between normals below which an edge of a convex grain may not be bent inward [rad]."""
 BENT_MOST = 0.6
-"""Most that an edge of a dented grain may be bent inward [rad]; others are drawn anew."""
+"""Most that an edge of a dented grain may be bent inward [rad]; others are drawn again."""
 LOWERED = 0.9
 """Factor on the lift of a node whose neighbour's edge is bent inward."""
 DRAWS_MOST = 60
 """Sets of corners that are drawn for one grain, before its wish counts as out of reach."""
 RATIO_LEAST = 0.2
-"""Smallest radius ratio of a tetrahedron; a grain with a flatter one is drawn anew."""
+"""Smallest radius ratio of a tetrahedron; a grain with a flatter one is drawn again."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def hull_faces(points: FloatArray) -> IntArray:
 def grain_random(generator: np.random.Generator, recipe: GrainRecipe) -> GrainForm:
     """One random grain; the same for the same state of ``generator``.
 
-    Corners are drawn anew, up to `DRAWS_MOST` times, where those drawn can not be given the
+    Corners are drawn again, up to `DRAWS_MOST` times, where those drawn can not be given the
     sphericity and roundness that were drawn first, or leave a sliver.  Raises `MeshError` if none
     will do.
     """

@@ -1,7 +1,7 @@
 """Rest by kinetic damping: a march whose velocities are set to zero at every peak of the motion.
 
 Undamped motion under constant loads turns potential energy into kinetic and back; at a peak of the
-kinetic energy the potential has its least, so what moves is stopped there and begins anew
+kinetic energy the potential has its least, so what moves is stopped there and begins again
 (Cundall 1976).  It needs no coefficient and no viscosity, and serves bodies in frictional contact,
 rigid or not, which have no static answer in `qdem_fem.dynamic_relaxation`.
 

@@ -151,7 +151,7 @@ def indices_problems(elements: IntArray, n_nodes: int) -> tuple[BoolArray, list[
             f"a node named twice by one element: {named('element', bad)}; "
             f"element {bad[0]} names {elements[bad[0]].tolist()}"
         )
-        problems.append(Problem(text, "remove the elements that collapsed, and mesh anew there"))
+        problems.append(Problem(text, "remove the elements that collapsed, and mesh again there"))
     return ~(out | twice), problems
 
 
@@ -206,7 +206,7 @@ def flat_problems(
         f"{volume[at]:.3g} m^3, {abs(shape[at]):.1e} of the cube of its longest edge "
         f"(at least {np.fmax(FLAT, noise[at]):.0e} is needed)"
     )
-    return volume, [Problem(text, "remove the flat elements or mesh anew there")]
+    return volume, [Problem(text, "remove the flat elements or mesh again there")]
 
 
 def _volumes(

@@ -239,13 +239,13 @@ class Table:
                     raise UsageError(
                         f"{count} rows up to {time:.6g} s were written, {rows} are there",
                         where=str(self.path),
-                        remedy="start anew: --force",
+                        remedy="start again: --force",
                     )
                 stream.truncate(kept)
         except (OSError, ValueError) as error:
             raise UsageError(
                 f"can not read the rows so far ({error})", where=str(self.path),
-                remedy="start anew: --force",
+                remedy="start again: --force",
             ) from error  # fmt: skip
 
 

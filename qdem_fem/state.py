@@ -105,6 +105,6 @@ class State(System):
                 self._contacts.bounds_forget()
 
     def displacement_changed(self) -> None:
-        """Find contacts anew when next needed: the user moved a body."""
+        """Find contacts again when next needed: the user moved a body."""
         if self._contacts is not None:
             self._contacts.stale = True

@@ -121,7 +121,7 @@ def _overlap_raise(face: IntArray, elements: IntArray, where: str) -> None:
         where=where,
         remedy="remove the elements that are one too many"
         if many
-        else "one of them was turned inside out: mesh anew there, or move its nodes back",
+        else "one of them was turned inside out: mesh again there, or move its nodes back",
     )
 
 

@@ -204,7 +204,7 @@ class Sitting:
             what = error.what if isinstance(error, CheckpointError) else f"{error} is not in it"
             raise CheckpointError(
                 f"a stage of the bed can not go on from it: {what}", where=str(self.part),
-                remedy="remove it: the stage then begins anew",
+                remedy="remove it: the stage then begins again",
             ) from error  # fmt: skip
 
     def keep(self, damping: Damping) -> None:
@@ -285,7 +285,7 @@ def bed_write(path: Path, recipe: BedRecipe, bed: Bed) -> None:
 
 def bed_read(path: Path, recipe: BedRecipe) -> Bed:
     """Read what `bed_write` wrote for this recipe; raises `CheckpointError` else."""
-    remedy = "give another file, or remove it to prepare the bed anew"
+    remedy = "give another file, or remove it to prepare the bed again"
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from qdem_fem.contact_kernel import (
     BLOCK,
     GO_ON,
-    LOOK_ANEW,
+    LOOK_AGAIN,
     TOO_DEEP,
     Contact,
     Planes,
@@ -143,7 +143,7 @@ def test_kernel_is_its_twin(walls: bool) -> None:
         step = 0.01
         at += step * velocity
         said = advance_one(c, packed(at), packed(velocity), step)
-        if said == LOOK_ANEW:
+        if said == LOOK_AGAIN:
             position = c.spheres.reference + at
             radius, body = c.spheres.radius, c.spheres.body
             near = walls_near(position, radius, c.planes.point, c.planes.normal, 0.2)
@@ -240,7 +240,7 @@ def test_what_a_step_says() -> None:
     def said(way: float) -> int:
         return int(advance_one(c, packed(np.array([[way, 0, 0], [0, 0, 0]])), still, 1.0))
 
-    assert [said(way) for way in (0.099, 0.101, 1.49, 1.51)] == [GO_ON] + 3 * [LOOK_ANEW]
+    assert [said(way) for way in (0.099, 0.101, 1.49, 1.51)] == [GO_ON] + 3 * [LOOK_AGAIN]
     assert not c.force.any()
     c.start[0, 0] = 1.45
     assert [said(way) for way in (1.49, 1.51)] == [GO_ON, TOO_DEEP]

@@ -98,7 +98,7 @@ def test_a_stage_of_something_else_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NotConverged):
         fallen(replace(recipe, patience=0.0), part)
     for other in (replace(recipe, seed=recipe.seed + 1), replace(recipe, softness=1e-3)):
-        with pytest.raises(CheckpointError, match="remove it: the stage then begins anew"):
+        with pytest.raises(CheckpointError, match="remove it: the stage then begins again"):
             fallen(other, part)
     part.write_bytes(part.read_bytes()[:-9])
     with pytest.raises(
