@@ -13,14 +13,17 @@ from trackbed.cache_folders import provide_cache_folders
 if TYPE_CHECKING:
     from rigid_lcp.breakage import Breakage
     from rigid_lcp.collisions import collide
+    from rigid_lcp.disc import Disc
     from rigid_lcp.errors import RigidError
     from rigid_lcp.friction_problem import BodySpace, FrictionProblem, FrictionSolution
     from rigid_lcp.frictionless import lcp
+    from rigid_lcp.half_space import HalfSpace
+    from rigid_lcp.polygon import Polygon
+    from rigid_lcp.polyhedron import Polyhedron, box
     from rigid_lcp.scene import Scene
-    from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
-    from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
     from rigid_lcp.simulation import Simulation
     from rigid_lcp.solver import solve_friction
+    from rigid_lcp.sphere import Sphere
     from rigid_lcp.wear import Wear
 
 provide_cache_folders(__path__[0])
@@ -28,18 +31,18 @@ provide_cache_folders(__path__[0])
 _HOMES = {
     "BodySpace": "friction_problem",
     "Breakage": "breakage",
-    "Disc": "shapes_2d",
+    "Disc": "disc",
     "FrictionProblem": "friction_problem",
     "FrictionSolution": "friction_problem",
-    "HalfSpace": "shapes_2d",
-    "Polygon": "shapes_2d",
-    "Polyhedron": "shapes_3d",
+    "HalfSpace": "half_space",
+    "Polygon": "polygon",
+    "Polyhedron": "polyhedron",
     "RigidError": "errors",
     "Scene": "scene",
     "Simulation": "simulation",
-    "Sphere": "shapes_3d",
+    "Sphere": "sphere",
     "Wear": "wear",
-    "box": "shapes_3d",
+    "box": "polyhedron",
     "collide": "collisions",
     "lcp": "frictionless",
     "solve_friction": "solver",

@@ -4,9 +4,9 @@ Archard (J. Appl. Phys. 24 (1953) 981): volume worn per length of sliding is ``K
 ``F_T = mu F_N`` it is a volume per work of friction, ``V = k W`` with ``k = K / (mu H)``
 (Reye 1860).
 
-Two effects, both small in one step: the vertex becomes a chamfer of the worn volume
-(`chamfer_vertex`), and, as section 8 of the paper proposes, "gradually changing the force law
-(38), which describes changing edge properties" (`worn_stiffness`, for `elastic_limit`).
+Two effects, both small in one step: the corner loses the worn volume (`rigid_lcp.worn_polygon`),
+and, as section 8 of the paper proposes, "gradually changing the force law (38), which describes
+changing edge properties" (`worn_stiffness`, for `elastic_limit`).
 """
 
 from __future__ import annotations
@@ -37,44 +37,6 @@ def worn_volume(work: ArrayLike, wear_coefficient: float) -> Floats:
             remedy="give zero or more, in m^3/J (1e-15 to 1e-12 for rock)",
         )  # fmt: skip
     return wear_coefficient * np.asarray(work, dtype=float)
-
-
-def chamfer_vertex(vertices: ArrayLike, vertex: int, area: float) -> Floats:
-    """The polygon (n, 2) [m] with a vertex worn off by ``area`` [m^2]: (n + 1, 2), anticlockwise.
-
-    The chamfer cuts equal lengths l off both edges, ``area = l^2 sin(alpha) / 2``; where an edge
-    is shorter than twice that, half of it goes and more of the other.  An area of zero, or one
-    too small for the digits, changes nothing.  Raises `ShapeError` where the vertex has not that
-    much to lose within half of both edges.
-    """
-    corners = np.asarray(vertices, dtype=float)
-    if not (np.isfinite(area) and area >= 0):
-        raise ShapeError(
-            f"the worn area is {area}", where=f"vertex {vertex}", remedy="give m^2, zero or more"
-        )
-    here = corners[vertex % len(corners)]
-    back = corners[(vertex - 1) % len(corners)] - here
-    ahead = corners[(vertex + 1) % len(corners)] - here
-    lengths = np.array([np.linalg.norm(back), np.linalg.norm(ahead)])
-    back, ahead = back / lengths[0], ahead / lengths[1]
-    sine = abs(float(back[0] * ahead[1] - back[1] * ahead[0]))
-    half = lengths / 2
-    if area > half[0] * half[1] * sine / 2:
-        raise ShapeError(
-            f"the worn area {area:.3g} m^2 is more than the corner within half of its edges has "
-            f"({half[0] * half[1] * sine / 2:.3g} m^2)", where=f"vertex {vertex}",
-            remedy="let it wear in smaller steps",
-        )  # fmt: skip
-    product = 2 * area / sine
-    cut = np.full(2, np.sqrt(product))
-    short = int(np.argmin(half))
-    if cut[short] > half[short]:
-        cut = np.where(np.arange(2) == short, half, product / half[short])
-    if cut.max() <= 1e-12 * lengths.min():
-        return corners
-    at = vertex % len(corners)
-    ends = [here + cut[0] * back, here + cut[1] * ahead]
-    return np.vstack([corners[:at], *ends, corners[at + 1 :]])
 
 
 def worn_stiffness(

@@ -99,7 +99,7 @@ class DenseFactorisation:
 
 
 class BlockSystem:
-    """A sparse matrix of dense blocks at fixed places, filled anew and factored each time."""
+    """A sparse matrix of dense blocks at fixed places, filled and factored each time."""
 
     def __init__(self, count: int, size: int, rows: Integers, columns: Integers) -> None:
         """``count`` block rows of ``size`` rows each; blocks at (rows, columns)."""

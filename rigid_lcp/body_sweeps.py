@@ -26,7 +26,7 @@ Integers = NDArray[np.int64]
 REGULAR = 1e-8
 """Least determinant of a block that is inverted, over the product of its diagonal."""
 COUPLED = 0.999
-"""Greatest ``mu |W_NT| / W_NN`` at which the sign of sliding is told without a test."""
+"""Greatest ``mu |W_NT| / W_NN`` at which the sign of sliding is known without a test."""
 
 
 @njit(cache=True)

@@ -27,20 +27,15 @@ different eps): eps is scaled down there too, as at eps = 0 there always are.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.collision_input import (
-    Energy,
-    Law,
-    check_choices,
-    moving_bodies,
-    numbers_of,
-    one_a_contact,
-)
 from rigid_lcp.cones import length
+from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import (
+    FORCE_ROUND_OFF,
     MOST_FRICTION,
     BodySpace,
     FrictionProblem,
@@ -49,7 +44,15 @@ from rigid_lcp.friction_problem import (
     friction_solution,
 )
 from rigid_lcp.frictionless import frictionless
-from rigid_lcp.restitution_share import Share
+from rigid_lcp.passed_collisions import SPEED_ROUND_OFF
+from rigid_lcp.problem_input import (
+    check_factors,
+    finite_numbers,
+    in_range,
+    one_number,
+    whole_number,
+)
+from rigid_lcp.restitution_scale import Share
 
 Floats = NDArray[np.float64]
 
@@ -57,10 +60,6 @@ ROUNDS, ROUNDS_ROUGH = 500, 50
 """Rounds of a collision until the rest ends without restitution: without friction, where masses of
 a factor of 1e3 that touch anywhere take some hundred; with it, where one in five of those has no
 end, and energy is lost anyway."""
-ROUND_OFF = 1e-12
-"""Velocities this small against the largest of the collision are no approach; energies likewise."""
-FORCE_ROUND_OFF = 1e-15
-"""Round-off of ``W p``, and of ``p W p``, beside its largest parts [-]."""
 LEAST_TOLERANCE = 1e-16
 """The smallest residual that is asked for [-]."""
 ROUGH = 1e-6
@@ -135,10 +134,10 @@ def collide(
     if drive is not None:
         moved = numbers_of("drive", drive, nc * dim, "one number a row of J")
     first = bodies.jacobian @ before + moved
-    none = max(still, ROUND_OFF * float(np.abs(first).max(initial=0.0)))
+    none = max(still, SPEED_ROUND_OFF * float(np.abs(first).max(initial=0.0)))
     after, impulse = before.copy(), np.zeros(nc * dim)
     worst, rounds, factor = 0.0, 0, 1.0
-    told: list[str] = []
+    notes: list[str] = []
     status: Status = "solved"
     while True:
         now = bodies.jacobian @ after + moved
@@ -154,7 +153,7 @@ def collide(
         worst, rounds, factor = max(worst, error), rounds + 1, min(factor, used)
         if not solution.solved or error > ROUGH:
             status = "not converged" if solution.solved else solution.status
-            told.append(
+            notes.append(
                 solution.message or f"impulses of {np.abs(part).max():.1g} N s were found, which"
                 f" leave velocities wrong by {error:.1g} of them"
             )  # fmt: skip
@@ -168,16 +167,16 @@ def collide(
     change = 0.5 * float(impulse @ (first + bodies.jacobian @ after + moved))
     cut_off = rounds > max_rounds and bool(eps.any())
     if cut_off:
-        told.insert(0, f"after {max_rounds} rounds the rest was taken without restitution")
+        notes.insert(0, f"after {max_rounds} rounds the rest was taken without restitution")
     if factor < 1.0:
-        told.insert(
+        notes.insert(
             0, f"restitution was scaled by {factor:.3g}, as energy would have grown, or no impulses"
             " were found"
         )  # fmt: skip
     if change > work_round_off(bodies, impulse, first):
-        told.append(f"energy grew by {change:.3g} J\n  -> use energy='safe', or law='moreau'")
+        notes.append(f"energy grew by {change:.3g} J\n  -> use energy='safe', or law='moreau'")
     return Collision(
-        after, impulse, change, worst, status, rounds, factor, "; ".join(told), cut_off
+        after, impulse, change, worst, status, rounds, factor, "; ".join(notes), cut_off
     )  # fmt: skip
 
 
@@ -229,7 +228,7 @@ def work_round_off(bodies: BodySpace, impulse: Floats, velocity: Floats) -> floa
     the size ``p_c^2 W_cc``.
     """
     own = FORCE_ROUND_OFF * float(impulse**2 @ bodies.diagonal)
-    return ROUND_OFF * float(np.abs(impulse) @ np.abs(velocity)) + own
+    return SPEED_ROUND_OFF * float(np.abs(impulse) @ np.abs(velocity)) + own
 
 
 def impulses_of(problem: FrictionProblem, tolerance: float) -> FrictionSolution:
@@ -263,3 +262,70 @@ def _impulses_at(problem: FrictionProblem, tolerance: float) -> FrictionSolution
         problem.bodies, problem.offset, problem.friction, problem.dim, tolerance=tolerance
     )
     return solution
+
+
+Law = Literal["newton", "moreau"]
+Energy = Literal["safe", "watched"]
+
+
+def moving_bodies(bodies: BodySpace, velocity: ArrayLike) -> tuple[int, Floats]:
+    """2 or 3 dimensions, and the velocities of the bodies; refuses what is neither."""
+    if not isinstance(bodies, BodySpace):
+        raise ProblemError(
+            f"they are a {type(bodies).__name__}", where="bodies",
+            remedy="give a BodySpace: a collision needs J and M^-1 apart",
+        )  # fmt: skip
+    check_factors(bodies.jacobian, bodies.inverse_mass, bodies.body_size)
+    dim = 2 if bodies.body_size == 3 else 3
+    rows, freedoms = bodies.jacobian.shape
+    if rows % dim:
+        raise ProblemError(
+            f"jacobian has {rows} rows, which are not {dim} a contact", where="bodies",
+            remedy="give a contact 2 rows where a body has 3 freedoms, and 3 where it has 6",
+        )  # fmt: skip
+    before = numbers_of("velocity", velocity, freedoms, "one number a freedom, as J has columns")
+    in_range(before, "velocity", least=0.0)
+    return dim, before
+
+
+def numbers_of(name: str, values: ArrayLike, count: int, remedy: str) -> Floats:
+    """``values`` as (count,); `ProblemError`, with ``name``, for another number of them."""
+    array = finite_numbers(values, name).ravel()
+    if len(array) != count:
+        raise ProblemError(
+            f"{name} has {len(array)} numbers, not {count}", where=name, remedy=f"give {remedy}"
+        )
+    return array
+
+
+def one_a_contact(name: str, values: ArrayLike, upper: float, nc: int) -> Floats:
+    """``values`` as (nc,), each from 0 to ``upper``; `ProblemError`, with ``name``, for others."""
+    array = finite_numbers(values, name)
+    if array.shape not in ((), (nc,)):
+        raise ProblemError(
+            f"{name} has shape {array.shape} for {nc} contacts", where=name,
+            remedy="give one number, or one a contact",
+        )  # fmt: skip
+    array = np.broadcast_to(array, (nc,)).copy()
+    bad = np.flatnonzero(~((array >= 0.0) & (array <= upper)))
+    if len(bad):
+        raise ProblemError(
+            f"{name} is {array[bad[0]]:g}", where=f"{name}, contact {bad[0]}",
+            remedy=f"give 0 to {upper:g}",
+        )  # fmt: skip
+    return array
+
+
+def check_choices(
+    law: str, energy: str, tolerance: float, max_rounds: int, still: float, rest_speed: float
+) -> None:
+    """Raise `UsageError` for what `rigid_lcp.collisions.collide` can not be asked."""
+    for name, given, known in (("law", law, get_args(Law)), ("energy", energy, get_args(Energy))):
+        if given not in known:
+            raise UsageError(
+                f"{name} is {given!r}", where=name, remedy="give one of " + ", ".join(known)
+            )
+    one_number(tolerance, "tolerance")
+    one_number(still, "still", zero=True)
+    one_number(rest_speed, "rest_speed", zero=True)
+    whole_number(max_rounds, "max_rounds")

@@ -23,7 +23,7 @@ def natural_map(force: Floats, velocity: Floats, mu: Floats, rho: float) -> Floa
     """``r - P_K(r - rho (u + mu |u_T| n))``, (nc, dim): zero at a solution, in units of r.
 
     With ``a = r - rho u`` the point to project is ``(a_N - mu |rho u_T|, a_T)``.  Where it lies is
-    told from ``a_N + mu (|a_T| - |rho u_T|)``, the lengths subtracted by their squares: added one
+    found by ``a_N + mu (|a_T| - |rho u_T|)``, the lengths subtracted by their squares: added one
     by one the terms of a great mu would swallow a_N, and with it the approach of the bodies.
     """
     error = np.empty_like(force)

@@ -41,10 +41,6 @@ class BodyBlocks:
         add_impulses(self.body, self.block, force, velocity)
         return velocity
 
-    def contact_velocity(self, velocity: Floats) -> Floats:
-        """``B w``, (nc, dim), of the velocities w (bodies + 1, body_size)."""
-        return velocities_relative(self.body, self.block, velocity)
-
 
 @njit(cache=True)
 def add_impulses(body: Integers, block: Floats, force: Floats, velocity: Floats) -> None:

@@ -122,7 +122,7 @@ def sweep_once(
         tally[3] = np.sqrt(square)
         tally[2] = min(tally[2], tally[3])
         if product > 0.0 or tally[3] > GROWTH * tally[2]:
-            # Begin anew, and rid the velocities of rounding, which momentum would throw forward.
+            # Begin again, and rid the velocities of rounding, which momentum would throw forward.
             tally[1], tally[2] = 1.0, np.inf
             state.velocity[:] = 0.0
             add_impulses(blocks.body, blocks.block, force, state.velocity)

@@ -78,6 +78,7 @@ from rigid_lcp.problem_input import one_number, order_given, whole_number
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+METHOD = "dantzig"
 
 
 @dataclass(frozen=True)

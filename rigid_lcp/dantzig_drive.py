@@ -39,7 +39,7 @@ NO_EVENT, TOUCHES, PARTS, STICKS, SLIDES = range(5)
 NORMAL, TANGENTIAL, OFFSET = range(3)
 """What is driven."""
 REFRESH = 200
-"""Updates of an inverse before it is made anew."""
+"""Updates of an inverse before it is computed afresh."""
 
 
 @njit(cache=True)

@@ -15,7 +15,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.contacts import Contacts
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import SceneError
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.near_pairs import (
     DISC,
     HALF_SPACE,
@@ -24,7 +26,7 @@ from rigid_lcp.near_pairs import (
     near_pairs,
     place_shapes,
 )
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
+from rigid_lcp.polygon import Polygon
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

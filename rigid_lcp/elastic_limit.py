@@ -12,12 +12,11 @@ What the limit is:
   Lagrangian of ``min sum f^2 / 2k`` subject to ``J^T f = c, f_N >= 0`` has its minimum at
   ``f = k (-J dq)`` where that is positive, with dq the multiplier: eqs 37 and 38.  It is strictly
   convex, so f is unique, whatever the order of contacts and bodies and whatever the start.
-  `minimum_norm_forces` computes it apart, by linear algebra, for contacts that stick.
 - Where contacts slide or open while others hold by friction (friction mobilised inside a jammed
   pile): equilibrium of springs and sliders loaded in one go from nothing.  Coulomb's law has no
   potential, and there is more than one such state: relaxed from another one
   (`state_reached_from`), the forces of a box of 46 discs with friction 1 or 5 differ by up to
-  36 %, and in a wedge with a history of sliding by 8 times (`coulomb_slider`, MD).  All obey eqs
+  36 %, and in a wedge with a history of sliding by 8 times (sliders with memory, MD).  All obey eqs
   26 and 27.  The unique forces are by definition those reached from no displacements.
 - Where bodies accelerate: displacements drift along the motion for ever, which opens what opens
   and slides what slides, friction against the velocity, and the forces of the contacts that hold
@@ -286,18 +285,3 @@ def turned(deformation: Floats, growth: Floats) -> Floats:
     new = deformation.copy()
     new[slides, 1:] = growth[slides, 1:] * (length[slides] / speed[slides])[:, None]
     return new
-
-
-def minimum_norm_forces(problem: FrictionProblem, stiffness: ArrayLike = 1.0) -> Floats:
-    """``argmin sum f^2 / k`` with every contact closed and sticking, (nc * dim,) [N].
-
-    By dense least squares, of order ``(nc dim)^3``: a check on `elastic_limit` for small problems.
-    When not to use it: contacts that would pull or slide are not noticed; the residual tells.
-    """
-    bodies = bodies_of(problem)
-    weight = np.sqrt(contact_stiffness(problem, stiffness).ravel())
-    jacobian, _ = mass_free_jacobian(bodies)
-    scaled = sp.csr_array(sp.diags_array(weight) @ jacobian).toarray()
-    free = free_motion(jacobian, problem.offset)
-    least, *_ = np.linalg.lstsq(scaled.T, -free, rcond=1e-12)
-    return np.asarray(weight * least)

@@ -20,11 +20,13 @@ convex problems; with Coulomb's law nothing is proved, and the best point is kep
 
 Measured on what no other method of this package solved: 100 to 1,500 factorisations.  Sweeps
 between them, each going on from where the other ended, save up to nine in ten
-(`rigid_lcp.solver_turns`); so may a start inside the cones, where a path of the interior point
+(`rigid_lcp.solver_sweeps`); so may a start inside the cones, where a path of the interior point
 ends.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,29 +34,52 @@ from numpy.typing import NDArray
 from rigid_lcp.body_factorisation import Factorisation, factorisation
 from rigid_lcp.cones import length
 from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
-from rigid_lcp.proximal_newton import FINEST, proximal_point
+from rigid_lcp.proximal_newton import PROXIMAL, proximal_point
 
 Floats = NDArray[np.float64]
 
-FIRST_SHIFT, LEAST_SHIFT, GREATEST_SHIFT = 1e-5, 1e-9, 10.0
-"""alpha over mean(diag W)."""
-STEPS, FEW_STEPS, MANY_STEPS = 8, 3, 5
-"""Newton steps in which a point has to be found; the centre runs further ahead after a point that
-took few, and less far after one that took many."""
-FINER, ROUGH = 0.3, 1e-3
-"""A point is found where its own error is so small a part of the residual of the one before; of a
-residual above ``ROUGH``, of that."""
-SHRINK, GROW, EASY, EASY_STEPS = 0.5, 3.0, 3, 3
-"""alpha falls by the first after more than ``EASY`` points in turn, the last in so many steps, and
-grows by the second where no point is found without extrapolation."""
-FURTHEST = 1e12
-"""Greatest theta: where nothing drifts it would double without end."""
-FALL_BACK = 0.25
-"""What is left of theta after a point that was not found."""
-ENDLESS = 1e12
-"""Forces over ``rho |q|`` that are not gone beyond: the drift of a problem without solution never
-ends."""
-FACTORISATIONS = 1500
+
+@dataclass(frozen=True)
+class PointNumbers:
+    """Shifts, steps and extrapolation of the points."""
+
+    first_shift: float = 1e-5
+    """alpha over the mean of W's diagonal [-] at first,"""
+    least_shift: float = 1e-9
+    """at least"""
+    greatest_shift: float = 10.0
+    """and at most."""
+    steps: int = 8
+    """Newton steps in which a point has to be found."""
+    few_steps: int = 3
+    """The centre runs further ahead after a point that took so few,"""
+    many_steps: int = 5
+    """and less far after one that took so many."""
+    finer: float = 0.3
+    """A point is found where its own error is so small a part of the residual of the one before
+    [-];"""
+    rough: float = 1e-3
+    """of a residual [-] above this, of this."""
+    shrink: float = 0.5
+    """Factor of alpha after more than `easy` points in turn, the last in `easy_steps` steps."""
+    grow: float = 3.0
+    """Factor of alpha where no point is found without extrapolation."""
+    easy: int = 3
+    """Points."""
+    easy_steps: int = 3
+    """Steps."""
+    furthest: float = 1e12
+    """Greatest theta [-]: where nothing drifts it would double without end."""
+    fall_back: float = 0.25
+    """What is left of theta after a point that was not found [-]."""
+    endless: float = 1e12
+    """Forces over ``rho |q|`` [-] that are not exceeded: the drift of a problem without solution
+    never ends."""
+    factorisations: int = 1500
+    """At most."""
+
+
+POINTS = PointNumbers()
 
 
 def extrapolated_points(
@@ -63,8 +88,8 @@ def extrapolated_points(
     tolerance: float = 1e-12,
     *,
     linear: Factorisation | None = None,
-    factorisations: int = FACTORISATIONS,
-    patience: int = FACTORISATIONS,
+    factorisations: int = POINTS.factorisations,
+    patience: int = POINTS.factorisations,
 ) -> FrictionSolution:
     """Extrapolated proximal points from ``start`` (zero forces if None): see the module.
 
@@ -78,24 +103,24 @@ def extrapolated_points(
     best, least = force, problem.residual(force)
     residual, spent, points, easy = least, 0, 0, 0
     mark, marked = least, 0
-    shift, ahead, drift = FIRST_SHIFT, 0.0, np.zeros_like(force)
-    endless = ENDLESS * max(problem.rho * length(problem.offset), length(force))
+    shift, ahead, drift = POINTS.first_shift, 0.0, np.zeros_like(force)
+    endless = POINTS.endless * max(problem.rho * length(problem.offset), length(force))
     while least > tolerance and spent < min(factorisations, marked + patience):
         centre = force + ahead * drift
-        if shift > GREATEST_SHIFT or not length(centre) < endless:
+        if shift > POINTS.greatest_shift or not length(centre) < endless:
             break
-        enough = max(FINER * min(residual, ROUGH), FINEST)
+        enough = max(POINTS.finer * min(residual, POINTS.rough), PROXIMAL.finest)
         point, found, steps = proximal_point(
             problem, centre, shift / problem.rho, linear, enough,
-            min(STEPS, factorisations - spent),
+            min(POINTS.steps, factorisations - spent),
         )  # fmt: skip
         spent, points = spent + steps, points + 1
         if not found:
             easy = 0
             if ahead > 0.0:
-                ahead = FALL_BACK * ahead if ahead > 1.0 else 0.0
+                ahead = POINTS.fall_back * ahead if ahead > 1.0 else 0.0
             else:
-                shift, drift = GROW * shift, drift / GROW
+                shift, drift = POINTS.grow * shift, drift / POINTS.grow
             continue
         drift, force = (point - force) / (ahead + 1.0), point
         residual, easy = problem.residual(force), easy + 1
@@ -103,12 +128,18 @@ def extrapolated_points(
             best, least = force, residual
         if least < 0.5 * mark:
             mark, marked = least, spent
-        if steps <= FEW_STEPS:
-            ahead = min(2.0 * ahead + 1.0, FURTHEST)
-        elif steps >= MANY_STEPS:
+        if steps <= POINTS.few_steps:
+            ahead = min(2.0 * ahead + 1.0, POINTS.furthest)
+        elif steps >= POINTS.many_steps:
             ahead = 0.5 * ahead
-        if easy > EASY and steps <= EASY_STEPS and shift > LEAST_SHIFT:  # the drift is as fast
-            shift, drift, ahead = SHRINK * shift, drift / SHRINK, SHRINK * ahead
+        if (
+            easy > POINTS.easy and steps <= POINTS.easy_steps and shift > POINTS.least_shift
+        ):  # the drift is as fast
+            shift, drift, ahead = (
+                POINTS.shrink * shift,
+                drift / POINTS.shrink,
+                POINTS.shrink * ahead,
+            )
     return friction_solution(
         problem, best, tolerance, "extrapolated points",
         {"points": float(points), "factorisations": float(spent)},

@@ -5,7 +5,7 @@ the static ones; at a sliding contact ``f_T = sigma mu f_N`` is put in, so its c
 ``A_N + sigma mu A_T``.  When a contact changes its list the matrix gains or loses one row and
 column, or adds a multiple of one column to another.  The inverse follows in O(k^2) and O(k)
 (bordering; Golub and Van Loan, Matrix Computations, 4th ed., 2.1.4) where solving afresh takes
-O(k^3).  Errors grow with every update, so `reduced_refresh` inverts anew.
+O(k^3).  Errors grow with every update, so `reduced_refresh` inverts afresh.
 
 All functions change their arrays in place.  The inverse is dense: k^2 numbers.
 """
@@ -212,7 +212,7 @@ def reduced_couple(geometry: Geometry, reduced: Reduced, contact: int, share: fl
 
 @njit(cache=True)
 def reduced_refresh(geometry: Geometry, reduced: Reduced) -> bool:
-    """Invert the matrix of eq. 28 anew; False, and nothing changed, where it is singular."""
+    """Invert the matrix of eq. 28 afresh; False, and nothing changed, where it is singular."""
     size = reduced.size[0]
     if size == 0:
         return True

@@ -42,14 +42,14 @@ def too_much(
     ``loads`` (n, 3) or (n, 6) [N, N m] in it, or None; ``error``: why its contact forces can not be
     computed, if it is they.
     """
-    told = "a state or an energy that is not finite"
+    leads = "a state or an energy that is not finite"
     if error is not None:
-        told = f"contact forces that can not be computed ({error.where}: {error.what})"
+        leads = f"contact forces that can not be computed ({error.where}: {error.what})"
     with np.errstate(all="ignore"):
         light = error is not None and error.where.endswith("inverse_mass")
         body, cause = _lightest(world) if light else _fastest(world, motion, loads, h)
     return SceneError(
-        f"{cause}: this leads to {told}", where=f"{world.scene.called(body)} at {time:.6g} s",
+        f"{cause}: this leads to {leads}", where=f"{world.scene.called(body)} at {time:.6g} s",
         remedy="look at loads, gravity, masses and velocities; take a shorter step, or other units",
     )  # fmt: skip
 

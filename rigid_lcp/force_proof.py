@@ -14,7 +14,7 @@ Ints = NDArray[np.int64]
 
 EQUILIBRATIONS = 3
 """Rounds of scaling rows and columns to entries of one: HiGHS takes what is below 1e-9 for zero."""
-INFEASIBLE, ROUND_OFF = 1e-7, 1e-12
+INFEASIBLE, MARGIN = 1e-7, 1e-12
 """Approach that is left beside the largest [-]; round-off of a proof's sums beside their parts."""
 
 
@@ -64,5 +64,5 @@ def forces_insufficient(problem: FrictionProblem, slip: Ints | None = None) -> b
     if found.status != 0 or found.fun <= INFEASIBLE:
         return False
     proof = np.maximum(-found.ineqlin.marginals, 0.0)
-    lessened = approach.T @ proof < -ROUND_OFF * (abs(approach).T @ proof)
+    lessened = approach.T @ proof < -MARGIN * (abs(approach).T @ proof)
     return bool(bound @ proof < 0.0 and not lessened.any())

@@ -18,9 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ShapeError
+from rigid_lcp.polygon import Polygon, convex_outline
 from rigid_lcp.real_numbers import real_numbers
-from rigid_lcp.scene_input import MOST_OF_A_STATE, density_given, line_given, vector_given
-from rigid_lcp.shapes_2d import Polygon, convex_outline
+from rigid_lcp.scene_input import MOST_OF_A_STATE, density_given, line_given
+from rigid_lcp.shape_numbers import vector_given
 
 if TYPE_CHECKING:
     from rigid_lcp.motion import Motion
@@ -138,7 +139,7 @@ def fragment(
     ``vertices`` (n, 2) [m] in the world, anticlockwise; ``point``, ``direction``: see
     `polygon_split`; ``density`` [kg/m^2]; ``velocity`` (2,) [m/s] of the centre of mass of the
     whole; ``spin`` [rad/s].  Raises `ShapeError` for what is no polygon, as
-    `rigid_lcp.shapes_2d.Polygon` does, and as `polygon_split` does; `SceneError` for a line,
+    `rigid_lcp.polygon.Polygon` does, and as `polygon_split` does; `SceneError` for a line,
     density, velocity or spin that is none, as `rigid_lcp.scene.Scene.add` does.
     """
     whole, where = convex_outline(vertices), "fragment"
@@ -238,7 +239,7 @@ def _parts_2d(body: Body, point: ArrayLike, direction: ArrayLike) -> tuple[Body,
 
 def _parts_3d(body: Body, point: ArrayLike, normal: ArrayLike) -> tuple[Body, Body]:
     from rigid_lcp.polyhedra import fragments
-    from rigid_lcp.shapes_3d import Polyhedron
+    from rigid_lcp.polyhedron import Polyhedron
 
     parts = fragments(
         body.shape, body.position, body.angle, body.velocity, body.spin, normal, point
@@ -251,7 +252,7 @@ def _parts_3d(body: Body, point: ArrayLike, normal: ArrayLike) -> tuple[Body, Bo
             _ = shape.edges  # contacts want them
         except ShapeError as error:
             raise ShapeError(
-                "the plane leaves corners too near to one another, or to a face, to be told apart",
+                "the plane leaves corners too near to one another, or to a face, to be kept apart",
                 where="cut", remedy="move the plane a little",
             ) from error  # fmt: skip
         mass, inertia = shape.mass_properties(density)

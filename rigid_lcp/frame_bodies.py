@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.breakage import Broken
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene, world_of
-from rigid_lcp.shapes_2d import Polygon
 from rigid_lcp.wear import WearState
 from rigid_lcp.wear_3d import SolidWear
 from rigid_lcp.worn_polygon import WornPolygon
@@ -149,7 +149,7 @@ def _wholes(run: Simulation) -> list[int]:
 
 def _shape(corners: Floats, dim: int) -> Any:
     if dim == 3:
-        from rigid_lcp.shapes_3d import Polyhedron
+        from rigid_lcp.polyhedron import Polyhedron
 
         return Polyhedron.of_corners(corners)
     made = Polygon(corners)

@@ -38,7 +38,7 @@ SHARE_LEFT = 0.1
 """Part of the error without forces that a solution may leave, where its forces are huge [-]."""
 BODY_SIZE = {2: 3, 3: 6}
 """Freedoms of a body by dimension."""
-ROUND_OFF = 1e-15
+FORCE_ROUND_OFF = 1e-15
 """Relative round-off of a force: what it leaves even where the residual is zero [-]."""
 
 
@@ -195,7 +195,7 @@ class FrictionProblem:
         Or of the velocities, each contact by its own rho: where W of one is 1e15 times that of
         another, rho of the mean sees nothing of the latter's.
         """
-        left = max(residual, ROUND_OFF) * length(force)
+        left = max(residual, FORCE_ROUND_OFF) * length(force)
         if left <= SHARE_LEFT * self.error_without_forces:
             return True
         none = self._approach(np.zeros_like(force))
@@ -208,7 +208,7 @@ class FrictionProblem:
         own, r = self.contact_rho[:, None], np.ascontiguousarray(force).reshape(shape)
         push = own * self.velocity(force).reshape(shape)
         error = np.abs(natural_map(r, push, self.friction, 1.0))
-        return length(np.maximum(error, ROUND_OFF * np.abs(r)) / own)
+        return length(np.maximum(error, FORCE_ROUND_OFF * np.abs(r)) / own)
 
 
 @dataclass(frozen=True)
@@ -316,7 +316,7 @@ def friction_problem(
         )  # fmt: skip
     bodies = matrix if isinstance(matrix, BodySpace) else None
     if bodies is not None:
-        check_factors(bodies)
+        check_factors(bodies.jacobian, bodies.inverse_mass, bodies.body_size)
     w = None if bodies is not None else matrix_given(matrix)
     if w is not None:
         in_range(w.data, "W")

@@ -39,9 +39,9 @@ from rigid_lcp.normal_matrices import (
     face_bandwidth,
     face_rows,
     normal_products,
+    normal_sweeps,
     pick_rows,
 )
-from rigid_lcp.normal_sweeps import normal_sweeps
 from rigid_lcp.problem_input import finite_numbers, matrix_given, one_number
 
 Floats = NDArray[np.float64]
@@ -62,7 +62,7 @@ PROXIMAL_STEPS = 20
 BAND_MOST, BAND_OVERHEAD = 1.3e8, 20
 """Banded Cholesky up to about so many multiplications, the band counted so much wider: half of what
 sparse LU takes in the plane, as much as it where 1,700 spheres touch."""
-ROUND_OFF = 1e-13
+SIGN_MARGIN = 1e-13
 """Relative size of an acceleration or force that counts as zero."""
 PATIENCE = 5
 """Exchanges at once that may fail to make violations fewer, before one at a time."""
@@ -192,7 +192,7 @@ def principal_pivots(
         f[inside] = solve(-offset[inside])
         a = offset + a_matrix @ f + shift * f
         size = scale + unit * float(np.abs(f).max())
-        wrong = np.where(carries, f < -ROUND_OFF * size / unit, a < -ROUND_OFF * size)
+        wrong = np.where(carries, f < -SIGN_MARGIN * size / unit, a < -SIGN_MARGIN * size)
         count = int(wrong.sum())
         if count == 0 or limit <= 0:
             break

@@ -40,6 +40,7 @@ from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, fricti
 from rigid_lcp.problem_input import one_number, order_given, start_given, whole_number
 
 Floats = NDArray[np.float64]
+METHOD = "gauss-seidel"
 Integers = NDArray[np.int64]
 Order = Literal["forward", "symmetric"]
 

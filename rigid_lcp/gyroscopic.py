@@ -79,7 +79,7 @@ def free_rotation(
     The kinetic energy ``sum L_i^2 / 2 I_i`` is split into that of a sphere with the middle moment
     and one rest for the first and for the third axis; each part turns the body about one axis,
     exactly (symplectic splitting; Touma and Wisdom, Astron. J. 107 (1994) 1189).  It keeps the
-    angular momentum; what it lacks of the energy, of third order in the step, is made good by
+    angular momentum; what it lacks of the energy, of third order in the step, is added by
     `turned_to_energy`.  So both are kept to round-off, the error is of second order, and spheres,
     cubes and all bodies with two equal moments move exactly.
     """

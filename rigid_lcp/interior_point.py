@@ -47,6 +47,9 @@ from rigid_lcp.lorentz_cones import (
 from rigid_lcp.problem_input import one_number, whole_number
 
 Floats = NDArray[np.float64]
+METHOD = "interior-point"
+POLISHED = True
+"""Newton's method is called from its end."""
 
 ITERATIONS = 50
 BOUNDARY_SHARE = 0.99

@@ -1,6 +1,6 @@
 """What happens to contacts between two Runge-Kutta steps: they last, collide, stop sliding, drift.
 
-Lengths are told by the size of the smallest movable body, velocities by ``sqrt(g size)``.
+Lengths are measured by the size of the smallest movable body, velocities by ``sqrt(g size)``.
 """
 
 from __future__ import annotations

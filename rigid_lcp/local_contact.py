@@ -17,46 +17,18 @@ the order is open, stick, slide; where none exists (Painleve) the status says so
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from rigid_lcp.errors import ProblemError
 from rigid_lcp.sliding_direction import ROUNDING, direction_near, directions_all
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-LocalStatus = Literal["open", "stick", "slide", "no solution"]
 OPEN, STICK, SLIDE, NONE = 0, 1, 2, 3
-STATUSES: tuple[LocalStatus, ...] = ("open", "stick", "slide", "no solution")
 
 SINGULAR = 1e-13
 """A block whose pivot is smaller than this part of its greatest entry is singular."""
-
-
-def local_solution(
-    block: ArrayLike, offset: ArrayLike, friction: float
-) -> tuple[Floats, LocalStatus]:
-    """Force r of one contact with ``u = W r + q``, and what the contact does.
-
-    ``block`` W (dim, dim) and ``offset`` q (dim,), normal first; ``friction`` mu.  Without a
-    solution r is zero.  Raises `ProblemError` for other shapes, NaN or negative friction.
-    """
-    w, q = np.array(block, dtype=float), np.array(offset, dtype=float)
-    if q.shape not in ((2,), (3,)) or w.shape != q.shape * 2:
-        raise ProblemError(
-            f"a contact with W of shape {w.shape} and q of shape {q.shape}", where="block",
-            remedy="give W (2, 2) and q (2,), or W (3, 3) and q (3,), the normal first",
-        )  # fmt: skip
-    if not (np.isfinite(w).all() and np.isfinite(q).all() and friction >= 0):
-        raise ProblemError(
-            f"W or q is not finite, or friction is not a number of zero or more ({friction})",
-            where="contact", remedy="look for a mass of zero or a division by zero",
-        )  # fmt: skip
-    force, status = contacts_apart(w[None], q[None], np.array([friction], dtype=float))
-    return force[0], STATUSES[status[0]]
 
 
 @njit(cache=True)

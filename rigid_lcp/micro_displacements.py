@@ -24,7 +24,7 @@ What the paper leaves open, and what is done here:
   the limit is the weighted minimum-norm solution (`rigid_lcp.elastic_limit`).  Coulomb's law
   where contacts slide is no such function: the state reached can then depend on where the
   relaxation begins (`coulomb_spring`), so it begins at no displacements, and the forces do depend
-  on the path of a law with memory (`coulomb_slider`).
+  on the path of a law with memory (`ForceLaw`).
 - h is not given: `stable_step` derives it.  The number of iterations grows as the ratio of the
   stiffest to the softest mode; `elastic_limit` finds the same forces without that cost.
 - The last line of eq. 27 lacks ``a_T f_T <= 0``: friction opposes sliding.  The residual has it.
@@ -105,19 +105,6 @@ def spring(
     For contacts that `rigid_lcp.held_contacts` has found to hold in the end.
     """
     return stiffness * deformation, slip
-
-
-def coulomb_slider(
-    deformation: Floats, slip: Floats, stiffness: Floats, friction: Floats
-) -> tuple[Floats, Floats]:
-    """As `coulomb_spring`, with memory: what slides stays slid, as in MD (Cundall and Strack).
-
-    The forces depend on the order in which contacts slid; not for forces that shall be unique.
-    """
-    force, _ = coulomb_spring(deformation, slip, stiffness, friction)
-    slipped = slip.copy()
-    slipped[:, 1:] = deformation[:, 1:] - force[:, 1:] / stiffness[:, 1:]
-    return force, slipped
 
 
 def contact_stiffness(problem: FrictionProblem, stiffness: ArrayLike) -> Floats:

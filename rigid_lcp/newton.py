@@ -23,6 +23,7 @@ from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, fricti
 from rigid_lcp.problem_input import one_number, start_given, whole_number
 
 Floats = NDArray[np.float64]
+METHOD = "newton"
 Flags = NDArray[np.int8]
 
 ITERATIONS = 50

@@ -53,7 +53,7 @@ GREATEST_TURN = 0.1
 TURNING, STIFF = 6, 1e-6
 """After so many, turning costs ``1 / STIFF`` times as much: small grains between large ones may
 turn to and fro for ever, where the large ones must give way."""
-ROUND_OFF = 1e-15
+LEAST_COST = 1e-15
 """Lifts that cost no more than this part of the energy are none [-]."""
 
 
@@ -146,7 +146,7 @@ def lift_paid(
         return parted
     energy = world.energy(parted)
     owed = min(energy - world.energy(end), energy - budget)
-    none = ROUND_OFF * abs(energy)
+    none = LEAST_COST * abs(energy)
     if owed <= none:
         return parted
     moved = world.movable & (parted.position != end.position).any(axis=1)

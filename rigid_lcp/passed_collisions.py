@@ -43,8 +43,8 @@ a heavy one takes as many at a mass ratio of 4e7."""
 LOSSY_ROUNDS, LOSSY_WORK = 50, 1_000
 """Rounds that contacts with friction or a restitution below 1 always have, and the sum of contacts
 over the rounds [-] until which they have more."""
-ROUND_OFF = 1e-12
-"""Velocities this small against the largest are no approach."""
+SPEED_ROUND_OFF = 1e-12
+"""Velocities this small against the largest of a collision are no approach; works likewise [-]."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Closing:
     """What the turning of the bodies adds to ``u_N`` from the midpoint to the end, and takes from
     ``before``, (nc,) [m/s]."""
     slow: float
-    """What gravity gives in a step [m/s]: an approach as slow can not be told from rest."""
+    """What gravity gives in a step [m/s]: an approach as slow cannot be distinguished from rest."""
     h: float
     """Length of the step [s]."""
     touching: float
@@ -135,7 +135,7 @@ def impulses_in_turn(bodies: BodySpace, closing: Closing, solve: Solve) -> Impul
     impulses of earlier rounds, and not yet what loads and turning add within the step.
     """
     within = closing.offset[:, 0] - closing.before
-    least = ROUND_OFF * float(np.abs(closing.offset).max(initial=0.0))
+    least = SPEED_ROUND_OFF * float(np.abs(closing.offset).max(initial=0.0))
     now = replace(closing, slow=max(closing.slow, least))
     lossy = (closing.restitution < 1.0) | (closing.friction > 0.0)
     impulse = np.zeros_like(now.offset)

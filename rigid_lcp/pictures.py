@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.contacts import ContactForces
+from rigid_lcp.disc import Disc
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.motion import Motion
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 
 Floats = NDArray[np.float64]
 

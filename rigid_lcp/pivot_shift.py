@@ -112,7 +112,7 @@ def state_restore(state: Pivots, kept: tuple[Ints, Floats, Floats], shift: float
 
 
 def lists_set(state: Pivots, kinds: Ints) -> None:
-    """Put every contact on a list; the inverse has then to be made anew."""
+    """Put every contact on a list; the inverse has then to be computed afresh."""
     geometry, reduced = state.geometry, state.reduced
     reduced.kind[:] = kinds
     reduced.place[:] = -1

@@ -1,7 +1,7 @@
 """A problem as the pivoting methods hold it, and the answer that comes out of it, judged.
 
-What has no solution is told by a proof, a linear programme, not by forces that grow: those can have
-a small residual, as that is relative to them.
+That there is no solution is shown by a proof, a linear programme, not by forces that grow: those
+can have a small residual, as that is relative to them.
 """
 
 from __future__ import annotations

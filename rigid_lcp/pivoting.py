@@ -60,6 +60,7 @@ from rigid_lcp.pivot_state import (
 from rigid_lcp.problem_input import one_number, whole_number
 
 Floats = NDArray[np.float64]
+METHOD = "pivoting"
 
 
 def pivoting(

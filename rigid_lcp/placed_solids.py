@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.errors import SceneError, ShapeError
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.near_pairs import HALF_SPACE
+from rigid_lcp.polyhedron import Polyhedron
 from rigid_lcp.rotations import rotation_matrix
 from rigid_lcp.separation_3d import NEARLY, TILT, Solids
-from rigid_lcp.shapes_2d import HalfSpace
-from rigid_lcp.shapes_3d import Polyhedron, Sphere
+from rigid_lcp.sphere import Sphere
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

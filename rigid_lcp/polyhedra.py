@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import SceneError, ShapeError
+from rigid_lcp.polyhedron import Polyhedron
 from rigid_lcp.rotations import rotate, rotate_back
-from rigid_lcp.scene_input import vector_given
-from rigid_lcp.shapes_3d import Polyhedron
+from rigid_lcp.shape_numbers import vector_given
 
 Floats = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene_types import Grains
-from rigid_lcp.shapes_2d import Polygon
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ def stone_3d(random: Generator, diameter: float, corners: int) -> Any:
 
     Directions are spread by a few steps of mutual repulsion, so that no face is a sliver.
     """
-    from rigid_lcp.shapes_3d import Polyhedron
+    from rigid_lcp.polyhedron import Polyhedron
 
     points = random.normal(size=(corners, 3))
     for _ in range(20):

@@ -4,7 +4,7 @@
     problem = read_problem("KaplasTower-i1061-4.hdf5")   # fclib_local, fclib_global
     problem = read_problem("RockPile_tob1.dat")          # text of Siconos
 
-npz: ``NAME.npz`` holds q (nc * dim,), mu (nc,) and, if it can not be told from their lengths, dim.
+npz: ``NAME.npz`` holds q (nc * dim,), mu (nc,) and, if their lengths do not show it, dim.
 W is an array W in the same file, or ``NAME_W.npz`` of `scipy.sparse.save_npz`; a problem that
 knows its bodies has J (nc * dim, ndof) as ``NAME_H.npz`` and the diagonal of M^-1, Minv (ndof,).
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from numbers import Integral
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ProblemError, UsageError
-
-if TYPE_CHECKING:
-    from rigid_lcp.friction_problem import BodySpace
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -181,10 +178,9 @@ def operator_written(operator: Any, name: str) -> sp.csr_array:
     return sp.csr_array(sp.hstack(parts)) if parts else sp.csr_array((rows, columns))
 
 
-def check_factors(bodies: BodySpace) -> None:
-    """Raise `ProblemError` where the factors of W do not fit together."""
+def check_factors(jacobian: sp.csr_array, inverse: sp.csr_array, size: int) -> None:
+    """Raise `ProblemError` where the factors of W (`BodySpace`) do not fit together."""
     where = "BodySpace"
-    jacobian, inverse, size = bodies.jacobian, bodies.inverse_mass, bodies.body_size
     for name, part in (("jacobian", jacobian), ("inverse_mass", inverse)):
         if not sp.issparse(part) or part.format != "csr":
             raise ProblemError(

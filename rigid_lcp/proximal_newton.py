@@ -13,6 +13,8 @@ to converge, as W + alpha is monotone but Coulomb's law is not; the best point i
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,19 +25,39 @@ from rigid_lcp.problem_input import one_number, start_given, whole_number
 
 Floats = NDArray[np.float64]
 
-FIRST_SHIFT, LEAST_SHIFT, GREATEST_SHIFT = 1e-4, 1e-11, 10.0
-"""alpha over mean(diag W); the first is not greater than the residual."""
-SHRINK, GROW = 0.3, 10.0
-"""How alpha goes on after a point that was found, and after one that was not."""
-STEPS = 5
-"""Newton steps in which a point has to be found: from the one before it most take one or two."""
-FINER = 0.1
-"""A point is found where its own error is so small a part of the residual of the one before."""
-FINEST = 1e-15
-HOPELESS, SAME, TRIED = 10.0, 1e-3, 4
-"""From so many errors on, a point is given up where the last is so many times that of the first
-step, or is an earlier one again to ``SAME`` of it: the same changes of status come in a circle."""
-FACTORISATIONS = 60
+
+@dataclass(frozen=True)
+class ProximalNumbers:
+    """Shifts and steps of the proximal points."""
+
+    first_shift: float = 1e-4
+    """alpha over the mean of W's diagonal [-] at first, not greater than the residual,"""
+    least_shift: float = 1e-11
+    """at least"""
+    greatest_shift: float = 10.0
+    """and at most."""
+    shrink: float = 0.3
+    """Factor of alpha after a point that was found,"""
+    grow: float = 10.0
+    """and after one that was not."""
+    steps: int = 5
+    """Newton steps in which a point has to be found: most take one or two from the one before."""
+    finer: float = 0.1
+    """A point is found where its own error is so small a part of the residual of the one before
+    [-],"""
+    finest: float = 1e-15
+    """or so small [-]."""
+    hopeless: float = 10.0
+    """A point is given up where its last error is so many times that of the first step [-],"""
+    same: float = 1e-3
+    """or is an earlier one again to this part of it [-]: the same changes of status in a circle,"""
+    tried: int = 4
+    """from so many errors on."""
+    factorisations: int = 60
+    """At most."""
+
+
+PROXIMAL = ProximalNumbers()
 
 
 def proximal_newton(
@@ -44,7 +66,7 @@ def proximal_newton(
     tolerance: float = 1e-12,
     *,
     linear: Factorisation | None = None,
-    factorisations: int = FACTORISATIONS,
+    factorisations: int = PROXIMAL.factorisations,
     first_shift: float | None = None,
 ) -> FrictionSolution:
     """Proximal points from ``start`` (zero forces if None) until the residual is small enough.
@@ -65,23 +87,29 @@ def proximal_newton(
         centre = start_given(start, len(centre), problem.dim)
     best, best_residual = centre, problem.residual(centre)
     residual, spent, points = best_residual, 0, 0
-    shift = max(LEAST_SHIFT, min(FIRST_SHIFT, residual)) if first_shift is None else first_shift
-    while best_residual > tolerance and spent < factorisations and shift <= GREATEST_SHIFT:
-        enough = max(FINER * residual, FINEST)
+    shift = (
+        max(PROXIMAL.least_shift, min(PROXIMAL.first_shift, residual))
+        if first_shift is None
+        else first_shift
+    )
+    while best_residual > tolerance and spent < factorisations and shift <= PROXIMAL.greatest_shift:
+        enough = max(PROXIMAL.finer * residual, PROXIMAL.finest)
         force, found, steps = proximal_point(
             problem, centre, shift / problem.rho, linear, enough,
-            min(STEPS, factorisations - spent),
+            min(PROXIMAL.steps, factorisations - spent),
         )  # fmt: skip
         spent, points = spent + steps, points + 1
         reached = problem.residual(force)
-        at_end = found and shift == LEAST_SHIFT and not reached < best_residual
+        at_end = found and shift == PROXIMAL.least_shift and not reached < best_residual
         if reached < best_residual:
             best, best_residual = force, reached
         if at_end:  # nothing but rounding is left
             break
         if found:
             centre, residual = force, reached
-        shift = max(LEAST_SHIFT, shift * SHRINK) if found else shift * GROW
+        shift = (
+            max(PROXIMAL.least_shift, shift * PROXIMAL.shrink) if found else shift * PROXIMAL.grow
+        )
     return friction_solution(
         problem, best, tolerance, "proximal newton",
         {"points": float(points), "factorisations": float(spent)},
@@ -123,6 +151,8 @@ def hopeless(errors: list[float]) -> bool:
     now = errors[-1]
     if not np.isfinite(now):
         return True
-    if len(errors) < TRIED:
+    if len(errors) < PROXIMAL.tried:
         return False
-    return now > HOPELESS * errors[1] or any(abs(now - e) < SAME * e for e in errors[1:-1])
+    return now > PROXIMAL.hopeless * errors[1] or any(
+        abs(now - e) < PROXIMAL.same * e for e in errors[1:-1]
+    )

@@ -15,35 +15,50 @@ no matter how they are found.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.body_factorisation import Factorisation, SingularSystem, Solve, factorisation
-from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_solution
+from rigid_lcp.friction_problem import (
+    FORCE_ROUND_OFF,
+    FrictionProblem,
+    FrictionSolution,
+    friction_solution,
+)
 from rigid_lcp.newton import alart_curnier
 
 Floats = NDArray[np.float64]
 
-SHIFT = 1e-9
-"""Proximal shift over mean(diag W) of the factors."""
-PRODUCTS = 8
-"""Dimension of the space that GMRES builds at most: one for each eigenvalue that the shift hides,
-and one for all others."""
-STEPS, LEVEL = 8, 2
-"""Most Newton steps: where contacts at Coulomb's limit turn the residual rises before it falls.
-They end where so many in turn leave it where it was: at round-off."""
-EXACT, ROUND_OFF = 2.2e-16, 1e-15
-"""A residual that no step betters, and one next to it: a step that does not halve this is the last.
-"""
-ENOUGH = 1e-6
-"""Error of a solution over the right hand side that is left: a Newton step needs no less."""
-LITTLE = 1e-14
-"""Part of a vector that is round-off of it [-]."""
+
+@dataclass(frozen=True)
+class RefinementNumbers:
+    """Steps without a shift, and what ends them."""
+
+    shift: float = 1e-9
+    """Proximal shift of the factors, over the mean of W's diagonal [-]."""
+    products: int = 8
+    """Dimension of the space that GMRES builds at most: one for each eigenvalue that the shift
+    hides, and one for all others."""
+    steps: int = 8
+    """Most Newton steps: where contacts at Coulomb's limit turn it rises before it falls."""
+    level: int = 2
+    """They end where so many in turn leave it where it was: at round-off."""
+    exact: float = 2.2e-16
+    """A residual [-] that no step betters."""
+    enough: float = 1e-6
+    """Error of a solution over the right hand side [-]: a Newton step needs no less."""
+    little: float = 1e-14
+    """Part of a vector that is round-off of it [-]."""
+
+
+REFINEMENT = RefinementNumbers()
 
 
 def refined(
     problem: FrictionProblem, start: Floats, tolerance: float, *,
-    linear: Factorisation | None = None, steps: int = STEPS,
+    linear: Factorisation | None = None, steps: int = REFINEMENT.steps,
 ) -> FrictionSolution:  # fmt: skip
     """The best point of some Newton steps from ``start`` (nc * dim,), forces near a solution.
 
@@ -55,18 +70,18 @@ def refined(
     linear = linear or factorisation(problem)
     rho = problem.contact_rho
     force = best = start
-    tolerance = max(tolerance, EXACT)
+    tolerance = max(tolerance, REFINEMENT.exact)
     least, done, level = problem.residual(start), 0, 0
     try:
-        while least > tolerance and done < steps and level < LEVEL:
+        while least > tolerance and done < steps and level < REFINEMENT.level:
             velocity = problem.velocity(force).reshape(shape)
             f, a, b, _ = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
-            solve = linear.factor(a + (SHIFT / problem.rho) * b, b)
+            solve = linear.factor(a + (REFINEMENT.shift / problem.rho) * b, b)
             force = force - gmres(problem, a, b, solve, f.ravel())
             residual = problem.residual(force)
             done += 1
             level = level + 1 if 0.5 * least < residual < 10.0 * least else 0
-            last = least <= ROUND_OFF and residual > 0.5 * least
+            last = least <= FORCE_ROUND_OFF and residual > 0.5 * least
             if residual < least:
                 best, least = force, residual
             if last:
@@ -88,8 +103,12 @@ def gmres(problem: FrictionProblem, a: Floats, b: Floats, solve: Solve, right: F
     length = float(np.linalg.norm(right))
     if length == 0.0 or not np.isfinite(length):
         return np.zeros_like(right)
-    basis, images, height = [right / length], [], np.zeros((PRODUCTS + 1, PRODUCTS))
-    for k in range(PRODUCTS):
+    basis, images, height = (
+        [right / length],
+        [],
+        np.zeros((REFINEMENT.products + 1, REFINEMENT.products)),
+    )
+    for k in range(REFINEMENT.products):
         image = solve(basis[k])
         images.append(image)
         velocity = response(image).reshape(*shape, 1)
@@ -104,9 +123,9 @@ def gmres(problem: FrictionProblem, a: Floats, b: Floats, solve: Solve, right: F
         wanted = np.zeros(k + 2)
         wanted[0] = length
         heights = height[: k + 2, : k + 1]
-        weights = np.linalg.lstsq(heights, wanted, rcond=LITTLE)[0]
+        weights = np.linalg.lstsq(heights, wanted, rcond=REFINEMENT.little)[0]
         error = float(np.linalg.norm(heights @ weights - wanted))
-        if error <= ENOUGH * length or not left > LITTLE * size:
+        if error <= REFINEMENT.enough * length or not left > REFINEMENT.little * size:
             break
         basis.append(product / left)
     return np.asarray(weights @ np.array(images))

@@ -14,9 +14,6 @@ from rigid_lcp.errors import SceneError
 
 Floats = NDArray[np.float64]
 
-IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
-"""No rotation."""
-
 
 def unit_quaternion(quaternion: ArrayLike) -> Floats:
     """Scale quaternions (..., 4) to length one.

@@ -16,15 +16,10 @@ from rigid_lcp.contacts import Contacts
 from rigid_lcp.detection_2d import detect_2d, shapes_2d
 from rigid_lcp.errors import SceneError
 from rigid_lcp.friction_problem import MOST_FRICTION
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.motion import Motion, motion_displaced
-from rigid_lcp.scene_input import (
-    MOST_OF_A_STATE,
-    check_half_space,
-    density_given,
-    number_in,
-    vector_given,
-)
-from rigid_lcp.shapes_2d import HalfSpace
+from rigid_lcp.scene_input import MOST_OF_A_STATE, check_half_space, density_given, number_in
+from rigid_lcp.shape_numbers import vector_given
 
 if TYPE_CHECKING:
     from rigid_lcp.gyroscopic import PrincipalInertia

@@ -147,8 +147,8 @@ def scene_build(file: SceneFile) -> Scene:
 
     Raises `ShapeError` and `SceneError` with the name of the body.
     """
+    from rigid_lcp.half_space import HalfSpace
     from rigid_lcp.pouring import grains_place
-    from rigid_lcp.shapes_2d import HalfSpace
 
     tables = file.tables
     scene = Scene(tables.dimensions, tables.gravity)
@@ -194,14 +194,16 @@ def shape_of(body: BodyTable, dim: int) -> Any:
     """The shape that a body's table names.  Raises `ShapeError` with the body's name."""
     with shape_named(f"body {body.name}"):
         if dim == 2:
-            from rigid_lcp.shapes_2d import Disc, Polygon
+            from rigid_lcp.disc import Disc
+            from rigid_lcp.polygon import Polygon
 
             if body.radius is not None:
                 return Disc(body.radius)
             if body.box is not None:
                 return Polygon.rectangle(*body.box)
             return Polygon(np.array(body.vertices))
-        from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
+        from rigid_lcp.polyhedron import Polyhedron, box
+        from rigid_lcp.sphere import Sphere
 
         if body.radius is not None:
             return Sphere(body.radius)

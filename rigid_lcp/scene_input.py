@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, nan
 from numbers import Integral, Real
-from sys import float_info
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from rigid_lcp.errors import SceneError, UsageError
 from rigid_lcp.motion import Motion
 from rigid_lcp.real_numbers import real_numbers
+from rigid_lcp.shape_numbers import vector_given
 
 if TYPE_CHECKING:
-    from rigid_lcp.shapes_2d import HalfSpace
+    from rigid_lcp.half_space import HalfSpace
 
 Floats = NDArray[np.float64]
 Loads = Callable[[float, Motion], ArrayLike | None]
@@ -36,22 +36,6 @@ MOST_STEPS = 1e10
 def too_many_steps(what: str, steps: float) -> str:
     """Sentence on a span of time, ``what``, of more steps than can be made."""
     return f"{what} is {steps:.3g} steps: at most {MOST_STEPS:.0e} can be made"
-
-
-def vector_given(
-    values: ArrayLike, size: int, what: str, where: str, most: float = float_info.max
-) -> Floats:
-    """A copy of ``size`` finite numbers, ``most`` at most; `SceneError` for anything else."""
-    try:
-        vector = np.atleast_1d(real_numbers(values))
-    except (TypeError, ValueError):
-        vector = np.zeros(0)
-    if vector.shape != (size,) or not (np.abs(vector) <= most).all():
-        bound = "" if most == float_info.max else f", {most:g} at most"
-        raise SceneError(
-            f"{what} is {values!r}", where=where, remedy=f"give {size} finite number(s){bound}"
-        )
-    return vector
 
 
 def density_given(value: Any, where: str, otherwise: str = "") -> float:

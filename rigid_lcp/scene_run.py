@@ -23,7 +23,7 @@ from rigid_lcp.wear import Wear
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float, Simulation], None]
-"""Told after every frame: time reached, duration [s], the run."""
+"""Called after every frame: time reached, duration [s], the run."""
 
 HISTORY = ("time", "energy", "contacts", "sliding", "overlap", "residual", "cpu")
 

@@ -7,13 +7,21 @@ level, section 9) for few bodies and high order.
 from __future__ import annotations
 
 from math import ceil, nan
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.breakage import Breakage, Broken, breaks, refuse_dust, scene_broken
 from rigid_lcp.contacts import ContactForces
-from rigid_lcp.errors import NotConverged, Overlapping, ProblemError, ShapeError, UsageError
+from rigid_lcp.errors import (
+    NotConverged,
+    Overlapping,
+    ProblemError,
+    SceneError,
+    ShapeError,
+    UsageError,
+)
 from rigid_lcp.finite_states import is_finite, too_much
 from rigid_lcp.fragmentation import broken_scene
 from rigid_lcp.motion import Motion
@@ -29,7 +37,6 @@ from rigid_lcp.scene_input import (
     seconds_given,
     too_many_steps,
 )
-from rigid_lcp.simulation_input import Method, check_run
 from rigid_lcp.time_stepping import contact_forces, moreau_step
 from rigid_lcp.unique_forces import unique_forces
 from rigid_lcp.wear import Wear, scene_worn, wear_after_break, wear_start, wear_step
@@ -122,7 +129,7 @@ class Simulation:
             )
         if seconds <= NO_STEP * self.step:
             return
-        with np.errstate(over="ignore"):  # a step that ends beyond numbers is told as that
+        with np.errstate(over="ignore"):  # a step that ends beyond numbers is reported as that
             if self.method == "acceleration":
                 self._integrate(seconds)
                 return
@@ -271,3 +278,30 @@ class Simulation:
                 where=f"{' and '.join(names)} at the start",
                 remedy="move them apart",
             )
+
+
+Method = Literal["time-stepping", "acceleration"]
+
+
+def check_run(scene: Any, method: Any, loads: Any, wear: Any, breakage: Any) -> None:
+    """Raise `SceneError` or `UsageError` for what `rigid_lcp.simulation.Simulation` can not take.
+
+    Its steps and residuals are looked at by `rigid_lcp.scene_input`.
+    """
+    if method not in get_args(Method):
+        raise UsageError(f"method is {method!r}", remedy="give 'time-stepping' or 'acceleration'")
+    if not isinstance(scene, Scene):
+        raise SceneError(f"the scene is {scene!r}", remedy="give a rigid_lcp.Scene")
+    for given, kind, what in ((wear, Wear, "wear"), (breakage, Breakage, "breakage")):
+        if given is not None and not isinstance(given, kind):
+            raise SceneError(
+                f"{what} is {given!r}", where="Simulation",
+                remedy=f"give a rigid_lcp.{kind.__name__}, or None",
+            )  # fmt: skip
+    if loads is not None and not callable(loads):
+        raise UsageError("loads are no function", remedy="give loads(time, motion)")
+    if method == "acceleration" and (wear is not None or breakage is not None):
+        raise UsageError(
+            "bodies do not wear or break at acceleration level", where="method",
+            remedy="give method='time-stepping', or leave wear and breakage out",
+        )  # fmt: skip

@@ -23,12 +23,14 @@ contacts on the path.  Where redundant contacts stick, the matrix of a step has 
 ``sigma / |x|^2`` for every self-stress; a small shift of W in it, not in F, bounds them and leaves
 the point what it is.
 
-The path of a non-monotone law may still fold.  Then another rounding is gone on with, whose path
+The path of a non-monotone law may still fold.  Then that of another rounding is followed, which
 folds elsewhere, from a sigma some times as great.  When none leads on the best point is given back,
-from which `rigid_lcp.extrapolated_points` often ends; `rigid_lcp.folded_path` goes round folds.
+from which `rigid_lcp.extrapolated_points` often ends.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -42,29 +44,49 @@ from rigid_lcp.newton import newton
 
 Floats = NDArray[np.float64]
 
-COMPLIANCE = 1e-4
-"""The path begins at forces as large as those of springs, ``(W + compliance / rho) r = -q``."""
-ROUNDINGS = (1e-2, 1e-1, 1e-3, 1e-4)
-"""eps over ``sqrt(sigma) / rho``, the velocity of a sticking contact on the path [-]: every one is
-another path, and they are followed in turn."""
-SHRINK, LESS = 0.3, 0.55
-"""sigma of the next point over that of the last, and where that was not found."""
-BACK = (3.0, 10.0)
-"""sigma with which another path is begun where one folds, over that of its last point: the greater
-when all paths have folded."""
-HOPS = 6
-"""So many other paths at most are gone on with."""
-SHIFT = 1e-8
-"""Of W in the matrices, over mean(diag W)."""
-FOUND = 0.03
-"""A point is found where |F| is so small a part of ``sqrt(sigma nc)``."""
-STEPS, FIRST_STEPS = 10, 20
-"""Newton steps in which a point has to be found, and the first one of a path."""
-DECREASE, LEAST_STEP = 1e-2, 2e-3
-"""Part of a step by which |F| has to fall; a step shorter than the second is none."""
-NEAR, END_STEPS, END_PATIENCE = 3e-8, 5, 3
-"""Residual from which Newton's method tries to end the path, and what it may spend on that."""
-FACTORISATIONS = 150
+
+@dataclass(frozen=True)
+class SmoothedNumbers:
+    """Points of the path, its other roundings, and its end."""
+
+    compliance: float = 1e-4
+    """The path begins at forces as large as those of springs [-],
+    ``(W + compliance / rho) r = -q``."""
+    roundings: tuple[float, ...] = (1e-2, 1e-1, 1e-3, 1e-4)
+    """eps over ``sqrt(sigma) / rho``, the velocity of a sticking contact on the path [-]: every one
+    is another path, and they are followed in turn."""
+    shrink: float = 0.3
+    """sigma of the next point over that of the last [-],"""
+    less: float = 0.55
+    """and where that was not found."""
+    back: tuple[float, float] = (3.0, 10.0)
+    """sigma with which another path is begun where one folds, over that of its last point [-]: the
+    greater when all paths have folded."""
+    hops: int = 6
+    """So many other paths at most are followed."""
+    shift: float = 1e-8
+    """Of W in the matrices, over the mean of its diagonal [-]."""
+    found: float = 0.03
+    """A point is found where |F| is so small a part of ``sqrt(sigma nc)`` [-]."""
+    first_steps: int = 20
+    """Newton steps in which the first point of a path has to be found,"""
+    steps: int = 10
+    """and each other."""
+    decrease: float = 1e-2
+    """Part of a step [-] by which |F| has to fall;"""
+    least_step: float = 2e-3
+    """a shorter step is none [-]."""
+    near: float = 3e-8
+    """Residual [-] from which Newton's method tries to end the path,"""
+    end_steps: int = 5
+    """its steps"""
+    end_patience: int = 3
+    """and those that may fail to halve the residual."""
+    factorisations: int = 150
+    """At most."""
+
+
+SMOOTHED = SmoothedNumbers()
 
 
 def smoothed_path(
@@ -73,7 +95,7 @@ def smoothed_path(
     begin: tuple[Floats, float] | None = None,
     *,
     linear: Factorisation | None = None,
-    factorisations: int = FACTORISATIONS,
+    factorisations: int = SMOOTHED.factorisations,
 ) -> FrictionSolution:
     """Follow the path from a great sigma until the residual is at or below ``tolerance``.
 
@@ -91,7 +113,7 @@ def smoothed_path(
     except SingularSystem:
         return friction_solution(problem, best, tolerance, "smoothed path", status="singular")
     found_force, found_sigma, shrink = force, sigma, 1.0
-    most, rounding, hopped = FIRST_STEPS, ROUNDINGS[0], 0
+    most, rounding, hopped = SMOOTHED.first_steps, SMOOTHED.roundings[0], 0
     while least > tolerance and spent < factorisations:
         force, found, steps = smoothed_point(
             problem, found_force, shrink * found_sigma, linear, min(most, factorisations - spent),
@@ -103,19 +125,19 @@ def smoothed_path(
             best, least = force, residual
         if found:
             found_force, found_sigma, points = force, shrink * found_sigma, points + 1
-            shrink, most = SHRINK, STEPS
-            if tolerance < residual < NEAR:
+            shrink, most = SMOOTHED.shrink, SMOOTHED.steps
+            if tolerance < residual < SMOOTHED.near:
                 ended = newton(
-                    problem, force, tolerance, linear=linear, iterations=END_STEPS,
-                    patience=END_PATIENCE,
+                    problem, force, tolerance, linear=linear, iterations=SMOOTHED.end_steps,
+                    patience=SMOOTHED.end_patience,
                 )  # fmt: skip
                 spent += int(ended.work["factorisations"])
                 if ended.residual < least:
                     best, least = ended.r, ended.residual
-        elif shrink == SHRINK:
-            shrink = LESS
-        elif hopped < HOPS:
-            hopped, most = hopped + 1, FIRST_STEPS
+        elif shrink == SMOOTHED.shrink:
+            shrink = SMOOTHED.less
+        elif hopped < SMOOTHED.hops:
+            hopped, most = hopped + 1, SMOOTHED.first_steps
             rounding, shrink = other_path(hopped)
         else:
             break
@@ -126,9 +148,11 @@ def smoothed_path(
 
 
 def other_path(hop: int) -> tuple[float, float]:
-    """Rounding [-] and sigma (over that of the last point) of the path that is gone on with after
+    """Rounding [-] and sigma (over that of the last point) of the path that is followed after
     ``hop`` folds."""
-    return ROUNDINGS[hop % len(ROUNDINGS)], BACK[hop // len(ROUNDINGS)]
+    return SMOOTHED.roundings[hop % len(SMOOTHED.roundings)], SMOOTHED.back[
+        hop // len(SMOOTHED.roundings)
+    ]
 
 
 def path_begin(problem: FrictionProblem, linear: Factorisation) -> tuple[Floats, float]:
@@ -136,7 +160,7 @@ def path_begin(problem: FrictionProblem, linear: Factorisation) -> tuple[Floats,
     and of velocities as great as those of q.  Raises `SingularSystem`."""
     force = np.zeros((problem.contacts, problem.dim))
     speed = float(np.sqrt(np.mean(problem.offset**2))) or 1.0
-    size = spring_size(problem, linear, COMPLIANCE) or problem.rho * speed
+    size = spring_size(problem, linear, SMOOTHED.compliance) or problem.rho * speed
     slides = problem.friction > 0.0
     force[:, 0] = size / np.where(slides, problem.friction, 1.0)
     return force.ravel(), float(np.mean(problem.contact_rho)) * speed * size
@@ -144,14 +168,14 @@ def path_begin(problem: FrictionProblem, linear: Factorisation) -> tuple[Floats,
 
 def smoothed_point(
     problem: FrictionProblem, force: Floats, sigma: float, linear: Factorisation, steps: int,
-    rounding: float = ROUNDINGS[0],
+    rounding: float = SMOOTHED.roundings[0],
 ) -> tuple[Floats, bool, int]:  # fmt: skip
     """Forces of the path's point at ``sigma`` [N^2], from ``force``: whether they were found, and
     the factorisations it took."""
     shape = (problem.contacts, problem.dim)
     rho = problem.contact_rho
     eps = rounding * np.sqrt(sigma) / float(rho.mean())
-    enough = FOUND * np.sqrt(sigma * problem.contacts)
+    enough = SMOOTHED.found * np.sqrt(sigma * problem.contacts)
 
     def at(r: Floats) -> tuple[Floats, Floats, Floats]:
         velocity = problem.velocity(r).reshape(shape)
@@ -166,17 +190,17 @@ def smoothed_point(
         if error < enough:
             return force, True, done
         try:
-            step = linear.factor(a + (SHIFT / problem.rho) * b, b)(f.ravel())
+            step = linear.factor(a + (SMOOTHED.shift / problem.rho) * b, b)(f.ravel())
         except SingularSystem:
             return force, False, done + 1
         part = 1.0
         while True:
             f, a, b = at(force - part * step)
             now = length(f)
-            if now <= (1.0 - DECREASE * part) * error:
+            if now <= (1.0 - SMOOTHED.decrease * part) * error:
                 break
             part *= 0.5
-            if part < LEAST_STEP:
+            if part < SMOOTHED.least_step:
                 return force, False, done + 1
         force, error = force - part * step, now
     return force, error < enough, steps
@@ -190,13 +214,12 @@ def smoothed_map(
     rho: Floats,
     sigma: float,
     eps: float,
-    share: float = 1.0,
 ) -> tuple[Floats, Floats, Floats]:
     """F and its derivatives A = dF/dr, B = dF/du.
 
     ``force`` and ``velocity`` (nc, dim); ``mu`` and ``rho`` (nc,), rho force per velocity;
-    ``sigma`` force squared, ``eps`` a velocity; ``share`` of the term |u_T|: 1 is Coulomb's law, 0
-    a convex one.  F (nc, dim) a force, A (nc, dim, dim), B (nc, dim, dim) force per velocity.
+    ``sigma`` force squared, ``eps`` a velocity.
+    F (nc, dim) a force, A (nc, dim, dim), B (nc, dim, dim) force per velocity.
     Without friction x and s are the normal parts, and ``F_T = r_T``.
     """
     nc, dim = force.shape
@@ -220,7 +243,7 @@ def smoothed_map(
             squares += velocity[c, i] ** 2
         rounded = np.sqrt(squares + eps**2)
         x[0] = mu[c] * force[c, 0]
-        s[0] = rho[c] * (velocity[c, 0] / mu[c] + share * squares / rounded)
+        s[0] = rho[c] * (velocity[c, 0] / mu[c] + squares / rounded)
         across = 0.0  # |z_T| of z = x - s
         for i in range(1, dim):
             x[i], s[i] = force[c, i], rho[c] * velocity[c, i]
@@ -243,7 +266,7 @@ def smoothed_map(
             for j in range(1, dim):
                 slope[i, j] = (along - sideways) * turn[i] * turn[j]
             slope[i, i] += sideways
-        bend = share * (squares + 2.0 * eps**2) / rounded**3  # of the rounded |u_T|, over u_T
+        bend = (squares + 2.0 * eps**2) / rounded**3  # of the rounded |u_T|, over u_T
         for i in range(dim):
             for j in range(dim):
                 same = 1.0 if i == j else 0.0

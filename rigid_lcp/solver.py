@@ -1,24 +1,25 @@
 """`solve_friction`: one call for friction problems, and the default that chooses and falls back.
 
 ``auto`` tries one method after another, what is cheap before what is dear
-(`rigid_lcp.solver_order`), and takes the first point that is exact enough, and otherwise the best.
+(`rigid_lcp.solver_plan`), and takes the first point that is exact enough, and otherwise the best.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
 from dataclasses import replace
-from typing import Literal, get_args
+from functools import cache
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.cones import length
 from rigid_lcp.errors import UsageError
 from rigid_lcp.friction_problem import (
-    ROUND_OFF,
+    FORCE_ROUND_OFF,
     SHARE_LEFT,
     BodySpace,
     FrictionProblem,
@@ -27,16 +28,13 @@ from rigid_lcp.friction_problem import (
     friction_solution,
 )
 from rigid_lcp.frictionless import frictionless
-from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.interior_point import interior_point
 from rigid_lcp.islands import islands, solve_islands
 from rigid_lcp.newton import newton
 from rigid_lcp.problem_input import in_range, one_number, start_given
-from rigid_lcp.solver_order import PATHS, attempts, proved_insoluble
-from rigid_lcp.solver_trial import FEW_CONTACTS, HAND_OVER, Trial
+from rigid_lcp.solver_plan import FIRST, attempts, is_proved_insoluble
+from rigid_lcp.solver_trial import LIMITS, Trial
 
 Floats = NDArray[np.float64]
-Method = Literal["auto", "newton", "interior-point", "gauss-seidel", "pivoting", "dantzig"]
 
 TINY = 1e-60
 """Problems with a smaller q are solved in other units."""
@@ -57,7 +55,7 @@ def solve_friction(
     dim: int,
     start: ArrayLike | None = None,
     tolerance: float = 1e-12,
-    method: Method = "auto",
+    method: str = "auto",
     accept: float = 0.0,
 ) -> FrictionSolution:
     """Forces r and velocities u with ``u = W r + q`` under unilateral contact and Coulomb friction.
@@ -69,7 +67,7 @@ def solve_friction(
     (`rigid_lcp.cones`); round-off ends near 1e-15 times the condition of W.
 
     ``accept``: where sweeps and Newton leave more than ``tolerance``, but not more than this,
-    ``auto`` tries no more on problems of more than `FEW_CONTACTS` contacts.
+    ``auto`` tries no more on problems of more than `Limits.few_contacts` contacts.
 
     ``method``: ``auto`` (module docstring); ``interior-point`` and ``newton`` are polished by
     Newton; ``pivoting`` and ``dantzig`` (2D) are in the modules of their names.
@@ -80,10 +78,10 @@ def solve_friction(
     not unique: compare residuals.
     """
     problem: FrictionProblem = friction_problem(W, q, mu, dim)
-    if method not in get_args(Method):
+    if method != "auto" and method not in find_methods():
         raise UsageError(
             f"there is no method {method!r}", where="method",
-            remedy="one of " + ", ".join(get_args(Method)),
+            remedy="one of " + ", ".join(["auto", *find_methods()]),
         )  # fmt: skip
     tolerance, accept = one_number(tolerance, "tolerance"), one_number(accept, "accept", zero=True)
     begin = None
@@ -103,7 +101,7 @@ def solve_friction(
         return replace(found, r=found.r * unit, u=found.u * unit)
     if method == "auto":
         return solve_auto(problem, begin, tolerance, accept)
-    return _methods()[method](problem, begin, tolerance)
+    return solve_alone(problem, begin, tolerance, method)
 
 
 def solve_auto(
@@ -115,7 +113,7 @@ def solve_auto(
         exact = frictionless(problem, start, tolerance)
         if exact.solved:
             return exact
-    parts = islands(problem) if problem.contacts > FEW_CONTACTS else []
+    parts = islands(problem) if problem.contacts > LIMITS.few_contacts else []
     larger = sum(len(part) > 1 for part in parts)
     split = len(parts) > 1 and larger <= FEW_ISLANDS
     if split:
@@ -124,11 +122,11 @@ def solve_auto(
     else:
         trial = attempts(problem, start, tolerance, accept)
     finer = tolerance
-    while trial.best.residual <= finer and not trial.best.solved and finer > ROUND_OFF:
+    while trial.best.residual <= finer and not trial.best.solved and finer > FORCE_ROUND_OFF:
         finer = finer_tolerance(problem, trial.best.r, finer)
-        trial.keep(attempts(problem, trial.best.r, finer, accept, paths=False).solution())
+        trial.keep(attempts(problem, trial.best.r, finer, accept, FIRST).solution())
     if trial.best.solved or (
-        trial.best.residual <= accept and problem.contacts > FEW_CONTACTS
+        trial.best.residual <= accept and problem.contacts > LIMITS.few_contacts
     ):  # fmt: skip
         return trial.solution()
     parts = parts or islands(problem)
@@ -136,7 +134,9 @@ def solve_auto(
         apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
         if _error(apart) < _error(trial.best):  # endless forces on one hide the errors of others
             trial.best = apart
-    if not trial.best.solved and (trial.best.status == "no solution" or proved_insoluble(problem)):
+    if not trial.best.solved and (
+        trial.best.status == "no solution" or is_proved_insoluble(problem)
+    ):
         if len(parts) <= 1:
             trial.forget_endless()
         return trial.solution(
@@ -170,27 +170,30 @@ def _solve_island(
     return attempts(problem, start, tolerance, accept).solution()
 
 
-def _interior_point(
-    problem: FrictionProblem, start: Floats | None, tolerance: float
+def solve_alone(
+    problem: FrictionProblem, start: Floats | None, tolerance: float, method: str
 ) -> FrictionSolution:
+    """One of `find_methods`, by itself or, where its file says ``POLISHED``, with Newton at its
+    end."""
+    module = import_module(find_methods()[method])
+    solve = getattr(module, module.__name__.rpartition(".")[2])
+    if not getattr(module, "POLISHED", False):
+        alone: FrictionSolution = solve(problem, start, tolerance)
+        return alone
     trial = Trial(problem, None, tolerance)
-    trial.linear = factorisation(problem)
-    found = interior_point(
-        problem, None, max(HAND_OVER, tolerance), PATHS[0][0], linear=trial.linear
-    )
-    trial.keep(found)
-    trial.polish(found)
+    rough = max(LIMITS.hand_over, tolerance)
+    trial.polish(trial.keep(solve(problem, None, rough, linear=trial.factors)))
     return trial.solution()
 
 
-def _methods() -> dict[str, Callable[..., FrictionSolution]]:
-    from rigid_lcp.dantzig import dantzig  # compiled when they are asked for
-    from rigid_lcp.pivoting import pivoting
-
-    return {
-        "newton": newton,
-        "interior-point": _interior_point,
-        "gauss-seidel": gauss_seidel,
-        "pivoting": pivoting,
-        "dantzig": dantzig,
-    }
+@cache
+def find_methods() -> dict[str, str]:
+    """The methods by name, and the module of each: the files beside that of Newton's method with a
+    line ``METHOD = "..."``, each with a function of its file's name.  They are compiled when they
+    are asked for."""
+    package, found = newton.__module__.rpartition(".")[0], {}
+    for path in sorted(Path(newton.__code__.co_filename).parent.glob("*.py")):
+        named = re.search(r'^METHOD = "(.+)"$', path.read_text(encoding="utf-8"), re.MULTILINE)
+        if named:
+            found[named[1]] = f"{package}.{path.stem}"
+    return found

@@ -12,6 +12,8 @@ few products by the same factors find it (`rigid_lcp.refinement.gmres`).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,23 +24,36 @@ from rigid_lcp.refinement import gmres
 
 Floats = NDArray[np.float64]
 
-SHIFT = 1e-9
-"""alpha over mean(diag W)."""
-STEPS = 6
-PAYS, STANDS = 0.01, 0.5
-"""What a step leaves of the residual if plain ones are enough; and if no more are of use."""
-HOPELESS = 1e-2
-"""A residual above this after a step: some contact does not stick."""
-LOOSE = 0.4
-"""Share of contacts that would have to be pulled to stick: much is loose (beds at rest: 0.2 to
-0.4, as their forces of least norm pull at some)."""
-AT_LIMIT = 1.0 - 1e-9
-"""Share of Coulomb's limit from which on a contact is called sliding."""
-STRAIGHT = 0.3
-"""Tangential forces over normal ones, up to which the forces of sticking tell what bears what."""
-HEAVY, GREAT = 1e3, 10.0
-"""Forces over what makes the contacts approach, ``rho |q|``, that heavy bodies on light ones have,
-and from which on their part is asked for more exactly."""
+
+@dataclass(frozen=True)
+class StickingNumbers:
+    """All contacts stick: when that is tried, and when given up."""
+
+    shift: float = 1e-9
+    """alpha over the mean of W's diagonal [-]."""
+    steps: int = 6
+    """Proximal steps at most."""
+    pays: float = 0.01
+    """What a step leaves of the residual [-] if plain ones are enough;"""
+    stands: float = 0.5
+    """and if no more are of use."""
+    hopeless: float = 1e-2
+    """A residual [-] above this after a step: some contact does not stick."""
+    loose: float = 0.4
+    """Share of contacts [-] that would have to be pulled to stick: much is loose (beds at rest:
+    0.2 to 0.4, as their forces of least norm pull at some)."""
+    at_limit: float = 1.0 - 1e-9
+    """Share of Coulomb's limit [-] from which on a contact is called sliding."""
+    straight: float = 0.3
+    """Tangential forces over normal ones [-], up to which the forces of sticking show what bears
+    what."""
+    heavy: float = 1e3
+    """Forces over ``rho |q|`` [-] that heavy bodies on light ones have,"""
+    great: float = 10.0
+    """and from which on their part is asked for more exactly."""
+
+
+STICKING = StickingNumbers()
 
 
 def sticking(
@@ -55,14 +70,16 @@ def sticking(
     least, hidden = np.inf, False
     try:
         linear = linear or factorisation(problem)
-        solve = linear.factor(identity * (SHIFT / problem.rho), identity)
-        for _ in range(STEPS):
+        solve = linear.factor(identity * (STICKING.shift / problem.rho), identity)
+        for _ in range(STICKING.steps):
             velocity = problem.velocity(force)
             step = gmres(problem, 0.0 * identity, identity, solve, velocity) if hidden else None
             force = force - (solve(velocity) if step is None else step)
             residual = problem.residual(force)
-            ends = residual <= tolerance or residual > min(HOPELESS, STANDS * least)
-            hidden = hidden or residual > PAYS * least
+            ends = residual <= tolerance or residual > min(
+                STICKING.hopeless, STICKING.stands * least
+            )
+            hidden = hidden or residual > STICKING.pays * least
             if residual < least:
                 best, least = force, residual
             if ends:
@@ -77,14 +94,14 @@ def seem_to_stick(problem: FrictionProblem, force: Floats) -> bool:
     r = force.reshape(-1, problem.dim)
     if not (r[:, 0] > 0.0).all():
         return False
-    limit = AT_LIMIT * problem.friction * r[:, 0]
+    limit = STICKING.at_limit * problem.friction * r[:, 0]
     return 2 * int((np.linalg.norm(r[:, 1:], axis=1) >= limit).sum()) < problem.contacts
 
 
 def seem_loose(problem: FrictionProblem, force: Floats) -> bool:
     """Whether in these forces, at which all contacts stick, many are pulled."""
     pulled = int((force[:: problem.dim] <= 0.0).sum())
-    return pulled >= LOOSE * problem.contacts
+    return pulled >= STICKING.loose * problem.contacts
 
 
 def heaviness(problem: FrictionProblem, stuck: Floats) -> float:
@@ -96,7 +113,7 @@ def heaviness(problem: FrictionProblem, stuck: Floats) -> float:
     """
     offered = problem.rho * length(problem.offset)
     r = np.abs(stuck.reshape(-1, problem.dim))
-    if offered == 0.0 or r[:, 1:].sum() > STRAIGHT * r[:, 0].sum():
+    if offered == 0.0 or r[:, 1:].sum() > STICKING.straight * r[:, 0].sum():
         return 1.0
     forces = length(stuck) / offered
-    return max(1.0, min((forces / HEAVY) ** 2, forces / GREAT))
+    return max(1.0, min((forces / STICKING.heavy) ** 2, forces / STICKING.great))

@@ -14,7 +14,7 @@ by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur
 spins freely keeps its energy (`rigid_lcp.gyroscopic.free_rotation`); with restitution 1 a bounce
 keeps it to round-off, of bodies that turn as well, and so do chains of collisions within the step
 (`rigid_lcp.passed_collisions`, `rigid_lcp.struck_bodies`) unless they run out of rounds, which is
-told.  An approach no faster than what gravity gives in a step, ``g h``, does not bounce.  With
+reported.  An approach no faster than what gravity gives in a step, ``g h``, does not bounce.  With
 friction a body that comes to rest within a step may gain up to ``m (h |f/m|)^2 / 8``, and
 restitution is scaled down where it would make more, or where wedged bodies have no impulses that
 let them bounce (`rigid_lcp.restitution_scale`).
@@ -51,10 +51,10 @@ from rigid_lcp.passed_collisions import (
     impulses_in_turn,
 )
 from rigid_lcp.restitution_scale import (
+    Share,
     StepVelocities,
     gains_energy,
 )
-from rigid_lcp.restitution_share import Share
 from rigid_lcp.scene import World
 from rigid_lcp.solver import solve_friction
 from rigid_lcp.struck_bodies import collisions_missed, contacts_of_struck, moreau_margin

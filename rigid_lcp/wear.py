@@ -29,8 +29,8 @@ from rigid_lcp.equations import relative_velocity
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.fragmentation import scene_at
 from rigid_lcp.motion import Motion
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene_input import number_in, whole_in
-from rigid_lcp.shapes_2d import Polygon
 from rigid_lcp.wear_3d import (
     SolidWear,
     energy_of,

@@ -19,8 +19,8 @@ from rigid_lcp.errors import ShapeError
 from rigid_lcp.fragmentation import scene_at
 from rigid_lcp.motion import Motion
 from rigid_lcp.placed_solids import FEATURE_BITS, MOST_EDGES
+from rigid_lcp.polyhedron import Polyhedron
 from rigid_lcp.rotations import rotate, rotate_back
-from rigid_lcp.shapes_3d import Polyhedron
 from rigid_lcp.worn_polyhedron import WornPolyhedron, plane_at, polyhedron_worn, rubbed, unworn
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.placed_solids import MOST_EDGES
 from rigid_lcp.polyhedra import points_before
-from rigid_lcp.shapes_3d import Polyhedron
+from rigid_lcp.polyhedron import Polyhedron
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -99,8 +99,8 @@ def polyhedron_worn(grain: WornPolyhedron) -> tuple[WornPolyhedron, Floats] | No
 def shape_cut(shape: Polyhedron, normal: Floats, volume: float) -> Polyhedron | None:
     """The polyhedron without ``volume`` [m^3] on the outer side of a plane with ``normal``.
 
-    None where the cut is too shallow, or would leave corners too near to one another to be told
-    apart or more edges than detection has names for: then it waits.  Its ``centroid`` is where
+    None where the cut is too shallow, or would leave corners too near to one another
+    or more edges than detection has names for: then it waits.  Its ``centroid`` is where
     the centre of mass lies in the frame of ``shape``.
     """
     if volume > MOST_AT_ONCE * shape.volume:

@@ -10,8 +10,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid_lcp.disc import Disc
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import Disc, Polygon
 from rigid_lcp.simulation import Simulation
 from validation.bench.rigid.scenes import DENSITY
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from rigid_lcp.contacts import Contacts
 from rigid_lcp.detection_3d import detect_3d, shapes_3d
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.polyhedra import ballast_stone
+from rigid_lcp.polyhedron import Polyhedron, box
 from rigid_lcp.rotations import Floats, rotation_matrix, unit_quaternion
-from rigid_lcp.shapes_2d import HalfSpace
-from rigid_lcp.shapes_3d import Polyhedron, box
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from rigid_lcp.contacts import Contacts, contact_rows
 from rigid_lcp.detection_2d import detect_2d, shapes_2d, widest_face
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import Overlapping, SceneError
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.near_pairs import bounding_boxes, near_pairs, place_shapes
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
 
 BOX = Polygon.rectangle(1.0, 1.0)

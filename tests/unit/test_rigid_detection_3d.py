@@ -8,14 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.detection_3d import place_solids, shapes_3d
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import SceneError
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.manifold_3d import MOST
 from rigid_lcp.near_pairs import bounding_boxes, near_pairs
 from rigid_lcp.placed_solids import MOST_EDGES
 from rigid_lcp.polyhedra import ballast_stone
+from rigid_lcp.polyhedron import Polyhedron, box
 from rigid_lcp.rotations import quaternion_of_rotation, quaternion_product, rotate, unit_quaternion
-from rigid_lcp.shapes_2d import Disc, HalfSpace
-from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
+from rigid_lcp.sphere import Sphere
 from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, contacts, near_pair, sorted_points
 
 # --- closed forms ---

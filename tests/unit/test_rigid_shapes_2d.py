@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import SceneError, ShapeError, UsageError
+from rigid_lcp.half_space import HalfSpace
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene, world_of
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]

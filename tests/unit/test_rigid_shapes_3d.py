@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
+from rigid_lcp.polyhedron import Polyhedron, box
+from rigid_lcp.sphere import Sphere
 
 
 def test_faces_of_a_box_are_rectangles() -> None:

@@ -113,3 +113,19 @@ def test_size_effect():
             weibull_strength(4e6, *bad[:3], survival=bad[3])
     with pytest.raises(ShapeError, match="volume"):
         mean_stress([[0, 0]], [[0, 0]], (0, 0), 0.0)
+
+
+def test_forces_that_only_turn_a_grain_put_no_stress_in_it():
+    """Equal forces along the rim, all one way round: a couple, which spins the grain up.  Stress is
+    symmetric, so a couple adds nothing to it, and a pressed grain breaks as without one."""
+    angles = np.arange(4) * np.pi / 2
+    points, pressed = radial(angles, [500.0, 0.0, 500.0, 0.0])
+    along = 80.0 * np.column_stack([-np.sin(angles), np.cos(angles)])
+    still = mean_stress(points, pressed, np.zeros(2), VOLUME)
+    spun = mean_stress(points, pressed + along, np.zeros(2), VOLUME)
+    scale = np.abs(still).max()
+    np.testing.assert_allclose(spun, still, atol=1e-15 * scale)
+    np.testing.assert_allclose(
+        mean_stress(points, along, np.zeros(2), VOLUME), 0.0, atol=1e-15 * scale
+    )
+    assert brazilian_tension(spun) == pytest.approx(brazilian_tension(still), rel=1e-14)

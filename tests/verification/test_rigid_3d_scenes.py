@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from rigid_lcp.gyroscopic import Floats, angular_momentum
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.polyhedra import ballast_stone
+from rigid_lcp.polyhedron import Polyhedron, box
 from rigid_lcp.rotations import quaternion_of_rotation, rotate, unit_quaternion
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import HalfSpace
-from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
 from rigid_lcp.simulation import Simulation
+from rigid_lcp.sphere import Sphere
 
 G = 9.81
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)

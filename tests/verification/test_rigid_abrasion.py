@@ -8,17 +8,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from rigid_lcp.abrasion import chamfer_vertex, friction_work, worn_stiffness, worn_volume
+from rigid_lcp.abrasion import friction_work, worn_stiffness, worn_volume
 from rigid_lcp.elastic_limit import elastic_limit
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.fragmentation import polygon_moments
 from rigid_lcp.friction_problem import BodySpace, friction_problem
-from rigid_lcp.shapes_2d import Polygon
-
-TRIANGLE = np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 1.0]])
 
 
 def test_work_of_a_sliding_block():
@@ -32,36 +26,7 @@ def test_work_of_a_sliding_block():
     assert in_3d == pytest.approx([50.0])
 
 
-@settings(max_examples=60, deadline=None)
-@given(vertex=st.integers(0, 2), share=st.floats(1e-6, 0.99))
-def test_chamfer_takes_exactly_the_worn_area(vertex, share):
-    """Needle corners and blunt ones, up to all that half of both edges has: area to 1e-13."""
-    back, ahead = TRIANGLE[vertex - 1] - TRIANGLE[vertex], TRIANGLE[vertex - 2] - TRIANGLE[vertex]
-    most = abs(back[0] * ahead[1] - back[1] * ahead[0]) / 8
-    worn = chamfer_vertex(TRIANGLE, vertex, share * most)
-    assert len(worn) == 4
-    assert polygon_moments(worn)[0] == pytest.approx(2.0 - share * most, rel=1e-13)
-    Polygon(worn)
-
-
-def test_small_steps_round_the_corner():
-    """A corner worn in ten steps at its sharpest vertex loses the same and stays convex."""
-    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    for _ in range(10):
-        before, after = corners - np.roll(corners, 1, 0), np.roll(corners, -1, 0) - corners
-        turn = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0],
-                          (before * after).sum(axis=1))  # fmt: skip
-        corners = chamfer_vertex(corners, int(np.argmax(turn)), 1e-3)
-    assert polygon_moments(corners)[0] == pytest.approx(1 - 1e-2, rel=1e-13)
-    assert Polygon(corners).area == pytest.approx(1 - 1e-2, rel=1e-13)
-
-
-def test_chamfer_that_is_nothing_or_too_much():
-    assert np.array_equal(chamfer_vertex(TRIANGLE, 0, 0.0), TRIANGLE)
-    assert np.array_equal(chamfer_vertex(TRIANGLE, 0, 1e-40), TRIANGLE)
-    for area, words in ((0.6, "smaller steps"), (-1.0, "worn area"), (np.nan, "worn area")):
-        with pytest.raises(ShapeError, match=words):
-            chamfer_vertex(TRIANGLE, 0, area)
+def test_wear_that_is_no_number_is_refused():
     with pytest.raises(ShapeError, match="wear coefficient"):
         worn_volume([1.0], -1.0)
     with pytest.raises(ShapeError, match="volume_scale"):

@@ -1,7 +1,7 @@
 """Sweeps in body space: every visit is the exact answer of `rigid_lcp.local_contact`.
 
 A twin in plain NumPy visits one contact after another (Jean 1999): ``q_c = u_c - W_cc y_c`` with
-``u = W y + q`` of all forces at present, ``r_c`` by `local_solution`.  The kernels carry body
+``u = W y + q`` of all forces at present, ``r_c`` by `solve_contact`.  The kernels carry body
 velocities, packed rows and inverse blocks instead; they have to give the same forces.
 """
 
@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rigid_lcp.body_sweeps import REGULAR, contacts_packed, inverses
-from rigid_lcp.contact_blocks import body_blocks
+from rigid_lcp.contact_blocks import body_blocks, velocities_relative
 from rigid_lcp.contact_sweeps import visit_all
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import sweep_blocks
-from rigid_lcp.local_contact import local_solution
+from tests.rigid_local import solve_contact
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def twin_sweep(
         here = slice(c * dim, (c + 1) * dim)
         u = w[here] @ now.ravel() + problem.offset[here]
         block = w[here, here]
-        found, status = local_solution(block, u - block @ now[c], problem.friction[c])
+        found, status = solve_contact(block, u - block @ now[c], problem.friction[c])
         if status != "no solution":
             now[c] = found
     weight = np.abs(w.diagonal()).reshape(now.shape)
@@ -107,7 +107,7 @@ def test_blocks_of_the_bodies_make_w(dim: int, full: bool) -> None:
     bodies = body_blocks(problem)
     assert bodies is not None
     r = random.normal(size=(4, dim))
-    u = bodies.contact_velocity(bodies.body_velocity(r))
+    u = velocities_relative(bodies.body, bodies.block, bodies.body_velocity(r))
     w = space.matrix.toarray()
     np.testing.assert_allclose(u.ravel(), w @ r.ravel(), rtol=1e-10, atol=1e-10)
     own = [w[k * dim : (k + 1) * dim, k * dim : (k + 1) * dim] for k in range(4)]

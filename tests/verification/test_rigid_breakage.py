@@ -10,8 +10,9 @@ import pytest
 
 from rigid_lcp.breakage import Breakage, breaks
 from rigid_lcp.errors import SceneError, ShapeError
+from rigid_lcp.half_space import HalfSpace
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
 from rigid_lcp.strength import brazilian_tension
 from rigid_lcp.wear import Wear
@@ -151,7 +152,7 @@ def test_breakage_that_is_refused():
 def test_a_pressed_cube_breaks_in_space():
     """Point load F / d^2 of the greatest pair: a cube between floor and plate in 3D splits in two
     halves along the force, with its mass, and the pile stays."""
-    from rigid_lcp.shapes_3d import box
+    from rigid_lcp.polyhedron import box
 
     scene = Scene(3)
     scene.add(HalfSpace([0, 0, 1]), friction=0.5)

@@ -11,8 +11,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.collision_input import Law
-from rigid_lcp.collisions import Collision, Floats, collide
+from rigid_lcp.collisions import Collision, Floats, Law, collide
 from rigid_lcp.errors import ProblemError, UsageError
 from rigid_lcp.friction_problem import BodySpace
 from tests.rigid_collision_sets import (

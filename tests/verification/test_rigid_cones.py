@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rigid_lcp.cones import natural_map, natural_residual
+from rigid_lcp.friction_problem import friction_problem
 
 Floats = NDArray[np.float64]
 ROUND_OFF = 1e-12
@@ -98,3 +99,20 @@ def test_the_natural_map_is_its_definition(greatest: float, dim: int) -> None:
     found = natural_map(force, velocity, mu, 0.7)
     definition = force - twin(force - 0.7 * dual, mu)
     np.testing.assert_allclose(found, definition, atol=1e-14 * (1 + greatest))
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0**-40, 2.0**40])
+def test_the_scale_of_a_contact_is_the_force_that_stops_it_alone(unit: float) -> None:
+    """Bodies that share no contact, ``W_cc = w I``: ``r_N = -rho u_N`` brings each to rest,
+    whatever the others weigh, and in other units of mass the force is as many times as great."""
+    inverse_mass = unit * np.array([0.5, 4.0, 1e3])
+    approach = np.array([-1.0, -2.0, -0.3])
+    q = np.zeros(6)
+    q[::2] = approach
+    problem = friction_problem(np.diag(np.repeat(inverse_mass, 2)), q, 0.5, 2)
+    stopping = -problem.contact_rho * approach
+    np.testing.assert_allclose(stopping, -approach / inverse_mass, rtol=1e-15)
+    force = np.zeros(6)
+    force[::2] = stopping
+    assert problem.residual(force) <= 1e-15
+    assert problem.mended(force, 0.0)

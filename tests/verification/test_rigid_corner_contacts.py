@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rigid_lcp.equations import inertial_acceleration, relative_velocity
 from rigid_lcp.motion import Motion, motion_displaced
+from rigid_lcp.polyhedron import Polyhedron
 from rigid_lcp.rotations import (
     Floats,
     quaternion_of_rotation,
@@ -17,7 +18,6 @@ from rigid_lcp.rotations import (
     unit_quaternion,
 )
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_3d import Polyhedron
 from rigid_lcp.simulation import Simulation
 from tests.rigid_solids import CUBE, coal_distance, contacts
 from tests.verification.test_rigid_hard_geometry_3d import (

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rigid_lcp.contacts import Contacts, contact_rows
+from rigid_lcp.disc import Disc
 from rigid_lcp.equations import (
     body_space,
     contact_offset,
@@ -16,9 +17,10 @@ from rigid_lcp.equations import (
     jacobian,
     relative_velocity,
 )
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene, World, world_of
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 
 Floats = NDArray[np.float64]
 PAIRS = {

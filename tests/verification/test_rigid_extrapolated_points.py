@@ -3,6 +3,8 @@ work in its budget."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,12 +14,12 @@ from numpy.typing import NDArray
 import rigid_lcp.extrapolated_points as module
 from rigid_lcp import solve_friction
 from rigid_lcp.body_factorisation import factorisation
-from rigid_lcp.extrapolated_points import FIRST_SHIFT, extrapolated_points
+from rigid_lcp.extrapolated_points import POINTS, extrapolated_points
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import gauss_seidel
 from rigid_lcp.proximal_newton import proximal_newton, proximal_point
+from rigid_lcp.solver_paths import turn_from_paths
 from rigid_lcp.solver_trial import Trial
-from rigid_lcp.solver_turns import turns_from_paths
 from validation.bench.rigid.examination import family_named
 from validation.bench.rigid.packings import packing
 
@@ -50,10 +52,11 @@ def test_a_drift_ends_where_the_ground_gives_way(monkeypatch: pytest.MonkeyPatch
     ``(1, 1, -1) / sqrt 3``: a point of shift alpha moves the squeeze by ``eps / (3 alpha)``, and
     plain points would take ``3 alpha mu / eps`` of them.  The shift is held: the centre runs ahead.
     """
-    monkeypatch.setattr(module, "LEAST_SHIFT", FIRST_SHIFT)
+    first = replace(POINTS, least_shift=POINTS.first_shift)
+    monkeypatch.setattr(module, "POINTS", first)
     problem = squeezed_row()
     start = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
-    linear, alpha = factorisation(problem), FIRST_SHIFT / problem.rho
+    linear, alpha = factorisation(problem), POINTS.first_shift / problem.rho
     once, found, _ = proximal_point(problem, start, alpha, linear, 1e-14, 5)
     assert found
     squeeze = np.array([1.0, 0.0, 1.0, 0.0, 0.0, -1.0]) / 3.0
@@ -85,7 +88,7 @@ def test_points_without_gain_are_left_after_their_patience() -> None:
     start = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
     found = extrapolated_points(problem, start, 1e-16, patience=10)
     assert not found.solved
-    assert found.work["factorisations"] <= 10 + module.STEPS
+    assert found.work["factorisations"] <= 10 + POINTS.steps
 
 
 @pytest.mark.long
@@ -108,7 +111,7 @@ def test_sweeps_and_points_by_turns_solve_a_bed_that_each_alone_leaves() -> None
 def test_the_end_of_a_path_is_a_start_too() -> None:
     """A bed that sweeps, Newton and proximal points leave at 1e-8, from paths' ends alone."""
     trial = Trial(packing(60, 3, seed=208, friction=0.1), None, 1e-12)
-    assert turns_from_paths(trial)
+    assert turn_from_paths(trial)
     assert trial.best.method.startswith("gauss-seidel + extrapolated points")
     assert trial.best.residual <= 1e-12
 

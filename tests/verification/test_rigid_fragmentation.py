@@ -10,10 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.fragmentation import broken_scene, fragment, polygon_moments, polygon_split
+from rigid_lcp.half_space import HalfSpace
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene, world_of
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -159,7 +161,7 @@ def test_a_spinning_body_of_a_scene_keeps_its_motion(far):
 
 
 def test_a_spinning_polyhedron_of_a_scene_keeps_its_motion():
-    from rigid_lcp.shapes_3d import box
+    from rigid_lcp.polyhedron import box
 
     scene = Scene(dim=3, gravity=(0, 0, 0))
     turned = np.array([0.9, 0.1, 0.3, 0.3])
@@ -172,16 +174,16 @@ def test_a_spinning_polyhedron_of_a_scene_keeps_its_motion():
 
 
 def test_a_plane_that_leaves_no_sound_parts_is_refused():
-    """2e-6 of the way below corners of a flat stone: parts without edges that could be told apart.
+    """2e-6 of the way below corners of a flat stone: parts without edges that could be kept apart.
     Once a run that broke worn stones ended there with a word about corners to be merged."""
     from rigid_lcp.detection_3d import shapes_3d
-    from rigid_lcp.shapes_3d import Polyhedron
+    from rigid_lcp.polyhedron import Polyhedron
 
     flat = Polyhedron(np.random.default_rng(2).normal(size=(8, 3)) * [1.0, 1.0, 0.02])
     scene = Scene(dim=3)
     scene.add(flat, density=2700, position=(0, 0, 0))
     _, motion = world_of(scene)
-    with pytest.raises(ShapeError, match=r"told apart\n.*move the plane"):
+    with pytest.raises(ShapeError, match=r"kept apart\n.*move the plane"):
         broken_scene(scene, motion, 0, (1 - 2e-6) * flat.vertices[1], flat.vertices[1])
     made = broken_scene(scene, motion, 0, 0.99 * flat.vertices[1], flat.vertices[1])
     shapes_3d([each.shape for each in made.bodies], np.ones(2, dtype=bool))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction_problem import BodySpace, friction_problem
 from rigid_lcp.frictionless import Floats, face_solver, frictionless, lcp, normal_matrix
-from rigid_lcp.normal_sweeps import normal_sweeps
+from rigid_lcp.normal_matrices import normal_sweeps
 from tests.rigid_networks import network, network_bodies, stored, tower
 from validation.bench.rigid.packings import packing
 

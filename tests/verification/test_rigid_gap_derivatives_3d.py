@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from rigid_lcp.contacts import Contacts, contact_frames
 from rigid_lcp.detection_3d import detect_3d, shapes_3d
 from rigid_lcp.equations import inertial_acceleration, relative_velocity
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.motion import Motion, motion_displaced
 from rigid_lcp.rotations import quaternion_of_rotation, quaternion_product, rotate
-from rigid_lcp.shapes_2d import HalfSpace
-from rigid_lcp.shapes_3d import Sphere
+from rigid_lcp.sphere import Sphere
 from tests.rigid_solids import CUBE, UPRIGHT, contacts, near_pair
 
 Floats = NDArray[np.float64]
@@ -101,7 +101,7 @@ def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
 def test_inertial_terms_at_edges(seed: int, form: str) -> None:
     """Normals across edges turn with both bodies: a cube's edge over another's, or under a sphere.
 
-    Without `rigid_lcp.edge_normals` a sphere that rolls along an edge would seem to lift off it
+    Without `rigid_lcp.equations` a sphere that rolls along an edge would seem to lift off it
     with v^2 / R.
     """
     generator = np.random.default_rng(seed)

@@ -14,7 +14,7 @@ from rigid_lcp.contact_blocks import body_blocks
 from rigid_lcp.errors import UsageError
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import Sweeper, gauss_seidel
-from rigid_lcp.local_contact import local_solution
+from tests.rigid_local import solve_contact
 from validation.bench.rigid.packings import tower
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ def plain_sweep(problem: FrictionProblem, force: Floats, visit: list[int]) -> Fl
         rows = slice(c * dim, (c + 1) * dim)
         block = matrix[rows, rows]
         others = matrix[rows] @ force + problem.offset[rows] - block @ force[rows]
-        force[rows], status = local_solution(block, others, problem.friction[c])
+        force[rows], status = solve_contact(block, others, problem.friction[c])
         assert status != "no solution"
     return force
 

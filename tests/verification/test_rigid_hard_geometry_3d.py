@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from rigid_lcp.manifold_3d import MOST
 from rigid_lcp.polyhedra import ballast_stone
+from rigid_lcp.polyhedron import Polyhedron, box
 from rigid_lcp.rotations import (
     Floats,
     quaternion_of_rotation,
@@ -17,7 +18,6 @@ from rigid_lcp.rotations import (
     unit_quaternion,
 )
 from rigid_lcp.separation_3d import PARALLEL
-from rigid_lcp.shapes_3d import Polyhedron, box
 from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, coal_distance, contacts
 
 

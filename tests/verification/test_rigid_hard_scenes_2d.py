@@ -7,8 +7,10 @@ from math import radians, tan
 import numpy as np
 import pytest
 
+from rigid_lcp.disc import Disc
+from rigid_lcp.half_space import HalfSpace
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
 from tests.rigid_hopper import WALL, jam
 from tests.rigid_motions import stack_drop

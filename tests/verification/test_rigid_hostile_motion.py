@@ -11,9 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 from rigid_lcp.acceleration_forces import forces_found, forces_if_lasting
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import NotConverged
+from rigid_lcp.half_space import HalfSpace
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
 from tests.rigid_motions import rocking_block, rocking_block_answer
 from tests.rigid_networks import tower, tower_bodies

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -91,7 +93,8 @@ def test_a_warm_start_ends_at_the_last_digit(layers: int) -> None:
 def test_no_factorisation_is_begun_beyond_the_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     """With nothing to spend Newton's method and the paths are left out, and the answer says what
     residual it has."""
-    monkeypatch.setattr(solver_trial, "MOST_FLOPS", 0.0)
+    limits = replace(solver_trial.LIMITS, most_flops=0.0)
+    monkeypatch.setattr(solver_trial, "LIMITS", limits)
     problem = crystal(6)
     found = solve_friction(
         problem.bodies, problem.offset, problem.friction, 3,

@@ -13,7 +13,6 @@ from rigid_lcp.elastic_limit import elastic_limit
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction_problem import friction_problem
 from rigid_lcp.micro_displacements import (
-    coulomb_slider,
     coulomb_spring,
     free_motion,
     mass_free_jacobian,
@@ -21,6 +20,7 @@ from rigid_lcp.micro_displacements import (
     stable_step,
     stiffest_mode,
 )
+from tests.rigid_elastic import slide_with_memory
 from tests.rigid_static_problems import (
     GRAVITY,
     beam,
@@ -147,9 +147,9 @@ def test_sliding_contacts_remember_their_path():
         # a heavy inertia: the wedge does not turn
         return bodies_2d(contacts, np.zeros((1, 2)), mass, 1e3 * mass, load, friction)
 
-    from_nothing = micro_displacements(wedge(0.0), law=coulomb_slider)
-    pressed = micro_displacements(wedge(100.0), law=coulomb_slider)
-    unloaded = micro_displacements(wedge(0.0), law=coulomb_slider, start=pressed)
+    from_nothing = micro_displacements(wedge(0.0), law=slide_with_memory)
+    pressed = micro_displacements(wedge(100.0), law=slide_with_memory)
+    unloaded = micro_displacements(wedge(0.0), law=slide_with_memory, start=pressed)
     assert from_nothing.solved
     assert pressed.solved
     assert unloaded.solved

@@ -8,13 +8,17 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from rigid_lcp.acceleration_forces import forces_found
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction_problem import BodySpace
+from rigid_lcp.half_space import HalfSpace
+from rigid_lcp.passed_collisions import Closing, Impulses
+from rigid_lcp.polygon import Polygon
+from rigid_lcp.polyhedron import box
+from rigid_lcp.restitution_scale import StepVelocities, gains_energy
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
-from rigid_lcp.shapes_3d import Sphere, box
-from rigid_lcp.simulation import Simulation
-from rigid_lcp.simulation_input import Method
+from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.sphere import Sphere
 
 Floats = NDArray[np.float64]
 ROUND_OFF = 1e-13
@@ -138,3 +142,31 @@ def test_a_slide_that_ends_elsewhere_leaves_a_bounce_as_it_is() -> None:
         speeds.append(run.velocities[0, 1])
     assert speeds[0] > 0.5
     assert speeds[1] == speeds[0]
+
+
+@pytest.mark.parametrize(("bounce", "makes"), [(0.0, False), (0.1, True), (0.2, True)])
+def test_an_impact_may_return_what_a_load_gives_within_a_step_and_no_more(
+    bounce: float, makes: bool
+) -> None:
+    """A body of mass M, on which a load works that gives it g in a step, rises with g / 2.
+
+    Stopped, without restitution, its impulse is ``M g / 2`` and works ``M g^2 / 8``: the most that
+    a stop can.  Thrown back with ``bounce`` g the work is ``M g^2 (1/2 + bounce)^2 / 2``: more.
+    """
+    mass, gain = 3.0, 0.7
+    bodies = BodySpace(
+        sp.csr_array(np.eye(2, 3)), sp.csr_array(sp.diags_array([1 / mass, 1 / mass, 1.0])), 3
+    )
+    before, free = np.array([[0.5 * gain, 0.0]]), np.array([[-0.5 * gain, 0.0]])
+    closing = Closing(
+        np.array([1.0]), np.array([0.5]), np.zeros(1), before[:, 0], free, np.zeros(1), 0.0, 1.0,
+        0.0,
+    )  # fmt: skip
+    velocities = StepVelocities(before, free, np.array([[-gain, 0.0, 0.0]]))
+    after = bounce * gain
+    impulse = np.array([[mass * (after + 0.5 * gain), 0.0]])
+    found = Impulses(impulse, np.array([[after, 0.0]]), 0.0, "")
+    work = 0.5 * impulse[0, 0] * (0.5 * gain + after)
+    assert work == pytest.approx(mass * gain**2 * (0.5 + bounce) ** 2 / 2, rel=1e-14)
+    gains = gains_energy(bodies, closing, velocities, found, np.array([True]))
+    assert gains.tolist() == [makes]

@@ -18,8 +18,8 @@ from rigid_lcp.gyroscopic import (
     principal_inertia,
     world_inertia,
 )
+from rigid_lcp.polyhedron import box
 from rigid_lcp.rotations import (
-    IDENTITY,
     quaternion_of_matrix,
     quaternion_of_rotation,
     quaternion_product,
@@ -30,8 +30,8 @@ from rigid_lcp.rotations import (
     rotation_matrix,
     unit_quaternion,
 )
-from rigid_lcp.shapes_3d import box
 
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 ROUND_OFF = 1e-15
 vectors = st.tuples(*[st.floats(-10.0, 10.0)] * 3).map(np.array)
 

@@ -9,14 +9,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import NoSolution, NotConverged
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.lasting_contacts import first_fall
 from rigid_lcp.motion import Motion
+from rigid_lcp.polygon import Polygon
+from rigid_lcp.polyhedron import box
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
-from rigid_lcp.shapes_3d import box
-from rigid_lcp.simulation import Simulation
-from rigid_lcp.simulation_input import Method
+from rigid_lcp.simulation import Method, Simulation
 from tests.rigid_motions import (
     bouncing_time,
     disc_on_incline_acceleration,

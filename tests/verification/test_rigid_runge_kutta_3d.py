@@ -9,12 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from rigid_lcp.gyroscopic import angular_momentum
+from rigid_lcp.half_space import HalfSpace
+from rigid_lcp.polyhedron import Polyhedron, box
 from rigid_lcp.rotations import quaternion_of_rotation, rotate
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import HalfSpace
-from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
-from rigid_lcp.simulation import Simulation
-from rigid_lcp.simulation_input import Method
+from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.sphere import Sphere
 from tests import rigid_motions as motions
 from tests.rigid_motions import STONE
 from tests.rigid_motions import STONE_SPIN as SPIN

@@ -16,15 +16,15 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp import BodySpace, solve_friction
+from rigid_lcp import BodySpace, solve_friction, solver_paths, solver_sweeps, solver_trial
 from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import FrictionProblem, friction_problem
 from rigid_lcp.problem_files import read_problem
 from rigid_lcp.solver import solve_auto
-from rigid_lcp.solver_cold import CONVEX_STEPS, convex_path
-from rigid_lcp.solver_order import attempts, fallback_paths, friction_steps
-from rigid_lcp.solver_trial import Trial
-from rigid_lcp.solver_turns import sharp_path, smoothed_further
+from rigid_lcp.solver_paths import CONVEX, SHARP, convex_path, sharp_path, smoothed_further
+from rigid_lcp.solver_plan import ALL_PATHS, LAST, run_plan, step_friction
+from rigid_lcp.solver_sweeps import TURNS
+from rigid_lcp.solver_trial import LIMITS, Trial
 from validation.bench.rigid.packings import packing
 
 FOLDER = Path(os.environ.get("TRACKBED_DATA", "")) / "friction_problems"
@@ -207,7 +207,7 @@ def test_low_friction_is_reached_along_the_convex_path_bent_to_coulombs():
     assert found.solved
     assert found.method == "interior-point + newton"
     assert "sweeps" not in found.work
-    assert found.work["interior-point iterations"] > CONVEX_STEPS
+    assert found.work["interior-point iterations"] > CONVEX.steps
 
 
 def random_problem(contacts: int, rank: int, friction: float, seed: int) -> FrictionProblem:
@@ -243,12 +243,11 @@ def struck(still) -> FrictionProblem:
 
 @pytest.fixture
 def jammed(monkeypatch) -> None:
-    """The hardly rounded path leads nowhere."""
-    for module in ("solver_turns", "solver_order"):
-        monkeypatch.setattr(f"rigid_lcp.{module}.sharp_path", lambda trial: False)
+    """The sharp path leads nowhere."""
+    monkeypatch.setattr(solver_paths, "SHARP", replace(SHARP, steps=1))
 
 
-def test_a_hardly_rounded_path_solves_in_few_steps_what_the_smoothed_one_leaves(monkeypatch):
+def test_the_sharp_path_solves_in_few_steps_what_the_smoothed_one_leaves(monkeypatch):
     """The one ends at Coulomb's law within 40 factorisations, the other has not after 150: what the
     order of the two rests on."""
     problem = packing(60, 3, seed=1, friction=0.3)
@@ -259,7 +258,8 @@ def test_a_hardly_rounded_path_solves_in_few_steps_what_the_smoothed_one_leaves(
     assert sharp_path(sharp)
     assert problem.residual(sharp.best.r) <= 1e-12
     assert sharp.work["factorisations"] <= 40
-    assert not smoothed_further(smoothed, path.path_point)
+    smoothed.path_point = path.path_point
+    assert not smoothed_further(smoothed)
     found = solve_auto(problem)
     assert found.solved
     assert "smoothed path points" not in found.work
@@ -267,14 +267,14 @@ def test_a_hardly_rounded_path_solves_in_few_steps_what_the_smoothed_one_leaves(
 
 @pytest.mark.usefixtures("jammed")
 def test_dear_factorisations_do_not_keep_from_the_smoothed_path(struck, monkeypatch):
-    """Beds of thousands of spheres take minutes to settle, so sweeps are told to cost next to
-    nothing here, which makes every factorisation dear."""
-    monkeypatch.setattr("rigid_lcp.solver_trial.DEAR", 0.0)
-    monkeypatch.setattr("rigid_lcp.solver_order.DEAR_SWEEPS", 100)
-    trial = attempts(struck, None, 1e-12)
+    """Beds of thousands of spheres take minutes to settle, so every factorisation is called dear
+    here."""
+    monkeypatch.setattr(solver_trial, "LIMITS", replace(LIMITS, dear=0.0))
+    trial = Trial(struck, None, 1e-12)
+    assert run_plan(trial, ALL_PATHS)
     assert struck.residual(trial.best.r) <= 1e-12
     assert trial.work["smoothed path points"] > 5
-    assert trial.work["sweeps"] < 2000
+    assert trial.work.get("sweeps", 0.0) < 2000
 
 
 @pytest.mark.usefixtures("jammed")
@@ -282,7 +282,7 @@ def test_a_start_does_not_keep_from_the_smoothed_path(still, struck):
     """Where sweeps from the forces of the step before have failed, both paths are followed."""
     trial = Trial(struck, solve_auto(still).r, 1e-12)
     assert not trial.best.solved
-    fallback_paths(trial, 0.0)
+    run_plan(trial, LAST)
     assert struck.residual(trial.best.r) <= 1e-12
     assert trial.work["smoothed path points"] > 5
 
@@ -296,13 +296,15 @@ def test_where_a_proof_is_at_hand_no_path_is_tried():
 
 
 def test_the_search_ends_after_the_effort_that_is_stated(monkeypatch):
-    """With no floor of flops, and none for turns, paths end once they cost `FALLBACK_SHARE` of what
-    went before, the last one included: six paths and twice the factorisations otherwise."""
+    """With no floor of flops, no turns and no points, paths end once they cost `Limits.last_share`
+    of what went before, the last one included: six paths and twice the factorisations otherwise."""
     problem = random_problem(40, 30, 0.5, 3)
     all_paths = solve_auto(problem).work
-    monkeypatch.setattr("rigid_lcp.solver_order.FALLBACK_FLOPS", 0.0)
-    monkeypatch.setattr("rigid_lcp.solver_turns.TURNS_FLOPS", 0.0)
-    monkeypatch.setattr("rigid_lcp.solver_order.LAST_DRIFT_FLOPS", 0.0)
+    monkeypatch.setattr(solver_trial, "LIMITS", replace(LIMITS, last_flops=0.0))
+    monkeypatch.setattr(solver_sweeps, "run_points", lambda trial, most, flops: False)
+    turns = replace(TURNS, flops=0.0)
+    for module in (solver_sweeps, solver_paths):
+        monkeypatch.setattr(module, "TURNS", turns)
     found = solve_auto(problem)
     assert not found.solved
     assert "->" in found.message
@@ -343,13 +345,13 @@ def test_real_problems(path):
     assert found.residual <= 1e-12, found.message
 
 
-def test_friction_of_a_thousand_beside_none_is_come_to_in_steps(monkeypatch):
+def test_friction_of_a_thousand_beside_none_is_reached_in_steps():
     """A bed whose contacts have friction 0.5 but for a fifth with none and a tenth with 1,000."""
     problem = packing(60, 2, seed=3, friction=0.5)
     draw = np.random.default_rng(11).random(problem.contacts)
     mixed = np.where(draw < 0.2, 0.0, np.where(draw > 0.9, 1000.0, 0.5))
     hard = friction_problem(problem.bodies, problem.offset, mixed, 2)
     trial = Trial(hard, None, 1e-12)
-    assert friction_steps(trial)
+    assert step_friction(trial)
     assert hard.residual(trial.best.r) <= 1e-12
-    assert not friction_steps(Trial(problem, None, 1e-12))  # nothing to come to
+    assert not step_friction(Trial(problem, None, 1e-12))  # nothing to reach

@@ -10,7 +10,7 @@ from rigid_lcp import solve_friction
 from rigid_lcp.body_factorisation import factorisation
 from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
 from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.sticking import HEAVY, heaviness, seem_to_stick, sticking
+from rigid_lcp.sticking import STICKING, heaviness, seem_to_stick, sticking
 from tests.rigid_networks import GRAVITY, STEP, tower
 from validation.bench.rigid.packings import tower as packed_tower
 
@@ -112,7 +112,7 @@ def test_heaviness_asks_more_only_where_light_bodies_bear_heavy_ones():
     # as great, but as much along the contacts as across: the answer of a W that is nearly singular
     turned = stuck.reshape(-1, 2).copy()
     turned[:, 1] = turned[:, 0]
-    assert np.linalg.norm(turned) > HEAVY * heavy.rho * np.linalg.norm(heavy.offset)
+    assert np.linalg.norm(turned) > STICKING.heavy * heavy.rho * np.linalg.norm(heavy.offset)
     assert heaviness(heavy, turned.ravel()) == 1.0
 
 

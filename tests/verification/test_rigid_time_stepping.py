@@ -10,10 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_lcp.contacts import contact_frames
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import NotConverged
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.passed_collisions import Closing, bouncing, contact_shift
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
 from tests.rigid_motions import (
     balls_in_a_row,

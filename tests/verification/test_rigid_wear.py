@@ -10,11 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigid_lcp.disc import Disc
 from rigid_lcp.errors import SceneError, ShapeError, UsageError
 from rigid_lcp.fragmentation import polygon_moments
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.motion import Motion
+from rigid_lcp.polygon import Polygon
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import Disc, HalfSpace, Polygon
 from rigid_lcp.simulation import Simulation
 from rigid_lcp.wear import (
     Wear,

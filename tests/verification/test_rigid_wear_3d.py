@@ -11,13 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.errors import ShapeError
+from rigid_lcp.half_space import HalfSpace
 from rigid_lcp.motion import Motion
 from rigid_lcp.polyhedra import ballast_stone
+from rigid_lcp.polyhedron import Polyhedron, box
 from rigid_lcp.rotations import quaternion_of_rotation, quaternion_product
 from rigid_lcp.scene import Scene
-from rigid_lcp.shapes_2d import HalfSpace
-from rigid_lcp.shapes_3d import Polyhedron, Sphere, box
 from rigid_lcp.simulation import Simulation
+from rigid_lcp.sphere import Sphere
 from rigid_lcp.wear import Wear, contact_stiffness_worn, scene_worn, wear_start
 from rigid_lcp.wear_3d import energy_of, solids_rubbed
 from rigid_lcp.worn_polyhedron import cut_depth, polyhedron_worn, rubbed, unworn

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.motion import Motion
+from rigid_lcp.polyhedron import box
 from rigid_lcp.rotations import rotate
 from rigid_lcp.scene import Scene
 from rigid_lcp.scene_file import scene_build, scene_read
-from rigid_lcp.shapes_3d import box
 from rigid_lcp.simulation import Simulation
 
 SCENE = Path(__file__).parents[3] / "scenes" / "sleeper-3d.toml"

@@ -1,4 +1,4 @@
-"""Shapes in space: spheres and convex polyhedra with exact mass properties.
+"""Convex polyhedra: grains with corners in space, with exact mass properties.
 
 A shape lives in its body frame, whose origin is the centre of mass; where a body is and how it
 is turned is the state's business.
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.shapes_2d import LEAST, MOST, _given, _length
+from rigid_lcp.shape_numbers import LEAST, MOST, finite_given, length_given
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -22,36 +22,6 @@ Ints = NDArray[np.int64]
 FLATNESS = 1e-9
 """Corners within this share of the size of a plane lie in it: round-off of coordinates is far
 below, and what a grain has for edges far above."""
-
-
-@dataclass(frozen=True)
-class Sphere:
-    """A sphere of the given radius [m].  Raises `ShapeError` unless the radius is positive."""
-
-    radius: float
-    dim = 3
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", _length(self.radius, "radius", "sphere"))
-
-    @property
-    def volume(self) -> float:
-        """Volume [m^3]."""
-        return 4.0 / 3.0 * np.pi * self.radius**3
-
-    @property
-    def inertia(self) -> Floats:
-        """Inertia tensor over density about the centre [m^5], (3, 3)."""
-        return 0.4 * self.volume * self.radius**2 * np.eye(3)
-
-    @property
-    def reach(self) -> float:
-        """Radius [m]."""
-        return self.radius
-
-    def mass_properties(self, density: float) -> tuple[float, Floats]:
-        """Mass [kg] and inertia tensor (3, 3) [kg m^2] at ``density`` [kg/m^3]."""
-        return density * self.volume, density * self.inertia
 
 
 @dataclass(frozen=True)
@@ -173,7 +143,7 @@ class Polyhedron:
 def box(length: float, width: float, height: float) -> Polyhedron:
     """A cuboid with edges along x, y and z [m].  Raises `ShapeError` unless all are positive."""
     edges = [
-        _length(value, name, "box")
+        length_given(value, name, "box")
         for value, name in ((length, "length"), (width, "width"), (height, "height"))
     ]
     corners = np.indices((2, 2, 2)).reshape(3, -1).T - 0.5
@@ -184,7 +154,7 @@ def _hull(points: ArrayLike) -> tuple[Ints, Floats]:
     """Triangles of the convex hull, wound outwards, and the points that are its corners."""
     from scipy.spatial import ConvexHull, QhullError
 
-    given = _given(points, "points", "Polyhedron")
+    given = finite_given(points, "points", "Polyhedron")
     if given.ndim != 2 or given.shape[1] != 3 or len(given) < 4 or not np.isfinite(given).all():
         raise ShapeError(
             f"points of shape {given.shape} are not four or more finite places in space",

@@ -1,4 +1,4 @@
-"""Shapes of rigid grains in the plane: convex polygons, discs, half-spaces.
+"""Convex polygons: grains with corners in the plane.
 
 A shape knows its own frame only: its centroid is the origin.  Where it is, and how fast, is a
 matter of the scene and of `rigid_lcp.motion`.
@@ -8,21 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, pi
+from math import pi
 from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.real_numbers import real_numbers
+from rigid_lcp.shape_numbers import LEAST, MOST, finite_given, length_given
 
 Floats = NDArray[np.float64]
 
 FLAT = 1e-12
 """Sine of the turn at a vertex below which three vertices count as one line [-]."""
-LEAST, MOST = 1e-50, 1e50
-"""Lengths that a shape may have [m]: their fourth powers are numbers still."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +49,8 @@ class Polygon:
     @classmethod
     def rectangle(cls, width: float, height: float) -> Polygon:
         """Rectangle of ``width`` along x and ``height`` along y [m].  Raises `ShapeError`."""
-        width = _length(width, "width", "rectangle")
-        height = _length(height, "height", "rectangle")
+        width = length_given(width, "width", "rectangle")
+        height = length_given(height, "height", "rectangle")
         x, y = width / 2, height / 2
         return cls([(-x, -y), (x, -y), (x, y), (-x, y)])
 
@@ -62,7 +60,7 @@ class Polygon:
 
         Raises `ShapeError`.
         """
-        radius = _length(radius, "radius", "polygon")
+        radius = length_given(radius, "radius", "polygon")
         if not isinstance(corners, Integral) or corners < 3:
             raise ShapeError(
                 f"it has {corners!r} corners",
@@ -95,73 +93,10 @@ class Polygon:
         return density * area, density * second
 
 
-@dataclass(frozen=True)
-class Disc:
-    """Disc of ``radius`` [m].  Raises `ShapeError` for a radius that is not positive."""
-
-    radius: float
-
-    dim = 2
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", _length(self.radius, "radius", "disc"))
-
-    @property
-    def area(self) -> float:
-        """Area [m^2]."""
-        return pi * self.radius**2
-
-    @property
-    def reach(self) -> float:
-        """Radius [m]."""
-        return self.radius
-
-    def mass_properties(self, density: float) -> tuple[float, float]:
-        """Mass [kg] and moment of inertia [kg m^2] at ``density`` [kg/m^2]."""
-        mass = density * self.area
-        return mass, mass * self.radius**2 / 2
-
-
-@dataclass(frozen=True, eq=False)
-class HalfSpace:
-    """Everything with ``normal . x <= offset``: floors and walls, in 2D or 3D, always fixed.
-
-    ``normal`` (dim,) points out of the solid and is normalised; ``offset`` [m] is the distance of
-    its face from the origin along it.  Raises `ShapeError` for a normal of length zero.
-    """
-
-    normal: Floats
-    offset: float
-
-    reach = inf
-
-    def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
-        direction = _given(normal, "normal", "half-space")
-        largest = float(np.abs(direction).max(initial=0.0))
-        if direction.shape not in ((2,), (3,)) or largest == 0:
-            raise ShapeError(
-                f"the normal is {normal!r}", where="half-space",
-                remedy="give two or three numbers that are not all zero",
-            )  # fmt: skip
-        distance = _given(offset, "offset", "half-space")
-        if distance.ndim:
-            raise ShapeError(
-                f"the offset is {offset!r}", where="half-space", remedy="give one number of metres"
-            )
-        direction = direction / largest  # squares of what is left neither vanish nor overflow
-        object.__setattr__(self, "normal", direction / np.linalg.norm(direction))
-        object.__setattr__(self, "offset", float(distance))
-
-    @property
-    def dim(self) -> int:
-        """Dimension of the space it halves."""
-        return len(self.normal)
-
-
 def convex_outline(vertices: ArrayLike) -> Floats:
     """The vertices (n, 2) if they are a convex polygon, anticlockwise; else a `ShapeError`."""
     where = "polygon"
-    outline = _given(vertices, "outline", where)
+    outline = finite_given(vertices, "outline", where)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
         raise ShapeError(
             f"vertices have shape {outline.shape}", where=where,
@@ -201,30 +136,6 @@ def convex_outline(vertices: ArrayLike) -> Floats:
             remedy="divide it into convex polygons, or take its convex hull",
         )  # fmt: skip
     return outline
-
-
-def _given(values: ArrayLike, what: str, where: str) -> Floats:
-    """A copy of finite numbers; a `ShapeError` for anything else."""
-    try:
-        array = real_numbers(values)
-    except (TypeError, ValueError) as error:
-        raise ShapeError(
-            f"the {what} holds what are not numbers ({error})", where=where, remedy="give metres"
-        ) from error
-    if not np.isfinite(array).all():
-        raise ShapeError(f"the {what} is not finite", where=where, remedy="give metres")
-    return array
-
-
-def _length(value: float, what: str, where: str) -> float:
-    """A length that a shape can have [m]; a `ShapeError` for any other."""
-    array = _given(value, what, where)
-    if array.ndim or not LEAST <= array <= MOST:
-        raise ShapeError(
-            f"the {what} is {value}", where=where,
-            remedy=f"give a positive length, {LEAST:g} to {MOST:g} m",
-        )  # fmt: skip
-    return float(array)
 
 
 def _moments(outline: Floats) -> tuple[float, Floats, float]:

@@ -1,0 +1,38 @@
+"""Twins of the unique forces: least squares, and sliders with memory."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.friction_problem import FrictionProblem
+from rigid_lcp.micro_displacements import (
+    bodies_of,
+    contact_stiffness,
+    coulomb_spring,
+    free_motion,
+    mass_free_jacobian,
+)
+
+Floats = NDArray[np.float64]
+
+
+def find_least_forces(problem: FrictionProblem, stiffness: ArrayLike = 1.0) -> Floats:
+    """``argmin sum f^2 / k`` with every contact closed and sticking, (nc * dim,) [N]."""
+    weight = np.sqrt(contact_stiffness(problem, stiffness).ravel())
+    jacobian, _ = mass_free_jacobian(bodies_of(problem))
+    scaled = sp.csr_array(sp.diags_array(weight) @ jacobian).toarray()
+    least, *_ = np.linalg.lstsq(scaled.T, -free_motion(jacobian, problem.offset), rcond=1e-12)
+    return np.asarray(weight * least)
+
+
+def slide_with_memory(
+    deformation: Floats, slip: Floats, stiffness: Floats, friction: Floats
+) -> tuple[Floats, Floats]:
+    """A law of one's own (`rigid_lcp.micro_displacements.ForceLaw`): what slides stays slid, as in
+    MD (Cundall and Strack), so that the forces depend on the order in which contacts slid."""
+    force, _ = coulomb_spring(deformation, slip, stiffness, friction)
+    slipped = slip.copy()
+    slipped[:, 1:] = deformation[:, 1:] - force[:, 1:] / stiffness[:, 1:]
+    return force, slipped
