@@ -9,12 +9,12 @@ setup:
 	@./setup.sh
 
 demo: setup
-	$(bin)/trackbed run scenes/karrech-coarse.toml --control --run-folder demo-bed/run
+	$(bin)/trackbed run trackbed/scenes/karrech-coarse.toml --control --run-folder demo-bed/run
 	$(bin)/trackbed report demo-bed/run --open
 	$(bin)/trackbed status demo-bed/run
 
 demo-rigid: setup
-	$(bin)/trackbed rigid scenes/pile.toml --run-folder demo-pile --resume \
+	$(bin)/trackbed rigid trackbed/scenes/pile.toml --run-folder demo-pile --resume \
 		--set run.duration=0.95 --set run.frames=19
 	@echo "now look at demo-pile/report.html and demo-pile/movie.gif"
 

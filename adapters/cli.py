@@ -75,7 +75,7 @@ def doctor_command(arguments: argparse.Namespace) -> int:
 
 def new_register(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``new``."""
-    from scenes import scene_names
+    from trackbed.scenes import scene_names
 
     parser.add_argument("name", metavar="NAME", help="; ".join(scene_names()))
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
@@ -84,12 +84,12 @@ def new_register(parser: argparse.ArgumentParser) -> None:
 
 def new_command(arguments: argparse.Namespace) -> int:
     """Copy a shipped scene to FOLDER/scene.toml; a scene that is there already is kept."""
-    from adapters.scene_checks import did_you_mean
-    from scenes import scene_names, scene_template, scene_verb
+    from trackbed.scene_file import suggest_word
+    from trackbed.scenes import scene_names, scene_template, scene_verb
 
     names = scene_names()
     if arguments.name not in names:
-        raise UsageError(f"there is no scene {arguments.name}{did_you_mean(arguments.name, names)}")
+        raise UsageError(f"there is no scene {arguments.name}{suggest_word(arguments.name, names)}")
     path: Path = arguments.folder / "scene.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     try:

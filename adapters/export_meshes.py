@@ -12,8 +12,8 @@ import numpy as np
 from adapters.export_fields import Array, contact_fields, contact_rows, grain_fields
 from adapters.export_instants import ExportedRun, Instant
 from adapters.export_walls import container_triangles, piston_triangles
-from adapters.run_folder import write_atomically
 from adapters.state import FloatArray, IntArray
+from trackbed.whole_files import write_whole
 
 
 def vtu_export(run: ExportedRun, into: Path, every: int) -> list[Path]:
@@ -73,7 +73,7 @@ def pvd_write(path: Path, members: Sequence[tuple[int, Path]]) -> None:
         for cycle, file in members
     ]
     head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
-    write_atomically(path, head + "\n".join(lines) + "\n</Collection>\n</VTKFile>\n")
+    write_whole(path, head + "\n".join(lines) + "\n</Collection>\n</VTKFile>\n")
 
 
 def stl_export(run: ExportedRun, into: Path, every: int) -> list[Path]:

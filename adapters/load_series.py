@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
-from adapters.errors import SceneError
+from adapters.errors import SceneError, UsageError
 from adapters.state import FloatArray
+from trackbed.series_file import TIMES, read_columns
 
+PRESSURES = ("Pa", "kPa", "MPa")
 SPACING_TOLERANCE = 1e-6
 """Greatest departure of a time interval from the median one, relative."""
 
@@ -37,44 +37,29 @@ class LoadSeries:
 
 
 def load_series_read(path: Path) -> LoadSeries:
-    """Read one period from a CSV file with the header ``time,stress`` (s, Pa).
+    """Read one period from a table with the columns ``time`` and ``stress``, in s and Pa or with
+    other units of them behind their names; see `trackbed.series_file`.
 
     Raises `SceneError`, which names file and line, unless there are at least three rows, evenly
     spaced in time, finite, without tension, and the last stress is the first.
     """
 
+    remedy = "give one period as columns time,stress (s, Pa)"
+
     def refuse(what: str, line: int | None = None) -> SceneError:
         where = str(path) if line is None else f"{path}:{line}"
-        return SceneError(
-            what, where=where, remedy="give one period as columns time,stress (s, Pa)"
-        )
+        return SceneError(what, where=where, remedy=remedy)
 
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.reader(stream)
-            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except OSError as error:
-        raise refuse(f"can not read the load series ({error.strerror})") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise refuse(f"this is not a text file of comma-separated values ({error})") from error
-    header = [cell.strip() for cell in rows[0][1]] if rows else []
-    if header != ["time", "stress"]:
-        raise refuse("the first line must be time,stress", rows[0][0] if rows else None)
-    values = []
-    for line, row in rows[1:]:
-        try:
-            time, stress = (float(cell) for cell in row)
-        except ValueError:
-            raise refuse(f"expected two numbers, found {','.join(row)!r}", line) from None
-        if not (isfinite(time) and isfinite(stress)):
-            raise refuse("time and stress must be finite", line)
-        if stress < 0:
-            raise refuse(f"stress {stress:g} Pa is negative: a piston can not pull", line)
-        values.append((line, time, stress))
-    if len(values) < 3:
-        raise refuse(f"one period needs at least three rows, found {len(values)}")
-    lines, time_, stress_ = (np.array(column) for column in zip(*values, strict=True))
-    interval = np.diff(time_)
+        (time, stress), lines = read_columns(path, ("time", "stress"), (TIMES, PRESSURES))
+    except UsageError as error:
+        raise SceneError(error.what, where=error.where, remedy=remedy) from error
+    if (stress < 0).any():
+        row = int(np.argmax(stress < 0))
+        raise refuse(f"stress {stress[row]:g} Pa is negative: a piston can not pull", lines[row])
+    if len(time) < 3:
+        raise refuse(f"one period needs at least three rows, found {len(time)}")
+    interval = np.diff(time)
     usual = float(np.median(interval))
     uneven = ~(np.abs(interval - usual) <= SPACING_TOLERANCE * usual)
     if uneven.any():
@@ -82,11 +67,10 @@ def load_series_read(path: Path) -> LoadSeries:
         raise refuse(
             f"times must grow by even steps: this one by {interval[first]:g} s, "
             f"the usual step is {usual:g} s",
-            int(lines[first + 1]),
+            lines[first + 1],
         )
-    if stress_[0] != stress_[-1]:
+    if stress[0] != stress[-1]:
         raise refuse(
-            f"the last stress, {stress_[-1]:g} Pa, must be the first, {stress_[0]:g} Pa",
-            int(lines[-1]),
+            f"the last stress, {stress[-1]:g} Pa, must be the first, {stress[0]:g} Pa", lines[-1]
         )
-    return LoadSeries(time_, stress_)
+    return LoadSeries(time, stress)

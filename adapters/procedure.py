@@ -15,10 +15,11 @@ from adapters.errors import EngineMissing, SceneError, UsageError
 from adapters.jump_fixed import settle_fixed
 from adapters.jump_run import settle_controlled
 from adapters.progress import Progress
-from adapters.run_folder import RunFolder, disk_full_named, write_atomically
+from adapters.run_folder import RunFolder, disk_full_named
 from adapters.scene import Scene, flat_keys
 from adapters.scene_file import scene_load
 from adapters.stages import Bed, Clock, Run, Variant
+from trackbed.whole_files import write_whole
 
 OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
 """What may be in a run folder before its manifest is written."""
@@ -173,14 +174,14 @@ def manifest_settle(
     folder: RunFolder, scene: Scene, scene_path: Path, overrides: Sequence[str], control: bool
 ) -> None:
     """Write the manifest of a new run, or refuse a folder that holds another scene's run."""
-    from adapters.provenance import provenance
+    from trackbed.provenance import record_provenance
 
     path = folder.path / "manifest.json"
     if path.exists():
         manifest = folder.manifest()
         refuse_differences(manifest["scene"], scene_record(scene), folder.path)
         if control and not manifest["control"]:
-            write_atomically(path, json.dumps(manifest | {"control": True}, indent=1) + "\n")
+            write_whole(path, json.dumps(manifest | {"control": True}, indent=1) + "\n")
         folder.event("resumed")
         return
     strangers = [p.name for p in folder.path.iterdir() if p.name not in OWN_FILES]
@@ -202,9 +203,9 @@ def manifest_settle(
         "overrides": kept,
         "control": control,
         "variant": asdict(Variant()),
-        "provenance": provenance(sys.argv),
+        "provenance": record_provenance(sys.argv),
     }
-    write_atomically(path, json.dumps(manifest, indent=1) + "\n")
+    write_whole(path, json.dumps(manifest, indent=1) + "\n")
     folder.event("started")
 
 

@@ -16,15 +16,16 @@ import numpy as np
 from adapters.overlaps import neighbours
 from adapters.report_bed import PAPER_DENSITY, karrech
 from adapters.report_history import jumped_spans
-from adapters.report_html import page
 from adapters.report_numbers import TWIN_SCATTER, Numbers, numbers_of, variant_name
 from adapters.report_preparation import preparation_series
 from adapters.report_record import Record, Track, record_read
 from adapters.report_sections import body
 from adapters.report_verdict import PROCEDURE
-from adapters.run_folder import Outcome, disk_full_named, write_atomically
+from adapters.run_folder import Outcome, disk_full_named
 from adapters.sample import PAPER_COORDINATION
 from adapters.state import FloatArray, state_load
+from trackbed.report.page import page
+from trackbed.whole_files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,19 +44,19 @@ def report_write(run_folder: Path) -> Path:
     numbers = numbers_of(record)
     with disk_full_named(run_folder):
         figures = figures_write(record, numbers)
-        write_atomically(run_folder / "report.json", numbers.to_json())
+        write_whole(run_folder / "report.json", numbers.to_json())
         html = page(f"Settlement of {numbers.scene}", body(record, numbers, figures))
-        write_atomically(run_folder / "report.html", html)
+        write_whole(run_folder / "report.html", html)
     return run_folder / "report.html"
 
 
 def figures_write(record: Record, numbers: Numbers) -> dict[str, Path]:
     """Draw every figure that the run has reached; their files by name."""
-    from adapters.report_drawing import figure_save
+    from trackbed.report.figure import save_figure
 
     folder = record.path / "figures"
     folder.mkdir(exist_ok=True)
-    files = {name: figure_save(draw, folder / name) for name, draw in _figures(record, numbers)}
+    files = {name: save_figure(draw, folder / name) for name, draw in _figures(record, numbers)}
     return {name.partition(".")[0]: path for name, path in files.items()}
 
 

@@ -9,7 +9,10 @@ from pathlib import Path
 from adapters.checks import FORCE_ERROR_GOAL
 from adapters.jump_seating import HUNG, cycles_hung, spans
 from adapters.report_error import COORDINATION_BAR, HEIGHT_BAR, PYTHON_BAR
-from adapters.report_html import (
+from adapters.report_numbers import Numbers
+from adapters.report_record import Record
+from adapters.sample import PAPER_COORDINATION, PAPER_WEIGHT
+from trackbed.report.page import (
     TIMES,
     micrometres,
     number,
@@ -21,9 +24,6 @@ from adapters.report_html import (
     table,
     verdict,
 )
-from adapters.report_numbers import Numbers
-from adapters.report_record import Record
-from adapters.sample import PAPER_COORDINATION, PAPER_WEIGHT
 
 PAPER_DENSITY = 0.5615
 """Relative density of the paper's bed (Table 1)."""

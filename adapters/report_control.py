@@ -6,8 +6,8 @@ from html import escape
 from math import inf
 
 from adapters.jump_band import PROBABILITY
-from adapters.report_html import micrometres, paragraph, per_cent, plain, section, table
 from adapters.report_record import Record, band_of_run, checks_of, decisions_of
+from trackbed.report.page import micrometres, paragraph, per_cent, plain, section, table
 
 
 def control(record: Record) -> str:

@@ -1,9 +1,8 @@
-"""How the figures of a report look, and how one is written; matplotlib is loaded when one is."""
+"""Colours and axes of a report's figures; matplotlib is loaded when one is drawn."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -23,43 +22,6 @@ SPAN = "#e9e9e9"
 
 WIDTH = 7.2
 """Width of a figure [inch]."""
-
-
-STYLE: Any = {
-    "font.size": 9.5,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e3e3e3",
-    "grid.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "axes.edgecolor": "#555555",
-    "axes.linewidth": 0.8,
-    "xtick.color": "#333333",
-    "ytick.color": "#333333",
-    "lines.linewidth": 1.5,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "savefig.dpi": 170,
-    "svg.hashsalt": "trackbed",
-    "svg.fonttype": "path",
-    "figure.constrained_layout.use": True,
-}
-
-
-def figure_save(draw: Callable[[], Figure], path: Path) -> Path:
-    """Draw a figure and write it to ``path`` (svg or png), atomically; the same bytes each time."""
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):
-        figure = draw()
-        temporary = path.with_name(f".{path.stem}.partial{path.suffix}")
-        plain = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-        figure.savefig(temporary, metadata=plain)
-    temporary.replace(path)
-    return path
 
 
 def figure_panels(rows: int, columns: int, height: float, **keywords: Any) -> tuple[Figure, Any]:

@@ -1,7 +1,7 @@
 """The figures of a report, one function each; matplotlib is loaded when one is drawn.
 
-Every function returns a figure that `report_drawing.figure_save` writes.  Lengths come in m and are
-shown in um or mm, shares in per cent.
+Every function returns a figure that `save_figure` writes.  Lengths come in m and are shown in
+um or mm, shares in per cent.
 """
 
 from __future__ import annotations

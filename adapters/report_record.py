@@ -126,7 +126,8 @@ def track_read(name: str, folder: RunFolder) -> Track:
     stages = [
         (stage, outcome)
         for stage in folder.stage_names()
-        if (outcome := folder.outcome(stage)) is not None and not folder.failure(stage)
+        if (outcome := folder.outcome(stage, verify=False)) is not None
+        and not folder.failure(stage)
     ]
     home = folder.path / "discarded"
     discarded = sorted(p.name for p in home.iterdir() if any(p.iterdir())) if home.exists() else []

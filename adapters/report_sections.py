@@ -10,7 +10,11 @@ from adapters.report_bed import Figures, cost, penetration, piston, preparation,
 from adapters.report_control import control
 from adapters.report_error import Comparison
 from adapters.report_history import AVERAGED
-from adapters.report_html import (
+from adapters.report_numbers import Numbers, variant_name
+from adapters.report_record import Record
+from adapters.report_verdict import FITTED, FULL, NOTHING, PROCEDURE
+from adapters.scene import Procedure
+from trackbed.report.page import (
     MINUS,
     TIMES,
     bullets,
@@ -24,10 +28,6 @@ from adapters.report_html import (
     table,
     verdict,
 )
-from adapters.report_numbers import Numbers, variant_name
-from adapters.report_record import Record
-from adapters.report_verdict import FITTED, FULL, NOTHING, PROCEDURE
-from adapters.scene import Procedure
 
 
 def body(record: Record, numbers: Numbers, figures: Figures) -> Iterator[str]:

@@ -2,25 +2,35 @@
 
 A stage (``preparation``, ``window_000020``, ``jump_000040_1``) is worked in ``partial/`` and
 renamed to its place when its ``outcome.json`` is written: what stands in its place is whole.
-Nothing is overwritten; what does not belong any more is moved to ``discarded/``.
+Nothing is overwritten; what does not belong any more is moved to ``discarded/``.  A folder of
+another name, such as a copy of a stage, is no stage and is left alone.
 """
 
 from __future__ import annotations
 
-import fcntl
+import hashlib
 import json
 import os
+import re
 import shutil
-import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
-from errno import EDQUOT, EFBIG, ENOSPC
 from pathlib import Path
 from typing import Any
 
 from adapters.errors import EngineFailed, NotCredible, UsageError
+from trackbed.errors import NO_ROOM, DiskFull
+from trackbed.run_folder import lock_folder, refuse_format, refuse_links
+from trackbed.whole_files import (
+    append_line,
+    digest_file,
+    read_object,
+    seal_file,
+    sync_folder,
+    write_whole,
+)
 
 COLUMNS = (
     "cycle",
@@ -73,6 +83,12 @@ ASKED_ON = "asked to go on cycle by cycle"
 STAGES = ("preparation", "jump", "window")
 """Kinds of stages; at one cycle in this order: a jump of h = 0 comes before its window."""
 
+STAGE = re.compile(r"preparation|jump_\d{6,}_\d+|window_\d{6,}")
+"""Name of a stage's folder."""
+
+SEAL = "seal"
+"""Key of an ``outcome.json`` with the SHA-256 of the others; older records have none."""
+
 
 def stage_place(name: str) -> tuple[int, int, str]:
     """Sorting key of a stage's name: its first cycle, its kind, its attempt."""
@@ -80,44 +96,19 @@ def stage_place(name: str) -> tuple[int, int, str]:
     return (int(numbers[0]) if numbers else -1, STAGES.index(kind), name)
 
 
-def write_atomically(path: Path, text: str) -> None:
-    """Write ``text`` to ``path``: a killed writer leaves the old file or the new, never a part."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    with temporary.open("w", encoding="utf-8") as stream:
-        stream.write(text)
-        stream.flush()
-        os.fsync(stream.fileno())
-    temporary.replace(path)
-
-
 class RunFolder:
     """Finished stages of one run under ``path``."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._known: dict[str, tuple[list[tuple[str, tuple[int, ...]]], bool, Outcome, str]] = {}
+        """Of stages read before: identities of their files, whether their digests were looked at,
+        outcome, and rows of the table."""
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the folder's only writer's lock; raises `UsageError` when another process has it.
-
-        The kernel drops the lock with the process, however it ends.
-        """
-        self.path.mkdir(parents=True, exist_ok=True)
-        with (self.path / "lock").open("a+", encoding="utf-8") as stream:
-            try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                stream.seek(0)
-                raise UsageError(
-                    f"another process writes to this run ({stream.read().strip()})",
-                    where=str(self.path),
-                    remedy="wait for it, or stop it; nothing was changed",
-                ) from error
-            stream.truncate(0)
-            stream.write(f"pid {os.getpid()} on {socket.gethostname()}")
-            stream.flush()
-            for leftover in self.path.glob(".*.partial"):  # of a killed writer
-                leftover.unlink()
+        """Hold the folder's only writer's lock; see `trackbed.run_folder.lock_folder`."""
+        with lock_folder(self.path, "lock"):
             yield
 
     def event(self, what: str, **details: object) -> None:
@@ -127,8 +118,7 @@ class RunFolder:
             "event": what,
             **details,
         }
-        with (self.path / "events.jsonl").open("a", encoding="utf-8") as stream:
-            stream.write(json.dumps(line) + "\n")
+        append_line(self.path / "events.jsonl", json.dumps(line))
 
     def asked_on(self, now: bool) -> bool:
         """Whether this run was asked to compute where it may not jump, ``now`` or ever before."""
@@ -148,27 +138,56 @@ class RunFolder:
                 continue
         return events
 
-    def outcome(self, name: str) -> Outcome | None:
-        """Outcome of a finished stage; None when it is not there, or not as it was left."""
+    def outcome(self, name: str, *, verify: bool = True) -> Outcome | None:
+        """Outcome of a finished stage; None when it is not there, or not as it was left.
+
+        ``verify`` looks into the files that a run goes on from, once for this `RunFolder`; else
+        their sizes are all that is compared.
+        """
         folder = self.path / name
         try:
-            text = (folder / "outcome.json").read_text(encoding="utf-8")
-            outcome = Outcome(**json.loads(text))
+            if name in self._known:
+                files, verified, outcome, _ = self._known[name]
+                looked_at = files if verify else files[:1]
+                same = all(_identify(path) == found for path, found in looked_at)
+                if same and verified >= verify:
+                    return outcome
+            outcome = _read_outcome(folder)
+            names = ("outcome.json", *outcome.notes.get("files", ()))
+            files = [(path, _identify(path)) for path in (f"{folder}/{one}" for one in names)]
             found = _sizes(folder)
             whole = outcome.notes.get("files", found) == found
+            digests = outcome.notes.get("digests", {}) if verify and whole else {}
+            whole &= all(digest_file(folder / one) == digest for one, digest in digests.items())
         except (OSError, ValueError, TypeError, AttributeError):
+            whole = False
+        if not whole:
+            self._known.pop(name, None)
             return None
-        return outcome if whole else None
+        rows = [",".join(_cell(row.get(column)) for column in COLUMNS) for row in outcome.rows]
+        self._known[name] = files, verify, outcome, "".join(f"{row}\n" for row in rows)
+        return outcome
 
     def stage_names(self) -> list[str]:
         """Names of all stage folders in the order of the run."""
-        names = [p.name for p in self.path.iterdir() if p.is_dir()] if self.path.exists() else []
-        return sorted((name for name in names if name.split("_")[0] in STAGES), key=stage_place)
+        if not self.path.exists():
+            return []
+        with os.scandir(self.path) as entries:
+            names = [
+                entry.name for entry in entries
+                if STAGE.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False)
+            ]  # fmt: skip
+        return sorted(names, key=stage_place)
 
     def outcomes(self) -> list[Outcome]:
         """Outcomes of all finished stages in order; failed jumps are left out."""
-        finished = (self.outcome(name) for name in self.stage_names() if not self.failure(name))
+        finished = (self.outcome(name, verify=False) for name in self._kept_stages())
         return [outcome for outcome in finished if outcome is not None]
+
+    def _kept_stages(self) -> list[str]:
+        """Names of all stage folders in order, without those of failed jumps."""
+        names = self.stage_names()
+        return [name for name in names if not (name.startswith("jump") and self.failure(name))]
 
     def failure(self, name: str) -> str:
         """Why a jump was given up, or an empty text."""
@@ -195,7 +214,7 @@ class RunFolder:
         """
         folder = self.path / name
         folder.mkdir(exist_ok=True)
-        write_atomically(folder / "failed.json", json.dumps({"why": why, **details}) + "\n")
+        write_whole(folder / "failed.json", json.dumps({"why": why, **details}) + "\n")
         self.event("jump failed", stage=name, why=why)
         self.settlement_write()
 
@@ -204,6 +223,7 @@ class RunFolder:
 
         What is there already is unfinished, damaged, or comes after it: it is moved away.
         """
+        refuse_links(self.path)
         for other in self.stage_names():
             if stage_place(other) >= stage_place(name):
                 self.discard(self.path / other)
@@ -218,12 +238,20 @@ class RunFolder:
     def finish(self, folder: Path, outcome: Outcome) -> Path:
         """Write the outcome and move the stage to its place; then rewrite ``settlement.csv``.
 
-        The outcome's notes get the sizes of the `NEEDED` files, which `outcome` looks for.
+        The outcome's notes get the sizes and digests of the `NEEDED` files, which `outcome` looks
+        for; all of it is on the disk when the stage is in its place.
         """
-        outcome = replace(outcome, notes=outcome.notes | {"files": _sizes(folder)})
-        write_atomically(folder / "outcome.json", json.dumps(asdict(outcome), indent=1) + "\n")
+        sizes = _sizes(folder)
+        digests = {name: seal_file(folder / name) for name in sizes}
+        outcome = replace(outcome, notes=outcome.notes | {"files": sizes, "digests": digests})
+        record = json.loads(json.dumps(asdict(outcome)))
+        text = json.dumps(record | {SEAL: _digest(record)}, indent=1)
+        write_whole(folder / "outcome.json", text + "\n")
+        sync_folder(folder)
         place = self.path / folder.name
         folder.rename(place)
+        sync_folder(self.path)
+        self._known.pop(folder.name, None)
         self.settlement_write()
         return place
 
@@ -241,25 +269,23 @@ class RunFolder:
 
     def settlement_write(self) -> None:
         """Write ``settlement.csv`` from the outcomes of all finished stages."""
-        lines = [",".join(COLUMNS)]
-        for outcome in self.outcomes():
-            for row in outcome.rows:
-                lines.append(",".join(_cell(row.get(column)) for column in COLUMNS))
-        write_atomically(self.path / "settlement.csv", "\n".join(lines) + "\n")
+        names = self._kept_stages()
+        kept = [name for name in names if name in self._known or self.outcome(name, verify=False)]
+        rows = [self._known[name][3] for name in kept]
+        write_whole(self.path / "settlement.csv", ",".join(COLUMNS) + "\n" + "".join(rows))
 
     def manifest(self) -> dict[str, Any]:
         """The manifest; raises `UsageError` when this is no run folder."""
-        path = self.path / "manifest.json"
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-            return {key: content[key] for key in MANIFEST} | content
-        except (OSError, ValueError, TypeError, KeyError) as error:
+        content = read_object(self.path / "manifest.json") or {}
+        if not content.keys() >= set(MANIFEST):
             raise UsageError(
                 "this is not a run folder (no readable manifest.json)",
                 where=str(self.path),
                 remedy="give the folder that trackbed run made; if it was stopped in its first "
                 "second, start it again with: trackbed run SCENE",
-            ) from error
+            )
+        refuse_format(self.path, content)
+        return content
 
     def share_start(self, other: RunFolder, last_cycle: int) -> None:
         """Link the stages of ``other`` up to ``last_cycle`` into this run: same work, same bits."""
@@ -278,6 +304,25 @@ class RunFolder:
             shutil.copytree(other.path / name, temporary, copy_function=_link)
             temporary.rename(here)
         self.settlement_write()
+
+
+def _digest(record: dict[str, Any]) -> str:
+    """SHA-256 of an outcome as JSON, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
+
+
+def _read_outcome(folder: Path) -> Outcome:
+    """The record of a stage; raises `ValueError` and others for one that is none or was changed."""
+    record = json.loads((folder / "outcome.json").read_text(encoding="utf-8"))
+    if (seal := record.pop(SEAL, None)) is not None and seal != _digest(record):
+        raise ValueError("changed since it was written")
+    return Outcome(**record)
+
+
+def _identify(path: str) -> tuple[int, ...]:
+    """What tells a file from a changed one, without reading it."""
+    found = os.lstat(path)
+    return found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def _sizes(folder: Path) -> dict[str, int]:
@@ -308,9 +353,11 @@ def disk_full_named(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno not in (ENOSPC, EDQUOT, EFBIG):
+        if error.errno not in NO_ROOM:
             raise
         raise _disk_full(path, str(error.strerror)) from error
+    except DiskFull as error:
+        raise _disk_full(path, f"{error.where} {error.what}") from error
     except (EngineFailed, NotCredible) as error:
         free = shutil.disk_usage(path).free
         if free >= FREE_LEAST or (isinstance(error, EngineFailed) and error.from_outside):

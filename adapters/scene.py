@@ -1,6 +1,6 @@
 """The scene: what is simulated, in SI units, as the tables and keys of a scene file.
 
-`adapters.scene_file.scene_load` reads a scene; ``scenes/karrech.toml`` explains every key.
+`adapters.scene_file.scene_load` reads a scene; ``trackbed/scenes/karrech.toml`` explains every key.
 """
 
 from __future__ import annotations
@@ -12,9 +12,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import (
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
     model_serializer,
@@ -30,6 +28,7 @@ from adapters.radii import RadiusDistribution, grain_count_expected
 from adapters.residual import FIRST_WINDOW
 from adapters.scene_checks import COUNT_GREATEST, scene_problems, scene_warnings
 from adapters.state import FloatArray
+from trackbed.scene_types import NonNegative, Positive, Table
 
 TRACK_SAMPLES = 100
 """Least number of samples of the piston's record in a cycle."""
@@ -37,8 +36,6 @@ TRACK_SAMPLES = 100
 FLAT_WALLED = ("yade",)
 """Engines without a cylinder: planes tangent to it take its place."""
 
-Positive = Annotated[float, Field(ge=1e-15, le=1e18, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, le=1e18, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=1e-6, le=1, allow_inf_nan=False)]
 Poisson = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False)]
 Restitution = Annotated[float, Field(gt=0.05, le=1, allow_inf_nan=False)]
@@ -50,12 +47,6 @@ Count = Annotated[int, Field(ge=1, le=COUNT_GREATEST)]
 
 def _as_schedule(value: object) -> object:
     return [value] if isinstance(value, int) and not isinstance(value, bool) else value
-
-
-class Table(BaseModel):
-    """A table of the scene file: frozen, of strict types, without unknown keys."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 class GrainRadius(Table):

@@ -7,8 +7,6 @@ itself, so that one wrong key never hides what is wrong elsewhere.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +21,7 @@ from adapters.errors import SceneError
 from adapters.load_series import load_series_read
 from adapters.named_files import find_choices, tell_retired
 from adapters.radii import RadiusDistribution, grain_count_expected, radius_that_fits
+from trackbed.scene_file import Problem, suggest_word
 
 ALTERNATIVES = (
     ("sample.count", "sample.fill_height"),
@@ -53,18 +52,6 @@ CHAIN_FACTOR = 10.0
 """Greatest contact force over the mean one in a bed under load, as in `adapters.relaxation`."""
 JUMP_DOUBTFUL = 10
 """Cycles of a jump for each cycle fitted, above which noise is extrapolated and not a law."""
-
-
-@dataclass(frozen=True)
-class Problem:
-    """What is wrong with a key."""
-
-    key: str
-    """Dotted key."""
-    what: str
-    """One sentence."""
-    where: str = ""
-    """File and line where that is not the scene file."""
 
 
 class _NotValid(Exception):
@@ -283,7 +270,7 @@ def _launcher(scene: _Values) -> Iterator[Problem]:
 def _engine(scene: _Values) -> Iterator[Problem]:
     name, known = scene.need("engine.name"), ("auto", *find_choices(AN_ENGINE, "ENGINE"))
     if name not in known:
-        yield Problem("engine.name", f"unknown engine {name!r}{did_you_mean(name, known)}")
+        yield Problem("engine.name", f"unknown engine {name!r}{suggest_word(name, known)}")
 
 
 def _law(scene: _Values) -> Iterator[Problem]:
@@ -291,7 +278,7 @@ def _law(scene: _Values) -> Iterator[Problem]:
 
     law, known = scene.need("procedure.law"), laws_known()
     if law not in known:
-        yield Problem("procedure.law", f"unknown law {law!r}{did_you_mean(law, known)}")
+        yield Problem("procedure.law", f"unknown law {law!r}{suggest_word(law, known)}")
 
 
 def _move(scene: _Values) -> Iterator[Problem]:
@@ -299,7 +286,7 @@ def _move(scene: _Values) -> Iterator[Problem]:
 
     move, known = scene.need("procedure.move"), moves_known()
     if move not in known:
-        hint = tell_retired(move, RETIRED) or did_you_mean(move, known)
+        hint = tell_retired(move, RETIRED) or suggest_word(move, known)
         yield Problem("procedure.move", f"unknown way {move!r}{hint}")
 
 
@@ -309,7 +296,7 @@ def _relaxation(scene: _Values) -> Iterator[Problem]:
         from adapters.relaxation import METHODS, RETIRED
 
         if method not in METHODS:
-            hint = tell_retired(method, RETIRED) or did_you_mean(method, (*METHODS, "none"))
+            hint = tell_retired(method, RETIRED) or suggest_word(method, (*METHODS, "none"))
             yield Problem("procedure.relaxation", f"unknown relaxation {method!r}{hint}")
 
 
@@ -492,12 +479,3 @@ def _found(checks: Iterable[Check], scene: _Values) -> list[Problem]:
         except _NotValid:
             continue
     return problems
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """``; did you mean X?`` for the nearest of the known words, or what they are."""
-    known = sorted(known)
-    near = get_close_matches(word.lower(), known, n=1, cutoff=0.6)
-    if near:
-        return f"; did you mean {near[0]}?"
-    return f"; known: {', '.join(known)}" if known else ""

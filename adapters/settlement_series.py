@@ -162,8 +162,9 @@ def _is_table(path: Path) -> bool:
     from adapters.settlement_table import SUFFIXES
 
     suffix = path.suffix.lower()
-    if suffix == SUFFIXES[0] or suffix not in SUFFIXES or not path.is_file():
-        return suffix == SUFFIXES[0]
+    certain = suffix in (SUFFIXES[0], SUFFIXES[-1])
+    if certain or suffix not in SUFFIXES or not path.is_file():
+        return certain
     with path.open("rb") as stream:
         return not stream.read(64).lstrip().startswith(b"ITEM:")
 

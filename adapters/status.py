@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import fcntl
-import re
 import shlex
-import socket
 from dataclasses import asdict, dataclass
 from math import isfinite, nan
 from pathlib import Path
@@ -13,6 +10,7 @@ from typing import Any
 
 from adapters.report_history import cost_total
 from adapters.report_record import Record, Track, band_of_run, record_read
+from trackbed.run_folder import is_written
 
 
 @dataclass(frozen=True)
@@ -55,7 +53,7 @@ def status(run_folder: Path) -> Status:
     history = record.run.history
     cycle = int(history.cycle[-1]) if len(history.cycle) else 0
     computed = history.computed(cycle)
-    state = "running" if _is_written(run_folder) else "stopped"
+    state = "running" if is_written(run_folder, "lock") else "stopped"
     if state == "stopped" and _is_finished(record):
         state = "finished"
     ratio = cycle / computed if computed else nan
@@ -102,25 +100,3 @@ def _is_finished(record: Record) -> bool:
         track is not None and len(track.history.cycle) > 0 and _cycle(track) == total
         for track in tracks
     )
-
-
-def _is_written(run_folder: Path) -> bool:
-    """Whether a process holds the folder's lock.
-
-    The lock is tried only when the process that last took it may still live: a try can refuse,
-    for its instant, a writer that starts.
-    """
-    path = run_folder / "lock"
-    try:
-        with path.open(encoding="utf-8") as stream:
-            holder = re.fullmatch(r"pid (\d+) on (.+)", stream.read().strip())
-            here = holder is not None and holder[2] == socket.gethostname()
-            if holder is not None and here and not Path(f"/proc/{holder[1]}").exists():
-                return False
-            try:
-                fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except BlockingIOError:
-                return True
-    except OSError:
-        return False
-    return False

@@ -128,9 +128,9 @@ def results_write(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], 
     for name, rows in tables.items():
         paths |= table_write(sweep.folder / name, rows)
     if bands:
-        from adapters.report_drawing import figure_save
+        from trackbed.report.figure import save_figure
 
-        picture = figure_save(lambda: bands_figure(bands), sweep.folder / "settlement.png")
+        picture = save_figure(lambda: bands_figure(bands), sweep.folder / "settlement.png")
         paths["picture"] = str(picture)
     return bands, paths
 

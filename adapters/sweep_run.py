@@ -11,11 +11,12 @@ from typing import Any
 from adapters.engine import interruptible
 from adapters.errors import Interrupted, UsageError
 from adapters.progress import Progress
-from adapters.run_folder import RunFolder, disk_full_named, write_atomically
+from adapters.run_folder import RunFolder, disk_full_named
 from adapters.status import status
 from adapters.sweep import Member, Sweep, engine_pinned, folder_check
 from adapters.sweep_cluster import cluster_client
 from adapters.sweep_member import STOPPED, Ended, member_command, member_run, worker_engine
+from trackbed.whole_files import write_whole
 
 STOP_S = 30
 """How long members may take to stop when the sweep is interrupted [s]."""
@@ -197,7 +198,7 @@ def _summed_up(result: Result) -> str:
 def _record(sweep: Sweep, cluster: Cluster, results: dict[str, Result]) -> None:
     """Write ``sweep.json``: how far every member is."""
     content = record_of(sweep, cluster, list(results.values()))
-    write_atomically(sweep.folder / "sweep.json", json.dumps(content, indent=1) + "\n")
+    write_whole(sweep.folder / "sweep.json", json.dumps(content, indent=1) + "\n")
 
 
 def record_of(sweep: Sweep, cluster: Cluster, results: Sequence[Result]) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def advise_command(arguments: argparse.Namespace) -> int:
             )
             print("\n".join(f"  {name}: {one:.2g}" for name, one in checked.probes.items()))
     if arguments.json is not None:
-        from qdem_fem.output import write_whole
+        from trackbed.whole_files import write_whole
 
         write_whole(arguments.json, json.dumps(answer, indent=1) + "\n")
     return 0

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from qdem_fem.critical_step import CriticalStep
 from qdem_fem.errors import CheckpointError
 from qdem_fem.motion import Motion
-from qdem_fem.output import write_whole
 from qdem_fem.series import Driver, Series
 from qdem_fem.state import State
+from trackbed.whole_files import write_whole
 
 Arrays = dict[str, NDArray[Any]]
 

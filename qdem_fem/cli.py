@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from trackbed.run_arguments import add_run_arguments, place_run, refuse_both
+
 if TYPE_CHECKING:
     from qdem_fem.scene_prepared import Prepared
 
@@ -21,41 +23,23 @@ TRIAL = 0.5
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``qdem`` to its parser."""
     assert verb == "qdem"
-    parser.add_argument("scene", metavar="SCENE", type=Path, help="a QDEM scene file (TOML)")
-    parser.add_argument(
-        "--run-folder", type=Path, metavar="FOLDER", help="default: SCENE-run beside the scene"
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
-        help="change a key of the scene, such as simulation.duration=0.1; may be repeated",
+    add_run_arguments(
+        parser, "a QDEM scene file (TOML)", "simulation.duration=0.1",
+        "the last checkpoint, to the same bits",
     )  # fmt: skip
-    parser.add_argument(
-        "--dry-run", action="store_true",
-        help="check the scene and tell what would run: step, steps, cost, what is left out",
-    )  # fmt: skip
-    parser.add_argument(
-        "--resume", action="store_true", help="go on from the last checkpoint, to the same bits"
-    )
-    parser.add_argument(
-        "--force", action="store_true", help="lose the run that is in the folder and start anew"
-    )
-    parser.add_argument("--no-pictures", action="store_true", help="write the report without any")
-    parser.add_argument("--json", action="store_true", help="print JSON on standard output")
     parser.set_defaults(command=qdem_command)
 
 
 def qdem_command(arguments: argparse.Namespace) -> int:
     """Run a scene, or tell what would run."""
-    from qdem_fem.errors import UsageError
     from qdem_fem.scene_checks import scene_load
 
-    if arguments.resume and arguments.force:
-        raise UsageError("--resume and --force exclude each other", remedy="give one of them")
+    refuse_both(arguments)
     prepared = scene_load(arguments.scene, arguments.overrides)
     if arguments.dry_run:
         _print(_outlook(prepared), arguments.json)
         return 0
-    path = arguments.run_folder or arguments.scene.with_name(f"{arguments.scene.stem}-run")
+    path = place_run(arguments)
     with warnings.catch_warnings():
         warnings.showwarning = _warning_show
         summary = _run(prepared, path, arguments)
@@ -65,12 +49,12 @@ def qdem_command(arguments: argparse.Namespace) -> int:
 
 def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
-    from qdem_fem.output import write_whole
     from qdem_fem.report import report_write
     from qdem_fem.run_folder import RESULT, RunFolder, manifest_of
     from qdem_fem.scene_build import simulation_of
     from qdem_fem.scene_run import run_dynamic, run_static
     from qdem_fem.summary import summary_of
+    from trackbed.whole_files import write_whole
 
     run, bodies = simulation_of(prepared)  # what it refuses must not leave a folder behind
     folder = RunFolder(path)

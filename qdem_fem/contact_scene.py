@@ -12,7 +12,8 @@ from qdem_fem.contact_spheres import NEAR, ContactPlane, SphereContact, planes_a
 from qdem_fem.contact_surface import SurfaceContact
 from qdem_fem.errors import ConditionError
 from qdem_fem.periodic import PeriodicWidth
-from qdem_fem.scene_types import Name, NonNegative, Positive, Table, Vector, number_or_table
+from qdem_fem.scene_types import Vector, number_or_table
+from trackbed.scene_types import Name, NonNegative, Positive, Table
 
 NumberByBody = Annotated[
     Annotated[Positive, Tag("#number")] | Annotated[dict[Name, Positive], Tag("#table")],

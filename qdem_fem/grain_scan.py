@@ -18,10 +18,10 @@ from qdem_fem.grain_surface import (
     surface_area,
 )
 from qdem_fem.mesh import TetMesh
-from qdem_fem.mesh_checks import FloatArray, IntArray, nodes_taken, problems_raise
+from qdem_fem.mesh_checks import FloatArray, IntArray
 from qdem_fem.mesh_generation import gmsh_model, gmsh_tetrahedra
-from qdem_fem.mesh_sources import file_read
 from qdem_fem.surface import surface_faces
+from trackbed.mesh_file import read_surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,30 +48,17 @@ class Scan:
         return roundness_wadell(self.nodes, self.faces)
 
 
-def scan_read(path: str | os.PathLike[str], unit: float = 1.0) -> Scan:
+def scan_read(path: str | os.PathLike[str], unit: float | str = 1.0) -> Scan:
     """Read the triangles of a file that meshio reads (STL, PLY, OBJ, ...), and check them.
 
-    ``unit`` is the length of the file's unit [m], 1e-3 for scans in mm.  Corners of the same
+    ``unit`` is the length of the file's unit [m], or its name: 1e-3 or "mm".  Corners of the same
     coordinates become one node, as STL repeats them, and triangles that lose a corner by that are
     left out.  Raises `MeshError` for a file that can not be read, has no triangles, or whose
     surface is open, not manifold, inside out or cuts itself (`surface_check`).
     """
     where = f"scan {os.fspath(path)!r}"
-    if not (np.isfinite(unit) and unit > 0):
-        raise MeshError(f"a unit of {unit} m", where=where, remedy="give 1e-3 for a scan in mm")
-    mesh = file_read(path, where)
-    blocks = [np.asarray(block.data) for block in mesh.cells if block.type == "triangle"]
-    if not sum(map(len, blocks)):
-        raise MeshError(
-            "there are no triangles", where=where, remedy="export the stone's surface as triangles"
-        )
-    points, problems = nodes_taken(mesh.points)
-    problems_raise(problems, where)
-    nodes, place = np.unique(points, axis=0, return_inverse=True)
-    faces = place.reshape(-1)[np.concatenate(blocks)].astype(np.int64)
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
-    scan = Scan(nodes * unit, faces)
+    surface = read_surface(path, unit, where=where)
+    scan = Scan(surface.nodes, surface.faces)
     surface_check(scan.nodes, scan.faces, where)
     return scan
 

@@ -9,17 +9,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from qdem_fem.errors import ConditionError
+from qdem_fem.errors import ConditionError, LibraryMissing, UsageError
 from qdem_fem.mesh_checks import FloatArray
-from qdem_fem.scene import SeriesTable
-from qdem_fem.scene_series import WrongSeries, series_of
 from qdem_fem.series import Series
+from trackbed.series_file import TIMES, read_columns
+from trackbed.whole_files import write_whole
 
 RATE = 10_000.0
 """Samples a second of the paper's record (section 4) [Hz]."""
 UNEVEN = 1e-3
 """Departure of an interval from the mean one, over it, from which on a record is uneven: times
 written with seven digits depart by less."""
+PRESSURES = ("Pa", "kPa", "MPa")
 SEATS = ("rp1", "rp2")
 """Columns of the right and the left rail seat, by the names of the paper's Fig. 5."""
 
@@ -82,7 +83,8 @@ class LoadRecord:
 
 
 def load_record_read(path: str | os.PathLike[str], rate: float | None = RATE) -> LoadRecord:
-    """Read a CSV file with a header line and columns ``time`` [s], ``rp1`` and ``rp2`` [Pa].
+    """Read a table with columns ``time`` [s], ``rp1`` and ``rp2`` [Pa], or other units behind these
+    names; see `trackbed.series_file`.
 
     Raises `ConditionError`, naming file and line: no file, no such column, no numbers, times that
     do not grow or not evenly, another sampling ``rate`` [Hz]; None takes any.
@@ -90,18 +92,16 @@ def load_record_read(path: str | os.PathLike[str], rate: float | None = RATE) ->
     target = Path(path)
     where = f"load record {os.fspath(path)!r}"
     try:
-        found = [
-            series_of(SeriesTable(csv=target.name, value=seat), seat, target.parent, vector=False)
-            for seat in SEATS
-        ]
-    except WrongSeries as wrong:
+        (time, *seats), _ = read_columns(target, ("time", *SEATS), (TIMES, *[PRESSURES] * 2))
+    except (UsageError, LibraryMissing) as error:
         raise ConditionError(
-            wrong.problem.what,
-            where=wrong.problem.where or where,
-            remedy="give a CSV file with the columns time, rp1, rp2 in s and Pa",
+            error.what,
+            where=error.where or where,
+            remedy="give a table with the columns time, rp1, rp2 in s and Pa, or their units "
+            "behind them",
         ) from None
     try:
-        record = LoadRecord(found[0].times, np.stack([one.values for one in found], axis=1))
+        record = LoadRecord(time, np.stack(seats, axis=1))
     except ConditionError as error:
         raise ConditionError(error.what, where=where, remedy=error.remedy) from None
     if rate is not None and abs(record.rate / rate - 1) > UNEVEN:
@@ -115,10 +115,6 @@ def load_record_read(path: str | os.PathLike[str], rate: float | None = RATE) ->
 
 def load_record_write(path: str | os.PathLike[str], record: LoadRecord) -> None:
     """Write a record as such a file, atomically; times to 0.1 us, pressures to nine digits."""
-    target = Path(path)
-    temporary = target.with_name(target.name + ".partial")
-    with temporary.open("w", encoding="utf-8") as stream:
-        stream.write(f"time,{','.join(SEATS)}\n")
-        for time, (one, two) in zip(record.time, record.pressure, strict=True):
-            stream.write(f"{time:.7f},{one:.9g},{two:.9g}\n")
-    temporary.replace(target)
+    rows = zip(record.time, record.pressure, strict=True)
+    lines = (f"{time:.7f},{one:.9g},{two:.9g}\n" for time, (one, two) in rows)
+    write_whole(Path(path), f"time,{','.join(SEATS)}\n" + "".join(lines))

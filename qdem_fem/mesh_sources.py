@@ -6,19 +6,15 @@ is loaded only to read a file.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
-import sys
-import warnings
 from collections import Counter
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from qdem_fem.errors import LibraryMissing, MeshError
+from qdem_fem.errors import MeshError
+from trackbed.mesh_file import list_groups, read_mesh_file
 
 _ACCEPTED = (
     "give a skfem.MeshTet, a meshio.Mesh, a pair (nodes, elements) of arrays, "
@@ -48,7 +44,7 @@ def mesh_parts(source: Any, where: str) -> MeshParts:
     Raises `MeshError` if the source is of no known kind, or holds no linear tetrahedra.
     """
     if isinstance(source, (str, os.PathLike)):
-        return _parts_of_meshio(file_read(source, where), where)
+        return _parts_of_meshio(read_mesh_file(source, where), where)
     if isinstance(source, (tuple, list)):
         if len(source) != 2:
             raise MeshError(
@@ -129,88 +125,11 @@ def _parts_of_meshio(mesh: Any, where: str) -> MeshParts:
         )
     try:
         elements = np.concatenate(blocks)
-        node_sets, element_sets = _sets_of_meshio(mesh)
+        node_sets, element_sets = list_groups(mesh, "tetra")
     except (IndexError, TypeError, ValueError, AttributeError, KeyError) as error:
         raise MeshError(
             f"cells and sets of the meshio mesh do not fit together: {error}",
             where=where,
-            remedy="make the mesh anew with meshio.Mesh, which checks this",
+            remedy="make the mesh again with meshio.Mesh, which checks this",
         ) from error
     return MeshParts(mesh.points, elements, node_sets, element_sets)
-
-
-def _sets_of_meshio(mesh: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A named group of tetrahedra is an element set, any other one the set of its nodes."""
-    nodes: dict[str, list[Any]] = {k: [np.asarray(v)] for k, v in mesh.point_sets.items()}
-    elements: dict[str, list[Any]] = {}
-    starts = np.cumsum([0, *(len(b.data) if b.type == "tetra" else 0 for b in mesh.cells)])
-
-    def add(name: str, block: int, cells: Any) -> None:
-        if mesh.cells[block].type == "tetra":
-            if cells.min() < 0 or cells.max() >= len(mesh.cells[block].data):
-                raise ValueError(f"set '{name}' names cells that block {block} does not have")
-            elements.setdefault(name, []).append(starts[block] + cells)
-        else:
-            nodes.setdefault(name, []).append(np.unique(mesh.cells[block].data[cells]))
-
-    for name, of_blocks in mesh.cell_sets.items():
-        if name.startswith("gmsh:"):  # meshio's own notes on the geometry, no groups of the user
-            continue
-        for block, cells in enumerate(of_blocks):
-            if cells is not None and len(cells):
-                add(name, block, np.asarray(cells, dtype=np.int64))
-    names = {
-        (int(entry[1]), int(entry[0])): name
-        for name, entry in mesh.field_data.items()
-        if np.shape(entry) == (2,)
-    }
-    for block, tags in enumerate(mesh.cell_data.get("gmsh:physical", [])):
-        for tag in np.unique(tags):
-            if tag:  # 0: in no group
-                name = names.get((mesh.cells[block].dim, int(tag)), str(int(tag)))
-                add(name, block, np.flatnonzero(np.asarray(tags) == tag))
-    return (
-        {name: np.unique(np.concatenate(parts)) for name, parts in nodes.items()},
-        {name: np.unique(np.concatenate(parts)) for name, parts in elements.items()},
-    )
-
-
-def file_read(path: str | os.PathLike[str], where: str) -> Any:
-    """The meshio.Mesh of a file; whatever meshio says or does on a bad one is in a `MeshError`."""
-    if not Path(path).is_file():
-        raise MeshError(
-            "it is a directory" if Path(path).is_dir() else "there is no such file",
-            where=where,
-            remedy="give the path of a mesh file that meshio reads (.msh, .vtu, .inp, .mesh, ...)",
-        )
-    try:
-        import meshio
-    except ImportError as error:
-        raise LibraryMissing(
-            "reading a mesh file needs meshio", where=where, remedy="pip install meshio"
-        ) from error
-    said = io.StringIO()
-    try:
-        with (
-            warnings.catch_warnings(),
-            contextlib.redirect_stdout(said),
-            contextlib.redirect_stderr(said),
-        ):
-            warnings.simplefilter("ignore")  # deprecations inside meshio are not the user's
-            mesh = meshio.read(path)
-    except ImportError as error:  # of h5py or netCDF4, which meshio needs for some formats
-        raise LibraryMissing(
-            f"meshio can not read this format without {error.name}",
-            where=where,
-            remedy=f"pip install {error.name}",
-        ) from error
-    except (Exception, SystemExit) as error:  # meshio leaves Python altogether on some files
-        reason = "" if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
-        text = " ".join(f"{said.getvalue()} {reason}".split())
-        raise MeshError(
-            f"meshio can not read it ({text})",
-            where=where,
-            remedy="check that the file is whole and that its name ends as its format demands",
-        ) from error
-    sys.stderr.write(said.getvalue())
-    return mesh

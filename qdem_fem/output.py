@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
-from errno import EDQUOT, EFBIG, ENOSPC
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -17,51 +15,15 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.errors import DiskFull, UsageError
+from qdem_fem.errors import UsageError
+from trackbed.whole_files import open_unlinked, refuse_writing, write_whole
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 TETRAHEDRON = 10
 """VTK's number of the linear tetrahedron."""
-NO_ROOM = (ENOSPC, EDQUOT, EFBIG)
-"""No space on the disk, none left in the user's quota, or a longer file than is allowed."""
 VTK_TYPES = {"float64": "Float64", "float32": "Float32", "int64": "Int64", "uint8": "UInt8"}
-
-
-def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
-    """Write a file: whatever kills the writer leaves the old file or the new, never a part.
-
-    Raises `DiskFull` when there is no room, `UsageError` when the system refuses otherwise.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    parts: Iterable[bytes]
-    if isinstance(content, str):
-        parts = [content.encode()]
-    else:
-        parts = [content] if isinstance(content, bytes) else content
-    try:
-        with temporary.open("wb") as stream:
-            for part in parts:
-                stream.write(part)
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.replace(path)
-    except OSError as error:
-        raise can_not_write(path, error) from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
-
-
-def can_not_write(path: Path, error: OSError) -> DiskFull | UsageError:
-    """What to raise when the system refuses to write: no space, no permission, no folder."""
-    refusal = DiskFull if error.errno in NO_ROOM else UsageError
-    return refusal(
-        f"can not be written ({error.strerror or error})",
-        where=str(path),
-        remedy="make room or leave to write there, or give another folder",
-    )
 
 
 def vtu_write(
@@ -208,11 +170,8 @@ class Table:
     def append(self, rows: npt.NDArray[Any]) -> None:
         """Append rows (k, columns); digits enough to read the same numbers back."""
         text = "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist())
-        try:
-            with self.path.open("a", encoding="ascii") as stream:
-                stream.write(text)
-        except OSError as error:
-            raise can_not_write(self.path, error) from error
+        with refuse_writing(self.path), open_unlinked(self.path, "a") as stream:
+            stream.write(text)
 
     def sync(self) -> None:
         """Have the system write everything to the disk."""

@@ -10,12 +10,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from math import floor, log10
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.spectra import Mode, amplitude_spectrum
+from trackbed.report.figure import STYLE, encode_figure
+from trackbed.whole_files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,26 +29,8 @@ Curve = tuple[FloatArray, FloatArray]
 OURS, RIVAL = "#0b5fa5", "#e07b00"
 COLOURS = (OURS, "#2a9d6f", "#7a4fa3", "#b02020", "#6b6b6b", "#00838f")
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-STYLE: Any = {
-    "font.size": 9.5,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#e3e3e3",
-    "grid.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "axes.edgecolor": "#555555",
-    "axes.linewidth": 0.8,
-    "xtick.color": "#333333",
-    "ytick.color": "#333333",
-    "lines.linewidth": 1.3,
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "savefig.dpi": 170,
-    "figure.constrained_layout.use": True,
-}
+LINES = {"lines.linewidth": 1.3}
+"""What is thinner here than in other reports."""
 
 
 def picture_history(
@@ -149,9 +133,7 @@ def figure_written(path: Path, size: tuple[float, float]) -> Iterator[Figure]:
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE | LINES):
         figure = Figure(figsize=size)
         yield figure
-        temporary = path.with_name(f".{path.stem}.partial{path.suffix}")
-        figure.savefig(temporary, metadata={"Software": None})
-    temporary.replace(path)
+        write_whole(path, encode_figure(figure, path.suffix))

@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.errors import MeshError
-from qdem_fem.mesh_sources import file_read
 from qdem_fem.output import bodies_vtu_write
 from qdem_fem.periodic import PeriodicWidth
 from qdem_fem.pictures_bodies import (
@@ -26,6 +25,7 @@ from qdem_fem.pictures_bodies import (
     picture_deformed,
     spheres_bearing,
 )
+from trackbed.mesh_file import read_mesh_file
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -123,7 +123,7 @@ def picture_beside(path: Path) -> Path:
 
 def _shown(path: Path, bodies: Sequence[Any]) -> tuple[list[Shown], npt.NDArray[np.bool_]]:
     """Bodies as a VTU file holds them, and which of all their nodes bore (n,)."""
-    mesh = file_read(path, f"{path}, of which a picture is drawn")
+    mesh = read_mesh_file(path, f"{path}, of which a picture is drawn")
     moved, stress = mesh.point_data["displacement"], mesh.cell_data["von_mises"][0]
     node = np.cumsum([0, *(len(body.nodes) for body in bodies)])
     element = np.cumsum([0, *(len(body.elements) for body in bodies)])

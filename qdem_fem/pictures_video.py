@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 
-from qdem_fem.output import write_whole
+from trackbed.whole_files import write_whole
 
 
 def video_write(path: Path, pictures: Sequence[Path], rate: float) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
@@ -10,31 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from qdem_fem.energy_account import STORED
-from qdem_fem.output import table_read, write_whole
+from qdem_fem.output import table_read
 from qdem_fem.run_folder import RunFolder
 from qdem_fem.scene_run import Done
 from qdem_fem.spectra import Mode
 from qdem_fem.summary import moving_components
-
-STYLE = """
-:root { color-scheme: light; }
-body { font: 16px/1.5 "Source Serif 4", Charter, Georgia, serif; color: #1a1a1a; background: #fff;
-  max-width: 54rem; margin: 2.5rem auto; padding: 0 1.25rem; }
-h1 { font-size: 1.6rem; line-height: 1.2; margin: 0 0 .3rem; }
-h2 { font-size: 1.15rem; margin: 2.2rem 0 .5rem; border-top: 1px solid #ccc; padding-top: .6rem; }
-.claim { font-size: 1.1rem; border-left: 4px solid #0b5fa5; padding: .1rem 0 .1rem 1rem; }
-figure { margin: 1rem 0; break-inside: avoid; }
-figure img { width: 100%; height: auto; display: block; }
-figcaption { font-size: .87rem; color: #444; }
-table { border-collapse: collapse; width: 100%; font: .86rem/1.4 "Source Sans 3", Helvetica, Arial,
-  sans-serif; font-variant-numeric: tabular-nums; margin: .8rem 0; }
-th, td { padding: .25rem .5rem; text-align: right; vertical-align: top; }
-th { border-bottom: 1px solid #888; } tbody tr { border-bottom: 1px solid #e4e4e4; }
-th:first-child, td:first-child { text-align: left; padding-left: 0; }
-code, pre { font: .82rem/1.4 "Source Code Pro", Menlo, Consolas, monospace; }
-pre { background: #f5f5f5; padding: .7rem .9rem; white-space: pre-wrap; overflow-wrap: anywhere; }
-summary { cursor: pointer; color: #0b5fa5; }
-"""
+from trackbed.report.page import bullets, page, picture, table
+from trackbed.whole_files import write_whole
 
 
 def report_write(
@@ -49,7 +30,7 @@ def report_write(
     body = [
         f"<h1>{escape(title)}</h1>",
         _claim(summary),
-        *(_figure(path, caption) for path, caption in pictures),
+        *(picture(path, caption, escape(caption)) for path, caption in pictures),
         *_bed(summary),
         *_probes(summary),
         *_modes(summary),
@@ -60,17 +41,8 @@ def report_write(
         *_cost(summary),
         *_again(manifest),
     ]
-    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-    head = [
-        "<!DOCTYPE html>",
-        '<html lang="en"><head><meta charset="utf-8"/>',
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}"/>',
-        '<meta name="viewport" content="width=device-width, initial-scale=1"/>',
-        '<link rel="icon" href="data:,"/>',
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>",
-    ]
     path = folder.path / "report.html"
-    write_whole(path, "\n".join([*head, *body, "</body></html>\n"]))
+    write_whole(path, page(title, body))
     return path
 
 
@@ -218,7 +190,7 @@ def _bed(summary: dict[str, Any]) -> Iterator[str]:
 
 def _left_out(summary: dict[str, Any]) -> Iterator[str]:
     yield "<h2>What is not in this run</h2>"
-    yield "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in summary["left_out"]) + "</ul>"
+    yield bullets(escape(text) for text in summary["left_out"])
 
 
 def _cost(summary: dict[str, Any]) -> Iterator[str]:
@@ -249,14 +221,4 @@ def _again(manifest: dict[str, Any]) -> Iterator[str]:
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
-    body = ("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
-
-
-def _figure(path: Path, caption: str) -> str:
-    content = base64.b64encode(path.read_bytes()).decode("ascii")
-    return (
-        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{content}"/>'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
+    return table("", [escape(cell) for cell in header], ([*map(escape, row)] for row in rows))

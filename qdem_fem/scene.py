@@ -1,6 +1,6 @@
 """The scene: bodies, conditions and output of one QDEM run, as the tables of a scene file (SI).
 
-`qdem_fem.scene_file.scene_read` reads a scene; ``scenes/cantilever.toml`` explains every key.
+`qdem_fem.scene_file.scene_read` reads a scene; ``cantilever.toml`` explains every key.
 """
 
 from __future__ import annotations
@@ -13,23 +13,17 @@ from qdem_fem.body import Rigid
 from qdem_fem.contact_scene import ContactTable
 from qdem_fem.scene_types import (
     Cells,
-    Interval,
-    Name,
-    NonNegative,
     NumberVector,
     NumberVectorName,
     Poisson,
-    Positive,
-    Real,
     Share,
     Size,
-    Table,
-    Text,
     Vector,
     number_or_table,
     vector_or_table,
 )
 from qdem_fem.strain_measures import Strain
+from trackbed.scene_types import Name, NonNegative, Positive, Real, Table, Text
 
 AUDIT = 1e-3
 """Of `Output.audit`, where bodies touch."""
@@ -267,7 +261,7 @@ class Output(Table):
     """Of displacements in a PNG picture beside every VTU file; none when not given."""
     video: Annotated[float, Field(gt=0, le=100)] | None = None
     """Of those pictures, a second [1/s], in video.gif; none is made when not given."""
-    checkpoint_interval: Interval = 300.0
+    checkpoint_interval: NonNegative = 300.0
     """Between checkpoints, by the clock on the wall [s]."""
     audit: Share | None = None
     """Share of the greatest energy that may be missing in the account of energies, what viscosity

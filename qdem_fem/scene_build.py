@@ -9,8 +9,8 @@ import numpy as np
 from qdem_fem.contact_scene import contact_of
 from qdem_fem.errors import ConditionError, QdemError
 from qdem_fem.scene import BodyTable
-from qdem_fem.scene_file import Problem, error_told
 from qdem_fem.scene_series import TimeSeries
+from trackbed.scene_file import Problem, describe_error
 
 if TYPE_CHECKING:
     from qdem_fem.body import Body
@@ -61,14 +61,14 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         try:
             getattr(run, step.verb)(bodies[step.body], *arguments)
         except QdemError as error:
-            problems.append(Problem(step.key, error_told(error)))
+            problems.append(Problem(step.key, describe_error(error)))
     if table.method == "static" and scene.absorb:
         problems.append(Problem("absorb.0", "a static answer has no waves: fix these nodes"))
     for number, moving in enumerate(scene.body):
         try:
             motion_begin(bodies[moving.name], moving)
         except QdemError as error:
-            problems.append(Problem(f"body.{number}", error_told(error)))
+            problems.append(Problem(f"body.{number}", describe_error(error)))
     prepared.text.refuse(problems)
     try:
         run.packed_lists()  # rollers against prescribed motions, what holds rigid bodies
@@ -82,7 +82,7 @@ def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
         where = error.where.replace("relax", "fix")
         if where in bodies:
             where = f"body.{list(bodies).index(where)}"
-        prepared.text.refuse([Problem(where, error_told(error))])
+        prepared.text.refuse([Problem(where, describe_error(error))])
     return run, bodies
 
 

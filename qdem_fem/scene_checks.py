@@ -30,10 +30,11 @@ from qdem_fem.scene import (
     Scene,
     SimulationTable,
 )
-from qdem_fem.scene_file import Problem, SceneText, did_you_mean, error_told, scene_read
+from qdem_fem.scene_file import scene_read
 from qdem_fem.scene_nodes import NoNodes, mesh_of, nodes_named, unit_vector
 from qdem_fem.scene_prepared import Prepared, Step, files_named, output_faults, tables_in
 from qdem_fem.scene_series import WrongSeries, series_of
+from trackbed.scene_file import Problem, SceneText, describe_error, suggest_word
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
@@ -60,7 +61,7 @@ def scene_load(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
     conditions: list[Step] = []
     for key, table in tables_in(text, Condition, Periodic):
         if names and table.body not in names:
-            near = did_you_mean(table.body, names)
+            near = suggest_word(table.body, names)
             problems.append(Problem(f"{key}.body", f"there is no body {table.body!r}{near}"))
         mesh = meshes.get(table.body)
         for step in _condition(key, table, mesh, folder):
@@ -116,11 +117,11 @@ def _meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Pro
             problems.append(wrong.problem)
             continue
         except MeshError as error:
-            problems.append(Problem(f"{key}.mesh", error_told(error), _of_file(error)))
+            problems.append(Problem(f"{key}.mesh", describe_error(error), _of_file(error)))
             continue
         for region in regions:
             if region not in mesh.element_sets:
-                near = did_you_mean(region, mesh.element_sets) or "; the mesh has none"
+                near = suggest_word(region, mesh.element_sets) or "; the mesh has none"
                 what = f"there is no element set {region!r}{near}"
                 problems.append(Problem(f"{key}.regions.{region}", what))
         meshes[name] = mesh
@@ -200,7 +201,7 @@ def _probes(
                 yield Problem(f"{key}.body", "missing: there are several bodies")
         elif body not in names:
             if names:
-                near = did_you_mean(body, names)
+                near = suggest_word(body, names)
                 yield Problem(f"{key}.body", f"there is no body {body!r}{near}")
         elif body in meshes:
             try:

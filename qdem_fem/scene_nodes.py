@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.scene import Mesh, Nodes
-from qdem_fem.scene_file import Problem, did_you_mean
+from trackbed.scene_file import Problem, suggest_word
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh
@@ -92,7 +92,7 @@ def nodes_named(nodes: Nodes, mesh: TetMesh, key: str) -> IntArray:
     if nodes.set is not None:
         sets = node_sets(mesh)
         if nodes.set not in sets:
-            near = did_you_mean(nodes.set, sets)
+            near = suggest_word(nodes.set, sets)
             known = f" (sets of this mesh: {', '.join(sorted(sets)[:20])})"
             what = f"there is no set {nodes.set!r}{near}{known if 'mean' in near else ''}"
             raise NoNodes(Problem(f"{key}.set", what))

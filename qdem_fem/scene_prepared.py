@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.scene import BodyTable, Output, Scene, SeriesTable, SimulationTable
-from qdem_fem.scene_file import Problem, SceneText
-from qdem_fem.scene_types import Table
+from trackbed.scene_file import Problem, SceneText
+from trackbed.scene_types import Table
 
 if TYPE_CHECKING:
     from qdem_fem.mesh import TetMesh

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import json
-import signal
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
@@ -17,9 +13,11 @@ import numpy as np
 
 from qdem_fem.energy_account import EnergyAccount
 from qdem_fem.errors import EnergyLost, Interrupted
-from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, write_whole
+from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read
 from qdem_fem.run_folder import RunFolder
 from qdem_fem.scene_prepared import Prepared
+from trackbed.signals import note_signals
+from trackbed.whole_files import write_whole
 
 CHUNK_WORK = 50_000_000
 """Element-steps between two looks at the clock and the signals: a second or a few."""
@@ -133,7 +131,7 @@ def run_dynamic(
     record.cost = cost
     done = Done(run, bodies, plan, cost)
     saved = time.monotonic()
-    with stop_signals() as stop:
+    with note_signals() as stop:
         while run.steps_done < plan.total:
             record.advance(plan.next_stop(run.steps_done) - run.steps_done, probes)
             progress.at(run.steps_done, plan.total, run.time)
@@ -310,33 +308,3 @@ def _probed(probes: dict[str, Any]) -> list[float]:
 def _energy_row(run: Any, when: float) -> Any:
     energy = run.energy()
     return np.array([[when, *(float(getattr(energy, name)) for name in energy_names(run))]])
-
-
-class Stop:
-    """Whether we were asked to stop: ``name`` of the signal."""
-
-    name = ""
-
-
-@contextmanager
-def stop_signals() -> Iterator[Stop]:
-    """SIGINT and SIGTERM set ``name`` and let the step finish; a second one stops at once."""
-    stop = Stop()
-    before: dict[signal.Signals, Any] = {}
-
-    def heard(number: int, _frame: object) -> None:
-        stop.name = signal.Signals(number).name
-        for one, handler in before.items():
-            signal.signal(one, handler)
-        print(f"{stop.name}: the state is saved, then the run stops", file=sys.stderr)
-
-    try:
-        for one in (signal.SIGINT, signal.SIGTERM):
-            before[one] = signal.signal(one, heard)
-    except ValueError:  # not in the main thread: whoever runs us there takes care of signals
-        before = {}
-    try:
-        yield stop
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from qdem_fem.scene import SeriesTable
-from qdem_fem.scene_file import Problem, did_you_mean
+from trackbed.errors import LibraryMissing, UsageError
+from trackbed.scene_file import Problem
+from trackbed.series_file import SI, TIMES, read_columns
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -99,43 +99,20 @@ def _from_csv(table: SeriesTable, key: str, folder: Path) -> TimeSeries:
     if not isinstance(table.value, str):
         raise WrongSeries(Problem(f"{key}.value", "name the column of the values"))
     path = folder / str(table.csv)
-    columns = (table.time, table.value)
 
-    def refuse(what: str, line: int | None = None) -> WrongSeries:
-        where = str(path) if line is None else f"{path}:{line}"
+    def refuse(what: str, where: str) -> WrongSeries:
         return WrongSeries(Problem(f"{key}.csv", what, where))
 
     try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.reader(stream)
-            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except (OSError, ValueError) as error:  # ValueError: a null byte in the path, no UTF-8
-        raise refuse(f"can not read it ({getattr(error, 'strerror', None) or error})") from error
-    except csv.Error as error:
-        raise refuse(f"no file of comma-separated values ({error})") from error
-    header = [cell.strip() for cell in rows[0][1]] if rows else []
-    for column in columns:
-        if column not in header:
-            near = did_you_mean(column, header)
-            raise refuse(f"there is no column {column!r} in its first line{near}")
-        if header.count(column) > 1:
-            raise refuse(f"{header.count(column)} columns are named {column!r}")
-    places = [header.index(column) for column in columns]
-    samples: list[tuple[float, float]] = []
-    for line, row in rows[1:]:
-        try:
-            time, value = (float(row[place]) for place in places)
-        except (ValueError, IndexError):
-            raise refuse(f"expected numbers, found {','.join(row)[:60]!r}", line) from None
-        if not (isfinite(time) and isfinite(value)):
-            raise refuse(f"{time:g}, {value:g}: both must be finite", line)
-        if samples and time <= samples[-1][0]:
-            raise refuse(f"times must grow: {time:g} s follows {samples[-1][0]:g} s", line)
-        samples.append((time, value))
-    if not samples:
-        raise refuse("it has no rows")
-    times, values = np.array(samples).T
-    return TimeSeries(times.copy(), values.copy())
+        (times, values), lines = read_columns(path, (table.time, table.value), (TIMES, tuple(SI)))
+    except (UsageError, LibraryMissing) as error:
+        raise refuse(error.what, error.where) from error
+    back = np.flatnonzero(np.diff(times) <= 0)
+    if len(back):
+        row = int(back[0]) + 1
+        what = f"times must grow: {times[row]:g} s follows {times[row - 1]:g} s"
+        raise refuse(what, f"{path}:{lines[row]}")
+    return TimeSeries(times, values)
 
 
 def _directed(found: TimeSeries, table: SeriesTable, key: str, vector: bool) -> TimeSeries:

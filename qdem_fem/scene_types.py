@@ -4,24 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import BaseModel, Discriminator, Field, Tag
 
-LEAST = 1e-18
-"""Least positive number of a scene."""
+from trackbed.scene_types import Positive, Real, Text
 
-Real = Annotated[float, Field(ge=-1e18, le=1e18, allow_inf_nan=False)]
-Positive = Annotated[float, Field(ge=LEAST, le=1e18, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, le=1e18, allow_inf_nan=False)]
 Poisson = Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=1e-3, le=1, allow_inf_nan=False)]
 Vector = Annotated[tuple[Real, Real, Real], Field(strict=False)]
 Size = Annotated[tuple[Positive, Positive, Positive], Field(strict=False)]
 CellCount = Annotated[int, Field(ge=1, le=2000)]
 Cells = Annotated[tuple[CellCount, CellCount, CellCount], Field(strict=False)]
-NAME_PATTERN = r"^[\w.+-]{1,60}$"
-Name = Annotated[str, Field(pattern=NAME_PATTERN)]
-Text = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"^[^\x00]*$")]
-Interval = Annotated[float, Field(ge=0, le=1e18, allow_inf_nan=False)]
 
 
 def _kind(value: object) -> str:
@@ -62,9 +54,3 @@ NumberVectorName = Annotated[
     | Annotated[Text, Tag("#name")],
     Discriminator(_number_vector_or_name),
 ]
-
-
-class Table(BaseModel):
-    """A table of the scene file: frozen, of strict types, without unknown keys."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)

@@ -43,9 +43,9 @@ from qdem_fem.checkpoint import checkpoint_read, checkpoint_write
 from qdem_fem.errors import CheckpointError, NotConverged
 from qdem_fem.grain_set import GrainSet
 from qdem_fem.kinetic_damping import Damping, Rest, rest_find
-from qdem_fem.output import write_whole
 from qdem_fem.track_bodies import GAP, grains_nodes
 from qdem_fem.track_recipe import SLEEPER, BedRecipe, bodies_of_bed, grains_of
+from trackbed.whole_files import write_whole
 
 if TYPE_CHECKING:
     from qdem_fem.simulation import Simulation

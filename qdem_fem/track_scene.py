@@ -1,6 +1,6 @@
 """Scenes with a table ``[track]``: ballast and a sleeper, or part of it, in place of ``[[body]]``.
 
-``scenes/track-small.toml`` explains every key.  `track_load` checks such a scene; `track_enter`
+``track-small.toml`` explains every key.  `track_load` checks such a scene; `track_enter`
 prepares the bed, or takes it from its file, and gives the simulation that begins there.
 """
 
@@ -23,7 +23,6 @@ from qdem_fem.kinetic_damping import Rest
 from qdem_fem.material import Material
 from qdem_fem.mesh_checks import FloatArray, IntArray
 from qdem_fem.scene import BodyTable, Scene
-from qdem_fem.scene_file import Problem, SceneText, error_told
 from qdem_fem.scene_prepared import Prepared, Step, files_named, output_faults
 from qdem_fem.scene_series import TimeSeries, WrongSeries
 from qdem_fem.sleeper_mesh import SleeperShape
@@ -31,6 +30,7 @@ from qdem_fem.track_bed import Bed, bed_prepare, stages_ahead
 from qdem_fem.track_bodies import TrackBox
 from qdem_fem.track_recipe import SLEEPER, BedRecipe, names_of
 from qdem_fem.track_table import TrackTable, loads_of, track_faults
+from trackbed.scene_file import Problem, SceneText, describe_error
 
 BELOW = 0.1
 """Depth below the sleeper of the grains that are watched [m], as the paper's accelerometers; in a
@@ -86,7 +86,7 @@ def track_load(text: SceneText) -> TrackPrepared:
         except WrongSeries as wrong:
             problems.append(wrong.problem)
         except ConditionError as error:
-            problems.append(Problem("track.bogie", error_told(error)))
+            problems.append(Problem("track.bogie", describe_error(error)))
         bed = (text.path.parent / track.bed).parent
         if not bed.is_dir():  # or minutes of preparation would find no place
             problems.append(Problem("track.bed", f"there is no folder {bed}"))

@@ -1,6 +1,6 @@
 """The table ``[track]`` of a scene: its keys, what they demand of one another, its loads.
 
-``scenes/track-small.toml`` explains every key.
+``trackbed/scenes/track-small.toml`` explains every key.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from qdem_fem.load_rail import Track
 from qdem_fem.load_roughness import RailKind, Roughness, WheelKind
 from qdem_fem.load_train import Train, WheelFlat
 from qdem_fem.scene import MaterialTable, SeriesTable
-from qdem_fem.scene_file import Problem
 from qdem_fem.scene_series import TimeSeries, series_of
-from qdem_fem.scene_types import Cells, NonNegative, Positive, Real, Share, Table, Text
+from qdem_fem.scene_types import Cells, Share
 from qdem_fem.sleeper_mesh import SleeperShape
 from qdem_fem.track_layout import Part
 from qdem_fem.track_load import bogie_series, down, passing_time
+from trackbed.scene_file import Problem
+from trackbed.scene_types import NonNegative, Positive, Real, Table, Text
 
 LEAST_SHOULDER = 0.1
 """Ballast beyond a free end, at least [m]: room for a grain and what is between."""

@@ -7,8 +7,9 @@ import json
 import sys
 import time
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from trackbed.run_arguments import add_run_arguments, place_run, refuse_both
 
 if TYPE_CHECKING:
     from rigid_lcp.scene_file import SceneFile
@@ -18,33 +19,17 @@ if TYPE_CHECKING:
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``rigid`` to its parser."""
     assert verb == "rigid"
-    parser.add_argument("scene", metavar="SCENE", type=Path, help="a scene of rigid bodies (TOML)")
-    parser.add_argument(
-        "--run-folder", type=Path, metavar="FOLDER", help="default: SCENE-run beside the scene"
+    add_run_arguments(
+        parser, "a scene of rigid bodies (TOML)", "run.duration=0.1", "the last frame"
     )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
-        help="change a key of the scene, such as run.duration=0.1; may be repeated",
-    )  # fmt: skip
-    parser.add_argument(
-        "--dry-run", action="store_true", help="check the scene and tell what would run"
-    )
-    parser.add_argument("--resume", action="store_true", help="go on from the last frame")
-    parser.add_argument(
-        "--force", action="store_true", help="lose the run that is in the folder and start anew"
-    )
-    parser.add_argument("--no-pictures", action="store_true", help="write the report without any")
-    parser.add_argument("--json", action="store_true", help="print JSON on standard output")
     parser.set_defaults(command=rigid_command)
 
 
 def rigid_command(arguments: argparse.Namespace) -> int:
     """Run a scene, or tell what would run."""
-    from rigid_lcp.errors import UsageError
     from rigid_lcp.scene_file import scene_read
 
-    if arguments.resume and arguments.force:
-        raise UsageError("--resume and --force exclude each other", remedy="give one of them")
+    refuse_both(arguments)
     file = scene_read(arguments.scene, arguments.overrides)
     answer = _outlook(file) if arguments.dry_run else _run(file, arguments)
     if arguments.json:
@@ -86,20 +71,23 @@ def _outlook(file: SceneFile) -> dict[str, Any]:
 
 def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
-    from rigid_lcp.interruption import interruptible
-    from rigid_lcp.provenance import provenance
     from rigid_lcp.report import report_write
-    from rigid_lcp.run_folder import RESULT, RunFolder, write_whole
+    from rigid_lcp.run_folder import RESULT, RunFolder
     from rigid_lcp.scene_run import scene_run, simulation_of, summary_of
+    from trackbed.provenance import record_provenance
+    from trackbed.signals import raise_on_signals
+    from trackbed.whole_files import write_whole
 
     scene, run = simulation_of(file)  # what it refuses must not leave a folder behind
-    path = arguments.run_folder or arguments.scene.with_name(f"{arguments.scene.stem}-run")
+    path = place_run(arguments)
     folder = RunFolder(path)
     manifest = {
         "scene": file.tables.model_dump(mode="json"),
-        "provenance": provenance(["trackbed", *sys.argv[1:]]),
+        "provenance": record_provenance(["trackbed", *sys.argv[1:]]),
     }
-    with folder.locked(), interruptible(path):
+    kept = "every finished frame is saved"
+    remedy = "the same command with --resume goes on from the last one"
+    with folder.locked(), raise_on_signals(kept, remedy, str(path)):
         goes_on = folder.settle(manifest, file.text, resume=arguments.resume, force=arguments.force)
         there = folder.summary
         if goes_on and there is not None:

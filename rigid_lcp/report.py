@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from html import escape
 from pathlib import Path
@@ -13,26 +12,14 @@ from numpy.typing import NDArray
 
 from rigid_lcp import pictures
 from rigid_lcp.frame_bodies import frame_scene
-from rigid_lcp.run_folder import RunFolder, frame_read, write_whole
+from rigid_lcp.run_folder import RunFolder, frame_read
 from rigid_lcp.scene import Scene
 from rigid_lcp.scene_run import history_of, history_write
+from trackbed.report.page import bullets, page, paragraph, picture, section, table
+from trackbed.whole_files import write_whole
 
 Floats = NDArray[np.float64]
 
-STYLE = """
-:root { color-scheme: light; }
-body { font: 16px/1.5 Charter, Georgia, serif; color: #1a1a1a; background: #fff;
-  max-width: 54rem; margin: 2.5rem auto; padding: 0 1.25rem; }
-h1 { font-size: 1.6rem; line-height: 1.2; margin: 0 0 .3rem; }
-h2 { font-size: 1.15rem; margin: 2.2rem 0 .5rem; border-top: 1px solid #ccc; padding-top: .6rem; }
-.claim { font-size: 1.1rem; border-left: 4px solid #0b5fa5; padding: .1rem 0 .1rem 1rem; }
-figure { margin: 1rem 0; break-inside: avoid; }
-figure img { max-width: 100%; height: auto; display: block; margin: auto; }
-figcaption { font-size: .87rem; color: #444; }
-table { border-collapse: collapse; font: .86rem/1.4 Helvetica, Arial, sans-serif; }
-th, td { padding: .25rem .8rem .25rem 0; text-align: left; border-bottom: 1px solid #e4e4e4; }
-pre { background: #f5f5f5; padding: .7rem .9rem; white-space: pre-wrap; overflow-wrap: anywhere; }
-"""
 ROWS = (
     ("bodies that move", "bodies", "{:,}"),
     ("time", "time", "{:.6g} s"),
@@ -86,26 +73,17 @@ def report_write(
             f" In {summary['steps_cut_off']:,} steps collisions ran out of rounds, and their rest "
             "ended without restitution, which costs energy."
         )
-    rows = "".join(
-        f"<tr><td>{name}</td><td>{form.format(summary[key])}</td></tr>"
-        for name, key, form in ROWS
-        if key in summary
-    )
-    absent = "".join(f"<li>{escape(text)}</li>" for text in summary["left_out"])
-    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-    page = [
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"/>',
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}"/>',
-        f"<title>{escape(title)}</title><style>{STYLE}</style></head><body>",
-        f'<h1>{escape(title)}</h1><p class="claim">{escape(claim)}</p>',
-        *(_figure(path, caption) for path, caption in figures),
-        f"<h2>Figures</h2><table>{rows}</table>",
-        f"<h2>Left out</h2><ul>{absent}</ul>",
-        f"<h2>Again</h2><pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>",
-        "</body></html>\n",
+    rows = [(name, form.format(summary[key])) for name, key, form in ROWS if key in summary]
+    parts = [
+        f"<h1>{escape(title)}</h1>",
+        paragraph(escape(claim), "claim"),
+        *(picture(path, caption, escape(caption)) for path, caption in figures),
+        section("Figures", table("", (), rows)),
+        section("Left out", bullets(escape(text) for text in summary["left_out"])),
+        section("Again", f"<pre>{escape(json.dumps(manifest['provenance'], indent=1))}</pre>"),
     ]
     path = folder.path / "report.html"
-    write_whole(path, "\n".join(page))
+    write_whole(path, page(title, parts))
     return path
 
 
@@ -149,11 +127,3 @@ def picture_write(folder: RunFolder, name: str, figure: Any) -> Path:
     path = folder.path / f"picture-{name}.png"
     write_whole(path, pictures.figure_png(figure))
     return path
-
-
-def _figure(path: Path, caption: str) -> str:
-    data = base64.b64encode(path.read_bytes()).decode()
-    return (
-        f'<figure><img src="data:image/png;base64,{data}" alt="{escape(caption)}"/>'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from rigid_lcp.breakage import Breakage
 from rigid_lcp.errors import UsageError
-from rigid_lcp.run_folder import FRAME, RunFolder, frame_read, frame_restore, write_whole
+from rigid_lcp.run_folder import FRAME, RunFolder, frame_read, frame_restore
 from rigid_lcp.scene import Scene
 from rigid_lcp.scene_file import SceneFile, loads_of, scene_build
 from rigid_lcp.simulation import NO_STEP, Simulation
 from rigid_lcp.wear import Wear
+from trackbed.whole_files import write_whole
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float, Simulation], None]

@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from rigid_lcp.scene_input import MOST_STEPS, too_many_steps
+from trackbed.scene_file import Problem, suggest_word
+from trackbed.scene_types import Name, NonNegative, Positive, Real, Table
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-"""Whole numbers too, but neither true nor a word."""
-Positive = Annotated[Number, Field(gt=0)]
-NotNegative = Annotated[Number, Field(ge=0)]
-Vector = Annotated[list[Number], Field(min_length=2, max_length=3)]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]{0,59}$")]
+Vector = Annotated[list[Real], Field(min_length=2, max_length=3)]
+VECTORS = (
+    "normal", "position", "velocity", "box", "region_low", "region_high", "force", "least",
+)  # fmt: skip
+"""Keys whose values have one number a dimension."""
+Restitution = Annotated[Real, Field(ge=0, le=1)]
 LEAST_OF_A_STEP = 1e-6
 """Shortest time between two frames in steps."""
-
-
-class Table(BaseModel):
-    """A table that knows all its keys."""
-
-    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)
 
 
 class Surface(Table):
     """What bodies without values of their own get."""
 
-    friction: NotNegative = 0.0
-    restitution: Annotated[Number, Field(ge=0, le=1)] = 0.0
+    friction: NonNegative = 0.0
+    restitution: Restitution = 0.0
 
 
 class Run(Table):
@@ -39,7 +36,7 @@ class Run(Table):
     step: Positive = 1e-3
     """Length of a step, the longest one at acceleration level [s]."""
     method: Literal["time-stepping", "acceleration"] = "time-stepping"
-    tolerance: Annotated[Number, Field(ge=1e-14, le=1e-3)] = 1e-10
+    tolerance: Annotated[Real, Field(ge=1e-14, le=1e-3)] = 1e-10
     """Scale-free residual of the contact forces [-]."""
     frames: Annotated[int, Field(ge=1, le=100_000)] = 20
     """States that are kept, at equal times."""
@@ -59,9 +56,9 @@ class Ground(Table):
     """A half-space: everything with ``normal . x <= offset``."""
 
     normal: Vector
-    offset: Number = 0.0
-    friction: NotNegative | None = None
-    restitution: Annotated[Number, Field(ge=0, le=1)] | None = None
+    offset: Real = 0.0
+    friction: NonNegative | None = None
+    restitution: Restitution | None = None
 
 
 class BodyTable(Table):
@@ -81,12 +78,12 @@ class BodyTable(Table):
     upright."""
     fixed: bool = False
     position: Vector | None = None
-    angle: Number | Annotated[list[Number], Field(min_length=4, max_length=4)] | None = None
+    angle: Real | Annotated[list[Real], Field(min_length=4, max_length=4)] | None = None
     """[rad]; in 3D a quaternion w, x, y, z."""
     velocity: Vector | None = None
-    spin: Number | Vector | None = None
-    friction: NotNegative | None = None
-    restitution: Annotated[Number, Field(ge=0, le=1)] | None = None
+    spin: Real | Vector | None = None
+    friction: NonNegative | None = None
+    restitution: Restitution | None = None
 
     @model_validator(mode="after")
     def _one_shape(self) -> BodyTable:
@@ -108,11 +105,11 @@ class Grains(Table):
     region_high: Vector
     """Corners of the region that the grid fills from below [m]; higher if it does not suffice."""
     density: Positive
-    corners: Annotated[list[int], Field(min_length=2, max_length=2)] = [5, 9]
+    corners: Annotated[list[int], Field(min_length=2, max_length=2)] = Field([5, 9])
     """Fewest and most corners of a stone."""
     seed: Annotated[int, Field(ge=0)] = 1
-    friction: NotNegative | None = None
-    restitution: Annotated[Number, Field(ge=0, le=1)] | None = None
+    friction: NonNegative | None = None
+    restitution: Restitution | None = None
 
     @model_validator(mode="after")
     def _in_order(self) -> Grains:
@@ -137,9 +134,9 @@ class Load(Table):
     """The smallest force of a cyclic load [N]; zero if not given."""
     frequency: Positive | None = None
     """[Hz]; without it the load is constant."""
-    phase: Number = 0.0
+    phase: Real = 0.0
     """Of a cyclic load at its begin [rad]; at zero it starts from the smallest force."""
-    begin: NotNegative = 0.0
+    begin: NonNegative = 0.0
     end: Positive | None = None
 
     @model_validator(mode="after")
@@ -169,7 +166,7 @@ class StrengthTable(Table):
     """[Pa]"""
     every: Annotated[int, Field(ge=1)] = 20
     """Steps between judgements."""
-    smallest: NotNegative = 0.0
+    smallest: NonNegative = 0.0
     """Volume below which grains do not break [m^3], in 2D area [m^2]."""
     modulus: Positive | None = None
     """Weibull's modulus; with ``reference_volume``."""
@@ -187,62 +184,54 @@ class SceneTables(Table):
     gravity: Vector | None = None
     run: Run
     surface: Surface = Surface()
-    ground: list[Ground] = []
-    body: list[BodyTable] = []
-    grains: list[Grains] = []
-    load: list[Load] = []
+    ground: list[Ground] = Field([])
+    body: list[BodyTable] = Field([])
+    grains: list[Grains] = Field([])
+    load: list[Load] = Field([])
     wear: WearTable | None = None
     strength: StrengthTable | None = None
 
-    @model_validator(mode="before")
-    @classmethod
-    def _no_lists_of_one(cls, data: Any) -> Any:
-        for name in ("ground", "body", "grains", "load"):
-            if isinstance(data, dict) and isinstance(data.get(name), dict):
-                raise ValueError(f"write [[{name}]], with two brackets")
-        return data
 
-    @model_validator(mode="after")
-    def _fits_together(self) -> SceneTables:
-        vectors = [
-            (f"body.{i}.vertices.{k} (body {body.name})", vertex)
-            for i, body in enumerate(self.body)
-            for k, vertex in enumerate(body.vertices or [])
-        ] + [
-            (f"{kind}.{i}.{key}", value)
-            for kind in ("ground", "body", "grains", "load")
-            for i, table in enumerate(getattr(self, kind))
-            for key in (
-                "normal", "position", "velocity", "box", "region_low", "region_high", "force",
-                "least",
-            )
-            if (value := getattr(table, key, None)) is not None
-        ]  # fmt: skip
-        for key, value in [("gravity", self.gravity or [0.0] * self.dimensions), *vectors]:
-            if len(value) != self.dimensions:
-                raise ValueError(f"{key} has {len(value)} numbers in {self.dimensions} dimensions")
-        names = [body.name for body in self.body]
-        held = {body.name for body in self.body if body.fixed}
-        if len(set(names)) < len(names):
-            twice = next(name for name in names if names.count(name) > 1)
-            raise ValueError(f"two bodies have the name {twice}")
-        for i, load in enumerate(self.load):
-            if load.body not in names:
-                raise ValueError(f"load.{i}.body: there is no body {load.body}")
-            if load.body in held:
-                raise ValueError(f"load.{i}.body: {load.body} is fixed, no load moves it")
-        for i, body in enumerate(self.body):
-            if body.inertia is not None and (self.dimensions == 3 or body.fixed):
-                raise ValueError(f"body.{i}.inertia: for bodies that move, in 2 dimensions")
-        for i, grains in enumerate(self.grains):
-            if self.dimensions == 3 and grains.corners[0] < 4:
-                raise ValueError(f"grains.{i}.corners: a polyhedron has at least 4")
-        if self.run.method == "acceleration" and (self.wear or self.strength):
-            raise ValueError("run.method: nothing wears or breaks at acceleration level")
-        if self.strength and (self.strength.modulus is None) != (
-            self.strength.reference_volume is None
-        ):
-            raise ValueError("strength: give both modulus and reference_volume, or neither")
-        if not self.grains and all(body.fixed for body in self.body):
-            raise ValueError("no body can move: add a [[body]] with a density, or [[grains]]")
-        return self
+def find_faults(tables: SceneTables) -> Iterator[Problem]:
+    """What the tables of a scene demand of one another."""
+    yield from _find_wrong_sizes(tables)
+    names = [body.name for body in tables.body]
+    held = {body.name for body in tables.body if body.fixed}
+    for i, body in enumerate(tables.body):
+        if body.name in names[:i]:
+            yield Problem(f"body.{i}.name", f"two bodies have the name {body.name}")
+        if body.inertia is not None and (tables.dimensions == 3 or body.fixed):
+            yield Problem(f"body.{i}.inertia", "for bodies that move, in 2 dimensions")
+    for i, load in enumerate(tables.load):
+        if load.body not in names:
+            near = suggest_word(load.body, names)
+            yield Problem(f"load.{i}.body", f"there is no body {load.body}{near}")
+        elif load.body in held:
+            yield Problem(f"load.{i}.body", f"{load.body} is fixed, no load moves it")
+    for i, grains in enumerate(tables.grains):
+        if tables.dimensions == 3 and grains.corners[0] < 4:
+            yield Problem(f"grains.{i}.corners", "a polyhedron has at least 4")
+    if tables.run.method == "acceleration" and (tables.wear or tables.strength):
+        yield Problem("run.method", "nothing wears or breaks at acceleration level")
+    if tables.strength and (tables.strength.modulus is None) != (
+        tables.strength.reference_volume is None
+    ):
+        yield Problem("strength", "give both modulus and reference_volume, or neither")
+    if not tables.grains and all(body.fixed for body in tables.body):
+        yield Problem("", "no body can move: add a [[body]] with a density, or [[grains]]")
+
+
+def _find_wrong_sizes(tables: SceneTables) -> Iterator[Problem]:
+    """Vectors that are not of the scene's dimensions."""
+    vectors: list[tuple[str, Any]] = [("gravity", tables.gravity)]
+    for kind, entries in (
+        ("ground", tables.ground), ("body", tables.body), ("grains", tables.grains),
+        ("load", tables.load),
+    ):  # fmt: skip
+        for i, table in enumerate(entries):
+            vectors += [(f"{kind}.{i}.{name}", getattr(table, name, None)) for name in VECTORS]
+            for k, vertex in enumerate(getattr(table, "vertices", None) or ()):
+                vectors.append((f"{kind}.{i}.vertices.{k}", vertex))
+    for key, value in vectors:
+        if value is not None and len(value) != tables.dimensions:
+            yield Problem(key, f"has {len(value)} numbers in {tables.dimensions} dimensions")

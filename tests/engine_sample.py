@@ -28,7 +28,7 @@ from adapters.run_folder import RunFolder
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.window import Window, window_load, window_read
-from scenes import scene_template
+from trackbed.scenes import scene_template
 
 REAL = [pytest.param(name, marks=pytest.mark.engine(name)) for name in real_engines()]
 """Engines with mechanics, and with a process to kill."""

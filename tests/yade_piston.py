@@ -13,7 +13,7 @@ from adapters.engine_yade import PARAMETERS, YadeEngine, piston_face
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 SCRIPT = """\
 import os

@@ -6,11 +6,12 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from errno import EDQUOT, EFBIG, ENOSPC
 from importlib import import_module
 from textwrap import wrap
 
 from trackbed import __version__
+from trackbed.errors import NO_ROOM, Interrupted, TrackbedError, describe_exit_codes
+from trackbed.run_verbs import choose_command
 
 ADAPTERS = "adapters.cli"
 VERBS = {
@@ -34,15 +35,6 @@ VERBS = {
 }
 """Verb -> module whose ``register(verb, parser)`` adds the verb's arguments, and a summary."""
 
-EXIT_CODES = """\
-exit codes:
-  0  ok                            5  engine failed, or disk full
-  1  bug in trackbed               6  result not credible
-  2  usage                         7  not converged
-  3  scene invalid                 8  members of a sweep failed
-  4  engine or library missing   130  interrupted, state saved
-"""
-
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):
     """Help whose lines do not break at hyphens: names of scenes and flags stay whole."""
@@ -56,7 +48,7 @@ def parser_build(verb: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="trackbed",
         description="Railway ballast: settlement under load cycles, vibration, hard grains.",
-        epilog=EXIT_CODES,
+        epilog=describe_exit_codes(),
         formatter_class=HelpFormatter,
         allow_abbrev=False,
     )
@@ -65,8 +57,8 @@ def parser_build(verb: str | None) -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", title="verbs", required=True)
     for name, (module, summary) in VERBS.items():
         verb_parser = verbs.add_parser(
-            name, help=summary, description=summary, allow_abbrev=False, epilog=EXIT_CODES,
-            formatter_class=HelpFormatter,
+            name, help=summary, description=summary, allow_abbrev=False,
+            epilog=describe_exit_codes(), formatter_class=HelpFormatter,
         )  # fmt: skip
         verb_parser.add_argument(
             "--debug", action="store_true", default=argparse.SUPPRESS, help=argparse.SUPPRESS
@@ -130,14 +122,14 @@ def import_failed(error: ImportError) -> str:
 
 def explained(error: BaseException) -> tuple[str, int]:
     """What to say of an error, and the exit code."""
-    if hasattr(error, "exit_code"):
+    if isinstance(error, TrackbedError | Interrupted):
         return str(error), error.exit_code
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", 130
     if isinstance(error, ImportError) and (why := import_failed(error)):
         return why, 4
     if isinstance(error, OSError):
-        return str(error), 5 if error.errno in (ENOSPC, EDQUOT, EFBIG) else 2
+        return str(error), 5 if error.errno in NO_ROOM else 2
     return (
         f"{type(error).__name__}: {error}\n  -> this is a bug in trackbed; run again with --debug "
         "and report the traceback",
@@ -150,7 +142,7 @@ def main(words: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if words is None else words
     try:
         arguments = parser_build(verb_named(words)).parse_args(words)
-        code: int = arguments.command(arguments)
+        code = choose_command(arguments)(arguments)
         sys.stdout.flush()
         return code
     except BrokenPipeError:  # the reader of our output went away, as in: trackbed ... | head

@@ -14,7 +14,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 from adapters.errors import UsageError
-from adapters.scene_checks import did_you_mean
+from trackbed.scene_file import suggest_word
 from validation import cases
 from validation.study import import_part, list_studies, read_record, record_path
 
@@ -98,7 +98,7 @@ def case_load(name: str) -> Callable[[bool], list[Check]]:
         return run
     if name in list_studies():
         return partial(judge_study, name)
-    known = did_you_mean(name, case_names())
+    known = suggest_word(name, case_names())
     raise UsageError(f"there is no validation case {name}{known}")
 
 

@@ -30,8 +30,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import t as student
 
-from adapters.provenance import provenance
-from adapters.run_folder import write_atomically
+from trackbed.provenance import record_provenance as provenance
+from trackbed.whole_files import write_whole
 
 if TYPE_CHECKING:
     from validation.case import Check
@@ -80,7 +80,7 @@ def measure_parts(
             *(one for one in parts if one in known),
             *(one for one in known if one not in parts),
         ]
-        write_atomically(path, "".join(json.dumps(known[one]) + "\n" for one in ordered))
+        write_whole(path, "".join(json.dumps(known[one]) + "\n" for one in ordered))
         print(json.dumps(row), flush=True)
 
 

@@ -21,7 +21,7 @@ from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
 from adapters.window import Window, window_read
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 SMALL = (
     "sample.count=60",

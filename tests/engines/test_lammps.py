@@ -28,7 +28,7 @@ from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State, state_load
 from adapters.window import Window, window_load, window_read
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 pytestmark = pytest.mark.engine("lammps")
 

@@ -29,9 +29,9 @@ from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State, state_load
 from adapters.window import Window, window_load, window_read
-from scenes import scene_template
 from tests.forked_commands import Commands, processes_in
 from trackbed import command
+from trackbed.scenes import scene_template
 
 pytestmark = pytest.mark.engine("liggghts")
 

@@ -26,7 +26,7 @@ from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import Contacts, State
 from adapters.window import Window, window_load, window_read
-from scenes import scene_template
+from trackbed.scenes import scene_template
 
 pytestmark = pytest.mark.engine("liggghts")
 

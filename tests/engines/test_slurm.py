@@ -20,9 +20,9 @@ import pytest
 
 from adapters.engine_process import process_run
 from adapters.run_folder import RunFolder
-from scenes import scene_path
 from tests.engines.test_cluster_scene import SMALL
 from tests.forked_commands import processes_in
+from trackbed.scenes import scene_path
 
 ROOT = Path(__file__).parents[2]
 TINY = (

@@ -18,9 +18,9 @@ from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
 from adapters.window import Window, state_read, window_read
-from scenes import scene_template
 from tests.tangential_rules import LOOPS, force_incremental, work
 from tests.yade_few_grains import track_run
+from trackbed.scenes import scene_template
 from validation.bench.few_grains import (
     RADIUS,
     Track,

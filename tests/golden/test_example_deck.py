@@ -17,7 +17,7 @@ from adapters.engine_liggghts import LiggghtsEngine
 from adapters.radii import radii_sample
 from adapters.sample import sample_start
 from adapters.scene_file import scene_load
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 EXAMPLE = Path(str(files("liggghts_inputs"))) / "example"
 BED = (

@@ -12,8 +12,6 @@ from rigid_lcp.polygon import Polygon
 from rigid_lcp.pouring import grains_place
 from rigid_lcp.scene import Scene, world_of
 from rigid_lcp.scene_types import Grains
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polygon import Polygon
 from validation.studies.rigid_ballast import soft as md
 
 pytestmark = pytest.mark.studies

@@ -178,7 +178,7 @@ def test_new_writes_the_shipped_scene(tmp_path: Path, capsys: pytest.CaptureFixt
     folder = tmp_path / "deep" / "my bed"
     assert main(["new", "karrech", str(folder)]) == 0
     written = folder / "scene.toml"
-    assert written.read_bytes() == (ROOT / "scenes" / "karrech.toml").read_bytes()
+    assert written.read_bytes() == (ROOT / "trackbed" / "scenes" / "karrech.toml").read_bytes()
     assert f"trackbed run '{written}'" in capsys.readouterr().out
     written.write_text("mine")
     assert main(["new", "karrech", str(folder)]) == 2
@@ -191,7 +191,7 @@ def test_every_shipped_scene_is_offered(capsys: pytest.CaptureFixture[str]) -> N
     with pytest.raises(SystemExit):
         main(["new", "--help"])
     text = capsys.readouterr().out
-    for path in (ROOT / "scenes").glob("*.toml"):
+    for path in (ROOT / "trackbed" / "scenes").glob("*.toml"):
         assert path.stem in text
 
 
@@ -422,8 +422,7 @@ def test_validate_record(
 def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
     """5 in all packages, and no other refusal to write has it."""
     from adapters.run_folder import disk_full_named
-    from qdem_fem.output import can_not_write
-    from rigid_lcp.run_folder import refusal_told
+    from trackbed.whole_files import refuse_writing
 
     def code(number: int, told: Callable[[Path], AbstractContextManager[None]]) -> int:
         with pytest.raises(Exception, match=os.strerror(number)) as caught, told(tmp_path):
@@ -434,9 +433,7 @@ def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
         (errno.ENOSPC, 5), (errno.EDQUOT, 5), (errno.EFBIG, 5), (errno.EACCES, 2), (errno.EIO, 2)
     ):  # fmt: skip
         assert code(number, disk_full_named) == wanted
-        assert code(number, refusal_told) == wanted
-        found = can_not_write(tmp_path, OSError(number, os.strerror(number)))
-        assert explained(found)[1] == wanted
+        assert code(number, refuse_writing) == wanted
         assert explained(OSError(number, os.strerror(number)))[1] == wanted
 
 

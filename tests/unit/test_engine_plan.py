@@ -7,7 +7,7 @@ import pytest
 
 from adapters.engine_plan import SEAT_DRAG_SHARE, SEAT_SHARE, seat_plan
 from adapters.scene_file import scene_load
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 SHIPPED = ("karrech", "karrech-coarse", "karrech-partial")
 

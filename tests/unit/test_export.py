@@ -25,8 +25,8 @@ from adapters.report_record import record_read
 from adapters.scene_file import scene_load
 from adapters.state import Contacts, State
 from adapters.window import PistonTrack, Window
-from scenes import scene_template
 from trackbed import command
+from trackbed.scenes import scene_template
 
 CYCLES = [0, 1, 2, 3, 4, 5, 7, 8, 9, 10, 11]
 """Instants of the fixture's run, which jumps from 5 to 7."""

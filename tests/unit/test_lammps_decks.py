@@ -23,7 +23,7 @@ from adapters.lammps_decks import (
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import State
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 RULE = LammpsEngine().tangential
 

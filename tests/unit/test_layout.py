@@ -52,6 +52,12 @@ def test_stories_do_not_import_one_another(story: str) -> None:
         assert not imported(path.read_text()) & strangers, path
 
 
+def test_the_floor_imports_no_story() -> None:
+    """``trackbed/`` stands below the stories; the command finds theirs by name when asked."""
+    for path in (ROOT / "trackbed").rglob("*.py"):
+        assert not imported(path.read_text()) & {*STORIES, "validation", "tests"}, path
+
+
 @pytest.mark.parametrize(
     "source",
     [
@@ -97,7 +103,7 @@ def test_data_files_are_packaged() -> None:
     """Each file beside the decks, scenes and results matches a package-data pattern."""
     patterns = PYPROJECT["tool"]["setuptools"]["package-data"]
     for package, globs in patterns.items():
-        folder = ROOT / package
+        folder = ROOT / package.replace(".", "/")
         packaged = {path for pattern in globs for path in folder.glob(pattern)}
         data = {
             path

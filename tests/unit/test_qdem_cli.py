@@ -311,15 +311,6 @@ def test_folder_is_never_lost_unasked(scene: Path) -> None:
         command(scene, "--force", "--resume")
 
 
-def test_one_writer_at_a_time(scene: Path) -> None:
-    """A second process is refused while the first one holds the folder."""
-    from qdem_fem.run_folder import RunFolder
-
-    folder = RunFolder(scene.with_name("scene-run"))
-    with folder.locked(), pytest.raises(UsageError, match=f"another process .*pid {os.getpid()}"):
-        command(scene)
-
-
 def test_dry_run_tells_and_writes_nothing(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A dry run names elements, step, steps, cost and what is left out, and leaves no file."""
     before = sorted(scene.parent.iterdir())

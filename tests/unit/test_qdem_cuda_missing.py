@@ -12,7 +12,7 @@ import qdem_fem as q
 from qdem_fem.errors import LibraryMissing
 
 ROOT = Path(__file__).parents[2]
-SCENE = (ROOT / "scenes" / "cantilever-vibration.toml").read_text()
+SCENE = (ROOT / "trackbed" / "scenes" / "cantilever-vibration.toml").read_text()
 WITHOUT_RUNTIME = r"""
 import importlib.abc, sys
 

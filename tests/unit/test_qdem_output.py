@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from qdem_fem.errors import DiskFull, UsageError
 from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, vtu_write, write_whole
+from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, vtu_write
 from qdem_fem.pictures import picture_energy, picture_history, picture_spectrum, unit_of
 from qdem_fem.pictures_bodies import (
     feature_edges,
@@ -83,21 +83,6 @@ def test_pvd_names_times_and_files(tmp_path: Path) -> None:
         (0.0, "a.vtu"),
         (0.1 + 0.2, "b&.vtu"),
     ]
-
-
-def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
-    """A writer that dies half-way leaves the file as it was, and no rubbish."""
-    path = tmp_path / "a"
-    write_whole(path, "old")
-
-    def parts() -> Any:
-        yield b"new"
-        raise RuntimeError
-
-    with pytest.raises(RuntimeError):
-        write_whole(path, parts())
-    assert [one.name for one in tmp_path.iterdir()] == ["a"]
-    assert path.read_text() == "old"
 
 
 @settings(max_examples=30, deadline=None)

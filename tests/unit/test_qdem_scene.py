@@ -17,18 +17,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.errors import LibraryMissing, QdemError, SceneError, UsageError
+from qdem_fem.errors import LibraryMissing, QdemError, SceneError
 from qdem_fem.mesh_generation import box_mesh
 from qdem_fem.scene import Scene
 from qdem_fem.scene_build import simulation_of
 from qdem_fem.scene_checks import scene_load
-from qdem_fem.scene_lines import key_lines
 from qdem_fem.scene_prepared import Prepared
 from qdem_fem.scene_series import TimeSeries
 
 pytestmark = pytest.mark.lowest
 
-SCENES = Path(__file__).parents[2] / "scenes"
+SCENES = Path(__file__).parents[2] / "trackbed" / "scenes"
 CANTILEVER = (SCENES / "cantilever.toml").read_text(encoding="utf-8")
 VIBRATION = (SCENES / "cantilever-vibration.toml").read_text(encoding="utf-8")
 SMALL = "cells = [4, 1, 1]"
@@ -164,18 +163,6 @@ def test_series_are_read(tmp_path: Path, force: str, times: Any, values: Any) ->
     assert list(prepared.files) == (["p.csv"] if "csv" in force else [])
 
 
-def test_overrides_reach_tables_lists_and_names(tmp_path: Path) -> None:
-    """An override finds bodies by name, other entries by number, and adds what is not there."""
-    words = ("body.beam.material.young=2e9", "load.0.force=[0, 0, 5]", "output.sampling=0.01")
-    scene = load(tmp_path, BASE, *words).scene
-    assert scene.body[0].material.young == 2e9
-    assert scene.load[0].force == (0, 0, 5)
-    assert scene.output.sampling == 0.01
-    for word in ("load.1.force=[0, 0, 5]", "title", "=3", "body.beam.name.x=1", "a b=1"):
-        with pytest.raises(UsageError, match="--set"):
-            load(tmp_path, BASE, word)
-
-
 def test_regions_change_the_material_of_their_elements(tmp_path: Path) -> None:
     """Keys of a region hold in its elements and nowhere else; the mesh file counts beside it."""
     mesh = box_mesh((2, 1, 1), (4, 2, 2))
@@ -219,13 +206,9 @@ def test_left_out_names_what_the_scene_does_not(tmp_path: Path) -> None:
 WRONG = [
     ("density = 1000.0", "density = -1.0", "7: body.0.material.density: must be above 0"),
     ("poisson = 0.2", "poisson = 0.5", "6: body.0.material.poisson: must be below 0.5, not 0.5"),
-    ("young = 1e9", "yuong = 1e9", "5: body.0.material.yuong: unknown key; did you mean young?"),
-    ("young = 1e9", "young = nan", "5: body.0.material.young: must be a finite number"),
-    ("young = 1e9", 'young = "stiff"', "5: body.0.material.young: must be a valid number"),
     ("duration = 0.1", "duration = 0", "9: simulation.duration: must be above 0"),
     ("duration = 0.1", "", "8: simulation.duration: missing"),
     ("duration = 0.1", "duration = 0.1\nstep = 1.0", "10: simulation.step: must not exceed"),
-    ("duration = 0.1", 'duration = 0.1\nstrain = "fingr"', "10: simulation.strain: .*did you mean finger"),
     ('"x-max"', '"x-mxa"', "15: load.0.nodes.set: there is no set 'x-mxa'; did you mean x-max.*y-min"),
     ('"x-max"', '"core"', "15: load.0.nodes.set: .*known: x-max, x-min, y-max, y-min, z-max, z-min"),
     ('set = "x-max"', "box = { min = [3, 0, 0], max = [4, 1, 1] }", "15: load.0.nodes.box: names no node; the body spans 0 ... 2, 0"),
@@ -234,10 +217,7 @@ WRONG = [
     ('set = "x-max"', 'set = "x-max", all = true', "15: load.0.nodes: give exactly one of"),
     ('set = "x-max"', "", "15: load.0.nodes: give exactly one of"),
     ('body = "beam"\nnodes = { set = "x-max"', 'body = "bean"\nnodes = { set = "x-max"', "14: load.0.body: there is no body 'bean'; did you mean beam?"),
-    ("force = [0, 0, -1]", "force = [0, 0]", "16: load.0.force.2: missing"),
     ("force = [0, 0, -1]", "force = 5", "16: load.0.force: must be a list in"),
-    ("force = [0, 0, -1]", "force = [0, 0, -1, 0]", "16: load.0.force: must have 3 entries, not"),
-    ('set = "x-max"', 'set = ""', "15: load.0.nodes.set: must not be empty"),
     ('name = "beam"', 'name = "a beam"', "2: body.0.name: a name has 1 to 60 letters"),
     ("force = [0, 0, -1]", "force = { ramp = 1 }", "16: load.0.force.value: missing"),
     ("force = [0, 0, -1]", "force = { ramp = 1, value = 2 }", "16: load.0.force: a force is a vector"),
@@ -246,13 +226,11 @@ WRONG = [
     ("force = [0, 0, -1]", "force = { times = [0, nan], values = [[0, 0, 0], [0, 0, 1]] }", "16: load.0.force.times.1: must be a finite"),
     ("force = [0, 0, -1]", "force = { times = [0], values = [[0, 0, 0], [0, 0, 1]] }", "16: load.0.force.values: 1 times, 2 values"),
     ("box = { size = [2, 1, 1], cells = [4, 2, 2] }", 'file = "no.vtu"', "no.vtu.*: body.0.mesh: "),
-    ("box = {", "boxx = {", "3: body.0.mesh.boxx: unknown key; did you mean box?"),
     ("cells = [4, 2, 2]", "cells = [2000, 2000, 2000]", "3: body.0.mesh.box.cells: 8000000000 cells are too many"),
     ("cells = [4, 2, 2]", "cells = [0, 2, 2]", "3: body.0.mesh.box.cells.0: must be at least 1"),
     ("nearest = [2, 1, 1]", 'nearest = [2, 1, 1], body = "bem"', "18: output.probes.tip.body: there is no body 'bem'"),
     ("[output.probes]", "[output]\nsampling = 1\n[output.probes]", "18: output.sampling: must not exceed"),
     ("[[load]]", "[[laod]]", "13: laod: unknown key; did you mean load?"),
-    ("[[load]]", "[load]", "13: load: write \\[\\[load\\]\\] tables"),
     ("[simulation]", "[fix]\n[simulation]", "scene.toml:1\\d: this is not TOML"),
 ]  # fmt: skip
 
@@ -292,15 +270,15 @@ def test_all_faults_are_told_at_once_in_the_order_of_the_file(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        ("t,p\n0,1\n1,nan\n", "p.csv:3: load.0.force.csv: 1, nan: both must be finite"),
+        ("t,p\n0,1\n1,nan\n", "p.csv:3, column p: load.0.force.csv: 'nan' is not a finite number"),
         ("t,p\n0,1\n2,1\n1,1\n", "p.csv:4: load.0.force.csv: times must grow: 1 s follows 2 s"),
-        ("t,p\n0,1\n1,x\n", "p.csv:3: load.0.force.csv: expected numbers, found '1,x'"),
-        ("t,p\n0,1\n1\n", "p.csv:3: load.0.force.csv: expected numbers"),
-        ("t,q\n0,1\n", "p.csv: load.0.force.csv: there is no column 'p'"),
+        ("t,p\n0,1\n1,x\n", "p.csv:3, column p: load.0.force.csv: 'x' is not a number"),
+        ("t,p\n0,1\n1\n", "p.csv:3: load.0.force.csv: 1 cells under a header of 2"),
+        ("t,q\n0,1\n", "p.csv:1: load.0.force.csv: there is no column p among t, q"),
         ("t,p\n", "p.csv: load.0.force.csv: it has no rows"),
-        ("", "p.csv: load.0.force.csv: there is no column 't'"),
-        ("t,p,p\n0,1,2\n", "p.csv: load.0.force.csv: 2 columns are named 'p'"),
-        ("t,p\n0,\udcff\n", "p.csv: load.0.force.csv: can not read it"),
+        ("", "p.csv: load.0.force.csv: the file is empty"),
+        ("t,p,p\n0,1,2\n", "p.csv:1: load.0.force.csv: there are two columns p"),
+        ("t,p\n0,\udcff\n", "p.csv:2, column p: load.0.force.csv: '\u00ff' is not a number"),
     ],
 )
 def test_wrong_csv_series_are_refused_with_their_line(
@@ -344,29 +322,10 @@ def test_conditions_that_contradict_one_another_are_problems_of_the_scene(tmp_pa
         simulation_of(prepared)
 
 
-def test_same_name_twice_and_missing_scene(tmp_path: Path) -> None:
-    """Two bodies of one name; no file; a file of bytes; a folder."""
+def test_same_name_twice(tmp_path: Path) -> None:
+    """Two bodies of one name."""
     body = BASE[: BASE.index("[simulation]")]
     assert "body.0 has this name already" in refusal(tmp_path, body + BASE)
-    with pytest.raises(UsageError, match="can not read the scene"):
-        scene_load(tmp_path / "none.toml")
-    with pytest.raises(UsageError, match="can not read the scene"):
-        scene_load(tmp_path)
-    (tmp_path / "scene.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(SceneError, match="not a text file"):
-        scene_load(tmp_path / "scene.toml")
-
-
-def test_lines_of_keys() -> None:
-    """Lines of nested and repeated tables, values of many lines, quotes and comments."""
-    text = (
-        'a = """\n[x]\n""" # c,\n[[b]]\nc = [\n  1,\n  2, # ],\n]\n[b.d]\ne.f = 1\n'
-        "[[b]]\nc = { g = 1, h = [{ i = 2 }] }\n"
-    )
-    assert key_lines(text) == {
-        "a": 1, "b": 4, "b.0": 4, "b.0.c": 5, "b.0.d": 9, "b.0.d.e": 10, "b.0.d.e.f": 10,
-        "b.1": 11, "b.1.c": 12, "b.1.c.g": 12, "b.1.c.h": 12, "b.1.c.h.0": 12, "b.1.c.h.0.i": 12,
-    }  # fmt: skip
 
 
 # ---------------------------------------------------------------------------- damaged scenes

@@ -14,7 +14,7 @@ from adapters.report_bed import changed_places, hung, owed
 from adapters.report_record import Record
 from adapters.run_folder import Outcome
 from adapters.scene_file import scene_load
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 
 def record(*notes: dict[str, Any], jammed: str = "less") -> Record:

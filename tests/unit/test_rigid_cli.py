@@ -53,17 +53,6 @@ def test_a_run_goes_on_from_its_last_sound_frame_to_the_same_end(scene: Path) ->
     np.testing.assert_array_equal(again["motion"].rates, last["motion"].rates)
 
 
-def test_a_folder_is_never_taken_from_others(
-    scene: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = scene.with_name("slide-run")
-    folder.mkdir()
-    (folder / "thesis.tex").write_text("mine", encoding="utf-8")
-    assert command.main(["rigid", str(scene), "--force"]) == 2
-    assert "thesis.tex" in capsys.readouterr().err
-    assert (folder / "thesis.tex").read_text(encoding="utf-8") == "mine"
-
-
 def test_another_scene_needs_force(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = ["rigid", str(scene), "--no-pictures"]
     assert command.main(run) == 0
@@ -113,33 +102,6 @@ def test_flags_that_are_none_are_named(
     assert ended.value.code == 2
     assert "error: " in capsys.readouterr().err
     assert not scene.with_name("slide-run").exists()
-
-
-@pytest.mark.parametrize(
-    ("override", "code", "said"),
-    [
-        ("nokey", 2, "is no KEY=VALUE"), ("body.7.density=1", 2, "names no key"),
-        ("run.step=abc", 3, ":6: run.step: "), ("run.nokey=1", 3, "run.nokey: "),
-        ("run=3", 3, "run: "), ("run.frames=2.5", 3, ":7: run.frames: "),
-        ("dimensions=3", 3, "normal has 2 numbers in 3 dimensions"),
-    ],
-)  # fmt: skip
-def test_overrides_that_are_none_are_named(
-    override: str, code: int, said: str, scene: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert command.main(["rigid", str(scene), "--set", override]) == code
-    message = capsys.readouterr().err
-    assert said in message
-    assert "\n  -> " in message
-    assert not scene.with_name("slide-run").exists()
-
-
-@pytest.mark.parametrize("path", ["nowhere.toml", "."])
-def test_a_scene_that_can_not_be_read_is_named(
-    path: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert command.main(["rigid", str(tmp_path / path)]) == 2
-    assert "the scene can not be read" in capsys.readouterr().err
 
 
 def test_report_and_summary_say_what_was_left_out_and_what_was_not_reached(

@@ -9,14 +9,14 @@ from random import Random
 import numpy as np
 import pytest
 
-from rigid_lcp.errors import RigidError, SceneError, ShapeError, UsageError
+from rigid_lcp.errors import RigidError, SceneError, ShapeError
 from rigid_lcp.pouring import stone_2d
-from rigid_lcp.scene_file import force_at, key_line, loads_of, scene_build, scene_read
+from rigid_lcp.scene_file import force_at, loads_of, scene_build, scene_read
 from rigid_lcp.scene_types import Load
 
 pytestmark = pytest.mark.lowest
 
-PILE = Path(__file__).parents[2] / "scenes" / "pile.toml"
+PILE = Path(__file__).parents[2] / "trackbed" / "scenes" / "pile.toml"
 SMALL = """\
 dimensions = 2
 
@@ -55,14 +55,6 @@ def test_surface_serves_bodies_without_values_of_their_own(tmp_path: Path) -> No
     assert [body.restitution for body in scene.bodies] == [0.1, 0.1]
 
 
-def test_overrides_reach_tables_and_entries(tmp_path: Path) -> None:
-    path = written(tmp_path, SMALL)
-    file = scene_read(path, ["run.step=1e-4", "body.0.density=1000", "title=a word"])
-    assert file.tables.run.step == 1e-4
-    assert file.tables.body[0].density == 1000
-    assert file.tables.title == "a word"
-
-
 def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
     text = SMALL.replace("duration = 0.01", "duration = -1\nstpe = 1").replace("2000.0", "0")
     with pytest.raises(SceneError) as caught:
@@ -83,13 +75,13 @@ def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
         ("position = [0.0, 0.05]", "position = [0.0, 0.05, 1.0]", "3 numbers in 2 dimensions"),
         ('name = "block"', 'name = ""', "name"),
         ("dimensions = 2", "dimensions = 4", "dimensions"),
-        ("[[body]]", "[body]", "two brackets"),
+        ("[[body]]", "[body]", "write \\[\\[body\\]\\] tables"),
         ("density = 2000.0", "density = nan", "finite"),
         ("duration = 0.01", 'duration = "long"', "duration"),
         ("density = 2000.0", "fixed = true", "no body can move"),
         ("density = 2000.0", "density = 2000.0\nfriction = true", "friction: .*valid number"),
-        ("duration = 0.01", "duration = 1e300", "at most 1e.10 can be made"),
-        ("duration = 0.01", "duration = 1e-300", "between two frames"),
+        ("duration = 0.01", "duration = 1e300", "duration: must be at most 1e.18"),
+        ("duration = 0.01", "duration = 1e-17", "between two frames"),
         (
             "[[body]]",
             '[[load]]\nbody = "block"\nforce = [1, 0]\nbegin = 2\nend = 1\n[[body]]',
@@ -109,7 +101,7 @@ def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
         (  # the second corner was a traceback of numpy
             "box = [0.2, 0.1]",
             "vertices = [[0, 0], [1, 0, 0], [0, 1]]",
-            "body.0.vertices.1 .body block. has 3 numbers in 2 dimensions.*correct these keys",
+            "11: body.0.vertices.1: has 3 numbers in 2 dimensions.*correct these keys",
         ),
         (
             SMALL,
@@ -117,23 +109,16 @@ def test_every_problem_is_named_with_its_line(tmp_path: Path) -> None:
             .replace("[0, 1]", "[0, 0, 1]")
             .replace("[0.0, 0.05]", "[0, 0, 1]")
             .replace("box = [0.2, 0.1]", "vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0]]"),
-            "body.0.vertices.3 .body block. has 2 numbers in 3 dimensions",
+            "body.0.vertices.3: has 2 numbers in 3 dimensions",
         ),
         ("density =", "densty =", "body.0.densty: unknown key; did you mean density?"),
         ("[[ground]]", "[[grund]]", "grund: unknown key; did you mean ground?"),
-        ("density =", "colour = 1\ndensity =", "body.0.colour: unknown key; known: name, box,"),
+        ("density =", "colour = 1\ndensity =", "body.0.colour: unknown key; known: angle, box,"),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(SceneError, match=r"(?s)" + said):
         scene_read(written(tmp_path, SMALL.replace(old, new)))
-
-
-def test_a_file_of_a_windows_editor_is_read(tmp_path: Path) -> None:
-    """With a byte order mark and its ends of lines."""
-    path = tmp_path / "scene.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + SMALL.replace("\n", "\r\n").encode())
-    assert scene_read(path).tables == scene_read(written(tmp_path, SMALL)).tables
 
 
 def test_a_ground_without_a_direction_is_named(tmp_path: Path) -> None:
@@ -169,22 +154,6 @@ def test_stones_in_space_have_four_corners(tmp_path: Path) -> None:
     """
     with pytest.raises(SceneError, match=r"grains.0.corners: a polyhedron has at least 4"):
         scene_read(written(tmp_path, text))
-
-
-@pytest.mark.parametrize("override", ["run.step", "=3", "body.7.density=1"])
-def test_bad_overrides_are_usage_errors(tmp_path: Path, override: str) -> None:
-    with pytest.raises(UsageError):
-        scene_read(written(tmp_path, SMALL), [override])
-
-
-@pytest.mark.parametrize("content", [b"\xff\xfe", b"[run\n", b"a = 1\n" * 3])
-def test_files_that_are_no_scenes(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "scene.toml"
-    path.write_bytes(content)
-    with pytest.raises(RigidError, match=r"scene\.toml"):
-        scene_read(path)
-    with pytest.raises(UsageError):
-        scene_read(tmp_path / "none.toml")
 
 
 def test_damaged_scenes_give_sentences_only(tmp_path: Path) -> None:
@@ -238,15 +207,6 @@ def test_the_same_seed_gives_the_same_stones() -> None:
     np.testing.assert_array_equal(first.vertices, again.vertices)
     assert len(first.vertices) == 7
     assert first.reach < 0.05
-
-
-def test_lines_of_keys() -> None:
-    text = "a = 1\n[run]\nb = 2\n[[body]]\nc = 1\n[[body]]\n\nc = 2\n"
-    assert key_line(text, ["a"]) == 1
-    assert key_line(text, ["run", "b"]) == 3
-    assert key_line(text, ["body", "1", "c"]) == 8
-    assert key_line(text, ["body", "1", "d"]) == 6
-    assert key_line(text, ["none"]) == 0
 
 
 def test_cyclic_load_starts_at_its_phase() -> None:

@@ -86,26 +86,9 @@ def test_steps_without_end_are_refused_as_the_scene_file_does(method, tmp_path):
     from rigid_lcp.scene_file import scene_read
 
     path = tmp_path / "scene.toml"
-    path.write_text(SLIDING_BLOCK.replace("step = 2e-3", "step = 1e-90"), encoding="utf-8")
-    with pytest.raises(SceneError, match=r"is 6e\+88 steps: at most 1e\+10 can be made, and"):
+    path.write_text(SLIDING_BLOCK.replace("step = 2e-3", "step = 1e-17"), encoding="utf-8")
+    with pytest.raises(SceneError, match=r"is 6e\+15 steps: at most 1e\+10 can be made, and"):
         scene_read(path)
-
-
-@pytest.mark.parametrize("below", [False, True])
-def test_a_run_folder_that_is_a_file_is_told_as_that(
-    below: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """One was told to get leave to write there."""
-    scene, file = tmp_path / "slide.toml", tmp_path / "notes"
-    scene.write_text(SLIDING_BLOCK, encoding="utf-8")
-    file.write_text("mine", encoding="utf-8")
-    folder = file / "run" if below else file
-    assert command.main(["rigid", str(scene), "--run-folder", str(folder)]) == 2
-    message = capsys.readouterr().err
-    assert f"{folder}: can not be written (" in message
-    assert "\n  -> a file is where the folder should be: give another --run-folder" in message
-    assert "leave" not in message
-    assert file.read_text(encoding="utf-8") == "mine"
 
 
 def test_a_scene_file_s_huge_load_and_gravity_are_named_by_body_and_key(
@@ -115,7 +98,7 @@ def test_a_scene_file_s_huge_load_and_gravity_are_named_by_body_and_key(
     load = '\n[[load]]\nbody = "block"\nforce = [0, -1e300]\n'
     scene.write_text(SLIDING_BLOCK + load, encoding="utf-8")
     assert command.main(["rigid", str(scene), "--no-pictures"]) == 3
-    assert "block at 0 s: its load is 1e+300 N on 40 kg" in capsys.readouterr().err
+    assert "load.0.force.1: must be at least -1e+18, not -1e+300" in capsys.readouterr().err
     scene.write_text("gravity = [0, -1e200]\n" + SLIDING_BLOCK, encoding="utf-8")
     assert command.main(["rigid", str(scene), "--dry-run"]) == 3
-    assert "gravity is [0.0, -1e+200]\n  -> give 2 finite" in capsys.readouterr().err
+    assert "gravity.1: must be at least -1e+18, not -1e+200" in capsys.readouterr().err

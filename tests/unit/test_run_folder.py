@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,6 @@ from adapters.run_folder import (
     RunFolder,
     disk_full_named,
     stage_place,
-    write_atomically,
 )
 
 ROOT = Path(__file__).parents[2]
@@ -95,6 +92,77 @@ def test_damaged_files_are_noticed(run: RunFolder, name: str, damage: str) -> No
         os.truncate(path, size)
     assert run.outcome("window_000000") is None
     assert run.outcome("window_000004") is not None
+
+
+@pytest.mark.parametrize("name", ["states.npz", "end.restart", "outcome.json"])
+def test_changed_files_are_noticed(run: RunFolder, name: str) -> None:
+    """A file that was changed and kept its size, or a number in the record, undoes the stage."""
+    path = run.path / "window_000000" / name
+    text = path.read_bytes()
+    changed = text.replace(b"0.1", b"0.2", 1) if name == "outcome.json" else bytes(len(text))
+    assert len(changed) == len(text)
+    assert run.outcome("window_000000") is not None
+    path.write_bytes(changed)
+    for folder in (run, RunFolder(run.path)):
+        assert folder.outcome("window_000000") is None
+        assert folder.outcome("window_000004") is not None
+
+
+def test_records_of_older_runs_are_read(run: RunFolder) -> None:
+    """Without a seal and digests, as version 0.1.0 wrote them first, a stage is whole."""
+    path = run.path / "window_000000" / "outcome.json"
+    record = json.loads(path.read_text())
+    del record["seal"], record["notes"]["digests"]
+    path.write_text(json.dumps(record))
+    outcome = RunFolder(run.path).outcome("window_000000")
+    assert outcome is not None
+    assert outcome.last_cycle == 2
+
+
+def test_one_more_stage_reads_no_earlier_one(run: RunFolder, monkeypatch: Any) -> None:
+    """The table and the list of outcomes come from what is known; only new records are read."""
+    run.outcomes()
+    read = []
+    real = Path.read_text
+    monkeypatch.setattr(Path, "read_text", lambda p, **k: (read.append(p), real(p, **k))[1])
+    finish(run, "window_000005", 5, 6)
+    assert len(run.outcomes()) == 5
+    assert [path.parent.name for path in read if path.name == "outcome.json"] == ["window_000005"]
+
+
+def test_folders_of_other_names_are_left_alone(run: RunFolder) -> None:
+    """A copy of a stage is no stage, and stays where it is when stages are done again."""
+    names = run.stage_names()
+    for name in ("window_000004 (copy)", "jump_x", "window_", "windows"):
+        (run.path / name).mkdir()
+    assert run.stage_names() == names
+    run.begin("window_000000")
+    assert (run.path / "window_000004 (copy)").is_dir()
+    run.settlement_write()
+
+
+@pytest.mark.parametrize("name", ["partial", "discarded", "lock", "events.jsonl", "window_000004"])
+def test_a_received_folder_leads_nowhere_else(run: RunFolder, tmp_path: Path, name: str) -> None:
+    """A symbolic link in a run folder is refused with a sentence, and what it names is left."""
+    outside = tmp_path / "outside"
+    if name in ("lock", "events.jsonl"):
+        outside.write_text("mine")
+    else:
+        outside.mkdir()
+        (outside / "mine").write_text("mine")
+    before = tree(tmp_path)
+    place = run.path / name
+    if place.exists():
+        place.rename(tmp_path / "away")
+        before = tree(tmp_path)
+    place.symlink_to(outside)
+    with pytest.raises(UsageError, match=f"symbolic link .{name}.") as caught, run.locked():
+        pass
+    assert "remove the link" in caught.value.remedy
+    with pytest.raises(UsageError, match="symbolic link"):
+        run.begin("window_000005")
+    place.unlink()
+    assert tree(tmp_path) == before
 
 
 def test_files_no_one_needs_may_go(run: RunFolder) -> None:
@@ -226,54 +294,6 @@ def test_no_run_folder(tmp_path: Path, content: bytes | None) -> None:
     with pytest.raises(UsageError, match="not a run folder") as caught:
         RunFolder(tmp_path).manifest()
     assert caught.value.where == str(tmp_path)
-
-
-def test_second_writer_is_refused(tmp_path: Path) -> None:
-    """Another process gets the pid of the first; when the first is gone the folder is free."""
-    folder = RunFolder(tmp_path)
-    code = (
-        "import sys; from pathlib import Path; from adapters.run_folder import RunFolder\n"
-        "with RunFolder(Path(sys.argv[1])).locked():\n"
-        "    print('in', flush=True); sys.stdin.read()"
-    )
-    first = subprocess.Popen(
-        [sys.executable, "-c", code, str(tmp_path)],
-        cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    )  # fmt: skip
-    try:
-        assert first.stdout is not None
-        assert first.stdout.readline() == "in\n"
-        before = tree(tmp_path)
-        with pytest.raises(UsageError, match=f"pid {first.pid} on "), folder.locked():
-            pass
-        assert tree(tmp_path) == before
-    finally:
-        first.kill()
-        first.communicate()
-    with folder.locked():
-        assert f"pid {os.getpid()} on " in (tmp_path / "lock").read_text()
-
-
-def test_leftovers_of_a_killed_writer_go(tmp_path: Path) -> None:
-    """Half-written hidden files are removed by the next writer, and nothing else is."""
-    (tmp_path / ".settlement.csv.123.partial").write_text("ha")
-    (tmp_path / "settlement.csv").write_text("whole")
-    with RunFolder(tmp_path).locked():
-        assert sorted(p.name for p in tmp_path.iterdir()) == ["lock", "settlement.csv"]
-
-
-def test_write_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """When writing fails, the old content is there and nothing of the new."""
-    path = tmp_path / "table.csv"
-    write_atomically(path, "old")
-
-    def full(_: int) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space left"):
-        write_atomically(path, "new")
-    assert path.read_text() == "old"
 
 
 @pytest.mark.parametrize(

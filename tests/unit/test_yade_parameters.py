@@ -27,8 +27,8 @@ from adapters.errors import EngineFailed, EngineMissing, NotConverged, SceneErro
 from adapters.scene import GrainRadius, Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State
-from scenes import scene_path
 from trackbed import command
+from trackbed.scenes import scene_path
 
 ENGINE = YadeEngine()
 

@@ -469,7 +469,7 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     [
         ("adapters.stages.state_save", ""),
         ("adapters.stages.window_save", "preparation"),
-        ("adapters.run_folder.write_atomically", ""),
+        ("adapters.run_folder.write_whole", ""),
         ("adapters.engine_fake.dump_write", ""),
     ],
 )
@@ -544,7 +544,7 @@ def test_full_disk_at_the_lock(
     def full() -> str:
         raise FULL
 
-    monkeypatch.setattr("adapters.run_folder.socket.gethostname", full)
+    monkeypatch.setattr("trackbed.run_folder.socket.gethostname", full)
     assert command.main(["resume", str(run)]) == 5
     assert "the disk is full" in capsys.readouterr().err
 

@@ -26,11 +26,11 @@ from adapters.report_record import checks_of, decisions_of, record_read
 from adapters.run_folder import RunFolder
 from adapters.scene_file import scene_load
 from adapters.status import status
-from scenes import scene_path
 from tests.forked_commands import Commands
 from tests.jump_curves import CURVES
 from tests.small_bed import small_bed
 from trackbed import command
+from trackbed.scenes import scene_path
 
 QUIET = Progress(quiet=True)
 

@@ -31,7 +31,7 @@ from adapters.run_folder import Outcome, RunFolder
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 COARSE = scene_path("karrech-coarse")
 HANGS = 30.0

@@ -30,7 +30,7 @@ from adapters.scene_file import scene_load
 from adapters.stages import Run, Variant
 from adapters.state import FloatArray, State, state_load
 from adapters.window import Window, window_load
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 QUIET = Progress(quiet=True)
 

@@ -125,8 +125,8 @@ def test_a_body_joined_to_its_images_does_not_turn(tmp_path: Path) -> None:
 
 
 def test_the_key_file_names_both() -> None:
-    """scenes/cantilever.toml explains every key."""
-    text = Path("scenes/cantilever.toml").read_text()
+    """trackbed/scenes/cantilever.toml explains every key."""
+    text = Path("trackbed/scenes/cantilever.toml").read_text()
     for key in ("velocity", "spin"):
         line = next(one for one in text.splitlines() if one.startswith(f"# {key} = "))
         assert len(tomllib.loads(line[2:])[key]) == 3

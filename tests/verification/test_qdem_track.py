@@ -464,13 +464,15 @@ def test_a_dry_run_prepares_no_bed(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_scene_of_the_small_track_is_sound() -> None:
-    prepared = scene_load(Path(__file__).parents[2] / "scenes" / "track-small.toml")
+    prepared = scene_load(Path(__file__).parents[2] / "trackbed" / "scenes" / "track-small.toml")
     assert isinstance(prepared, TrackPrepared)
     assert prepared.recipe.below + prepared.recipe.beside == 300
     assert prepared.scene.simulation.duration == pytest.approx(prepared.load.times[-1], abs=1e-3)
 
 
 def test_every_key_of_a_track_is_named_in_its_scene() -> None:
-    text = (Path(__file__).parents[2] / "scenes" / "track-small.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "trackbed" / "scenes" / "track-small.toml").read_text(
+        encoding="utf-8"
+    )
     keys = [*TrackTable.model_fields, *BogieTable.model_fields]
     assert [key for key in keys if key not in text] == []

@@ -127,7 +127,7 @@ def test_a_bogie_that_no_record_holds_is_refused_by_its_key(
     with pytest.raises(SceneError, match=said) as caught:
         load_of(tmp_path, bogie)
     assert "track.bogie: " in str(caught.value)
-    assert "scenes/track-small.toml" in str(caught.value)
+    assert "trackbed new track-small FOLDER" in str(caught.value)
 
 
 def test_a_bogie_as_near_as_may_be_has_all_of_its_load(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_a_record_of_the_load_belongs_to_the_run(tmp_path: Path) -> None:
     digests.append(scene_load(path).files["record.csv"])
     assert len(set(digests)) == 2
     path.write_text(SCENE.replace(pressure, record.replace('"p"', '"q"')), encoding="utf-8")
-    with pytest.raises(SceneError, match="there is no column 'q' in its first line"):
+    with pytest.raises(SceneError, match="there is no column q among time, p"):
         scene_load(path)
 
 

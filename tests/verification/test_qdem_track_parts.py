@@ -29,7 +29,7 @@ CONCRETE = Material(45e9, 0.167, 2350.0)
 WHOLE = TrackLayout("whole", TrackBox(5.0, 0.6), SleeperShape(), (24, 4, 3), 0.012, (0.5, 1.3))
 HALF = replace(WHOLE, part="half", box=TrackBox(2.4, 0.6), cells=(12, 4, 3))
 WIDTH = 'contact.periodic={axis="y", width=0.42}'
-SCENES = Path(__file__).parents[2] / "scenes"
+SCENES = Path(__file__).parents[2] / "trackbed" / "scenes"
 
 
 def test_modes_of_a_free_track_sleeper_are_those_of_its_eigenproblem() -> None:

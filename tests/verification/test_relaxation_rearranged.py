@@ -19,9 +19,9 @@ from adapters.relaxation_measured import RelaxationNotConverged
 from adapters.relaxation_rearranged import ENOUGH, LEAST, MOST, OVERLAP_MAX, rearrange
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State
-from scenes import scene_path
 from tests.deepest_overlap import deepest
 from tests.made_beds import STIFFNESS, state_at_rest
+from trackbed.scenes import scene_path
 
 BEDS = Path(__file__).parents[1] / "jammed_beds.npz"
 SCENE = scene_load(scene_path("karrech-coarse"), ["material.grain.young=1e9"])

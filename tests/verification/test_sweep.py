@@ -358,7 +358,7 @@ def test_killed_it_goes_on(
 @pytest.mark.long
 def test_a_real_engine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Twenty soft grains on LAMMPS, two seeds, each in a process of its own: two settlements."""
-    from scenes import scene_template
+    from trackbed.scenes import scene_template
 
     scene = tmp_path / "scene.toml"
     scene.write_text(scene_template("karrech-coarse"))

@@ -19,7 +19,7 @@ from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import Contacts, FloatArray
 from adapters.window import contacts_of_frame
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 RADIUS = 3.2e-3
 """Radius of every grain here [m], the mean of Table 1."""
@@ -65,7 +65,7 @@ class Track:
 
 
 def table_1(*overrides: str) -> Scene:
-    """Grains, walls and contact law of the paper's Table 1 (``scenes/karrech.toml``), changed."""
+    """Grains, walls and contact law of the paper's Table 1 (``karrech.toml``), changed."""
     return scene_load(scene_path("karrech"), overrides)
 
 

@@ -17,11 +17,11 @@ from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray
 from adapters.window import Window, state_read, window_read
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 CYCLES = 50
 SETTINGS = ("material.grain.young=1e9",)
-"""What differs from ``scenes/karrech-coarse.toml``: softer by ten, for a step longer by three."""
+"""What differs from ``karrech-coarse.toml``: softer by ten, for a step longer by three."""
 
 TWIN = 1e-9
 """By how much the first grain of the twin is aside [m]."""

@@ -15,7 +15,7 @@ from adapters.relaxation_measured import RelaxationNotConverged
 from adapters.residual import error_of_coordinates, error_of_displacement
 from adapters.scene_file import scene_load
 from adapters.state import FloatArray, State
-from scenes import scene_path
+from trackbed.scenes import scene_path
 from validation.studies.laws.run import data_folder
 
 Row = dict[str, Any]

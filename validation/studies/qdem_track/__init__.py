@@ -4,7 +4,7 @@ After Nishiura, Sakaguchi and Aikawa 2017, section 4.  Three sizes: 20 grains un
 the account of energies, resumption and the levers of cost are judged (``twenty``); 300 grains under
 one bogie on a rough rail, three packings at the friction of Table 1 and at three times it
 (``packings``), beside what the paper found; and the paper's 5,700 grains at rest, where a step is
-timed (``paper scale``: the bed is prepared before by `trackbed qdem scenes/track.toml`, in hours).
+timed (``paper scale``: the bed is prepared before by `trackbed qdem track.toml`, in hours).
 Bars, fixed before: the account of energies closes to .1 %, a resumed run equals the uninterrupted
 one to the bit, a higher friction leaves less settlement and lateral motion.
 

@@ -18,7 +18,7 @@ from qdem_fem.track_scene import TrackPrepared, TrackScene
 from qdem_fem.track_table import BogieTable
 from validation.studies.qdem_track.trials import run_scene
 
-SCENE = Path(__file__).parents[3] / "scenes" / "track-small.toml"
+SCENE = Path(__file__).parents[3] / "trackbed" / "scenes" / "track-small.toml"
 SEEDS, FRICTIONS = (1, 2, 3), (0.577, 1.73)
 POINTS = (*GRAINS, "sleeper")
 APART = 8.0

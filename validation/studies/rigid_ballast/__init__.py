@@ -6,10 +6,10 @@ at equal error of the residual settlement after five load cycles?  Does the step
 Answer: rigid steps of 1 ms cost what soft grains of 1e9 N/m do, with 500 times fewer steps; but the
 two limits differ by half of their mean, so that smaller errors can not be told from noise.
 
-Design, fixed before the runs: the 30 beds of ``scenes/ballast-2d.toml`` of seeds 1 to 30, none left
+Design, fixed before the runs: the 30 beds of ``ballast-2d.toml`` of seeds 1 to 30, none left
 out, poured and tamped once by rigid grains; every method starts from that state at rest, has 50 ms
 under the least load and five cycles.  Reference of a level: the mean of the finest level of each
 method, bed by bed; a finest level is judged by the other.  Error: mean over the beds of the
 difference to the reference over the reference's mean, with Student's interval of paired beds.
-In space: ten samples of ``scenes/sleeper-3d.toml``, rigid grains at three steps, six cycles.
+In space: ten samples of ``sleeper-3d.toml``, rigid grains at three steps, six cycles.
 """

@@ -18,7 +18,7 @@ from validation.studies.rigid_ballast.soft import soft_advance, soft_grains
 
 Floats = NDArray[np.float64]
 
-SCENE = Path(__file__).parents[3] / "scenes" / "ballast-2d.toml"
+SCENE = Path(__file__).parents[3] / "trackbed" / "scenes" / "ballast-2d.toml"
 TAMPED, REST, PERIOD = 0.9, 0.05, 0.04
 """When the bed is tamped, time under the least load before the first cycle, length of one [s]."""
 LEAST, PEAK, LATERAL = 1e3, 25e3, 0.2

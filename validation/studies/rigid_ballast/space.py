@@ -21,7 +21,7 @@ from rigid_lcp.scene import Scene
 from rigid_lcp.scene_file import scene_build, scene_read
 from rigid_lcp.simulation import Simulation
 
-SCENE = Path(__file__).parents[3] / "scenes" / "sleeper-3d.toml"
+SCENE = Path(__file__).parents[3] / "trackbed" / "scenes" / "sleeper-3d.toml"
 STONES, BLOCK = 100, (0.12, 0.09, 0.06)
 """Number of stones, and edges of the sleeper block [m]."""
 LEAST, MOST, FREQUENCY, CYCLES = 50.0, 500.0, 25.0, 6

@@ -11,7 +11,7 @@ from adapters.sample import GRAVITY
 from adapters.scene import Scene
 from adapters.scene_file import scene_load
 from adapters.stages import Variant
-from scenes import scene_path
+from trackbed.scenes import scene_path
 
 STEP = 1e-10
 """Displacement [m] of one grain at k_i, times the number of the member."""

@@ -12,22 +12,24 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+LIBRARIES = ("trackbed", "numpy", "scipy", "numba", "meshio", "scikit-fem")
 
-def provenance(command: Sequence[str]) -> dict[str, Any]:
+
+def record_provenance(command: Sequence[str]) -> dict[str, Any]:
     """What is needed to make a result again; ``command`` is the command line that made it.
 
     Keys: ``commit``, ``versions`` (name -> version), ``machine``, ``command``, ``started`` (UTC).
     """
     return {
-        "commit": commit(),
-        "versions": versions(),
-        "machine": machine(),
+        "commit": find_commit(),
+        "versions": list_versions(),
+        "machine": describe_machine(),
         "command": shlex.join(command),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 
-def commit() -> str:
+def find_commit() -> str:
     """Commit of the checkout this file lies in, "-modified" when it differs; else ""."""
     here = Path(__file__).resolve()
 
@@ -45,10 +47,10 @@ def commit() -> str:
         return ""
 
 
-def versions() -> dict[str, str]:
+def list_versions() -> dict[str, str]:
     """Versions of Python, trackbed and the libraries that compute; only what is installed."""
     found = {"python": platform.python_version()}
-    for name in ("trackbed", "numpy", "scipy", "numba"):
+    for name in LIBRARIES:
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
@@ -56,7 +58,7 @@ def versions() -> dict[str, str]:
     return found
 
 
-def machine() -> str:
+def describe_machine() -> str:
     """Processor, number of its cores open to this process, and operating system."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 
-def key_lines(text: str) -> dict[str, int]:
+def find_key_lines(text: str) -> dict[str, int]:
     """Line number of every table and key of a valid TOML text, by dotted key.
 
     Statement by statement through the TOML reader itself, which knows about quotes, comments,
@@ -29,19 +29,19 @@ def key_lines(text: str) -> dict[str, int]:
         start = statement[0].lstrip()
         statement = []
         if start.startswith("["):
-            names = _header_names(parsed)
+            names = _read_header(parsed)
             if start.startswith("[["):
-                outer = _numbered(names[:-1], entries) + names[-1:]
+                outer = _number_entries(names[:-1], entries) + names[-1:]
                 lines.setdefault(".".join(outer), first)
                 entries[outer] = entries.get(outer, -1) + 1
-            table, parsed = _numbered(names, entries), {}
+            table, parsed = _number_entries(names, entries), {}
             lines.setdefault(".".join(table), first)
-        for inner in _paths(parsed):
+        for inner in _list_paths(parsed):
             lines.setdefault(".".join(table + inner), first)
     return lines
 
 
-def _header_names(parsed: Any) -> tuple[str, ...]:
+def _read_header(parsed: Any) -> tuple[str, ...]:
     """Names in a table's header, from what the TOML reader makes of it."""
     names = []
     while parsed:
@@ -53,7 +53,7 @@ def _header_names(parsed: Any) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _numbered(names: tuple[str, ...], entries: dict[tuple[str, ...], int]) -> tuple[str, ...]:
+def _number_entries(names: tuple[str, ...], entries: dict[tuple[str, ...], int]) -> tuple[str, ...]:
     """Names of a table with the number of the entry behind each list of tables."""
     path: tuple[str, ...] = ()
     for name in names:
@@ -63,10 +63,10 @@ def _numbered(names: tuple[str, ...], entries: dict[tuple[str, ...], int]) -> tu
     return path
 
 
-def _paths(value: Any) -> Iterator[tuple[str, ...]]:
+def _list_paths(value: Any) -> Iterator[tuple[str, ...]]:
     pairs = value.items() if isinstance(value, dict) else enumerate(value)
     for key, inner in pairs:
         if isinstance(value, dict) or isinstance(inner, dict):
             yield (str(key),)
         if isinstance(inner, dict | list):
-            yield from ((str(key), *path) for path in _paths(inner))
+            yield from ((str(key), *path) for path in _list_paths(inner))

@@ -1,0 +1,95 @@
+"""One form of sentence and one exit code for what went wrong, whoever says it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from trackbed.command import main
+from trackbed.errors import EXIT_CODES, Interrupted, TrackbedError, describe_exit_codes
+
+STORIES = ("adapters", "qdem_fem", "rigid_lcp")
+DOORS = {
+    "run": "engine",
+    "qdem": "simulation",
+    "rigid": "run",
+}
+"""Verbs that read a scene file, and a table of each."""
+
+
+@pytest.mark.parametrize("story", STORIES)
+def test_every_error_is_one_of_the_floor(story: str) -> None:
+    """A story's own errors come from the floor's, with an exit code that the help explains."""
+    kinds = [
+        kind
+        for kind in vars(import_module(f"{story}.errors")).values()
+        if isinstance(kind, type) and issubclass(kind, BaseException)
+    ]
+    for kind in kinds:
+        if issubclass(kind, Warning):
+            continue
+        assert issubclass(kind, TrackbedError | Interrupted), kind
+        assert kind.exit_code in EXIT_CODES
+
+
+def test_help_shows_every_code_once() -> None:
+    """The table of the help holds every code with its meaning."""
+    table = describe_exit_codes()
+    for code, meaning in EXIT_CODES.items():
+        assert table.count(f"{code:3}  {meaning}") == 1
+
+
+def test_an_error_says_what_where_and_what_to_do() -> None:
+    """The three parts of an error stand in its text; an error moved names the other place."""
+    error = TrackbedError("it is broken", where="here", remedy="mend it")
+    assert str(error) == "here: it is broken\n  -> mend it"
+    assert str(error.at("there")) == "there: it is broken\n  -> mend it"
+
+
+@pytest.mark.parametrize("verb", DOORS)
+def test_a_missing_scene_reads_alike_at_every_door(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No file: exit code 2 and the file's name first, at all three doors."""
+    path = tmp_path / "none.toml"
+    assert main([verb, str(path)]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"trackbed: {path}: can not read the scene (No such file or directory)")
+    assert "\n  -> " in told
+
+
+@pytest.mark.parametrize("verb", DOORS)
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        ("a = 1\nb = = 2\n", ":2: this is not TOML: ", "b = = 2"),
+        ("\n[surprise]\nx = 1\n", ":2: surprise: unknown key", "problem"),
+        ("TABLE = 3\n", ":1: TABLE: must be a table, not 3", "problem"),
+    ],
+)
+def test_a_wrong_scene_reads_alike_at_every_door(
+    verb: str, text: str, where: str, what: str, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """Not TOML, an unknown table, a wrong type: exit code 3, file, line, key, one sentence each."""
+    path = tmp_path / "scene.toml"
+    path.write_text(text.replace("TABLE", DOORS[verb]))
+    assert main([verb, str(path)]) == 3
+    told = capsys.readouterr().err
+    assert f"{path}{where}".replace("TABLE", DOORS[verb]) in told
+    assert what in told
+    assert "\n  -> " in told
+
+
+@pytest.mark.parametrize("verb", DOORS)
+def test_an_override_that_is_none_reads_alike_at_every_door(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """``--set`` without a key: exit code 2 and how to write one."""
+    path = tmp_path / "scene.toml"
+    path.write_text('title = "one"\n')
+    assert main([verb, str(path), "--set", "nothing"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("trackbed: --set: can not read the override 'nothing'\n  -> write ")

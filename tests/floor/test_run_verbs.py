@@ -1,0 +1,95 @@
+"""status, report, export and resume know every kind of run folder by what is in it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from trackbed.command import main
+from trackbed.run_folder import lock_folder
+from trackbed.run_verbs import find_kind
+
+STARTED = "trackbed VERB a.toml --set 'x=[1, 2]' --force"
+SCENES: dict[str, Any] = {
+    "qdem": {"scene": {"title": "beam", "simulation": {}}, "files": {}},
+    "rigid": {"scene": {"title": "pile", "run": {}}},
+}
+
+
+def folder_of(kind: str, path: Path) -> Path:
+    """A run of this kind that was stopped."""
+    path.mkdir()
+    command = STARTED.replace("VERB", kind)
+    origin = {"command": command} if kind == "qdem" else {"provenance": {"command": command}}
+    (path / "manifest.json").write_text(json.dumps(SCENES[kind] | origin))
+    (path / ("checkpoint.npz" if kind == "qdem" else "frame_000000.npz")).touch()
+    return path
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_status_tells_how_far_a_run_is(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Stopped, running, finished, and what to do next, in the words of the command."""
+    folder = folder_of(kind, tmp_path / "run")
+    assert main(["status", str(folder), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["kind"], told["state"], told["saved_states"]) == (kind, "stopped", 1)
+    assert told["next"] == f"trackbed {kind} a.toml --set 'x=[1, 2]' --resume"
+    with lock_folder(folder):
+        assert main(["status", str(folder), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["state"] == "running"
+    (folder / "result.json").write_text('{"time": 0.5, "steps": 3}')
+    assert main(["status", str(folder)]) == 0
+    told_to_people = capsys.readouterr().out
+    assert "state                       finished\n" in told_to_people
+    assert "steps                       3\n" in told_to_people
+
+
+@pytest.mark.parametrize("kind", SCENES)
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["report"], "this VERB run is stopped, and its report is written at its end"),
+        (["resume"], "a VERB run goes on with the command that started it\n  -> trackbed VERB a"),
+        (["export", "--to", "csv"], "only settlement runs are exported"),
+    ],
+)
+def test_what_a_story_has_no_verb_for_is_a_sentence(
+    kind: str, words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2, and what to do instead."""
+    folder = folder_of(kind, tmp_path / "run")
+    assert main([words[0], str(folder), *words[1:]]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"trackbed: {folder}: ")
+    assert said.replace("VERB", kind) in told
+    assert "\n  -> " in told
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_report_of_a_finished_run_is_shown(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its path."""
+    folder = folder_of(kind, tmp_path / "run")
+    (folder / "result.json").write_text('{"time": 0.5}')
+    (folder / "report.html").touch()
+    assert main(["report", str(folder)]) == 0
+    assert capsys.readouterr().out == f"{folder}/report.html\n"
+
+
+@pytest.mark.parametrize("content", [None, "", "[]", '{"scene": 3}', '{"scene": {}}'])
+@pytest.mark.parametrize("verb", ["status", "report", "resume"])
+def test_other_folders_are_no_run_folders(
+    verb: str, content: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As before: a sentence of the settlement's verbs."""
+    if content is not None:
+        (tmp_path / "manifest.json").write_text(content)
+    assert find_kind(tmp_path) is None
+    assert main([verb, str(tmp_path)]) == 2
+    assert "this is not a run folder" in capsys.readouterr().err

@@ -1,0 +1,146 @@
+"""The verbs about a finished or stopped run, for every kind of run folder.
+
+A settlement run is its story's; of QDEM and rigid runs, which are gone on with by the command that
+started them, the same verbs say here how far they are and what to do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from trackbed.errors import UsageError
+from trackbed.run_folder import MANIFEST, RESULT, is_written, refuse_format
+from trackbed.whole_files import read_object
+
+RUN_VERBS = ("status", "report", "export", "resume")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of run, by what its folder holds."""
+
+    table: str
+    """A table of the scene that only this kind has."""
+    verb: str
+    """The verb that runs such a scene."""
+    states: str = ""
+    """Pattern of its saved states; empty for a kind whose story has the verbs itself."""
+    files: str = ""
+    """What its folder holds for other programs, as a sentence."""
+
+
+KINDS = (
+    Kind("sample", "run"),
+    Kind("simulation", "qdem", "checkpoint.npz", "fields.pvd opens in ParaView, probes.csv and "
+         "energy.csv in a spreadsheet"),
+    Kind("run", "rigid", "frame_*.npz", "history.csv opens in a spreadsheet, movie.gif in a "
+         "browser, frame_*.npz in NumPy"),
+)  # fmt: skip
+
+
+def find_kind(path: Path) -> Kind | None:
+    """The kind of the run in a folder; None where there is no manifest to tell it by."""
+    manifest = read_object(path / MANIFEST) or {}
+    scene = manifest.get("scene")
+    if not isinstance(scene, dict):
+        return None
+    return next((kind for kind in KINDS if kind.table in scene), None)
+
+
+def choose_command(arguments: argparse.Namespace) -> Callable[[argparse.Namespace], int]:
+    """What does the verb that was asked for: that of the run's kind, where it is about a run."""
+    command: Callable[[argparse.Namespace], int] = arguments.command
+    if arguments.verb not in RUN_VERBS:
+        return command
+    kind = find_kind(arguments.run_folder)
+    if kind is None or not kind.states:
+        return command
+    return lambda given: DOES[given.verb](given, kind)
+
+
+def describe_run(path: Path, kind: Kind) -> dict[str, Any]:
+    """How far a run is, by names that JSON and people read."""
+    manifest = read_object(path / MANIFEST) or {}
+    refuse_format(path, manifest)
+    summary = read_object(path / RESULT) or {}
+    states = len(list(path.glob(kind.states)))
+    state = "running" if is_written(path) else "finished" if summary else "stopped"
+    told = {
+        "run_folder": str(path),
+        "kind": kind.verb,
+        "title": manifest["scene"].get("title", ""),
+        "state": state,
+        "saved_states": states,
+    }
+    told |= {key: summary[key] for key in ("time", "steps") if key in summary}
+    next_step = {
+        "running": f"trackbed status {shlex.quote(str(path))}",
+        "finished": str(path / "report.html"),
+        "stopped": _go_on(manifest),
+    }
+    return told | {"next": next_step[state]}
+
+
+def _show_status(arguments: argparse.Namespace, kind: Kind) -> int:
+    told = describe_run(arguments.run_folder, kind)
+    if arguments.json:
+        print(json.dumps(told, indent=2))
+    else:
+        for key, value in told.items():
+            print(f"{key.replace('_', ' '):28}{value}")
+    return 0
+
+
+def _show_report(arguments: argparse.Namespace, kind: Kind) -> int:
+    told = describe_run(arguments.run_folder, kind)
+    path: Path = arguments.run_folder / "report.html"
+    if told["state"] != "finished" or not path.is_file():
+        raise UsageError(
+            f"this {kind.verb} run is {told['state']}, and its report is written at its end",
+            where=str(arguments.run_folder), remedy=f"first: {told['next']}",
+        )  # fmt: skip
+    print(path)
+    if arguments.open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        import webbrowser
+
+        webbrowser.open(path.resolve().as_uri())
+    return 0
+
+
+def _refuse_export(arguments: argparse.Namespace, kind: Kind) -> int:
+    raise UsageError(
+        f"only settlement runs are exported, and this is a {kind.verb} run",
+        where=str(arguments.run_folder), remedy=f"its files are open already: {kind.files}",
+    )  # fmt: skip
+
+
+def _refuse_resume(arguments: argparse.Namespace, kind: Kind) -> int:
+    told = describe_run(arguments.run_folder, kind)
+    what = f"a {kind.verb} run goes on with the command that started it"
+    raise UsageError(
+        f"this run is {told['state']}; {what}" if told["state"] != "stopped" else what,
+        where=str(arguments.run_folder), remedy=told["next"],
+    )  # fmt: skip
+
+
+def _go_on(manifest: dict[str, Any]) -> str:
+    """The command that goes on with a run that stopped, from where it was started."""
+    origin = manifest.get("provenance", manifest)
+    words = shlex.split(str(origin.get("command", "trackbed")))
+    kept = [word for word in words if word not in ("--force", "--resume")]
+    return shlex.join([*kept, "--resume"])
+
+
+DOES = {
+    "status": _show_status,
+    "report": _show_report,
+    "export": _refuse_export,
+    "resume": _refuse_resume,
+}

@@ -1,0 +1,126 @@
+"""Files that are written whole or not at all, and through no symbolic link."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from errno import EEXIST, ELOOP, ENOTDIR
+from pathlib import Path
+from typing import IO, Any
+
+from trackbed.errors import NO_ROOM, DiskFull, UsageError
+
+NO_FOLDER = (EEXIST, ENOTDIR)
+"""A file where the folder, or one above it, should be."""
+BLOCK = 1 << 20
+"""Bytes of a file that are read at once."""
+
+
+def open_unlinked(path: Path, mode: str) -> IO[Any]:
+    """Open a file as `open` does, but raise `OSError` (ELOOP) where ``path`` is a symbolic link."""
+
+    def opener(name: str, flags: int) -> int:
+        return os.open(name, flags | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+
+    return open(path, mode, encoding=None if "b" in mode else "utf-8", opener=opener)
+
+
+@contextmanager
+def refuse_writing(path: Path) -> Iterator[None]:
+    """`DiskFull`, or `UsageError`, in place of what the system raises when it refuses to write."""
+    try:
+        yield
+    except OSError as error:
+        raise explain_refusal(path, error) from error
+
+
+def explain_refusal(path: Path, error: OSError) -> DiskFull | UsageError:
+    """What to raise when the system refuses to write: no space, no permission, no folder."""
+    full = error.errno in NO_ROOM
+    room = "make room" if full else "make room or get leave to write there"
+    remedy = f"{room}, then try again (a run goes on with --resume); or give another folder"
+    if error.errno in NO_FOLDER:
+        remedy = "a file is where the folder should be: give another folder"
+    if error.errno == ELOOP:
+        remedy = "it is a symbolic link, which may lead anywhere: remove it"
+    refusal = DiskFull if full else UsageError
+    return refusal(
+        f"can not be written ({error.strerror or error})", where=str(path), remedy=remedy
+    )
+
+
+def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
+    """Write a file: whatever kills the writer leaves the old file or the new, never a part.
+
+    A symbolic link at ``path`` is replaced, not followed.  Raises `DiskFull` when there is no
+    room, `UsageError` when the system refuses otherwise.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    parts: Iterable[bytes]
+    if isinstance(content, str):
+        parts = [content.encode()]
+    else:
+        parts = [content] if isinstance(content, bytes) else content
+    try:
+        with refuse_writing(path):
+            with open_unlinked(temporary, "wb") as stream:
+                for part in parts:
+                    stream.write(part)
+                stream.flush()
+                os.fsync(stream.fileno())
+            temporary.replace(path)
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def append_line(path: Path, line: str) -> None:
+    """Append a line of text to a file; raises `OSError`, ELOOP for a symbolic link."""
+    with open_unlinked(path, "a") as stream:
+        stream.write(line + "\n")
+
+
+def seal_file(path: Path) -> str:
+    """Have the system write a file to the disk; its SHA-256.  Raises `OSError`."""
+    with path.open("rb") as stream:
+        digest = digest_stream(stream)
+        os.fsync(stream.fileno())
+    return digest
+
+
+def digest_file(path: Path) -> str:
+    """SHA-256 of a file.  Raises `OSError`."""
+    with path.open("rb") as stream:
+        return digest_stream(stream)
+
+
+def digest_stream(stream: IO[bytes]) -> str:
+    """SHA-256 of all that is left in a stream."""
+    digest = hashlib.sha256()
+    while block := stream.read(BLOCK):
+        digest.update(block)
+    return digest.hexdigest()
+
+
+def sync_folder(path: Path) -> None:
+    """Have the system write the names in a folder to the disk, where it can."""
+    with suppress(OSError):
+        number = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)
+
+
+def read_object(path: Path) -> dict[str, Any] | None:
+    """An object of a JSON file; None where there is no file, empty when it can not be read."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return content if isinstance(content, dict) else {}
