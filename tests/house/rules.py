@@ -108,8 +108,8 @@ def name_module(file: str) -> str:
 
 
 def name_room(file: str) -> str:
-    """The folder of a file."""
-    return file.rpartition("/")[0]
+    """The folder of a file; a file at the top of a package stands by itself."""
+    return file.rpartition("/")[0] if file.count("/") > 1 else file
 
 
 def read_imports(tree: ast.Module, modules: Mapping[str, Any]) -> Iterator[Import]:
@@ -216,7 +216,11 @@ def check_public_words(house: House) -> Iterator[Breach]:
             yield Breach(file, 1, "rule 3", "does not say what the room is for")
     for file, one, other in house.arrows():
         room = name_room(other)
-        if "/" not in room or room == name_room(file):
+        if room == other or room == name_room(file):
+            continue
+        inside = one.module.rpartition(".")[2]
+        init = house.trees.get(f"{room}/__init__.py")
+        if not one.names and init is not None and inside in read_public_words(init):
             continue
         if not other.endswith("/__init__.py"):
             yield Breach(file, one.line, "rule 3", f"{one.module} is inside the room {room}")
