@@ -29,7 +29,7 @@ CITATIONS = (
 """Pairs (what it is cited for, BibTeX entry)."""
 
 
-def citations_text(version: str) -> str:
+def format_citations(version: str) -> str:
     """All entries, each under a comment saying what it is cited for."""
     entries = "\n\n".join(f"% {purpose}\n{entry}" for purpose, entry in CITATIONS)
     return entries.replace("VERSION", version)

@@ -18,24 +18,24 @@ JUMP_KEYS = ("procedure.k", "procedure.h")
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``verb`` to its parser."""
     {
-        "doctor": doctor_register,
-        "new": new_register,
-        "run": run_register,
-        "resume": resume_register,
-        "status": status_register,
-        "report": report_register,
-        "fit": fit_register,
-        "relax": relax_register,
-        "cite": cite_register,
+        "doctor": register_doctor,
+        "new": register_new,
+        "run": register_run,
+        "resume": register_resume,
+        "status": register_status,
+        "report": register_report,
+        "fit": register_fit,
+        "relax": register_relax,
+        "cite": register_cite,
     }[verb](parser)
 
 
-def json_flag(parser: argparse.ArgumentParser) -> None:
+def add_json_flag(parser: argparse.ArgumentParser) -> None:
     """Add ``--json``."""
     parser.add_argument("--json", action="store_true", help="print JSON on standard output")
 
 
-def json_print(content: Any) -> None:
+def print_json(content: Any) -> None:
     """Print JSON on standard output; a number that is not finite becomes an error."""
     print(json.dumps(content, indent=2, allow_nan=False))
 
@@ -43,29 +43,28 @@ def json_print(content: Any) -> None:
 # --- doctor --------------------------------------------------------------------------------
 
 
-def doctor_register(parser: argparse.ArgumentParser) -> None:
+def register_doctor(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``doctor``."""
-    json_flag(parser)
-    parser.set_defaults(command=doctor_command)
+    add_json_flag(parser)
+    parser.set_defaults(command=run_doctor)
 
 
-def doctor_command(arguments: argparse.Namespace) -> int:
+def run_doctor(arguments: argparse.Namespace) -> int:
     """Print what is here and what is missing; `EngineMissing` when no engine is here."""
     from dataclasses import asdict
 
-    from adapters.doctor import engine_usable, findings
-    from adapters.engine import ENGINE_REMEDY
+    from adapters.engines import ENGINE_REMEDY, findings, has_usable_engine
 
     found = findings()
     if arguments.json:
-        json_print({"ok": engine_usable(found), "findings": [asdict(one) for one in found]})
+        print_json({"ok": has_usable_engine(found), "findings": [asdict(one) for one in found]})
     else:
         for one in found:
             version = one.version or ("missing" if one.remedy else "yes")
             print(f"{one.kind:9}{one.name:16}{version:28}  {one.where}".rstrip())
             if one.remedy:
                 print(f"{'':9}-> {one.remedy}")
-    if not engine_usable(found):
+    if not has_usable_engine(found):
         raise EngineMissing("no engine is installed, so nothing can be run", remedy=ENGINE_REMEDY)
     return 0
 
@@ -73,18 +72,18 @@ def doctor_command(arguments: argparse.Namespace) -> int:
 # --- new -----------------------------------------------------------------------------------
 
 
-def new_register(parser: argparse.ArgumentParser) -> None:
+def register_new(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``new``."""
     from trackbed.scenes import scene_names
 
     parser.add_argument("name", metavar="NAME", help="; ".join(scene_names()))
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
-    parser.set_defaults(command=new_command)
+    parser.set_defaults(command=run_new)
 
 
-def new_command(arguments: argparse.Namespace) -> int:
+def run_new(arguments: argparse.Namespace) -> int:
     """Copy a shipped scene to FOLDER/scene.toml; a scene that is there already is kept."""
-    from trackbed.scene_file import suggest_word
+    from trackbed.scene_files import suggest_word
     from trackbed.scenes import scene_names, scene_template, scene_verb
 
     names = scene_names()
@@ -109,7 +108,7 @@ def new_command(arguments: argparse.Namespace) -> int:
 # --- run, resume, status, report -----------------------------------------------------------
 
 
-def scene_arguments(parser: argparse.ArgumentParser) -> None:
+def add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     """Add SCENE, ``--engine`` and ``--launcher``."""
     parser.add_argument("scene", metavar="SCENE", type=Path, help="a scene file (TOML)")
     parser.add_argument(
@@ -121,9 +120,9 @@ def scene_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run_register(parser: argparse.ArgumentParser) -> None:
+def register_run(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``run``."""
-    scene_arguments(parser)
+    add_scene_arguments(parser)
     parser.add_argument(
         "--run-folder", type=Path, metavar="FOLDER", help="default: run/ beside the scene"
     )
@@ -142,14 +141,14 @@ def run_register(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cycles", type=int, metavar="N", help="short for --set procedure.total_cycles=N"
     )
-    cycle_by_cycle_flag(parser)
+    add_cycle_by_cycle_flag(parser)
     parser.add_argument(
         "--dry-run", action="store_true", help="write the decks and print the engine's command"
     )
     parser.set_defaults(command=run_command)
 
 
-def cycle_by_cycle_flag(parser: argparse.ArgumentParser) -> None:
+def add_cycle_by_cycle_flag(parser: argparse.ArgumentParser) -> None:
     """Add ``--cycle-by-cycle``."""
     parser.add_argument(
         "--cycle-by-cycle", action="store_true",
@@ -158,7 +157,7 @@ def cycle_by_cycle_flag(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def jump_overrides(arguments: argparse.Namespace) -> list[str]:
+def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
     """KEY=VALUE of ``--tolerance`` and ``--cycles``; `UsageError` beside a k or h by hand."""
     overrides = []
     if arguments.tolerance is not None:
@@ -174,7 +173,7 @@ def jump_overrides(arguments: argparse.Namespace) -> list[str]:
     return overrides
 
 
-def overrides_of(arguments: argparse.Namespace) -> list[str]:
+def list_overrides(arguments: argparse.Namespace) -> list[str]:
     """KEY=VALUE of ``--set``, ``--engine`` and ``--launcher``; the values are TOML."""
     overrides = list(arguments.overrides)
     if arguments.engine is not None:
@@ -190,71 +189,71 @@ def overrides_of(arguments: argparse.Namespace) -> list[str]:
 
 def run_command(arguments: argparse.Namespace) -> int:
     """Run a scene from its start."""
-    from adapters import procedure
+    from adapters.procedure import run as procedure
 
     procedure.run_scene(
         arguments.scene,
         arguments.run_folder or arguments.scene.parent / "run",
         control=arguments.control,
-        overrides=overrides_of(arguments) + jump_overrides(arguments),
+        overrides=list_overrides(arguments) + list_jump_overrides(arguments),
         dry_run=arguments.dry_run,
         cycle_by_cycle=arguments.cycle_by_cycle,
     )
     return 0
 
 
-def run_argument(parser: argparse.ArgumentParser) -> None:
+def add_run_argument(parser: argparse.ArgumentParser) -> None:
     """Add the argument RUN."""
     parser.add_argument("run_folder", metavar="RUN", type=Path, help="a run folder")
 
 
-def resume_register(parser: argparse.ArgumentParser) -> None:
+def register_resume(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``resume``."""
-    run_argument(parser)
-    cycle_by_cycle_flag(parser)
-    parser.set_defaults(command=resume_command)
+    add_run_argument(parser)
+    add_cycle_by_cycle_flag(parser)
+    parser.set_defaults(command=run_resume)
 
 
-def resume_command(arguments: argparse.Namespace) -> int:
+def run_resume(arguments: argparse.Namespace) -> int:
     """Go on with a run from its last window that passes the checks."""
-    from adapters import procedure
+    from adapters.procedure import run as procedure
 
     procedure.resume(arguments.run_folder, cycle_by_cycle=arguments.cycle_by_cycle)
     return 0
 
 
-def status_register(parser: argparse.ArgumentParser) -> None:
+def register_status(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``status``."""
-    run_argument(parser)
-    json_flag(parser)
-    parser.set_defaults(command=status_command)
+    add_run_argument(parser)
+    add_json_flag(parser)
+    parser.set_defaults(command=run_status)
 
 
-def status_command(arguments: argparse.Namespace) -> int:
+def run_status(arguments: argparse.Namespace) -> int:
     """Print how far a run is."""
-    from adapters.status import status
+    from adapters.procedure import status
 
     content = status(arguments.run_folder).to_dict()
     if arguments.json:
-        json_print(content)
+        print_json(content)
     else:
         for key, value in content.items():
             print(f"{key.replace('_', ' '):28}{value}")
     return 0
 
 
-def report_register(parser: argparse.ArgumentParser) -> None:
+def register_report(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``report``."""
-    run_argument(parser)
+    add_run_argument(parser)
     parser.add_argument("--open", action="store_true", help="show it, when there is a display")
-    parser.set_defaults(command=report_command)
+    parser.set_defaults(command=run_report)
 
 
-def report_command(arguments: argparse.Namespace) -> int:
+def run_report(arguments: argparse.Namespace) -> int:
     """Write report.html and the figures; print the path."""
-    from adapters.report import report_write
+    from adapters.report import write_report
 
-    path = report_write(arguments.run_folder)
+    path = write_report(arguments.run_folder)
     print(path)
     if arguments.open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         import webbrowser
@@ -266,7 +265,7 @@ def report_command(arguments: argparse.Namespace) -> int:
 # --- fit, relax ----------------------------------------------------------------------------
 
 
-def fit_register(parser: argparse.ArgumentParser) -> None:
+def register_fit(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``fit``."""
     parser.add_argument(
         "paths", nargs="+", metavar="RUN|DUMP...|CSV", type=Path,
@@ -317,16 +316,15 @@ def fit_register(parser: argparse.ArgumentParser) -> None:
         help="also the cycles k that keep the mean error term below --error so surely (eq. 15)",
     )  # fmt: skip
     parser.add_argument("--error", type=float, metavar="E", help="in the unit of the series")
-    json_flag(parser)
-    parser.set_defaults(command=fit_command)
+    add_json_flag(parser)
+    parser.set_defaults(command=run_fit)
 
 
-def fit_command(arguments: argparse.Namespace) -> int:
+def run_fit(arguments: argparse.Namespace) -> int:
     """Fit a law to a series; print its parameters, a prediction and its band."""
     from adapters.errors import JumpRefused
-    from adapters.fit import cycles_needed, fit_auto, fit_series, series_read
-    from adapters.fit_auto import AGREE
-    from adapters.laws import law_named
+    from adapters.laws import get_law
+    from adapters.laws.fit import AGREE, count_cycles_needed, fit_auto, fit_series, read_series
 
     if (arguments.confidence is None) != (arguments.error is None):
         raise UsageError("--confidence and --error belong together", remedy="give both or none")
@@ -336,8 +334,8 @@ def fit_command(arguments: argparse.Namespace) -> int:
             "--law auto is no single law, so it has no error term of eq. 15",
             remedy="name a law for --error, such as --law log",
         )
-    law = law_named("log" if auto else arguments.law)
-    series = series_read(
+    law = get_law("log" if auto else arguments.law)
+    series = read_series(
         arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
     )
     to_cycle = arguments.to_cycle
@@ -349,7 +347,7 @@ def fit_command(arguments: argparse.Namespace) -> int:
     series = series.since(arguments.from_cycle)
     needed = {}
     if arguments.error is not None:
-        cycles = cycles_needed(series, law, arguments.error, arguments.confidence)
+        cycles = count_cycles_needed(series, law, arguments.error, arguments.confidence)
         needed = {"cycles_needed": cycles}
     try:
         if auto:
@@ -359,15 +357,15 @@ def fit_command(arguments: argparse.Namespace) -> int:
     except JumpRefused as refusal:
         if arguments.json:
             unexcluded = {} if arguments.fail_at is None else {"failure_excluded": False}
-            json_print(refusal.to_json(series.unit) | unexcluded | needed)
+            print_json(refusal.to_json(series.unit) | unexcluded | needed)
         else:
-            cycles_needed_print(needed, arguments, series.unit)
+            print_cycles_needed(needed, arguments, series.unit)
         raise
     fitted = found.to_json() | needed
     if arguments.json:
-        json_print(fitted)
+        print_json(fitted)
         return 0
-    unit = unit_words(series.unit)
+    unit = name_unit(series.unit)
     print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles")
     for name, value in fitted["parameters"].items():
         print(f"  {name} = {value:.6g}")
@@ -380,27 +378,27 @@ def fit_command(arguments: argparse.Namespace) -> int:
     print(f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}")
     if found.failure_excluded is False:
         print(f"  so that failure at {arguments.fail_at:g} is not excluded")
-    cycles_needed_print(needed, arguments, series.unit)
+    print_cycles_needed(needed, arguments, series.unit)
     return 0
 
 
-def unit_words(unit: str) -> str:
+def name_unit(unit: str) -> str:
     """The unit of a series, for a text."""
-    from adapters.settlement_series import UNKNOWN
+    from adapters.files import UNKNOWN
 
     return "(unit as given)" if unit == UNKNOWN else unit
 
 
-def cycles_needed_print(needed: dict[str, int], arguments: argparse.Namespace, unit: str) -> None:
+def print_cycles_needed(needed: dict[str, int], arguments: argparse.Namespace, unit: str) -> None:
     """Print the bound of eq. 15 where it was asked for; a refused prediction has it too."""
     if needed:
         print(
-            f"cycles that keep the mean error term below {arguments.error:g} {unit_words(unit)} "
+            f"cycles that keep the mean error term below {arguments.error:g} {name_unit(unit)} "
             f"with confidence {arguments.confidence:g}: {needed['cycles_needed']}"
         )
 
 
-def relax_register(parser: argparse.ArgumentParser) -> None:
+def register_relax(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``relax``."""
     parser.add_argument("state", metavar="STATE", type=Path, help="a .npz of trackbed or a dump")
     parser.add_argument(
@@ -420,13 +418,13 @@ def relax_register(parser: argparse.ArgumentParser) -> None:
         "--method", default="smallest-move", metavar="NAME",
         help="smallest-move (default) or karrech2007",
     )  # fmt: skip
-    json_flag(parser)
-    parser.set_defaults(command=relax_command)
+    add_json_flag(parser)
+    parser.set_defaults(command=run_relax)
 
 
-def scene_of_state(state: Path) -> tuple[Path, list[str]]:
+def find_scene_of_state(state: Path) -> tuple[Path, list[str]]:
     """Scene file and overrides of the run folder that a state lies in."""
-    from adapters.run_folder import RunFolder
+    from adapters.files import RunFolder
 
     for folder in state.resolve().parents:
         if (folder / "manifest.json").exists():
@@ -438,29 +436,29 @@ def scene_of_state(state: Path) -> tuple[Path, list[str]]:
     )
 
 
-def relax_command(arguments: argparse.Namespace) -> int:
+def run_relax(arguments: argparse.Namespace) -> int:
     """Relax a state, write it at rest, print what changed."""
     import numpy as np
 
+    from adapters.bed import make_no_contacts
+    from adapters.files import read_state_file, write_state_file
     from adapters.relaxation import relax, relax_bare
-    from adapters.scene_file import scene_load
-    from adapters.state import contacts_none
-    from adapters.state_file import state_of_file, state_to_file
+    from adapters.scene import load_scene
 
     if not arguments.out.parent.is_dir():
         raise UsageError("the folder of --out does not exist", where=str(arguments.out))
     if arguments.scene is None:
-        scene = scene_load(*scene_of_state(arguments.state))
+        scene = load_scene(*find_scene_of_state(arguments.state))
     else:
-        scene = scene_load(arguments.scene)
+        scene = load_scene(arguments.scene)
     density = scene.material.grain.density
-    state = state_of_file(arguments.state, density)
+    state = read_state_file(arguments.state, density)
     walls = scene.container.walls(state.piston_height, scene.piston_reach)
     if arguments.before is None:
         load = float(scene.stress_at(0.0)) * scene.loaded_area
         relaxation = relax_bare(state, walls, scene.stiffness, method=arguments.method, load=load)
     else:
-        before = state_of_file(arguments.before, density)
+        before = read_state_file(arguments.before, density)
         if not np.array_equal(before.identifier, state.identifier):
             raise UsageError("the grains are not those of STATE", where=str(arguments.before))
         relaxation = relax(
@@ -474,12 +472,12 @@ def relax_command(arguments: argparse.Namespace) -> int:
     still = np.zeros_like(state.position)
     # Contacts and wall forces belong to the positions before and are left out.
     relaxed = state.moved(
-        relaxation.position, velocity=still, spin=still, contacts=contacts_none(), wall_force={}
+        relaxation.position, velocity=still, spin=still, contacts=make_no_contacts(), wall_force={}
     )
-    state_to_file(relaxed, arguments.out)
+    write_state_file(relaxed, arguments.out)
     record = relaxation.record()
     if arguments.json:
-        json_print(record)
+        print_json(record)
         return 0
     print(f"{arguments.out}, at rest; all figures in SI units")
     for key, value in record.items():
@@ -496,16 +494,16 @@ def relax_command(arguments: argparse.Namespace) -> int:
 # --- cite ----------------------------------------------------------------------------------
 
 
-def cite_register(parser: argparse.ArgumentParser) -> None:
+def register_cite(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``cite``."""
-    parser.set_defaults(command=cite_command)
+    parser.set_defaults(command=run_cite)
 
 
-def cite_command(arguments: argparse.Namespace) -> int:
+def run_cite(arguments: argparse.Namespace) -> int:
     """Print BibTeX entries."""
     from importlib.metadata import version
 
-    from adapters.citations import citations_text
+    from adapters.citations import format_citations
 
-    print(citations_text(version("trackbed")))
+    print(format_citations(version("trackbed")))
     return 0

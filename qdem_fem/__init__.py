@@ -1,7 +1,8 @@
 """QDEM: explicit dynamics of viscoelastic bodies made of linear tetrahedra.
 
 Method: Nishiura, Sakaguchi and Aikawa, Materials 10 (2017) 615.  Start with `Body`, `Material`
-and `Simulation`; errors a user can act on are in `qdem_fem.errors`.  A name is loaded when it is
+and `Simulation`; errors a user can act on are in `qdem_fem.files.errors`.  A name is loaded when it
+is
 first used, so that help texts cost nothing.
 """
 
@@ -11,36 +12,33 @@ from typing import TYPE_CHECKING, Any
 from trackbed.cache_folders import provide_cache_folders
 
 if TYPE_CHECKING:
-    from qdem_fem.body import Body
-    from qdem_fem.contact_spheres import ContactPlane, SphereContact
-    from qdem_fem.contact_surface import SurfaceContact
-    from qdem_fem.critical_step import CriticalStep
-    from qdem_fem.dynamic_relaxation import StaticAnswer
-    from qdem_fem.energies import Energy
-    from qdem_fem.errors import QdemError, StepWarning
-    from qdem_fem.material import Material
-    from qdem_fem.periodic import PeriodicWidth
-    from qdem_fem.series import Series, ramp
-    from qdem_fem.simulation import History, Simulation
+    from qdem_fem.bodies import Body
+    from qdem_fem.contact import CriticalStep
+    from qdem_fem.contact.search import PeriodicWidth
+    from qdem_fem.contact.spheres import ContactPlane, SphereContact
+    from qdem_fem.contact.surface import SurfaceContact
+    from qdem_fem.element import Material
+    from qdem_fem.files import QdemError, Series, StepWarning, ramp
+    from qdem_fem.march import Energy, History, Simulation, StaticAnswer
 
 provide_cache_folders(__path__[0])
 
 _HOMES = {
-    "Body": "body",
-    "ContactPlane": "contact_spheres",
-    "CriticalStep": "critical_step",
-    "Energy": "energies",
-    "History": "simulation",
-    "Material": "material",
-    "PeriodicWidth": "periodic",
-    "QdemError": "errors",
-    "Series": "series",
-    "Simulation": "simulation",
-    "SphereContact": "contact_spheres",
-    "SurfaceContact": "contact_surface",
-    "StaticAnswer": "dynamic_relaxation",
-    "StepWarning": "errors",
-    "ramp": "series",
+    "Body": "bodies",
+    "ContactPlane": "contact.spheres",
+    "CriticalStep": "contact",
+    "Energy": "march",
+    "History": "march",
+    "Material": "element",
+    "PeriodicWidth": "contact.search",
+    "QdemError": "files",
+    "Series": "files",
+    "Simulation": "march",
+    "SphereContact": "contact.spheres",
+    "SurfaceContact": "contact.surface",
+    "StaticAnswer": "march",
+    "StepWarning": "files",
+    "ramp": "files",
 }
 __all__ = [
     "Body",

@@ -11,10 +11,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from trackbed.run_arguments import add_run_arguments, place_run, refuse_both
+from trackbed.run_files import add_run_arguments, place_run, refuse_both
 
 if TYPE_CHECKING:
-    from qdem_fem.scene_prepared import Prepared
+    from qdem_fem.tables import Prepared
 
 TRIAL = 0.5
 """Time that a dry run may spend on trial steps to tell the cost [s]."""
@@ -32,10 +32,10 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 def qdem_command(arguments: argparse.Namespace) -> int:
     """Run a scene, or tell what would run."""
-    from qdem_fem.scene_checks import scene_load
+    from qdem_fem.scene import load_scene
 
     refuse_both(arguments)
-    prepared = scene_load(arguments.scene, arguments.overrides)
+    prepared = load_scene(arguments.scene, arguments.overrides)
     if arguments.dry_run:
         _print(_outlook(prepared), arguments.json)
         return 0
@@ -49,16 +49,21 @@ def qdem_command(arguments: argparse.Namespace) -> int:
 
 def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
-    from qdem_fem.report import report_write
-    from qdem_fem.run_folder import RESULT, RunFolder, manifest_of
-    from qdem_fem.scene_build import simulation_of
-    from qdem_fem.scene_run import run_dynamic, run_static
-    from qdem_fem.summary import summary_of
-    from trackbed.whole_files import write_whole
+    from qdem_fem.scene import (
+        RESULT,
+        RunFolder,
+        make_manifest,
+        run_dynamic,
+        run_static,
+        simulation_of,
+        summary_of,
+        write_report,
+    )
+    from trackbed.run_files import write_whole
 
     run, bodies = simulation_of(prepared)  # what it refuses must not leave a folder behind
     folder = RunFolder(path)
-    manifest = manifest_of(
+    manifest = make_manifest(
         prepared.scene.parameters(),
         prepared.files,
         arguments.overrides,
@@ -79,14 +84,14 @@ def _run(prepared: Prepared, path: Path, arguments: argparse.Namespace) -> dict[
         summary = summary_of(prepared, done, folder)
         more: Iterable[tuple[Path, str]] = ()
         if "track" in prepared.text.data:  # other scenes do not pay for its import
-            from qdem_fem.track_figures import track_facts, track_pictures
-            from qdem_fem.track_scene import TrackPrepared
+            from qdem_fem.report import draw_track_pictures, list_track_facts
+            from qdem_fem.track import TrackPrepared
 
             assert isinstance(prepared, TrackPrepared)
-            summary["track"] = track_facts(path, prepared.load)
+            summary["track"] = list_track_facts(path, prepared.load)
             summary["bed"] = prepared.stand
-            more = track_pictures(path, prepared.load)
-        report_write(folder, manifest, summary, None if arguments.no_pictures else done, more)
+            more = draw_track_pictures(path, prepared.load)
+        write_report(folder, manifest, summary, None if arguments.no_pictures else done, more)
         write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
     return summary | {"folder": str(path)}
 
@@ -105,10 +110,14 @@ def _warning_show(
 
 def _outlook(prepared: Prepared) -> dict[str, Any]:
     """What a run would be: bodies, steps, and the cost as a short trial tells it."""
-    from qdem_fem.errors import StepWarning
-    from qdem_fem.scene_build import simulation_of
-    from qdem_fem.scene_run import plan_of
-    from qdem_fem.summary import bodies_facts, critical_step_of, mass_scaling_facts
+    from qdem_fem.files import StepWarning
+    from qdem_fem.scene import (
+        list_body_facts,
+        list_mass_scaling_facts,
+        make_plan,
+        simulation_of,
+        tell_critical_step,
+    )
 
     outlook: dict[str, Any] = {
         "title": prepared.scene.title,
@@ -116,19 +125,19 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
         "left_out": prepared.scene.left_out(),
     }
     if "track" in prepared.text.data:
-        from qdem_fem.track_scene import TrackPrepared, bed_outlook
+        from qdem_fem.track import TrackPrepared, foresee_bed
 
         assert isinstance(prepared, TrackPrepared)
-        if bed := bed_outlook(prepared):  # what follows it is known when it stands
+        if bed := foresee_bed(prepared):  # what follows it is known when it stands
             return outlook | {"bed": bed}
     run, bodies = simulation_of(prepared)
     outlook |= {
-        "bodies": bodies_facts(bodies),
-        "critical_step": critical_step_of(run),
-        "mass_scaling": mass_scaling_facts(run),
+        "bodies": list_body_facts(bodies),
+        "critical_step": tell_critical_step(run),
+        "mass_scaling": list_mass_scaling_facts(run),
     }
     if prepared.scene.simulation.method == "dynamic":
-        plan = plan_of(prepared, float(run.step))
+        plan = make_plan(prepared, float(run.step))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", StepWarning)  # the outlook has its text
             seconds = _seconds_a_step(run, plan.total)

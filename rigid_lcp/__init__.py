@@ -11,41 +11,36 @@ from typing import TYPE_CHECKING, Any
 from trackbed.cache_folders import provide_cache_folders
 
 if TYPE_CHECKING:
-    from rigid_lcp.breakage import Breakage
-    from rigid_lcp.collisions import collide
-    from rigid_lcp.disc import Disc
+    from rigid_lcp.collision import collide
     from rigid_lcp.errors import RigidError
-    from rigid_lcp.friction_problem import BodySpace, FrictionProblem, FrictionSolution
-    from rigid_lcp.frictionless import lcp
-    from rigid_lcp.half_space import HalfSpace
-    from rigid_lcp.polygon import Polygon
-    from rigid_lcp.polyhedron import Polyhedron, box
-    from rigid_lcp.scene import Scene
-    from rigid_lcp.simulation import Simulation
-    from rigid_lcp.solver import solve_friction
-    from rigid_lcp.sphere import Sphere
-    from rigid_lcp.wear import Wear
+    from rigid_lcp.friction.attempts import lcp
+    from rigid_lcp.friction.auto import solve_friction
+    from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution
+    from rigid_lcp.motion import Scene
+    from rigid_lcp.scene import Simulation
+    from rigid_lcp.shapes import Disc, HalfSpace, Polygon, Polyhedron, Sphere, box
+    from rigid_lcp.wear import Breakage, Wear
 
 provide_cache_folders(__path__[0])
 
 _HOMES = {
-    "BodySpace": "friction_problem",
-    "Breakage": "breakage",
-    "Disc": "disc",
-    "FrictionProblem": "friction_problem",
-    "FrictionSolution": "friction_problem",
-    "HalfSpace": "half_space",
-    "Polygon": "polygon",
-    "Polyhedron": "polyhedron",
+    "BodySpace": "friction.problem",
+    "Breakage": "wear",
+    "Disc": "shapes",
+    "FrictionProblem": "friction.problem",
+    "FrictionSolution": "friction.problem",
+    "HalfSpace": "shapes",
+    "Polygon": "shapes",
+    "Polyhedron": "shapes",
     "RigidError": "errors",
-    "Scene": "scene",
-    "Simulation": "simulation",
-    "Sphere": "sphere",
+    "Scene": "motion",
+    "Simulation": "scene",
+    "Sphere": "shapes",
     "Wear": "wear",
-    "box": "polyhedron",
-    "collide": "collisions",
-    "lcp": "frictionless",
-    "solve_friction": "solver",
+    "box": "shapes",
+    "collide": "collision",
+    "lcp": "friction.attempts",
+    "solve_friction": "friction.auto",
 }
 __all__ = [
     "BodySpace",

@@ -9,11 +9,10 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from trackbed.run_arguments import add_run_arguments, place_run, refuse_both
+from trackbed.run_files import add_run_arguments, place_run, refuse_both
 
 if TYPE_CHECKING:
-    from rigid_lcp.scene_file import SceneFile
-    from rigid_lcp.simulation import Simulation
+    from rigid_lcp.scene import SceneFile, Simulation
 
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
@@ -27,7 +26,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 def rigid_command(arguments: argparse.Namespace) -> int:
     """Run a scene, or tell what would run."""
-    from rigid_lcp.scene_file import scene_read
+    from rigid_lcp.scene import scene_read
 
     refuse_both(arguments)
     file = scene_read(arguments.scene, arguments.overrides)
@@ -52,11 +51,11 @@ def _shown(value: Any) -> str:
 
 def _outlook(file: SceneFile) -> dict[str, Any]:
     """What a run would be: bodies, steps, what is left out."""
-    from rigid_lcp.scene_run import left_out, simulation_of, steps_planned, unknowns_a_contact
+    from rigid_lcp.scene import left_out, plan_steps, simulation_of, unknowns_a_contact
 
     _, run = simulation_of(file)
     tables = file.tables.run
-    steps, step = steps_planned(file)
+    steps, step = plan_steps(file)
     return {
         "title": file.tables.title,
         "method": tables.method,
@@ -71,12 +70,9 @@ def _outlook(file: SceneFile) -> dict[str, Any]:
 
 def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
     """The whole run with its report; its summary."""
-    from rigid_lcp.report import report_write
-    from rigid_lcp.run_folder import RESULT, RunFolder
-    from rigid_lcp.scene_run import scene_run, simulation_of, summary_of
-    from trackbed.provenance import record_provenance
-    from trackbed.signals import raise_on_signals
-    from trackbed.whole_files import write_whole
+    from rigid_lcp.report import write_report
+    from rigid_lcp.scene import RESULT, RunFolder, scene_run, simulation_of, summary_of
+    from trackbed.run_files import raise_on_signals, record_provenance, write_whole
 
     scene, run = simulation_of(file)  # what it refuses must not leave a folder behind
     path = place_run(arguments)
@@ -94,7 +90,7 @@ def _run(file: SceneFile, arguments: argparse.Namespace) -> dict[str, Any]:
             return there | {"folder": str(path)}
         scene_run(file, run, folder, resume=goes_on, progress=_progress())
         summary = summary_of(file, scene, run, folder)
-        report_write(folder, scene, manifest, summary, draw=not arguments.no_pictures)
+        write_report(folder, scene, manifest, summary, draw=not arguments.no_pictures)
         write_whole(path / RESULT, json.dumps(summary, indent=1) + "\n")
     return summary | {"folder": str(path)}
 

@@ -48,14 +48,14 @@ def _place(item: pytest.Item) -> tuple[int, bool, int]:
 @cache
 def engine_missing(name: str) -> str:
     """Why an engine, or a program such as ``chromium``, can not be used; empty where it can."""
-    from adapters.engine import engine_named, engines_known
+    from adapters.engines.contract import get_engine, list_engines
     from adapters.errors import EngineMissing
 
-    if name not in engines_known():
+    if name not in list_engines():
         return "" if shutil.which(name) else f"the engine {name} is not installed"
 
     try:
-        engine_named(name).version()
+        get_engine(name).version()
     except EngineMissing as error:
         return error.what
     return ""

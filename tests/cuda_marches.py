@@ -9,10 +9,10 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.contact_search import Pairs
-from qdem_fem.contact_spheres import pair_stiffness
-from qdem_fem.contact_step import network_bound
-from qdem_fem.periodic import extents
+from qdem_fem.contact.bounds import bound_spring_network
+from qdem_fem.contact.search.pairs import Pairs
+from qdem_fem.contact.search.periodic import extents
+from qdem_fem.contact.spheres.options import pair_stiffness
 from validation.bench.qdem_gpu.contact import STEPS, two_cubes
 from validation.bench.qdem_gpu.search import Cloud, contact_of, lists_gpu
 
@@ -22,9 +22,10 @@ Integers = NDArray[np.int64]
 
 def lists_gpu_shuffled(given: Cloud, seed: int) -> Pairs:
     """`lists_gpu` with every bucket of cells in another order, as hardware may leave it."""
-    from qdem_fem import cuda_cells, cuda_search
+    from qdem_fem.contact.cuda import cells as cuda_cells
+    from qdem_fem.contact.cuda import pairs as cuda_search
 
-    random, in_order = np.random.default_rng(seed), cuda_cells.cells_of
+    random, in_order = np.random.default_rng(seed), cuda_cells.find_cells
 
     def shuffled(*asked: Any) -> Any:
         cells = in_order(*asked)
@@ -34,7 +35,7 @@ def lists_gpu_shuffled(given: Cloud, seed: int) -> Pairs:
         cells.order.copy_to_device(order)
         return cells
 
-    with patch.object(cuda_search, "cells_of", shuffled):
+    with patch.object(cuda_search, "find_cells", shuffled):
         return lists_gpu(given, seed)
 
 
@@ -53,9 +54,9 @@ class Sums(NamedTuple):
 
 def sums_gpu(given: Cloud, seed: int, first: Integers, lost: bool) -> Sums:
     """`Sums` on a GPU of bodies that begin at ``first`` (b + 1,); one vertex may be ``lost``."""
-    from qdem_fem.cuda_contact_state import DeviceContact
-    from qdem_fem.cuda_contact_sums import extents_of
-    from qdem_fem.cuda_step import cuda
+    from qdem_fem.contact.cuda.arrays import DeviceContact
+    from qdem_fem.contact.cuda.sums import find_device_extents
+    from qdem_fem.kernel.cuda.step import cuda
 
     there = DeviceContact(contact_of(given, seed), given.side)
     moved = np.zeros((len(given.radius), 4))
@@ -65,7 +66,7 @@ def sums_gpu(given: Cloud, seed: int, first: Integers, lost: bool) -> Sums:
     return Sums(
         there.gap(position),
         there.bound(cuda.to_device(1 + given.radius)),
-        extents_of(position, 1, cuda.to_device(own), cuda.to_device(first)),
+        find_device_extents(position, 1, cuda.to_device(own), cuda.to_device(first)),
         there.positions(cuda.to_device(moved.ravel())) is not None,
     )
 
@@ -85,7 +86,7 @@ def sums_processor(given: Cloud, seed: int, first: Integers) -> Sums:
     stiffness = contact.spheres.normal
     return Sums(
         np.concatenate(gaps).max(initial=0.0),
-        network_bound(
+        bound_spring_network(
             ends, pair_stiffness(*stiffness[ends.T]), 2 * stiffness * walls.sum(axis=0),
             1 + given.radius,
         ),
@@ -95,18 +96,18 @@ def sums_processor(given: Cloud, seed: int, first: Integers) -> Sums:
 
 
 def sums_before(values: Integers) -> Integers:
-    """`qdem_fem.cuda_scan.sums_before` of (n,) on a GPU."""
-    from qdem_fem import cuda_scan
-    from qdem_fem.cuda_step import cuda
+    """`qdem_fem.kernel.cuda.sums_before` of (n,) on a GPU."""
+    from qdem_fem.kernel.cuda import scan as cuda_scan
+    from qdem_fem.kernel.cuda.step import cuda
 
     found: Integers = cuda_scan.sums_before(cuda.to_device(values), len(values)).copy_to_host()
     return found
 
 
 def motion_summed(displacement: Floats, velocity: Floats, mass: Floats, parts: int) -> Floats:
-    """`qdem_fem.cuda_sums.motion_summed` of fields (n, 4) by so many threads on a GPU."""
-    from qdem_fem import cuda_sums
-    from qdem_fem.cuda_step import cuda
+    """`qdem_fem.kernel.cuda.motion_summed` of fields (n, 4) by so many threads on a GPU."""
+    from qdem_fem.kernel.cuda import sums as cuda_sums
+    from qdem_fem.kernel.cuda.step import cuda
 
     with patch.object(cuda_sums, "PARTS", parts):
         return cuda_sums.motion_summed(
@@ -116,7 +117,7 @@ def motion_summed(displacement: Floats, velocity: Floats, mass: Floats, parts: i
 
 def simulator_begin() -> None:
     """Small blocks: in numba's simulator every thread of a block costs, at work or not."""
-    from qdem_fem import cuda_step
+    from qdem_fem.kernel.cuda import step as cuda_step
 
     cuda_step.BLOCK = 8
 
@@ -126,11 +127,11 @@ def steps_launched(look: int) -> list[tuple[int, int]]:
 
     The host looks every ``look`` steps whether a window has ended.
     """
-    from qdem_fem import cuda_assembly
-    from qdem_fem.cuda_contact_state import DeviceContact
+    from qdem_fem.contact.cuda.arrays import DeviceContact
+    from qdem_fem.kernel.cuda import assembly as cuda_assembly
 
     windows: list[tuple[int, int]] = []
-    push, run_window = DeviceContact.launch_push, cuda_assembly.CudaAssembly.kernel_run
+    push, run_window = DeviceContact.launch_push, cuda_assembly.CudaAssembly.run_kernel
 
     def push_counted(*given: Any) -> None:
         done, launched = windows[-1]
@@ -146,7 +147,7 @@ def steps_launched(look: int) -> list[tuple[int, int]]:
     with (
         patch.object(cuda_assembly, "LOOK", look),
         patch.object(DeviceContact, "launch_push", push_counted),
-        patch.object(cuda_assembly.CudaAssembly, "kernel_run", window_counted),
+        patch.object(cuda_assembly.CudaAssembly, "run_kernel", window_counted),
     ):
         run = two_cubes("cuda", skin=2e-6)
         run.advance(STEPS * run.step)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.distance import pdist
 
-from adapters.container import Walls
-from adapters.state import FloatArray
+from adapters.bed.container import Walls
+from adapters.bed.state import FloatArray
 
 
 def deepest(position: FloatArray, radius: FloatArray, walls: Walls) -> float:

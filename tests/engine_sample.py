@@ -13,26 +13,26 @@ from pathlib import Path
 
 import pytest
 
-from adapters.engine import (
+from adapters.engines.contract import (
     Engine,
     EngineRun,
     EngineStart,
-    engine_named,
-    engines_known,
-    real_engines,
+    get_engine,
+    list_engines,
+    list_real_engines,
 )
-from adapters.engine_fake import FakeEngine
-from adapters.procedure import run_scene
-from adapters.progress import Progress
-from adapters.run_folder import RunFolder
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.window import Window, window_load, window_read
+from adapters.engines.fake import FakeEngine
+from adapters.files.run_folder import RunFolder
+from adapters.files.window import Window, load_window, read_window
+from adapters.procedure.progress import Progress
+from adapters.procedure.run import run_scene
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_template
 
-REAL = [pytest.param(name, marks=pytest.mark.engine(name)) for name in real_engines()]
+REAL = [pytest.param(name, marks=pytest.mark.engine(name)) for name in list_real_engines()]
 """Engines with mechanics, and with a process to kill."""
-ENGINES = [*REAL, *(name for name in engines_known() if name not in real_engines())]
+ENGINES = [*REAL, *(name for name in list_engines() if name not in list_real_engines())]
 
 QUIET = Progress(quiet=True)
 TINY = (
@@ -70,7 +70,7 @@ class Sample:
         self.overrides = (
             *TINY, f'engine.name="{name}"', f"engine.launcher={json.dumps(LAUNCHER)}"
         )  # fmt: skip
-        self.engine: Engine = engine_named(name)
+        self.engine: Engine = get_engine(name)
         if not (folder / "done").exists():
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir()
@@ -79,7 +79,7 @@ class Sample:
             run_scene(self.file, self.run, overrides=self.overrides, progress=QUIET)
             (folder / FAULT).unlink()
             (folder / "done").touch()
-        self.scene: Scene = scene_load(self.file, self.overrides)
+        self.scene: Scene = load_scene(self.file, self.overrides)
 
     @property
     def table(self) -> bytes:
@@ -98,7 +98,7 @@ class Sample:
         return folder
 
     def window(self, stage: str) -> Window:
-        return window_load(self.run / stage / "states.npz")
+        return load_window(self.run / stage / "states.npz")
 
     def start(self, stage: str) -> EngineStart:
         """That of a window that goes on from a finished one."""
@@ -121,7 +121,7 @@ class Sample:
         assert done.cpu_s >= 0
         assert 0 <= done.start_up_s <= max(done.wall_s, done.start_up_s)
         names = self.engine.wall_names(self.scene, piston=True)
-        return window_read(folder, 0, names, start.piston_height)
+        return read_window(folder, 0, names, start.piston_height)
 
     # --- faults -----------------------------------------------------------------------------
 

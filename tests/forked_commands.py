@@ -47,8 +47,9 @@ def tell(**answer: object) -> None:
 
 def slow_down(seconds: float) -> None:
     """Have each part of a run tell that it begins, and sleep around its work."""
-    from adapters import jump_room, stages
-    from adapters.engine_fake import FakeEngine
+    from adapters.engines.fake import FakeEngine
+    from adapters.procedure import room as jump_room
+    from adapters.procedure import stages
 
     def slowed(work: Callable[..., Any], part: str) -> Callable[..., Any]:
         def wrapper(*arguments: Any, **named: Any) -> Any:
@@ -96,7 +97,7 @@ def serve(request: dict[str, Any]) -> None:
     if "path" in request:
         os.environ["PATH"] = request["path"]
     if "bed" in request:
-        from adapters import engine_fake
+        from adapters.engines import fake as engine_fake
         from tests.jump_curves import CURVES, Curve
 
         engine_fake.BED = Curve(CURVES[request["bed"]], bursts=0.2).bed

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine_fake import FakeBed
-from adapters.jump_check import accept, judge, reject
-from adapters.jump_control import Decision, Settings, begin, decide, observe
-from adapters.jump_rates import Stretch
-from adapters.jump_slopes import Landing, unmoved
-from adapters.state import FloatArray
+from adapters.bed.state import FloatArray
+from adapters.engines.fake import FakeBed
+from adapters.jumps.check import accept, judge, reject
+from adapters.jumps.control import Decision, Settings, begin, decide, observe
+from adapters.jumps.rates import Stretch
+from adapters.jumps.slopes import Landing, unmoved
 
 Law = Callable[[FloatArray], FloatArray]
 
@@ -104,7 +104,7 @@ class Play:
 
     decisions: list[Decision] = field(default_factory=list)
     checks: list[dict[str, Any]] = field(default_factory=list)
-    """Of jumps that stand, as `jump_band.band_of` takes them."""
+    """Of jumps that stand, as `jump_band.estimate_band` takes them."""
     taken_back: list[dict[str, Any]] = field(default_factory=list)
     true_errors: list[float] = field(default_factory=list)
     """Gain of each jump that stands less that of the mean law, over the total."""
@@ -121,7 +121,7 @@ class Play:
         return np.abs(self.true_errors)
 
 
-def stretch_of(bed: FakeBed | Measured, first: int, cycles: int) -> Stretch:
+def make_stretch(bed: FakeBed | Measured, first: int, cycles: int) -> Stretch:
     """Cycles of a bed as the controller sees them."""
     unknown = np.full(cycles, np.nan)
     return Stretch(first, np.diff(bed.settlement(first, cycles)), unknown, unknown)
@@ -149,13 +149,13 @@ def play(curve: Curve | Measured, k_i: int, settings: Settings) -> Play:
             out.refused = decision.action == "refuse"
             break
         if decision.action == "compute":
-            window = stretch_of(bed, control.cycle, decision.window)
+            window = make_stretch(bed, control.cycle, decision.window)
             window = moved_more(curve, window, control.landings)
             out.computed += decision.window
             control = observe(control, window, control.settlement + float(window.gain.sum()))
             continue
         landed = control.cycle + decision.jump
-        window = stretch_of(bed, landed, settings.healing + decision.window)
+        window = make_stretch(bed, landed, settings.healing + decision.window)
         window = moved_more(curve, window, (*control.landings, Landing(landed, decision.moved)))
         out.computed += settings.healing + decision.window
         settlement = control.settlement + decision.moved + float(window.gain.sum())

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from adapters.contact_law import hertz_stiffness
-from adapters.container import Container, Walls
-from adapters.overlaps import Neighbours, behind_discs, neighbours, rows_at
-from adapters.relaxation import relax_bare
-from adapters.relaxation_smallest import smallest_move
-from adapters.state import FloatArray, State
+from adapters.bed.contact_law import hertz_stiffness
+from adapters.bed.container import Container, Walls
+from adapters.bed.overlaps import Neighbours, find_behind_discs, measure_rows, neighbours
+from adapters.bed.state import FloatArray, State
+from adapters.relaxation.methods import relax_bare
+from adapters.relaxation.smallest import find_smallest_move
 
 STIFFNESS = hertz_stiffness(46.9e9, 0.25, 210e9, 0.3)
 DENSITY = 2710.0
@@ -43,7 +43,7 @@ def bed_made(count: int, seed: int = 0) -> tuple[State, Walls]:
     position = edge * place + 3e-4 * generator.standard_normal((count, 3))
     walls = Container("box", size_x=side * edge, size_y=side * edge).walls()
     position = relax_bare(state_at_rest(position, radius), walls, STIFFNESS).position
-    behind = behind_discs(position, walls)
+    behind = find_behind_discs(position, walls)
     near = neighbours(position, radius, walls, 1e-3)
     closed = np.argsort(-near.overlap)[: 2 * count]
     none = Neighbours(near.first[:0], near.second[:0], near.normal[:0], near.overlap[:0])
@@ -53,14 +53,14 @@ def bed_made(count: int, seed: int = 0) -> tuple[State, Walls]:
         near.normal[closed],
         OVERLAP * generator.exponential(size=len(closed)),
     )
-    made = smallest_move(
+    made = find_smallest_move(
         position,
         position,
         radius,
         network,
         none,
         5 * OVERLAP,
-        lambda x, first, second: rows_at(x, radius, first, second, walls, behind),
+        lambda x, first, second: measure_rows(x, radius, first, second, walls, behind),
         lambda x, gap: neighbours(x, radius, walls, gap, behind),
         keep_height=False,
         tolerance=0.01 * OVERLAP,

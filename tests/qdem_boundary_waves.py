@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 
 Floats = NDArray[np.float64]
 GROUND = q.Material(200e6, 0.25, 2000.0)
@@ -33,7 +33,7 @@ class Share(NamedTuple):
 
 def bar(cells: int, size: float = 0.1, **options: Any) -> q.Simulation:
     """A row of so many cubes [m] along x, joined to its images across y and z: waves are plane."""
-    mesh = box_mesh((cells * size, size, size), (cells, 1, 1), "kuhn")
+    mesh = make_box_mesh((cells * size, size, size), (cells, 1, 1), "kuhn")
     body = q.Body(mesh, GROUND, name="bar")
     run = q.Simulation([body], strain="small", threads=1, **options)
     for axis in (1, 2):
@@ -146,7 +146,7 @@ def oblique_share(degrees: float, cells: int = 24, length: float = 6.0) -> Share
     k_mean = k_x / np.tan(angle)
     layers = int(np.ceil(length * 2 * np.pi / k_mean / size))
     depth = layers * size
-    mesh = box_mesh((width, size, depth), (cells, 1, layers), "kuhn")
+    mesh = make_box_mesh((width, size, depth), (cells, 1, layers), "kuhn")
     body = q.Body(mesh, GROUND, name="slab")
     run = q.Simulation([body], strain="small", threads=1)
     for axis, end in ((0, width), (1, size)):

@@ -28,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from qdem_fem.kinematics import FloatArray, IntArray, isotropic
+from qdem_fem.element.kinematics import FloatArray, IntArray, isotropic
 
 INTERFACES = (
     (0, 1, 2, 3),

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.linalg import eigh
 
 from qdem_fem import Body, Simulation, ramp
-from qdem_fem.errors import ElementInverted
-from qdem_fem.mesh import TetMesh
-from qdem_fem.mesh_generation import box_mesh, jitter
+from qdem_fem.files.errors import ElementInverted
+from qdem_fem.mesh.generation import jitter, make_box_mesh
+from qdem_fem.mesh.tetrahedra import TetMesh
 from validation.bench.qdem import judge as qdem_judge
 from validation.bench.qdem.checks import below, between, reported
 from validation.bench.qdem.hard import CONCRETE
@@ -108,7 +108,7 @@ def inverted_checks(seeds: range) -> list[Check]:
 
 def _push(seed: int) -> tuple[TetMesh, int, FloatArray]:
     """An irregular cube, an inner node of it, and the way it is to go, 1 m."""
-    mesh = jitter(box_mesh((1.0, 1.0, 1.0), (4, 4, 4)), 0.2, seed=seed)
+    mesh = jitter(make_box_mesh((1.0, 1.0, 1.0), (4, 4, 4)), 0.2, seed=seed)
     random = np.random.default_rng(seed)
     inner = np.flatnonzero(((mesh.nodes > 0.1) & (mesh.nodes < 0.9)).all(axis=1))
     direction = random.normal(size=3)
@@ -156,7 +156,7 @@ def impact_names_wrong() -> float:
 
     At the displacement before the last step, whose forces can not be right.
     """
-    mesh = box_mesh((1.0, 1.0, 1.0), (4, 4, 4))
+    mesh = make_box_mesh((1.0, 1.0, 1.0), (4, 4, 4))
     body = Body(mesh, CONCRETE)
     run = Simulation([body], threads=1)
     run.fix(body, mesh.nodes[:, 0] < 0.01)

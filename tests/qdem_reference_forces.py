@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from qdem_fem.kinematics import (
+from qdem_fem.element.kinematics import (
     IDENTITY,
     FloatArray,
     IntArray,
@@ -23,10 +23,10 @@ from qdem_fem.kinematics import (
     volume_change,
     von_mises,
 )
-from qdem_fem.measure_finger import strain_of as strain_finger
-from qdem_fem.measure_finger import stress_nominal as stress_finger
-from qdem_fem.measure_small import stress_nominal as stress_small
-from qdem_fem.strain_measures import MEASURES, Strain, elastic_energy, stress_cauchy
+from qdem_fem.element.measure_finger import strain_of as strain_finger
+from qdem_fem.element.measure_finger import stress_nominal as stress_finger
+from qdem_fem.element.measure_small import stress_nominal as stress_small
+from qdem_fem.element.strain_measures import MEASURES, Strain, elastic_energy, stress_cauchy
 from tests.qdem_construction import particle_forces, strain_rate
 
 __all__ = [

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem.contact import FACES_OF, GRAVITY, SIDE, STONE
 
 
@@ -29,7 +29,7 @@ def slope_gain(
         contact = q.SurfaceContact(
             stiffness / SIDE**2, share / 2, planes=walls, faces=FACES_OF[model]
         )
-    body = q.Body(box_mesh((SIDE,) * 3, (2, 2, 2), "kuhn", (0, 0, height)), STONE, rigid=rigid)
+    body = q.Body(make_box_mesh((SIDE,) * 3, (2, 2, 2), "kuhn", (0, 0, height)), STONE, rigid=rigid)
     times = np.linspace(0, ramp, 200)
     along = GRAVITY * np.sin(alpha) * 0.5 * (1 - np.cos(np.pi * times / ramp))
     across = np.full(200, -GRAVITY * np.cos(alpha))
@@ -69,8 +69,11 @@ def tetrahedron(model: str, friction: float) -> tuple[float, float]:
         contact = q.SurfaceContact(1e11, friction, faces=FACES_OF[model])
         bears = area / 3 * (1 - (1 / 3) ** 50)
         lift = -weight / (0.5 * 1e11 * bears)
-    plate = q.Body(box_mesh((0.04, 0.04, 0.01), (4, 4, 1), "kuhn", (-0.02, -0.02, -0.01)), STONE,
-                   rigid=True)  # fmt: skip
+    plate = q.Body(
+        make_box_mesh((0.04, 0.04, 0.01), (4, 4, 1), "kuhn", (-0.02, -0.02, -0.01)),
+        STONE,
+        rigid=True,
+    )
     nodes[:, 2] += lift
     if model != "spheres":  # within a face, away from where several meet
         nodes[:, :2] += np.array([0.003, 0.004]) - nodes[np.argmin(nodes[:, 2]), :2]

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.friction_problem import FrictionProblem
-from rigid_lcp.micro_displacements import (
+from rigid_lcp.friction.problem.definition import FrictionProblem
+from rigid_lcp.unique.micro_displacements import (
     bodies_of,
     contact_stiffness,
     coulomb_spring,
@@ -30,7 +30,8 @@ def find_least_forces(problem: FrictionProblem, stiffness: ArrayLike = 1.0) -> F
 def slide_with_memory(
     deformation: Floats, slip: Floats, stiffness: Floats, friction: Floats
 ) -> tuple[Floats, Floats]:
-    """A law of one's own (`rigid_lcp.micro_displacements.ForceLaw`): what slides stays slid, as in
+    """A law of one's own (`rigid_lcp.unique.micro_displacements.ForceLaw`): what slides stays slid,
+    as in
     MD (Cundall and Strack), so that the forces depend on the order in which contacts slid."""
     force, _ = coulomb_spring(deformation, slip, stiffness, friction)
     slipped = slip.copy()

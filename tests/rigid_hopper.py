@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.disc import Disc
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.polygon import Polygon
 from validation.bench.rigid.scenes import DENSITY
 
 Floats = NDArray[np.float64]

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rigid_lcp.disc import Disc
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.motion import Motion
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.polyhedra import ballast_stone
-from rigid_lcp.polyhedron import Polyhedron
-from rigid_lcp.rotations import quaternion_of_rotation, quaternion_rate, rotate
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.motion.state import Motion
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Method, Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
+from rigid_lcp.shapes.polyhedron import Polyhedron
+from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_rate, rotate
+from rigid_lcp.shapes.stones import ballast_stone
 from validation.bench.rigid.scenes import DENSITY, FLOOR, G, gravity_on
 
 Floats = NDArray[np.float64]

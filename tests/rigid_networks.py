@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from tests.rigid_collision_sets import contact_rows
 
 Floats = NDArray[np.float64]

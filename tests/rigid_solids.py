@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from rigid_lcp.contacts import Contacts
-from rigid_lcp.detection_3d import detect_3d, shapes_3d
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polyhedra import ballast_stone
-from rigid_lcp.polyhedron import Polyhedron, box
-from rigid_lcp.rotations import Floats, rotation_matrix, unit_quaternion
+from rigid_lcp.contact.arrays import Contacts
+from rigid_lcp.contact.detection_space import detect_3d, shapes_3d
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp.shapes.rotations import Floats, rotation_matrix, unit_quaternion
+from rigid_lcp.shapes.stones import ballast_stone
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 
 GRAVITY = 9.81
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.integrate import trapezoid
 
-from adapters.state import FloatArray
+from adapters.bed.state import FloatArray
 
 LOOPS = {
     "load n, load t, unload n, unload t": np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]),

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from adapters.dump import dump_frames
-from adapters.engine_yade import PARAMETERS, YadeEngine
-from adapters.scene import Scene
-from adapters.state import FloatArray
-from adapters.window import contacts_of_frame
+from adapters.bed.state import FloatArray
+from adapters.engines.yade import PARAMETERS, YadeEngine
+from adapters.files.dump import read_frames
+from adapters.files.window import read_contacts
+from adapters.scene.tables import Scene
 from validation.bench.few_grains import RADIUS, Track
 
 SCRIPT = """\
@@ -96,10 +96,8 @@ def track_run(
         (folder / PARAMETERS).write_text(materials(json.dumps(content)))
         (folder / "few.py").write_text(SCRIPT)
         engine.run(scene, "few.py", folder, lambda: None, digests)
-        frames = list(dump_frames(folder / "states.dump"))
-        contacts = tuple(
-            contacts_of_frame(frame) for frame in dump_frames(folder / "contacts.dump")
-        )
+        frames = list(read_frames(folder / "states.dump"))
+        contacts = tuple(read_contacts(frame) for frame in read_frames(folder / "contacts.dump"))
         force = np.loadtxt(folder / "force.txt").reshape(-1, len(radius), 3)
     position, velocity, spin = (
         np.array([frame.block(*(letter + axis for axis in "xyz")) for frame in frames])

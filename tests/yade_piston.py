@@ -9,10 +9,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from adapters.engine_yade import PARAMETERS, YadeEngine, piston_face
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray
+from adapters.bed.state import FloatArray
+from adapters.engines.yade import PARAMETERS, YadeEngine, cover_piston
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
 
 SCRIPT = """\
@@ -48,7 +48,7 @@ open("end.restart", "w").write("none")
 
 def scene_partial(*settings: str) -> Scene:
     """The shipped scene with a piston over a part of the bed, on YADE."""
-    return scene_load(scene_path("karrech-partial"), ['engine.name="yade"', *settings])
+    return load_scene(scene_path("karrech-partial"), ['engine.name="yade"', *settings])
 
 
 def piston_forces(
@@ -67,7 +67,7 @@ def piston_forces(
         content = json.loads((folder / PARAMETERS).read_text())
         content["grain_count"] = count
         content["piston"] = {"mass": 1.0, "height": height}
-        content["piston"] |= piston_face(
+        content["piston"] |= cover_piston(
             scene.container, scene.piston_reach, scene.sample.grain_radius
         )
         content["few"] = [each.tolist() for each in places]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.state import FloatArray
+from adapters.bed.state import FloatArray
 
 SEAM_MEAN = 3 * np.pi / 16
 """Mean of (1 - x^2)^(3/2) over 0 < x < 1."""

@@ -16,8 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from trackbed.errors import UsageError
-from trackbed.run_folder import MANIFEST, RESULT, is_written, refuse_format
-from trackbed.whole_files import read_object
+from trackbed.run_files import MANIFEST, RESULT, is_written, read_object, refuse_format
 
 RUN_VERBS = ("status", "report", "export", "resume")
 

@@ -14,7 +14,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 from adapters.errors import UsageError
-from trackbed.scene_file import suggest_word
+from trackbed.scene_files.reader import suggest_word
 from validation import cases
 from validation.study import import_part, list_studies, read_record, record_path
 
@@ -111,7 +111,7 @@ def judge_study(name: str, quick: bool) -> list[Check]:
 def case_report(name: str) -> Callable[[Path, Sequence[Check], dict[str, Any]], None] | None:
     """The function ``report_write(path, checks, provenance)`` of a case, None where it has none."""
     live = live_cases()
-    return getattr(import_module(live[name]), "report_write", None) if name in live else None
+    return getattr(import_module(live[name]), "write_report", None) if name in live else None
 
 
 def record(name: str, checks: Sequence[Check], provenance: dict[str, Any]) -> dict[str, Any]:

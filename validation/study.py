@@ -30,8 +30,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import t as student
 
-from trackbed.provenance import record_provenance as provenance
-from trackbed.whole_files import write_whole
+from trackbed.run_files.provenance import record_provenance as provenance
+from trackbed.run_files.whole import write_whole
 
 if TYPE_CHECKING:
     from validation.case import Check

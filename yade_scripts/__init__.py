@@ -1,1 +1,1 @@
-"""Static scripts of the YADE engine; ``adapters.engine_yade`` writes the JSON file they read."""
+"""Static scripts of the YADE engine; ``adapters.engines.yade`` writes the JSON file they read."""

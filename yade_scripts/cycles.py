@@ -22,7 +22,7 @@ import record
 O = Omega()
 parameters = bed.parameters_read()
 gravity, window = parameters["gravity"], parameters["window"]
-record.scene_load()
+record.load_scene()
 piston = bed.Piston(parameters)
 
 

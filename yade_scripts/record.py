@@ -213,7 +213,7 @@ def scene_save():
     os.replace(SAVED, "end.restart")
 
 
-def scene_load():
+def load_scene():
     """Read ``start.restart``."""
     saved = "start.yade.gz"
     os.symlink("start.restart", saved)

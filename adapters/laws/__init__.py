@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from adapters.laws.law import Law
-from adapters.named_files import find_choice, find_choices
+from adapters.laws.form import Law
+from trackbed.choices import find_choice, find_choices
 
-__all__ = ["Law", "law_named", "laws_known"]
+__all__ = ["Law", "get_law", "list_laws"]
 
 
-def laws_known() -> tuple[str, ...]:
+def list_laws() -> tuple[str, ...]:
     """Names of all laws, sorted."""
     return tuple(find_choices(__name__, "LAW"))
 
 
-def law_named(name: str) -> Law:
+def get_law(name: str) -> Law:
     """The law of this name; raises `UsageError` with the nearest name when there is none."""
     law: Law = find_choice(__name__, "LAW", name, "there is no law")
     return law

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from adapters.named_files import find_choice, find_choices
+from trackbed.choices import find_choice, find_choices
 
 if TYPE_CHECKING:  # a scene asks for names only; the ways themselves load scipy
-    from adapters.moves.move import Move
+    from adapters.moves.contract import Move
 
-__all__ = ["DEFAULT", "RETIRED", "move_named", "moves_known"]
+__all__ = ["DEFAULT", "RETIRED", "get_move", "list_moves"]
 
 DEFAULT = "smoothed"
 """The way of a scene that names none."""
@@ -23,12 +23,12 @@ RETIRED = {
 """Ways that left trackbed, and the nearest one that is here."""
 
 
-def moves_known() -> tuple[str, ...]:
+def list_moves() -> tuple[str, ...]:
     """Names of all ways to move grains in a jump, sorted."""
     return tuple(find_choices(__name__, "MOVE"))
 
 
-def move_named(name: str) -> Move:
+def get_move(name: str) -> Move:
     """The way of this name; raises `UsageError` with the nearest name when there is none."""
     move: Move = find_choice(__name__, "MOVE", name, "no jump moves grains by", RETIRED)
     return move

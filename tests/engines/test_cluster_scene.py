@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.engine import EngineStart, engine_named
-from adapters.engine_yade import PARAMETERS
+from adapters.bed.radii import expect_grain_count, sample_radii
+from adapters.bed.sample import draw_sample_start
+from adapters.bed.state import FloatArray
+from adapters.engines.contract import EngineStart, get_engine
+from adapters.engines.yade import PARAMETERS
 from adapters.errors import EngineMissing, SceneError
-from adapters.radii import grain_count_expected, radii_sample
-from adapters.sample import sample_start
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray
-from adapters.window import Window, window_read
+from adapters.files.window import Window, read_window
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
 
 SMALL = (
@@ -43,7 +43,7 @@ LAUNCHERS = {
 def launcher_of(engine: str) -> tuple[str, ...]:
     """The words that start two processes of an engine; skips where one of the two is not here."""
     try:
-        engine_named(engine).version()
+        get_engine(engine).version()
     except EngineMissing as error:
         pytest.skip(str(error))
     words = LAUNCHERS[engine]
@@ -61,7 +61,7 @@ def start_at_rest(
 
     Centres [m], shape (n, 3), radii [m], shape (n,).  Raises as `Engine.run`.
     """
-    engine = engine_named(scene.engine.name)
+    engine = get_engine(scene.engine.name)
     folder.mkdir(parents=True)
     top = float((position[:, 2] + radius).max())
     digests = engine.write_preparation(scene, position, radius, top, folder)
@@ -91,16 +91,16 @@ def computed(engine_name: str, launcher: tuple[str, ...], folder: Path) -> Windo
     """A cycle of rain, then two load cycles, each stage a fresh run of the scene's decks."""
     words = ", ".join(f'"{word}"' for word in launcher)
     overrides = (*SMALL, f'engine.name="{engine_name}"', f"engine.launcher=[{words}]")
-    scene = scene_load(scene_path("cluster"), overrides)
-    radius = radii_sample(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
-    position, _ = sample_start(radius, scene.container, 0.15, scene.sample.seed)
+    scene = load_scene(scene_path("cluster"), overrides)
+    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    position, _ = draw_sample_start(radius, scene.container, 0.15, scene.sample.seed)
     start = start_at_rest(scene, position, radius, folder / "rain")
-    engine, window = engine_named(engine_name), folder / "window"
+    engine, window = get_engine(engine_name), folder / "window"
     window.mkdir()
     digests = engine.write_cycles(scene, start, 2, window)
     engine.run(scene, "in.cycles", window, lambda: None, digests)
     names = engine.wall_names(scene, piston=True)
-    return window_read(window, 0, names, start.piston_height)
+    return read_window(window, 0, names, start.piston_height)
 
 
 def grids(folder: Path) -> set[str]:
@@ -134,7 +134,7 @@ def test_srun_takes_the_number_of_processes_from_the_job(
     srun.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("SLURM_NTASKS", "2")
-    launcher = scene_load(scene_path("cluster")).engine.launcher
+    launcher = load_scene(scene_path("cluster")).engine.launcher
     assert launcher == ("srun",)
     computed("liggghts", launcher, tmp_path)
     assert grids(tmp_path) == {"2 by 1 by 1"}
@@ -143,14 +143,14 @@ def test_srun_takes_the_number_of_processes_from_the_job(
 def test_yade_has_no_use_for_srun() -> None:
     """It would run as often as the job has processes, in one folder."""
     with pytest.raises(SceneError, match="one process"):
-        scene_load(scene_path("cluster"), ['engine.name="yade"'])
+        load_scene(scene_path("cluster"), ['engine.name="yade"'])
 
 
 def test_what_the_scene_says_of_itself() -> None:
     """A million grains fill a third of a metre; piston mass and load an area are the paper's."""
-    cluster, paper = (scene_load(scene_path(name)) for name in ("cluster", "karrech"))
+    cluster, paper = (load_scene(scene_path(name)) for name in ("cluster", "karrech"))
     law = cluster.sample.grain_radius.law
-    assert grain_count_expected(law, cluster.container, 1 / 3) == pytest.approx(1e6, rel=0.02)
+    assert expect_grain_count(law, cluster.container, 1 / 3) == pytest.approx(1e6, rel=0.02)
 
     def mass_an_area(scene: Scene) -> float:
         assert scene.loading is not None

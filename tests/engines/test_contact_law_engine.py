@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from adapters import contact_law as law
+from adapters.bed import contact_law as law
 from tests.tangential_rules import LOOPS, force_secant, work
 from validation.bench.few_grains import (
     RADIUS,

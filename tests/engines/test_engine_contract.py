@@ -16,12 +16,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.dump import dump_frames
-from adapters.engine import Engine
-from adapters.run_folder import RunFolder
-from adapters.sample import GRAVITY
-from adapters.scene_file import scene_load
-from adapters.state import Contacts, State, state_load
+from adapters.bed.sample import GRAVITY
+from adapters.bed.state import Contacts, State, load_state
+from adapters.engines.contract import Engine
+from adapters.files.dump import read_frames
+from adapters.files.run_folder import RunFolder
+from adapters.scene.file import load_scene
 from tests.engine_sample import AFTER, FIRST, JUMP, SECOND, Sample
 from tests.forked_commands import Commands, processes_in
 from trackbed import command
@@ -95,7 +95,7 @@ def test_version_and_command(sample: Sample) -> None:
     """An engine tells its version, and the words that run it, the launcher's first."""
     assert sample.engine.name == sample.name
     assert any(letter.isdigit() for letter in sample.engine.version())
-    launched = scene_load(sample.file, (*sample.overrides, 'engine.launcher=["nice"]'))
+    launched = load_scene(sample.file, (*sample.overrides, 'engine.launcher=["nice"]'))
     if sample.name != "fake":
         assert sample.engine.command(launched, "in.cycles")[0] == "nice"
 
@@ -105,9 +105,9 @@ def test_preparation(sample: Sample) -> None:
     folder = sample.run / "preparation"
     history = np.loadtxt(folder / "history.txt", skiprows=1, ndmin=2)
     assert history.shape[1] == HISTORY
-    for frame in dump_frames(folder / "rain.dump", expected_ids=range(1, 41)):
+    for frame in read_frames(folder / "rain.dump", expected_ids=range(1, 41)):
         assert {"id", "x", "y", "z", "radius"} <= set(frame.columns)
-    state = state_load(folder / "state.npz")
+    state = load_state(folder / "state.npz")
     assert np.array_equal(state.identifier, np.arange(1, 41))
     assert set(state.wall_force) == set(sample.engine.wall_names(sample.scene, piston=False))
     mass = 4 / 3 * np.pi * sample.scene.material.grain.density * state.radius**3
@@ -121,7 +121,7 @@ def test_settled_bed_is_in_balance(sample: Sample) -> None:
     So forces have the sign, and walls the names, that the contract asks for.
     """
     real(sample)
-    state = state_load(sample.run / "preparation" / "state.npz")
+    state = load_state(sample.run / "preparation" / "state.npz")
     force = np.sum(list(state.wall_force.values()), axis=0)
     force[:, 2] -= GRAVITY * state.mass
     on_first = state.contacts.normal_force + state.contacts.tangential_force
@@ -174,7 +174,7 @@ def test_forces_of_contacts_obey_hertz_and_coulomb(sample: Sample) -> None:
     step behind the instant.  Normals point from j to i.
     """
     real(sample)
-    state = state_load(sample.run / JUMP / "relaxed.npz")
+    state = load_state(sample.run / JUMP / "relaxed.npz")
     after = sample.window(AFTER).state(0)
     assert np.array_equal(after.position, state.position)
     pair = after.contacts.pair - 1
@@ -291,14 +291,14 @@ def test_perturbed_start(sample: Sample, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_jump_and_report(sample: Sample) -> None:
     """The procedure went through its jump, and the report can be written."""
-    from adapters.report import report_write
+    from adapters.report.page import write_report
 
     names = RunFolder(sample.run).stage_names()
     assert names == ["preparation", FIRST, SECOND, JUMP, AFTER]
     assert b",jumped," in sample.table
-    relaxed = state_load(sample.run / JUMP / "relaxed.npz")
+    relaxed = load_state(sample.run / JUMP / "relaxed.npz")
     assert np.array_equal(sample.window(AFTER).position[0], relaxed.position)
-    assert "settlement" in report_write(sample.run).read_text().lower()
+    assert "settlement" in write_report(sample.run).read_text().lower()
 
 
 # --- dies cleanly ---------------------------------------------------------------------------

@@ -8,10 +8,10 @@ import meshio
 import numpy as np
 import pytest
 
-import adapters.meshio_dump  # noqa: F401  registers the format
-from adapters.export import export_run
-from adapters.export_instants import exported_run
-from adapters.state import state_load
+import adapters.files.meshio_dump  # noqa: F401  registers the format
+from adapters.bed.state import load_state
+from adapters.export.formats import export_run
+from adapters.export.instants import read_exported_run
 from tests.engine_sample import SECOND, Sample
 
 VECTORS = {"Particle Identifier", "Position", "Velocity", "Angular Velocity", "Radius", "Mass"}
@@ -26,7 +26,7 @@ def engine_dump(sample: Sample) -> Path:
 def test_dump_opens_in_meshio(sample: Sample) -> None:
     """Every digit, and the walls' forces as vectors."""
     mesh = meshio.read(engine_dump(sample))
-    state = state_load(sample.run / "preparation" / "state.npz")
+    state = load_state(sample.run / "preparation" / "state.npz")
     assert np.array_equal(mesh.points, state.position)
     assert np.array_equal(mesh.point_data["v"], state.velocity)
     assert np.array_equal(mesh.point_data["omega"], state.spin)
@@ -50,7 +50,7 @@ def test_dumps_open_in_ovito(sample: Sample) -> None:
     contacts.source.load(str(folder / "contacts.dump"), columns=columns)
     pipeline.modifiers.append(contacts)
     data = pipeline.compute(pipeline.source.num_frames - 1)
-    state = state_load(folder / "state.npz")
+    state = load_state(folder / "state.npz")
     assert set(data.particles.keys()) >= VECTORS
     # OVITO's reader of numbers is quick, and may be wrong in the last digit.
     np.testing.assert_allclose(data.particles.positions[...], state.position, rtol=1e-15)
@@ -66,7 +66,7 @@ def test_export_opens(sample: Sample, tmp_path: Path) -> None:
     """Forces of contacts and places of grains are the engine's own, in VTK's reader."""
     import pyvista
 
-    export_run(exported_run(sample.run), "vtu", tmp_path, every=5)
+    export_run(read_exported_run(sample.run), "vtu", tmp_path, every=5)
     state = sample.window(SECOND).state(-1)
     grains = pyvista.read(tmp_path / "vtu" / f"grains_{state.cycle:06d}.vtu")
     assert np.array_equal(grains.points, state.position)

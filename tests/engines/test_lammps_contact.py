@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from adapters import contact_law as law
-from adapters.lammps_decks import TANGENTIAL_RULES
+from adapters.bed import contact_law as law
+from adapters.engines.lammps_decks import TANGENTIAL_RULES
 from tests.tangential_rules import (
     LOOPS,
     force_incremental,

@@ -17,18 +17,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import stages
-from adapters.engine import EngineStart
-from adapters.engine_liggghts import LiggghtsEngine
+from adapters.bed.sample import GRAVITY
+from adapters.bed.state import FloatArray, State, load_state
+from adapters.engines.contract import EngineStart
+from adapters.engines.liggghts import LiggghtsEngine
 from adapters.errors import TrackbedError
-from adapters.procedure import run_scene
-from adapters.progress import Progress
-from adapters.run_folder import RunFolder
-from adapters.sample import GRAVITY
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray, State, state_load
-from adapters.window import Window, window_load, window_read
+from adapters.files.run_folder import RunFolder
+from adapters.files.window import Window, load_window, read_window
+from adapters.procedure import stages
+from adapters.procedure.progress import Progress
+from adapters.procedure.run import run_scene
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from tests.forked_commands import Commands, processes_in
 from trackbed import command
 from trackbed.scenes import scene_template
@@ -72,11 +72,11 @@ def run(scene_file: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def scene(scene_file: Path) -> Scene:
-    return scene_load(scene_file, TINY)
+    return load_scene(scene_file, TINY)
 
 
 def window_of(run: Path, name: str) -> Window:
-    return window_load(run / name / "states.npz")
+    return load_window(run / name / "states.npz")
 
 
 def start_of(run: Path, name: str) -> EngineStart:
@@ -100,7 +100,7 @@ def computed(scene: Scene, start: EngineStart, cycles: int, folder: Path) -> Win
 
 
 def read(scene: Scene, start: EngineStart, folder: Path) -> Window:
-    return window_read(folder, 0, ENGINE.wall_names(scene, piston=True), start.piston_height)
+    return read_window(folder, 0, ENGINE.wall_names(scene, piston=True), start.piston_height)
 
 
 def by_hand(folder: Path, deck: str, *words: str) -> str:
@@ -186,7 +186,7 @@ def test_contacts_accelerate_their_grains(steps: Window, scene: Scene) -> None:
 
 def test_settled_bed_is_in_balance(run: Path) -> None:
     """After the rain contacts, walls and weight of every grain add up to nearly nothing."""
-    state = state_load(run / "preparation" / "state.npz")
+    state = load_state(run / "preparation" / "state.npz")
     walls = np.sum(list(state.wall_force.values()), axis=0)
     force = walls + inner_force(state)
     force[:, 2] -= GRAVITY * state.mass
@@ -276,7 +276,7 @@ def test_a_lifted_loose_grain_does_not_raise_the_piston(
     before = window_of(folder, SECOND).state(-1)
     loose = np.setdiff1d(before.identifier, before.contacts.pair) - 1
     top = int(loose[np.argmax((before.position[:, 2] + before.radius)[loose])])
-    real = stages.move_named("smoothed")
+    real = stages.get_move("smoothed")
 
     def thrown(*arguments: object) -> FloatArray:
         move = real.displacement(*arguments)  # type: ignore[arg-type]
@@ -284,7 +284,7 @@ def test_a_lifted_loose_grain_does_not_raise_the_piston(
         move[top, 2] = above - before.radius[top] - before.position[top, 2]
         return move
 
-    monkeypatch.setattr(stages, "move_named", lambda name: replace(real, displacement=thrown))
+    monkeypatch.setattr(stages, "get_move", lambda name: replace(real, displacement=thrown))
     bed = stages.jump(going, bed, 4, 1)
     relaxed = bed.start.moved
     assert relaxed is not None
@@ -436,7 +436,7 @@ def test_absurd_time_step(
     words = ["--set", f"engine.rayleigh_share={share}", "--run-folder", str(tmp_path / "no")]
     assert command.main(["run", str(scene_file), *words]) == 3
     assert "rayleigh_share" in capsys.readouterr().err
-    plain = scene_load(scene_file, TINY)
+    plain = load_scene(scene_file, TINY)
     step = plain.rayleigh_time * share
     monkeypatch.setattr(Scene, "time_step", step)
     monkeypatch.setattr(Scene, "steps_per_cycle", 100)
@@ -485,7 +485,7 @@ def test_load_series_across_a_jump(scene_file: Path, tmp_path: Path) -> None:
     shorter = ("procedure.k_i=1", "procedure.k=3", "procedure.h=1", "procedure.total_cycles=9")
     overrides = (*TINY, *shorter)
     run_scene(path, tmp_path / "run", overrides=overrides, progress=QUIET)
-    scene = scene_load(path, overrides)
+    scene = load_scene(path, overrides)
     per_cycle = scene.samples_per_cycle
     # The mesh of samples holds the segments' ends.
     assert per_cycle % 5 == 0

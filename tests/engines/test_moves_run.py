@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from adapters.moves import moves_known
-from adapters.run_folder import RunFolder
-from adapters.scene import Scene
-from adapters.stages import Bed, Run, Variant, compute, jump
-from adapters.state import state_load
+from adapters.bed.state import load_state
+from adapters.files.run_folder import RunFolder
+from adapters.moves import list_moves
+from adapters.procedure.stages import Bed, Run, Variant, compute, jump
+from adapters.scene.tables import Scene
 from tests.engine_sample import AFTER, JUMP, QUIET, SECOND, Sample
 
 
@@ -24,7 +24,7 @@ def moved_by(scene: Scene, way: str) -> Scene:
 @pytest.mark.parametrize(
     "sample", ["fake", pytest.param("liggghts", marks=pytest.mark.engine)], indirect=True
 )
-@pytest.mark.parametrize("way", moves_known())
+@pytest.mark.parametrize("way", list_moves())
 @pytest.mark.long
 def test_run_goes_on_after_each_way(sample: Sample, tmp_path: Path, way: str) -> None:
     """The engine takes the relaxed bed: overlaps as carried before, no grain lost, all cycles."""
@@ -38,7 +38,7 @@ def test_run_goes_on_after_each_way(sample: Sample, tmp_path: Path, way: str) ->
     assert record["relaxed"]["max_penetration"] <= 1.1 * record["before"]["max_penetration"] + 1e-9
     before = sample.window(SECOND).state(-1)
     if way == "still":
-        estimated = state_load(folder.path / JUMP / "estimated.npz").position
+        estimated = load_state(folder.path / JUMP / "estimated.npz").position
         assert (estimated == before.position).all()
         assert bed.start.piston_height == start.piston_height
     done = compute(run, bed, 2, 1)

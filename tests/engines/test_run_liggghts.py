@@ -14,18 +14,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import decks, jump_fixed, jump_room
-from adapters.engine import EngineStart
-from adapters.engine_liggghts import LiggghtsEngine
+from adapters.bed.state import Contacts, State
+from adapters.engines import decks
+from adapters.engines.contract import EngineStart
+from adapters.engines.liggghts import LiggghtsEngine
 from adapters.errors import NotConverged
-from adapters.procedure import run_scene
-from adapters.progress import Progress
-from adapters.relaxation_rearranged import LEAST, MOST, OVERLAP_MAX
-from adapters.run_folder import RunFolder
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import Contacts, State
-from adapters.window import Window, window_load, window_read
+from adapters.files.run_folder import RunFolder
+from adapters.files.window import Window, load_window, read_window
+from adapters.procedure import fixed as jump_fixed
+from adapters.procedure import room as jump_room
+from adapters.procedure.progress import Progress
+from adapters.procedure.run import run_scene
+from adapters.relaxation.rearranged import LEAST, MOST, OVERLAP_MAX
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_template
 
 pytestmark = pytest.mark.engine("liggghts")
@@ -63,11 +65,11 @@ def run(scene_file: Path) -> Path:
 
 
 def tiny(scene_file: Path) -> Scene:
-    return scene_load(scene_file, TINY)
+    return load_scene(scene_file, TINY)
 
 
 def window_of(run: Path, name: str) -> Window:
-    return window_load(run / name / "states.npz")
+    return load_window(run / name / "states.npz")
 
 
 def springs(contacts: Contacts) -> dict[tuple[int, int], bytes]:
@@ -94,7 +96,7 @@ def resubmitted(
     )
     digests = ENGINE.write_cycles(scene, start, 1, folder)
     ENGINE.run(scene, "in.cycles", folder, lambda: None, digests)
-    return window_read(folder, moved.cycle, ENGINE.wall_names(scene, piston=True), piston)
+    return read_window(folder, moved.cycle, ENGINE.wall_names(scene, piston=True), piston)
 
 
 def at_rest(state: State, position: np.ndarray) -> State:
@@ -160,9 +162,9 @@ def test_broken_contacts_lose_their_springs_and_new_ones_start_at_zero(
 
 def test_jump_restarts_where_it_was_relaxed(run: Path) -> None:
     """The window after a jump starts at the relaxed positions; no loose grain lifts the piston."""
-    from adapters.state import state_load
+    from adapters.bed.state import load_state
 
-    relaxed = state_load(run / "jump_000010_1" / "relaxed.npz")
+    relaxed = load_state(run / "jump_000010_1" / "relaxed.npz")
     window = window_of(run, "window_000016")
     assert np.array_equal(window.position[0], relaxed.position)
     before = window_of(run, "window_000006").piston_heights()[-1]
@@ -181,9 +183,9 @@ def test_grains_are_in_balance(run: Path) -> None:
 
     The bed settled to a kinetic energy of 1e-6 of the potential, so what is left is its rattle.
     """
-    from adapters.state import state_load
+    from adapters.bed.state import load_state
 
-    state = state_load(run / "preparation" / "state.npz")
+    state = load_state(run / "preparation" / "state.npz")
     force = np.sum(list(state.wall_force.values()), axis=0)
     force[:, 2] -= 9.81 * state.mass
     pair = state.contacts.pair - 1
@@ -243,7 +245,7 @@ def test_load_series_is_followed_to_the_sample(scene_file: Path, run: Path, tmp_
     path.write_text(head + loading + tail)
     changes = [*TINY, "procedure.k_i=2", "procedure.total_cycles=4", "procedure.k=2"]
     run_scene(path, tmp_path / "run", overrides=changes, progress=QUIET)
-    scene = scene_load(path, changes)
+    scene = load_scene(path, changes)
     for name in ("window_000000", "window_000002"):
         window = window_of(tmp_path / "run", name)
         phase = (window.piston.time_step - window.time_step[0]) / scene.steps_per_cycle
@@ -300,7 +302,7 @@ def test_digests_are_those_of_the_shipped_decks(run: Path) -> None:
     """The record of a window names every static deck it used, by content."""
     outcome = RunFolder(run).outcome("window_000006")
     assert outcome is not None
-    copies = decks.deck_copy(run.parent, tuple(outcome.notes["decks"]))
+    copies = decks.copy_deck(run.parent, tuple(outcome.notes["decks"]))
     assert copies == outcome.notes["decks"]
     assert replace(outcome, notes={}).stage == "window"
 
@@ -317,7 +319,7 @@ def test_engine_goes_on_from_grains_that_changed_places(
         raise NotConverged("made to fail")
 
     monkeypatch.setattr(jump_room, "relaxed", jammed)
-    monkeypatch.setattr(jump_fixed, "history_gain", lambda *_: 300e-6)
+    monkeypatch.setattr(jump_fixed, "find_history_gain", lambda *_: 300e-6)
     history = ('procedure.settlement="history"', 'procedure.jammed="rearranged"', "procedure.h=30")
     more = ("procedure.k_i=10", "procedure.total_cycles=50")
     run_scene(scene_file, tmp_path / "run", overrides=(*TINY, *history, *more), progress=QUIET)

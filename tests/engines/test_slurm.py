@@ -18,8 +18,8 @@ from pathlib import Path
 
 import pytest
 
-from adapters.engine_process import process_run
-from adapters.run_folder import RunFolder
+from adapters.engines.process import run_process
+from adapters.files.run_folder import RunFolder
 from tests.engines.test_cluster_scene import SMALL
 from tests.forked_commands import processes_in
 from trackbed.scenes import scene_path
@@ -225,6 +225,6 @@ def test_an_interrupted_srun_leaves_no_task(tmp_path: Path) -> None:
 
     task = ": > task.$SLURM_PROCID; sleep 600"
     with pytest.raises(KeyboardInterrupt):
-        process_run(["srun", "-J", name, "-n", "2", "sh", "-c", task], tmp_path, interrupted)
+        run_process(["srun", "-J", name, "-n", "2", "sh", "-c", task], tmp_path, interrupted)
     until(lambda: not processes_in(tmp_path))
     until(lambda: not answer("squeue", "-h", "-n", name))

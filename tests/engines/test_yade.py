@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import contact_law as law
-from adapters.engine import EngineStart
-from adapters.engine_yade import YadeEngine, damping_ratio
-from adapters.sample import GRAVITY
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray
-from adapters.window import Window, state_read, window_read
+from adapters.bed import contact_law as law
+from adapters.bed.sample import GRAVITY
+from adapters.bed.state import FloatArray
+from adapters.engines.contract import EngineStart
+from adapters.engines.yade import YadeEngine, damping_ratio
+from adapters.files.window import Window, read_state, read_window
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from tests.tangential_rules import LOOPS, force_incremental, work
 from tests.yade_few_grains import track_run
 from trackbed.scenes import scene_template
@@ -215,7 +215,7 @@ def scene_load_text(text: str, *overrides: str) -> Scene:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "scene.toml"
         path.write_text(text)
-        return scene_load(path, overrides)
+        return load_scene(path, overrides)
 
 
 # --- a bed under a piston -------------------------------------------------------------------
@@ -227,17 +227,17 @@ class Bed:
     def __init__(self, folder: Path, *overrides: str) -> None:
         self.folder = folder
         self.scene = scene_load_text(scene_template("karrech-coarse"), *TINY, *overrides)
-        from adapters.radii import radii_sample
-        from adapters.sample import sample_start
+        from adapters.bed.radii import sample_radii
+        from adapters.bed.sample import draw_sample_start
 
         scene = self.scene
-        radius = radii_sample(scene.sample.grain_radius.law, 40, 1)
-        position, height = sample_start(radius, scene.container, 0.05, 1)
+        radius = sample_radii(scene.sample.grain_radius.law, 40, 1)
+        position, height = draw_sample_start(radius, scene.container, 0.05, 1)
         prepared = folder / "preparation"
         prepared.mkdir()
         digests = ENGINE.write_preparation(scene, position, radius, height, prepared)
         ENGINE.run(scene, "in.prepare", prepared, lambda: None, digests)
-        state = state_read(prepared, ENGINE.wall_names(scene, piston=False))
+        state = read_state(prepared, ENGINE.wall_names(scene, piston=False))
         reach = np.hypot(*state.position[:, :2].T) - state.radius < scene.piston_reach
         top = float((state.position[:, 2] + state.radius)[reach].max())
         self.start = EngineStart(prepared / "end.restart", state.time_step, 0, top, first=True)
@@ -254,7 +254,7 @@ class Bed:
             (folder / "params.json").write_text(json.dumps(content))
         ENGINE.run(self.scene, "in.cycles", folder, lambda: None, digests)
         names = ENGINE.wall_names(self.scene, piston=True)
-        return window_read(folder, 0, names, start.piston_height)
+        return read_window(folder, 0, names, start.piston_height)
 
     def after(self) -> EngineStart:
         """The start of the next window."""
@@ -379,7 +379,7 @@ def test_by_hand(bed: Bed, tmp_path: Path) -> None:
         words, cwd=folder, check=True, capture_output=True, text=True, stdin=subprocess.DEVNULL
     )
     assert "COMPLETE step" in said.stdout
-    window = window_read(
+    window = read_window(
         folder, 0, ENGINE.wall_names(bed.scene, piston=True), bed.after().piston_height
     )
     assert np.array_equal(window.position[0], bed.window.position[-1])

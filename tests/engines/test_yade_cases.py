@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import contact_law as law
-from adapters.engine_yade import DISC_CORNERS
+from adapters.bed import contact_law as law
+from adapters.engines.yade import DISC_CORNERS
 from tests.engines.test_yade import ALPHA, Bed
 from tests.yade_few_grains import track_run
 from tests.yade_piston import piston_forces, scene_partial

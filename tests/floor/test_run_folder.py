@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from trackbed.errors import DiskFull, UsageError
-from trackbed.run_folder import RunFolder, lock_folder
-from trackbed.whole_files import append_line, seal_file, write_whole
+from trackbed.run_files.folder import RunFolder, lock_folder
+from trackbed.run_files.whole import append_line, seal_file, write_whole
 
 ROOT = Path(__file__).parents[2]
 STORIES = ("adapters", "qdem_fem", "rigid_lcp")
@@ -87,7 +87,7 @@ def test_a_lock_that_becomes_a_link_is_not_followed(
     (tmp_path / "mine").write_text("mine")
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / ".lock").symlink_to(tmp_path / "mine")
-    monkeypatch.setattr("trackbed.run_folder.refuse_links", lambda path: None)
+    monkeypatch.setattr("trackbed.run_files.folder.refuse_links", lambda path: None)
     with pytest.raises(UsageError, match="symbolic link"), lock_folder(tmp_path / "run"):
         pass
     assert (tmp_path / "mine").read_text() == "mine"

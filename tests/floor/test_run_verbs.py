@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from trackbed.command import main
-from trackbed.run_folder import lock_folder
+from trackbed.run_files.folder import lock_folder
 from trackbed.run_verbs import find_kind
 
 STARTED = "trackbed VERB a.toml --set 'x=[1, 2]' --force"

@@ -9,9 +9,9 @@ import pytest
 from pydantic import Field
 
 from trackbed.errors import SceneError, UsageError
-from trackbed.scene_file import Guide, SceneText, read_scene, suggest_word
-from trackbed.scene_lines import find_key_lines
-from trackbed.scene_types import Name, Positive, Table, Text
+from trackbed.scene_files.lines import find_key_lines
+from trackbed.scene_files.reader import Guide, SceneText, read_scene, suggest_word
+from trackbed.scene_files.types import Name, Positive, Table, Text
 
 GUIDE = Guide("karrech", "run.step=1")
 BODY = 'run = {}\n[[body]]\nname = "a"\n'

@@ -11,12 +11,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from adapters import lammps_decks
-from adapters.engine import EngineStart
-from adapters.engine_lammps import LammpsEngine
-from adapters.radii import radii_sample
-from adapters.sample import sample_start
-from adapters.scene_file import scene_load
+from adapters.bed.radii import sample_radii
+from adapters.bed.sample import draw_sample_start
+from adapters.engines import lammps_decks
+from adapters.engines.contract import EngineStart
+from adapters.engines.lammps import LammpsEngine
+from adapters.scene.file import load_scene
 from trackbed.scenes import scene_path
 
 EXAMPLE = Path(str(files("lammps_inputs"))) / "example"
@@ -35,9 +35,9 @@ PISTON_HEIGHT = 0.048
 
 def example_write(folder: Path) -> None:
     """The generated files of the rain and of the first window, in one folder."""
-    scene, engine = scene_load(scene_path("karrech-coarse"), BED), LammpsEngine()
-    radius = radii_sample(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
-    position, height = sample_start(
+    scene, engine = load_scene(scene_path("karrech-coarse"), BED), LammpsEngine()
+    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
     )
     with TemporaryDirectory() as name:
@@ -62,7 +62,7 @@ def example_write(folder: Path) -> None:
     (folder / "parameters.in").write_text("\n".join(lines) + "\n")
     # The rain has no piston yet, so its columns serve both.
     names = lammps_decks.wall_names(scene.container, piston=False)
-    (folder / "dump_states.in").write_text(lammps_decks.dump_states_text(names))
+    (folder / "dump_states.in").write_text(lammps_decks.format_dump_states(names))
 
 
 def test_example_is_what_the_code_writes(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from adapters import contact_law
+from adapters.bed import contact_law
 from validation.studies.contact_law.closed_forms import (
     LAW_OF_ENGINE,
     Law,

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import contact_law
-from adapters.engine_lammps import LammpsEngine
+from adapters.bed import contact_law
+from adapters.bed.radii import sample_radii
+from adapters.bed.sample import GRAVITY, draw_sample_start, measure_bed_height
+from adapters.bed.state import FloatArray
+from adapters.engines.lammps import LammpsEngine
 from adapters.errors import NotCredible
-from adapters.radii import radii_sample
-from adapters.sample import GRAVITY, bed_height, sample_start
-from adapters.state import FloatArray
 from validation.studies.engines.packing import (
     WAYS,
     Way,
@@ -31,8 +31,8 @@ FAKE = Way("fake", "fake")
 def start_of(way: Way) -> tuple[FloatArray, FloatArray]:
     """Grains that do not touch, and their radii."""
     scene = way.scene(1)
-    radius = radii_sample(scene.sample.grain_radius.law, scene.grain_count, 1)
-    return sample_start(radius, scene.container, 0.15, 1)[0], radius
+    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, 1)
+    return draw_sample_start(radius, scene.container, 0.15, 1)[0], radius
 
 
 def test_figures_of_a_run(tmp_path: Path) -> None:
@@ -52,18 +52,18 @@ def test_density_and_coordination_are_those_of_the_positions(tmp_path: Path) -> 
     start, radius = start_of(FAKE)
     run_way(FAKE, 1, start, radius, tmp_path, cycles=12)
     scene = FAKE.scene(1)
-    from adapters.engine import engine_named
-    from adapters.window import window_read
+    from adapters.engines.contract import get_engine
+    from adapters.files.window import read_window
 
-    names = engine_named("fake").wall_names(scene, piston=True)
-    window = window_read(tmp_path / "loaded", 0, names, 0.05)
+    names = get_engine("fake").wall_names(scene, piston=True)
+    window = read_window(tmp_path / "loaded", 0, names, 0.05)
     apart = np.column_stack([np.zeros(len(radius))] * 2 + [np.arange(len(radius)) * 0.02 + 0.01])
     apart[1] = apart[0] + [0, 0, radius[0] + radius[1] - 1e-6]
     still = replace(window, position=np.repeat(apart[None], len(window.position), axis=0))
     figures = measure_window(still, apart, scene)
     assert figures.coordination == pytest.approx(2 / len(radius))
     assert figures.settlement == 0
-    top = 0.9 * bed_height(apart, radius)
+    top = 0.9 * measure_bed_height(apart, radius)
     assert figures.density < 4 / 3 * np.pi * np.sum(radius**3) / (scene.container.area * top)
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from qdem_fem.errors import LibraryMissing
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import LibraryMissing
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem.judge import lumped_mass, stiffness
 from validation.studies.qdem_cost.matrices import (
     SAFETY,
@@ -46,7 +46,7 @@ needs_mkl = pytest.mark.skipif(mkl_missing(), reason="needs the Intel MKL (extra
 
 def cantilever() -> tuple[LinearProblem, FloatArray]:
     """A small beam, numbered at random, and its dense-matrix answer after `STEPS` steps (n, 3)."""
-    mesh = box_mesh((0.4, 0.1, 0.1), (4, 2, 2), "five")
+    mesh = make_box_mesh((0.4, 0.1, 0.1), (4, 2, 2), "five")
     shuffle = np.random.default_rng(5).permutation(len(mesh.nodes))
     nodes, elements = mesh.nodes[np.argsort(shuffle)], shuffle[mesh.elements]
     fixed = nodes[:, 0] == 0

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from qdem_fem.errors import UsageError
-from qdem_fem.load_train import Train
-from qdem_fem.track_table import BogieTable
+from qdem_fem.files.errors import UsageError
+from qdem_fem.track.loads.train import Train
+from qdem_fem.track.table import BogieTable
 from validation.studies.qdem_track.bogie import passages, settlement_at
 
 pytestmark = pytest.mark.studies

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.pouring import grains_place
-from rigid_lcp.scene import Scene, world_of
-from rigid_lcp.scene_types import Grains
+from rigid_lcp.motion.world import Scene, make_world
+from rigid_lcp.scene.pouring import place_grains
+from rigid_lcp.scene.types import Grains
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
 from validation.studies.rigid_ballast import soft as md
 
 pytestmark = pytest.mark.studies
@@ -24,7 +24,7 @@ def block_on_floor(angle: float = 0.0, speed: float = 0.0) -> md.SoftGrains:
     scene = Scene(2, gravity=9.81 * np.array([np.sin(angle), -np.cos(angle)]))
     scene.add(HalfSpace([0, 1], 0.0))
     scene.add(Polygon.rectangle(0.1, 0.05), density=2600, position=(0, 0.025), velocity=(speed, 0))
-    world, motion = world_of(scene)
+    world, motion = make_world(scene)
     return md.soft_grains(world, motion, K, MU)
 
 
@@ -88,7 +88,7 @@ def test_friction_of_a_wall_is_remembered_in_a_scene_of_many_bodies() -> None:
     scene.add(HalfSpace([0, 1], 0.0))
     for k in range(4):
         scene.add(Polygon.rectangle(0.1, 0.05), density=2600, position=(0, 0.025 + 0.05 * k))
-    world, motion = world_of(scene)
+    world, motion = make_world(scene)
     run = md.soft_grains(world, motion, K, MU)
     md.soft_advance(run, 1, np.zeros((2, 2)), 1.0)
     start = run.motion.position[1:, 0].copy()
@@ -144,9 +144,9 @@ def test_falling_polygons_never_gain_energy() -> None:
     scene.add(HalfSpace([-1, 0], -0.07))
     grains = Grains(count=8, size=[0.03, 0.05], corners=[3, 6], density=2600.0,
                     region_low=[-0.07, 0.0], region_high=[0.07, 0.3], seed=5)  # fmt: skip
-    for shape, position, angle in grains_place(grains, 2):
+    for shape, position, angle in place_grains(grains, 2):
         scene.add(shape, density=2600.0, position=position, angle=angle)
-    world, motion = world_of(scene)
+    world, motion = make_world(scene)
     run = md.soft_grains(world, motion, K, MU)
 
     def energy() -> float:

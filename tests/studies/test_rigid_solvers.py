@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigid_lcp.friction_problem import FrictionProblem, friction_problem
-from rigid_lcp.solver import solve_friction
+from rigid_lcp.friction.auto.solve import solve_friction
+from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
 from validation.bench.rigid.examination import family_named
 from validation.bench.rigid.friction_problems import NamedProblem
 from validation.bench.rigid.packings import tower

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from adapters.jump_schedule import jump_lengths
+from adapters.jumps.schedule import schedule_jumps
 from validation.studies.settlement.beds import COARSE, CONFINED, EVERY, list_methods, list_runs
 from validation.studies.settlement.reading import (
     cheaper_at_equal_step,
@@ -73,7 +73,7 @@ def test_schedules_end_at_the_last_cycle() -> None:
     for kind in (CONFINED, COARSE):
         for method in list_methods(kind):
             if method.jumps:
-                h = jump_lengths(
+                h = schedule_jumps(
                     method.jumps, kind.last, kind.k_i, method.window, 5, method.growing
                 )
                 jumped = sum(h) + method.jumps * (5 + method.window)

@@ -26,7 +26,7 @@ def refuse(event, arguments, allowed=sys.argv.pop(1)):
 sys.addaudithook(refuse)
 """
 """A process that can make files in one folder only, root or not."""
-KERNELS = "adapters.relaxation_kernel, qdem_fem.kernel, rigid_lcp.cones"
+KERNELS = "adapters.relaxation.kernel, qdem_fem.kernel.cpu.step, rigid_lcp.friction.problem.cones"
 
 
 def run_without_home(code: str, folder: Path) -> str:
@@ -55,7 +55,7 @@ def test_kernels_are_defined_and_pictures_drawn(tmp_path: Path, numba_first: boo
 def test_kernels_are_kept(tmp_path: Path) -> None:
     """A second process finds what the first compiled."""
     code = (
-        "import numpy as np\nfrom adapters.dump_kernel import float_bits\n"
+        "import numpy as np\nfrom adapters.files.dump_kernel import float_bits\n"
         "float_bits(np.uint64(1), np.int64(0))\nprint(sum(float_bits.stats.cache_hits.values()))"
     )
     assert [run_without_home(code, tmp_path) for _ in range(2)] == ["0", "1"]

@@ -10,7 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.checks import (
+from adapters.bed.contact_law import OVERLAP_BOUND
+from adapters.bed.sample import GRAVITY
+from adapters.bed.state import make_no_contacts
+from adapters.errors import EngineFailed, NotCredible
+from adapters.files.window import PistonTrack, Window
+from adapters.procedure.checks import (
     FORCE_ERROR_BOUND,
     FORCE_START_CYCLES,
     WindowFigures,
@@ -21,12 +26,7 @@ from adapters.checks import (
     check_window,
     figures_of_window,
 )
-from adapters.contact_law import OVERLAP_BOUND
-from adapters.errors import EngineFailed, NotCredible
-from adapters.sample import GRAVITY
-from adapters.scene import Scene
-from adapters.state import contacts_none
-from adapters.window import PistonTrack, Window
+from adapters.scene.tables import Scene
 
 RADIUS = 3e-3
 MASS = 2e-4
@@ -69,7 +69,7 @@ def window(cycles: int = 4, **change: Any) -> Window:
         velocity=np.zeros((n, 3, 3)),
         spin=np.zeros((n, 3, 3)),
         wall_force={"floor": np.zeros((n, 3, 3))},
-        contacts=(contacts_none(),) * n,
+        contacts=(make_no_contacts(),) * n,
         piston=PistonTrack(
             time_step=track * (STEPS // SAMPLES),
             target_force=force,

@@ -141,7 +141,7 @@ def test_malformed_scene(content: bytes, tmp_path: Path) -> None:
         (KeyboardInterrupt(), 130),
         (PermissionError(13, "Permission denied", "there"), 2),
         (ModuleNotFoundError("No module named 'numba'", name="numba"), 4),
-        (ImportError("cannot import name 'x'", name="adapters.fit"), 1),
+        (ImportError("cannot import name 'x'", name="adapters.laws.fit.prediction"), 1),
         (ZeroDivisionError("division by zero"), 1),
     ],
 )
@@ -202,7 +202,7 @@ def test_run_hands_over_what_was_asked(tmp_path: Path, monkeypatch: pytest.Monke
     def run_scene(scene: Path, run_folder: Path, **options: object) -> None:
         asked.update(options, scene=scene, run_folder=run_folder)
 
-    monkeypatch.setattr("adapters.procedure.run_scene", run_scene)
+    monkeypatch.setattr("adapters.procedure.run.run_scene", run_scene)
     scene = tmp_path / "scene.toml"
     words = ["--control", "--set", "procedure.h=10", "--set", "sample.seed=2"]
     words += ["--engine", "fake", "--launcher", "mpirun -np '2'", "--dry-run"]
@@ -315,14 +315,14 @@ def test_fit_of_too_few_cycles_names_file_and_flags(
 
 def test_relax_writes_a_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """``relax`` takes 50 % of overlap out of two grains and states what the bed was and is."""
-    from adapters.dump import Frame, dump_frames, dump_write
+    from adapters.files.dump import Frame, read_frames, write_dump
 
     assert main(["new", "karrech-coarse", str(tmp_path)]) == 0
     radius = 3.2e-3
     columns = ("id", "x", "y", "z", "radius")
     deep, there = tmp_path / "deep.dump", tmp_path / "relaxed.dump"
     values = np.array([[1, 0.01, 0.01, radius, radius], [2, 0.013, 0.01, radius, radius]])
-    dump_write(deep, [Frame(0, columns, values)])
+    write_dump(deep, [Frame(0, columns, values)])
     words = ["relax", str(deep), "--out", str(there), "--json"]
     assert main(words) == 2
     assert "--scene" in capsys.readouterr().err
@@ -330,7 +330,7 @@ def test_relax_writes_a_state(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     record = json.loads(capsys.readouterr().out)
     assert record["estimated"]["max_penetration"] == pytest.approx(2 * radius - 0.003)
     assert record["relaxed"]["max_penetration"] < 1e-6
-    (frame,) = dump_frames(there)
+    (frame,) = read_frames(there)
     apart = np.linalg.norm(np.diff(frame.block("x", "y", "z"), axis=0))
     assert apart == pytest.approx(2 * radius, abs=1e-6)
 
@@ -421,8 +421,8 @@ def test_validate_record(
 
 def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
     """5 in all packages, and no other refusal to write has it."""
-    from adapters.run_folder import disk_full_named
-    from trackbed.whole_files import refuse_writing
+    from adapters.files.run_folder import name_full_disk
+    from trackbed.run_files.whole import refuse_writing
 
     def code(number: int, told: Callable[[Path], AbstractContextManager[None]]) -> int:
         with pytest.raises(Exception, match=os.strerror(number)) as caught, told(tmp_path):
@@ -432,7 +432,7 @@ def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
     for number, wanted in (
         (errno.ENOSPC, 5), (errno.EDQUOT, 5), (errno.EFBIG, 5), (errno.EACCES, 2), (errno.EIO, 2)
     ):  # fmt: skip
-        assert code(number, disk_full_named) == wanted
+        assert code(number, name_full_disk) == wanted
         assert code(number, refuse_writing) == wanted
         assert explained(OSError(number, os.strerror(number)))[1] == wanted
 

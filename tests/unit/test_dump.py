@@ -13,9 +13,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from adapters import dump_kernel, dump_reader, dump_text
-from adapters.dump import Frame, dump_frames, dump_write
 from adapters.errors import DumpError, UsageError
+from adapters.files import dump_kernel, dump_reader, dump_text
+from adapters.files.dump import Frame, read_frames, write_dump
 
 # As LIGGGHTS 3.8.0 writes it: rows in no order, a blank before each line end.
 GRAINS = """\
@@ -92,7 +92,7 @@ def written(folder: Path, content: str | bytes) -> Path:
 def frames_and_error(path: Path, **options: object) -> tuple[list[Frame], DumpError | None]:
     frames: list[Frame] = []
     try:
-        frames.extend(dump_frames(path, **options))
+        frames.extend(read_frames(path, **options))
     except DumpError as error:
         return frames, error
     return frames, None
@@ -122,7 +122,7 @@ def tokens_read(tokens: list[str]) -> np.ndarray:
     table = np.empty((len(tokens), 1))
     row = start = 0
     while row < len(tokens):
-        status, row, column, start = dump_kernel.rows_read(text, start, len(text), table, row, 0)
+        status, row, column, start = dump_kernel.read_rows(text, start, len(text), table, row, 0)
         if status == dump_kernel.TOKEN_UNUSUAL:  # left to the caller, who reads it as float() does
             table[row, column] = float(tokens[row])
             start, row = start + len(tokens[row]) + 1, row + 1
@@ -146,7 +146,7 @@ def test_kernel_reads_common_numbers_by_itself() -> None:
     text = "".join(f"{x:.17g}\n{x:g}\n{x:.0f}\n" if abs(x) < 1e18 else f"{x:e}\n" for x in values)
     data = np.frombuffer(text.encode(), np.uint8)
     table = np.empty((text.count("\n"), 1))
-    status, row, _, _ = dump_kernel.rows_read(data, 0, len(data), table, 0, 0)
+    status, row, _, _ = dump_kernel.read_rows(data, 0, len(data), table, 0, 0)
     assert (status, row) == (dump_kernel.BLOCK_READ, len(table))
 
 
@@ -218,7 +218,7 @@ def test_power_table_brackets_powers_of_five() -> None:
 def test_known_numbers(tmp_path: Path, token: str, value: float) -> None:
     """Signed zero, subnormals, the largest float64, integers above 2^53: each to the bit."""
     text = GRAINS.replace("-1.5E+02", token)
-    frame = list(dump_frames(written(tmp_path, text)))[1]
+    frame = list(read_frames(written(tmp_path, text)))[1]
     assert bits(frame.column("vx"))[0] == bits(np.array([value]))[0]
 
 
@@ -263,9 +263,9 @@ def dumps(draw: st.DrawFn) -> list[Frame]:
 @FILES
 @given(frames=dumps(), suffix=st.sampled_from([".dump", ".gz"]))
 def test_round_trip(tmp_path: Path, frames: list[Frame], suffix: str) -> None:
-    """What `dump_write` writes, `dump_frames` reads back bit for bit, grains sorted by id."""
+    """What `write_dump` writes, `read_frames` reads back bit for bit, grains sorted by id."""
     path = tmp_path / f"frames{suffix}"
-    dump_write(path, frames)
+    write_dump(path, frames)
     expected = [
         Frame(
             frame.time_step,
@@ -276,7 +276,7 @@ def test_round_trip(tmp_path: Path, frames: list[Frame], suffix: str) -> None:
         )
         for frame in frames
     ]
-    assert_frames_equal(list(dump_frames(path)), expected)
+    assert_frames_equal(list(read_frames(path)), expected)
 
 
 @FILES
@@ -284,25 +284,25 @@ def test_round_trip(tmp_path: Path, frames: list[Frame], suffix: str) -> None:
 def test_blocks_of_text_do_not_matter(tmp_path: Path, frames: list[Frame], block: int) -> None:
     """Frames are the same wherever the borders of the blocks read from the file fall."""
     path = tmp_path / "frames.dump"
-    dump_write(path, frames)
-    whole = list(dump_frames(path))
+    write_dump(path, frames)
+    whole = list(read_frames(path))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(dump_text, "BLOCK", block)
         patch.setattr(dump_reader, "_VALUES_AT_FIRST", 1)
-        assert_frames_equal(list(dump_frames(path)), whole)
+        assert_frames_equal(list(read_frames(path)), whole)
 
 
 def test_write_takes_a_format_for_each_column(tmp_path: Path) -> None:
     """Formats as in dump_modify: identifiers as %d; a wrong number of formats is refused."""
     frame = Frame(3, ("id", "x"), np.array([[4.0, 0.1]]), np.array([[0.0, 1.0]] * 3))
     path = tmp_path / "one.dump"
-    dump_write(path, [frame], "%d %.3f")
+    write_dump(path, [frame], "%d %.3f")
     assert path.read_text() == (
         "ITEM: TIMESTEP\n3\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n"
         "0 1\n0 1\n0 1\nITEM: ATOMS id x\n4 0.100\n"
     )
     with pytest.raises(UsageError, match="3 formats"):
-        dump_write(path, [frame], "%d %g %g")
+        write_dump(path, [frame], "%d %g %g")
 
 
 def test_write_is_atomic(tmp_path: Path) -> None:
@@ -310,11 +310,11 @@ def test_write_is_atomic(tmp_path: Path) -> None:
     path = written(tmp_path, GRAINS)
 
     def half() -> object:
-        yield from dump_frames(path)
+        yield from read_frames(path)
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        dump_write(path, half())
+        write_dump(path, half())
     assert path.read_text() == GRAINS
     assert list(tmp_path.iterdir()) == [path]
 
@@ -324,7 +324,7 @@ def test_write_is_atomic(tmp_path: Path) -> None:
 
 def test_engine_dump(tmp_path: Path) -> None:
     """A dump as LIGGGHTS writes it: columns by name, grains by id, bounds kept."""
-    first, second, third = dump_frames(written(tmp_path, GRAINS))
+    first, second, third = read_frames(written(tmp_path, GRAINS))
     assert (first.time_step, first.kind, first.boundary) == (0, "atoms", "ff ff ff")
     assert first.column("id").tolist() == [2, 5, 7]
     assert first.column("x").tolist() == [0.0105, -0.009, 0.03]
@@ -337,7 +337,7 @@ def test_engine_dump(tmp_path: Path) -> None:
 
 def test_contact_dump(tmp_path: Path) -> None:
     """A dump of contacts keeps the order of its rows, and may have none."""
-    first, second = dump_frames(written(tmp_path, CONTACTS))
+    first, second = read_frames(written(tmp_path, CONTACTS))
     assert first.kind == "entries"
     assert first.block("c_pl[7]", "c_pl[8]").tolist() == [[2, 7], [5, 2]]
     assert second.values.shape == (0, 4)
@@ -359,14 +359,14 @@ OTHER_FORMS = {
 @pytest.mark.parametrize("text", OTHER_FORMS.values(), ids=OTHER_FORMS)
 def test_other_forms_read_the_same(tmp_path: Path, text: str) -> None:
     """Windows line ends, blanks and optional items change nothing."""
-    expected = list(dump_frames(written(tmp_path, GRAINS)))
-    assert_frames_equal(list(dump_frames(written(tmp_path, text))), expected)
+    expected = list(read_frames(written(tmp_path, GRAINS)))
+    assert_frames_equal(list(read_frames(written(tmp_path, text))), expected)
 
 
 def test_tilted_box(tmp_path: Path) -> None:
     """A triclinic box keeps its tilt factors."""
     text = GRAINS.replace("BOUNDS ff", "BOUNDS xy xz yz ff").replace(" 0.1\n", " 0.1 0.5\n")
-    frame = next(dump_frames(written(tmp_path, text.replace("0 0.25\n", "0 0.25 -0.5\n"))))
+    frame = next(read_frames(written(tmp_path, text.replace("0 0.25\n", "0 0.25 -0.5\n"))))
     assert frame.boundary == "xy xz yz ff ff ff"
     assert frame.bounds.tolist() == [[-0.1, 0.1, 0.5], [-0.1, 0.1, 0.5], [0, 0.25, -0.5]]
 
@@ -377,8 +377,8 @@ def test_grains_may_come_in(tmp_path: Path) -> None:
     some = Frame(1, ("id", "x"), np.array([[4.0, 0.0]]))
     more = Frame(2, ("id", "x"), np.array([[3.0, 0.0], [4.0, 0.0]]))
     path = tmp_path / "rain.dump"
-    dump_write(path, [empty, some, more])
-    assert [len(frame.values) for frame in dump_frames(path)] == [0, 1, 2]
+    write_dump(path, [empty, some, more])
+    assert [len(frame.values) for frame in read_frames(path)] == [0, 1, 2]
     frames, error = frames_and_error(path, expected_ids=[4])
     assert not frames
     assert "no grains" in str(error)
@@ -391,7 +391,7 @@ def test_nan_on_demand(tmp_path: Path) -> None:
         .replace("-1.5E+02", "-inf")
         .replace("7 1 0.03 0", "7 1 inf NaN")
     )
-    frame = list(dump_frames(written(tmp_path, text), allow_nan=True))[1]
+    frame = list(read_frames(written(tmp_path, text), allow_nan=True))[1]
     assert np.array_equal(frame.column("vx"), [-np.inf, np.nan, np.nan], equal_nan=True)
     assert frame.column("x")[2] == np.inf
 
@@ -400,10 +400,10 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
     """Fifty frames take the memory of about two, and of a block of text."""
     path = tmp_path / "long.dump"
     values = np.column_stack([np.arange(1, 5001), np.full((5000, 5), 0.1)])
-    dump_write(path, (Frame(step, ("id", *"xyzuv"), values) for step in range(50)))
-    next(dump_frames(path))  # compiles
+    write_dump(path, (Frame(step, ("id", *"xyzuv"), values) for step in range(50)))
+    next(read_frames(path))  # compiles
     tracemalloc.start()
-    assert sum(len(frame.values) for frame in dump_frames(path)) == 250_000
+    assert sum(len(frame.values) for frame in read_frames(path)) == 250_000
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 5 * values.nbytes + 2 * dump_text.BLOCK
@@ -528,13 +528,13 @@ def test_missing_file_is_a_usage_error(tmp_path: Path) -> None:
     """A file that is not there, or a folder, is the user's mistake, told with its name."""
     for path in (tmp_path / "none.dump", tmp_path):
         with pytest.raises(UsageError, match=re.escape(str(path))):
-            list(dump_frames(path))
+            list(read_frames(path))
 
 
 def test_expected_grains(tmp_path: Path) -> None:
     """A grain the caller expects is missed in the first frame already, and so is an id column."""
     path = written(tmp_path, GRAINS)
-    assert len(list(dump_frames(path, expected_ids=range(5, 6)))) == 3
+    assert len(list(read_frames(path, expected_ids=range(5, 6)))) == 3
     _, error = frames_and_error(path, expected_ids=[*range(1, 100)])
     assert error is not None
     assert error.lost_ids == tuple(i for i in range(1, 100) if i not in (2, 5, 7))
@@ -558,7 +558,7 @@ def test_nan_in_identifier(tmp_path: Path) -> None:
 
 def test_every_cut_is_seen(tmp_path: Path) -> None:
     """A dump cut at any byte yields its whole frames, then an error that says it is incomplete."""
-    whole = list(dump_frames(written(tmp_path, GRAINS)))
+    whole = list(read_frames(written(tmp_path, GRAINS)))
     ends = [GRAINS.index("ITEM: TIMESTEP\n10"), GRAINS.index("ITEM: TIMESTEP\n20"), len(GRAINS)]
     for cut in range(1, len(GRAINS)):
         frames, error = frames_and_error(written(tmp_path, GRAINS[:cut]))

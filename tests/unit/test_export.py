@@ -14,17 +14,17 @@ import meshio
 import numpy as np
 import pytest
 
-from adapters.container import Container, sides_needed
+from adapters.bed.container import Container, count_sides
+from adapters.bed.state import Contacts, State
 from adapters.errors import EngineFailed
-from adapters.export import FORMATS, export_run
-from adapters.export_instants import ExportedRun, exported_run
-from adapters.export_walls import container_triangles, piston_triangles
-from adapters.procedure import run_scene
-from adapters.progress import Progress
-from adapters.report_record import record_read
-from adapters.scene_file import scene_load
-from adapters.state import Contacts, State
-from adapters.window import PistonTrack, Window
+from adapters.export.formats import FORMATS, export_run
+from adapters.export.instants import ExportedRun, read_exported_run
+from adapters.export.walls import triangulate_container, triangulate_piston
+from adapters.files.window import PistonTrack, Window
+from adapters.procedure.progress import Progress
+from adapters.procedure.record import read_run_record
+from adapters.procedure.run import run_scene
+from adapters.scene.file import load_scene
 from trackbed import command
 from trackbed.scenes import scene_template
 
@@ -97,7 +97,7 @@ class Bed:
 
 
 def bed(scene_file: Path, friction: float, contacts: bool = True) -> ExportedRun:
-    scene = scene_load(scene_file, (*TINY, f"material.grain.friction={friction}"))
+    scene = load_scene(scene_file, (*TINY, f"material.grain.friction={friction}"))
     return ExportedRun(scene, Bed(friction, contacts))  # type: ignore[arg-type]
 
 
@@ -109,7 +109,7 @@ def test_paraview_series(run: Path, tmp_path: Path) -> None:
     """VTK's reader: an instant a cycle, only the fields asked for, means those of the table."""
     import pyvista
 
-    export_run(exported_run(run), "vtu", tmp_path)
+    export_run(read_exported_run(run), "vtu", tmp_path)
     series = pyvista.get_reader(str(tmp_path / "grains.pvd"))
     assert series.time_values == CYCLES
     start = None
@@ -129,8 +129,8 @@ def test_paraview_series(run: Path, tmp_path: Path) -> None:
 
 def test_meshio_reads_the_same(run: Path, tmp_path: Path) -> None:
     """meshio's reader gives back every digit."""
-    every = {instant.cycle: instant for instant in exported_run(run).instants()}
-    export_run(exported_run(run), "vtu", tmp_path)
+    every = {instant.cycle: instant for instant in read_exported_run(run).instants()}
+    export_run(read_exported_run(run), "vtu", tmp_path)
     for cycle in CYCLES:
         mesh = meshio.read(tmp_path / "vtu" / f"grains_{cycle:06d}.vtu")
         assert np.array_equal(mesh.points, every[cycle].state.position)
@@ -194,7 +194,7 @@ def areas(triangles: np.ndarray) -> np.ndarray:
 def test_container_is_closed_but_for_mirrors_and_top(name: str) -> None:
     """Every inner edge has two triangles; open edges lie in mirrors or at the top."""
     container = CONTAINERS[name]
-    triangles = container_triangles(container, HEIGHT, GRAIN)
+    triangles = triangulate_container(container, HEIGHT, GRAIN)
     edges: dict[tuple, int] = {}
     for triangle in triangles.round(12) + 0.0:
         for a, b in ((0, 1), (1, 2), (2, 0)):
@@ -215,11 +215,11 @@ def test_container_has_its_area_and_faces_the_grains(name: str) -> None:
     Chords of N sides miss (2 pi / N)^2 / 6 of a circle's area and a quarter of that of its length.
     """
     container = CONTAINERS[name]
-    triangles = container_triangles(container, HEIGHT, GRAIN)
+    triangles = triangulate_container(container, HEIGHT, GRAIN)
     double = areas(triangles)
     size = np.linalg.norm(double, axis=1) / 2
     floor = np.abs(double[:, 2]) > 0
-    sides = container.sides or sides_needed(container.radius, GRAIN) if name[-3:] != "box" else 4
+    sides = container.sides or count_sides(container.radius, GRAIN) if name[-3:] != "box" else 4
     share = (2 * np.pi / sides) ** 2 / 6 if name[-3:] != "box" else 1e-12
     assert size[floor].sum() == pytest.approx(container.area, rel=1.1 * share)
     length = {"box": 2 * (0.03 + 0.02), "mirrored box": 2 * 0.03 + 0.02}.get(
@@ -233,7 +233,7 @@ def test_container_has_its_area_and_faces_the_grains(name: str) -> None:
 def test_planes_are_those_of_the_engine() -> None:
     """Where planes stand for the cylinder, every side of the STL lies in one of them."""
     container = CONTAINERS["planes"]
-    triangles = container_triangles(container, HEIGHT, GRAIN)
+    triangles = triangulate_container(container, HEIGHT, GRAIN)
     walls = container.walls()
     upright = triangles[areas(triangles)[:, 2] == 0]
     gap = np.einsum("tcpa,pa->tcp", upright[:, :, None] - walls.plane_point, walls.plane_normal)
@@ -245,9 +245,9 @@ def test_piston_faces_down(share: float) -> None:
     """The whole section or the part under load, normals down."""
     container = CONTAINERS["quarter"]
     reach = np.inf if share == 1 else container.radius * np.sqrt(share)
-    double = areas(piston_triangles(container, reach, GRAIN))
+    double = areas(triangulate_piston(container, reach, GRAIN))
     assert np.all(double[:, 2] < 0)
-    sides = sides_needed(min(container.radius, reach), GRAIN)
+    sides = count_sides(min(container.radius, reach), GRAIN)
     area = -double[:, 2].sum() / 2
     assert area == pytest.approx(share * container.area, rel=1.1 * (2 * np.pi / sides) ** 2 / 6)
 
@@ -257,9 +257,9 @@ def test_stl_opens(run: Path, tmp_path: Path) -> None:
     """VTK's and meshio's readers; the piston is where the table has it."""
     import pyvista
 
-    export_run(exported_run(run), "stl", tmp_path)
+    export_run(read_exported_run(run), "stl", tmp_path)
     assert pyvista.read(tmp_path / "container.stl").n_cells > 10
-    start = exported_run(run).track.window("window_000000").piston_start
+    start = read_exported_run(run).track.window("window_000000").piston_start
     for cycle in CYCLES:
         path = tmp_path / "stl" / f"piston_{cycle:06d}.stl"
         face = pyvista.read(path)
@@ -276,7 +276,7 @@ def test_ovito(run: Path, tmp_path: Path) -> None:
     """OVITO's reader knows every column, and takes the cycle for the time step."""
     from ovito.io import import_file
 
-    export_run(exported_run(run), "ovito", tmp_path)
+    export_run(read_exported_run(run), "ovito", tmp_path)
     pipeline = import_file(str(tmp_path / "grains.dump"))
     assert pipeline.source.num_frames == len(CYCLES)
     for frame, cycle in enumerate(CYCLES):
@@ -312,7 +312,7 @@ def test_ovito_bonds(scene_file: Path, tmp_path: Path) -> None:
 
 def test_csv_reads_back(run: Path, tmp_path: Path) -> None:
     """Every number comes back bit for bit; the piston's samples are all there."""
-    exported = exported_run(run)
+    exported = read_exported_run(run)
     export_run(exported, "csv", tmp_path)
     grains = np.genfromtxt(tmp_path / "grains.csv", delimiter=",", names=True)
     instants = list(exported.instants())
@@ -365,7 +365,7 @@ def test_default_folder_is_no_run(scene_file: Path, tmp_path: Path) -> None:
     assert command.main(["export", str(run), "--to", "csv", "--variant", "control"]) == 0
     one, other = run / "export" / "grains.csv", run / "control" / "export" / "grains.csv"
     assert one.read_bytes() == other.read_bytes()  # nothing was jumped in four cycles
-    record = record_read(run)
+    record = read_run_record(run)
     assert record.control is not None
     assert record.others == ()
 
@@ -396,8 +396,8 @@ def test_nothing_to_export(tmp_path: Path, run: Path, capsys: pytest.CaptureFixt
 
 def test_unloaded_scene_has_no_piston(scene_file: Path, run: Path, tmp_path: Path) -> None:
     """A run that is only prepared: one instant, no displacement, no piston."""
-    prepared = replace(exported_run(run), track=SimpleNamespace(
-        windows=[], start=exported_run(run).track.start
+    prepared = replace(read_exported_run(run), track=SimpleNamespace(
+        windows=[], start=read_exported_run(run).track.start
     ))  # fmt: skip
     for to in FORMATS:
         export_run(prepared, to, tmp_path)
@@ -421,9 +421,9 @@ def disk_of(size: int) -> Iterator[None]:
 @pytest.mark.parametrize("to", FORMATS)
 def test_full_disk(run: Path, tmp_path: Path, to: str) -> None:
     """Exit code 5's error, no part of a file, and what was there before stays."""
-    first = export_run(exported_run(run), to, tmp_path, every=100)
+    first = export_run(read_exported_run(run), to, tmp_path, every=100)
     before = {path: path.read_bytes() for path in first}
     with disk_of(512), pytest.raises(EngineFailed, match="disk is full"):
-        export_run(exported_run(run), to, tmp_path)
+        export_run(read_exported_run(run), to, tmp_path)
     assert not list(tmp_path.rglob("*partial*"))
     assert {path: path.read_bytes() for path in first} == before

@@ -14,9 +14,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters import meshio_dump
-from adapters.dump import Frame, dump_frames, dump_write
 from adapters.errors import DumpError, UsageError
+from adapters.files import meshio_dump
+from adapters.files.dump import Frame, read_frames, write_dump
 
 pytestmark = pytest.mark.lowest
 
@@ -39,7 +39,7 @@ def frame(step: int, count: int = 3, columns: list[str] = COLUMNS) -> Frame:
 def test_last_frame_with_vectors_joined(tmp_path: Path) -> None:
     """Places are points, components are one vector, grains ascend by id."""
     path = tmp_path / "states.dump"
-    dump_write(path, [frame(0), frame(500)])
+    write_dump(path, [frame(0), frame(500)])
     mesh = meshio.read(path)
     last = frame(500).values[::-1]
     assert np.array_equal(mesh.points, last[:, 2:5])
@@ -50,17 +50,17 @@ def test_last_frame_with_vectors_joined(tmp_path: Path) -> None:
     assert mesh.point_data["id"].dtype == np.int64
     assert mesh.field_data["time_step"] == [500]
     assert np.array_equal(mesh.field_data["box"], frame(500).bounds)
-    steps = [int(each.field_data["time_step"][0]) for each in meshio_dump.dump_meshes(path)]
+    steps = [int(each.field_data["time_step"][0]) for each in meshio_dump.read_dump_meshes(path)]
     assert steps == [0, 500]
 
 
 @pytest.mark.parametrize("name", ["a.dump", "a.lammpstrj", "a.liggghts", "a.dump.gz", "A.10.DUMP"])
 def test_known_by_its_ending(tmp_path: Path, name: str) -> None:
     """Endings, packed or not; written by meshio and read back, bit for bit."""
-    dump_write(tmp_path / "first.dump", [frame(7)])
+    write_dump(tmp_path / "first.dump", [frame(7)])
     mesh = meshio.read(tmp_path / "first.dump")
     mesh.write(tmp_path / name)
-    (written,) = dump_frames(tmp_path / name)
+    (written,) = read_frames(tmp_path / name)
     assert sorted(written.columns) == sorted(COLUMNS)
     again = meshio.read(tmp_path / name)
     assert np.array_equal(again.points, mesh.points)
@@ -72,7 +72,7 @@ def test_known_by_its_ending(tmp_path: Path, name: str) -> None:
 
 def test_other_names_say_the_format(tmp_path: Path) -> None:
     """``dump.500`` has no ending that tells."""
-    dump_write(tmp_path / "dump.500", [frame(500)])
+    write_dump(tmp_path / "dump.500", [frame(500)])
     mesh = meshio.read(tmp_path / "dump.500", file_format=meshio_dump.FORMAT)
     assert len(mesh.points) == 3
 
@@ -80,14 +80,14 @@ def test_other_names_say_the_format(tmp_path: Path) -> None:
 def test_importing_registers(tmp_path: Path) -> None:
     """Without the import meshio does not know the format, with it it does."""
     path = tmp_path / "states.dump"
-    dump_write(path, [frame(0)])
+    write_dump(path, [frame(0)])
     code = f"""
         import meshio
         try:
             meshio.read({str(path)!r})
         except meshio.ReadError as error:
             print(error)
-        import adapters.meshio_dump
+        import adapters.files.meshio_dump
         print(len(meshio.read({str(path)!r}).points))
     """
     done = subprocess.run(
@@ -98,7 +98,7 @@ def test_importing_registers(tmp_path: Path) -> None:
 
 def test_to_paraview(tmp_path: Path) -> None:
     """A dump becomes a VTU by meshio alone."""
-    dump_write(tmp_path / "states.dump", [frame(0)])
+    write_dump(tmp_path / "states.dump", [frame(0)])
     mesh = meshio.read(tmp_path / "states.dump")
     mesh.write(tmp_path / "states.vtu")
     again = meshio.read(tmp_path / "states.vtu")
@@ -108,7 +108,7 @@ def test_to_paraview(tmp_path: Path) -> None:
 def test_contacts_are_no_mesh(tmp_path: Path) -> None:
     """A dump without places is refused with its columns."""
     path = tmp_path / "contacts.dump"
-    dump_write(path, [Frame(3, ("c_pair[1]", "c_pair[2]"), np.ones((2, 2)), kind="entries")])
+    write_dump(path, [Frame(3, ("c_pair[1]", "c_pair[2]"), np.ones((2, 2)), kind="entries")])
     with pytest.raises(DumpError, match=r"no places x y z, only c_pair\[1\] c_pair\[2\]"):
         meshio.read(path)
 
@@ -157,7 +157,7 @@ def test_any_mesh_becomes_a_dump(tmp_path: Path) -> None:
 def test_no_column_is_lost(tmp_path_factory: pytest.TempPathFactory, columns: list[str]) -> None:
     """In whatever order: every number is in the mesh once, components in their order."""
     path = tmp_path_factory.mktemp("d") / "d.dump"
-    dump_write(path, [frame(1, 2, columns)])
+    write_dump(path, [frame(1, 2, columns)])
     mesh = meshio.read(path)
     rows = frame(1, 2, columns).values[::-1]
     named = dict(zip(columns, rows.T, strict=True))

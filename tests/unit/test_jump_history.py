@@ -9,20 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters import jump_slopes
-from adapters.jump_history import Jumped, asked_gain
-from adapters.jump_rates import Stretch
-from adapters.jump_slopes import (
+from adapters.bed.state import FloatArray
+from adapters.jumps import slopes as jump_slopes
+from adapters.jumps.history import Jumped, find_asked_gain
+from adapters.jumps.rates import Stretch
+from adapters.jumps.slopes import (
     LONGEST_BLOCK,
     LONGEST_RESEATING,
     Landing,
     Slopes,
-    blocks_of,
-    slopes_of,
-    system_of,
+    assemble_kriging,
+    cut_slope_blocks,
+    estimate_slopes,
     unmoved,
 )
-from adapters.state import FloatArray
 
 SLOPE = 3e-5
 
@@ -47,7 +47,7 @@ def noisy(seed: int, slope: float, burst: float) -> list[Stretch]:
 def walked(place: FloatArray, slope: FloatArray, noise: FloatArray) -> Slopes:
     """Blocks of a walk of variance 1 in a unit of ln N, before any jump."""
     nothing = np.zeros(len(place))
-    return Slopes(place, slope, nothing, system_of(place, noise, nothing))
+    return Slopes(place, slope, nothing, assemble_kriging(place, noise, nothing))
 
 
 def jumping(
@@ -66,7 +66,7 @@ def jumping(
     made: list[Jumped] = []
     missed, settled = [], 0.0
     for _ in range(jumps):
-        gain = asked_gain(known, h, made)
+        gain = find_asked_gain(known, h, made)
         behind, last = end + h, end + h + healing + k
         gains = [cycle_gain(behind + n) + more(n, gain) for n in range(1, healing + k + 1)]
         after = [settled, settled + gain, settled + gain + sum(gains)]
@@ -88,7 +88,7 @@ def test_logarithm_is_continued() -> None:
         known = [log_stretch(*window) for window in windows]
         last = windows[-1][1]
         for h in (1, 30, 100 * last):
-            assert asked_gain(known, h) == pytest.approx(SLOPE * np.log1p(h / last), rel=1e-6)
+            assert find_asked_gain(known, h) == pytest.approx(SLOPE * np.log1p(h / last), rel=1e-6)
 
 
 def test_error_is_least_among_linear_estimates() -> None:
@@ -139,7 +139,7 @@ def test_bursts_err_less_than_by_the_last_window() -> None:
     for seed in range(40):
         known = noisy(seed, SLOPE, 0.6)
         truth = SLOPE * np.log(2)
-        missed.append(asked_gain(known, 820) / truth - 1)
+        missed.append(find_asked_gain(known, 820) / truth - 1)
         alone.append(known[-1].gain.sum() / np.log(820 / 800) * np.log(2) / truth - 1)
     assert np.mean(np.square(missed)) < 0.7 * np.mean(np.square(alone))
 
@@ -150,7 +150,7 @@ def test_bursts_err_less_than_by_the_last_window() -> None:
 def test_unit_of_length_is_free(unit: float, gains: list[float], h: int) -> None:
     """Gains times a factor, with a jump between: the same gain, times the factor."""
     one, other = (
-        asked_gain(
+        find_asked_gain(
             [stretch(10, np.array(gains[:3]) * u), stretch(31, np.array(gains[3:]) * u)],
             h,
             [Jumped(np.array([13, 30, 28 + len(gains)]), np.array([0.0, 1.0, 1.5]) * u)],
@@ -198,7 +198,7 @@ def test_nothing_is_asked_where_too_much_was_gained() -> None:
     """A jump that went too far by more than the next may gain: the next moves nothing."""
     known = [log_stretch(10, 70), log_stretch(101, 120)]
     far = [Jumped(np.array([70, 100, 120]), np.array([0.0, 1e-3, 1e-3 + SLOPE]))]
-    assert asked_gain(known, 10, far) == 0
+    assert find_asked_gain(known, 10, far) == 0
 
 
 def test_blocks_cut_no_cycle_and_lose_none() -> None:
@@ -211,7 +211,7 @@ def test_blocks_cut_no_cycle_and_lose_none() -> None:
         (log_stretch(5000, 5020), [jump]),
         (log_stretch(4991, 5020), [jump]),
     ):
-        found = blocks_of(one, made)
+        found = cut_slope_blocks(one, made)
         blocks = [block for block, _ in found]
         assert np.concatenate([b.gain for b in blocks]) == pytest.approx(one.gain)
         assert [b.first_cycle for b in blocks[1:]] == [b.last_cycle for b in blocks[:-1]]
@@ -226,18 +226,20 @@ def test_blocks_cut_no_cycle_and_lose_none() -> None:
 
 def test_bed_without_motion_and_bed_that_rises() -> None:
     """Nothing is gained, and no number is not finite."""
-    assert asked_gain([stretch(10, np.zeros(20))], 100) == 0
-    assert asked_gain([stretch(10, np.full(20, -1e-6))], 100) == 0
-    assert asked_gain([stretch(1, np.array([1e-6]))], 10) == pytest.approx(
+    assert find_asked_gain([stretch(10, np.zeros(20))], 100) == 0
+    assert find_asked_gain([stretch(10, np.full(20, -1e-6))], 100) == 0
+    assert find_asked_gain([stretch(1, np.array([1e-6]))], 10) == pytest.approx(
         1e-6 / np.log(2) * np.log(6)
     )
     nothing = [Jumped(np.array([30, 100, 120]), np.zeros(3))]
-    assert asked_gain([stretch(10, np.zeros(20)), stretch(101, np.zeros(19))], 9, nothing) == 0
+    assert find_asked_gain([stretch(10, np.zeros(20)), stretch(101, np.zeros(19))], 9, nothing) == 0
 
 
 def test_slopes_of_a_logarithm_are_one() -> None:
     """Every block of u = a ln N has the slope a."""
-    assert slopes_of([log_stretch(10, 70), log_stretch(500, 520)]).slope == pytest.approx(SLOPE)
+    assert estimate_slopes([log_stretch(10, 70), log_stretch(500, 520)]).slope == pytest.approx(
+        SLOPE
+    )
 
 
 def test_kappa_is_found_with_its_error_and_taken_out() -> None:
@@ -248,7 +250,7 @@ def test_kappa_is_found_with_its_error_and_taken_out() -> None:
     for one in landings:
         bare = log_stretch(one.cycle + 1, one.cycle + 25)
         known.append(unmoved(bare, [one], -kappa))
-    slopes = slopes_of(known, landings)
+    slopes = estimate_slopes(known, landings)
     found, error = slopes.kappa()
     assert found == pytest.approx(kappa, rel=0.2)
     assert abs(found - kappa) < 2 * error
@@ -260,4 +262,4 @@ def test_kappa_is_found_with_its_error_and_taken_out() -> None:
 
 def test_no_jump_tells_no_kappa() -> None:
     """Nothing is taken out, and the standard error stays what it was before."""
-    assert slopes_of([log_stretch(10, 70)]).kappa() == (0.0, jump_slopes.RESEATING)
+    assert estimate_slopes([log_stretch(10, 70)]).kappa() == (0.0, jump_slopes.RESEATING)

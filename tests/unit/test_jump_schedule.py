@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from adapters.jump_schedule import jump_lengths
+from adapters.jumps.schedule import schedule_jumps
 
 
 @pytest.mark.parametrize("jumps", [1, 5, 13])
 def test_growing_jumps_have_one_ratio(jumps: int) -> None:
     """Ends of jumps with the window behind each: N_i = N_0 q^i, rounded to cycles."""
-    lengths = np.array(jump_lengths(jumps, 10_000, 100, 20, 5))
+    lengths = np.array(schedule_jumps(jumps, 10_000, 100, 20, 5))
     ends = 120 + np.cumsum(np.append(0, lengths + 25))
     assert ends[-1] == 10_000
     ratio = (10_000 / ends[0]) ** (1 / jumps)
@@ -23,9 +23,9 @@ def test_growing_jumps_have_one_ratio(jumps: int) -> None:
 def test_jumps_without_room_are_refused() -> None:
     for growing in (True, False):
         with pytest.raises(ValueError, match="no cycle"):
-            jump_lengths(40, 1_000, 100, 20, 5, growing)
+            schedule_jumps(40, 1_000, 100, 20, 5, growing)
     with pytest.raises(ValueError, match="no cycle"):
-        jump_lengths(1, 0, 100, 20, 5)
+        schedule_jumps(1, 0, 100, 20, 5)
 
 
 @given(
@@ -38,7 +38,7 @@ def test_any_schedule_ends_at_the_last_cycle(
     """k_i, a window, and of each jump h, healing and a window; growing ones never shrink by more
     than rounding."""
     try:
-        lengths = jump_lengths(jumps, last, k_i, window, healing, growing)
+        lengths = schedule_jumps(jumps, last, k_i, window, healing, growing)
     except ValueError:
         return
     assert len(lengths) == jumps

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from adapters.stages import settled_by
-from adapters.state import FloatArray, State
+from adapters.bed.state import FloatArray, State
+from adapters.procedure.stages import settle_by
 from tests.verification.test_moves import bed
 
 
@@ -29,7 +29,7 @@ def test_piston_is_strained_with_the_bed(gain: float, wrong: float, seed: int) -
     path, radius = bed(seed)
     state = at_rest(path[0], radius)
     noise = np.random.default_rng(seed).normal(scale=1e-4, size=path[0].shape)
-    target, piston = settled_by(gain, state, path[0] + noise - [0.0, 0.0, wrong])
+    target, piston = settle_by(gain, state, path[0] + noise - [0.0, 0.0, wrong])
     assert (state.position - target)[:, 2].mean() == pytest.approx(gain, abs=1e-15)
     low = state.position[:, 2].min()
     mean = float((state.position[:, 2] - low).mean())

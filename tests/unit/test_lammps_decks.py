@@ -7,29 +7,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import contact_law
-from adapters.dump import Frame
-from adapters.engine import EngineStart
-from adapters.engine_lammps import LammpsEngine
-from adapters.lammps_decks import (
-    contact_text,
-    contact_values,
-    dump_states_text,
-    moved_write,
-    piston_wall_text,
+from adapters.bed import contact_law
+from adapters.bed.state import State
+from adapters.engines.contract import EngineStart
+from adapters.engines.lammps import LammpsEngine
+from adapters.engines.lammps_decks import (
+    convert_contacts,
+    format_contact,
+    format_dump_states,
+    format_piston_wall,
     scene_text,
     wall_names,
+    write_moved,
 )
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import State
+from adapters.files.dump import Frame
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
 
 RULE = LammpsEngine().tangential
 
 
 def scene_of(*overrides: str) -> Scene:
-    return scene_load(scene_path("karrech-coarse"), ('engine.name="lammps"', *overrides))
+    return load_scene(scene_path("karrech-coarse"), ('engine.name="lammps"', *overrides))
 
 
 def bed(count: int) -> State:
@@ -43,10 +43,10 @@ def bed(count: int) -> State:
 
 def test_contact_words_hold_the_equations() -> None:
     """4/3 E*, e, 8 G*, sqrt(4 G*/E*), mu in LAMMPS' order; without friction no stiffness."""
-    words = contact_text(3e9, 1e9, 0.2, 0.5, RULE).split()
+    words = format_contact(3e9, 1e9, 0.2, 0.5, RULE).split()
     assert words[0::2] == ["hertz", "0.20000000000000001", RULE, "1.1547005383792515", "damping"]
     assert [float(w) for w in (words[1], words[5], words[7])] == [4e9, 8e9, 0.5]
-    assert "mindlin" not in contact_text(3e9, 1e9, 0.2, 0.0, RULE)
+    assert "mindlin" not in format_contact(3e9, 1e9, 0.2, 0.0, RULE)
 
 
 def test_scene_names_its_walls_only() -> None:
@@ -78,7 +78,7 @@ def test_walls_of_a_box_face_inwards(tmp_path: Path) -> None:
     lines[at:at] = ["size_x = 0.04", "size_y = 0.03"]
     path = tmp_path / "scene.toml"
     path.write_text("\n".join(lines) + "\n")
-    scene = scene_load(path, ('engine.name="lammps"', "sample.symmetry=[]"))
+    scene = load_scene(path, ('engine.name="lammps"', "sample.symmetry=[]"))
     words = {
         line.split()[1]: line.split()[-4:-1]
         for line in scene_text(scene, RULE).splitlines()
@@ -91,15 +91,17 @@ def test_walls_of_a_box_face_inwards(tmp_path: Path) -> None:
 
 def test_piston_is_a_plane_or_the_end_of_a_cylinder() -> None:
     """Full area: a plane that faces down; partial: a cylinder of the reach, from outside."""
-    assert "region piston plane 0.0 0.0 0.0 0.0 0.0 -1.0 move" in piston_wall_text(scene_of(), RULE)
+    assert "region piston plane 0.0 0.0 0.0 0.0 0.0 -1.0 move" in format_piston_wall(
+        scene_of(), RULE
+    )
     scene = scene_of("loading.area_share=0.25")
-    text = piston_wall_text(scene, RULE)
+    text = format_piston_wall(scene, RULE)
     assert "cylinder z 0.0 0.0 0.014999999999999999 0.0 INF side out move" in text
 
 
 def test_columns_are_those_of_every_engine() -> None:
     """The force of a wall is renamed to the columns that readers know, in their order."""
-    text = dump_states_text(("floor", "piston_wall"))
+    text = format_dump_states(("floor", "piston_wall"))
     assert "f_floor[2] f_floor[3] f_floor[4] f_piston_wall[2]" in text
     assert "colname 13 f_force_floor[1]" in text
     assert text.rstrip().endswith("colname 18 f_force_piston_wall[3]")
@@ -109,7 +111,7 @@ def test_moved_places_come_back_exactly(tmp_path: Path) -> None:
     """All grains by identifier, to the last bit, and the piston's atom after them."""
     scene, state = scene_of(), bed(5)
     shifted = state.moved(state.position + 1 / 3, piston_height=0.1 + 1e-17)
-    moved_write(tmp_path, scene.container, shifted)
+    write_moved(tmp_path, scene.container, shifted)
     for axis, name in enumerate("xyz"):
         rows = (tmp_path / f"moved_{name}.txt").read_text().split("\n")
         assert rows[0] == "6"
@@ -163,9 +165,9 @@ def test_contacts_from_pairs() -> None:
     velocity = slide - spin * radius
     force = -stiffness * spring - damping * velocity
     pairs = np.array([[4, 9, 1.5, 0, 0, 0, force, 0, 2 * radius - overlap]])
-    values = contact_values(scene, pairs, Frame(0, names, rows))
+    values = convert_contacts(scene, pairs, Frame(0, names, rows))
     assert values[0, :8].tolist() == [4, 9, 1.5, 0, 0, 0, force, 0]
     assert values[0, 8:11] == pytest.approx([0, spring, 0], abs=1e-12 * spring)
     assert values[0, 11] == pytest.approx(overlap, rel=1e-9)
-    plain = contact_values(scene, pairs[:, [0, 1, 2, 3, 4, 8]], Frame(0, names, rows))
+    plain = convert_contacts(scene, pairs[:, [0, 1, 2, 3, 4, 8]], Frame(0, names, rows))
     assert plain[0] == pytest.approx([4, 9, 1.5, 0, 0, overlap], rel=1e-9)

@@ -7,23 +7,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.container import Container, Walls
-from adapters.errors import UsageError
-from adapters.overlaps import (
+from adapters.bed.container import Container, Walls
+from adapters.bed.overlaps import (
     bed_measure,
-    behind_discs,
+    find_behind_discs,
+    find_pairs_within,
+    measure_rows,
     neighbours,
-    pairs_within,
-    rows_at,
     wall_names,
 )
-from adapters.state import FloatArray
+from adapters.bed.state import FloatArray
+from adapters.errors import UsageError
 
 QUARTER = Container("cylinder", ("x", "y"), radius=0.05)
 
 
 def pairs_tried(position: FloatArray, radius: FloatArray, gap: float) -> set[tuple[int, int]]:
-    """The twin of `pairs_within`: all pairs, one by one."""
+    """The twin of `find_pairs_within`: all pairs, one by one."""
     return {
         (i, j)
         for i in range(len(radius))
@@ -56,7 +56,7 @@ def test_pairs_are_exactly_the_near_ones(seed: int, ratio: float) -> None:
     radius = 1e-3 * ratio ** generator.random(n)
     position = generator.random((n, 3)) * 0.02
     gap = float(generator.choice([0.0, 1e-3]))
-    found = pairs_within(position, radius, gap)
+    found = find_pairs_within(position, radius, gap)
     assert set(map(tuple, found.tolist())) == pairs_tried(position, radius, gap)
     assert len(found) == len(np.unique(found, axis=0))
     assert (found[:, 0] < found[:, 1]).all()
@@ -86,7 +86,7 @@ def test_normals_are_gradients_of_the_overlap() -> None:
     radius = generator.uniform(2e-3, 6e-3, 12)
     position = generator.uniform(2e-3, 0.03, (12, 3))
     walls = QUARTER.walls(piston_height=0.033, piston_reach=0.02)
-    behind = behind_discs(position, walls)
+    behind = find_behind_discs(position, walls)
     rows = neighbours(position, radius, walls, gap=0.05, behind=behind)
     step = 1e-7
     for c, (i, j) in enumerate(zip(rows.first, rows.second, strict=True)):
@@ -99,7 +99,9 @@ def test_normals_are_gradients_of_the_overlap() -> None:
                 moved[0][grain, a] -= step
                 moved[1][grain, a] += step
                 low, high = (
-                    rows_at(x, radius, rows.first[[c]], rows.second[[c]], walls, behind).overlap[0]
+                    measure_rows(
+                        x, radius, rows.first[[c]], rows.second[[c]], walls, behind
+                    ).overlap[0]
                     for x in moved
                 )
                 slope[a] = (high - low) / (2 * step)

@@ -12,10 +12,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
-from qdem_fem.advise import advise, compliance_of, error_together, stiffness_matrix
-from qdem_fem.advise_check import advice_check, advise_scene
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.sleeper_modes import free_modes
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.scene.advise import advise, compliance_of, error_together, stiffness_matrix
+from qdem_fem.scene.advise_check import advise_scene, check_advice
+from qdem_fem.track.sleeper_modes import find_free_modes
 from trackbed import command
 
 STONE = q.Material(30e9, 0.2, 2700.0)
@@ -25,7 +25,7 @@ STONES = Path(__file__).parents[1] / "qdem_stones.toml"
 
 def beam(young: float = 30e9, turn: Any = None) -> q.Body:
     """A beam of 4 x 1 x 1 cells, turned."""
-    mesh = box_mesh((0.08, 0.02, 0.02), (4, 1, 1))
+    mesh = make_box_mesh((0.08, 0.02, 0.02), (4, 1, 1))
     turn = Rotation.identity() if turn is None else turn
     return q.Body((turn.apply(mesh.nodes), mesh.elements), q.Material(young, 0.2, 2700.0))
 
@@ -43,7 +43,9 @@ def test_compliance_against_all_modes() -> None:
     found = compliance_of(own)
     assert found.vertex == pytest.approx(max(each), rel=1e-6)
     assert found.frequency == pytest.approx(np.sqrt(value[6]) / 2 / np.pi, rel=1e-3)
-    assert found.frequency == pytest.approx(free_modes(own.mesh, STONE, 1).frequency[0], rel=1e-3)
+    assert found.frequency == pytest.approx(
+        find_free_modes(own.mesh, STONE, 1).frequency[0], rel=1e-3
+    )
     assert found.transit == pytest.approx(0.08 / STONE.wave_speed)
 
 
@@ -62,7 +64,7 @@ def test_reasons() -> None:
 
     def said(change: Any, **options: Any) -> tuple[bool, str]:
         contact = q.SphereContact(0.001, options.pop("stiffness", 1e3), 0.1)
-        body = q.Body(box_mesh((0.03,) * 3, (1, 1, 1)), STONE)
+        body = q.Body(make_box_mesh((0.03,) * 3, (1, 1, 1)), STONE)
         run = q.Simulation([body], contact=options.pop("contact", contact), threads=1)
         change(run, body)
         (one,) = advise(run)
@@ -84,7 +86,7 @@ def test_two_runs_tell_that_the_prediction_bounds() -> None:
     """Stones on a pad: what was measured is below what was predicted, and not far below."""
     advice = advise_scene(STONES, [], 0.05)
     assert [one.rigid for one in advice] == [False, True, True]
-    checked = advice_check(STONES, [], advice)
+    checked = check_advice(STONES, [], advice)
     assert checked.predicted == error_together(advice)
     assert checked.predicted / 10 < checked.measured < checked.predicted
     nobody = [replace(one, rigid=False) for one in advice]

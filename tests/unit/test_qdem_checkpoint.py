@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import qdem_fem as q
-from qdem_fem.errors import CheckpointError, DiskFull
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import CheckpointError, DiskFull
+from qdem_fem.mesh.generation import make_box_mesh
 
 CELLS = (5, 2, 2)
 STEEL = {"young": 2e11, "poisson": 0.3, "density": 7800.0}
@@ -27,7 +27,7 @@ def made(
     **options: Any,
 ) -> q.Simulation:
     """A clamped bar under an end load, and what a test adds."""
-    mesh = box_mesh((0.5, 0.1, 0.1), cells)
+    mesh = make_box_mesh((0.5, 0.1, 0.1), cells)
     body = q.Body(mesh, q.Material(**STEEL | (material or {})), name="bar")
     run = q.Simulation([body], threads=1, **options)
     run.fix(body, body.nodes[:, 0] == 0)
@@ -43,7 +43,7 @@ def state_of(run: q.Simulation) -> list[Any]:
     return [
         repr(run.motion), run.time,
         *(a.tobytes() for a in (state.displacement, state.velocity, run.motion.work)),
-        run.packed_lists()[1].previous.tobytes(), run.energy(), run.critical_step.value,
+        run.pack_lists()[1].previous.tobytes(), run.energy(), run.critical_step.value,
     ]  # fmt: skip
 
 
@@ -112,7 +112,7 @@ def test_state_of_periodic_bodies_in_the_middle(tmp_path: Path) -> None:
     """Nodes that follow others come back with their masters."""
 
     def ring() -> q.Simulation:
-        body = q.Body(box_mesh((0.5, 0.1, 0.1), CELLS), q.Material(**STEEL))
+        body = q.Body(make_box_mesh((0.5, 0.1, 0.1), CELLS), q.Material(**STEEL))
         run = q.Simulation([body], threads=1)
         run.periodic(body, body.nodes[:, 0] == 0, body.nodes[:, 0] == 0.5)
         run.fix(body, body.nodes[:, 2] == 0)
@@ -219,7 +219,7 @@ def test_missing_file_foreign_npz_and_later_format(
     np.savez(tmp_path / "foreign.npz", displacement=np.zeros(3))
     with pytest.raises(CheckpointError, match="no whole checkpoint"):
         victim.restore(tmp_path / "foreign.npz")
-    monkeypatch.setattr("qdem_fem.checkpoint.FORMAT", 99)
+    monkeypatch.setattr("qdem_fem.march.checkpoint.FORMAT", 99)
     victim.save(tmp_path / "later.npz")
     monkeypatch.undo()
     with pytest.raises(CheckpointError, match="format 99"):

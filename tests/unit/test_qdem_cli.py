@@ -19,9 +19,10 @@ import meshio
 import numpy as np
 import pytest
 
-from qdem_fem import cli, scene_build
-from qdem_fem.errors import Interrupted, SceneError, StepWarning, UsageError
-from qdem_fem.output import table_read
+from qdem_fem import cli
+from qdem_fem.files.errors import Interrupted, SceneError, StepWarning, UsageError
+from qdem_fem.files.output import table_read
+from qdem_fem.scene import build as scene_build
 
 ROOT = Path(__file__).parents[2]
 SCENE = """\
@@ -137,7 +138,7 @@ def test_run_writes_what_it_promises(scene: Path, capsys: pytest.CaptureFixture[
     assert report.count("<img") == len(list(folder.glob("picture-*.png"))) == 4
 
 
-def result_of(scene: Path, name: str, *words: str) -> dict[str, Any]:
+def find_result(scene: Path, name: str, *words: str) -> dict[str, Any]:
     """What a run with some overrides came to."""
     folder = scene.with_name(name)
     overrides = [word for override in words for word in ("--set", override)]
@@ -149,7 +150,7 @@ def test_energy_balance_is_that_of_verlet(scene: Path) -> None:
     """After the blow external - kinetic - elastic oscillates by O(dt^2), as nothing dissipates."""
 
     def imbalance(name: str, safety: float) -> float:
-        result_of(scene, name, f"simulation.safety={safety}")
+        find_result(scene, name, f"simulation.safety={safety}")
         rows = table_read(scene.with_name(name) / "energy.csv")
         missing = rows["external"] - rows["kinetic"] - rows["elastic"]
         return float(np.abs(missing / rows["external"][-1])[rows["time"] > 0.002].max())
@@ -164,9 +165,9 @@ def stiffness_of(size: tuple[float, float, float]) -> tuple[Any, Any]:
     import skfem
     from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-    from qdem_fem.mesh_generation import box_mesh
+    from qdem_fem.mesh.generation import make_box_mesh
 
-    mesh = box_mesh(size, (8, 2, 2))
+    mesh = make_box_mesh(size, (8, 2, 2))
     basis = skfem.Basis(
         skfem.MeshTet(mesh.nodes.T, mesh.elements.T), skfem.ElementVector(skfem.ElementTetP1())
     )
@@ -181,14 +182,14 @@ def test_frequency_of_the_run_is_that_of_its_own_matrices(scene: Path) -> None:
     """
     from scipy.linalg import eigh
 
-    from qdem_fem.mesh import element_gradients, lumped_mass
+    from qdem_fem.mesh.tetrahedra import element_gradients, lumped_mass
 
     size = (0.4, 0.1, 0.3)
     words = (
         "body.bar.mesh={box={size=[0.4, 0.1, 0.3], cells=[8, 2, 2]}}",
         "simulation.duration=0.05",
     )
-    result = result_of(scene, "run", *words)
+    result = find_result(scene, "run", *words)
     found, step = result["modes"]["tip_z"][0]["frequency"], result["step"]
     mesh, stiffness = stiffness_of(size)
     volumes = element_gradients(mesh.nodes, mesh.elements)[1]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import qdem_fem as q
-from qdem_fem.errors import LibraryMissing
+from qdem_fem.files.errors import LibraryMissing
 
 ROOT = Path(__file__).parents[2]
 SCENE = (ROOT / "trackbed" / "scenes" / "cantilever-vibration.toml").read_text()
@@ -72,7 +72,7 @@ def test_missing_library_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch
     """The same from Python."""
     tetrahedron = q.Body(([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), CONCRETE)
     monkeypatch.setitem(sys.modules, "numba.cuda", None)
-    monkeypatch.delitem(sys.modules, "qdem_fem.cuda_step", raising=False)
+    monkeypatch.delitem(sys.modules, "qdem_fem.kernel.cuda.step", raising=False)
     with pytest.raises(LibraryMissing) as caught:
         q.Simulation([tetrahedron], device="cuda")
     assert "pip install 'trackbed[cuda]'" in caught.value.remedy

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from qdem_fem.errors import MaterialError
-from qdem_fem.material import Material
+from qdem_fem.element.material import Material
+from qdem_fem.files.errors import MaterialError
 
 CONCRETE = Material(45e9, 0.167, 2350, shear_viscosity=1e4)
 positive = st.floats(1e-3, 1e15)

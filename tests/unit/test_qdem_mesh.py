@@ -16,14 +16,14 @@ import skfem
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.errors import LibraryMissing, MeshError
-from qdem_fem.mesh import TetMesh, element_gradients, mesh_read
-from qdem_fem.mesh_checks import FLAT
-from qdem_fem.mesh_generation import box_mesh, gmsh_box, jitter, ring_mesh
+from qdem_fem.files.errors import LibraryMissing, MeshError
+from qdem_fem.mesh.checks import FLAT
+from qdem_fem.mesh.generation import jitter, make_box_mesh, make_gmsh_box, make_ring_mesh
+from qdem_fem.mesh.tetrahedra import TetMesh, element_gradients, read_mesh
 
 pytestmark = pytest.mark.lowest
 
-BOX = box_mesh((0.4, 0.3, 0.2), (2, 2, 2))
+BOX = make_box_mesh((0.4, 0.3, 0.2), (2, 2, 2))
 NODES, ELEMENTS = BOX.nodes, BOX.elements
 UNIT = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 """Corners of a right-handed element."""
@@ -44,7 +44,7 @@ def at(row: int, value: float) -> tuple[np.ndarray, np.ndarray]:
 def refused(source: Any) -> str:
     """The text of the one `MeshError` a source must give, which names a remedy."""
     with pytest.raises(MeshError) as caught:
-        mesh_read(source)
+        read_mesh(source)
     assert caught.value.where
     assert caught.value.remedy
     return str(caught.value)
@@ -53,7 +53,7 @@ def refused(source: Any) -> str:
 def attempt(source: Any) -> tuple[TetMesh | None, str]:
     """The mesh, or the text of the `MeshError`; every other error goes through."""
     try:
-        return mesh_read(source), ""
+        return read_mesh(source), ""
     except MeshError as error:
         return None, str(error)
 
@@ -68,7 +68,7 @@ def attempt(source: Any) -> tuple[TetMesh | None, str]:
 def test_box_has_the_counts_of_the_reference_beams(
     cells: Any, pattern: Any, elements: int, nodes: int
 ) -> None:
-    mesh = box_mesh((2.4, 0.25, 0.22), cells, pattern)
+    mesh = make_box_mesh((2.4, 0.25, 0.22), cells, pattern)
     assert mesh.elements.shape == (elements, 4)
     assert mesh.nodes.shape == (nodes, 3)
 
@@ -91,7 +91,7 @@ def test_sources_give_the_same_mesh(tmp_path: Path) -> None:
         meshio.Mesh(NODES, {"tetra": ELEMENTS}).write(path)
         sources += [path, str(path)]
     for source in sources:
-        mesh = mesh_read(source)
+        mesh = read_mesh(source)
         np.testing.assert_allclose(mesh.nodes, NODES, rtol=1e-14, atol=1e-15)
         np.testing.assert_array_equal(mesh.elements, ELEMENTS)
         assert mesh.nodes.dtype == np.float64
@@ -101,7 +101,7 @@ def test_sources_give_the_same_mesh(tmp_path: Path) -> None:
 
 def test_arrays_are_copied_and_never_changed() -> None:
     nodes, elements = UNIT.copy(), np.array([[0, 1, 3, 2]])
-    mesh = mesh_read((nodes, elements))
+    mesh = read_mesh((nodes, elements))
     np.testing.assert_array_equal(elements, [[0, 1, 3, 2]])
     nodes[0] = 7
     np.testing.assert_array_equal(mesh.nodes, UNIT)
@@ -111,18 +111,18 @@ def test_left_handed_elements_are_mended_and_named() -> None:
     elements = ELEMENTS.copy()
     wrong = [0, 5, 11]
     elements[wrong] = elements[wrong][:, [1, 0, 2, 3]]
-    mesh = mesh_read((NODES, elements))
+    mesh = read_mesh((NODES, elements))
     np.testing.assert_array_equal(mesh.flipped, wrong)
     _, volumes = element_gradients(mesh.nodes, mesh.elements)
     assert volumes.min() > 0
     np.testing.assert_array_equal(np.sort(mesh.elements, axis=1), np.sort(ELEMENTS, axis=1))
-    np.testing.assert_array_equal(mesh_read(mesh).flipped, wrong)
+    np.testing.assert_array_equal(read_mesh(mesh).flipped, wrong)
 
 
 def test_unused_nodes_are_listed_and_coincident_ones_allowed() -> None:
     """A crack: two elements over the same triangle, with nodes of their own."""
     nodes = np.concatenate([UNIT, UNIT[:3], [[0, 0, -1], [9, 9, 9]]])
-    mesh = mesh_read((nodes, [[0, 1, 2, 3], [4, 6, 5, 7]]))
+    mesh = read_mesh((nodes, [[0, 1, 2, 3], [4, 6, 5, 7]]))
     np.testing.assert_array_equal(mesh.unused, [8])
     assert len(mesh.flipped) == 0
 
@@ -133,7 +133,7 @@ def test_sets_of_skfem() -> None:
         .with_boundaries({"left": lambda x: x[0] == 0})
         .with_subdomains({"low": lambda x: x[2] < 0.5})
     )
-    mesh = mesh_read(source)
+    mesh = read_mesh(source)
     np.testing.assert_array_equal(mesh.node_sets["left"], np.flatnonzero(mesh.nodes[:, 0] == 0))
     middle = mesh.nodes[mesh.elements].mean(axis=1)
     np.testing.assert_array_equal(mesh.element_sets["low"], np.flatnonzero(middle[:, 2] < 0.5))
@@ -152,7 +152,7 @@ def test_sets_of_meshio_over_joined_blocks() -> None:
         cell_data={"gmsh:physical": [np.full(5, 1), np.full(2, 1), np.repeat([0, 9], (3, 40))]},
         field_data={"core": np.array([1, 3]), "skin": np.array([1, 2])},
     )
-    mesh = mesh_read(source)
+    mesh = read_mesh(source)
     assert {k: v.tolist() for k, v in mesh.node_sets.items()} == {
         "probe": [3, 7],
         "face": [1, 3, 4],
@@ -181,7 +181,7 @@ def test_physical_groups_of_a_gmsh_file(tmp_path: Path) -> None:
         for version in (2.2, 4.1):
             gmsh.option.setNumber("Mesh.MshFileVersion", version)
             gmsh.write(str(path))
-            mesh = mesh_read(path)
+            mesh = read_mesh(path)
             assert len(mesh.element_sets["ballast stone"]) == len(mesh.elements)
             bottom = np.flatnonzero(mesh.nodes[:, 0] == 0)  # gmsh's face 1 is x = 0
             np.testing.assert_array_equal(mesh.node_sets["bottom"], bottom)
@@ -318,7 +318,7 @@ def test_whatever_is_damaged_is_read_rightly_or_refused(
 @given(exponent=st.integers(-300, 300))
 def test_no_mesh_is_flat_for_its_unit_of_length(exponent: int) -> None:
     """2^300 m is 1e90 m: the cubes of both ends still have normal floats."""
-    assert len(mesh_read((np.ldexp(NODES, exponent), ELEMENTS)).elements) == 48
+    assert len(read_mesh((np.ldexp(NODES, exponent), ELEMENTS)).elements) == 48
 
 
 @pytest.mark.parametrize(("factor", "sound"), [(4.0, True), (0.25, False)])
@@ -326,7 +326,7 @@ def test_flat_begins_at_the_stated_ratio(factor: float, sound: bool) -> None:
     """The longest edge of the unit element is sqrt(2); with height h its volume is h / 6."""
     nodes = UNIT * [1, 1, factor * FLAT * 6 * np.sqrt(8)]
     if sound:
-        assert len(mesh_read((nodes, [[0, 1, 2, 3]])).flipped) == 0
+        assert len(read_mesh((nodes, [[0, 1, 2, 3]])).flipped) == 0
     else:
         refused((nodes, [[0, 1, 2, 3]]))
 
@@ -346,7 +346,7 @@ def test_files_that_can_not_be_read(tmp_path: Path, capfd: pytest.CaptureFixture
     for path in [tmp_path / "absent.msh", tmp_path, *(tmp_path / name for name in contents)]:
         assert str(path) in refused(path)
         with pytest.raises(MeshError, match=f"^beam, mesh file '{re.escape(str(path))}'"):
-            mesh_read(path, where="beam")
+            read_mesh(path, where="beam")
     assert capfd.readouterr() == ("", "")
 
 
@@ -367,8 +367,8 @@ def test_files_cut_short_are_refused(suffix: str, tmp_path: Path) -> None:
 
 def test_no_mesh_library_is_loaded_for_arrays() -> None:
     program = (
-        "import sys, qdem_fem.mesh, qdem_fem.mesh_generation as g;"
-        "qdem_fem.mesh.mesh_read(g.box_mesh((1, 1, 1), (1, 1, 1)));"
+        "import sys, qdem_fem.mesh.tetrahedra, qdem_fem.mesh.generation as g;"
+        "qdem_fem.mesh.tetrahedra.mesh_read(g.box_mesh((1, 1, 1), (1, 1, 1)));"
         "sys.exit(any(m in sys.modules for m in ('skfem', 'meshio', 'gmsh', 'matplotlib')))"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
@@ -380,9 +380,9 @@ def test_libraries_missing_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     monkeypatch.setitem(sys.modules, "gmsh", None)
     monkeypatch.setitem(sys.modules, "meshio", None)
     with pytest.raises(LibraryMissing, match="pip install gmsh"):
-        gmsh_box((1, 1, 1), 0.5)
+        make_gmsh_box((1, 1, 1), 0.5)
     with pytest.raises(LibraryMissing, match="pip install meshio"):
-        mesh_read(path)
+        read_mesh(path)
 
 
 def test_library_that_meshio_lacks_is_named(
@@ -392,19 +392,19 @@ def test_library_that_meshio_lacks_is_named(
     path.write_bytes(b"?")
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(LibraryMissing, match="pip install h5py"):
-        mesh_read(path)
+        read_mesh(path)
 
 
 def test_generation_refuses_what_makes_no_mesh() -> None:
     for make in (
-        lambda: box_mesh((1, 0, 1), (1, 1, 1)),
-        lambda: box_mesh((1, 1, 1), (1, 0, 1)),
-        lambda: box_mesh((1, 1, 1), (1, 1, 1), "six"),  # type: ignore[arg-type]
-        lambda: ring_mesh(2, 1, 1, (1, 8, 1)),
-        lambda: ring_mesh(1, 2, 1, (1, 2, 1)),
+        lambda: make_box_mesh((1, 0, 1), (1, 1, 1)),
+        lambda: make_box_mesh((1, 1, 1), (1, 0, 1)),
+        lambda: make_box_mesh((1, 1, 1), (1, 1, 1), "six"),  # type: ignore[arg-type]
+        lambda: make_ring_mesh(2, 1, 1, (1, 8, 1)),
+        lambda: make_ring_mesh(1, 2, 1, (1, 2, 1)),
         lambda: jitter(BOX, -0.1, 0),
         lambda: jitter(BOX, 40.0, 0),
-        lambda: gmsh_box((1, 1, 1), -1),
+        lambda: make_gmsh_box((1, 1, 1), -1),
     ):
         with pytest.raises(MeshError):
             make()

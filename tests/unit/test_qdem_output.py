@@ -13,29 +13,29 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.errors import DiskFull, UsageError
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.output import Table, bodies_vtu_write, pvd_write, table_read, vtu_write
-from qdem_fem.pictures import picture_energy, picture_history, picture_spectrum, unit_of
-from qdem_fem.pictures_bodies import (
+from qdem_fem.files.errors import DiskFull, UsageError
+from qdem_fem.files.output import Table, table_read, write_bodies_vtu, write_pvd, write_vtu
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.mesh.surface import find_surface_faces
+from qdem_fem.report.deformed import (
+    draw_deformed,
     feature_edges,
     magnification_round,
     nodal_average,
-    picture_deformed,
     view_frame,
 )
-from qdem_fem.surface import surface_faces
+from qdem_fem.report.figures import draw_energy, draw_spectrum, picture_history, unit_of
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
 def body(shift: float = 0.0) -> Any:
     """What output asks of a `qdem_fem.Body`."""
-    mesh = box_mesh((2.0, 1.0, 1.0), (4, 2, 2), origin=(shift, 0, 0))
+    mesh = make_box_mesh((2.0, 1.0, 1.0), (4, 2, 2), origin=(shift, 0, 0))
     x = mesh.nodes
     stress = mesh.nodes[mesh.elements].mean(axis=1)[:, 0] * 1e5
     return SimpleNamespace(
-        nodes=x, elements=mesh.elements, surface=surface_faces(mesh.elements),
+        nodes=x, elements=mesh.elements, surface=find_surface_faces(mesh.elements),
         displacement=1e-4 * x[:, [1, 2, 0]], velocity=x**2, von_mises=lambda: stress,
         _simulation=None,
     )  # fmt: skip
@@ -44,7 +44,7 @@ def body(shift: float = 0.0) -> Any:
 def test_vtu_is_read_back_by_meshio(tmp_path: Path) -> None:
     """Two bodies in one file: coordinates, elements and every field, bit by bit."""
     bodies = [body(), body(5.0)]
-    bodies_vtu_write(tmp_path / "a.vtu", bodies)
+    write_bodies_vtu(tmp_path / "a.vtu", bodies)
     mesh = meshio.read(tmp_path / "a.vtu")
     count = len(bodies[0].nodes)
     assert (mesh.points == np.concatenate([one.nodes for one in bodies])).all()
@@ -63,7 +63,7 @@ def test_fields_of_any_type_and_name(tmp_path: Path, kind: Any) -> None:
     """Single precision, integers and foreign byte order survive, and so does a strange name."""
     one = body()
     field = np.arange(len(one.nodes)).astype(kind)
-    vtu_write(tmp_path / "a.vtu", one.nodes, one.elements, {'<"&>': field}, {})
+    write_vtu(tmp_path / "a.vtu", one.nodes, one.elements, {'<"&>': field}, {})
     assert (meshio.read(tmp_path / "a.vtu").point_data['<"&>'] == field).all()
 
 
@@ -71,13 +71,13 @@ def test_field_of_another_length_is_refused(tmp_path: Path) -> None:
     """A field must have a row for each node or element; nothing is written else."""
     one = body()
     with pytest.raises(UsageError, match="'wrong' has 3 rows, not 96"):
-        vtu_write(tmp_path / "a.vtu", one.nodes, one.elements, {}, {"wrong": np.zeros(3)})
+        write_vtu(tmp_path / "a.vtu", one.nodes, one.elements, {}, {"wrong": np.zeros(3)})
     assert not list(tmp_path.iterdir())
 
 
 def test_pvd_names_times_and_files(tmp_path: Path) -> None:
     """The series is XML that gives each file its time to the last bit."""
-    pvd_write(tmp_path / "f.pvd", [(0.0, "a.vtu"), (np.float64(0.1 + 0.2), "b&.vtu")])
+    write_pvd(tmp_path / "f.pvd", [(0.0, "a.vtu"), (np.float64(0.1 + 0.2), "b&.vtu")])
     found = ElementTree.parse(tmp_path / "f.pvd").getroot().iter("DataSet")
     assert [(float(one.attrib["timestep"]), one.attrib["file"]) for one in found] == [
         (0.0, "a.vtu"),
@@ -196,10 +196,10 @@ def test_pictures_are_written_and_repeat(tmp_path: Path) -> None:
     energy = {name: time**2 for name in ("time", "kinetic", "elastic", "external")}
     drawn: list[dict[str, bytes]] = []
     for _ in range(2):
-        picture_deformed(tmp_path / "a.png", [body(), body(5.0)])
+        draw_deformed(tmp_path / "a.png", [body(), body(5.0)])
         picture_history(tmp_path / "b.png", curve, rivals={"FEM": curve["tip_z"]})
-        picture_spectrum(tmp_path / "c.png", curve)
-        picture_energy(tmp_path / "d.png", energy)
+        draw_spectrum(tmp_path / "c.png", curve)
+        draw_energy(tmp_path / "d.png", energy)
         now = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
         assert sorted(now) == ["a.png", "b.png", "c.png", "d.png"]
         assert all(content.startswith(b"\x89PNG") for content in now.values())
@@ -213,7 +213,7 @@ def test_a_tall_body_is_not_drawn_beside_an_empty_half(tmp_path: Path) -> None:
     tall.nodes = tall.nodes * [0.05, 0.1, 1.0]
     widths = []
     for name, one in (("tall", tall), ("beam", body())):
-        picture_deformed(tmp_path / f"{name}.png", [one], magnification=1.0)
+        draw_deformed(tmp_path / f"{name}.png", [one], magnification=1.0)
         widths.append(int.from_bytes((tmp_path / f"{name}.png").read_bytes()[16:20], "big"))
     assert widths[0] < 0.5 * widths[1]
 
@@ -223,20 +223,20 @@ def test_motionless_body_is_drawn(tmp_path: Path) -> None:
     one = body()
     one.displacement = np.zeros_like(one.nodes)
     one.von_mises = lambda: np.zeros(len(one.elements))
-    assert picture_deformed(tmp_path / "a.png", [one]) == 1.0
+    assert draw_deformed(tmp_path / "a.png", [one]) == 1.0
 
 
 def test_video_holds_every_picture_at_its_scale(tmp_path: Path) -> None:
     """Pictures of two sizes: as many frames of the larger one, the rest white, 0.1 s each."""
     from PIL import Image
 
-    from qdem_fem.pictures_video import video_write
+    from qdem_fem.report.video import write_video
 
     sizes = [(40, 30), (60, 30), (60, 50)]
     paths = [tmp_path / f"{number}.png" for number in range(3)]
     for path, size in zip(paths, sizes, strict=True):
         Image.new("RGB", size, (0, 0, 200)).save(path)
-    video_write(tmp_path / "video.gif", paths, 10.0)
+    write_video(tmp_path / "video.gif", paths, 10.0)
     with Image.open(tmp_path / "video.gif") as video:
         assert video.size == (60, 50)
         assert video.n_frames == 3

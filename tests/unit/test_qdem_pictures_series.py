@@ -14,13 +14,13 @@ import pytest
 from matplotlib import colormaps, image
 
 import qdem_fem as q
-from qdem_fem import pictures_series
 from qdem_fem.cli import Progress
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.output import bodies_vtu_write
-from qdem_fem.periodic import PeriodicWidth
-from qdem_fem.pictures_series import Shown, inside, picture_beside, series_draw
-from qdem_fem.surface import surface_faces
+from qdem_fem.contact.search.periodic import PeriodicWidth
+from qdem_fem.files.output import write_bodies_vtu
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.mesh.surface import find_surface_faces
+from qdem_fem.report import series as pictures_series
+from qdem_fem.report.series import Shown, inside, place_picture_beside, series_draw
 from trackbed.command import main
 
 pytestmark = pytest.mark.lowest
@@ -56,9 +56,9 @@ STILL = SimpleNamespace(contacts=None)
 
 def block(stress: float, moved: float = 0.0) -> Any:
     """A cube of 1 m of one stress [Pa], shifted along x."""
-    mesh = box_mesh((1.0, 1.0, 1.0), (2, 2, 2))
+    mesh = make_box_mesh((1.0, 1.0, 1.0), (2, 2, 2))
     return SimpleNamespace(
-        nodes=mesh.nodes, elements=mesh.elements, surface=surface_faces(mesh.elements),
+        nodes=mesh.nodes, elements=mesh.elements, surface=find_surface_faces(mesh.elements),
         displacement=np.tile([moved, 0.0, 0.0], (len(mesh.nodes), 1)),
         velocity=np.zeros_like(mesh.nodes), _simulation=None,
         von_mises=lambda: np.full(len(mesh.elements), stress),
@@ -81,9 +81,9 @@ def test_colours_of_a_series_are_shares_of_its_greatest_stress(tmp_path: Path) -
     stresses = [1.0, 2e6, 4e6]
     files = [(0.1 * n, tmp_path / f"fields_{n}.vtu") for n in range(3)]
     for stress, (_, path) in zip(stresses, files, strict=True):
-        bodies_vtu_write(path, [block(stress)])
+        write_bodies_vtu(path, [block(stress)])
     pictures = series_draw(STILL, [block(0.0)], files, 1.0)
-    assert pictures == [picture_beside(path) for _, path in files]
+    assert pictures == [place_picture_beside(path) for _, path in files]
     for stress, picture in zip(stresses, pictures, strict=True):
         expected = np.array(colormaps["viridis"](stress / 4e6)[:3])
         assert hue(picture) == pytest.approx(expected / np.linalg.norm(expected), abs=0.01)
@@ -93,7 +93,7 @@ def test_a_series_has_one_frame(tmp_path: Path) -> None:
     """A body that moves far leaves another where it stands; pictures have one size."""
     files = [(0.1 * n, tmp_path / f"fields_{n}.vtu") for n in range(2)]
     for moved, (_, path) in zip((0.0, 4.0), files, strict=True):
-        bodies_vtu_write(path, [block(4.0, moved), block(1.0)])
+        write_bodies_vtu(path, [block(4.0, moved), block(1.0)])
     first, last = (image.imread(p) for p in series_draw(STILL, 2 * [block(0.0)], files, 1.0))
     assert first.shape == last.shape
     seen = [
@@ -123,21 +123,23 @@ def test_pictures_of_an_interrupted_run_are_those_of_a_whole_one(
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE, encoding="utf-8")
     words = ["qdem", str(scene), "--no-pictures", "--set", "output.checkpoint_interval=0.0"]
-    drawn, draw = [], pictures_series.picture_deformed
+    drawn, draw = [], pictures_series.draw_deformed
 
     def note(*given: Any, **named: Any) -> None:
         drawn.append(len(named["bearing"].nodes))
         draw(*given, **named)
 
     with monkeypatch.context() as noted:
-        noted.setattr(pictures_series, "picture_deformed", note)
+        noted.setattr(pictures_series, "draw_deformed", note)
         assert main([*words, "--run-folder", str(tmp_path / "whole")]) == 0
     at, stopped = Progress.at, []
 
     def stop(self: Progress, steps: int, total: int, when: float) -> None:
         at(self, steps, total, when)
         if 2 * steps >= total and not stopped:
-            stopped.append(picture_beside(tmp_path / "parts" / "fields_000000.vtu").read_bytes())
+            stopped.append(
+                place_picture_beside(tmp_path / "parts" / "fields_000000.vtu").read_bytes()
+            )
             os.kill(os.getpid(), signal.SIGTERM)
 
     monkeypatch.setattr(Progress, "at", stop)
@@ -168,9 +170,9 @@ def test_bodies_that_left_a_periodic_width_are_drawn_as_their_images() -> None:
     size = np.array([0.1, 0.1, 0.1])
     bodies = []
     for place, move in ((0.0, 0.0), (0.3, 0.1), (-0.4, 0.0), (0.2, 0.4), (-0.7, -1.0)):
-        mesh = box_mesh(tuple(size), (1, 1, 1), origin=tuple([3.0, place, 5.0] - size / 2))
+        mesh = make_box_mesh(tuple(size), (1, 1, 1), origin=tuple([3.0, place, 5.0] - size / 2))
         moved = np.tile([0.0, move, 0.0], (8, 1))
-        faces = surface_faces(mesh.elements)
+        faces = find_surface_faces(mesh.elements)
         bodies.append(Shown(mesh.nodes, mesh.elements, faces, moved, np.zeros(len(mesh.elements))))
     found = inside(bodies, PeriodicWidth("y", 1.0))
     places = [(body.nodes + body.displacement).mean(axis=0) for body in found]
@@ -184,18 +186,18 @@ def test_bodies_that_left_a_periodic_width_are_drawn_as_their_images() -> None:
 def test_a_file_that_is_gone_is_told_and_the_others_are_drawn(tmp_path: Path, torn: bool) -> None:
     if torn:
         (tmp_path / "fields_0.vtu").write_text("torn")
-    bodies_vtu_write(tmp_path / "fields_1.vtu", [block(1.0)])
+    write_bodies_vtu(tmp_path / "fields_1.vtu", [block(1.0)])
     files = [(float(i), tmp_path / f"fields_{i}.vtu") for i in (0, 1)]
     with pytest.warns(UserWarning, match=r"fields_0\.vtu, of which a picture is drawn"):
-        assert series_draw(STILL, [block(0.0)], files, 1.0) == [picture_beside(files[1][1])]
+        assert series_draw(STILL, [block(0.0)], files, 1.0) == [place_picture_beside(files[1][1])]
     with pytest.warns(UserWarning, match=r"it gets none"):
         assert series_draw(STILL, [block(0.0)], files[:1], 1.0) == []
 
 
 def test_a_series_without_any_stress_is_drawn(tmp_path: Path) -> None:
     """A rigid body has none."""
-    mesh = box_mesh((1.0, 1.0, 1.0), (1, 1, 1))
+    mesh = make_box_mesh((1.0, 1.0, 1.0), (1, 1, 1))
     body = q.Body(mesh, q.Material(1e6, 0.2, 1000.0), rigid=True)
-    bodies_vtu_write(tmp_path / "fields_0.vtu", [body])
+    write_bodies_vtu(tmp_path / "fields_0.vtu", [body])
     (picture,) = series_draw(STILL, [body], [(0.0, tmp_path / "fields_0.vtu")], 1.0)
     assert picture.read_bytes().startswith(b"\x89PNG")

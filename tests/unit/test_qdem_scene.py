@@ -17,13 +17,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.errors import LibraryMissing, QdemError, SceneError
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.scene import Scene
-from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.scene_prepared import Prepared
-from qdem_fem.scene_series import TimeSeries
+from qdem_fem.files.errors import LibraryMissing, QdemError, SceneError
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.tables.keys import Scene
+from qdem_fem.tables.prepared import Prepared
+from qdem_fem.tables.series import TimeSeries
 
 pytestmark = pytest.mark.lowest
 
@@ -60,7 +60,7 @@ def write(folder: Path, text: str) -> Path:
 
 
 def load(folder: Path, text: str, *overrides: str) -> Prepared:
-    return scene_load(write(folder, text), overrides)
+    return load_scene(write(folder, text), overrides)
 
 
 def refusal(folder: Path, text: str, *overrides: str) -> str:
@@ -76,7 +76,7 @@ def refusal(folder: Path, text: str, *overrides: str) -> str:
 def test_shipped_scenes_are_the_papers_beam() -> None:
     """Both scenes hold the beam of section 3.1: 2.4 x 0.25 x 0.22 m of concrete, tip at its end."""
     for name in ("cantilever", "cantilever-vibration"):
-        prepared = scene_load(SCENES / f"{name}.toml")
+        prepared = load_scene(SCENES / f"{name}.toml")
         material = prepared.scene.body[0].material
         assert (material.young, material.poisson, material.density) == (45e9, 0.167, 2350)
         nodes = prepared.meshes["beam"].nodes
@@ -165,7 +165,7 @@ def test_series_are_read(tmp_path: Path, force: str, times: Any, values: Any) ->
 
 def test_regions_change_the_material_of_their_elements(tmp_path: Path) -> None:
     """Keys of a region hold in its elements and nowhere else; the mesh file counts beside it."""
-    mesh = box_mesh((2, 1, 1), (4, 2, 2))
+    mesh = make_box_mesh((2, 1, 1), (4, 2, 2))
     sets = {"core": [np.arange(10)], "rim": [np.arange(80, 96)]}
     meshio.Mesh(mesh.nodes, {"tetra": mesh.elements}, cell_sets=sets).write(tmp_path / "beam.inp")
     text = BASE.replace(
@@ -371,7 +371,7 @@ def loads_or_refuses(path: Path) -> bool:
     Damage may take the # from `device = "cuda"`: a sound scene, for another machine.
     """
     try:
-        simulation_of(scene_load(path))
+        simulation_of(load_scene(path))
     except LibraryMissing:
         return True
     except QdemError as error:

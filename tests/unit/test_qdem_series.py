@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import qdem_fem as q
-from qdem_fem.errors import ConditionError
-from qdem_fem.series import Driver, is_real
+from qdem_fem.files.errors import ConditionError
+from qdem_fem.files.series import Driver, is_real
 
 numbers = st.floats(-1e6, 1e6)
 

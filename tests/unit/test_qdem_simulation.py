@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
-from qdem_fem import simulation
-from qdem_fem.assembly import Assembly
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.output import bodies_vtu_write
+from qdem_fem.bodies.assembly import Assembly
+from qdem_fem.files.output import write_bodies_vtu
+from qdem_fem.march import simulation
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem.meshes import delaunay_mesh
 
 YOUNG, POISSON, DENSITY = 1e6, 0.25, 1000.0
@@ -28,7 +28,7 @@ def stone(count: int = 60, seed: int = 1, **material: Any) -> q.Body:
 
 
 def beam() -> q.Body:
-    return q.Body(box_mesh((1.0, 0.5, 0.5), (4, 2, 2)), q.Material(YOUNG, POISSON, DENSITY))
+    return q.Body(make_box_mesh((1.0, 0.5, 0.5), (4, 2, 2)), q.Material(YOUNG, POISSON, DENSITY))
 
 
 def alone(body: q.Body, **options: Any) -> q.Simulation:
@@ -381,9 +381,9 @@ def test_many_bodies_are_set_and_written_in_one_go(
         body.velocity = random_field(body, 1e-3)
     run.advance(2 * run.step)
     asked = []
-    now = simulation.velocity_now
-    monkeypatch.setattr(simulation, "velocity_now", lambda run: asked.append(1) or now(run))
-    bodies_vtu_write(tmp_path / "a.vtu", bodies)
+    now = simulation.find_velocity
+    monkeypatch.setattr(simulation, "find_velocity", lambda run: asked.append(1) or now(run))
+    write_bodies_vtu(tmp_path / "a.vtu", bodies)
     assert len(asked) == 1
     read = meshio.read(tmp_path / "a.vtu").point_data["velocity"]
     assert (read == np.concatenate([body.velocity for body in bodies])).all()

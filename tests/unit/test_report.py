@@ -17,15 +17,15 @@ import numpy as np
 import pytest
 
 from adapters.errors import UsageError
-from adapters.procedure import run_scene
-from adapters.progress import Progress
-from adapters.report import report_write
-from adapters.report_model import left_out
-from adapters.report_spheres import extent_of, spheres_draw, view
-from adapters.run_folder import RunFolder
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.status import status
+from adapters.files.run_folder import RunFolder
+from adapters.procedure.progress import Progress
+from adapters.procedure.run import run_scene
+from adapters.procedure.status import status
+from adapters.report.page import write_report
+from adapters.report.spheres import draw_spheres, extent_of, view
+from adapters.scene.file import load_scene
+from adapters.scene.model import left_out
+from adapters.scene.tables import Scene
 from trackbed.report.page import number, per_cent, plain
 from trackbed.scenes import scene_path
 
@@ -54,7 +54,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
         overrides=SMALL,
         progress=Progress(quiet=True),
     )
-    report_write(folder)
+    write_report(folder)
     return folder
 
 
@@ -74,7 +74,7 @@ def report_of(folder: Path) -> tuple[dict[str, Any], str]:
 
 def written(folder: Path) -> tuple[dict[str, Any], str]:
     """Write the report of ``folder``; its numbers and page."""
-    assert report_write(folder) == folder / "report.html"
+    assert write_report(folder) == folder / "report.html"
     return report_of(folder)
 
 
@@ -221,7 +221,7 @@ def test_report_changes_nothing_else_and_repeats_itself(finished: Path, copy: Pa
         return {path.relative_to(folder): path.read_bytes() for path in found}
 
     before = files(copy)
-    report_write(copy)
+    write_report(copy)
     after = files(copy)
     assert {path.parts[0] for path in after.keys() - before.keys()} == {
         "report.html", "report.json", "figures",
@@ -235,7 +235,7 @@ def remove(folder: Path, *patterns: str) -> None:
     for pattern in patterns:
         for path in folder.glob(pattern):
             shutil.rmtree(path)
-    RunFolder(folder).settlement_write()
+    RunFolder(folder).write_settlement()
 
 
 def without_control(folder: Path) -> None:
@@ -273,7 +273,7 @@ def no_jumps(folder: Path) -> None:
         path.rename(folder / path.name)
     (folder / "control" / "preparation").rename(folder / "preparation")
     shutil.rmtree(folder / "control")
-    RunFolder(folder).settlement_write()
+    RunFolder(folder).write_settlement()
 
 
 @pytest.mark.parametrize(
@@ -365,7 +365,7 @@ def test_no_run_folder(content: str | None, tmp_path: Path) -> None:
     if content is not None:
         (tmp_path / "manifest.json").write_text(content)
     there = sorted(tmp_path.iterdir())
-    for verb in (report_write, status):
+    for verb in (write_report, status):
         with pytest.raises(UsageError, match="run folder"):
             verb(tmp_path)
     assert sorted(tmp_path.iterdir()) == there
@@ -391,9 +391,9 @@ def test_status(copy: Path) -> None:
 def test_plotting_library_is_loaded_only_to_draw() -> None:
     """Importing the report's modules loads no matplotlib, and the status no numba."""
     code = (
-        "import sys, adapters.status\n"
+        "import sys, adapters.procedure.status\n"
         "assert 'numba' not in sys.modules\n"
-        "import adapters.report, adapters.report_figures\n"
+        "import adapters.report.page, adapters.report.figures\n"
         "assert 'matplotlib' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
@@ -423,7 +423,7 @@ def test_powers_and_shares_are_typeset() -> None:
 
 def coarse(*overrides: str) -> Scene:
     """The coarse scene, changed."""
-    return scene_load(scene_path("karrech-coarse"), overrides)
+    return load_scene(scene_path("karrech-coarse"), overrides)
 
 
 def test_what_is_left_out_follows_from_the_scene() -> None:
@@ -453,7 +453,7 @@ def test_spheres_cover_their_disc_and_hide_each_other() -> None:
     """A sphere covers pi r^2 of the picture; of two in line the nearer one is seen."""
     red, blue = np.array([[1.0, 0, 0]]), np.array([[0, 0, 1.0]])
     origin, radius = np.zeros((1, 3)), np.array([0.5])
-    alone = spheres_draw(origin, radius, red, (-1, 1, -1, 1), 200)
+    alone = draw_spheres(origin, radius, red, (-1, 1, -1, 1), 200)
     # The rim crosses about 2 pi r / pixel pixels, each of which may fall either way.
     assert (alone < 1).any(axis=2).mean() * 4 == pytest.approx(pi / 4, abs=2 * pi * 0.5 * 0.01)
     towards = 3 * view(np.eye(3))[:, 2]
@@ -461,7 +461,7 @@ def test_spheres_cover_their_disc_and_hide_each_other() -> None:
     assert np.allclose(view(both)[1], [0, 0, 3], atol=1e-12)
     for order in ([0, 1], [1, 0]):
         colour = np.vstack([red, blue])[order]
-        image = spheres_draw(both[order], np.repeat(radius, 2), colour, (-1, 1, -1, 1), 100)
+        image = draw_spheres(both[order], np.repeat(radius, 2), colour, (-1, 1, -1, 1), 100)
         centre = image[50, 50]
         assert centre[2] > 0.3
         assert centre[0] == 0

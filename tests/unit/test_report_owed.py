@@ -9,11 +9,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from adapters import report_bed
-from adapters.report_bed import changed_places, hung, owed
-from adapters.report_record import Record
-from adapters.run_folder import Outcome
-from adapters.scene_file import scene_load
+from adapters.files.run_folder import Outcome
+from adapters.procedure.record import Record
+from adapters.report import bed as report_bed
+from adapters.report.bed import hung, owed, tell_changed_places
+from adapters.scene.file import load_scene
 from trackbed.scenes import scene_path
 
 
@@ -42,8 +42,8 @@ def test_grains_that_changed_places_are_told() -> None:
         {"asked": asked, "gain": gain, "relaxation": {"hops": 7}}
         for asked, gain in ((7e-5, 8e-5), (3e-5, 1e-5))
     ]
-    assert changed_places(record()) == changed_places(record(other, other)) == ""
-    found = changed_places(record(other, *changed))
+    assert tell_changed_places(record()) == tell_changed_places(record(other, other)) == ""
+    found = tell_changed_places(record(other, *changed))
     assert "In 2 of 3 jumps" in found
     assert ">90.0</data> µm in all" in found
 
@@ -62,10 +62,10 @@ def test_a_piston_that_hung_is_told(
 ) -> None:
     """In which cycles, and how many jumps were made then or in the k_i = 10 cycles behind; nothing
     where it did not hang, or there is no load."""
-    scene = scene_load(scene_path("karrech-coarse"), ["procedure.k_i=10"])
+    scene = load_scene(scene_path("karrech-coarse"), ["procedure.k_i=10"])
     made = [("jump", Outcome("jump", first, first + 5, [], {})) for first in jumps]
     run = SimpleNamespace(outcomes=[], jumps=made)
-    monkeypatch.setattr(report_bed, "cycles_hung", lambda *_: np.array(cycles, int))
+    monkeypatch.setattr(report_bed, "find_hung_cycles", lambda *_: np.array(cycles, int))
     found = hung(cast(Record, SimpleNamespace(scene=scene, run=run)))
     assert re.search(told, found, re.DOTALL)
     assert bool(found) == bool(cycles)

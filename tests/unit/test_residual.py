@@ -7,10 +7,10 @@ from math import exp
 import numpy as np
 import pytest
 
-from adapters import residual
+from adapters.bed.state import FloatArray
 from adapters.errors import UsageError
-from adapters.laws import law_named
-from adapters.state import FloatArray
+from adapters.laws import get_law
+from adapters.laws.fit import residual
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def position() -> FloatArray:
 def test_error_terms_have_zero_mean(name: str, position: FloatArray) -> None:
     """Eq. 12 takes xi as of zero mean: so it is for a law with a constant, grain by grain."""
     displacement = (position - position[0])[1:]
-    term = residual.error_term(law_named(name), np.arange(11.0, 41.0), displacement)
+    term = residual.fit_error_term(get_law(name), np.arange(11.0, 41.0), displacement)
     assert term.shape == (30, 5, 3)
     assert np.abs(term.mean(axis=0)).max() < 1e-12 * np.abs(displacement).max()
     assert np.abs(term).max() > 1e-3 * np.abs(displacement).max()
@@ -34,19 +34,19 @@ def test_relative_errors_tell_displacements_from_coordinates() -> None:
     """Eq. 22 on a jump that is missed whole: 1 of the displacement, 1e-3 of the coordinates."""
     start = np.array([[0.0, 0.0, 1.0]])
     computed = start - [0.0, 0.0, 1e-3]
-    assert residual.error_of_displacement(start, computed, start) == pytest.approx(1.0)
-    assert residual.error_of_coordinates(computed, start) == pytest.approx(1e-3, rel=2e-3)
-    assert residual.error_of_displacement(start, computed, computed) == 0.0
+    assert residual.measure_displacement_error(start, computed, start) == pytest.approx(1.0)
+    assert residual.measure_coordinates_error(computed, start) == pytest.approx(1e-3, rel=2e-3)
+    assert residual.measure_displacement_error(start, computed, computed) == 0.0
     half = start - [0.0, 0.0, 0.5e-3]
-    assert residual.error_of_displacement(start, computed, half) == pytest.approx(0.5)
+    assert residual.measure_displacement_error(start, computed, half) == pytest.approx(0.5)
     with pytest.raises(UsageError, match="nothing moved"):
-        residual.error_of_displacement(start, start, computed)
+        residual.measure_displacement_error(start, start, computed)
 
 
 def test_chernoff_bound_is_eq_15() -> None:
     """k from eq. 15 by hand, and with it 2 exp(-2 k eps^2 / (b - a)^2) falls to p, not before."""
     low, high, error, probability = -3e-6, 2e-6, 1e-6, 0.1
-    cycles = residual.cycles_for_error(low, high, error, probability)
+    cycles = residual.bound_cycles_for_error(low, high, error, probability)
     assert cycles == 38  # 25 / 2 ln 20 = 37.4...
 
     def chance(k: int) -> float:
@@ -57,14 +57,14 @@ def test_chernoff_bound_is_eq_15() -> None:
 
 def test_chernoff_bound_holds_for_independent_terms() -> None:
     """2,000 samples of k fair coins: the mean leaves [-eps, eps] no oftener than p."""
-    k = residual.cycles_for_error(-1.0, 1.0, 0.25, 0.2)
+    k = residual.bound_cycles_for_error(-1.0, 1.0, 0.25, 0.2)
     means = np.random.default_rng(1).choice([-1.0, 1.0], (2000, k)).mean(axis=1)
     assert np.mean(np.abs(means) >= 0.25) <= 0.2
 
 
 def test_chernoff_bound_fails_for_correlated_terms() -> None:
     """What the docstring warns of: terms that repeat 20 times break the bound."""
-    k = residual.cycles_for_error(-1.0, 1.0, 0.25, 0.2)
+    k = residual.bound_cycles_for_error(-1.0, 1.0, 0.25, 0.2)
     blocks = np.random.default_rng(1).choice([-1.0, 1.0], (2000, -(-k // 20)))
     means = np.repeat(blocks, 20, axis=1)[:, :k].mean(axis=1)
     assert np.mean(np.abs(means) >= 0.25) > 0.4
@@ -79,9 +79,9 @@ def test_chernoff_bound_fails_for_correlated_terms() -> None:
 def test_bound_refuses_what_it_has_no_answer_for(arguments: tuple[float, ...]) -> None:
     """Levels, probabilities and intervals out of range are refused with a sentence."""
     with pytest.raises(UsageError):
-        residual.cycles_for_error(*arguments)
+        residual.bound_cycles_for_error(*arguments)
 
 
 def test_bound_of_a_perfect_law_is_one_cycle() -> None:
     """No residual at all needs one cycle."""
-    assert residual.cycles_for_error(0.0, 0.0, 1e-6, 0.1) == 1
+    assert residual.bound_cycles_for_error(0.0, 0.0, 1e-6, 0.1) == 1

@@ -9,18 +9,18 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.body_matrix import (
+from rigid_lcp.sparse.body_matrix import (
     add_contacts,
-    bodies_pushed,
     body_pairs,
     contact_stiffness,
     dense_delassus,
     diagonal_blocks,
-    force_left,
-    jacobian_blocks,
     multiply_blocks,
+    push_bodies,
+    split_jacobian,
+    subtract_motion,
 )
-from rigid_lcp.elimination_order import (
+from rigid_lcp.sparse.elimination_order import (
     FEW_BLOCKS,
     MUCH_FLOPS,
     elimination_flops,
@@ -28,7 +28,12 @@ from rigid_lcp.elimination_order import (
     minimum_degree,
     symmetric_pattern,
 )
-from rigid_lcp.sparse_products import columns_product, factors_product, row_forms, rows_product
+from rigid_lcp.sparse.products import (
+    find_row_forms,
+    multiply_csr,
+    multiply_factors,
+    multiply_transposed,
+)
 
 BODIES, CONTACTS = 7, 12
 Floats = NDArray[np.float64]
@@ -57,12 +62,12 @@ def test_products_are_those_of_the_matrices(dim):
     g = np.random.default_rng(1)
     r, v = g.standard_normal(jacobian.shape[0]), g.standard_normal(jacobian.shape[1])
     w = (jacobian @ inverse @ jacobian.T).toarray()
-    np.testing.assert_allclose(rows_product(*arrays(jacobian), v), jacobian @ v, atol=1e-13)
-    found = columns_product(*arrays(jacobian), len(v), r)
+    np.testing.assert_allclose(multiply_csr(*arrays(jacobian), v), jacobian @ v, atol=1e-13)
+    found = multiply_transposed(*arrays(jacobian), len(v), r)
     np.testing.assert_allclose(found, jacobian.T @ r, atol=1e-13)
     both = (*arrays(jacobian), *arrays(inverse))
-    np.testing.assert_allclose(factors_product(*both, r), w @ r, atol=1e-11)
-    np.testing.assert_allclose(row_forms(*both, len(v)), np.diag(w), atol=1e-12)
+    np.testing.assert_allclose(multiply_factors(*both, r), w @ r, atol=1e-11)
+    np.testing.assert_allclose(find_row_forms(*both, len(v)), np.diag(w), atol=1e-12)
     np.testing.assert_allclose(dense_delassus(*both), w, atol=1e-12)
 
 
@@ -72,9 +77,9 @@ def test_diagonals_of_w_with_masses_alone_and_columns_given_twice():
     inverse = sp.csr_array(sp.diags_array(np.random.default_rng(5).uniform(1, 3, 3 * BODIES)))
     both = (*arrays(jacobian), *arrays(inverse))
     expected = np.diag((jacobian @ inverse @ jacobian.T).toarray())
-    np.testing.assert_allclose(row_forms(*both, 3 * BODIES), expected, rtol=1e-13)
+    np.testing.assert_allclose(find_row_forms(*both, 3 * BODIES), expected, rtol=1e-13)
     value, index, start = np.array([1.0, 2.0, -4.0]), np.array([1, 1, 0]), np.array([0, 3])
-    twice = row_forms(start, index, value, *arrays(inverse), 3 * BODIES)
+    twice = find_row_forms(start, index, value, *arrays(inverse), 3 * BODIES)
     first, second = inverse.diagonal()[:2]
     np.testing.assert_allclose(twice, [9.0 * second + 16.0 * first], rtol=1e-14)
 
@@ -84,7 +89,7 @@ def test_blocks_of_the_jacobian_assemble_the_matrix_of_bodies(dim):
     """``J^T K J`` block by block, and the way there and back, ``J^T r`` and ``r - K J v``."""
     jacobian, inverse = random_bodies(dim)
     size, g = 3 * dim - 3, np.random.default_rng(2)
-    first, body, block = jacobian_blocks(*arrays(jacobian), dim, size)
+    first, body, block = split_jacobian(*arrays(jacobian), dim, size)
     again = np.zeros(jacobian.shape)
     for c in range(CONTACTS):
         for k in range(first[c], first[c + 1]):
@@ -101,9 +106,9 @@ def test_blocks_of_the_jacobian_assemble_the_matrix_of_bodies(dim):
     expected = jacobian.T @ full @ jacobian.toarray()
     np.testing.assert_allclose(whole.reshape(expected.shape), expected, atol=1e-12)
     r, v = g.standard_normal((CONTACTS, dim)), g.standard_normal(BODIES * size)
-    pushed = bodies_pushed(first, body, block, BODIES, r)
+    pushed = push_bodies(first, body, block, BODIES, r)
     np.testing.assert_allclose(pushed, jacobian.T @ r.ravel(), atol=1e-13)
-    left = force_left(first, body, block, stiffness, r, v)
+    left = subtract_motion(first, body, block, stiffness, r, v)
     np.testing.assert_allclose(left, r.ravel() - full @ (jacobian @ v), atol=1e-12)
     np.testing.assert_array_equal(
         diagonal_blocks(*arrays(inverse), size)[3],

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_lcp.run_folder import RunFolder, frame_read
+from rigid_lcp.scene.run_folder import RunFolder, read_frame
 from tests.rigid_runs import SLIDING_BLOCK
 from trackbed import command
 
@@ -42,13 +42,13 @@ def test_a_run_ends_where_friction_stops_the_block(
 def test_a_run_goes_on_from_its_last_sound_frame_to_the_same_end(scene: Path) -> None:
     assert command.main(["rigid", str(scene), "--no-pictures"]) == 0
     folder = RunFolder(scene.with_name("slide-run"))
-    last = frame_read(folder.frames()[-1])
+    last = read_frame(folder.frames()[-1])
     (folder.path / "result.json").unlink()
     (folder.path / "frame_000003.npz").unlink()
     (folder.path / "frame_000002.npz").write_bytes(b"PK cut short")
     assert command.main(["rigid", str(scene), "--no-pictures"]) == 2
     assert command.main(["rigid", str(scene), "--no-pictures", "--resume"]) == 0
-    again = frame_read(folder.frames()[-1])
+    again = read_frame(folder.frames()[-1])
     np.testing.assert_array_equal(again["motion"].position, last["motion"].position)
     np.testing.assert_array_equal(again["motion"].rates, last["motion"].rates)
 

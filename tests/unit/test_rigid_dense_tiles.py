@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.dense_tiles import DEPTH, divide_rows, subtract_product
+from rigid_lcp.sparse.dense_tiles import DEPTH, divide_rows, subtract_product
 
 ROUND_OFF = np.finfo(float).eps
 

@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.contacts import Contacts, contact_rows
-from rigid_lcp.detection_2d import detect_2d, shapes_2d, widest_face
-from rigid_lcp.disc import Disc
+from rigid_lcp.contact.arrays import Contacts, contact_rows
+from rigid_lcp.contact.detection_plane import detect_2d, shapes_2d, widest_face
+from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs, place_shapes
 from rigid_lcp.errors import Overlapping, SceneError
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.near_pairs import bounding_boxes, near_pairs, place_shapes
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
 
 BOX = Polygon.rectangle(1.0, 1.0)
 
@@ -121,9 +121,7 @@ def test_broad_phase_finds_every_near_pair(seed: int) -> None:
     vertices, _ = place_shapes(
         arrays.kind, arrays.first, arrays.vertices, arrays.normals, places, angles
     )
-    boxes = bounding_boxes(
-        arrays.first, vertices, arrays.radius, places, np.full(len(shapes), 0.01)
-    )
+    boxes = bound_shapes(arrays.first, vertices, arrays.radius, places, np.full(len(shapes), 0.01))
     x0, y0, x1, y1 = boxes.T
     near = (x0[:, None] <= x1) & (x0 <= x1[:, None]) & (y0[:, None] <= y1) & (y0 <= y1[:, None])
     expected = np.argwhere(np.triu(near, 1))

@@ -7,17 +7,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.detection_3d import place_solids, shapes_3d
-from rigid_lcp.disc import Disc
+from rigid_lcp.contact.detection_space import place_solids, shapes_3d
+from rigid_lcp.contact.manifold import MOST
+from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs
+from rigid_lcp.contact.placed_solids import MOST_EDGES
 from rigid_lcp.errors import SceneError
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.manifold_3d import MOST
-from rigid_lcp.near_pairs import bounding_boxes, near_pairs
-from rigid_lcp.placed_solids import MOST_EDGES
-from rigid_lcp.polyhedra import ballast_stone
-from rigid_lcp.polyhedron import Polyhedron, box
-from rigid_lcp.rotations import quaternion_of_rotation, quaternion_product, rotate, unit_quaternion
-from rigid_lcp.sphere import Sphere
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp.shapes.rotations import (
+    quaternion_of_rotation,
+    quaternion_product,
+    rotate,
+    unit_quaternion,
+)
+from rigid_lcp.shapes.sphere import Sphere
+from rigid_lcp.shapes.stones import ballast_stone
 from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, contacts, near_pair, sorted_points
 
 # --- closed forms ---
@@ -186,7 +191,7 @@ def test_boxes_are_those_of_the_corners(dim: int) -> None:
     first = np.array([0, 4, 4, 11])  # the second has no corners
     corners = generator.normal(size=(11, dim))
     place, radius, margin = generator.normal(size=(3, dim)), np.full(3, 0.3), generator.random(3)
-    boxes = bounding_boxes(first, corners, radius, place, margin)
+    boxes = bound_shapes(first, corners, radius, place, margin)
     ball = place[1] + 0.3 * np.array([[-1.0], [1.0]])
     for body, points in enumerate((corners[:4], ball, corners[4:])):
         wanted = [points.min(axis=0) - margin[body], points.max(axis=0) + margin[body]]
@@ -201,7 +206,7 @@ def test_pairs_are_those_of_all_boxes() -> None:
     movable[60] = False
     arrays = shapes_3d(shapes, movable)
     solids = place_solids(arrays, position, np.tile(UPRIGHT, (61, 1)))
-    boxes = bounding_boxes(
+    boxes = bound_shapes(
         solids.first_vertex, solids.vertex, arrays.reach, position, np.full(61, 0.01)
     )
     wanted = [

@@ -7,8 +7,8 @@ import pytest
 
 from rigid_lcp import Polygon, Scene, box
 from rigid_lcp.errors import SceneError, ShapeError
-from rigid_lcp.fragmentation import fragment, polygon_split
-from rigid_lcp.polyhedra import cut, fragments
+from rigid_lcp.shapes.stones import cut, fragments
+from rigid_lcp.wear.fragmentation import fragment, split_polygon
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 MIDDLE, UP = (0.5, 0.5), (0, 1)
@@ -61,7 +61,7 @@ def test_lines_that_are_none_are_named(point, direction):
 @pytest.mark.parametrize("point", [(0.5, 0.5, 0), 0.5])
 def test_a_point_of_another_space_splits_nothing(point):
     with pytest.raises(ShapeError, match=r"split: .*point"):
-        polygon_split(SQUARE, point, UP)
+        split_polygon(SQUARE, point, UP)
 
 
 @pytest.mark.parametrize("length", [1e-200, 1.0, 1e200])

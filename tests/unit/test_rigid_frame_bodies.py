@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import SceneError
-from rigid_lcp.frame_bodies import bodies_arrays
-from rigid_lcp.report import frames_draw
-from rigid_lcp.run_folder import RunFolder
-from rigid_lcp.scene_file import scene_read
-from rigid_lcp.scene_run import left_out, scene_run, simulation_of, summary_of
+from rigid_lcp.report.page import draw_frames
+from rigid_lcp.scene.file import scene_read
+from rigid_lcp.scene.frame_bodies import pack_bodies
+from rigid_lcp.scene.run import left_out, scene_run, simulation_of, summary_of
+from rigid_lcp.scene.run_folder import RunFolder
 from tests.rigid_runs import WORN_AND_BROKEN, WORN_IN_SPACE
 
 
@@ -30,7 +30,7 @@ def test_frames_of_changed_bodies_are_drawn(tmp_path):
     scene_run(file, run, folder, resume=False, progress=lambda *_: None)
     assert run.broken
     assert run.worn.volume > 0
-    assert len(frames_draw(folder, scene, "broken")) == 7
+    assert len(draw_frames(folder, scene, "broken")) == 7
 
 
 def test_a_run_that_asks_for_neither_keeps_no_bodies(tmp_path):
@@ -38,7 +38,7 @@ def test_a_run_that_asks_for_neither_keeps_no_bodies(tmp_path):
     file = scene_file(tmp_path, text)
     _, run = simulation_of(file)
     assert run.worn is None
-    assert bodies_arrays(run) == {}
+    assert pack_bodies(run) == {}
     assert sum("abrasion" in line or "fragmentation" in line for line in left_out(file)) == 2
     assert not any("abrasion" in line for line in left_out(scene_file(tmp_path)))
 
@@ -61,7 +61,7 @@ def test_wear_in_space_is_kept_and_told(tmp_path):
     folder = RunFolder(tmp_path / "run")
     folder.path.mkdir()
     scene_run(file, run, folder, resume=False, progress=lambda *_: None)
-    arrays = bodies_arrays(run)
+    arrays = pack_bodies(run)
     assert arrays["wear_counts"].tolist()[0] == -1
     assert arrays["wear_lost"].sum() > 0
     summary = summary_of(file, scene, run, folder)
@@ -74,7 +74,7 @@ def test_bodies_of_a_frame_are_numbered_as_they_broke(tmp_path):
     _, run = simulation_of(file)
     part = run.fragment(1, ([0.0, 0.1], [0.0, 1.0]))
     second = run.fragment(part, ([0.05, 0.1], [1.0, 0.0]))
-    arrays = bodies_arrays(run)
+    arrays = pack_bodies(run)
     assert part == 3
     assert second == 4
     assert arrays["body_whole"].tolist() == [0, 1, 2, 1, 1]

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rigid_lcp import BodySpace, solve_friction
-from rigid_lcp.cones import natural_map, natural_residual
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction_problem import friction_problem, friction_solution
-from rigid_lcp.problem_files import read_problem
+from rigid_lcp.friction.files.formats import read_problem
+from rigid_lcp.friction.problem.cones import natural_map, natural_residual
+from rigid_lcp.friction.problem.definition import friction_problem, judge_forces
 from tests.rigid_static_problems import tower
 
 Floats = NDArray[np.float64]
@@ -179,7 +179,7 @@ def test_bodies_may_come_to_rest_as_slowly_as_they_like(scale):
 def test_forces_without_bound_are_no_solution_and_the_message_says_so():
     """W = 0 at a contact that approaches: r = 1e18 has a residual of zero."""
     problem = friction_problem(np.zeros((2, 2)), [-1.0, 0.0], 0.5, 2)
-    found = friction_solution(problem, np.array([1e18, 0.0]), 1e-12, "any")
+    found = judge_forces(problem, np.array([1e18, 0.0]), 1e-12, "any")
     assert found.status == "not converged"
     assert "without bound" in found.message
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.islands import island_problem, islands, solve_islands
+from rigid_lcp.friction.auto.islands import cut_out_island, islands, solve_islands
+from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 
 Floats = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def test_island_problem_has_the_rows_of_the_whole(dim: int, factors: bool) -> No
     problem = three_islands(dim) if factors else as_matrix(three_islands(dim))
     part = np.array([1, 4])
     rows = (part[:, None] * dim + np.arange(dim)).ravel()
-    alone = island_problem(problem, part)
+    alone = cut_out_island(problem, part)
     whole = problem.delassus.toarray()
     np.testing.assert_allclose(alone.delassus.toarray(), whole[np.ix_(rows, rows)], atol=1e-14)
     if alone.bodies is not None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_lcp.dantzig import dantzig
 from rigid_lcp.errors import ProblemError, UsageError
-from rigid_lcp.friction_problem import friction_problem
-from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.interior_point import interior_point
-from rigid_lcp.newton import newton
-from rigid_lcp.pivoting import pivoting
-from rigid_lcp.proximal_newton import proximal_newton
+from rigid_lcp.friction.attempts.proximal_newton import proximal_newton
+from rigid_lcp.friction.methods.dantzig import dantzig
+from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.methods.interior_point import interior_point
+from rigid_lcp.friction.methods.newton import newton
+from rigid_lcp.friction.methods.pivoting import pivoting
+from rigid_lcp.friction.problem.definition import friction_problem
 
 PROBLEM = friction_problem(np.diag([1.0, 2.0, 1.0, 2.0]), [-1.0, 0.5, 1.0, 0.0], 0.5, 2)
 R = [1.0, -0.25, 0.0, 0.0]

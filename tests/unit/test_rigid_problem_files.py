@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.errors import LibraryMissing, ProblemError
-from rigid_lcp.friction_problem import FrictionProblem
-from rigid_lcp.problem_files import read_forces, read_problem
+from rigid_lcp.friction.files.formats import read_forces, read_problem
+from rigid_lcp.friction.problem.definition import FrictionProblem
 
 Arrays = dict[str, Any]
 FORMATS = {-2: "csr", -1: "csc", 0: "coo"}

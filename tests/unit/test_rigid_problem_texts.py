@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.problem_files import read_forces, read_problem
+from rigid_lcp.friction.files.formats import read_forces, read_problem
 
 
 def posed(dim: int, contacts: int, seed: int = 0) -> tuple[Any, Any, Any]:

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as some
 
-from rigid_lcp.restitution_scale import RESOLUTION, Share
+from rigid_lcp.collision.restitution_scale import RESOLUTION, Share
 
 THRESHOLD = some.one_of(some.floats(0.0, 1.0), some.sampled_from((0.0, 0.5, RESOLUTION, 1.0)))
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import RigidError, SceneError, ShapeError
-from rigid_lcp.pouring import stone_2d
-from rigid_lcp.scene_file import force_at, loads_of, scene_build, scene_read
-from rigid_lcp.scene_types import Load
+from rigid_lcp.scene.file import force_at, loads_of, scene_build, scene_read
+from rigid_lcp.scene.pouring import make_stone_2d
+from rigid_lcp.scene.types import Load
 
 pytestmark = pytest.mark.lowest
 
@@ -192,9 +192,9 @@ def test_a_load_acts_on_the_named_body_alone() -> None:
     scene = scene_build(file)
     loads = loads_of(file)
     assert loads is not None
-    from rigid_lcp.scene import world_of
+    from rigid_lcp.motion.world import make_world
 
-    _, motion = world_of(scene)
+    _, motion = make_world(scene)
     peak = file.tables.load[0].begin + 0.5 / (file.tables.load[0].frequency or 1.0)
     forces = np.asarray(loads(peak, motion))
     loaded = np.flatnonzero(np.abs(forces).sum(axis=1))
@@ -203,7 +203,7 @@ def test_a_load_acts_on_the_named_body_alone() -> None:
 
 
 def test_the_same_seed_gives_the_same_stones() -> None:
-    first, again = (stone_2d(np.random.default_rng(5), 0.05, 7) for _ in range(2))
+    first, again = (make_stone_2d(np.random.default_rng(5), 0.05, 7) for _ in range(2))
     np.testing.assert_array_equal(first.vertices, again.vertices)
     assert len(first.vertices) == 7
     assert first.reach < 0.05

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_lcp.disc import Disc
 from rigid_lcp.errors import SceneError, ShapeError, UsageError
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene, world_of
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.world import Scene, make_world
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 
@@ -113,7 +113,7 @@ def test_scene_refused() -> None:
     with pytest.raises(SceneError, match="dim"):
         Scene(4)
     with pytest.raises(SceneError, match="no body can move"):
-        world_of(scene)
+        make_world(scene)
     scene.add(box, density=1.0)
     for wrong in ({"method": "euler"}, {"step": 0.0}, {"step": np.nan}):
         with pytest.raises(UsageError):
@@ -124,5 +124,5 @@ def test_body_stays_where_its_vertices_were_given() -> None:
     scene = Scene(2)
     scene.add(Polygon(SQUARE), density=1.0)
     scene.add(Polygon(SQUARE), density=1.0, position=(5, 5))
-    _, start = world_of(scene)
+    _, start = make_world(scene)
     np.testing.assert_allclose(start.position, [[0.5, 0.5], [5, 5]])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.polyhedron import Polyhedron, box
-from rigid_lcp.sphere import Sphere
+from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp.shapes.sphere import Sphere
 
 
 def test_faces_of_a_box_are_rectangles() -> None:

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from rigid_lcp import solve_friction
 from rigid_lcp.errors import ProblemError, UsageError
-from rigid_lcp.frictionless import lcp
+from rigid_lcp.friction.attempts.frictionless import lcp
 
 W = np.diag([1.0, 2.0, 1.0, 2.0])
 Q = np.array([-1.0, 0.5, 1.0, 0.0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_lcp.sphere import Sphere
+from rigid_lcp.shapes.sphere import Sphere
 from tests.rigid_solids import CUBE, FLOOR, contacts
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.strength import (
+from rigid_lcp.wear.strength import (
     brazilian_tension,
+    find_opposite_pair,
+    find_splitting_line,
     mean_stress,
-    opposite_pair,
-    splitting_line,
     weibull_strength,
 )
 
@@ -71,15 +71,15 @@ def test_mean_stress_of_a_bar():
 def test_greatest_pair_and_line():
     """Two weak and two strong opposite pushes: the crack runs through the strong ones."""
     points, forces = radial(np.array([0, np.pi, 1.2, 1.2 + np.pi]), [50, 50, 700, 690.0])
-    i, j, squeeze = opposite_pair(points, forces)
+    i, j, squeeze = find_opposite_pair(points, forces)
     assert (i, j) == (2, 3)
     assert squeeze == pytest.approx(690)
-    split = splitting_line(points, forces, (0, 0), VOLUME, strength=1e4)
+    split = find_splitting_line(points, forces, (0, 0), VOLUME, strength=1e4)
     assert split.point == pytest.approx([0, 0], abs=1e-15)
     assert abs(split.direction @ [np.cos(1.2), np.sin(1.2)]) == pytest.approx(1)
     # just below and just above its tension: it breaks or holds
     for share, breaks in ((1 - 1e-12, True), (1 + 1e-12, False)):
-        found = splitting_line(points, forces, (0, 0), VOLUME, split.tension * share)
+        found = find_splitting_line(points, forces, (0, 0), VOLUME, split.tension * share)
         assert (found is not None) is breaks
 
 
@@ -87,19 +87,19 @@ def test_point_load_in_3d():
     """F / d^2, Jaeger."""
     points = np.array([[0, 0, 0.025], [0, 0, -0.025]])
     forces = np.array([[0, 0, -900.0], [0, 0, 900.0]])
-    split = splitting_line(points, forces, (0, 0, 0), 6e-5, 1e5, kind="point-load")
+    split = find_splitting_line(points, forces, (0, 0, 0), 6e-5, 1e5, kind="point-load")
     assert split.tension == pytest.approx(900 / 0.05**2)
     with pytest.raises(ShapeError, match="2D"):
-        splitting_line(points, forces, (0, 0, 0), 6e-5, 1e5)
+        find_splitting_line(points, forces, (0, 0, 0), 6e-5, 1e5)
 
 
 def test_no_pair_no_break():
     """A grain pulled apart, a grain with one contact, and one with none."""
     points, forces = radial(np.array([0, np.pi]), [-5.0, -5.0])
-    assert opposite_pair(points, forces) is None
-    assert splitting_line(points[:1], -forces[:1], (0, 0), VOLUME, 1.0) is None
-    assert splitting_line(np.zeros((0, 2)), np.zeros((0, 2)), (0, 0), VOLUME, 1.0) is None
-    assert opposite_pair([[0, 0], [0, 0]], [[1, 0], [-1, 0]]) is None
+    assert find_opposite_pair(points, forces) is None
+    assert find_splitting_line(points[:1], -forces[:1], (0, 0), VOLUME, 1.0) is None
+    assert find_splitting_line(np.zeros((0, 2)), np.zeros((0, 2)), (0, 0), VOLUME, 1.0) is None
+    assert find_opposite_pair([[0, 0], [0, 0]], [[1, 0], [-1, 0]]) is None
 
 
 def test_size_effect():

@@ -9,7 +9,7 @@ import pytest
 
 from rigid_lcp import Disc, Polygon, Polyhedron, Scene, Simulation, Sphere, box
 from rigid_lcp.errors import NotConverged, RigidError, SceneError, ShapeError, UsageError
-from rigid_lcp.polyhedra import cut
+from rigid_lcp.shapes.stones import cut
 from tests.rigid_runs import SLIDING_BLOCK
 from trackbed import command
 
@@ -83,7 +83,7 @@ def test_steps_without_end_are_refused_as_the_scene_file_does(method, tmp_path):
     with pytest.raises(UsageError, match=r"is 2e\+87 steps: at most 1e\+10 can be made\n  -> "):
         run.advance(0.002)
     assert (run.time, run.steps) == (0.0, 0)
-    from rigid_lcp.scene_file import scene_read
+    from rigid_lcp.scene.file import scene_read
 
     path = tmp_path / "scene.toml"
     path.write_text(SLIDING_BLOCK.replace("step = 2e-3", "step = 1e-17"), encoding="utf-8")

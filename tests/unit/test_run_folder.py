@@ -13,13 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapters.errors import EngineFailed, UsageError
-from adapters.run_folder import (
-    COLUMNS,
-    Outcome,
-    RunFolder,
-    disk_full_named,
-    stage_place,
-)
+from adapters.files.run_folder import COLUMNS, Outcome, RunFolder, name_full_disk, place_stage
 
 ROOT = Path(__file__).parents[2]
 
@@ -138,7 +132,7 @@ def test_folders_of_other_names_are_left_alone(run: RunFolder) -> None:
     assert run.stage_names() == names
     run.begin("window_000000")
     assert (run.path / "window_000004 (copy)").is_dir()
-    run.settlement_write()
+    run.write_settlement()
 
 
 @pytest.mark.parametrize("name", ["partial", "discarded", "lock", "events.jsonl", "window_000004"])
@@ -179,7 +173,7 @@ def test_damaged_outcome_is_no_outcome(run: RunFolder, content: bytes) -> None:
     """A record that is cut, empty, of another kind or no text is no record."""
     (run.path / "window_000000" / "outcome.json").write_bytes(content)
     assert run.outcome("window_000000") is None
-    run.settlement_write()
+    run.write_settlement()
     assert [row[0] for row in table(run)] == ["3", "4", "5"]
 
 
@@ -187,7 +181,7 @@ def test_damaged_outcome_is_no_outcome(run: RunFolder, content: bytes) -> None:
 def test_stages_sort_by_cycle(first: int, second: int, attempt: int) -> None:
     """Preparation first, then by cycle; a jump of no cycles stands before the window after it."""
     names = [f"window_{first:06d}", f"jump_{second:06d}_{attempt}", "preparation"]
-    ordered = sorted(names, key=stage_place)
+    ordered = sorted(names, key=place_stage)
     assert ordered[0] == "preparation"
     jump_first = second <= first
     assert ordered[1].startswith("jump") == jump_first
@@ -302,7 +296,7 @@ def test_no_run_folder(tmp_path: Path, content: bytes | None) -> None:
 )
 def test_disk_full_is_named(tmp_path: Path, number: int, named: bool) -> None:
     """A full disk or quota becomes exit code 5 with a remedy; other faults stay what they are."""
-    with pytest.raises(EngineFailed if named else OSError) as caught, disk_full_named(tmp_path):
+    with pytest.raises(EngineFailed if named else OSError) as caught, name_full_disk(tmp_path):
         raise OSError(number, os.strerror(number))
     if named:
         assert "the disk is full" in str(caught.value)

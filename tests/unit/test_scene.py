@@ -12,13 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters.engine import engine_named, engines_known, real_engines
+from adapters.engines.contract import get_engine, list_engines, list_real_engines
 from adapters.errors import SceneError, TrackbedError
-from adapters.jump_schedule import jump_lengths
-from adapters.load_series import load_series_read
-from adapters.scene import Loading, Scene
-from adapters.scene_file import scene_load
-from trackbed.scene_lines import find_key_lines
+from adapters.files.load_series import read_load_series
+from adapters.jumps.schedule import schedule_jumps
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Loading, Scene
+from trackbed.scene_files.lines import find_key_lines
 from trackbed.scenes import scene_names, scene_path, scene_template, scene_verb
 
 pytestmark = pytest.mark.lowest
@@ -48,14 +48,14 @@ def with_value(text: str, key: str, statement: str) -> tuple[str, int]:
 
 def refusal(folder: Path, text: str, overrides: list[str] | None = None) -> str:
     with pytest.raises(SceneError) as caught:
-        scene_load(write(folder, text), overrides or [])
+        load_scene(write(folder, text), overrides or [])
     return str(caught.value)
 
 
 def scene_or_refusal(path: Path) -> Scene | None:
     """The scene, or None when it was refused by an error of ours that names the file."""
     try:
-        return scene_load(path)
+        return load_scene(path)
     except TrackbedError as error:
         if str(path) not in str(error):
             raise
@@ -70,7 +70,7 @@ def test_shipped_scenes_load_without_doubts() -> None:
     names = [name for name in scene_names() if scene_verb(name) == "run"]
     assert names == ["cluster", "karrech", "karrech-coarse", "karrech-partial"]
     for name in names:
-        scene = scene_load(Path(__file__).parents[2] / "trackbed" / "scenes" / f"{name}.toml")
+        scene = load_scene(Path(__file__).parents[2] / "trackbed" / "scenes" / f"{name}.toml")
         assert scene.warnings == ()
         assert scene.engine.name == "auto"
     with pytest.raises(KeyError, match="karrech-coarse"):
@@ -79,17 +79,17 @@ def test_shipped_scenes_load_without_doubts() -> None:
 
 def test_new_names_the_verb_that_reads_the_scene() -> None:
     """`trackbed new` says which verb goes on: that whose reader takes the scene."""
-    from qdem_fem.scene_file import scene_read as qdem_scene
-    from rigid_lcp.scene_file import scene_read as rigid_scene
+    from qdem_fem.tables.file import scene_read as qdem_scene
+    from rigid_lcp.scene.file import scene_read as rigid_scene
 
-    readers = {"run": scene_load, "qdem": qdem_scene, "rigid": rigid_scene}
+    readers = {"run": load_scene, "qdem": qdem_scene, "rigid": rigid_scene}
     for name in scene_names():
         readers[scene_verb(name)](scene_path(name))
 
 
 def test_karrech_scene_is_table_1(tmp_path: Path) -> None:
     """karrech.toml holds the numbers of the paper's Table 1 and its load."""
-    scene = scene_load(write(tmp_path, KARRECH))
+    scene = load_scene(write(tmp_path, KARRECH))
     grain = scene.material.grain
     assert (grain.young, grain.poisson, grain.density) == (46.9e9, 0.25, 2710)
     assert (grain.friction, grain.viscous_alpha) == (0.5, 0.44)
@@ -101,18 +101,18 @@ def test_karrech_scene_is_table_1(tmp_path: Path) -> None:
 
 def test_partial_scene_loads_its_share(tmp_path: Path) -> None:
     """The piston of karrech-partial.toml is a disc of 80 % of the section, 5.87 kPa at 10 Hz."""
-    scene = scene_load(write(tmp_path, scene_template("karrech-partial")))
+    scene = load_scene(write(tmp_path, scene_template("karrech-partial")))
     assert pi * scene.piston_reach**2 / 4 == pytest.approx(scene.loaded_area, rel=1e-14)
     assert scene.loaded_area == pytest.approx(0.8 * scene.container.area, rel=1e-14)
     assert scene.loading is not None
     assert (scene.loading.amplitude, scene.loading.period) == (5870, 0.1)
-    whole = scene_load(write(tmp_path, KARRECH))
+    whole = load_scene(write(tmp_path, KARRECH))
     assert whole.piston_reach == inf
 
 
 def test_coarse_scene_peaks_at_ten_newton(tmp_path: Path) -> None:
     """The demo's piston presses with 10 N at the crest and nothing at the trough."""
-    scene = scene_load(write(tmp_path, scene_template("karrech-coarse")))
+    scene = load_scene(write(tmp_path, scene_template("karrech-coarse")))
     assert float(scene.stress_at(0.5)) * scene.loaded_area == pytest.approx(10.0, rel=1e-3)
     assert float(scene.stress_at(3.0)) == pytest.approx(0, abs=1e-9)
     assert scene.sample.count == 150
@@ -139,9 +139,9 @@ def test_every_key_of_the_models_is_explained(tmp_path: Path) -> None:
 
 def test_engine_names_agree() -> None:
     """Every file with an engine is known by its name; ``auto`` asks those with mechanics only."""
-    assert [engine_named(name).name for name in engines_known()] == list(engines_known())
-    assert real_engines() == ("liggghts", "lammps", "yade")
-    assert set(engines_known()) - set(real_engines()) == {"fake"}
+    assert [get_engine(name).name for name in list_engines()] == list(list_engines())
+    assert list_real_engines() == ("liggghts", "lammps", "yade")
+    assert set(list_engines()) - set(list_real_engines()) == {"fake"}
 
 
 @settings(max_examples=60, deadline=None)
@@ -168,7 +168,7 @@ def test_period_is_whole_steps(
             text, _ = with_value(text, f"loading.{key}", "")
         text, _ = with_value(text, "loading.waveform", 'waveform = "series"\nseries = "load.csv"')
         overrides = overrides[:1]
-    scene = scene_load(write(folder, text), overrides)
+    scene = load_scene(write(folder, text), overrides)
     limit = share * scene.rayleigh_time
     intervals, steps = scene.samples_per_cycle, scene.steps_per_cycle
     assert intervals % (samples or 1) == 0
@@ -181,7 +181,7 @@ def test_period_is_whole_steps(
 
 def test_time_step_that_fits_is_kept(tmp_path: Path) -> None:
     """A time step that divides the period already, 0.02 s/5e-7 s = 40,000, is not shortened."""
-    scene = scene_load(write(tmp_path, KARRECH), ["engine.time_step=5e-7"])
+    scene = load_scene(write(tmp_path, KARRECH), ["engine.time_step=5e-7"])
     assert scene.steps_per_cycle == 40_000
     assert scene.time_step == pytest.approx(5e-7, rel=1e-12)
 
@@ -189,7 +189,7 @@ def test_time_step_that_fits_is_kept(tmp_path: Path) -> None:
 def test_unloaded_scene(tmp_path: Path) -> None:
     """A scene may leave out loading and procedure: no stress, no area, the longest time step."""
     text = KARRECH[: KARRECH.index("[loading]")] + KARRECH[KARRECH.index("[engine]") :]
-    scene = scene_load(write(tmp_path, text))
+    scene = load_scene(write(tmp_path, text))
     assert scene.loading is None
     assert (scene.loaded_area, scene.piston_reach, scene.steps_per_cycle) == (0, inf, 0)
     assert scene.time_step == pytest.approx(0.2 * scene.rayleigh_time)
@@ -208,7 +208,7 @@ def test_sine_stress(phase: float) -> None:
 
 def test_fill_height_gives_the_count(tmp_path: Path) -> None:
     """``fill_height`` alone fixes the count, through relative density 0.5615 and mean volume."""
-    scene = scene_load(write(tmp_path, KARRECH), ["sample.fill_height=0.06"])
+    scene = load_scene(write(tmp_path, KARRECH), ["sample.fill_height=0.06"])
     assert scene.sample.count is None
     grains = scene.grain_count * scene.sample.grain_radius.law.volume_mean
     assert grains / (scene.container.area * 0.06) == pytest.approx(0.5615, rel=1e-3)
@@ -216,21 +216,21 @@ def test_fill_height_gives_the_count(tmp_path: Path) -> None:
 
 def test_schedule_of_jumps(tmp_path: Path) -> None:
     """A schedule's last entry repeats; a bare number is a schedule of one."""
-    procedure = scene_load(write(tmp_path, KARRECH), ["procedure.h=[5, 10]"]).procedure
+    procedure = load_scene(write(tmp_path, KARRECH), ["procedure.h=[5, 10]"]).procedure
     assert procedure is not None
     assert [procedure.jump_cycles(i) for i in range(4)] == [5, 10, 10, 10]
-    procedure = scene_load(write(tmp_path, KARRECH), ["procedure.h=0"]).procedure
+    procedure = load_scene(write(tmp_path, KARRECH), ["procedure.h=0"]).procedure
     assert procedure is not None
     assert procedure.h == (0,)
 
 
 def test_growing_jumps_are_spelled_out(tmp_path: Path) -> None:
-    """h = "3 growing": the lengths of `jump_lengths`, which a manifest keeps as numbers."""
+    """h = "3 growing": the lengths of `schedule_jumps`, which a manifest keeps as numbers."""
     keys = ["procedure.k_i=40", "procedure.k=10", "procedure.total_cycles=500"]
     for words in ('"3 growing"', "3 growing", '"3 growing jumps"'):
-        procedure = scene_load(write(tmp_path, KARRECH), [*keys, f"procedure.h={words}"]).procedure
+        procedure = load_scene(write(tmp_path, KARRECH), [*keys, f"procedure.h={words}"]).procedure
         assert procedure is not None
-        assert procedure.h == tuple(jump_lengths(3, 500, 40, 10, procedure.healing_cycles))
+        assert procedure.h == tuple(schedule_jumps(3, 500, 40, 10, procedure.healing_cycles))
     text, _ = with_value(KARRECH, "procedure.h", 'h = "2 growing"')
     wrong, _ = with_value(text, "procedure.k", "k = 1")
     message = refusal(tmp_path, wrong)  # what is wrong with the other keys is told, and only that
@@ -240,7 +240,7 @@ def test_growing_jumps_are_spelled_out(tmp_path: Path) -> None:
 
 def test_scene_survives_json(tmp_path: Path) -> None:
     """What a manifest stores gives back the same scene."""
-    scene = scene_load(write(tmp_path, KARRECH))
+    scene = load_scene(write(tmp_path, KARRECH))
     stored = json.loads(scene.model_dump_json(exclude_none=True))
     assert Scene.model_validate(stored) == scene
 
@@ -268,14 +268,14 @@ def test_scene_built_in_python_is_checked() -> None:
 )
 def test_doubts_are_warnings(tmp_path: Path, override: str, words: str) -> None:
     """What is allowed but doubtful is said, once, and is no error."""
-    (warning,) = scene_load(write(tmp_path, KARRECH), [override]).warnings
+    (warning,) = load_scene(write(tmp_path, KARRECH), [override]).warnings
     assert words in warning
 
 
 def test_a_jump_by_history_is_not_fitted_to_its_window_alone(tmp_path: Path) -> None:
     """So its length over the window's is no doubt."""
     keys = ["procedure.h=1000", 'procedure.settlement="history"']
-    assert scene_load(write(tmp_path, KARRECH), keys).warnings == ()
+    assert load_scene(write(tmp_path, KARRECH), keys).warnings == ()
 
 
 # ---------------------------------------------------------------------------- what is refused
@@ -351,7 +351,7 @@ def test_where_grains_can_not_change_places(tmp_path: Path) -> None:
     text, _ = with_value(KARRECH, "procedure.k", "tolerance = 0.02")
     text, _ = with_value(text, "procedure.h", "")
     assert "jumps with a tolerance move by what has room" in refusal(tmp_path, text, keys[:1])
-    assert scene_load(write(tmp_path, KARRECH), keys).procedure is not None
+    assert load_scene(write(tmp_path, KARRECH), keys).procedure is not None
 
 
 @pytest.mark.parametrize(("key", "statement", "words"), REFUSED)
@@ -422,7 +422,7 @@ ALL_KEYS = sorted(key for key in find_key_lines(KARRECH) if "." in key)
 def test_override_of_an_alternative_replaces_the_other(tmp_path: Path) -> None:
     """Setting one of two alternative keys removes the other of the file."""
     path = write(tmp_path, KARRECH)
-    scene = scene_load(path, ["material.grain.restitution=0.5", "engine.time_step=1e-7"])
+    scene = load_scene(path, ["material.grain.restitution=0.5", "engine.time_step=1e-7"])
     assert scene.restitution == 0.5
     assert scene.material.grain.viscous_alpha is None
     assert scene.engine.rayleigh_share is None
@@ -491,7 +491,7 @@ def series_scene(folder: Path, rows: str) -> Path:
 def test_series_is_read_beside_the_scene(tmp_path: Path) -> None:
     """A series is found beside its scene, linear between samples, and periodic."""
     path = series_scene(tmp_path, "time,stress\n0.5,0\n0.6,100\n0.7,300\n0.8,200\n0.9,0\n")
-    scene = scene_load(path)
+    scene = load_scene(path)
     assert scene.loading is not None
     assert scene.loading.period == pytest.approx(0.4)
     assert scene.stress_at(np.array([0, 0.25, 0.375, 0.5, 1.25, -0.25])).tolist() == pytest.approx(
@@ -551,7 +551,7 @@ def test_series_returns_what_was_written(
     path.write_text(
         "time,stress\n" + "\n".join(f"{i * step!r},{s!r}" for i, s in enumerate(stress))
     )
-    series = load_series_read(path)
+    series = read_load_series(path)
     assert series.stress.tolist() == stress
     assert series.period == pytest.approx((len(stress) - 1) * step)
     phase = np.arange(len(stress)) / (len(stress) - 1)

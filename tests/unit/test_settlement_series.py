@@ -11,9 +11,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from adapters.dump import Frame, dump_write
 from adapters.errors import TrackbedError, UsageError
-from adapters.settlement_series import Series, series_read
+from adapters.files.dump import Frame, write_dump
+from adapters.files.series import Series, read_series
 
 pytestmark = pytest.mark.lowest
 
@@ -31,7 +31,7 @@ def dumped(path: Path, heights: dict[int, list[float]], first_id: int = 1) -> Pa
         identifier = np.arange(first_id, first_id + len(z), dtype=float)
         values = np.stack([identifier, np.array(z)], axis=1)
         frames.append(Frame(step, ("id", "z"), values, np.array([[0.0, 1.0]] * 3)))
-    dump_write(path, frames)
+    write_dump(path, frames)
     return path
 
 
@@ -39,7 +39,7 @@ def dumped(path: Path, heights: dict[int, list[float]], first_id: int = 1) -> Pa
 def test_unit_is_that_of_the_header(tmp_path: Path, column: str, unit: str) -> None:
     """A plain column is in m, settlement_mm in mm; other columns, comments, order do not matter."""
     text = f"# a track\nstress, Cycle ,{column}\n5,20,0.5\n\n5,10,0.25\n# end\n5,30.5,0.75\n"
-    series = series_read([written(tmp_path / "series.csv", text)])
+    series = read_series([written(tmp_path / "series.csv", text)])
     assert series.unit == unit
     assert series.cycle.tolist() == [10.0, 20.0, 30.5]
     assert series.settlement.tolist() == [0.25, 0.5, 0.75]
@@ -53,7 +53,7 @@ def test_only_computed_rows_are_taken(tmp_path: Path) -> None:
         "12,,jumped,\n13,9e-5,healing,4.5\n14,4e-5,computed,4.6\n"
     )
     written(tmp_path / "settlement.csv", text)
-    series = series_read([tmp_path])
+    series = read_series([tmp_path])
     assert series.cycle.tolist() == [1.0, 2.0, 14.0]
     assert series.settlement.tolist() == [1e-5, 2e-5, 4e-5]
 
@@ -79,7 +79,7 @@ def test_tables_of_laboratories_are_read(
     """Separators, decimal commas, units in the header or none: the same two readings."""
     path = tmp_path / f"series.{suffix}"
     path.write_bytes(text.encode(encoding))
-    series = series_read([path])
+    series = read_series([path])
     assert (series.cycle.tolist(), series.settlement.tolist()) == ([1.0, 20.0], [0.5, 0.75])
     assert series.unit == unit
 
@@ -90,19 +90,19 @@ def test_unit_is_told_where_no_header_gives_it(tmp_path: Path) -> None:
     named = written(tmp_path / "named.csv", "N,eps_a\n1,0.5\n20,0.75\n")
     plain = written(tmp_path / "plain.csv", "N,settlement\n1,0.5\n20,0.75\n")
     percent = written(tmp_path / "percent.csv", "N,strain [%]\n1,0.5\n20,0.75\n")
-    assert series_read([bare]).unit == "unknown"
-    assert series_read([bare], unit="1").unit == "1"
-    assert series_read([named], columns=("N", "eps_a")).unit == "unknown"
-    assert series_read([named], columns=("N", "eps_a"), unit="%").unit == "%"
-    assert series_read([plain], unit="mm").unit == "mm"
-    assert series_read([percent], unit="%").unit == "%"
+    assert read_series([bare]).unit == "unknown"
+    assert read_series([bare], unit="1").unit == "1"
+    assert read_series([named], columns=("N", "eps_a")).unit == "unknown"
+    assert read_series([named], columns=("N", "eps_a"), unit="%").unit == "%"
+    assert read_series([plain], unit="mm").unit == "mm"
+    assert read_series([percent], unit="%").unit == "%"
     with pytest.raises(UsageError, match="is in %, not in mm"):
-        series_read([percent], unit="mm")
+        read_series([percent], unit="mm")
     with pytest.raises(UsageError, match="inch is no unit"):
-        series_read([bare], unit="inch")
+        read_series([bare], unit="inch")
     dump = dumped(tmp_path / "dump.txt", {100: [1.0, 2.0], 200: [0.8, 2.0]})
     with pytest.raises(UsageError, match="dumps are in m"):
-        series_read([dump], unit="mm")
+        read_series([dump], unit="mm")
 
 
 def test_columns_of_other_names_are_named(tmp_path: Path) -> None:
@@ -110,14 +110,14 @@ def test_columns_of_other_names_are_named(tmp_path: Path) -> None:
     text = "Lastwechsel;Setzung [mm];Setzung rechts [mm];settlement\n1;0,5;9;8\n2;0,6;9;8\n"
     path = written(tmp_path / "series.csv", text)
     for name, expected in (("setzung", 0.5), ("Setzung [mm]", 0.5), ("Setzung rechts", 9.0)):
-        series = series_read([path], columns=("Lastwechsel", name))
+        series = read_series([path], columns=("Lastwechsel", name))
         assert (series.settlement[0], series.unit) == (expected, "mm")
     with pytest.raises(UsageError, match=r"no column setzun among .*did you mean setzung\?"):
-        series_read([path], columns=("Lastwechsel", "setzun"))
+        read_series([path], columns=("Lastwechsel", "setzun"))
     dump = dumped(tmp_path / "dump.txt", {100: [1.0, 2.0], 200: [0.8, 2.0]})
-    assert series_read([dump]).settlement.tolist() == pytest.approx([0.0, 0.1])
+    assert read_series([dump]).settlement.tolist() == pytest.approx([0.0, 0.1])
     with pytest.raises(UsageError, match="dumps have no columns"):
-        series_read([dump], columns=("cycle", "z"))
+        read_series([dump], columns=("cycle", "z"))
 
 
 @pytest.mark.long
@@ -130,7 +130,7 @@ def test_long_tables_are_read_fast(tmp_path: Path) -> None:
     seconds, least = [], []
     for _ in range(5):
         start = time.process_time()
-        series = series_read([path])
+        series = read_series([path])
         read = time.process_time()
         with path.open() as file:
             told = {float(n): float(value) for n, value in list(csv.reader(file))[1:]}
@@ -158,7 +158,7 @@ def test_csv_is_read_without_loss(
     lines = ["cycle,settlement", *(f"{cycle!r},{value!r}" for cycle, value in rows.items())]
     path = tmp_path / "series.csv"
     path.write_bytes(("\ufeff" * bom + end.join(lines)).encode())
-    series = series_read([path])
+    series = read_series([path])
     expected = sorted({cycle + 0.0: value for cycle, value in rows.items()}.items())
     assert list(zip(series.cycle.tolist(), series.settlement.tolist(), strict=True)) == expected
 
@@ -174,7 +174,7 @@ def test_any_file_is_read_or_refused_with_a_sentence(tmp_path: Path, content: st
         path = tmp_path / name
         path.write_bytes(head + data)
         try:
-            series = series_read([path])
+            series = read_series([path])
         except TrackbedError as error:
             assert name in str(error)  # noqa: PT017
         else:
@@ -213,7 +213,7 @@ def test_faulty_csv_names_file_line_and_column(
     """Each fault of a CSV is refused where it is."""
     path = written(tmp_path / "series.csv", text)
     with pytest.raises(UsageError) as raised:
-        series_read([path])
+        read_series([path])
     assert raised.value.where == f"{path}{place}"
     assert message in raised.value.what
 
@@ -222,11 +222,11 @@ def test_dumps_are_taken_in_natural_order(tmp_path: Path) -> None:
     """2.dump comes before 10.dump; settlement is the drop of the mean height, frame by frame."""
     late = dumped(tmp_path / "10.dump", {300: [1.0, 2.0], 400: [0.8, 2.0]})
     early = dumped(tmp_path / "2.dump", {100: [1.5, 2.5], 200: [1.2, 2.6], 300: [1.0, 2.0]})
-    series = series_read([late, early])
+    series = read_series([late, early])
     assert series.unit == "m"
     assert series.cycle.tolist() == [0.0, 1.0, 2.0, 3.0]
     np.testing.assert_allclose(series.settlement, [0.0, 0.1, 0.5, 0.6], atol=1e-15)
-    steps = series_read([late, early], steps_per_cycle=50)
+    steps = read_series([late, early], steps_per_cycle=50)
     assert steps.cycle.tolist() == [2.0, 4.0, 6.0, 8.0]
 
 
@@ -246,9 +246,9 @@ def test_series_of_unlike_files_is_refused(tmp_path: Path) -> None:
         ([], "no series was named"),
     ):
         with pytest.raises(UsageError, match=message):
-            series_read(paths)
+            read_series(paths)
     with pytest.raises(UsageError, match="steps per cycle"):
-        series_read([first], steps_per_cycle=0)
+        read_series([first], steps_per_cycle=0)
 
 
 def test_a_unit_that_the_data_has_is_not_given_another(tmp_path: Path) -> None:
@@ -257,17 +257,17 @@ def test_a_unit_that_the_data_has_is_not_given_another(tmp_path: Path) -> None:
     run.mkdir()
     rows = "1,0.001\n2,0.002\n"
     (run / "settlement.csv").write_text("cycle,settlement\n" + rows)
-    assert series_read([run], unit="m").unit == "m"
+    assert read_series([run], unit="m").unit == "m"
     with pytest.raises(UsageError, match="a run's settlement is in m, not in mm"):
-        series_read([run], unit="mm")
+        read_series([run], unit="mm")
     table = tmp_path / "one.csv"
     table.write_text("cycle,strain\n" + rows)
-    assert series_read([table], unit="%").unit == "%"
+    assert read_series([table], unit="%").unit == "%"
     with pytest.raises(UsageError, match="has no length, mm"):
-        series_read([table], unit="mm")
+        read_series([table], unit="mm")
     table.write_text("cycle,Settlement [inch]\n" + rows)
     with pytest.raises(UsageError, match="is in inch, which is not known"):
-        series_read([table], columns=("cycle", "Settlement [inch]"), unit="mm")
+        read_series([table], columns=("cycle", "Settlement [inch]"), unit="mm")
 
 
 @pytest.mark.parametrize(("told", "unit"), [("µm", "um"), (" MM ", "mm"), ("-", "1"), ("1", "1")])
@@ -275,7 +275,7 @@ def test_units_are_told_as_headers_give_them(tmp_path: Path, told: str, unit: st
     """Case, blanks and the other letter mu do not count."""
     table = tmp_path / "bare.csv"
     table.write_text("1,0.001\n2,0.002\n")
-    assert series_read([table], unit=told).unit == unit
+    assert read_series([table], unit=told).unit == unit
 
 
 def test_settlement_before_the_count_began_is_known() -> None:

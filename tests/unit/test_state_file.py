@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.dump import Frame, dump_write
+from adapters.bed.state import State
 from adapters.errors import DumpError, UsageError
-from adapters.state import State
-from adapters.state_file import state_of_file, state_to_file
+from adapters.files.dump import Frame, write_dump
+from adapters.files.states import read_state_file, write_state_file
 
 
 @pytest.fixture
@@ -34,8 +34,8 @@ def state() -> State:
 def test_round_trip(state: State, name: str, tmp_path: Path) -> None:
     """Every number of a grain comes back bit for bit."""
     path = tmp_path / name
-    state_to_file(state, path)
-    again = state_of_file(path, density=1.0)
+    write_state_file(state, path)
+    again = read_state_file(path, density=1.0)
     for field in ("identifier", "position", "radius", "mass", "velocity", "spin", "time_step"):
         np.testing.assert_array_equal(getattr(again, field), getattr(state, field))
     assert np.isnan(again.piston_height) == (path.suffix != ".npz")
@@ -47,8 +47,8 @@ def test_last_frame_and_masses_of_spheres(tmp_path: Path) -> None:
     values = np.array([[1.0, 0, 0, 0.5, 0.01], [2.0, 0, 0, 0.9, 0.02]])
     columns = ("id", "x", "y", "z", "radius")
     later = values + np.array([0, 0, 0, 1, 0])
-    dump_write(path, [Frame(0, columns, values), Frame(10, columns, later)])
-    state = state_of_file(path, density=2710.0)
+    write_dump(path, [Frame(0, columns, values), Frame(10, columns, later)])
+    state = read_state_file(path, density=2710.0)
     assert state.time_step == 10
     np.testing.assert_array_equal(state.position[:, 2], [1.5, 1.9])
     volume = 4 / 3 * np.pi * np.array([0.01, 0.02]) ** 3
@@ -60,16 +60,16 @@ def test_last_frame_and_masses_of_spheres(tmp_path: Path) -> None:
 def test_dump_without_radius(tmp_path: Path) -> None:
     """A dump of points is refused with the name of the column it lacks."""
     path = tmp_path / "points.dump"
-    dump_write(path, [Frame(0, ("id", "x", "y", "z"), np.array([[1.0, 0, 0, 0]]))])
+    write_dump(path, [Frame(0, ("id", "x", "y", "z"), np.array([[1.0, 0, 0, 0]]))])
     with pytest.raises(DumpError, match="radius"):
-        state_of_file(path, density=1.0)
+        read_state_file(path, density=1.0)
 
 
 @pytest.mark.parametrize("name", ["no.npz", "no.dump"])
 def test_missing_file(name: str, tmp_path: Path) -> None:
     """A file that is not there is wrong use, and the text names it."""
     with pytest.raises(UsageError, match=name):
-        state_of_file(tmp_path / name, density=1.0)
+        read_state_file(tmp_path / name, density=1.0)
 
 
 @pytest.mark.parametrize("name", ["garbage.npz", "garbage.dump"])
@@ -78,4 +78,4 @@ def test_garbage(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
     path.write_bytes(bytes(range(256)) * 40)
     with pytest.raises((UsageError, DumpError), match=name):
-        state_of_file(path, density=1.0)
+        read_state_file(path, density=1.0)

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapters.errors import EngineMissing, SceneError, UsageError
-from adapters.sweep import NAME_LONGEST, member_name, sweep_plan, values_of
-from adapters.sweep_cluster import libraries_check
-from adapters.sweep_member import sentence_of
-from adapters.sweep_results import mean_and_half
+from adapters.procedure.sweep.cluster import check_libraries
+from adapters.procedure.sweep.member import read_sentence
+from adapters.procedure.sweep.plan import NAME_LONGEST, name_member, plan_sweep, split_values
+from adapters.procedure.sweep.results import estimate_mean
 from tests.small_bed import small_bed
 
 
@@ -38,20 +38,20 @@ def scene(tmp_path: Path) -> Path:
 )
 def test_values_between_commas(text: str, values: list[str]) -> None:
     """Commas inside brackets and quotes part nothing."""
-    assert values_of(text) == values
+    assert split_values(text) == values
 
 
 @pytest.mark.parametrize("text", ["", "10,", ",10", "10,,20", "10,10"])
 def test_values_that_can_not_be_meant(text: str) -> None:
     """An empty value, or one given twice, is refused."""
     with pytest.raises(UsageError, match=r"empty|twice"):
-        values_of(text)
+        split_values(text)
 
 
 def test_members_are_the_product(scene: Path, tmp_path: Path) -> None:
     """Two keys with two values each and three seeds: twelve members, four groups of three."""
     words = ["loading.frequency=10,20", "procedure.h=[1, 2],2"]
-    sweep = sweep_plan(scene, tmp_path / "sweep", words, 3, ["loading.mean=8000"])
+    sweep = plan_sweep(scene, tmp_path / "sweep", words, 3, ["loading.mean=8000"])
     assert len(sweep.members) == 12
     assert [len(members) for members in sweep.groups().values()] == [3, 3, 3, 3]
     assert {member.seed for member in sweep.members} == {1, 2, 3}
@@ -63,17 +63,17 @@ def test_members_are_the_product(scene: Path, tmp_path: Path) -> None:
 
 def test_groups_are_told_by_what_differs(scene: Path, tmp_path: Path) -> None:
     """A key with one value is part of a member's folder, and of no label."""
-    sweep = sweep_plan(scene, tmp_path, ["procedure.k=3", "loading.frequency=10,20"], 2)
+    sweep = plan_sweep(scene, tmp_path, ["procedure.k=3", "loading.frequency=10,20"], 2)
     assert list(sweep.groups()) == ["loading.frequency=10", "loading.frequency=20"]
     assert sweep.members[0].name == "procedure.k=3,loading.frequency=10,sample.seed=1"
-    assert list(sweep_plan(scene, tmp_path, ["procedure.k=3"], 2).groups()) == ["the scene"]
+    assert list(plan_sweep(scene, tmp_path, ["procedure.k=3"], 2).groups()) == ["the scene"]
 
 
 def test_seeds_count_from_the_scene(scene: Path, tmp_path: Path) -> None:
     """Seeds count up from the scene's; given as values they are those; one by default."""
 
     def seeds(words: list[str], count: int | None) -> list[int]:
-        return [m.seed for m in sweep_plan(scene, tmp_path / "s", words, count).members]
+        return [m.seed for m in plan_sweep(scene, tmp_path / "s", words, count).members]
 
     scene.write_text(scene.read_text().replace("count = 60", "count = 60\nseed = 40"))
     assert seeds([], 3) == [40, 41, 42]
@@ -87,15 +87,15 @@ def test_seeds_count_from_the_scene(scene: Path, tmp_path: Path) -> None:
 
 def test_more_values_keep_the_names(scene: Path, tmp_path: Path) -> None:
     """A sweep with more values and seeds has the members of the smaller one, by the same names."""
-    small = sweep_plan(scene, tmp_path, ["loading.frequency=10"], 2)
-    large = sweep_plan(scene, tmp_path, ["loading.frequency=20,10"], 4)
+    small = plan_sweep(scene, tmp_path, ["loading.frequency=10"], 2)
+    large = plan_sweep(scene, tmp_path, ["loading.frequency=20,10"], 4)
     assert {m.name for m in small.members} < {m.name for m in large.members}
 
 
 @given(st.text(min_size=1, max_size=300), st.text(min_size=1, max_size=300))
 def test_names_are_folders_and_differ(first: str, second: str) -> None:
     """Any value makes a plain folder name, and two values never the same one."""
-    names = [member_name({"a.b": value}, 1) for value in (first, second)]
+    names = [name_member({"a.b": value}, 1) for value in (first, second)]
     for name in names:
         assert "/" not in name
         assert "\0" not in name
@@ -120,7 +120,7 @@ def test_wrong_values_are_refused_before_anything_starts(
 ) -> None:
     """Every member's scene is checked first, and the message names the value."""
     with pytest.raises(error, match=sentence):
-        sweep_plan(scene, tmp_path / "sweep", words, 2)
+        plan_sweep(scene, tmp_path / "sweep", words, 2)
     assert not (tmp_path / "sweep").exists()
 
 
@@ -129,18 +129,18 @@ def test_a_scene_without_load_is_no_sweep(scene: Path, tmp_path: Path) -> None:
     text = scene.read_text()
     scene.write_text(text.partition("[loading]")[0] + "[engine]" + text.partition("[engine]")[2])
     with pytest.raises(SceneError, match="no load cycles"):
-        sweep_plan(scene, tmp_path / "sweep", [], 2)
+        plan_sweep(scene, tmp_path / "sweep", [], 2)
 
 
 def test_what_a_member_said(tmp_path: Path) -> None:
     """The last error sentence with its remedy; without one the signal, or the last words."""
     screen = tmp_path / "screen.txt"
     screen.write_text("rain of grains\ntrackbed: x.toml: no engine\n  -> install one\n")
-    assert sentence_of(4, screen) == "x.toml: no engine\n  -> install one"
-    assert sentence_of(0, screen) == ""
+    assert read_sentence(4, screen) == "x.toml: no engine\n  -> install one"
+    assert read_sentence(0, screen) == ""
     screen.write_text("rain of grains\n")
-    assert sentence_of(-9, screen) == "the run was ended by SIGKILL"
-    assert sentence_of(1, screen) == "the run ended with exit code 1: rain of grains"
+    assert read_sentence(-9, screen) == "the run was ended by SIGKILL"
+    assert read_sentence(1, screen) == "the run ended with exit code 1: rain of grains"
 
 
 @pytest.mark.parametrize("missing", ["distributed", "pyarrow", "dask_jobqueue"])
@@ -150,21 +150,21 @@ def test_a_missing_library_is_told_before_anything_starts(
     """Exit code 4 and how to get it; dask-jobqueue is asked for only where SLURM is."""
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == missing else 1)
     with pytest.raises(EngineMissing, match=rf"{missing}\n.*trackbed\[sweep\]"):
-        libraries_check("slurm")
+        check_libraries("slurm")
     if missing == "dask_jobqueue":
-        libraries_check("local")
+        check_libraries("local")
 
 
 def test_band_is_students() -> None:
     """Half width t_(n-1) s/sqrt(n): for 1, 2, 3 it is 4.302653 times 1/sqrt(3); one has none."""
-    mean, half = mean_and_half(np.array([[1.0], [2.0], [3.0]]))
+    mean, half = estimate_mean(np.array([[1.0], [2.0], [3.0]]))
     assert mean == pytest.approx([2.0])
     assert half == pytest.approx([4.30265273 / 3**0.5], rel=1e-8)
-    assert np.isnan(mean_and_half(np.array([[1.0]]))[1]).all()
+    assert np.isnan(estimate_mean(np.array([[1.0]]))[1]).all()
 
 
 def test_band_holds_the_mean_as_often_as_it_says() -> None:
     """2,000 samples of five: the 95 % band misses the mean in 5 % of them, give or take 1.5."""
     values = np.random.default_rng(5).normal(3.0, 2.0, size=(5, 2000))
-    mean, half = mean_and_half(values)
+    mean, half = estimate_mean(values)
     assert np.mean(np.abs(mean - 3.0) > half) == pytest.approx(0.05, abs=0.015)

@@ -11,22 +11,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters import contact_law as law
-from adapters.container import Container, sides_needed
-from adapters.decks import PISTON_MARGIN
-from adapters.engine import EngineStart
-from adapters.engine_yade import (
+from adapters.bed import contact_law as law
+from adapters.bed.container import Container, count_sides
+from adapters.bed.state import FloatArray, State
+from adapters.engines.contract import EngineStart
+from adapters.engines.decks import PISTON_MARGIN
+from adapters.engines.yade import (
     YadeEngine,
+    cover_piston,
+    cover_rim,
+    cover_side,
     damping_ratio,
-    piston_face,
-    rim_triangles,
-    shared_parameters,
-    side_triangle,
+    gather_shared_parameters,
 )
 from adapters.errors import EngineFailed, EngineMissing, NotConverged, SceneError
-from adapters.scene import GrainRadius, Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray, State
+from adapters.scene.file import load_scene
+from adapters.scene.tables import GrainRadius, Scene
 from trackbed import command
 from trackbed.scenes import scene_path
 
@@ -34,7 +34,7 @@ ENGINE = YadeEngine()
 
 
 def coarse(*overrides: str) -> Scene:
-    return scene_load(scene_path("karrech-coarse"), ('engine.name="yade"', *overrides))
+    return load_scene(scene_path("karrech-coarse"), ('engine.name="yade"', *overrides))
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -72,7 +72,7 @@ def test_each_key_of_the_scene_is_what_it_says() -> None:
 def test_pairs_have_the_friction_of_the_scene() -> None:
     """mu between grains, at walls, none at mirrors; without friction no tangential damping."""
     scene = coarse("material.grain.friction=0.3", "material.wall.friction=0.0")
-    pairs = {pair["second"]: pair for pair in shared_parameters(scene, 0.1)["pairs"]}
+    pairs = {pair["second"]: pair for pair in gather_shared_parameters(scene, 0.1)["pairs"]}
     assert {name: pair["friction"] for name, pair in pairs.items()} == {
         "grain": 0.3,
         "wall": 0.0,
@@ -141,10 +141,10 @@ def test_mpi_is_refused() -> None:
 @given(st.floats(0.01, 2.0), st.floats(1e-4, 5e-3), st.floats(1e-3, 1.0), st.integers(0, 10**6))
 def test_triangle_covers_its_side(radius: float, grain: float, height: float, number: int) -> None:
     """It lies in the tangent plane and holds the side's rectangle, corner to corner, to height."""
-    sides = sides_needed(radius, grain)
+    sides = count_sides(radius, grain)
     container = Container("cylinder", (), radius, sides=sides)
     angle = float(container.side_angles()[number % sides])
-    triangle = side_triangle(container, angle, height)
+    triangle = cover_side(container, angle, height)
     outward = np.array([np.cos(angle), np.sin(angle), 0.0])
     assert triangle @ outward == pytest.approx(radius, rel=1e-12)
     along = np.array([-outward[1], outward[0], 0.0])
@@ -170,7 +170,7 @@ def test_triangles_of_a_polygon_cover_it_once(corners: int, turn: float) -> None
     """Areas add up to the polygon's and none turns over; every seam goes to the middle."""
     angle = turn + np.linspace(0, 2 * np.pi, corners + 1)[:-1]
     polygon = np.column_stack([np.cos(angle), np.sin(angle)])
-    triangles = rim_triangles(polygon)
+    triangles = cover_rim(polygon)
     area = areas(triangles)
     assert np.all(area > 0)
     assert area.sum() == pytest.approx(corners / 2 * np.sin(2 * np.pi / corners), rel=1e-9)
@@ -181,25 +181,25 @@ def test_grains_meet_the_rim_near_it() -> None:
     """Closer to it than a fifth of a mean radius; a piston of a pebble's size is all rim."""
     grain = GrainRadius(distribution="constant", mean=0.003)
     container = Container("cylinder", ("x", "y"), 0.03)
-    assert piston_face(container, 0.02, grain)["plane_reach"] == pytest.approx(0.02 - 0.0006)
-    assert piston_face(container, 0.0005, grain)["plane_reach"] == 0
-    assert "plane_reach" not in piston_face(container, np.inf, grain)
+    assert cover_piston(container, 0.02, grain)["plane_reach"] == pytest.approx(0.02 - 0.0006)
+    assert cover_piston(container, 0.0005, grain)["plane_reach"] == 0
+    assert "plane_reach" not in cover_piston(container, np.inf, grain)
 
 
 def test_pistons_cover_what_is_loaded() -> None:
     """A whole piston the section with room to spare; a partial one its disc behind the mirrors."""
     container = Container("cylinder", ("x", "y"), 0.03)
     grain = GrainRadius(distribution="constant", mean=0.004 / PISTON_MARGIN)
-    (whole,) = np.array(piston_face(container, np.inf, grain)["triangles"])
+    (whole,) = np.array(cover_piston(container, np.inf, grain)["triangles"])
     for point in [(-0.004, -0.004), (0.034, 0.034), (-0.003, 0.033), (0.033, -0.003)]:
         turns = cross(np.roll(whole, -1, axis=0) - whole, np.array(point) - whole)
         assert np.all(turns <= 1e-18)  # the normal points down
-    part = np.array(piston_face(container, 0.02, grain)["triangles"])
+    part = np.array(cover_piston(container, 0.02, grain)["triangles"])
     assert np.all(areas(part) < 0)
     assert part.min() == pytest.approx(-0.004)
     assert np.linalg.norm(part, axis=2).max() == pytest.approx(0.02, rel=1e-2)
     box = Container("box", (), size_x=0.02, size_y=0.01)
-    (lid,) = np.array(piston_face(box, np.inf, grain)["triangles"])
+    (lid,) = np.array(cover_piston(box, np.inf, grain)["triangles"])
     assert lid.min() == pytest.approx(-0.004)
 
 

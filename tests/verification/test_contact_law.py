@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters import contact_law as law
+from adapters.bed import contact_law as law
 
 YOUNG = st.floats(1e6, 1e12)
 POISSON = st.floats(0, 0.49)

@@ -13,16 +13,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import procedure, stages
-from adapters.dump import Frame, dump_frames, dump_write
-from adapters.engine import EngineRun
-from adapters.engine_fake import FakeEngine
-from adapters.engine_process import engine_failure
+from adapters.engines.contract import EngineRun
+from adapters.engines.fake import FakeEngine
+from adapters.engines.process import explain_engine_failure
 from adapters.errors import EngineFailed, NotCredible
-from adapters.progress import Progress
-from adapters.run_folder import RunFolder
-from adapters.scene import Scene
-from adapters.stages import Bed
+from adapters.files.dump import Frame, read_frames, write_dump
+from adapters.files.run_folder import RunFolder
+from adapters.procedure import run as procedure
+from adapters.procedure import stages
+from adapters.procedure.progress import Progress
+from adapters.procedure.stages import Bed
+from adapters.scene.tables import Scene
 from tests.small_bed import small_bed
 from trackbed import command
 
@@ -72,7 +73,7 @@ def damaged(damage: Damage, *names: str) -> Callable[..., EngineRun]:
 
 
 def frames_of(path: Path) -> list[Frame]:
-    return list(dump_frames(path, allow_nan=True))
+    return list(read_frames(path, allow_nan=True))
 
 
 def last_frame(change: Callable[[Frame], Frame]) -> Damage:
@@ -80,7 +81,7 @@ def last_frame(change: Callable[[Frame], Frame]) -> Damage:
 
     def damage(folder: Path) -> None:
         *before, last = frames_of(folder / "states.dump")
-        dump_write(folder / "states.dump", [*before, change(last)])
+        write_dump(folder / "states.dump", [*before, change(last)])
 
     return damage
 
@@ -115,7 +116,7 @@ def lost_at_the_end(folder: Path) -> None:
 def lost_always(folder: Path) -> None:
     frames = frames_of(folder / "states.dump")
     less = [replace(frame, values=np.delete(frame.values, 6, axis=0)) for frame in frames]
-    dump_write(folder / "states.dump", less)
+    write_dump(folder / "states.dump", less)
 
 
 def truncated(name: str, share: float) -> Damage:
@@ -133,7 +134,7 @@ def short(*names: str) -> Damage:
 
     def damage(folder: Path) -> None:
         for name in names:
-            dump_write(folder / name, frames_of(folder / name)[:-1])
+            write_dump(folder / name, frames_of(folder / name)[:-1])
 
     return damage
 
@@ -258,7 +259,11 @@ def failing(count: int, error: Exception) -> Callable[..., EngineRun]:
 
 @pytest.mark.parametrize(
     "error",
-    [NotCredible("made to fail"), EngineFailed("made to fail"), engine_failure(-11, Path("."))],
+    [
+        NotCredible("made to fail"),
+        EngineFailed("made to fail"),
+        explain_engine_failure(-11, Path(".")),
+    ],
 )
 @pytest.mark.parametrize("count", [1, 2, 3])
 @pytest.mark.long
@@ -360,7 +365,7 @@ def test_killed_engine_is_not_a_failed_jump(
 ) -> None:
     """An engine killed from outside stops the run: a shorter jump would not help."""
     run = scene.parent / "run"
-    error = engine_failure(status, scene.parent)
+    error = explain_engine_failure(status, scene.parent)
     with monkeypatch.context() as patch:
         patch.setattr(FakeEngine, "run", failing(4, error))
         assert command.main(["run", str(scene)]) == 5
@@ -467,10 +472,10 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 @pytest.mark.parametrize(
     ("where", "stage"),
     [
-        ("adapters.stages.state_save", ""),
-        ("adapters.stages.window_save", "preparation"),
-        ("adapters.run_folder.write_whole", ""),
-        ("adapters.engine_fake.dump_write", ""),
+        ("adapters.procedure.stages.state_save", ""),
+        ("adapters.procedure.stages.window_save", "preparation"),
+        ("adapters.files.run_folder.write_whole", ""),
+        ("adapters.engines.fake.dump_write", ""),
     ],
 )
 def test_full_disk(
@@ -503,7 +508,7 @@ def test_full_disk_in_a_jump_is_no_failed_jump(
 ) -> None:
     """The disk is full while the jump is saved: the jump is not given up for it."""
     run = scene.parent / "run"
-    real = stages.state_save
+    real = stages.save_state
 
     def full(state: object, path: Path) -> None:
         if path.name == "relaxed.npz":
@@ -511,7 +516,7 @@ def test_full_disk_in_a_jump_is_no_failed_jump(
         real(state, path)  # type: ignore[arg-type]
 
     with monkeypatch.context() as patch:
-        patch.setattr(stages, "state_save", full)
+        patch.setattr(stages, "save_state", full)
         assert command.main(["run", str(scene)]) == 5
     assert not any(event["event"] == "jump failed" for event in RunFolder(run).events())
     assert command.main(["resume", str(run)]) == 0
@@ -544,7 +549,7 @@ def test_full_disk_at_the_lock(
     def full() -> str:
         raise FULL
 
-    monkeypatch.setattr("trackbed.run_folder.socket.gethostname", full)
+    monkeypatch.setattr("trackbed.run_files.folder.socket.gethostname", full)
     assert command.main(["resume", str(run)]) == 5
     assert "the disk is full" in capsys.readouterr().err
 
@@ -659,12 +664,12 @@ def test_engine_that_fails(
 )
 def test_who_is_to_blame(scene: Path, programs: Path, work: str, from_outside: bool) -> None:
     """Only an engine that began and then failed by itself can blame the jump before it."""
-    from adapters.engine_liggghts import LiggghtsEngine
-    from adapters.scene_file import scene_load
+    from adapters.engines.liggghts import LiggghtsEngine
+    from adapters.scene.file import load_scene
 
     install(programs, GOOD, work)
     with pytest.raises(EngineFailed) as caught:
-        LiggghtsEngine().run(scene_load(scene), "in.cycles", scene.parent, lambda: None, {})
+        LiggghtsEngine().run(load_scene(scene), "in.cycles", scene.parent, lambda: None, {})
     assert caught.value.from_outside == from_outside
 
 
@@ -697,7 +702,7 @@ def test_library_use_in_a_thread(scene: Path) -> None:
 def test_what_an_engine_says_is_explained(tmp_path: Path, words: str, meaning: str) -> None:
     """Where the physics of a scene ended an engine, the remedy is one of physics."""
     (tmp_path / "screen.txt").write_text(f"Step\n{words}\n")
-    error = engine_failure(1, tmp_path)
+    error = explain_engine_failure(1, tmp_path)
     assert words in str(error)
     assert meaning in error.remedy
     assert error.exit_code == 5

@@ -9,19 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters import fit_band
+from adapters.bed.state import FloatArray
 from adapters.errors import JumpRefused, NotConverged, UsageError
-from adapters.fit import Series, cycles_needed, fit_series
-from adapters.fit_band import autoregression, fit_noise, prediction_band
-from adapters.laws import Law, law_named
-from adapters.residual import error_term
-from adapters.state import FloatArray
+from adapters.laws import Law, get_law
+from adapters.laws.fit import band as fit_band
+from adapters.laws.fit.band import draw_autoregression, estimate_fit_noise, estimate_prediction_band
+from adapters.laws.fit.prediction import Series, count_cycles_needed, fit_series
+from adapters.laws.fit.residual import fit_error_term
 
 pytestmark = pytest.mark.lowest
 
-LOG = law_named("log")
+LOG = get_law("log")
 every_law = pytest.mark.parametrize(
-    "law", [law_named(name) for name in ("karrech2007", "linear", "log", "log-linear")]
+    "law", [get_law(name) for name in ("karrech2007", "linear", "log", "log-linear")]
 )
 
 
@@ -36,7 +36,7 @@ def correlated_noise(seed: int, count: int, correlation: float, many: int) -> Fl
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.95])
 def test_autoregression_is_its_recursion(correlation: float) -> None:
     """The filter gives the same series as a loop: of variance 1 from its first value on."""
-    filtered = autoregression(np.random.default_rng(5), correlation, (30, 4))
+    filtered = draw_autoregression(np.random.default_rng(5), correlation, (30, 4))
     np.testing.assert_allclose(filtered, correlated_noise(5, 30, correlation, 4), atol=1e-13)
 
 
@@ -50,7 +50,7 @@ def test_autoregression_is_its_recursion(correlation: float) -> None:
 )
 def test_series_that_follows_a_law_is_predicted(name: str, parameters: dict[str, float]) -> None:
     """A series on the law returns its parameters and its continuation to round-off."""
-    cycle, law = np.arange(1.0, 101.0), law_named(name)
+    cycle, law = np.arange(1.0, 101.0), get_law(name)
     values = np.array(list(parameters.values()))
     found = fit_series(Series(cycle, law.value(values, cycle), "mm"), law, 1000)
     assert found.parameters == pytest.approx(parameters, rel=1e-9)
@@ -69,7 +69,7 @@ def test_series_that_follows_a_law_is_predicted(name: str, parameters: dict[str,
 def test_karrech2007_counts_twice_what_was_computed() -> None:
     """Eq. 17 as printed adds the whole law to the last settlement."""
     cycle = np.arange(1.0, 101.0)
-    law = law_named("karrech2007")
+    law = get_law("karrech2007")
     series = Series(cycle, law.value(np.array([0.3, 0.01]), cycle))
     expected = series.settlement[-1] + 0.3 * log(1000) + 0.01 * 1000
     assert fit_series(series, law, 1000).prediction == pytest.approx(expected, rel=1e-9)
@@ -123,7 +123,7 @@ def test_fit_noise_covers_correlated_residuals(correlation: float, reach: float)
         settlement = 10 * np.log(cycle) + noise[:40, column]
         truth = 10 * log(60 + step) + noise[-1, column]
         found = settlement[-1] + LOG.increment(LOG.fit(cycle, settlement), 60.0, 60.0 + step)
-        half = fit_noise(LOG, cycle, settlement, 60.0 + step, 0.9)
+        half = estimate_fit_noise(LOG, cycle, settlement, 60.0 + step, 0.9)
         inside += abs(float(found) - truth) <= half
     assert 0.83 < inside / many < 0.97
 
@@ -134,8 +134,8 @@ def test_ignoring_correlation_would_not_cover() -> None:
     settlement = 10 * np.log(cycle) + correlated_noise(3, 40, 0.8, 1)[:, 0]
     shuffled = settlement - 10 * np.log(cycle)
     np.random.default_rng(0).shuffle(shuffled)
-    half = fit_noise(LOG, cycle, settlement, 6000.0, 0.9)
-    independent = fit_noise(LOG, cycle, 10 * np.log(cycle) + shuffled, 6000.0, 0.9)
+    half = estimate_fit_noise(LOG, cycle, settlement, 6000.0, 0.9)
+    independent = estimate_fit_noise(LOG, cycle, 10 * np.log(cycle) + shuffled, 6000.0, 0.9)
     assert half > 1.5 * independent
 
 
@@ -149,12 +149,12 @@ def test_noise_of_a_long_series_is_that_of_every_cycle(
     Both are from 66 members at least, each with a scatter of 9 %, of the same seed but not the
     same noise.  Every 15th cycle with the noise of all would make it wider by a half and more.
     """
-    cycle, law = np.arange(6001.0, 12001.0), law_named(name)
+    cycle, law = np.arange(6001.0, 12001.0), get_law(name)
     trend = law.value(np.array([0.0, 300.0, 3e4][: len(law.parameter_names)]), cycle)
     settlement = trend + correlated_noise(11, 6000, correlation, 1)[:, 0]
-    every = fit_noise(law, cycle, settlement, 1e9, 0.9)
+    every = estimate_fit_noise(law, cycle, settlement, 1e9, 0.9)
     monkeypatch.setattr(fit_band, "NOISE_ROWS", 400)
-    assert fit_noise(law, cycle, settlement, 1e9, 0.9) == pytest.approx(every, rel=0.15)
+    assert estimate_fit_noise(law, cycle, settlement, 1e9, 0.9) == pytest.approx(every, rel=0.15)
 
 
 settlements = st.integers(0, 2**32 - 1).map(
@@ -191,7 +191,7 @@ def test_prediction_scales_with_the_unit_of_length(law: Law) -> None:
 @pytest.mark.parametrize("duration", [0.02, 20.0])
 def test_band_does_not_depend_on_the_unit_of_time(name: str, duration: float) -> None:
     """Cycles, seconds and milliseconds give one prediction and one band."""
-    law = law_named(name)
+    law = get_law(name)
     cycle = np.arange(6.0, 31.0)
     settlement = np.log(cycle) + correlated_noise(1, 25, 0.5, 1)[:, 0]
     here = fit_series(Series(cycle, settlement), law, 90)
@@ -206,7 +206,7 @@ def test_last_cycle_itself_is_known() -> None:
     settlement = np.log(cycle) + correlated_noise(1, 25, 0.5, 1)[:, 0]
     found = fit_series(Series(cycle, settlement), LOG, 30)
     assert found.prediction == found.band[0] == found.band[1] == settlement[-1]
-    below, above = prediction_band(LOG, cycle, settlement, 30 * (1 + 1e-9), 0.9)
+    below, above = estimate_prediction_band(LOG, cycle, settlement, 30 * (1 + 1e-9), 0.9)
     assert max(below, above) < 1e-3 * np.ptp(settlement)
 
 
@@ -220,7 +220,7 @@ def test_a_band_does_not_rise(name: str, sign: float) -> None:
     """
     cycle = np.unique(np.geomspace(1, 1e4, 30).round())
     series = Series(cycle, sign * 1.2 * np.log(cycle))
-    low, high = sorted(sign * end for end in fit_series(series, law_named(name), 1e10).band)
+    low, high = sorted(sign * end for end in fit_series(series, get_law(name), 1e10).band)
     assert low > sign * series.settlement[-1] - 6.3 * 2
     assert high > 100
 
@@ -239,7 +239,7 @@ def test_a_settled_bed_stays_where_it_is() -> None:
     """A constant series predicts itself, with no band, for every law with a constant."""
     series = Series(np.arange(1.0, 11.0), np.full(10, 3.0))
     for name in ("linear", "log", "log-linear"):
-        found = fit_series(series, law_named(name), 1e6)
+        found = fit_series(series, get_law(name), 1e6)
         assert [found.prediction, *found.band] == pytest.approx([3.0] * 3, abs=1e-6)
 
 
@@ -250,7 +250,7 @@ def test_cycle_zero_is_no_obstacle() -> None:
     with_zero = fit_series(Series(cycle, settlement), LOG, 20)
     without = fit_series(Series(cycle[1:], settlement[1:]), LOG, 20)
     assert with_zero == without
-    linear = fit_series(Series(cycle, settlement), law_named("linear"), 20)
+    linear = fit_series(Series(cycle, settlement), get_law("linear"), 20)
     assert linear.prediction == pytest.approx(2 * settlement[-1])
 
 
@@ -258,9 +258,9 @@ def test_cycles_needed_is_eq_15_on_the_residuals() -> None:
     """The bound takes a and b from the residuals of the law, p = 1 - confidence."""
     cycle = np.arange(0.0, 41.0)
     settlement = np.log(cycle + 1) + correlated_noise(2, 41, 0.5, 1)[:, 0]
-    residual = error_term(LOG, cycle[1:], settlement[1:])
+    residual = fit_error_term(LOG, cycle[1:], settlement[1:])
     expected = ceil(np.ptp(residual) ** 2 / (2 * 0.3**2) * log(2 / 0.05))
-    assert cycles_needed(Series(cycle, settlement), LOG, 0.3, 0.95) == expected
+    assert count_cycles_needed(Series(cycle, settlement), LOG, 0.3, 0.95) == expected
 
 
 @pytest.mark.parametrize("to_cycle", [29.0, -1.0, np.nan, np.inf])
@@ -281,9 +281,9 @@ def test_faulty_series_are_refused() -> None:
             fit_series(series, LOG, 20, probability)
     huge = Series(np.arange(1.0, 11.0), 1e300 * np.arange(10.0))
     with pytest.raises(NotConverged, match=r"no finite settlement at cycle 1e[+]300"):
-        fit_series(huge, law_named("linear"), 1e300)
+        fit_series(huge, get_law("linear"), 1e300)
     late = Series(huge.cycle + 500, huge.settlement).after(500)
     with pytest.raises(NotConverged, match="no finite settlement at cycle 1000000500"):
-        fit_series(late, law_named("linear"), 1e9)
+        fit_series(late, get_law("linear"), 1e9)
     with pytest.raises(JumpRefused, match="was reached at cycle 502"):
-        fit_series(late, law_named("linear"), 1e9, fail_at=1.0)
+        fit_series(late, get_law("linear"), 1e9, fail_at=1.0)

@@ -11,20 +11,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adapters.bed.state import FloatArray
 from adapters.errors import JumpRefused, NotConverged, TrackbedError, UsageError
-from adapters.fit import Prediction, Series, fit_auto, fit_series, regime_of
-from adapters.fit_auto import AGREE, laws_said, outlook
-from adapters.fit_candidates import (
+from adapters.laws import get_law
+from adapters.laws.fit.candidates import (
     SLOW_LAWS,
-    candidates_of,
-    constant_rate_gains,
-    held_out_rows,
+    count_held_out_rows,
+    find_candidates,
+    fit_constant_rate_gains,
     thinned,
 )
-from adapters.fit_refusal import UNCERTAIN, refusals
-from adapters.fit_regime import SHAKEDOWN, independent, regimes_of, tail_rows
-from adapters.laws import law_named
-from adapters.state import FloatArray
+from adapters.laws.fit.outlook import AGREE, compare_laws, outlook
+from adapters.laws.fit.prediction import Prediction, Series, find_regime, fit_auto, fit_series
+from adapters.laws.fit.refusal import UNCERTAIN, refusals
+from adapters.laws.fit.regime import SHAKEDOWN, find_regimes, independent, select_tail
 from trackbed.command import main
 
 READ = np.unique(np.geomspace(1, 1000, 22).round())
@@ -55,7 +55,7 @@ def test_regimes_of_known_series(name: str, seed: int | None) -> None:
     alike = ({"shakedown", "steady"}, {"ratcheting", "collapse"})
     for settlement in SERIES[name]:
         read = settlement if seed is None else noisy(settlement, seed)
-        found = regime_of(Series(READ, read))
+        found = find_regime(Series(READ, read))
         same = next(names for names in alike if name in names)
         assert found == name if seed is None else found in same
 
@@ -68,7 +68,7 @@ def test_exponent_of_the_tail_is_measured(exponent: float) -> None:
     reading 1/20 of that: it says little more than what was thought before.
     """
     settlement = 3 + READ**exponent / exponent
-    (found,) = regimes_of(READ, settlement[:, None])
+    (found,) = find_regimes(READ, settlement[:, None])
     assert abs(found.exponent - exponent) < max(2 * found.deviation, 0.05)
     assert found.deviation < (0.15 if exponent > 0 else 0.8)
     assert (found.bounded > 0.5) == (exponent < 0)
@@ -90,7 +90,7 @@ def test_exponent_knows_how_little_a_computed_series_says() -> None:
     """
     cycle = np.arange(1.0, 101.0)
     walks = 0.02 * np.random.default_rng(4).standard_normal((100, 200)).cumsum(axis=0)
-    found = regimes_of(*thinned(cycle, np.log(cycle)[:, None] + walks))
+    found = find_regimes(*thinned(cycle, np.log(cycle)[:, None] + walks))
     assert sum(abs(regime.exponent) < 2 * regime.deviation for regime in found) >= 140
     assert all(regime.jump_allowed for regime in found)
 
@@ -107,7 +107,7 @@ def test_a_law_of_the_bank_is_continued(name: str) -> None:
         "stretched-exponential": [0.5, 2.0, 60.0, 0.5],
         "inverse-log": [0.5, 2.0, 20.0, 0.5],
     }[name]
-    law = law_named(name)
+    law = get_law(name)
     truth = law.value(np.array(parameters), np.append(READ, 1e4))
     found = fit_auto(Series(READ, truth[:-1]), 1e4)
     assert found.prediction == pytest.approx(truth[-1], rel=0.05)
@@ -122,10 +122,11 @@ def test_a_law_of_the_bank_is_continued(name: str) -> None:
 def test_band_holds_a_constant_rate_that_the_tail_shows(name: str, parameters: list[float]) -> None:
     """A quarter of the rate at cycle 1000 goes on for ever: 7 of 10 bands hold it at 1e4.
 
-    Of 10 that hold with 90 %, fewer than 7 do with a chance of 1 %.  Without `constant_rate_gains`
+    Of 10 that hold with 90 %, fewer than 7 do with a chance of 1 %.  Without
+    `fit_constant_rate_gains`
     none does.
     """
-    cycle, law, inside = np.unique(np.geomspace(1, 1000, 60).round()), law_named(name), 0
+    cycle, law, inside = np.unique(np.geomspace(1, 1000, 60).round()), get_law(name), 0
     truth = law.value(np.array(parameters), np.append(cycle, 1e4))
     for seed in range(10):
         noise = 0.001 * np.random.default_rng(seed).standard_normal(len(cycle))
@@ -138,10 +139,10 @@ def test_constant_rate_is_not_believed_of_a_power_law() -> None:
     """The band of N^0.3 is what it is without: a + b N beside a logarithm fits it worse."""
     cycle = np.geomspace(1, 1000, 40)
     for exponent in (0.15, 0.3, 0.45):
-        gains = constant_rate_gains(cycle, cycle[:, None] ** exponent, 1e4)
+        gains = fit_constant_rate_gains(cycle, cycle[:, None] ** exponent, 1e4)
         assert np.isnan(gains).all()
     ratchet = np.log(cycle) + 3e-4 * cycle
-    gains = constant_rate_gains(cycle, ratchet[:, None], 1e4)
+    gains = fit_constant_rate_gains(cycle, ratchet[:, None], 1e4)
     assert np.nanmax(gains) == pytest.approx(np.log(10) + 2.7, rel=1e-6)
 
 
@@ -153,7 +154,7 @@ def test_jumps_are_refused_with_a_sentence(name: str) -> None:
         fit_auto(series, 1e4)
     assert (raised.value.exit_code, raised.value.regime) == (6, name)
     assert "--law" in raised.value.remedy
-    named = fit_series(series, law_named("linear"), 1e4)
+    named = fit_series(series, get_law("linear"), 1e4)
     assert named.regime == name
     here = fit_auto(series, READ[-1])  # no jump: nothing to refuse
     assert here.prediction == here.band[0] == here.band[1] == series.settlement[-1]
@@ -222,7 +223,7 @@ def test_sentences_count_as_the_user_does() -> None:
                 if law == "auto":
                     fit_auto(moved(settlement), to_cycle, fail_at=fail_at)
                 else:
-                    fit_series(moved(settlement), law_named(law), to_cycle, fail_at=fail_at)
+                    fit_series(moved(settlement), get_law(law), to_cycle, fail_at=fail_at)
             except TrackbedError as error:
                 found.append(error.what)
         return found
@@ -255,7 +256,7 @@ def test_a_prediction_that_reaches_failure_is_refused(name: str, sign: int) -> N
     def said(fail_at: float | None, to_cycle: float = 1e4) -> Prediction:
         if name == "auto":
             return fit_auto(series, to_cycle, fail_at=fail_at)
-        return fit_series(series, law_named(name), to_cycle, fail_at=fail_at)
+        return fit_series(series, get_law(name), to_cycle, fail_at=fail_at)
 
     def predicted(fail_at: float, to_cycle: float = 1e4) -> float:
         return said(fail_at, to_cycle).prediction
@@ -277,7 +278,7 @@ def test_a_prediction_that_reaches_failure_is_refused(name: str, sign: int) -> N
 def test_which_laws_agree() -> None:
     """Of an exact logarithm the logarithm agrees, and the hyperbola, which ends, does not."""
     found = outlook(READ, (np.log(READ) + 1)[:, None], 1e6)
-    said = laws_said(found)
+    said = compare_laws(found)
     assert list(said) == list(SLOW_LAWS)
     assert said["log"].agrees
     assert said["log"].votes == 3
@@ -289,7 +290,7 @@ def test_which_laws_agree() -> None:
         assert one.agrees == (abs(gain / joint - 1) <= AGREE)
         assert one.inside == (found.low[0] <= one.prediction <= found.high[0])
     assert not said["hyperbolic"].agrees
-    assert all(one.inside is None for one in laws_said(found, refused=True).values())
+    assert all(one.inside is None for one in compare_laws(found, refused=True).values())
 
 
 @pytest.mark.parametrize("level", [0.0, 1e3])
@@ -300,13 +301,13 @@ def test_agreement_is_that_of_what_comes(level: float) -> None:
     a bed at rest: one that moves by its last digit only.
     """
     read = (np.log(READ) + 1 + level)[:, None]
-    said = laws_said(outlook(READ, read, 1100.0))
+    said = compare_laws(outlook(READ, read, 1100.0))
     assert [name for name, one in said.items() if not one.agrees] == ["hyperbolic"]
     assert said["hyperbolic"].prediction == pytest.approx(said["log"].prediction, rel=0.01)
-    assert all(one.agrees for one in laws_said(outlook(READ, read, 1001.0)).values())
+    assert all(one.agrees for one in compare_laws(outlook(READ, read, 1001.0)).values())
     digit = 1e-3 * np.random.default_rng(1).integers(0, 2, len(READ))
     for rest in (np.zeros(len(READ)), digit):
-        said = laws_said(outlook(READ, (level + rest)[:, None], 1100.0))
+        said = compare_laws(outlook(READ, (level + rest)[:, None], 1100.0))
         assert all(one.agrees for one in said.values())
 
 
@@ -373,12 +374,12 @@ def test_held_out_block_is_never_fitted() -> None:
 
     Its first row is changed too, which a fit that reached one row too far would see.
     """
-    before = held_out_rows(READ)
+    before = count_held_out_rows(READ)
     assert READ[before - 1] <= READ[-1] / 10**0.5 < READ[before]
     read = np.log(READ)[:, None]
     other = read.copy()
     other[[before, -1]] += 0.5
-    one, two = (candidates_of(READ, rows, 1e4) for rows in (read, other))
+    one, two = (find_candidates(READ, rows, 1e4) for rows in (read, other))
     np.testing.assert_allclose(two.combined_miss - one.combined_miss, -0.5, atol=1e-9)
 
 
@@ -431,9 +432,9 @@ def test_hard_series() -> None:
 
 def test_tail_is_the_last_decade() -> None:
     """Cycles from N_k / 10 on, six at least."""
-    assert READ[tail_rows(READ)][0] >= 100 > READ[tail_rows(READ).start - 1]
+    assert READ[select_tail(READ)][0] >= 100 > READ[select_tail(READ).start - 1]
     sparse = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0])
-    assert len(sparse[tail_rows(sparse)]) == 6
+    assert len(sparse[select_tail(sparse)]) == 6
 
 
 def test_command_refuses_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -504,7 +505,7 @@ def test_a_series_that_has_failed_is_no_series_to_predict_from(law: str) -> None
     def predicted(fail_at: float, to_cycle: float) -> float:
         if law == "auto":
             return fit_auto(series, to_cycle, fail_at=fail_at).prediction
-        return fit_series(series, law_named(law), to_cycle, fail_at=fail_at).prediction
+        return fit_series(series, get_law(law), to_cycle, fail_at=fail_at).prediction
 
     for to_cycle in (100.0, 1000.0):
         with pytest.raises(JumpRefused, match="was reached at cycle 54"):

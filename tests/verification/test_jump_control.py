@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from adapters.jump_band import band_of
-from adapters.jump_check import ALLOWANCE, CHANGED, accept, drift_of, judge, reject
-from adapters.jump_control import (
+from adapters.bed.state import FloatArray
+from adapters.jumps.band import estimate_band
+from adapters.jumps.check import ALLOWANCE, CHANGED, accept, judge, reject, sum_drift
+from adapters.jumps.control import (
     GROWTH,
     LONGEST_WINDOW,
     Control,
@@ -21,16 +22,15 @@ from adapters.jump_control import (
     decide,
     observe,
 )
-from adapters.jump_forecast import forecast_of, gain_between, laws_gain
-from adapters.jump_rates import (
+from adapters.jumps.forecast import bound_gain_by_laws, fit_forecast, integrate_gain
+from adapters.jumps.rates import (
     Stretch,
-    cycles_bound,
-    long_run_variance,
-    noise_of,
-    rates_of,
-    slope_trend,
+    bound_cycles,
+    estimate_long_run_variance,
+    estimate_noise,
+    fit_slope_trend,
+    measure_rates,
 )
-from adapters.state import FloatArray
 from tests.jump_curves import CURVES, Curve, play
 
 SETTINGS = Settings(tolerance=0.02, healing=5, total_cycles=2000)
@@ -56,7 +56,7 @@ def test_long_run_variance_of_an_autoregression() -> None:
     """S = sigma^2 / (1 - rho)^2 of x_t = rho x_(t-1) + sigma e_t; Bartlett takes a little less."""
     random, rho = np.random.default_rng(1), 0.5
     series = lfilter([1.0], [1.0, -rho], random.standard_normal((400, 400)), axis=0)
-    found = np.mean([long_run_variance(series[:, i]) for i in range(400)])
+    found = np.mean([estimate_long_run_variance(series[:, i]) for i in range(400)])
     # Bartlett's weights, L = 20, miss 2 sum_l (l / L) gamma_l; a trend of two parameters takes
     # 2 S / k from each of the L covariances that are added.
     missed = 2 / (1 - rho**2) * rho / (20 * (1 - rho) ** 2)
@@ -66,7 +66,7 @@ def test_long_run_variance_of_an_autoregression() -> None:
 
 def test_a_straight_trend_is_no_noise() -> None:
     """Gains that fall in a straight line have no long-run variance but round-off."""
-    assert long_run_variance(np.linspace(2.0, 1.0, 30)) < 1e-25
+    assert estimate_long_run_variance(np.linspace(2.0, 1.0, 30)) < 1e-25
 
 
 def test_quiet_windows_are_not_believed_more() -> None:
@@ -83,7 +83,7 @@ def test_quiet_windows_are_not_believed_more() -> None:
             stretch(n, 1e-3 / (n + 5) * gain)
             for n, gain in zip(range(1000, 1160, 20), gains, strict=True)
         ]
-        forecast = forecast_of(rates_of(beds))
+        forecast = fit_forecast(measure_rates(beds))
         found.append(float(forecast.rate @ forecast.weight))
     error = float(np.std(found)) / 40**0.5
     assert np.mean(found) == pytest.approx(1e-3 / 1150, abs=2 * error)
@@ -98,7 +98,7 @@ def test_noise_in_proportion_to_the_rate_is_told_from_constant_noise() -> None:
             for n in (100, 200, 400, 1000)
             for noise in [random.standard_normal(30)]
         ]
-        noise = noise_of(beds).variance
+        noise = estimate_noise(beds).variance
         ratio = (100 / 1000) ** (2 * power)
         assert noise[-1] / noise[0] == pytest.approx(ratio, rel=0.35)
 
@@ -110,9 +110,9 @@ def test_a_noisy_slope_is_no_curvature() -> None:
         stretch(n, 1e-4 / (n + np.arange(20.0)) * (1 + 0.3 * random.standard_normal(20)))
         for n in (100, 150, 220)
     ]
-    slope, error = slope_trend(rates_of(noisy))
+    slope, error = fit_slope_trend(measure_rates(noisy))
     assert abs(slope) < 2 * error
-    slope, error = slope_trend(rates_of([of_law(n, 20, 0.5) for n in (100, 150, 220)]))
+    slope, error = fit_slope_trend(measure_rates([of_law(n, 20, 0.5) for n in (100, 150, 220)]))
     assert slope > 5 * error
 
 
@@ -120,7 +120,7 @@ def test_a_noisy_slope_is_no_curvature() -> None:
 def test_forecast_of_a_power_law(beta: float) -> None:
     """Four windows over a doubling of N, without noise, give the gain of the next half doubling."""
     beds = [of_law(n, 20, beta) for n in (100, 130, 160, 200)]
-    forecast = forecast_of(rates_of(beds))
+    forecast = fit_forecast(measure_rates(beds))
     truth = float(of_law(220, 110, beta).gain.sum())
     noise, form = forecast.half_widths(220, 330.0, 0.9)
     # laws are known to 2 % of a block (LAW_ERROR), so beta only to some tenths
@@ -132,7 +132,7 @@ def test_units_do_not_matter() -> None:
     """Millimetres instead of metres, ten times the cycles: the same gain and the same weights."""
     beds = [of_law(n, 20, 0.3) for n in (100, 200)]
     scaled = [stretch(one.first_cycle, 1e3 * one.gain) for one in beds]
-    one, other = (forecast_of(rates_of(of)) for of in (beds, scaled))
+    one, other = (fit_forecast(measure_rates(of)) for of in (beds, scaled))
     np.testing.assert_allclose(other.weight, one.weight, rtol=1e-9)
     assert float(other.gain(220, 300.0)) == pytest.approx(1e3 * float(one.gain(220, 300.0)))
 
@@ -141,27 +141,27 @@ def test_gain_between_is_exact_for_powers() -> None:
     """Rates at both ends of a power law give its integral; of opposite signs, the trapezoid."""
     for beta in (-1.5, -0.4, 0.7, 1.0):
         truth = (300**beta - 100**beta) / beta
-        found = gain_between(100 ** (beta - 1), 300 ** (beta - 1), 100, 300)
+        found = integrate_gain(100 ** (beta - 1), 300 ** (beta - 1), 100, 300)
         assert found == pytest.approx(truth, rel=1e-9)
-    assert gain_between(1 / 100, 1 / 300, 100, 300) == pytest.approx(log(3))
-    assert gain_between(-1 / 100, 1 / 300, 100, 300) == pytest.approx(0.0, abs=1e-15)
+    assert integrate_gain(1 / 100, 1 / 300, 100, 300) == pytest.approx(log(3))
+    assert integrate_gain(-1 / 100, 1 / 300, 100, 300) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_slow_laws_of_a_curve() -> None:
     """On a noise-free logarithm all laws that hold it agree within a few per cent of the gain."""
     cycle = np.arange(20.0, 101)
-    low, high = laws_gain(cycle, np.log(cycle), np.array([150.0]), 0.9)
+    low, high = bound_gain_by_laws(cycle, np.log(cycle), np.array([150.0]), 0.9)
     assert low[0] < log(1.5) < high[0]
     assert high[0] - low[0] < 0.2 * log(1.5)
-    low, high = laws_gain(cycle[:5], cycle[:5], np.array([10.0]), 0.9)
+    low, high = bound_gain_by_laws(cycle[:5], cycle[:5], np.array([10.0]), 0.9)
     assert (low[0], high[0]) == (-inf, inf)
 
 
 def test_paper_bound_is_told() -> None:
     """(b - a)^2 / (2 eps^2) ln(2 / p): range 2, eps 1, p 0.1 is 5.99, so 6; none for eps 0."""
     gains = stretch(100, np.array([1.0, -1.0, 1.0, -1.0]))
-    assert cycles_bound(gains, 1.0, 0.9) == 6
-    assert cycles_bound(gains, 0.0, 0.9) is None
+    assert bound_cycles(gains, 1.0, 0.9) == 6
+    assert bound_cycles(gains, 0.0, 0.9) is None
 
 
 # --- decisions ------------------------------------------------------------------------------
@@ -209,7 +209,7 @@ def test_slope_rule() -> None:
     """The longest jump by the slope is where g x^2 / 2 reaches 0.9 of the tolerance's error."""
     beds = [of_law(n, 20, 0.4) for n in (50, 80, 120)]
     control = known(*beds)
-    trend, error = slope_trend(rates_of(beds))
+    trend, error = fit_slope_trend(measure_rates(beds))
     longest = dict(decide(control, SETTINGS).limits)["slope"]
     missed = 0.5 * (trend - error) * log(1 + longest / 140) ** 2
     gain = float(of_law(140, int(longest), 0.4).gain.sum())
@@ -285,7 +285,7 @@ def test_a_rate_that_changed_is_seen_and_the_past_forgotten() -> None:
     assert check.changed
     assert not check.accepted
     before, behind = 1e-4 / 70, after.rate
-    expected = gain_between(before, behind, 70, after.first_cycle + 5)
+    expected = integrate_gain(before, behind, 70, after.first_cycle + 5)
     assert check.expected == pytest.approx(expected, rel=0.1)  # kappa has a share
     shorter = reject(control, decision, check.error, SETTINGS)
     assert shorter.cycle == control.cycle
@@ -303,13 +303,13 @@ def test_deviations_to_one_side_are_summed() -> None:
     bound = CHANGED - ALLOWANCE
     drift = (0.0, 0.0)
     for deviation, down in ((-1.7, 1.2), (-2.0, 2.7), (-2.2, 4.4)):
-        drift = drift_of(drift, deviation)
+        drift = sum_drift(drift, deviation)
         assert drift == pytest.approx((0.0, down))
         assert (max(drift) > bound) == (deviation == -2.2)
-    assert max(drift_of((0.0, 0.0), 3.49)) < bound < max(drift_of((0.0, 0.0), 3.51))
+    assert max(sum_drift((0.0, 0.0), 3.49)) < bound < max(sum_drift((0.0, 0.0), 3.51))
     drift = (0.0, 0.0)
     for turn in range(20):
-        drift = drift_of(drift, (-1.0) ** turn * 3)
+        drift = sum_drift(drift, (-1.0) ** turn * 3)
         assert max(drift) < bound
 
 
@@ -375,7 +375,7 @@ def test_realised_errors_within_the_tolerance(name: str) -> None:
     assert np.mean(errors <= SETTINGS.tolerance) >= 0.9
     inside = 0
     for run in runs:
-        band = band_of(1000, run.settlement, run.checks)
+        band = estimate_band(1000, run.settlement, run.checks)
         inside += band.mean_low <= run.truth <= band.mean_high
         assert run.computed < 600
     assert np.mean([(run.settlement / run.truth - 1) ** 2 for run in runs]) < 0.1**2
@@ -395,7 +395,7 @@ def test_a_moved_bed_that_settles_more() -> None:
         [play(replace(one, seed=seed), 50, settings) for seed in range(5)] for one in (moved, bare)
     )
     assert np.mean([(run.settlement / run.truth - 1) ** 2 for run in runs]) < 0.1**2
-    bands = [band_of(1000, run.settlement, run.checks) for run in runs]
+    bands = [estimate_band(1000, run.settlement, run.checks) for run in runs]
     pairs = zip(bands, runs, strict=True)
     assert sum(band.mean_low <= run.truth <= band.mean_high for band, run in pairs) >= 4
     assert sum(run.computed for run in runs) < 1.5 * sum(run.computed for run in others)
@@ -471,7 +471,7 @@ def test_band_of_two_jumps() -> None:
     known = {"gained": 1.0, "expected": 2.0, "form": 2.0, "jump": 10, "window": 5}
     first = known | {"sources": [(10, 4, 1.0, 0.5), (25, 4, 1.0, 0.5)]}
     second = known | {"sources": [(25, 4, 1.0, 0.25), (40, 4, 1.0, 0.25)]}
-    band = band_of(44, 50.0, [first, second])
+    band = estimate_band(44, 50.0, [first, second])
     assert band.corrected == 52
     assert band.jumps**2 == pytest.approx(2 + 4 * (1.5**2 + 1.75**2 + 1.25**2))
     half = 1.6448536

@@ -9,20 +9,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adapters.bed.state import FloatArray
 from adapters.errors import UsageError
-from adapters.laws import Law, law_named
-from adapters.laws.law_karrech2007 import Karrech2007
-from adapters.moves.move_smoothed import clipped, jump_field, smoothed
-from adapters.state import FloatArray
+from adapters.laws import Law, get_law
+from adapters.laws.karrech2007 import Karrech2007
+from adapters.moves.smoothed import clipped, estimate_jump_field, smoothed
 
-LOG = law_named("log")
+LOG = get_law("log")
 CYCLE = np.arange(30.0, 51.0)
 every_law = pytest.mark.parametrize(
     "law",
-    [law_named(name) for name in ("karrech2007", "linear", "log", "log-linear", "hyperbolic")],
+    [get_law(name) for name in ("karrech2007", "linear", "log", "log-linear", "hyperbolic")],
 )
 every_free_law = pytest.mark.parametrize(
-    "law", [law_named(name) for name in ("karrech2007", "linear", "log")]
+    "law", [get_law(name) for name in ("karrech2007", "linear", "log")]
 )
 """Without constraints the law of the mean is the mean of the laws."""
 seeds = st.integers(0, 2**32 - 1)
@@ -42,7 +42,7 @@ def bed(seed: int = 0, count: int = 60) -> tuple[FloatArray, FloatArray]:
 def test_without_clip_and_smoothing_it_is_the_law_of_each_grain(law: Law) -> None:
     """Limit clip 1, smoothing 0: the paper's per-grain estimate, to round-off of the mean."""
     position, radius = bed()
-    move = jump_field(CYCLE, position, radius, law, 30, smoothing_radii=0, clip_quantile=1)
+    move = estimate_jump_field(CYCLE, position, radius, law, 30, smoothing_radii=0, clip_quantile=1)
     rows = slice(law.first_state, None)
     parameters = law.fit(CYCLE[rows], position[rows] - position[0])
     expected = law.increment(parameters, 50.0, 80.0)
@@ -53,14 +53,14 @@ def test_limits_are_eq_16_and_eq_17_as_printed() -> None:
     """The same limits, written out: h/k of the window, and a ln t + b t from eqs 18, 20, 21."""
     position, radius = bed()
     limit = {"smoothing_radii": 0.0, "clip_quantile": 1.0}
-    linear = jump_field(CYCLE, position, radius, law_named("linear"), 30, **limit)
+    linear = estimate_jump_field(CYCLE, position, radius, get_law("linear"), 30, **limit)
     np.testing.assert_allclose(linear, 30 / 20 * (position[-1] - position[0]), atol=1e-15)
     t = 0.02 * CYCLE[1:]
     columns = np.stack([np.log(t), t], axis=1)
     displacement = (position[1:] - position[0]).reshape(20, -1)
     a, b = np.linalg.lstsq(columns, displacement, rcond=None)[0]
     expected = (a * np.log(1.6) + b * 1.6).reshape(-1, 3)
-    printed = jump_field(CYCLE, position, radius, Karrech2007(period=0.02), 30, **limit)
+    printed = estimate_jump_field(CYCLE, position, radius, Karrech2007(period=0.02), 30, **limit)
     np.testing.assert_allclose(printed, expected, atol=1e-10 * np.abs(expected).max())
 
 
@@ -72,7 +72,7 @@ def test_mean_settlement_is_the_law_of_the_mean(
 ) -> None:
     """However much is clipped and smoothed, the mean vertical move is the law's own."""
     position, radius = bed(seed)
-    move = jump_field(
+    move = estimate_jump_field(
         CYCLE, position, radius, law, 30, smoothing_radii=reach, clip_quantile=quantile
     )
     rows = slice(law.first_state, None)
@@ -84,12 +84,12 @@ def test_mean_settlement_is_the_law_of_the_mean(
 def test_loose_grains_are_not_flung() -> None:
     """A grain that hops 3 mm a cycle, twice the bed in a jump, moves like its surroundings."""
     position, radius = bed()
-    calm = jump_field(CYCLE, position, radius, LOG, 30)
+    calm = estimate_jump_field(CYCLE, position, radius, LOG, 30)
     top = int(position[-1, :, 2].argmax())
     loose = position.copy()
     loose[:, top] += np.multiply.outer(np.arange(21.0), [0.0, 1e-3, 3e-3])
-    alone = jump_field(CYCLE, loose, radius, LOG, 30, smoothing_radii=0, clip_quantile=1)
-    move = jump_field(CYCLE, loose, radius, LOG, 30)
+    alone = estimate_jump_field(CYCLE, loose, radius, LOG, 30, smoothing_radii=0, clip_quantile=1)
+    move = estimate_jump_field(CYCLE, loose, radius, LOG, 30)
     assert alone[top, 2] > 0.04
     bound = np.linalg.norm(clipped(alone, 0.95), axis=1).max()
     assert bound < 1e-4
@@ -107,7 +107,7 @@ def test_one_loose_grain_in_a_large_bed_changes_nothing_else() -> None:
     top = int(position[-1, :, 2].argmax())
     loose = position.copy()
     loose[:, top, 2] += np.linspace(0.0, 3e-3, 21)
-    change = jump_field(CYCLE, loose, radius, LOG, 30) - jump_field(
+    change = estimate_jump_field(CYCLE, loose, radius, LOG, 30) - estimate_jump_field(
         CYCLE, position, radius, LOG, 30
     )
     increment = LOG.increment(LOG.fit(CYCLE[1:], loose[1:, top, 2]), 50.0, 80.0)
@@ -119,7 +119,7 @@ def test_deficit_is_laid_on_as_a_strain() -> None:
     """What clipping takes from the mean comes back in proportion to height, none at the floor."""
     position, radius = bed()
     options = {"smoothing_radii": 0.0, "clip_quantile": 0.5}
-    move = jump_field(CYCLE, position, radius, LOG, 30, **options)
+    move = estimate_jump_field(CYCLE, position, radius, LOG, 30, **options)
     increments = LOG.increment(LOG.fit(CYCLE[1:], position[1:] - position[0]), 50.0, 80.0)
     added = move - clipped(increments, 0.5)
     height = position[-1, :, 2] - position[-1, :, 2].min()
@@ -134,16 +134,16 @@ def test_deficit_is_laid_on_as_a_strain() -> None:
 def test_field_turns_and_shifts_with_the_bed(seed: int) -> None:
     """Rotation about the vertical, translation and renumbering of grains commute with the jump."""
     position, radius = bed(seed)
-    move = jump_field(CYCLE, position, radius, LOG, 30)
+    move = estimate_jump_field(CYCLE, position, radius, LOG, 30)
     angle = np.random.default_rng(seed).uniform(0, 2 * np.pi)
     turn = np.array(
         [[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
     )
-    turned = jump_field(CYCLE, position @ turn + [0.5, -0.2, 0.1], radius, LOG, 30)
+    turned = estimate_jump_field(CYCLE, position @ turn + [0.5, -0.2, 0.1], radius, LOG, 30)
     # Positions of 0.5 m are rounded to 1e-16; the law sums 20 of them, amplified by 1 / ln(50/30).
     np.testing.assert_allclose(turned, move @ turn, atol=1e-14)
     order = np.random.default_rng(seed).permutation(len(radius))
-    renumbered = jump_field(CYCLE, position[:, order], radius[order], LOG, 30)
+    renumbered = estimate_jump_field(CYCLE, position[:, order], radius[order], LOG, 30)
     np.testing.assert_allclose(renumbered, move[order], atol=1e-16)
 
 
@@ -168,7 +168,7 @@ def test_uniform_move_is_not_changed() -> None:
     """A bed that moves as one body goes on as one body, whatever is clipped and smoothed."""
     place, radius = bed()
     drift = np.multiply.outer(np.log(CYCLE / 30.0), np.ones((60, 1)) * [1e-5, 0.0, -3e-5])
-    move = jump_field(CYCLE, place[0] + drift, radius, LOG, 30)
+    move = estimate_jump_field(CYCLE, place[0] + drift, radius, LOG, 30)
     np.testing.assert_allclose(move, np.log(1.6) * np.array([[1e-5, 0, -3e-5]] * 60), atol=1e-15)
 
 
@@ -188,7 +188,7 @@ def test_clip_shortens_without_turning(seed: int, quantile: float) -> None:
 def test_no_jump_no_move() -> None:
     """h = 0 moves nothing, to the last bit."""
     position, radius = bed()
-    assert not jump_field(CYCLE, position, radius, LOG, 0).any()
+    assert not estimate_jump_field(CYCLE, position, radius, LOG, 0).any()
 
 
 def test_window_may_begin_before_the_first_cycle() -> None:
@@ -196,8 +196,8 @@ def test_window_may_begin_before_the_first_cycle() -> None:
     position, radius = bed()
     cycle = np.arange(21.0)
     options = {"smoothing_radii": 0.0, "clip_quantile": 1.0}
-    move = jump_field(cycle, position, radius, LOG, 20, **options)
-    later = jump_field(cycle[1:], position[1:], radius, LOG, 20, **options)
+    move = estimate_jump_field(cycle, position, radius, LOG, 20, **options)
+    later = estimate_jump_field(cycle[1:], position[1:], radius, LOG, 20, **options)
     assert np.isfinite(move).all()
     assert np.abs(move - later).max() > 1e-8  # cycle 1 is a datum of the first, not of the second
 
@@ -206,7 +206,7 @@ def test_single_grain_and_flat_layer() -> None:
     """A bed without height takes the deficit as a shift: no division by zero."""
     path = np.zeros((21, 1, 3))
     path[:, 0, 2] = -1e-5 * np.log(CYCLE)
-    move = jump_field(CYCLE, path, np.array([3e-3]), LOG, 30)
+    move = estimate_jump_field(CYCLE, path, np.array([3e-3]), LOG, 30)
     assert move[0] == pytest.approx([0, 0, -1e-5 * np.log(1.6)])
 
 
@@ -229,7 +229,7 @@ def test_arguments_out_of_range_are_refused(change: dict[str, object], message: 
     position, radius = bed()
     arguments = {"cycle": CYCLE, "position": position, "radius": radius, "law": LOG, "h": 30.0}
     with pytest.raises(UsageError, match=message):
-        jump_field(**(arguments | change))  # type: ignore[arg-type]
+        estimate_jump_field(**(arguments | change))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("row", [0, 7, 20])
@@ -238,7 +238,7 @@ def test_damaged_position_is_named(row: int) -> None:
     position, radius = bed()
     position[row, 4, 1] = np.nan
     with pytest.raises(UsageError, match=r"not finite.*4, 1"):
-        jump_field(CYCLE, position, radius, LOG, 30)
+        estimate_jump_field(CYCLE, position, radius, LOG, 30)
 
 
 @pytest.mark.long
@@ -248,5 +248,5 @@ def test_hundred_thousand_grains_take_seconds() -> None:
     place = random.uniform(0, 0.36, (100_000, 3))  # as dense as a bed of 3.2 mm grains
     position = place - np.multiply.outer(1e-5 * np.log(CYCLE), np.ones((100_000, 3)))
     start = time.process_time()
-    jump_field(CYCLE, position, np.full(100_000, 3.2e-3), LOG, 30)
+    estimate_jump_field(CYCLE, position, np.full(100_000, 3.2e-3), LOG, 30)
     assert time.process_time() - start < 3.0

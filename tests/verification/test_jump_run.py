@@ -11,21 +11,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters import engine_fake, procedure, stages
-from adapters.engine_fake import FakeBed
+from adapters.engines import fake as engine_fake
+from adapters.engines.fake import FakeBed
 from adapters.errors import JumpRefused, SceneError
-from adapters.fit_regime import RATCHETING, STEADY
-from adapters.jump_control import joined
-from adapters.jump_rates import Stretch
-from adapters.jump_run import regime_sinking
-from adapters.jump_slopes import Landing
-from adapters.progress import Progress
-from adapters.report import report_write
-from adapters.report_control import control
-from adapters.report_record import checks_of, decisions_of, record_read
-from adapters.run_folder import RunFolder
-from adapters.scene_file import scene_load
-from adapters.status import status
+from adapters.files.run_folder import RunFolder
+from adapters.jumps.control import joined
+from adapters.jumps.rates import Stretch
+from adapters.jumps.slopes import Landing
+from adapters.laws.fit.regime import RATCHETING, STEADY
+from adapters.procedure import run as procedure
+from adapters.procedure import stages
+from adapters.procedure.controlled import find_sinking_regime
+from adapters.procedure.progress import Progress
+from adapters.procedure.record import list_checks, list_decisions, read_run_record
+from adapters.procedure.status import status
+from adapters.report.control import control
+from adapters.report.page import write_report
+from adapters.scene.file import load_scene
 from tests.forked_commands import Commands
 from tests.jump_curves import CURVES
 from tests.small_bed import small_bed
@@ -67,16 +69,16 @@ def test_to_the_end_with_its_control(tmp_path: Path) -> None:
     assert (tmp_path / "run" / "control" / shared).samefile(tmp_path / "run" / shared)
     low, high = status(tmp_path / "run").band_m or (0, 0)
     assert low < truth < high
-    report_write(tmp_path / "run")
+    write_report(tmp_path / "run")
     page = (tmp_path / "run" / "report.html").read_text()
     assert "Jump control" in page
-    decisions = decisions_of(RunFolder(tmp_path / "run").events())
+    decisions = list_decisions(RunFolder(tmp_path / "run").events())
     assert page.count("<td>jump</td>") == sum(one["action"] == "jump" for one in decisions)
     written = json.loads((tmp_path / "run" / "report.json").read_text())
     assert written["band"]["low"] == pytest.approx(low)
     events = len(RunFolder(tmp_path / "run").events())
     procedure.resume(tmp_path / "run", progress=QUIET)  # finished: the same decisions, none told
-    assert decisions_of(RunFolder(tmp_path / "run").events()) == decisions
+    assert list_decisions(RunFolder(tmp_path / "run").events()) == decisions
     assert len(RunFolder(tmp_path / "run").events()) == events + 3  # resumed, two engines
 
 
@@ -84,8 +86,8 @@ def test_the_mean_grain_moves_by_what_was_decided(tmp_path: Path) -> None:
     """Before relaxation the mean drop of each jump is what the decision says, to round-off."""
     run(tmp_path, 120)
     folder = RunFolder(tmp_path / "run")
-    held = checks_of(folder.events())
-    for decision in decisions_of(folder.events()):
+    held = list_checks(folder.events())
+    for decision in list_decisions(folder.events()):
         if (decision["cycle"], 1) in held and decision["action"] == "jump":
             jump = folder.path / f"jump_{decision['cycle']:06d}_1"
             moved = np.load(jump / "estimated.npz")["position"][:, 2].mean()
@@ -114,7 +116,7 @@ def test_load_step_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     cycles = [int(row["cycle"]) for row in rows]
     assert cycles == sorted(set(cycles))
     assert float(rows[-1]["settlement"]) == pytest.approx(float(step.law(np.array(200.0))), rel=0.1)
-    assert "taken back" in control(record_read(tmp_path / "run"))
+    assert "taken back" in control(read_run_record(tmp_path / "run"))
 
 
 def test_collapse_is_refused_with_its_code(
@@ -185,8 +187,8 @@ def test_what_a_piston_sinks_more_behind_jumps_is_no_ratcheting(share: float) ->
         cycle += h + 5
         sunk = joined(sunk, window(cycle, 10))
         cycle += 10
-        regimes.append(regime_sinking(sunk, landings))
-        raw.append(regime_sinking(sunk, []))
+        regimes.append(find_sinking_regime(sunk, landings))
+        raw.append(find_sinking_regime(sunk, []))
     assert cycle > 2000
     assert [one.name for one in regimes if one] == [STEADY] * 9
     assert any(one.name == RATCHETING for one in raw if one) == (share > 0)
@@ -204,19 +206,19 @@ def test_no_jump_pays_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_scene_keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A tolerance stands instead of k and h; both, or none, is an error with a sentence."""
     scene = scene_path("karrech-coarse")
-    loaded = scene_load(scene, ["procedure.tolerance=0.02"]).procedure
+    loaded = load_scene(scene, ["procedure.tolerance=0.02"]).procedure
     assert loaded is not None
     assert (loaded.tolerance, loaded.k, loaded.h) == (0.02, None, None)
     with pytest.raises(SceneError, match="with a tolerance h chooses itself"):
-        scene_load(scene, ["procedure.tolerance=0.02", "procedure.h=3"])
+        load_scene(scene, ["procedure.tolerance=0.02", "procedure.h=3"])
     text = scene.read_text().replace("\nk = 20", "").replace("\nh = 35", "")
     (tmp_path / "none.toml").write_text(text)
     with pytest.raises(SceneError, match="give k and h, or a tolerance") as caught:
-        scene_load(tmp_path / "none.toml")
+        load_scene(tmp_path / "none.toml")
     assert "2 problems" in str(caught.value)
     for value in ("0", "1", '"much"'):
         with pytest.raises(SceneError, match=r"procedure\.tolerance"):
-            scene_load(scene, [f"procedure.tolerance={value}"])
+            load_scene(scene, [f"procedure.tolerance={value}"])
     words = ["run", str(scene), "--tolerance", "0.02", "--set", "procedure.h=3"]
     assert command.main(words) == 2
     assert "--tolerance chooses k and h" in capsys.readouterr().err
@@ -262,7 +264,7 @@ def test_killed_at_file_operations(commands: Commands, tmp_path: Path) -> None:
     assert names[0] == names[1]
 
     def told(path: Path) -> list[dict[str, object]]:
-        return [{**e, "time": ""} for e in decisions_of(RunFolder(path).events())]
+        return [{**e, "time": ""} for e in list_decisions(RunFolder(path).events())]
 
     assert told(run_folder) == told(whole)
 
@@ -298,7 +300,7 @@ def test_report_of_a_run_by_an_earlier_version(tmp_path: Path) -> None:
             event.pop(name, None)
         lines.append(json.dumps(event) + "\n")
     path.write_text("".join(lines), encoding="utf-8")
-    report_write(tmp_path / "run")
+    write_report(tmp_path / "run")
     text = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert "Jump control" in text
     assert "because it was moved (in the" not in text

@@ -13,24 +13,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from adapters import engine_fake, jump_fixed, jump_seating, procedure
-from adapters.engine_fake import SETTLEMENT, FakeBed
+from adapters.bed.state import FloatArray
+from adapters.engines import fake as engine_fake
+from adapters.engines.fake import SETTLEMENT, FakeBed
 from adapters.errors import SceneError
-from adapters.jump_history import Jumped
-from adapters.jump_rates import Stretch
-from adapters.jump_seating import (
+from adapters.files.run_folder import Outcome, RunFolder
+from adapters.jumps.history import Jumped
+from adapters.jumps.rates import Stretch
+from adapters.procedure import fixed as jump_fixed
+from adapters.procedure import run as procedure
+from adapters.procedure import seating as jump_seating
+from adapters.procedure.progress import Progress
+from adapters.procedure.record import DECISION
+from adapters.procedure.seating import (
     CONSTRAINED,
-    cycles_hung,
-    deflection_over_mean_field,
-    modulus_constrained,
+    compare_deflection,
+    estimate_constrained_modulus,
+    find_hung_cycles,
     spans,
 )
-from adapters.progress import Progress
-from adapters.report_record import DECISION
-from adapters.run_folder import Outcome, RunFolder
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
 
 COARSE = scene_path("karrech-coarse")
@@ -53,7 +56,7 @@ def test_modulus_is_that_of_spheres_that_move_with_the_mean_strain() -> None:
     strain = 3e-5
     bulk = (pressure(strain * (1 + 1e-5)) - pressure(strain * (1 - 1e-5))) / (6e-5 * strain)
     columns = (np.array([value]) for value in (density, coordination))
-    found = modulus_constrained(young, poisson, *columns, pressure(strain))
+    found = estimate_constrained_modulus(young, poisson, *columns, pressure(strain))
     assert found / CONSTRAINED == pytest.approx([bulk], rel=1e-8)
 
 
@@ -73,7 +76,10 @@ def rows_like(scene: Scene, count: int = 3, **columns: float) -> list[dict[str, 
         np.array([given[name]]) for name in ("relative_density", "coordination_number")
     )
     strain, _ = quad(
-        lambda s: 1 / modulus_constrained(grain.young, grain.poisson, density, coordination, s)[0],
+        lambda s: (
+            1
+            / estimate_constrained_modulus(grain.young, grain.poisson, density, coordination, s)[0]
+        ),
         float(stress[-1]),
         float(stress.max()),
     )
@@ -85,8 +91,8 @@ def test_deflection_of_the_mean_field() -> None:
     """The integral of ds / M(s) in closed form, by quadrature: 1e-6 for the root at zero stress;
     a load that does not come back to zero too."""
     for mean in ("7075.0", "30000.0"):
-        scene = scene_load(COARSE, [f"loading.mean={mean}"])
-        found = deflection_over_mean_field(scene, rows_like(scene))
+        scene = load_scene(COARSE, [f"loading.mean={mean}"])
+        found = compare_deflection(scene, rows_like(scene))
         assert found == pytest.approx(np.ones(3), rel=1e-6)
 
 
@@ -104,8 +110,8 @@ def test_a_load_series_may_begin_anywhere(tmp_path: Path, shift: float) -> None:
     own = f'[loading]\nwaveform = "series"\nseries = "{path}"\npiston_mass = 0.1\n\n'
     file = tmp_path / "scene.toml"
     file.write_text(before + own + behind[behind.index("[procedure]") :], encoding="utf-8")
-    scene = scene_load(file, [])
-    found = deflection_over_mean_field(scene, rows_like(scene, 1))
+    scene = load_scene(file, [])
+    found = compare_deflection(scene, rows_like(scene, 1))
     assert found == pytest.approx([np.nan if shift == 0.5 else 1.0], rel=1e-4, nan_ok=True)
 
 
@@ -113,7 +119,7 @@ def test_a_load_series_may_begin_anywhere(tmp_path: Path, shift: float) -> None:
 def test_deflection_is_told_in_any_unit(force: float, length: float) -> None:
     """Stress and moduli times a, lengths times b: the ratio is the same to round-off."""
     a, b = 10.0**force, 10.0**length
-    scene = scene_load(COARSE, [])
+    scene = load_scene(COARSE, [])
     assert scene.loading is not None
     grain = scene.material.grain.model_copy(update={"young": a * scene.material.grain.young})
     load = {name: a * getattr(scene.loading, name) for name in ("mean", "amplitude")}
@@ -127,26 +133,26 @@ def test_deflection_is_told_in_any_unit(force: float, length: float) -> None:
     scaled = [
         rows[0] | {name: b * rows[0][name] for name in ("piston_height", "elastic_deflection")}
     ]
-    expected = deflection_over_mean_field(scene, rows)
-    assert deflection_over_mean_field(other, scaled) == pytest.approx(expected, rel=1e-12)
+    expected = compare_deflection(scene, rows)
+    assert compare_deflection(other, scaled) == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_bed_without_contacts_tells_nothing() -> None:
     """No stiffness, no ratio: nothing is said to hang."""
-    scene = scene_load(COARSE, [])
+    scene = load_scene(COARSE, [])
     rows = rows_like(scene, 4)
     rows[-1]["coordination_number"] = 0.0
-    assert np.isnan(deflection_over_mean_field(scene, rows)).tolist() == [False] * 3 + [True]
-    assert not len(cycles_hung(scene, [Outcome("window", 0, 4, rows, {})]))
+    assert np.isnan(compare_deflection(scene, rows)).tolist() == [False] * 3 + [True]
+    assert not len(find_hung_cycles(scene, [Outcome("window", 0, 4, rows, {})]))
 
 
 def test_first_and_healing_cycles_do_not_count() -> None:
     """Of 20 first cycles the first four take the load for the first time."""
-    scene = scene_load(COARSE, ["procedure.k_i=20"])
+    scene = load_scene(COARSE, ["procedure.k_i=20"])
     rows = rows_like(scene, 30)
     for number, kind in ((4, "computed"), (6, "computed"), (9, "healing"), (12, "jumped")):
         rows[number - 1] |= {"kind": kind, "elastic_deflection": 1.0}
-    assert cycles_hung(scene, [Outcome("window", 0, 30, rows, {})]).tolist() == [6]
+    assert find_hung_cycles(scene, [Outcome("window", 0, 30, rows, {})]).tolist() == [6]
 
 
 @pytest.mark.parametrize(
@@ -174,7 +180,7 @@ def settle(
         cycle = np.array([row["cycle"] for row in rows])
         return np.where((cycle >= hung[0]) & (cycle <= hung[1]), HANGS, 1.0)
 
-    monkeypatch.setattr(jump_seating, "deflection_over_mean_field", hangs)
+    monkeypatch.setattr(jump_seating, "compare_deflection", hangs)
     said: list[str] = []
     progress = Progress(quiet=True)
     monkeypatch.setattr(progress, "say", said.append)
@@ -270,14 +276,14 @@ def test_history_begins_where_the_bed_carries_its_piston(
     cycle it would be 1.3 times that.  Where the piston hangs again, nothing is owed for jumps
     before."""
     asked: list[tuple[int, int, list[int]]] = []
-    real = jump_fixed.asked_gain
+    real = jump_fixed.find_asked_gain
 
     def gain(known: Sequence[Stretch], h: int, jumps: Sequence[Jumped]) -> float:
         before = [int(one.cycles[0]) for one in jumps]
         asked.append((known[0].first_cycle, known[-1].last_cycle, before))
         return real(known, h, jumps)
 
-    monkeypatch.setattr(jump_fixed, "asked_gain", gain)
+    monkeypatch.setattr(jump_fixed, "find_asked_gain", gain)
     history = (WAITS, 'procedure.settlement="history"')
     with monkeypatch.context() as late:
         taken = FakeBed(lambda n: SETTLEMENT * np.log1p(np.clip(n - 23, 0, None)))
@@ -303,7 +309,7 @@ def by_tolerance(
     def hangs(_: Scene, rows: list[dict[str, Any]]) -> FloatArray:
         return np.where(hung(np.array([row["cycle"] for row in rows], float)), HANGS, 1.0)
 
-    monkeypatch.setattr(jump_seating, "deflection_over_mean_field", hangs)
+    monkeypatch.setattr(jump_seating, "compare_deflection", hangs)
     text = COARSE.read_text(encoding="utf-8")
     kept = [line for line in text.splitlines() if not line.startswith(("k =", "h ="))]
     scene = folder.with_suffix(".toml")

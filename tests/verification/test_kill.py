@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters import engine_process
-from adapters.engine_process import process_run
-from adapters.run_folder import RunFolder
+from adapters.engines import process as engine_process
+from adapters.engines.process import run_process
+from adapters.files.run_folder import RunFolder
 from tests.forked_commands import Commands, alive, awaited, processes_in
 from tests.small_bed import small_bed
 from trackbed import command
@@ -227,7 +227,7 @@ def test_engine_ends_with_its_run_when_python_lives_on(tmp_path: Path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        process_run(["sh", "-c", "sleep 600 & sleep 600"], tmp_path, interrupted)
+        run_process(["sh", "-c", "sleep 600 & sleep 600"], tmp_path, interrupted)
     deadline = time.monotonic() + 60
     while processes_in(tmp_path) and time.monotonic() < deadline:
         time.sleep(0.01)
@@ -253,7 +253,7 @@ def test_a_launcher_can_end_its_tasks(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        process_run(["sh", "-c", launcher], tmp_path, interrupted)
+        run_process(["sh", "-c", launcher], tmp_path, interrupted)
     deadline = time.monotonic() + 60
     while processes_in(tmp_path) and time.monotonic() < deadline:
         time.sleep(0.01)

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adapters.bed.state import FloatArray
 from adapters.errors import UsageError
-from adapters.laws import Law, law_named, laws_known
-from adapters.laws.law_karrech2007 import Karrech2007
-from adapters.named_files import find_choice, find_choices
-from adapters.state import FloatArray
+from adapters.laws import Law, get_law, list_laws
+from adapters.laws.karrech2007 import Karrech2007
+from trackbed.choices import find_choice, find_choices
 
-LAWS = [law_named(name) for name in ("karrech2007", "linear", "log")]
+LAWS = [get_law(name) for name in ("karrech2007", "linear", "log")]
 """Laws without shape parameters and constraints; `test_laws_shaped` has the others."""
 DEFAULTS = [law for law in LAWS if law.name != "karrech2007"]
 EPS = np.finfo(float).eps
@@ -104,7 +104,7 @@ def test_karrech2007_is_eqs_17_20_21_as_printed() -> None:
 def test_linear_is_eq_16() -> None:
     """The linear estimate is h/k times the sum of the window's increments."""
     displacement = paths(2, (21, 7, 3))
-    law = law_named("linear")
+    law = get_law("linear")
     estimate = law.increment(law.fit(np.arange(30.0, 51.0), displacement), 50.0, 85.0)
     expected = 35 / 20 * np.diff(displacement, axis=0).sum(axis=0)
     np.testing.assert_allclose(estimate, expected, rtol=1e-13)
@@ -198,7 +198,7 @@ def test_increment_does_not_see_the_origin(
     assert (np.abs(here - there) <= bound).all()
 
 
-@pytest.mark.parametrize("law", [*DEFAULTS, law_named("log-linear")], ids=lambda law: law.name)
+@pytest.mark.parametrize("law", [*DEFAULTS, get_law("log-linear")], ids=lambda law: law.name)
 def test_a_million_cycles_do_not_spoil_the_fit(law: Law) -> None:
     """At cycles 1e6 to 1e6 + 20 a fit agrees with one in extended precision.
 
@@ -276,14 +276,14 @@ def test_laws_break_down_with_a_sentence() -> None:
     cycle = 1e15 + np.arange(4.0)
     for name in ("log-linear", "karrech2007"):
         with pytest.raises(UsageError, match="use the law log"):
-            law_named(name).fit(cycle, np.zeros(4))
+            get_law(name).fit(cycle, np.zeros(4))
 
 
-@pytest.mark.parametrize("name", laws_known())
+@pytest.mark.parametrize("name", list_laws())
 def test_every_law_keeps_the_contract(name: str) -> None:
     """Whatever file is a law: it has its name, describes all of its parameters, leaves a bed at
     rest where it is, and lets one that settles by ln N settle on, by a finite length."""
-    law, cycle = law_named(name), np.arange(1.0, 41.0)
+    law, cycle = get_law(name), np.arange(1.0, 41.0)
     assert law.name == name
     assert len(law.parameter_names) == len(law.parameter_units)
     still = law.fit(cycle, np.zeros((40, 2)))
@@ -297,10 +297,10 @@ def test_every_law_keeps_the_contract(name: str) -> None:
 def test_unknown_law_names_the_nearest(wrong: str, meant: str) -> None:
     """A law that does not exist is refused with the nearest name and all names."""
     with pytest.raises(UsageError, match=f"did you mean '{meant}'") as raised:
-        law_named(wrong)
+        get_law(wrong)
     assert "karrech2007, linear, log, log-linear" in raised.value.remedy
     with pytest.raises(UsageError) as raised:
-        law_named("quadratic")
+        get_law("quadratic")
     assert raised.value.what == "there is no law 'quadratic'"
 
 
@@ -320,7 +320,7 @@ def test_hundred_thousand_grains_take_less_than_a_second() -> None:
     """Fit and increment of 1e5 grains, 3 axes, 100 cycles: under 1 s of one thread, linear laws."""
     cycle = np.arange(51.0, 151.0)
     displacement = np.random.default_rng(0).random((100, 100_000, 3))
-    for law in [*LAWS, law_named("log-linear"), law_named("shenton")]:
+    for law in [*LAWS, get_law("log-linear"), get_law("shenton")]:
         seconds = []
         for _ in range(3):
             start = time.process_time()

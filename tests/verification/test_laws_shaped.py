@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import curve_fit, nnls
 
+from adapters.bed.state import FloatArray
 from adapters.errors import UsageError
-from adapters.laws import Law, law_named
-from adapters.laws.projection import amplitudes, centred, orthonormal
-from adapters.state import FloatArray
+from adapters.laws import Law, get_law
+from adapters.laws.form.projection import amplitudes, centred, orthonormal
 
 TRUE = {
     "log-linear": (1.0, 2.0, 0.01),
@@ -33,7 +33,7 @@ every_law = pytest.mark.parametrize("name", TRUE)
 
 def series(name: str) -> FloatArray:
     """The law's own values [mm] at `CYCLE`."""
-    return law_named(name).value(np.array(TRUE[name]), CYCLE)
+    return get_law(name).value(np.array(TRUE[name]), CYCLE)
 
 
 def increment(law: Law, cycle: FloatArray, displacement: FloatArray, reach: float) -> FloatArray:
@@ -49,7 +49,7 @@ def test_own_series_is_recovered(name: str) -> None:
     The residual's rounding, 1e-16 of 3 mm, moves parameters by at most the condition of the fit,
     below 1e5 for these; so 1e-8 of each.
     """
-    law = law_named(name)
+    law = get_law(name)
     found = law.fit(CYCLE, series(name))
     np.testing.assert_allclose(found, TRUE[name], rtol=1e-8)
     ahead = law.increment(np.array(TRUE[name]), 100.0, 1e4)
@@ -69,7 +69,7 @@ def test_prediction_has_no_units(name: str, seed: int, unit: float, period: floa
     In noise the search ends where a step gains less than 1e-8 of the squares: the prediction is
     known to about 1e-4 of its own standard deviation, and that is what may differ.
     """
-    law, random = law_named(name), np.random.default_rng(seed)
+    law, random = get_law(name), np.random.default_rng(seed)
     noise = 0.01 * random.standard_normal(len(CYCLE))
     here = increment(law, CYCLE, series(name) + noise, 10)
     there = increment(law, CYCLE * period, unit * (series(name) + noise), 10)
@@ -81,7 +81,7 @@ def test_prediction_has_no_units(name: str, seed: int, unit: float, period: floa
 @settings(max_examples=8, deadline=None)
 def test_origin_and_direction_do_not_matter(name: str, shift: float, sign: int) -> None:
     """Counted from anywhere, downwards or upwards (heave): the same increment."""
-    law = law_named(name)
+    law = get_law(name)
     here = increment(law, CYCLE, series(name), 10)
     there = increment(law, CYCLE, sign * (series(name) + shift), 10)
     assert sign * there == pytest.approx(float(here), rel=1e-6)
@@ -93,7 +93,7 @@ def test_many_series_are_fitted_as_each_alone(name: str) -> None:
 
     Parameters in a flat valley differ by where the search ends, predictions hardly.
     """
-    law, random = law_named(name), np.random.default_rng(3)
+    law, random = get_law(name), np.random.default_rng(3)
     many = series(name)[:, None, None] * random.uniform(-2, 2, (5, 3))
     many = many + 0.02 * random.standard_normal((100, 5, 3))
     found = law.fit(CYCLE, many)
@@ -114,7 +114,7 @@ def test_no_worse_than_a_general_optimiser(name: str, seed: int) -> None:
 
     Noise of 0.05 mm in 100 readings; curve_fit's own tolerance is 1e-8.
     """
-    law = law_named(name)
+    law = get_law(name)
     noisy = series(name) + 0.05 * np.random.default_rng(seed).standard_normal(len(CYCLE))
     found = law.fit(CYCLE, noisy)
     ours = ((noisy - law.value(found, CYCLE)) ** 2).sum()
@@ -173,14 +173,14 @@ def test_data_that_can_not_be_fitted_are_refused(
 ) -> None:
     """Two points, duplicates, disorder, nan, negative cycles: a sentence, never nan."""
     with pytest.raises(UsageError, match=message):
-        law_named(name).fit(np.array(cycle), np.asarray(displacement))
+        get_law(name).fit(np.array(cycle), np.asarray(displacement))
 
 
 @every_law
 @pytest.mark.parametrize("level", [0.0, 3.0])
 def test_a_constant_series_stays(name: str, level: float) -> None:
     """All zeros, or any constant: amplitudes are zero, nothing is predicted to move."""
-    law = law_named(name)
+    law = get_law(name)
     found = law.fit(CYCLE, np.full(100, level))
     assert np.isfinite(found).all()
     assert law.increment(found, 100.0, 1e9) == pytest.approx(0.0, abs=1e-9)
@@ -190,7 +190,7 @@ def test_a_constant_series_stays(name: str, level: float) -> None:
 @pytest.mark.parametrize("shape", ["burst", "accelerating", "reversing", "huge", "outlier"])
 def test_hard_series_give_finite_numbers(name: str, shape: str) -> None:
     """Steps, growth as N^3, a reversal, cycles to 1e9 and one wild reading: a fit, all finite."""
-    law, cycle = law_named(name), CYCLE
+    law, cycle = get_law(name), CYCLE
     if shape == "huge":
         cycle = np.geomspace(1, 1e9, 60)
     displacement = {
@@ -210,7 +210,7 @@ def test_hard_series_give_finite_numbers(name: str, shape: str) -> None:
 @pytest.mark.parametrize(("name", "bar"), [("hyperbolic", 2.5), ("stretched-exponential", 6.0)])
 def test_thousands_of_grains_at_once(name: str, bar: float) -> None:
     """1,000 grains, 3 axes, 50 cycles: one shape parameter within 2.5 s, two within 6 s."""
-    law, random = law_named(name), np.random.default_rng(0)
+    law, random = get_law(name), np.random.default_rng(0)
     many = series(name)[:50, None, None] + 0.05 * random.standard_normal((50, 1000, 3))
     start = time.process_time()
     law.fit(CYCLE[:50], many)

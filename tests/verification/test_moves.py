@@ -10,28 +10,28 @@ import numpy as np
 import pytest
 
 import adapters.moves
-from adapters.container import Container
-from adapters.engine_fake import SETTLEMENT
+from adapters.bed.container import Container
+from adapters.bed.state import FloatArray
+from adapters.engines.fake import SETTLEMENT
 from adapters.errors import SceneError, UsageError
-from adapters.laws import law_named
-from adapters.laws.law import Law
-from adapters.moves import RETIRED, move_named, moves_known
-from adapters.moves.move import Move, law_moves
-from adapters.moves.move_profile import block_moves, grain_weights, within_variance
-from adapters.procedure import resume, run_scene, scene_record
-from adapters.progress import Progress
-from adapters.run_folder import RunFolder
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray
-from adapters.status import status
+from adapters.files.run_folder import RunFolder
+from adapters.laws import get_law
+from adapters.laws.form.contract import Law
+from adapters.moves import RETIRED, get_move, list_moves
+from adapters.moves.contract import Move, extrapolate_grains
+from adapters.moves.profile import extrapolate_blocks, weigh_grains, within_variance
+from adapters.procedure.progress import Progress
+from adapters.procedure.run import record_scene, resume, run_scene
+from adapters.procedure.status import status
+from adapters.scene.file import load_scene
 from tests.small_bed import small_bed
 
-LOG = law_named("log")
+LOG = get_law("log")
 CYCLE = np.arange(30.0, 51.0)
 QUARTER = Container("cylinder", ("x", "y"), radius=0.03)
 WHOLE = Container("cylinder", radius=0.03)
 QUIET = Progress(quiet=True)
-WAYS = [move_named(name) for name in moves_known()]
+WAYS = [get_move(name) for name in list_moves()]
 every_way = pytest.mark.parametrize("way", WAYS, ids=lambda way: way.name)
 extrapolating = pytest.mark.parametrize(
     "way", [way for way in WAYS if way.moves_piston], ids=lambda way: way.name
@@ -59,9 +59,9 @@ def test_every_file_is_a_way_of_its_name() -> None:
     """The registry is the folder; a near miss is named."""
     files = Path(adapters.moves.__file__).parent.glob("*.py")
     assert sum("\nMOVE = " in path.read_text() for path in files) == len(WAYS)
-    assert list(moves_known()) == [way.name for way in WAYS]
+    assert list(list_moves()) == [way.name for way in WAYS]
     with pytest.raises(UsageError, match="did you mean 'smoothed'"):
-        move_named("smooth")
+        get_move("smooth")
 
 
 @pytest.mark.parametrize("name", RETIRED)
@@ -70,7 +70,7 @@ def test_a_way_that_left_is_refused_with_what_to_use(name: str, tmp_path: Path) 
     scene = tmp_path / "scene.toml"
     scene.write_text(small_bed(k=4, h=2, total_cycles=12))
     with pytest.raises(SceneError) as raised:
-        scene_load(scene, [f'procedure.move="{name}"'])
+        load_scene(scene, [f'procedure.move="{name}"'])
     assert f"--set procedure.move=\"{name}\": procedure.move: unknown way '{name}'" in str(
         raised.value
     )
@@ -130,7 +130,7 @@ def test_even_compaction_goes_on_exactly_where_no_grain_has_a_neighbour(way: Mov
 
 
 @extrapolating
-@pytest.mark.parametrize("law", [law_named("log"), law_named("linear")], ids=lambda law: law.name)
+@pytest.mark.parametrize("law", [get_law("log"), get_law("linear")], ids=lambda law: law.name)
 def test_mean_settlement_is_the_law_of_the_mean(way: Move, law: Law) -> None:
     """Whatever is cut, shrunk or smoothed, the mean vertical move is the law's own."""
     position, radius = bed(3)
@@ -166,7 +166,7 @@ def test_a_loose_grain_is_not_flung(way: Move) -> None:
     loose = position.copy()
     hop = np.random.default_rng(5).standard_normal((21, 3)) * 2e-3
     loose[:, 7] += hop
-    alone = law_moves(CYCLE, loose, LOG, 30)[7]
+    alone = extrapolate_grains(CYCLE, loose, LOG, 30)[7]
     change = np.linalg.norm(moved(way, loose, radius) - calm, axis=1)
     # The share of one grain in the mean of 400 is laid on all, twice at the top; the bound for the
     # rest is a quarter of what the paper's estimate throws the grain.
@@ -181,12 +181,14 @@ def test_a_loose_grain_is_not_flung(way: Move) -> None:
 def test_blocks_share_the_window_and_the_law() -> None:
     """Four parts of five cycles; where the law goes on unchanged each says what the whole says."""
     position, _ = bed(noise=0.0)
-    parts = block_moves(CYCLE, position, LOG, 30)
+    parts = extrapolate_blocks(CYCLE, position, LOG, 30)
     assert parts.shape == (4, 120, 3)
-    np.testing.assert_allclose(parts, [law_moves(CYCLE, position, LOG, 30)] * 4, atol=1e-12)
-    assert len(block_moves(CYCLE[:4], position[:4], LOG, 30)) == 2
-    assert len(block_moves(CYCLE[:3], position[:3], LOG, 30)) == 0
-    np.testing.assert_array_equal(grain_weights(np.empty((0, 5, 3))), np.ones(5))
+    np.testing.assert_allclose(
+        parts, [extrapolate_grains(CYCLE, position, LOG, 30)] * 4, atol=1e-12
+    )
+    assert len(extrapolate_blocks(CYCLE[:4], position[:4], LOG, 30)) == 2
+    assert len(extrapolate_blocks(CYCLE[:3], position[:3], LOG, 30)) == 0
+    np.testing.assert_array_equal(weigh_grains(np.empty((0, 5, 3))), np.ones(5))
 
 
 def test_variance_within_a_grain_is_that_of_its_mean() -> None:
@@ -200,7 +202,7 @@ def test_variance_within_a_grain_is_that_of_its_mean() -> None:
 def test_profile_keeps_fluctuations() -> None:
     """Grains at one height move down alike; outwards they move in proportion to their distance."""
     position, radius = bed(4, count=300)
-    move = moved(move_named("profile"), position, radius)
+    move = moved(get_move("profile"), position, radius)
     ratio = move[:, :2] / position[-1, :, :2]
     np.testing.assert_allclose(ratio, ratio[0, 0], rtol=1e-9)
     order = np.argsort(position[-1, :, 2])
@@ -248,7 +250,7 @@ def test_few_grains_move_too(way: Move, count: int) -> None:
     move = moved(way, position, radius)
     assert np.isfinite(move).all()
     if way.moves_piston:
-        expected = law_moves(CYCLE, position, LOG, 30)[:, 2].mean()
+        expected = extrapolate_grains(CYCLE, position, LOG, 30)[:, 2].mean()
         assert move[:, 2].mean() == pytest.approx(expected, rel=1e-9)
 
 
@@ -298,7 +300,7 @@ def test_scene_without_the_key_is_the_scene_of_older_runs(tmp_path: Path) -> Non
     scene = tmp_path / "scene.toml"
     scene.write_text(small_bed(k=4, h=2, total_cycles=12))
     usual, named, other = (
-        scene_record(scene_load(scene, overrides))["procedure"]
+        record_scene(load_scene(scene, overrides))["procedure"]
         for overrides in ([], ['procedure.move="smoothed"'], ['procedure.move="profile"'])
     )
     assert "move" not in usual

@@ -14,22 +14,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters import jump_fixed, jump_room, procedure, stages
-from adapters.contact_law import HertzStiffness
-from adapters.container import Walls
-from adapters.engine import engine_named
-from adapters.engine_fake import SETTLEMENT
+from adapters.bed.contact_law import HertzStiffness
+from adapters.bed.container import Walls
+from adapters.bed.state import FloatArray, State, load_state
+from adapters.engines.contract import get_engine
+from adapters.engines.fake import SETTLEMENT
 from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
-from adapters.jump_fixed import room_known
-from adapters.progress import Progress
-from adapters.relaxation import relax
-from adapters.relaxation_measured import Relaxation
-from adapters.run_folder import Outcome, RunFolder
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.stages import Run, Variant
-from adapters.state import FloatArray, State, state_load
-from adapters.window import Window, window_load
+from adapters.files.run_folder import Outcome, RunFolder
+from adapters.files.window import Window, load_window
+from adapters.procedure import fixed as jump_fixed
+from adapters.procedure import room as jump_room
+from adapters.procedure import run as procedure
+from adapters.procedure import stages
+from adapters.procedure.fixed import find_known_room
+from adapters.procedure.progress import Progress
+from adapters.procedure.stages import Run, Variant
+from adapters.relaxation.measured import Relaxation
+from adapters.relaxation.methods import relax
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
 
 QUIET = Progress(quiet=True)
@@ -98,13 +101,13 @@ def test_healing_cycles_stay_out_of_the_fit(
 ) -> None:
     """The fit after a jump sees k + 1 states, and none of the healing ones."""
     seen: list[np.ndarray] = []
-    real = stages.move_named("smoothed")
+    real = stages.get_move("smoothed")
 
     def spy(cycle: np.ndarray, *rest: object) -> np.ndarray:
         seen.append(cycle)
         return real.displacement(cycle, *rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(stages, "move_named", lambda name: replace(real, displacement=spy))
+    monkeypatch.setattr(stages, "get_move", lambda name: replace(real, displacement=spy))
     settle(tmp_path / "run", "procedure.h=10", "procedure.total_cycles=120")
     first, second = seen[:2]
     assert first.tolist() == list(range(20, 41))
@@ -201,9 +204,9 @@ def test_piston_waits_where_grains_have_no_room_below_it(
     assert outcome is not None
     assert outcome.notes["relaxation"]["piston"] == "on the bed"
     jump = folder.path / "jump_000040_1"
-    estimated, relaxed = (state_load(jump / f"{name}.npz") for name in ("estimated", "relaxed"))
+    estimated, relaxed = (load_state(jump / f"{name}.npz") for name in ("estimated", "relaxed"))
     assert relaxed.position[:, 2].mean() == pytest.approx(estimated.position[:, 2].mean(), abs=1e-8)
-    before = window_load(folder.path / "window_000020" / "states.npz").state(-1)
+    before = load_window(folder.path / "window_000020" / "states.npz").state(-1)
     top = float((relaxed.position[:, 2] + relaxed.radius).max())
     assert relaxed.piston_height == min(top, before.piston_height)
 
@@ -256,9 +259,9 @@ def test_room_that_jumps_found() -> None:
         (jump(250, 60, 20, 1), 40),
     ]
     jumps = [one for one, _ in made]
-    assert room_known([], 1000) == np.inf
+    assert find_known_room([], 1000) == np.inf
     for one, room in made:
-        assert 1e6 * room_known(jumps, one.last_cycle) == pytest.approx(room)
+        assert 1e6 * find_known_room(jumps, one.last_cycle) == pytest.approx(room)
 
 
 Relaxed = Callable[[Scene, State, FloatArray, float], tuple[FloatArray, dict[str, Any]]]
@@ -330,7 +333,7 @@ def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
     """History asks the first jump for nothing, and what its grains move beside one another has no
     room: tried with less and less of that, the run goes on from where they were."""
     monkeypatch.setattr(jump_room, "relaxed", jammed_at_40(jump_room.relaxed))
-    monkeypatch.setattr(jump_fixed, "history_gain", lambda *_: 0.0)
+    monkeypatch.setattr(jump_fixed, "find_history_gain", lambda *_: 0.0)
     settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=90")
     jump = next(one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump")
     assert (jump.notes["attempt"], jump.notes["gain"]) == (4, 0.0)
@@ -379,8 +382,8 @@ def test_piston_is_never_lifted_by_a_jump(tmp_path: Path) -> None:
     """The piston follows the law of its own heights, downwards only."""
     settle(tmp_path / "run")
     run = tmp_path / "run"
-    before = window_load(run / "window_000020" / "states.npz").piston_heights()[-1]
-    after = window_load(run / "window_000060" / "states.npz").piston_start
+    before = load_window(run / "window_000020" / "states.npz").piston_heights()[-1]
+    after = load_window(run / "window_000060" / "states.npz").piston_start
     assert after <= before
     drop = SETTLEMENT * np.log(61 / 41)
     assert before - after == pytest.approx(drop, rel=0.05)
@@ -392,9 +395,9 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Window]:
     path = tmp_path_factory.mktemp("finished") / "run"
     settle(path)
     manifest = RunFolder(path).manifest()
-    scene = scene_load(path / "scene.toml", manifest["overrides"])
-    run = Run(scene, RunFolder(path), engine_named("fake"), Variant(), QUIET)
-    return run, window_load(path / "window_000020" / "states.npz")
+    scene = load_scene(path / "scene.toml", manifest["overrides"])
+    run = Run(scene, RunFolder(path), get_engine("fake"), Variant(), QUIET)
+    return run, load_window(path / "window_000020" / "states.npz")
 
 
 @pytest.mark.parametrize("per_cycle", [-2e-6, 0.0, 3e-6])

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
-from qdem_fem.body_frames import BodyFrames
-from qdem_fem.kinematics import displacement_gradient
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.bodies.frames import BodyFrames
+from qdem_fem.element.kinematics import displacement_gradient
+from qdem_fem.mesh.generation import make_box_mesh
 
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2600.0)
-MESH = box_mesh((0.05, 0.04, 0.03), (4, 3, 3), "kuhn")
+MESH = make_box_mesh((0.05, 0.04, 0.03), (4, 3, 3), "kuhn")
 EPS = float(np.finfo(np.float32).eps)
 
 
@@ -43,7 +43,7 @@ def thrown(
 
 def frames_of(run: q.Simulation) -> BodyFrames:
     """Its frames; the simulation has them."""
-    run.packed_lists()
+    run.pack_lists()
     frames = run.assembly.frames
     assert frames is not None
     return frames
@@ -203,7 +203,7 @@ def test_a_body_that_is_caught_loses_its_frame_and_not_its_place() -> None:
     run.advance(5e-4)
     place, speed = body.displacement, body.velocity
     held = run.roller(body, body.nodes[:, 0] == 0, [0, 1, 0])
-    run.packed_lists()
+    run.pack_lists()
     assert run.assembly.frames is None
     np.testing.assert_allclose(body.displacement, place, rtol=0, atol=2 * EPS * abs(place).max())
     np.testing.assert_allclose(body.velocity, speed, rtol=0, atol=2 * EPS * abs(speed).max())
@@ -232,7 +232,7 @@ def test_a_saved_flight_goes_on_to_the_same_bits(tmp_path: Path) -> None:
 def test_a_bodys_field_is_its_part_of_all_and_reads_no_more(
     precision: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mesh = box_mesh((0.1, 0.1, 0.1), (1, 1, 1))
+    mesh = make_box_mesh((0.1, 0.1, 0.1), (1, 1, 1))
     bodies = [q.Body(mesh, q.Material(1e9, 0.2, 2e3), name=name) for name in "abc"]
     run = q.Simulation(bodies, precision=precision, threads=1)
     for number, body in enumerate(bodies):

@@ -10,13 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from qdem_fem.contact_search import pairs_near, pairs_periodic
-from qdem_fem.errors import CheckpointError, ConditionError, SceneError
-from qdem_fem.leapfrog import accelerations_free
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.output import table_read
-from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import scene_load
+from qdem_fem.contact.search.pairs import find_near_pairs, find_periodic_pairs
+from qdem_fem.files.errors import CheckpointError, ConditionError, SceneError
+from qdem_fem.files.output import table_read
+from qdem_fem.march.leapfrog import find_free_accelerations
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.checks import load_scene
 from tests.qdem_boundary_waves import (
     GROUND,
     PRESSURE,
@@ -44,7 +44,7 @@ def touch(model: str, periodic: Any = ACROSS, **more: Any) -> Any:
 
 def block(name: str, origin: Any, rigid: bool = False, size: Any = (SIDE,) * 3) -> q.Body:
     """A block of stone of 2 x 2 x 2 cells."""
-    mesh = box_mesh(size, (2, 2, 2), "kuhn", tuple(origin))
+    mesh = make_box_mesh(size, (2, 2, 2), "kuhn", tuple(origin))
     return q.Body(mesh, STONE, name=name, rigid=rigid)
 
 
@@ -112,7 +112,7 @@ def test_a_closed_ring_is_at_rest(model: str) -> None:
 
 def slab(cells: int = 5) -> q.Body:
     """A slab as wide as the width."""
-    mesh = box_mesh((0.06, WIDTH, 0.02), (3, cells, 1), "kuhn", (-0.015, 0, -0.02))
+    mesh = make_box_mesh((0.06, WIDTH, 0.02), (3, cells, 1), "kuhn", (-0.015, 0, -0.02))
     return q.Body(mesh, STONE, name="slab")
 
 
@@ -181,7 +181,7 @@ def test_list_is_that_of_all_images() -> None:
     position[:40, 2] = np.rint(position[:40, 2])
     position[40:50, 2] = -1e-17
     radius, body = random.uniform(0.05, 0.1, 300), random.integers(0, 40, 300)
-    first, second, image = pairs_periodic(position, radius, body, skin, side)
+    first, second, image = find_periodic_pairs(position, radius, body, skin, side)
     found = dict(zip(zip(np.repeat(np.arange(300), np.diff(first)), second, strict=True),
                      image, strict=True))  # fmt: skip
     expected = {}
@@ -194,8 +194,8 @@ def test_list_is_that_of_all_images() -> None:
     for key, way in expected.items():
         assert np.array_equal(found[key], way)
     inside = np.abs(position[:, 2] - 0.5) < 0.2  # nothing there can reach a side
-    alone = pairs_near(position[inside], radius[inside], body[inside], skin)
-    same = pairs_periodic(position[inside], radius[inside], body[inside], skin, side)
+    alone = find_near_pairs(position[inside], radius[inside], body[inside], skin)
+    same = find_periodic_pairs(position[inside], radius[inside], body[inside], skin, side)
     for one, other in zip(alone, same[:2], strict=True):
         assert np.array_equal(one, other)
 
@@ -248,7 +248,7 @@ def test_a_scene_names_the_width(tmp_path: Path) -> None:
     """The keys reach the contact; what does not fit them is told with its key."""
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
-    run, _ = simulation_of(scene_load(path))
+    run, _ = simulation_of(load_scene(path))
     assert run.contact.periodic == ACROSS
     for change, words in (
         ("contact.periodic.width=0.04", "contact.periodic.width: stone is 0.03 m long"),
@@ -257,7 +257,7 @@ def test_a_scene_names_the_width(tmp_path: Path) -> None:
         ("contact.plane.0.normal=[0, 1, 1]", "contact.plane.0.normal: its normal has a part"),
     ):
         with pytest.raises(SceneError) as told:
-            simulation_of(scene_load(path, [change]))
+            simulation_of(load_scene(path, [change]))
         assert words in str(told.value), change
 
 
@@ -332,7 +332,7 @@ def test_dashpots_alone_creep_and_a_depth_holds() -> None:
 
 def corner(**options: Any) -> tuple[q.Simulation, q.Body]:
     """A block whose faces x-max and y-max absorb, of two depths, held and moved elsewhere."""
-    body = q.Body(box_mesh((0.3, 0.2, 0.2), (3, 2, 2), "kuhn"), GROUND, name="block")
+    body = q.Body(make_box_mesh((0.3, 0.2, 0.2), (3, 2, 2), "kuhn"), GROUND, name="block")
     run = q.Simulation([body], threads=1, **options)
     x, y, z = body.nodes.T
     run.absorb(body, x > 0.29, 0.5)
@@ -405,7 +405,7 @@ def test_step_is_that_of_the_springs_alone(tmp_path: Path) -> None:
         columns, scale = [], np.sqrt(np.where(run.assembly.mass > 0, run.assembly.mass, 1.0))
         for unit in np.eye(3 * len(body.nodes)):
             u = 1e-9 * unit.reshape(-1, 3)[run.master]
-            rate = accelerations_free(run, u, 0 * u) / 1e-9
+            rate = find_free_accelerations(run, u, 0 * u) / 1e-9
             rate[run.master != np.arange(len(u))] = 0.0
             columns.append(rate.ravel())
         root = np.repeat(scale, 3)
@@ -486,5 +486,5 @@ def test_a_scene_names_absorbing_faces(tmp_path: Path) -> None:
         ('simulation.precision="float32"', "absorb.0: absorbing faces are computed in double"),
     ):
         with pytest.raises(SceneError) as told:
-            simulation_of(scene_load(path, [change]))
+            simulation_of(load_scene(path, [change]))
         assert words in str(told.value), change

@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
-from qdem_fem.errors import ConditionError, QdemError
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import ConditionError, QdemError
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem.meshes import delaunay_mesh
 
 pytestmark = pytest.mark.lowest
@@ -23,7 +23,7 @@ STEEL = q.Material(YOUNG, POISSON, DENSITY)
 
 def block(rotation: Rotation | None = None, cells: tuple[int, int, int] = (3, 2, 2)) -> q.Body:
     """A block of 1 x 0.6 x 0.5 m with one corner in the origin, turned about it."""
-    mesh = box_mesh((1.0, 0.6, 0.5), cells)
+    mesh = make_box_mesh((1.0, 0.6, 0.5), cells)
     nodes = mesh.nodes if rotation is None else rotation.apply(mesh.nodes)
     return q.Body((nodes, mesh.elements), STEEL)
 
@@ -240,7 +240,7 @@ def test_one_periodic_cell_is_a_row_of_them() -> None:
     """One cell of a row that repeats moves as each cell of three; momentum goes round."""
     displacements = []
     for cells in (1, 3):
-        mesh = box_mesh((0.2 * cells, 0.6, 0.5), (cells, 3, 2))
+        mesh = make_box_mesh((0.2 * cells, 0.6, 0.5), (cells, 3, 2))
         body = q.Body(mesh, STEEL)
         run = free(body, step=5e-4, gravity=[0.5, 0, -9.81])
         x = mesh.nodes

@@ -19,9 +19,9 @@ import pytest
 from numpy.typing import ArrayLike
 
 from qdem_fem import Body, Material, Series, Simulation
-from qdem_fem.mesh import TetMesh
-from qdem_fem.mesh_generation import box_mesh, jitter
-from qdem_fem.spectra import peak_frequencies
+from qdem_fem.mesh.generation import jitter, make_box_mesh
+from qdem_fem.mesh.tetrahedra import TetMesh
+from qdem_fem.report.spectra import find_peak_frequencies
 from validation.bench.qdem import judge
 from validation.bench.qdem.checks import orders
 from validation.bench.qdem.closed_forms import dilatational_speed
@@ -38,7 +38,7 @@ LONG_SAMPLES, TENTH = 400, 40
 
 def block() -> Problem:
     """A soft irregular block of 96 elements, clamped on one side."""
-    mesh = jitter(box_mesh((2.0, 1.0, 1.0), (4, 2, 2)), 0.2, seed=1)
+    mesh = jitter(make_box_mesh((2.0, 1.0, 1.0), (4, 2, 2)), 0.2, seed=1)
     return clamped(mesh, Material(young=1e6, poisson=0.25, density=1000.0))
 
 
@@ -152,7 +152,7 @@ def block_on_its_axes() -> tuple[TetMesh, FloatArray]:
 
     About any other axis it would tumble.
     """
-    block = jitter(box_mesh((1.2, 1.0, 0.6), (2, 2, 2)), 0.2, seed=3)
+    block = jitter(make_box_mesh((1.2, 1.0, 0.6), (2, 2, 2)), 0.2, seed=3)
     mass = judge.lumped_mass(block.nodes, block.elements, SOFT.density)
     place = block.nodes - mass @ block.nodes / mass.sum()
     _, axes = np.linalg.eigh(place.T @ (mass[:, None] * place))  # largest spread last
@@ -307,7 +307,7 @@ def thickness_frequency(height: float, young: float, density: float, poisson: fl
 
 def thickness_run(viscosity: float, layers: int) -> tuple[float, float]:
     """Decay rate [1/s] and frequency [Hz] of the first thickness mode, sides on rollers."""
-    mesh = box_mesh((0.11, 0.11, HEIGHT), (2, 2, layers))
+    mesh = make_box_mesh((0.11, 0.11, HEIGHT), (2, 2, layers))
     body = Body(mesh, Material(45e9, 0.0, DENSITY, shear_viscosity=viscosity))
     run = Simulation([body], threads=1)
     hold_uniaxial(run, body)
@@ -317,7 +317,7 @@ def thickness_run(viscosity: float, layers: int) -> tuple[float, float]:
     body.displacement = field
     period = 1 / thickness_frequency(HEIGHT, 45e9, DENSITY)
     history = run.advance(8 * period, {"top": mesh.node_sets["z-max"]}, period / 40)
-    mode = peak_frequencies(history.time, history["top"][:, 2], count=1)[0]
+    mode = find_peak_frequencies(history.time, history["top"][:, 2], count=1)[0]
     return mode.decay, mode.frequency
 
 
@@ -348,7 +348,7 @@ def convolved(creep: Callable[..., FloatArray], time: FloatArray) -> FloatArray:
 
 def creep_run(free_sides: bool) -> tuple[FloatArray, FloatArray]:
     """Times [s] and axial strain [-] of a column under the load of `load_history`."""
-    mesh = box_mesh((0.11, 0.11, HEIGHT), (2, 2, 4))
+    mesh = make_box_mesh((0.11, 0.11, HEIGHT), (2, 2, 4))
     body = Body(mesh, Material(YOUNG_SOFT, 0.0, DENSITY, shear_viscosity=VISCOSITY_SOFT))
     run = Simulation([body], threads=1)
     sets = mesh.node_sets

@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from qdem_fem.kinematics import FloatArray, cofactor
+from qdem_fem.element.kinematics import FloatArray, cofactor
 from tests import qdem_construction as c
 
 ROUND_OFF = np.finfo(float).eps

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 from numba import types
 from numpy.typing import NDArray
 
-from qdem_fem.contact_kernel import (
+from qdem_fem.contact.bounds import (
+    bound_allowed_contacts,
+    bound_spring_network,
+    shorten_step_by_contact,
+)
+from qdem_fem.contact.search.pairs import find_near_pairs, find_near_walls, renew_pairs
+from qdem_fem.contact.spheres.law import (
     BLOCK,
     GO_ON,
     LOOK_AGAIN,
@@ -23,9 +29,7 @@ from qdem_fem.contact_kernel import (
     advance_threads,
     slider,
 )
-from qdem_fem.contact_search import pairs_near, pairs_renew, walls_near
-from qdem_fem.contact_spheres import pair_stiffness, tangential_stiffness
-from qdem_fem.contact_step import allowed_bound, network_bound, step_with_contact
+from qdem_fem.contact.spheres.options import pair_stiffness, tangential_stiffness
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -107,13 +111,13 @@ def cloud(seed: int, count: int, walls: bool, skin: float = 0.2) -> Contact:
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     size = np.zeros((count, 3))
     point = ((reference @ across.T).min(axis=0) - 0.25)[:, None] * across
-    near = walls_near(reference, radius, point, across, skin)
+    near = find_near_walls(reference, radius, point, across, skin)
     return Contact(
         Spheres(
             reference, 4 * np.arange(count), 4 * np.arange(count), body, radius, normal,
             tangential_stiffness(normal, 0.2),
         ),
-        pairs_renew(None, reference, radius, body, skin, near),
+        renew_pairs(None, reference, radius, body, skin, near),
         Planes(
             point, across,
             np.array([0.2, 0.7])[: 2 * walls],
@@ -146,8 +150,8 @@ def test_kernel_is_its_twin(walls: bool) -> None:
         if said == LOOK_AGAIN:
             position = c.spheres.reference + at
             radius, body = c.spheres.radius, c.spheres.body
-            near = walls_near(position, radius, c.planes.point, c.planes.normal, 0.2)
-            pairs = pairs_renew(c.pairs, position, radius, body, 0.2, near)
+            near = find_near_walls(position, radius, c.planes.point, c.planes.normal, 0.2)
+            pairs = renew_pairs(c.pairs, position, radius, body, 0.2, near)
             c = c._replace(pairs=pairs)
             c.start[:] = position
             renewed += 1
@@ -232,7 +236,7 @@ def test_what_a_step_says() -> None:
     c.spheres.radius[:] = 0.5
     c.spheres.reference[:] = [[0, 0, 0], [2.0, 0, 0]]
     c = c._replace(
-        pairs=pairs_renew(None, c.spheres.reference, c.spheres.radius, np.arange(2), 9.0, NO_WALLS)
+        pairs=renew_pairs(None, c.spheres.reference, c.spheres.radius, np.arange(2), 9.0, NO_WALLS)
     )
     c.start[:] = c.spheres.reference
     still = np.zeros(8)
@@ -259,7 +263,7 @@ def test_spheres_that_turn_as_one_strain_their_spring() -> None:
     c = c._replace(
         friction=np.inf,
         half_skin=np.inf,
-        pairs=pairs_renew(
+        pairs=renew_pairs(
             None, c.spheres.reference, c.spheres.radius, c.spheres.body, 1.0, NO_WALLS
         ),
     )
@@ -285,7 +289,7 @@ def test_list_is_complete_and_in_order(seed: int, count: int, scale: float) -> N
     position = random.uniform(-3, 3, (count, 3)) + 1e3 * random.integers(-1, 2, (count, 1))
     radius, body = random.uniform(0.1, 0.8, count), random.integers(0, 3, count)
     skin = float(random.uniform(0, 0.3))
-    first, second = pairs_near(scale * position, scale * radius, body, scale * skin)
+    first, second = find_near_pairs(scale * position, scale * radius, body, scale * skin)
     found = np.column_stack([np.repeat(np.arange(count), np.diff(first)), second])
     expected = pairs_twin(scale * position, scale * radius, body, scale * skin)
     assert found.tolist() == expected.tolist()
@@ -303,7 +307,7 @@ def test_pairs_of_bodies_of_many_patches(far: float) -> None:
     body = np.concatenate([random.integers(0, 2, 250), np.zeros(50, int)])
     body[250:] = 1 - body[:50]
     radius = random.uniform(0.05, 0.1, 300)
-    first, second = pairs_near(position, radius, body, 0.02)
+    first, second = find_near_pairs(position, radius, body, 0.02)
     found = np.column_stack([np.repeat(np.arange(300), np.diff(first)), second])
     assert found.tolist() == pairs_twin(position, radius, body, 0.02).tolist()
     assert len(found) >= 50
@@ -368,23 +372,23 @@ def test_bound_of_a_network_holds(seed: int, nodes: int, springs: int, walls: bo
         matrix[i, :, i] += wall[i] * np.diag([1, 0.4, 0.4])
     root = np.sqrt(np.repeat(inverse, 3))
     highest = np.linalg.eigvalsh(root[:, None] * matrix.reshape(3 * nodes, -1) * root)[-1]
-    assert highest <= network_bound(ends, stiffness, wall, inverse) * (1 + 1e-9)
+    assert highest <= bound_spring_network(ends, stiffness, wall, inverse) * (1 + 1e-9)
 
 
 def test_bounds_are_sharp_for_one_pair_and_one_wall() -> None:
     """``omega^2 = k (1/m1 + 1/m2)``, ``k/m``; and of any number of contacts that a vertex has."""
     pair = np.array([[0, 1]])
     inverse = np.array([2.0, 3.0])
-    assert network_bound(pair, np.array([7.0]), np.zeros(2), inverse) == 7 * 5
-    assert network_bound(pair[:0], np.zeros(0), np.array([7.0, 0]), inverse) == 14
-    assert allowed_bound(np.array([7.0, 7.0]), inverse, 1) >= 7 * 5
+    assert bound_spring_network(pair, np.array([7.0]), np.zeros(2), inverse) == 7 * 5
+    assert bound_spring_network(pair[:0], np.zeros(0), np.array([7.0, 0]), inverse) == 14
+    assert bound_allowed_contacts(np.array([7.0, 7.0]), inverse, 1) >= 7 * 5
 
 
 @pytest.mark.parametrize("viscous", [False, True])
 def test_step_with_contact(viscous: bool) -> None:
     """At the step, ``dt^2 K + 2 dt C + dt^2 K_c = 4``; without contact or elements, the known."""
-    step = step_with_contact(0.5, 7.0, viscous=viscous)
+    step = shorten_step_by_contact(0.5, 7.0, viscous=viscous)
     elements = 4 * step / 0.5 if viscous else 4 * (step / 0.5) ** 2
     assert elements + step**2 * 7.0 == pytest.approx(4, rel=1e-12)
-    assert step_with_contact(0.5, 0.0, viscous=viscous) == 0.5
-    assert step_with_contact(np.inf, 4.0, viscous=viscous) == 1.0
+    assert shorten_step_by_contact(0.5, 0.0, viscous=viscous) == 0.5
+    assert shorten_step_by_contact(np.inf, 4.0, viscous=viscous) == 1.0

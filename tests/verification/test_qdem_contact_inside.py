@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
-from qdem_fem.energy_account import energy_facts
-from qdem_fem.errors import ContactTooDeep
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import ContactTooDeep
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.scene.energy_account import list_energy_facts
 
 SIDE = 0.03
 STONE = q.Material(30e9, 0.2, 2700.0)
@@ -19,12 +19,12 @@ MODELS = {
     "surface": q.SurfaceContact(1e10, 0.5, depth=0.002),
     "overlaps": q.SurfaceContact(1e10, 0.5, depth=0.002, faces="overlaps"),
 }
-LOW = box_mesh((SIDE,) * 3, (2, 2, 2))
+LOW = make_box_mesh((SIDE,) * 3, (2, 2, 2))
 
 
 def beside(model: str, size: float, corner: tuple[float, float, float]) -> q.Simulation:
     """A cube of 3 cm at the origin, and one of ``size`` [m] with its least corner at ``corner``."""
-    other = box_mesh((size,) * 3, (1, 1, 1), origin=corner)
+    other = make_box_mesh((size,) * 3, (1, 1, 1), origin=corner)
     bodies = [q.Body(LOW, STONE, name="low"), q.Body(other, STONE, name="other")]
     return q.Simulation(bodies, threads=1, contact=MODELS[model], step=1e-8)
 
@@ -59,7 +59,7 @@ def test_bodies_deep_in_each_other_are_told(
 )
 def test_images_across_a_width_are_looked_at(model: str, y: float, said: str | None) -> None:
     """Cubes of 3 cm, the other's place taken any number of widths of 10 cm ahead or back."""
-    other = box_mesh((0.03,) * 3, (1, 1, 1), origin=(0.011, y, 0.013))
+    other = make_box_mesh((0.03,) * 3, (1, 1, 1), origin=(0.011, y, 0.013))
     bodies = [q.Body(LOW, STONE, name="low"), q.Body(other, STONE, name="other")]
     contact = replace(MODELS[model], periodic=q.PeriodicWidth("y", 0.1))
     run = q.Simulation(bodies, threads=1, contact=contact, step=1e-8)
@@ -83,7 +83,7 @@ def test_what_overlap_gives_is_what_the_account_is_measured_by() -> None:
     """Springs that the scene begins with make motion: nothing was put in, and 1 % is missing."""
     rows = {"kinetic": [0.0, 60, 99], "elastic": [0.0, 0, 0], "external": [0.0, 0, 0]}
     rows |= {"contact": [100.0, 40, 0]}
-    facts = energy_facts({name: np.array(values) for name, values in rows.items()})
+    facts = list_energy_facts({name: np.array(values) for name, values in rows.items()})
     assert facts["greatest_imbalance"] == pytest.approx(1.0)
     assert facts["relative_imbalance"] == pytest.approx(0.01)
 
@@ -91,8 +91,8 @@ def test_what_overlap_gives_is_what_the_account_is_measured_by() -> None:
 def test_motion_that_a_scene_begins_with_is_not_missing() -> None:
     """`velocity` of a body is no work of loads; what is lost on the way is told over it."""
     rows = {"kinetic": [400.0, 400.0, 396.0], "elastic": [0.0] * 3, "external": [0.0] * 3}
-    steady = energy_facts({name: np.array(values[:2]) for name, values in rows.items()})
+    steady = list_energy_facts({name: np.array(values[:2]) for name, values in rows.items()})
     assert steady["relative_imbalance"] == 0.0
-    assert energy_facts({name: np.array(values) for name, values in rows.items()})[
+    assert list_energy_facts({name: np.array(values) for name, values in rows.items()})[
         "relative_imbalance"
     ] == pytest.approx(0.01)

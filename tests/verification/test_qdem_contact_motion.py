@@ -16,14 +16,20 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from qdem_fem import contact_window
-from qdem_fem.contact_search import SEARCH, skin_next
-from qdem_fem.contact_spheres import SKIN
-from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, SceneError, StepWarning
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.periodic import extents
-from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import scene_load
+from qdem_fem.contact import window as contact_window
+from qdem_fem.contact.search.pairs import SEARCH, choose_skin
+from qdem_fem.contact.search.periodic import extents
+from qdem_fem.contact.spheres.options import SKIN
+from qdem_fem.files.errors import (
+    CheckpointError,
+    ConditionError,
+    ContactTooDeep,
+    SceneError,
+    StepWarning,
+)
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.checks import load_scene
 from tests.qdem_slopes import slope_gain
 
 Floats = NDArray[np.float64]
@@ -34,7 +40,7 @@ EPS = float(np.finfo(float).eps)
 
 def block(name: str = "block", origin: Any = (0, 0, 0), cells: Any = (2, 2, 2)) -> q.Body:
     """A cube of stone, its vertices 15 mm apart."""
-    return q.Body(box_mesh((SIDE,) * 3, cells, "kuhn", tuple(origin)), STONE, name=name)
+    return q.Body(make_box_mesh((SIDE,) * 3, cells, "kuhn", tuple(origin)), STONE, name=name)
 
 
 def two(
@@ -170,7 +176,7 @@ def test_units_change_no_bit() -> None:
         pressure = kilogram / (metre * second**2)
         stone = q.Material(30e9 * pressure, 0.2, 2700.0 * kilogram / metre**3)
         bodies = [
-            q.Body(box_mesh((SIDE * metre,) * 3, (2, 2, 2), "kuhn", place), stone, name=name)
+            q.Body(make_box_mesh((SIDE * metre,) * 3, (2, 2, 2), "kuhn", place), stone, name=name)
             for name, place in (
                 ("below", (0.0, 0.0, 0.0)),
                 ("above", (0.001 * metre, 0.0, 0.04195 * metre)),
@@ -286,13 +292,13 @@ def test_skin_next(
     """
     most, spheres = least + more, 10**6
     skin = float(np.clip(skin, least, most))
-    found = skin_next(skin, lasted, idle, spheres, least, most)
+    found = choose_skin(skin, lasted, idle, spheres, least, most)
     assert least <= found <= most
     assert skin / 2 <= found <= 2 * skin
     way = least / (2 * speed)
     for _ in range(40):
         pairs = int(dense * skin / least * spheres)
-        skin = skin_next(skin, int(skin / 2 / way) + 1, pairs, spheres, least, most)
+        skin = choose_skin(skin, int(skin / 2 / way) + 1, pairs, spheres, least, most)
     best = np.clip(np.sqrt(2 * way * SEARCH * least / dense), least, most)
     # a list lasts whole steps: one too many of n
     assert skin == pytest.approx(best, rel=max(1e-6, 3 * way / best))
@@ -353,7 +359,7 @@ def test_threads_change_no_bit() -> None:
 def rigid_pair(threads: int | None) -> q.Simulation:
     """Two rigid cubes that grind on each other."""
     bodies = [
-        q.Body(box_mesh((SIDE,) * 3, (2, 2, 2), origin=origin), STONE, name=str(k), rigid=True)
+        q.Body(make_box_mesh((SIDE,) * 3, (2, 2, 2), origin=origin), STONE, name=str(k), rigid=True)
         for k, origin in enumerate(((0, 0, 0), (0.004, 0.002, SIDE + 2 * RADIUS - 2e-6)))
     ]
     contact = q.SphereContact(RADIUS, 1e6, 0.5)
@@ -369,11 +375,11 @@ def test_rigid_bodies_are_on_the_threads_asked_for(monkeypatch: pytest.MonkeyPat
     for run in asked.values():
         run.energy()  # finds the contacts
     kernels = {threads: run.contacts.kernel for threads, run in asked.items()}
-    found = {n: contact_window.threads_of(asked[n], kernels[n]) for n in asked}
+    found = {n: contact_window.choose_threads(asked[n], kernels[n]) for n in asked}
     assert found == {1: 1, 2: 2, None: 1}
     monkeypatch.setattr(contact_window, "THREAD_SPHERES", 20)
-    assert contact_window.threads_of(asked[None], kernels[None]) == 2
-    assert contact_window.threads_of(asked[2], None) == asked[2].assembly.threads == 1
+    assert contact_window.choose_threads(asked[None], kernels[None]) == 2
+    assert contact_window.choose_threads(asked[2], None) == asked[2].assembly.threads == 1
 
 
 @pytest.mark.validate
@@ -488,7 +494,7 @@ friction = 0.2
 def scene_of(folder: Path, change: Callable[[str], str] = str) -> Any:
     """`SCENE`, changed, as a scene file."""
     (folder / "scene.toml").write_text(change(SCENE), encoding="utf-8")
-    return scene_load(folder / "scene.toml")
+    return load_scene(folder / "scene.toml")
 
 
 def test_a_scene_names_its_contact(tmp_path: Path) -> None:

@@ -11,10 +11,10 @@ import pytest
 from scipy.linalg import eigh
 
 import qdem_fem as q
-from qdem_fem.contact_scene import ContactTable, contact_faults
-from qdem_fem.errors import ConditionError, StepWarning, Unstable
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.rigid_mass import cross_matrix
+from qdem_fem.bodies.rigid_mass import cross_matrix
+from qdem_fem.files.errors import ConditionError, StepWarning, Unstable
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.tables.contact import ContactTable, contact_faults
 
 SIDE, RADIUS, STIFFNESS = 0.03, 0.006, 1e8
 JELLY = q.Material(1e3, 0.2, 2700.0)
@@ -25,7 +25,7 @@ def two(gap: float, material: q.Material = JELLY, **options: Any) -> q.Simulatio
     """Two cubes, nine vertices of one opposite nine of the other, ``gap`` [m] from touching."""
     rigid, stiffness = options.pop("rigid", False), options.pop("stiffness", STIFFNESS)
     bodies = [
-        q.Body(box_mesh((SIDE,) * 3, (2, 2, 2), "kuhn", (0.0, 0.0, z)), material, name=name,
+        q.Body(make_box_mesh((SIDE,) * 3, (2, 2, 2), "kuhn", (0.0, 0.0, z)), material, name=name,
                rigid=rigid)
         for name, z in (("below", 0.0), ("above", SIDE + 2 * RADIUS + gap))
     ]  # fmt: skip

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import qdem_fem as q
-from qdem_fem.contact_surface import face_points, sharp_edges
-from qdem_fem.contact_window import advance_of
-from qdem_fem.errors import ConditionError, ContactTooDeep
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.contact.surface.options import find_sharp_edges, place_face_points
+from qdem_fem.contact.window import advance_contact
+from qdem_fem.files.errors import ConditionError, ContactTooDeep
+from qdem_fem.mesh.generation import make_box_mesh
 from tests.qdem_slopes import slope_gain
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,7 @@ TETRAHEDRON = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
 
 def cube(cells: int = 1, place: Any = (0, 0, 0), turn: Any = None, name: str = "cube") -> q.Body:
     """A cube with its least corner at ``place``, turned about its middle."""
-    mesh = box_mesh((SIDE,) * 3, (cells,) * 3, "five")
+    mesh = make_box_mesh((SIDE,) * 3, (cells,) * 3, "five")
     arm = mesh.nodes - SIDE / 2
     if turn is not None:
         arm = turn.apply(arm)
@@ -46,7 +46,7 @@ def forces_at(run: q.Simulation, displacement: Floats) -> tuple[Floats, float]:
     c, state = run.contacts, run.assembly.state
     flat = np.zeros((run.assembly.n_nodes, 4))
     flat[c.place, :3] = displacement
-    advance_of(c.kernel, None, flat.ravel(), np.zeros_like(np.asarray(state.velocity)), 0.0)
+    advance_contact(c.kernel, None, flat.ravel(), np.zeros_like(np.asarray(state.velocity)), 0.0)
     return np.array(c.kernel.force), float(c.kernel.account[0])
 
 
@@ -156,7 +156,8 @@ def test_faces_bear_the_pressure_of_their_depth() -> None:
     depth = 1e-5
     for below, above in ((1, 1), (2, 3)):
         inner = q.Body(
-            box_mesh((0.6 * SIDE,) * 3, (above,) * 3, "five", (0.006, 0.005, SIDE - depth)), STONE
+            make_box_mesh((0.6 * SIDE,) * 3, (above,) * 3, "five", (0.006, 0.005, SIDE - depth)),
+            STONE,
         )
         run = touching([cube(below), inner])
         run.contacts.refresh()
@@ -331,7 +332,7 @@ def test_a_saved_run_goes_on_to_the_same_bits(tmp_path: Path, faces: str) -> Non
 @given(st.integers(1, 6), st.integers(0, 2**32 - 1))
 def test_points_of_a_face_integrate_linear_functions(parts: int, seed: int) -> None:
     """Equal shares, inside, and their mean is the mean of the corners."""
-    share = face_points(parts)
+    share = place_face_points(parts)
     corners = np.random.default_rng(seed).normal(size=3)
     assert share.shape == (parts**2, 3)
     assert share.min() > 0
@@ -342,7 +343,7 @@ def test_points_of_a_face_integrate_linear_functions(parts: int, seed: int) -> N
 def test_sharp_edges_of_a_cube_are_twelve() -> None:
     """As many pieces each as it has cells; those of its flat faces are none."""
     body = cube(3)
-    edges, opposite = sharp_edges(body.nodes, body.surface)
+    edges, opposite = find_sharp_edges(body.nodes, body.surface)
     assert len(edges) == 12 * 3
     ends = body.nodes[edges]
     on_rim = ((np.abs(ends) < 1e-12) | (np.abs(ends - SIDE) < 1e-12)).all(axis=1)

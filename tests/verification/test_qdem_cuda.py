@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
-from qdem_fem import kernel, stress
-from qdem_fem.cuda_assembly import node_actions, sample_numbers
-from qdem_fem.errors import ConditionError, LibraryMissing
-from qdem_fem.kernel_arrays import Constraints, Loads, Probes
+from qdem_fem.element import stress
+from qdem_fem.files.errors import ConditionError, LibraryMissing
+from qdem_fem.kernel.cpu import step as kernel
+from qdem_fem.kernel.cpu.arrays import Constraints, Loads, Probes
+from qdem_fem.kernel.cuda.assembly import number_samples, sort_node_actions
 from validation.bench.qdem_gpu.contact import MARCHES
 from validation.bench.qdem_gpu.search import CLOUDS
 from validation.cases.qdem_gpu import STRAINS, twins_in_simulator
@@ -89,10 +90,10 @@ def test_every_variant_was_compared(apart: dict[str, float]) -> None:
 
 def test_no_float_literal_in_single_precision_code() -> None:
     """A literal 0.5 is a double on a GPU, and would take the element's arithmetic with it."""
-    from qdem_fem import cuda_step
+    from qdem_fem.kernel.cuda import step as cuda_step
 
     assert literals(inspect.getsource(stress)) == []
-    for function in (cuda_step.edges, cuda_step.forces_add):
+    for function in (cuda_step.edges, cuda_step.add_forces):
         assert literals(inspect.getsource(function.py_func)) == []
     assert literals(inspect.getsource(cuda_step.element_forces_kernel.__wrapped__)) == []
     assert literals(inspect.getsource(cuda_step.pulls_function)) == []
@@ -116,7 +117,7 @@ def test_actions_of_a_node_keep_the_order_of_the_step() -> None:
         roller_normal=np.array([[0.0, 0.6, 0.8], [1.0, 0.0, 0.0]]),
     )  # fmt: skip
     probes = Probes(np.array([12, 4]), np.zeros((1, 2, 3)), 1, 1)
-    found = node_actions(5, loads, held, probes)
+    found = sort_node_actions(5, loads, held, probes)
     assert found.first.tolist() == [0, 0, 2, 2, 7, 7]
     assert found.actions[:7].tolist() == [
         [2, 2, 0, 0], [3, 0, -1, 1],
@@ -129,10 +130,10 @@ def test_actions_of_a_node_keep_the_order_of_the_step() -> None:
 @pytest.mark.parametrize(("stride", "first", "rows"), [(1, 1, 9), (3, 2, 9), (4, 9, 1), (2, 1, 2)])
 def test_samples_are_those_of_the_cpu_kernel(stride: int, first: int, rows: int) -> None:
     probes = Probes(np.array([4]), np.zeros((rows, 1, 3)), stride, first)
-    numbers = sample_numbers(8, probes)
+    numbers = number_samples(8, probes)
     for done in range(1, 9):
         probes.record[:] = np.nan
-        kernel.probes_take.py_func(probes, done, np.ones(8))
+        kernel.take_probes.py_func(probes, done, np.ones(8))
         taken = np.flatnonzero(np.isfinite(probes.record[:, 0, 0]))
         assert numbers[done - 1] == (taken[0] if taken.size else -1)
 

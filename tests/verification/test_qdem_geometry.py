@@ -11,19 +11,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import qdem_fem.surface
-from qdem_fem.errors import MeshError
-from qdem_fem.mesh import TetMesh, altitudes, element_gradients, lumped_mass, mesh_read
-from qdem_fem.mesh_generation import box_mesh, gmsh_box, jitter, ring_mesh
-from qdem_fem.ordering import order_for_locality
-from qdem_fem.surface import face_area_vectors, faces_within, pressure_forces, surface_faces
+from qdem_fem.files.errors import MeshError
+from qdem_fem.kernel.cpu.ordering import order_for_locality
+from qdem_fem.mesh import surface
+from qdem_fem.mesh.generation import jitter, make_box_mesh, make_gmsh_box, make_ring_mesh
+from qdem_fem.mesh.surface import (
+    face_area_vectors,
+    find_faces_within,
+    find_surface_faces,
+    pressure_forces,
+)
+from qdem_fem.mesh.tetrahedra import TetMesh, altitudes, element_gradients, lumped_mass, read_mesh
 
 EPS = float(np.finfo(np.float64).eps)
 EXTENDED = float(np.finfo(np.longdouble).eps)
 SIZE = (0.5, 0.3, 0.2)
-KUHN = box_mesh(SIZE, (5, 4, 3), origin=(1.0, -2.0, 0.5))
-FIVE = box_mesh(SIZE, (3, 4, 5), "five")
-RING = ring_mesh(0.3, 0.5, 0.2, (2, 11, 3))
+KUHN = make_box_mesh(SIZE, (5, 4, 3), origin=(1.0, -2.0, 0.5))
+FIVE = make_box_mesh(SIZE, (3, 4, 5), "five")
+RING = make_ring_mesh(0.3, 0.5, 0.2, (2, 11, 3))
 POLYGON = 11 / 2 * np.sin(2 * np.pi / 11) * (0.5**2 - 0.3**2) * 0.2
 """Volume of the ring with its circles as polygons of eleven sides [m^3]."""
 MESHES = {
@@ -43,7 +48,7 @@ def shuffled(mesh: TetMesh, seed: int) -> TetMesh:
     nodes = np.empty_like(mesh.nodes)
     nodes[name] = mesh.nodes
     elements = name[mesh.elements][generator.permutation(len(mesh.elements))]
-    return mesh_read((nodes, generator.permuted(elements, axis=1)))
+    return read_mesh((nodes, generator.permuted(elements, axis=1)))
 
 
 @pytest.fixture(params=MESHES)
@@ -64,7 +69,7 @@ def test_volumes_fill_the_body_and_agree_with_its_surface(
 ) -> None:
     mesh, volume, _ = body
     _, volumes = element_gradients(mesh.nodes, mesh.elements)
-    faces = surface_faces(mesh.elements)
+    faces = find_surface_faces(mesh.elements)
     assert volumes.sum() == pytest.approx(volume, rel=1e-13)
     assert divergence_volume(mesh.nodes, faces) == pytest.approx(volume, rel=1e-13)
     assert np.abs(face_area_vectors(mesh.nodes, faces).sum(axis=0)).max() < 1e-14
@@ -78,7 +83,7 @@ def test_euler_characteristic(body: tuple[TetMesh, float, int]) -> None:
         for k in (1, 2, 3, 4)
     ]
     assert counts[0] - counts[1] + counts[2] - counts[3] == euler
-    faces = surface_faces(mesh.elements).tolist()
+    faces = find_surface_faces(mesh.elements).tolist()
     counts = [len({frozenset(s) for row in faces for s in combinations(row, k)}) for k in (1, 2, 3)]
     assert counts[0] - counts[1] + counts[2] == 2 * euler
 
@@ -87,7 +92,7 @@ def test_surface_is_every_face_of_one_element_only(body: tuple[TetMesh, float, i
     """Against a dictionary of all faces; every edge is walked once each way."""
     mesh = body[0]
     count = Counter(frozenset(f) for row in mesh.elements.tolist() for f in combinations(row, 3))
-    faces = surface_faces(mesh.elements)
+    faces = find_surface_faces(mesh.elements)
     assert {f for f, n in count.items() if n == 1} == {frozenset(f) for f in faces.tolist()}
     walked = Counter((a, b) for f in faces.tolist() for a, b in zip(f, f[1:] + f[:1], strict=True))
     assert set(walked.values()) == {1}
@@ -98,40 +103,40 @@ def test_surface_does_not_depend_on_how_faces_are_compared(
     body: tuple[TetMesh, float, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     elements = body[0].elements
-    packed = surface_faces(elements)
-    np.testing.assert_array_equal(packed, surface_faces(elements[::-1]))
-    far = surface_faces(elements + (1 << 40))
+    packed = find_surface_faces(elements)
+    np.testing.assert_array_equal(packed, find_surface_faces(elements[::-1]))
+    far = find_surface_faces(elements + (1 << 40))
     np.testing.assert_array_equal(packed, far - (1 << 40))
-    monkeypatch.setattr(qdem_fem.surface, "_BLOCK", 7)
-    np.testing.assert_array_equal(packed, surface_faces(elements))
+    monkeypatch.setattr(surface, "_BLOCK", 7)
+    np.testing.assert_array_equal(packed, find_surface_faces(elements))
 
 
 def test_largest_packed_node_number() -> None:
     """Node 2^21 - 1 still fits beside two others and the sense of the face."""
     top = (1 << 21) - 1
-    faces = surface_faces(np.array([[top - 3, top - 2, top - 1, top]]))
-    np.testing.assert_array_equal(faces - top + 3, surface_faces(np.array([[0, 1, 2, 3]])))
+    faces = find_surface_faces(np.array([[top - 3, top - 2, top - 1, top]]))
+    np.testing.assert_array_equal(faces - top + 3, find_surface_faces(np.array([[0, 1, 2, 3]])))
 
 
 def test_surface_that_overlaps_itself_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     three = np.array([[0, 1, 2, 3], [0, 2, 1, 4], [5, 6, 7, 8], [0, 1, 2, 9]])
     with pytest.raises(MeshError, match=r"3 elements \(0, 1, 3\) share the face .*\[0, 1, 2\]"):
-        surface_faces(three)
+        find_surface_faces(three)
     with pytest.raises(MeshError, match=r"elements 0, 1 lie on the same side .*\[0, 1, 2\]"):
-        surface_faces(three[[0, 3]])
+        find_surface_faces(three[[0, 3]])
     with pytest.raises(MeshError, match="3 elements"):
-        surface_faces(three + (1 << 30))
+        find_surface_faces(three + (1 << 30))
     nodes = KUHN.nodes.copy()
-    inside = np.setdiff1d(np.arange(len(nodes)), surface_faces(KUHN.elements))[0]
+    inside = np.setdiff1d(np.arange(len(nodes)), find_surface_faces(KUHN.elements))[0]
     nodes[inside] += [0.3, 0, 0]  # three cells on: elements around it are turned inside out
-    folded = mesh_read((nodes, KUHN.elements))
+    folded = read_mesh((nodes, KUHN.elements))
     assert len(folded.flipped) > 0
     with pytest.raises(MeshError, match="same side"):
-        surface_faces(folded.elements)
+        find_surface_faces(folded.elements)
 
 
 def test_no_elements_have_no_surface() -> None:
-    assert surface_faces(np.zeros((0, 4), np.int64)).shape == (0, 3)
+    assert find_surface_faces(np.zeros((0, 4), np.int64)).shape == (0, 3)
     assert pressure_forces(KUHN.nodes, np.zeros((0, 3), np.int64), 120).shape == (120, 3)
 
 
@@ -230,7 +235,7 @@ def test_lumped_mass_keeps_mass_and_centre_of_mass(body: tuple[TetMesh, float, i
 def test_pressure_on_a_closed_surface_is_in_balance(body: tuple[TetMesh, float, int]) -> None:
     """No force, no moment; and sum f x X = -V I, Gauss's theorem for the field X."""
     mesh, volume, _ = body
-    force = pressure_forces(mesh.nodes, surface_faces(mesh.elements), len(mesh.nodes))
+    force = pressure_forces(mesh.nodes, find_surface_faces(mesh.elements), len(mesh.nodes))
     assert np.abs(force.sum(axis=0)).max() < 1e-14
     assert np.abs(np.cross(mesh.nodes, force).sum(axis=0)).max() < 1e-14
     np.testing.assert_allclose(force.T @ mesh.nodes, -volume * np.eye(3), atol=1e-14)
@@ -240,7 +245,7 @@ def test_pressure_on_one_side_pushes_inward_at_its_middle() -> None:
     """1 Pa on x-max of the box: force ly lz towards -x, moment as if at the side's centre."""
     side = np.zeros(len(KUHN.nodes), bool)
     side[KUHN.node_sets["x-max"]] = True
-    faces = faces_within(surface_faces(KUHN.elements), side)
+    faces = find_faces_within(find_surface_faces(KUHN.elements), side)
     assert len(faces) == 2 * 4 * 3
     force = pressure_forces(KUHN.nodes, faces, len(KUHN.nodes))
     total = np.array([-0.3 * 0.2, 0, 0])
@@ -278,14 +283,14 @@ def test_node_sets_of_boxes_and_rings_lie_where_their_names_say() -> None:
 @settings(max_examples=40, deadline=None)
 def test_generated_meshes_are_sound(cells: tuple[int, int, int], around: int, seed: int) -> None:
     """Any number of cells: read without a change, conforming, and right after a jitter < 1/4."""
-    ring = ring_mesh(1, 2, 0.7, (cells[0], around, cells[2]))
-    for mesh in (box_mesh((1, 2, 3), cells), box_mesh((1, 2, 3), cells, "five"), ring):
+    ring = make_ring_mesh(1, 2, 0.7, (cells[0], around, cells[2]))
+    for mesh in (make_box_mesh((1, 2, 3), cells), make_box_mesh((1, 2, 3), cells, "five"), ring):
         moved = jitter(mesh, 0.249, seed)
         for each in (mesh, moved):
-            read = mesh_read(each)
+            read = read_mesh(each)
             assert len(read.flipped) == len(read.unused) == 0
             np.testing.assert_array_equal(read.elements, mesh.elements)
-        faces = surface_faces(mesh.elements)
+        faces = find_surface_faces(mesh.elements)
         volume = element_gradients(moved.nodes, moved.elements)[1].sum()
         assert divergence_volume(mesh.nodes, faces) == pytest.approx(volume, rel=1e-12)
         surface = np.unique(faces)
@@ -294,7 +299,7 @@ def test_generated_meshes_are_sound(cells: tuple[int, int, int], around: int, se
 
 def test_jitter_moves_every_interior_node_and_repeats() -> None:
     moved = jitter(KUHN, 0.2, 8)
-    inside = np.setdiff1d(np.arange(len(KUHN.nodes)), surface_faces(KUHN.elements))
+    inside = np.setdiff1d(np.arange(len(KUHN.nodes)), find_surface_faces(KUHN.elements))
     distance = np.linalg.norm(moved.nodes - KUHN.nodes, axis=1)
     assert distance[inside].min() > 0
     gradients, _ = element_gradients(KUHN.nodes, KUHN.elements)
@@ -314,7 +319,7 @@ def test_order_brings_neighbours_together() -> None:
     An element spans two levels at most, so its numbers differ by less than two levels' nodes; a
     level of the Kuhn mesh is no larger than the cross-section is in nodes.
     """
-    bar = box_mesh((30, 2, 2), (60, 4, 4))
+    bar = make_box_mesh((30, 2, 2), (60, 4, 4))
     mesh = shuffled(bar, 6)
     nodes = np.concatenate([mesh.nodes, [[9, 9, 9]]])
     elements = np.where(mesh.elements >= 100, mesh.elements + 1, mesh.elements)  # 100: unused
@@ -346,12 +351,12 @@ def test_order_of_bodies_in_pieces_and_of_none() -> None:
 def test_gmsh_box_with_holes() -> None:
     """Holes become prisms inside their circles: volume between the two; one handle each."""
     size, radius = (1.0, 0.5, 0.25), 0.1
-    mesh = gmsh_box(size, 0.1, [("y", (0.3, 0.12), radius), ("z", (0.75, 0.25), radius)])
+    mesh = make_gmsh_box(size, 0.1, [("y", (0.3, 0.12), radius), ("z", (0.75, 0.25), radius)])
     _, volumes = element_gradients(mesh.nodes, mesh.elements)
     circle = np.pi * radius**2 * (0.5 + 0.25)
     removed = np.prod(size) - volumes.sum()
     assert 0.6 * circle < removed < circle
-    faces = surface_faces(mesh.elements)
+    faces = find_surface_faces(mesh.elements)
     assert divergence_volume(mesh.nodes, faces) == pytest.approx(volumes.sum(), rel=1e-12)
     edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0)
     assert len(np.unique(faces)) - len(edges) + len(faces) == 2 - 2 * 2
@@ -373,11 +378,11 @@ def test_gmsh_of_the_user_is_left_as_it_was() -> None:
         for name in ("mine", "another"):
             gmsh.model.add(name)
         gmsh.model.setCurrent("mine")
-        assert len(gmsh_box((1, 1, 1), 0.5).elements) > 20
+        assert len(make_gmsh_box((1, 1, 1), 0.5).elements) > 20
         assert gmsh.model.getCurrent() == "mine"
         assert gmsh.option.getNumber("Mesh.MeshSizeMax") == 7
         with pytest.raises(MeshError):
-            gmsh_box((1, 1, 1), 0.5, [("x", (0.5, 0.5), 3.0)])  # nothing of the box remains
+            make_gmsh_box((1, 1, 1), 0.5, [("x", (0.5, 0.5), 3.0)])  # nothing of the box remains
         assert gmsh.model.getCurrent() == "mine"
     finally:
         gmsh.finalize()

@@ -11,35 +11,41 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from qdem_fem.errors import MeshError
-from qdem_fem.grain_form import (
+from qdem_fem.files.errors import MeshError
+from qdem_fem.grains.grading import BALLAST, EN_13450_A, Grading, draw_sizes, passing_of
+from qdem_fem.grains.hulls import (
     BENT_MOST,
     LIFT_MOST,
     RATIO_LEAST,
     ROUNDNESS_WITHIN,
     GrainRecipe,
     corners_apart,
-    grain_random,
-    hull_faces,
+    draw_grain,
+    find_hull_faces,
 )
-from qdem_fem.grain_grading import BALLAST, EN_13450_A, Grading, passing_of, sizes_drawn
-from qdem_fem.grain_mesh import CORNERS, DIAGONALS, grain_faces, grain_tetrahedra, radius_ratios
-from qdem_fem.grain_set import GrainSet, grains_load, grains_make, grains_save
-from qdem_fem.grain_sieve import sieve_size
-from qdem_fem.grain_surface import (
+from qdem_fem.grains.measures import (
     edge_angles,
-    faces_quartered,
+    find_surface_edges,
     inscribed_sphere,
     node_areas,
     polyhedron_integrals,
+    quarter_faces,
     roundness_wadell,
     sphericity_true,
     surface_area,
-    surface_edges,
 )
-from qdem_fem.mesh import element_gradients
-from qdem_fem.mesh_checks import FloatArray, IntArray
-from qdem_fem.surface import surface_faces
+from qdem_fem.grains.meshing import (
+    CORNERS,
+    DIAGONALS,
+    make_grain_faces,
+    make_grain_tetrahedra,
+    radius_ratios,
+)
+from qdem_fem.grains.sets import GrainSet, load_grains, make_grains, save_grains
+from qdem_fem.grains.sieve import find_sieve_size
+from qdem_fem.mesh.checks import FloatArray, IntArray
+from qdem_fem.mesh.surface import find_surface_faces
+from qdem_fem.mesh.tetrahedra import element_gradients
 from trackbed.command import main
 
 CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)]) - 0.5
@@ -52,11 +58,11 @@ TURN = Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix()
 
 def halved(nodes: FloatArray, faces: IntArray, sphere: bool) -> tuple[FloatArray, IntArray]:
     """Every face cut into four; new nodes pushed onto the unit sphere where asked."""
-    edges = surface_edges(faces)
+    edges = find_surface_edges(faces)
     finer = np.vstack([nodes, nodes[edges.nodes].mean(axis=1)])
     if sphere:
         finer /= np.linalg.norm(finer, axis=1)[:, None]
-    return finer, faces_quartered(faces, edges)
+    return finer, quarter_faces(faces, edges)
 
 
 def sphericity(nodes: FloatArray, faces: IntArray) -> float:
@@ -70,7 +76,7 @@ def test_box_volume_and_inertia_are_exact_wherever_it_lies() -> None:
     """V = abc; inertia V/12 (b^2 + c^2) along a, turned with the box."""
     size = np.array([3.0, 2.0, 0.5])
     nodes = (CUBE * size) @ TURN.T + [10.0, -4.0, 2.0]
-    solid = polyhedron_integrals(nodes, hull_faces(CUBE))
+    solid = polyhedron_integrals(nodes, find_hull_faces(CUBE))
     expected = size.prod() / 12 * ((size**2).sum() - size**2)
     assert solid.volume == pytest.approx(size.prod(), rel=1e-13)
     np.testing.assert_allclose(solid.centroid, [10, -4, 2], rtol=1e-13)
@@ -86,7 +92,7 @@ def test_box_volume_and_inertia_are_exact_wherever_it_lies() -> None:
 )  # fmt: skip
 def test_sphericity_and_inscribed_sphere(nodes: FloatArray, psi: float, inscribed: float) -> None:
     """Closed forms, at any place, size and orientation."""
-    faces = hull_faces(nodes)
+    faces = find_hull_faces(nodes)
     for size, shift in ((1.0, 0.0), (1e-3, 1.0), (1e3, -5e3)):
         moved = size * nodes @ TURN.T + shift
         # relative round-off of coordinates: shift/size in units of 1e-16
@@ -99,7 +105,7 @@ def test_sphere_has_roundness_and_sphericity_one_in_the_limit() -> None:
 
     H^2 - K, zero on a sphere, is O(h^2) here, and the root of it enters the curvature.
     """
-    nodes, faces = ICOSAHEDRON, hull_faces(ICOSAHEDRON)
+    nodes, faces = ICOSAHEDRON, find_hull_faces(ICOSAHEDRON)
     lacks = []
     for _ in range(5):
         lacks.append((1 - sphericity(nodes, faces), 1 - roundness_wadell(nodes, faces)))
@@ -113,7 +119,7 @@ def test_sphere_has_roundness_and_sphericity_one_in_the_limit() -> None:
 def test_areas_of_nodes_are_positive_with_obtuse_triangles() -> None:
     """A stretched hull, for some of whose nodes Voronoi regions alone would be negative."""
     nodes = corners_apart(np.random.default_rng(0), 20) * [6.0, 1.0, 1.0]
-    faces = hull_faces(nodes)
+    faces = find_hull_faces(nodes)
     areas = node_areas(nodes, faces)
     assert areas.min() > 0
     assert areas.sum() == pytest.approx(surface_area(nodes, faces), rel=1e-12)
@@ -122,7 +128,7 @@ def test_areas_of_nodes_are_positive_with_obtuse_triangles() -> None:
 @pytest.mark.parametrize("nodes", [CUBE, TETRAHEDRON], ids=["cube", "tetrahedron"])
 def test_roundness_of_sharp_edges_falls_with_the_mesh_size(nodes: FloatArray) -> None:
     """Edges are sharp: only the mesh size keeps the radius above zero, in proportion."""
-    faces, rounds = hull_faces(nodes), []
+    faces, rounds = find_hull_faces(nodes), []
     for _ in range(5):
         nodes, faces = halved(nodes, faces, sphere=False)
         rounds.append(roundness_wadell(nodes, faces))
@@ -136,7 +142,7 @@ def test_rounded_cube_has_the_roundness_of_its_edges() -> None:
     Its surface is that of a finely cut cube, each node moved to the nearest point of the rounded
     one; corners and ridges come within the 10 % that the mesh size leaves.
     """
-    nodes, faces = 2 * CUBE, hull_faces(CUBE)
+    nodes, faces = 2 * CUBE, find_hull_faces(CUBE)
     for _ in range(5):
         nodes, faces = halved(nodes, faces, sphere=False)
     for q in (0.6, 0.8):
@@ -152,7 +158,7 @@ def test_rounded_cube_has_the_roundness_of_its_edges() -> None:
 def test_inscribed_sphere_touches_four_planes_and_cuts_none(seed: int, count: int) -> None:
     """The optimum of the linear programme, by its own conditions."""
     nodes = corners_apart(np.random.default_rng(seed), count) * [1.5, 1.0, 0.6]
-    faces = hull_faces(nodes)
+    faces = find_hull_faces(nodes)
     centre, radius = inscribed_sphere(nodes, faces)
     a, b, c = nodes[faces].transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)
@@ -176,15 +182,15 @@ def test_inscribed_sphere_touches_four_planes_and_cuts_none(seed: int, count: in
 )
 def test_sieve_size_closed_forms(nodes: FloatArray, size: float) -> None:
     """To 5e-5, about twice the last random turn of the search."""
-    assert sieve_size(nodes @ TURN.T + 3.0) == pytest.approx(size, rel=5e-5)
+    assert find_sieve_size(nodes @ TURN.T + 3.0) == pytest.approx(size, rel=5e-5)
 
 
 def test_sieve_size_of_a_sphere_and_scaling() -> None:
     """A polyhedron with corners on a sphere passes 2 r at most; lengths scale."""
     nodes = corners_apart(np.random.default_rng(1), 300)
-    size = sieve_size(nodes)
+    size = find_sieve_size(nodes)
     assert 1.9 < size <= 2
-    assert sieve_size(0.01 * nodes) == pytest.approx(0.01 * size, rel=1e-6)
+    assert find_sieve_size(0.01 * nodes) == pytest.approx(0.01 * size, rel=1e-6)
 
 
 def test_default_curve_is_within_the_standard() -> None:
@@ -201,7 +207,7 @@ def test_drawn_sizes_meet_the_curve(seed: int, count: int) -> None:
     The heaviest grain is (63/22.4)^3 = 22 times the lightest; one slice is cut by a sieve, and
     sizes move within slices.
     """
-    sizes = sizes_drawn(BALLAST, count, np.random.default_rng(seed))
+    sizes = draw_sizes(BALLAST, count, np.random.default_rng(seed))
     mass = sizes**3
     got = passing_of(sizes, mass, BALLAST.sieves)
     assert np.abs(got - BALLAST.passing).max() < 3 * mass.max() / mass.sum()
@@ -231,39 +237,39 @@ def test_a_grain_is_what_was_asked(seed: int, psi: float, roundness: float, dent
     """Sphericity to the last digits, roundness to its tolerance; convex unless dented; no sliver;
     tetrahedra fill the polyhedron and share its surface."""
     recipe = GrainRecipe(psi, 0.0, roundness, 0.0, dents)
-    form = grain_random(np.random.default_rng(seed), recipe)
+    form = draw_grain(np.random.default_rng(seed), recipe)
     corners = int(form.corner_faces.max()) + 1
-    faces = grain_faces(form.corner_faces)
+    faces = make_grain_faces(form.corner_faces)
     surface = form.nodes[: 4 * corners - 6]
     assert sphericity(surface, faces) == pytest.approx(psi, rel=1e-9)
     assert roundness_wadell(surface, faces) == pytest.approx(roundness, abs=ROUNDNESS_WITHIN)
-    _, angle = edge_angles(surface, faces, surface_edges(faces))
+    _, angle = edge_angles(surface, faces, find_surface_edges(faces))
     if dents == 0:
         # 1e-9 before the stretch, which may magnify it by the squared ratio of the axes, e^7.2
         assert angle.min() > -2e-6
     assert angle.min() >= -BENT_MOST
-    mesh = grain_tetrahedra(form.nodes, form.corner_faces)
+    mesh = make_grain_tetrahedra(form.nodes, form.corner_faces)
     assert len(mesh.elements) == 8 * (2 * corners - 4)
     assert radius_ratios(mesh.nodes, mesh.elements).min() >= RATIO_LEAST
     _, volumes = element_gradients(mesh.nodes, mesh.elements)
     solid = polyhedron_integrals(surface, faces)
     assert volumes.sum() == pytest.approx(solid.volume, rel=1e-12)
     np.testing.assert_allclose(solid.centroid, 0, atol=1e-12)
-    outer = {tuple(np.roll(f, -f.argmin())) for f in surface_faces(mesh.elements)}
+    outer = {tuple(np.roll(f, -f.argmin())) for f in find_surface_faces(mesh.elements)}
     assert outer == {tuple(np.roll(f, -f.argmin())) for f in faces}
 
 
 def test_inertia_of_the_tetrahedra_is_that_of_the_polyhedron() -> None:
     """integral x x^T = V/20 (sum x_a sum x_a^T + sum x_a x_a^T) for a tetrahedron."""
-    form = grain_random(np.random.default_rng(5), GrainRecipe(concavity=0.2))
-    mesh = grain_tetrahedra(form.nodes, form.corner_faces)
+    form = draw_grain(np.random.default_rng(5), GrainRecipe(concavity=0.2))
+    mesh = make_grain_tetrahedra(form.nodes, form.corner_faces)
     _, volumes = element_gradients(mesh.nodes, mesh.elements)
     x = mesh.nodes[mesh.elements]
     total = x.sum(axis=1)
     second = np.einsum("m,mi,mj->ij", volumes, total, total) / 20
     second += np.einsum("m,mai,maj->ij", volumes, x, x) / 20
     inertia = np.trace(second) * np.eye(3) - second
-    solid = polyhedron_integrals(form.nodes, grain_faces(form.corner_faces))
+    solid = polyhedron_integrals(form.nodes, make_grain_faces(form.corner_faces))
     np.testing.assert_allclose(inertia, solid.inertia, rtol=1e-11, atol=1e-13)
 
 
@@ -287,7 +293,7 @@ def test_eight_parts_of_a_cone_fill_it_around_each_diagonal() -> None:
 def test_out_of_reach_says_what_was_reached() -> None:
     recipe = GrainRecipe(roundness=0.98, roundness_scatter=0.0)
     with pytest.raises(MeshError, match=r"roundness 0\.980 .*reached was roundness 0\."):
-        grain_random(np.random.default_rng(0), recipe)
+        draw_grain(np.random.default_rng(0), recipe)
     assert LIFT_MOST > 1
 
 
@@ -306,7 +312,7 @@ def test_a_recipe_of_no_grain_is_refused(wrong: dict[str, object]) -> None:
 
 @pytest.fixture(scope="module")
 def some() -> GrainSet:
-    return grains_make(40, 3)
+    return make_grains(40, 3)
 
 
 def same(one: GrainSet, other: GrainSet) -> bool:
@@ -318,58 +324,58 @@ def test_a_set_is_the_same_for_any_number_of_workers(
     some: GrainSet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Batches of other lengths made in other processes hold the same grains."""
-    monkeypatch.setattr("qdem_fem.grain_set.BATCH", 7)
+    monkeypatch.setattr("qdem_fem.grains.sets.BATCH", 7)
     from concurrent.futures import ThreadPoolExecutor
 
     monkeypatch.setattr(
-        "qdem_fem.grain_set.ProcessPoolExecutor", lambda workers, _: ThreadPoolExecutor(workers)
+        "qdem_fem.grains.sets.ProcessPoolExecutor", lambda workers, _: ThreadPoolExecutor(workers)
     )
-    assert same(grains_make(40, 3, workers=3), some)
-    assert not np.array_equal(grains_make(2, 4).nodes, grains_make(2, 3).nodes)
+    assert same(make_grains(40, 3, workers=3), some)
+    assert not np.array_equal(make_grains(2, 4).nodes, make_grains(2, 3).nodes)
 
 
 def test_grains_have_the_sizes_that_were_drawn(some: GrainSet) -> None:
     for grain in (0, 17, 39):
         nodes, _ = some.parts(grain)
-        assert sieve_size(nodes) == pytest.approx(some.sizes[grain], rel=1e-9)
+        assert find_sieve_size(nodes) == pytest.approx(some.sizes[grain], rel=1e-9)
         assert len(some.mesh(grain).elements) == some.tetrahedra[grain]
         assert some.solid(grain).volume > 0
 
 
 def test_saved_and_loaded_to_the_last_digit(some: GrainSet, tmp_path: Path) -> None:
     path = tmp_path / "grains.npz"
-    grains_save(path, some)
-    assert same(grains_load(path), some)
+    save_grains(path, some)
+    assert same(load_grains(path), some)
     assert path.stat().st_size < 1200 * len(some) + 5000
 
 
 def test_files_that_hold_no_grains_are_refused(some: GrainSet, tmp_path: Path) -> None:
     path = tmp_path / "grains.npz"
-    grains_save(path, some)
+    save_grains(path, some)
     whole = path.read_bytes()
     for content in (whole[: len(whole) // 2], b"", b"solid stone"):
         path.write_bytes(content)
         with pytest.raises(MeshError, match="not a set of grains"):
-            grains_load(path)
+            load_grains(path)
     with pytest.raises(MeshError, match="not a set of grains"):
-        grains_load(tmp_path / "none.npz")
+        load_grains(tmp_path / "none.npz")
     with path.open("wb") as stream:
         np.savez(stream, format=1, corners=[8], nodes=np.zeros((3, 3)), corner_faces=np.zeros(3),
                  shape=np.zeros((3, 1)))  # fmt: skip
     with pytest.raises(MeshError, match="nodes"):
-        grains_load(path)
+        load_grains(path)
 
 
 def test_command_makes_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["grains", "--count", "3", "--seed", "3", "--out", str(tmp_path / "g.npz")]) == 0
     assert "3 grains" in capsys.readouterr().out
-    assert len(grains_load(tmp_path / "g.npz")) == 3
+    assert len(load_grains(tmp_path / "g.npz")) == 3
 
 
 def test_command_makes_grains_between_two_sieves(tmp_path: Path) -> None:
     out = tmp_path / "g.npz"
     assert main(["grains", "--count", "4", "--sizes", "0.045", "0.055", "--out", str(out)]) == 0
-    sizes = grains_load(out).sizes
+    sizes = load_grains(out).sizes
     assert ((sizes >= 0.045) & (sizes <= 0.055)).all()
 
 

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.errors import MeshError
-from qdem_fem.grain_checks import surface_check, triangles_cutting
-from qdem_fem.grain_form import corners_apart, hull_faces
-from qdem_fem.grain_mesh import radius_ratios
-from qdem_fem.grain_scan import Scan, scan_mesh, scan_read, scan_thinned
-from qdem_fem.grain_surface import faces_quartered, polyhedron_integrals, surface_edges
-from qdem_fem.mesh import element_gradients
-from qdem_fem.mesh_checks import FloatArray, IntArray
+from qdem_fem.files.errors import MeshError
+from qdem_fem.grains.checks import check_surface, triangles_cutting
+from qdem_fem.grains.hulls import corners_apart, find_hull_faces
+from qdem_fem.grains.measures import find_surface_edges, polyhedron_integrals, quarter_faces
+from qdem_fem.grains.meshing import radius_ratios
+from qdem_fem.grains.scan import Scan, scan_mesh, scan_read, thin_scan
+from qdem_fem.mesh.checks import FloatArray, IntArray
+from qdem_fem.mesh.tetrahedra import element_gradients
 
 Surface = tuple[FloatArray, IntArray]
 
@@ -25,11 +25,11 @@ Surface = tuple[FloatArray, IntArray]
 def stone(halvings: int = 3) -> Surface:
     """A bumpy, mildly concave stone of about 5 cm [m]."""
     nodes = corners_apart(np.random.default_rng(0), 9)
-    faces = hull_faces(nodes)
+    faces = find_hull_faces(nodes)
     for _ in range(halvings):
-        edges = surface_edges(faces)
+        edges = find_surface_edges(faces)
         nodes, faces = (
-            np.vstack([nodes, nodes[edges.nodes].mean(axis=1)]), faces_quartered(faces, edges)
+            np.vstack([nodes, nodes[edges.nodes].mean(axis=1)]), quarter_faces(faces, edges)
         )  # fmt: skip
     bumps = 1 + 0.15 * np.sin(3 * nodes[:, 0]) * np.cos(4 * nodes[:, 1])
     away = nodes / np.linalg.norm(nodes, axis=1)[:, None]
@@ -114,7 +114,7 @@ def flat(nodes: FloatArray, faces: IntArray) -> Surface:
 def test_what_is_no_stone_is_refused(spoil: object, words: str) -> None:
     nodes, faces = spoil(*stone(1))  # type: ignore[operator]
     with pytest.raises(MeshError, match=words) as caught:
-        surface_check(nodes, faces, "scan 'x.stl'")
+        check_surface(nodes, faces, "scan 'x.stl'")
     assert "scan 'x.stl'" in str(caught.value)
     assert "->" in str(caught.value)
 
@@ -141,7 +141,7 @@ def test_files_that_hold_no_stone_are_refused(tmp_path: Path) -> None:
 @given(seed=st.integers(0, 10**6))
 def test_cuts_are_found_as_by_every_pair(seed: int) -> None:
     """Random triangles in a box: the sweep finds the pairs that a look at all pairs finds."""
-    from qdem_fem.grain_checks import _pierced
+    from qdem_fem.grains.checks import _pierced
 
     generator = np.random.default_rng(seed)
     start = generator.random((30, 3))
@@ -160,7 +160,7 @@ def test_a_thinned_stone_keeps_its_volume_and_takes_a_hundred_tetrahedra() -> No
     """Thinned to 50 triangles, then filled by gmsh: same volume, no flat tetrahedra."""
     nodes, faces = stone()
     scan = Scan(nodes, faces)
-    thin = scan_thinned(scan, 50)
+    thin = thin_scan(scan, 50)
     assert thin.volume == pytest.approx(scan.volume, rel=1e-12)
     assert len(thin.faces) == pytest.approx(50, abs=4)
     mesh = scan_mesh(thin)
@@ -169,8 +169,8 @@ def test_a_thinned_stone_keeps_its_volume_and_takes_a_hundred_tetrahedra() -> No
     assert 50 < len(mesh.elements) < 200
     assert radius_ratios(mesh.nodes, mesh.elements).min() > 0.05
     assert set(mesh.node_sets["surface"]) == set(range(len(thin.nodes)))
-    assert scan_thinned(scan, 10**6) is scan
+    assert thin_scan(scan, 10**6) is scan
     with pytest.raises(MeshError, match="5 triangles"):
-        scan_thinned(scan, 5)
+        thin_scan(scan, 5)
     with pytest.raises(MeshError, match="elements of 0"):
         scan_mesh(thin, 0.0)

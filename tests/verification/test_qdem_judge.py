@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import skfem
 
-from qdem_fem.errors import LibraryMissing, NotConverged, UsageError
+from qdem_fem.files.errors import LibraryMissing, NotConverged, UsageError
 from validation.bench.qdem import closed_forms as closed
 from validation.bench.qdem import judge
 from validation.bench.qdem.modes import modes

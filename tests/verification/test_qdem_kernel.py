@@ -16,11 +16,13 @@ import pytest
 from numba.core import types
 
 import qdem_fem as q
-from qdem_fem import kernel, lanes, measure_finger, measure_small, stress
-from qdem_fem.assembly import NO_LOADS
-from qdem_fem.kinematics import displacement_gradient, volume_change
-from qdem_fem.layout import layout_build
-from qdem_fem.strain_measures import MEASURES, Strain
+from qdem_fem.bodies.assembly import NO_LOADS
+from qdem_fem.element import measure_finger, measure_small, stress
+from qdem_fem.element.kinematics import displacement_gradient, volume_change
+from qdem_fem.element.strain_measures import MEASURES, Strain
+from qdem_fem.kernel.cpu import lanes
+from qdem_fem.kernel.cpu import step as kernel
+from qdem_fem.kernel.cpu.layout import build_layout
 from tests import qdem_reference_forces as reference_forces
 from tests.qdem_reference_forces import Elements
 from validation.bench.qdem.meshes import delaunay_mesh
@@ -163,7 +165,8 @@ def test_a_wrong_force_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("scale", [1e-12, 1e-6, 1e-3, 0.2])
 @LAW
 def test_stress_of_arrays_and_of_numbers(law: Strain, scale: float) -> None:
-    """`qdem_fem.stress` on NumPy arrays and Python floats is `reference_forces`, to round-off.
+    """`qdem_fem.element.stress` on NumPy arrays and Python floats is `reference_forces`, to
+    round-off.
 
     About 40 roundings of at most (lambda + 2 mu) |H| (1 + |H|)^3; the inverse of U in the
     corotational law multiplies them by its condition, below 5 here (stretches 0.4 to 1.6).
@@ -248,8 +251,8 @@ def test_layout_holds_every_element_once(name: str, dtype: str) -> None:
     """Corners of all blocks are the mesh's elements; what fills the last block has no stiffness."""
     nodes, elements = mesh(name)
     numbers = np.arange(len(elements), dtype=float)
-    packed = layout_build(elements, len(nodes), np.tile(numbers[:, None], 11), dtype)
-    width = lanes.lane_count(np.dtype(dtype))
+    packed = build_layout(elements, len(nodes), np.tile(numbers[:, None], 11), dtype)
+    width = lanes.count_lane(np.dtype(dtype))
     rows = packed.layout.rows.reshape(-1, 11, width)
     m = len(elements)
     assert sorted(rows[:, 0].ravel()[:m]) == list(numbers)
@@ -349,7 +352,7 @@ def test_a_scalar_kernel_would_be_seen() -> None:
 
 def cache_key() -> Any:
     """What the compiled window is filed under."""
-    dispatcher = kernel.window_build("one thread")
+    dispatcher = kernel.build_window("one thread")
     return dispatcher._cache._index_key((types.int64,), dispatcher.targetctx.codegen())
 
 
@@ -366,7 +369,7 @@ STARTING = """
 import time
 begun = time.process_time()
 import qdem_fem as q
-from qdem_fem.leapfrog import velocities_behind
+from qdem_fem.march.leapfrog import velocities_behind
 imported = time.process_time()
 nodes = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 run = q.Simulation([q.Body((nodes, [[0, 1, 2, 3]]), q.Material(1e6, 0.2, 1e3))], threads=1, step=1.)
@@ -404,7 +407,7 @@ ALONE = """
 import time
 import numpy as np
 import qdem_fem as q
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.mesh.generation import box_mesh
 
 body = q.Body(box_mesh((2.4, 0.25, 0.22), (72, 12, 11), "five"), q.Material(45e9, 0.167, 2350.0))
 run = q.Simulation([body], threads=1, gravity=lambda t: (0, 0, np.sin(1e3 * t)))

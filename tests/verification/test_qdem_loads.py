@@ -13,17 +13,23 @@ from scipy.integrate import trapezoid
 from scipy.linalg import eigh
 
 from qdem_fem import Body, Simulation
-from qdem_fem.errors import ConditionError, MeshError, NotConverged
-from qdem_fem.grain_form import GrainRecipe, grain_random
-from qdem_fem.grain_mesh import grain_tetrahedra
-from qdem_fem.load_rail import Track, seat_share
-from qdem_fem.load_record import LoadRecord, load_record_read, load_record_write
-from qdem_fem.load_train import Train, WheelFlat, seat_forces, train_record, train_spectrum
-from qdem_fem.material import Material
-from qdem_fem.mesh import TetMesh, element_gradients, lumped_mass
-from qdem_fem.sleeper_mesh import SleeperShape, sleeper_mesh
-from qdem_fem.sleeper_modes import free_modes
-from qdem_fem.spectra import fourier_spectrum
+from qdem_fem.element.material import Material
+from qdem_fem.files.errors import ConditionError, MeshError, NotConverged
+from qdem_fem.grains.hulls import GrainRecipe, draw_grain
+from qdem_fem.grains.meshing import make_grain_tetrahedra
+from qdem_fem.mesh.tetrahedra import TetMesh, element_gradients, lumped_mass
+from qdem_fem.report.spectra import fourier_spectrum
+from qdem_fem.track.loads.rail import Track, seat_share
+from qdem_fem.track.loads.record import LoadRecord, load_record_read, load_record_write
+from qdem_fem.track.loads.train import (
+    Train,
+    WheelFlat,
+    find_seat_forces,
+    make_train_record,
+    train_spectrum,
+)
+from qdem_fem.track.sleeper_mesh import SleeperShape, sleeper_mesh
+from qdem_fem.track.sleeper_modes import find_free_modes
 from trackbed.command import main
 
 CONCRETE = Material(young=45e9, poisson=0.167, density=2350)
@@ -67,7 +73,7 @@ def test_box_modes_are_those_of_a_beam() -> None:
     a wave along it, c/2 L, less the inertia of its sides: (nu pi r/L)^2, nothing here."""
     shape = SleeperShape(width=0.05, height=0.05, top_width=0.05, centre_height=0.05,
                          end_height=0.05)  # fmt: skip
-    modes = free_modes(sleeper_mesh(shape, 30, 1, 1), CONCRETE, 12, quadratic=True)
+    modes = find_free_modes(sleeper_mesh(shape, 30, 1, 1), CONCRETE, 12, quadratic=True)
     wave = sqrt(45e9 / 2350)
     vertical = modes.frequency[[kind == "vertical" for kind in modes.kind]]
     beam = np.array([22.373, 61.673]) / (2 * pi * 4) * wave * 0.05 / sqrt(12)
@@ -82,7 +88,7 @@ def test_twist_and_stretch_of_the_paper_s_block() -> None:
     axial c/2 L less (nu pi r/L)^2/2: 0.03 %.  Three cells over the width are 0.6 % too stiff in
     torsion, and converge."""
     b, h = 0.24, 0.174
-    modes = free_modes(sleeper_mesh(SleeperShape(top_width=b), 24, 3, 3), CONCRETE, 9, True)
+    modes = find_free_modes(sleeper_mesh(SleeperShape(top_width=b), 24, 3, 3), CONCRETE, 9, True)
     odd = np.arange(1, 40, 2)
     torsion = b * h**3 / 3 * (1 - 192 * h / (pi**5 * b) * (np.tanh(odd * pi * b / 2 / h)
                                                            / odd**5).sum())  # fmt: skip
@@ -98,13 +104,15 @@ def test_twist_and_stretch_of_the_paper_s_block() -> None:
 
 def test_modes_of_a_grain_scale_with_its_size() -> None:
     """A body that is no beam, with slices of a single node: f goes with 1/size, and E with f^2."""
-    form = grain_random(np.random.default_rng(0), GrainRecipe())
-    mesh = grain_tetrahedra(form.nodes, form.corner_faces)
+    form = draw_grain(np.random.default_rng(0), GrainRecipe())
+    mesh = make_grain_tetrahedra(form.nodes, form.corner_faces)
     small = TetMesh(0.01 * mesh.nodes, mesh.elements)
     soft = Material(young=45e7, poisson=0.167, density=2350)
-    frequency = free_modes(mesh, CONCRETE, 4).frequency
-    np.testing.assert_allclose(free_modes(small, CONCRETE, 4).frequency, 100 * frequency, rtol=1e-9)
-    np.testing.assert_allclose(free_modes(mesh, soft, 4).frequency, frequency / 10, rtol=1e-9)
+    frequency = find_free_modes(mesh, CONCRETE, 4).frequency
+    np.testing.assert_allclose(
+        find_free_modes(small, CONCRETE, 4).frequency, 100 * frequency, rtol=1e-9
+    )
+    np.testing.assert_allclose(find_free_modes(mesh, soft, 4).frequency, frequency / 10, rtol=1e-9)
 
 
 def test_modes_are_found_again_to_the_bit_and_are_those_of_the_whole_matrix() -> None:
@@ -112,9 +120,9 @@ def test_modes_are_found_again_to_the_bit_and_are_those_of_the_whole_matrix() ->
 
     The stiffness matrix is the forces of unit displacements, by QDEM's own elements.
     """
-    form = grain_random(np.random.default_rng(0), GrainRecipe())
-    mesh = grain_tetrahedra(form.nodes, form.corner_faces)
-    found = [free_modes(mesh, CONCRETE, 6) for _ in range(2)]
+    form = draw_grain(np.random.default_rng(0), GrainRecipe())
+    mesh = make_grain_tetrahedra(form.nodes, form.corner_faces)
+    found = [find_free_modes(mesh, CONCRETE, 6) for _ in range(2)]
     assert np.array_equal(found[0].shape, found[1].shape)
     gradient, volume = element_gradients(mesh.nodes, mesh.elements)
     full = np.concatenate([-gradient.sum(axis=1, keepdims=True), gradient], axis=1)
@@ -135,7 +143,7 @@ def test_modes_of_two_blocks_are_refused() -> None:
     nodes = np.vstack([one.nodes, one.nodes + np.array([0.0, 1.0, 0.0])])
     elements = np.vstack([one.elements, one.elements + len(one.nodes)])
     with pytest.raises(NotConverged, match="more than six motions"):
-        free_modes(TetMesh(nodes, elements), CONCRETE, 8)
+        find_free_modes(TetMesh(nodes, elements), CONCRETE, 8)
 
 
 @pytest.mark.parametrize(
@@ -185,7 +193,7 @@ def test_share_is_that_of_zimmermann_s_beam() -> None:
 def test_integral_over_time_is_axle_load_times_spacing_over_speed() -> None:
     """Each wheel leaves P a/v, flats the impulse 2/pi peak duration where they strike."""
     train = Train(first_share=0.6)
-    record = train_record(train, TRACK, area=0.0221)
+    record = make_train_record(train, TRACK, area=0.0221)
     impulse = trapezoid(record.pressure, record.time, axis=0) * 0.0221
     expected = 20 * train.axle_load * TRACK.spacing / train.speed * np.array([0.6, 0.4])
     # what is cut off at both ends is below e^-12 of a wheel
@@ -194,7 +202,7 @@ def test_integral_over_time_is_axle_load_times_spacing_over_speed() -> None:
 
     time = np.arange(-20000, 80000) / 1e5
     flat = WheelFlat(axle=0, peak=60e3, duration=1e-3, place=-0.5e-3 * train.speed)
-    added = seat_forces(time, train, TRACK, [flat]) - seat_forces(time, train, TRACK)
+    added = find_seat_forces(time, train, TRACK, [flat]) - find_seat_forces(time, train, TRACK)
     struck = seat_share(2 * pi * 0.43 * np.arange(-3, 9), TRACK).sum()
     got = trapezoid(added[:, 0], time)
     assert got == pytest.approx(2 / pi * 60e3 * 1e-3 * struck, rel=2e-3)  # it moves 32 mm meanwhile
@@ -206,7 +214,7 @@ def test_spectrum_is_the_closed_form() -> None:
     train = Train()
     lead = (12 * TRACK.elastic_length + 0.3) / train.speed
     time = np.arange(-round(lead * 10000) - 5000, 45000) / 10000
-    force = seat_forces(time, train, TRACK)[:, 0]
+    force = find_seat_forces(time, train, TRACK)[:, 0]
     frequency, got = fourier_spectrum(time, force)
     exact = train_spectrum(frequency, train, TRACK)
     assert np.abs(got - exact).max() < 3e-6 * np.abs(exact[0])
@@ -232,7 +240,7 @@ def test_peaks_of_the_spectrum_are_at_multiples_of_speed_over_car_length() -> No
 def flat_of(**changed: float) -> object:
     """The load of the default train with one flat, of 60 kN for 2 ms but for what is changed."""
     sizes = {"axle": 0, "peak": 60e3, "duration": 2e-3} | changed
-    return seat_forces(np.zeros(1), Train(), TRACK, [WheelFlat(**sizes)])  # type: ignore[arg-type]
+    return find_seat_forces(np.zeros(1), Train(), TRACK, [WheelFlat(**sizes)])  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -243,14 +251,14 @@ def flat_of(**changed: float) -> object:
         (lambda: Train(cars=2.5), "whole number"),  # type: ignore[arg-type]
         (lambda: Train(first_share=1.0), "share"),
         (lambda: Track(modulus=float("nan")), "modulus"),
-        (lambda: seat_forces(np.zeros(1), Train(), TRACK, [WheelFlat(20, 1.0, 1.0)]), "axle 20"),
+        (lambda: find_seat_forces(np.zeros(1), Train(), TRACK, [WheelFlat(20, 1, 1)]), "axle 20"),
         (lambda: flat_of(duration=2 * pi * 0.43 / 32 * 1.001), "a flat of 60000.0 N for"),
         (lambda: flat_of(peak=float("nan")), "a flat of nan N"),
         (lambda: flat_of(wheel_radius=float("inf")), "radius inf"),
-        (lambda: train_record(Train(), TRACK, area=0.0), "area 0"),
-        (lambda: train_record(Train(), TRACK, area=float("inf")), "area inf"),
-        (lambda: train_record(Train(speed=1e-9), TRACK, area=1.0), "more speed or fewer cars"),
-        (lambda: train_record(Train(cars=10**8), TRACK, area=1.0), "more speed or fewer cars"),
+        (lambda: make_train_record(Train(), TRACK, area=0.0), "area 0"),
+        (lambda: make_train_record(Train(), TRACK, area=float("inf")), "area inf"),
+        (lambda: make_train_record(Train(speed=1e-9), TRACK, area=1.0), "more speed or fewer cars"),
+        (lambda: make_train_record(Train(cars=10**8), TRACK, area=1.0), "more speed or fewer cars"),
     ],
 )  # fmt: skip
 def test_a_train_that_can_not_be_is_refused(made: object, word: str) -> None:
@@ -263,7 +271,7 @@ def test_a_train_that_can_not_be_is_refused(made: object, word: str) -> None:
 
 def test_record_is_linear_between_samples(tmp_path: Path) -> None:
     """Read back to nine digits; between samples exactly the chord, outside the end values."""
-    made = train_record(Train(cars=1), TRACK, 0.0221)
+    made = make_train_record(Train(cars=1), TRACK, 0.0221)
     path = tmp_path / "train.csv"
     load_record_write(path, made)
     record = load_record_read(path)

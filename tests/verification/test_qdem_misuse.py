@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
-from qdem_fem.errors import ConditionError, ElementInverted, QdemError, StepWarning, Unstable
-from qdem_fem.march import gravity_work
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import ConditionError, ElementInverted, QdemError, StepWarning, Unstable
+from qdem_fem.march.steps import gravity_work
+from qdem_fem.mesh.generation import make_box_mesh
 
-MESH = box_mesh((1.0, 0.5, 0.5), (4, 2, 2), "kuhn")
+MESH = make_box_mesh((1.0, 0.5, 0.5), (4, 2, 2), "kuhn")
 X = MESH.nodes
 LEFT, RIGHT = X[:, 0] == 0, X[:, 0] == 1
 

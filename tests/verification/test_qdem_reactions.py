@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
-from qdem_fem.errors import ConditionError
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import ConditionError
+from qdem_fem.mesh.generation import make_box_mesh
 
-MESH = box_mesh((1.0, 0.5, 0.5), (4, 2, 2), "kuhn")
+MESH = make_box_mesh((1.0, 0.5, 0.5), (4, 2, 2), "kuhn")
 X = MESH.nodes
 LEFT, RIGHT, BOTTOM = X[:, 0] == 0, X[:, 0] == 1, X[:, 2] == 0
 MASS = 1500.0 * 0.25

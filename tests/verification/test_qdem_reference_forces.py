@@ -13,8 +13,8 @@ import skfem
 from scipy.spatial.transform import Rotation
 from skfem.models.elasticity import linear_elasticity
 
-from qdem_fem.kinematics import FloatArray
-from qdem_fem.strain_measures import Strain
+from qdem_fem.element.kinematics import FloatArray
+from qdem_fem.element.strain_measures import Strain
 from tests import qdem_reference_forces as r
 from tests.qdem_construction import edge_vectors, internal_forces_constructed, volume
 from tests.qdem_reference_forces import Elements

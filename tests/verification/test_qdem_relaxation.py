@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
-from qdem_fem.errors import ConditionError, ElementInverted, NotConverged
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import ConditionError, ElementInverted, NotConverged
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem import judge as qdem_judge
 
 LOAD = np.array([0.0, 0.0, -200.0])
@@ -18,7 +18,7 @@ SIZE = (2.4, 0.25, 0.22)
 
 def cantilever(cells: tuple[int, int, int], **options: Any) -> tuple[q.Simulation, q.Body, Any]:
     """The paper's beam (section 3.1), its simulation and the mask of its loaded face."""
-    mesh = box_mesh(SIZE, cells)
+    mesh = make_box_mesh(SIZE, cells)
     body = q.Body(mesh, q.Material(45e9, 0.167, 2350.0), name="beam")
     run = q.Simulation([body], threads=1, **options)
     run.fix(body, body.nodes[:, 0] == 0)
@@ -87,7 +87,9 @@ def test_single_precision_relaxes_in_double() -> None:
 
 def bar(strain: Any, cells: tuple[int, int, int] = (4, 3, 2), poisson: float = 0.3) -> Any:
     """A soft bar along x, free to contract, held by symmetry planes."""
-    body = q.Body(box_mesh((0.4, 0.1, 0.1), cells), q.Material(1e6, poisson, 1000.0), name="bar")
+    body = q.Body(
+        make_box_mesh((0.4, 0.1, 0.1), cells), q.Material(1e6, poisson, 1000.0), name="bar"
+    )
     run = q.Simulation([body], strain=strain, threads=1)
     for c, name in enumerate("xyz"):
         run.fix(body, body.nodes[:, c] == 0, name)
@@ -131,7 +133,7 @@ def test_prescribed_displacement_gravity_roller_and_series() -> None:
     Two rollers at every node, not at right angles, leave it the z direction alone.
     """
     height, young, poisson, density = 0.5, 2e7, 0.3, 1800.0
-    body = q.Body(box_mesh((0.1, 0.1, height), (2, 2, 8)), q.Material(young, poisson, density))
+    body = q.Body(make_box_mesh((0.1, 0.1, height), (2, 2, 8)), q.Material(young, poisson, density))
     modulus = young * (1 - poisson) / (1 + poisson) / (1 - 2 * poisson)
     run = q.Simulation(
         [body], strain="small", threads=1, gravity=q.Series([0, 1e-3], [[0, 0, 0], [0, 0, -9.81]])
@@ -157,7 +159,7 @@ def test_oblique_roller_is_the_fixed_component_turned() -> None:
     fields = []
     turn = np.array([[0.75**0.5, -0.5, 0], [0.5, 0.75**0.5, 0], [0, 0, 1.0]])
     for rotation in (np.eye(3), turn):
-        mesh = box_mesh((1.0, 0.2, 0.2), (5, 2, 2))
+        mesh = make_box_mesh((1.0, 0.2, 0.2), (5, 2, 2))
         nodes = mesh.nodes @ rotation.T
         body = q.Body((nodes, mesh.elements), q.Material(1e7, 0.3, 1000.0))
         run = q.Simulation([body], threads=1, strain="svk")
@@ -171,7 +173,9 @@ def test_oblique_roller_is_the_fixed_component_turned() -> None:
 
 def test_large_bending_is_where_a_damped_march_comes_to_rest() -> None:
     """A soft cantilever bent by half its length: the explicit run from the answer stays there."""
-    body = q.Body(box_mesh((1, 0.1, 0.1), (20, 2, 2)), q.Material(1e8, 0.3, 1000.0), name="rod")
+    body = q.Body(
+        make_box_mesh((1, 0.1, 0.1), (20, 2, 2)), q.Material(1e8, 0.3, 1000.0), name="rod"
+    )
     run = q.Simulation([body], strain="svk", threads=1)
     run.fix(body, body.nodes[:, 0] == 0)
     end = np.isclose(body.nodes[:, 0], 1)
@@ -191,7 +195,7 @@ def test_large_bending_is_where_a_damped_march_comes_to_rest() -> None:
 def test_two_bodies_and_periodic_partners() -> None:
     """Each body finds its own answer; partners move as one."""
     bodies = [
-        q.Body(box_mesh((0.5, 0.1, 0.1), (5, 2, 2)), q.Material(young, 0.2, 1000.0), name=name)
+        q.Body(make_box_mesh((0.5, 0.1, 0.1), (5, 2, 2)), q.Material(young, 0.2, 1000.0), name=name)
         for name, young in (("soft", 1e6), ("stiff", 1e9))
     ]
     run = q.Simulation(bodies, strain="small", threads=1)
@@ -212,7 +216,7 @@ def test_unit_invariance() -> None:
     """Lengths in mm, forces in mN, E in kPa: the same motion in the new unit, in as many steps."""
     found = []
     for unit in (1.0, 1e3):
-        mesh = box_mesh((0.5, 0.1, 0.1), (5, 2, 2))
+        mesh = make_box_mesh((0.5, 0.1, 0.1), (5, 2, 2))
         body = q.Body((mesh.nodes * unit, mesh.elements), q.Material(1e9 / unit, 0.3, 1000.0))
         run = q.Simulation([body], threads=1)
         run.fix(body, body.nodes[:, 0] == 0)
@@ -241,7 +245,9 @@ def test_nothing_to_do_and_going_on() -> None:
 )
 def test_free_body_is_told(held: list[tuple[Any, str]], free: int) -> None:
     """Each rigid motion that is left is counted; node 4 is on the x axis through node 0."""
-    body = q.Body(box_mesh((0.4, 0.1, 0.1), (4, 3, 2)), q.Material(1e6, 0.3, 1000.0), name="grain")
+    body = q.Body(
+        make_box_mesh((0.4, 0.1, 0.1), (4, 3, 2)), q.Material(1e6, 0.3, 1000.0), name="grain"
+    )
     run = q.Simulation([body], threads=1)
     for nodes, components in held:
         run.fix(body, np.arange(len(body.nodes))[nodes], components)
@@ -251,7 +257,7 @@ def test_free_body_is_told(held: list[tuple[Any, str]], free: int) -> None:
 
 def test_loose_part_of_a_mesh_is_told() -> None:
     """A body in two parts, one of them held."""
-    mesh = box_mesh((0.4, 0.1, 0.1), (2, 1, 1))
+    mesh = make_box_mesh((0.4, 0.1, 0.1), (2, 1, 1))
     count = len(mesh.nodes)
     nodes = np.concatenate([mesh.nodes, mesh.nodes + np.array([1.0, 0, 0])])
     elements = np.concatenate([mesh.elements, mesh.elements + count])

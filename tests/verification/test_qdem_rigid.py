@@ -17,12 +17,18 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj
 
 import qdem_fem as q
-from qdem_fem.contact_step import network_bound
-from qdem_fem.errors import CheckpointError, ConditionError, ContactTooDeep, SceneError, Unstable
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.rigid_mass import cross_matrix, rigid_mass
-from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import scene_load
+from qdem_fem.bodies.rigid_mass import cross_matrix, rigid_mass
+from qdem_fem.contact.bounds import bound_spring_network
+from qdem_fem.files.errors import (
+    CheckpointError,
+    ConditionError,
+    ContactTooDeep,
+    SceneError,
+    Unstable,
+)
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.checks import load_scene
 from tests.qdem_slopes import slope_gain
 from trackbed import command
 
@@ -39,7 +45,9 @@ def brick(
     name: str = "brick", size: Any = BRICK, origin: Any = (0, 0, 0), rigid: Any = True
 ) -> q.Body:
     """A block of stone of 2 x 2 x 2 cells."""
-    return q.Body(box_mesh(size, (2, 2, 2), "kuhn", tuple(origin)), STONE, name=name, rigid=rigid)
+    return q.Body(
+        make_box_mesh(size, (2, 2, 2), "kuhn", tuple(origin)), STONE, name=name, rigid=rigid
+    )
 
 
 def spun(body: q.Body, omega: Any, velocity: Any = (0, 0, 0)) -> q.Body:
@@ -83,7 +91,7 @@ def test_mass_centre_and_inertia_are_those_of_the_solid() -> None:
     """A brick's are known, whatever its mesh, wherever it lies and however it is turned."""
     turn = Rotation.from_rotvec([0.3, -1.1, 0.7])
     for cells in ((1, 1, 1), (3, 2, 4)):
-        mesh = box_mesh(BRICK, cells)
+        mesh = make_box_mesh(BRICK, cells)
         nodes = np.array([5.0, -3, 2]) + turn.apply(mesh.nodes)
         body = q.Body((nodes, mesh.elements), STONE, rigid=True)
         own, mass = body.rigid_mass, 2700 * np.prod(BRICK)
@@ -103,7 +111,7 @@ def test_lumped_inertia_is_that_of_the_deformable_mesh() -> None:
     excess = []
     for cells in (2, 4):
         body = brick(rigid="lumped")
-        body = q.Body(box_mesh(BRICK, (cells,) * 3), STONE, rigid="lumped")
+        body = q.Body(make_box_mesh(BRICK, (cells,) * 3), STONE, rigid="lumped")
         soft = q.Body(body.mesh, STONE)
         mass, own = q.Simulation([soft]).assembly.mass, body.rigid_mass
         arm = cross_matrix(body.nodes - own.centre)
@@ -226,7 +234,7 @@ def test_without_contact_and_under_gravity() -> None:
     """The loop without contact and with gravity does the same, and a far body changes no bit."""
     fields = []
     for others in ([], [spun(brick("far", origin=(1, 0, 0)), [9.0, 5, 1])]):
-        soft = q.Body(box_mesh(BRICK, (2, 2, 2)), STONE, name="soft")
+        soft = q.Body(make_box_mesh(BRICK, (2, 2, 2)), STONE, name="soft")
         run = q.Simulation([soft, *others], step=1e-6, gravity=[0, 0, -9.81], threads=1)
         run.fix(soft, soft.nodes[:, 2] == 0)
         run.advance(1e-3, {str(i): (body, [i]) for i, body in enumerate(run.bodies)})
@@ -302,7 +310,7 @@ def bounce(kind: float | str, cells: int = 2, samples: int = 100) -> Floats:
     ``kind``: Young's modulus [Pa] of a deformable brick, or ``"solid"`` or ``"lumped"`` of a rigid
     one.  The mean displacement, and the vector of rotation (best fit of all nodes) times 0.05 m.
     """
-    mesh = box_mesh(BRICK, (cells,) * 3)
+    mesh = make_box_mesh(BRICK, (cells,) * 3)
     nodes = Rotation.from_euler("xyz", [0.5, 0.3, 0.2]).apply(mesh.nodes)
     nodes[:, 2] += 0.006 + 1e-6 - nodes[:, 2].min()
     young = 30e9 if isinstance(kind, str) else float(kind)
@@ -379,7 +387,9 @@ def test_bound_on_frequencies_holds_with_rigid_bodies() -> None:
             matrix += k * apart.T @ apart
         matrix += np.einsum("c,cki,ckj->ij", wall, place, place)
         highest = eigh(matrix, inertia, eigvals_only=True)[-1]
-        bound = network_bound(ends, stiffness, wall, contacts.inverse_mass, contacts.rigid_bound)
+        bound = bound_spring_network(
+            ends, stiffness, wall, contacts.inverse_mass, contacts.bound_rigid
+        )
         assert highest <= bound * (1 + 1e-9)
         assert bound < 4 * highest  # and is of use
 
@@ -398,7 +408,7 @@ def test_critical_step_of_a_rigid_body_on_a_wall() -> None:
         run.load(body, body.nodes[:, 2] > -1, [0.0, 0, -9 * 2e6 * deep])
         assert run.contacts is not None
         run.contacts.refresh()
-        assert omega**2 < run.contacts.stiffness_now() < 4 * omega**2  # in all directions
+        assert omega**2 < run.contacts.bound_present_stiffness() < 4 * omega**2  # in all directions
         assert run.critical_step.value < 2 / omega  # which allows for every vertex at once
         run.advance(400 * run.step)
         return run
@@ -490,7 +500,7 @@ def test_what_a_rigid_body_can_not_do(ask: Any, said: str) -> None:
 
     def asked() -> None:
         ask(run, body)
-        run.packed_lists()
+        run.pack_lists()
 
     with pytest.raises(ConditionError, match=said):
         asked()
@@ -571,7 +581,7 @@ def test_a_scene_names_its_rigid_bodies(tmp_path: Path, capsys: pytest.CaptureFi
     """The key becomes the body's; its viscosity counts for nothing; what is refused has a key."""
     file = tmp_path / "scene.toml"
     file.write_text(SCENE, encoding="utf-8")
-    prepared = scene_load(file)
+    prepared = load_scene(file)
     run, bodies = simulation_of(prepared)
     assert bodies["stone"].rigid is True
     assert not run.viscous
@@ -586,14 +596,14 @@ def test_a_scene_names_its_rigid_bodies(tmp_path: Path, capsys: pytest.CaptureFi
     assert command.main(["qdem", str(file), "--force", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["critical_step"]["value"] is None
     file.write_text(SCENE, encoding="utf-8")
-    lumped = scene_load(file, ['body.0.rigid="lumped"'])
+    lumped = load_scene(file, ['body.0.rigid="lumped"'])
     assert simulation_of(lumped)[1]["stone"].rigid == "lumped"
     with pytest.raises(SceneError, match="rigid"):
-        scene_load(file, ['body.0.rigid="stiff"'])
+        load_scene(file, ['body.0.rigid="stiff"'])
     hinge = SCENE + '[[fix]]\nbody = "stone"\nnodes = { nearest = [0, 0, 0] }\n'
     file.write_text(hinge, encoding="utf-8")
     with pytest.raises(SceneError, match=r"body.0: what is held leaves the rigid body a motion"):
-        simulation_of(scene_load(file))
+        simulation_of(load_scene(file))
     file.write_text(alone, encoding="utf-8")
     with pytest.raises(ConditionError, match="double precision"):
-        simulation_of(scene_load(file, ['simulation.precision="float32"']))
+        simulation_of(load_scene(file, ['simulation.precision="float32"']))

@@ -8,35 +8,35 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qdem_fem import load_roughness
-from qdem_fem.errors import ConditionError, SceneError
-from qdem_fem.load_rail import Track, seat_share
-from qdem_fem.load_record import load_record_read
-from qdem_fem.load_rolling import (
+from qdem_fem.files.errors import ConditionError, SceneError
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.track.bogie import make_bogie_series
+from qdem_fem.track.commands import SEAT_AREA
+from qdem_fem.track.enter import TrackPrepared
+from qdem_fem.track.loads import roughness as load_roughness
+from qdem_fem.track.loads.rail import Track, seat_share
+from qdem_fem.track.loads.record import load_record_read
+from qdem_fem.track.loads.rolling import (
     STEEL_MODULUS,
     Rolling,
+    find_rolling_forces,
     force_response,
     foundation_stiffness,
     hertz_contact,
     rail_receptance,
-    rolling_forces,
-    rolling_rail,
+    roll_on_rail,
     seat_response,
 )
-from qdem_fem.load_roughness import (
+from qdem_fem.track.loads.roughness import (
     RAIL,
     WAVELENGTHS,
     WHEEL,
     Roughness,
     contact_filter,
-    roughness_lines,
+    draw_roughness_lines,
     roughness_power,
 )
-from qdem_fem.load_train import Train, train_record
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.track_cli import SEAT_AREA
-from qdem_fem.track_load import bogie_series
-from qdem_fem.track_scene import TrackPrepared
+from qdem_fem.track.loads.train import Train, make_train_record
 from trackbed.command import main
 from validation.bench.track_trials import SCENE
 
@@ -148,7 +148,7 @@ def test_a_realisation_has_its_power_in_every_line() -> None:
     """Parseval over the length that it repeats after, and line by line by a transform."""
     length = 2 * pi * 0.43
     rough = Roughness(wheel="composite", seed=4, highest=1500.0)
-    frequency, lines = roughness_lines(WHEEL["composite"], length, SPEED, rough, [0, 1])
+    frequency, lines = draw_roughness_lines(WHEEL["composite"], length, SPEED, rough, [0, 1])
     count = 512
     time = np.arange(count) * length / SPEED / count
     height = (np.exp(2j * pi * np.outer(time, frequency)) @ lines).real
@@ -167,7 +167,7 @@ def test_spectrum_of_the_force_is_the_closed_form() -> None:
     power = np.zeros(len(time) // 2 + 1)
     for seed in range(6):
         of_seat = (TRACK, ROLLING, Roughness("average", seed=seed, highest=900.0), 0)
-        contact, _ = rolling_rail(time, SPEED, LOAD, 1, *of_seat)
+        contact, _ = roll_on_rail(time, SPEED, LOAD, 1, *of_seat)
         power += np.abs(np.fft.rfft(seen * contact[:, 0])) ** 2 / 6
     frequency = np.fft.rfftfreq(len(time), 5e-4).astype(np.float64)
     power *= 1e-3 / (seen**2).sum()
@@ -194,22 +194,22 @@ def test_wheels_of_a_rail_read_the_same_rail(monkeypatch: pytest.MonkeyPatch) ->
     time, rough = np.arange(-400, 400) / 1e4, Roughness(highest=700.0)
     arguments = (TRACK, ROLLING, rough, 1)
     monkeypatch.setitem(load_roughness.WHEEL, "disc", SILENT)
-    contact, taken = rolling_rail(time, SPEED, LOAD, 3, *arguments)
+    contact, taken = roll_on_rail(time, SPEED, LOAD, 3, *arguments)
     np.testing.assert_allclose(contact, np.repeat(contact[:, :1], 3, axis=1), atol=1e-9)
-    whole = rolling_forces(
+    whole = find_rolling_forces(
         time, SPEED, np.array([0.0, 64 * 3.2e-3]), np.array([LOAD, LOAD]), TRACK, rough
     )
     np.testing.assert_allclose(whole[64:, 1], taken[64:, 0] + taken[:-64, 0], atol=1e-6)
     assert abs(alike(*whole.T)) < 0.5  # the other rail is another one
     monkeypatch.undo()
     monkeypatch.setitem(load_roughness.RAIL, "smooth", SILENT)
-    contact, _ = rolling_rail(time, SPEED, LOAD, 2, *arguments)
+    contact, _ = roll_on_rail(time, SPEED, LOAD, 2, *arguments)
     assert abs(alike(*contact.T)) < 0.5
 
 
 def test_load_is_a_seeds_own_linear_and_nothing_without_roughness() -> None:
     def series(*rough: Roughness) -> np.ndarray:
-        return bogie_series(Train(cars=1), TRACK, 0.4, 1.0, 0.0, 1e4, *rough).values[:, 2]
+        return make_bogie_series(Train(cars=1), TRACK, 0.4, 1.0, 0.0, 1e4, *rough).values[:, 2]
 
     smooth = series()
     one, again = (series(Roughness(highest=500.0)) for _ in range(2))
@@ -227,8 +227,8 @@ def test_a_record_of_rough_rails_is_written_by_the_command(tmp_path: Path) -> No
     words = ["train", "--out", str(tmp_path / "train.csv"), "--cars", "1", "--speed", "90"]
     assert main([*words, "--roughness", "smooth", "--seed", "3"]) == 0
     train, rough = Train(cars=1, speed=90.0), Roughness("smooth", seed=3)
-    made = train_record(train, TRACK, SEAT_AREA, roughness=rough)
-    even = train_record(train, TRACK, SEAT_AREA)
+    made = make_train_record(train, TRACK, SEAT_AREA, roughness=rough)
+    even = make_train_record(train, TRACK, SEAT_AREA)
     found = load_record_read(tmp_path / "train.csv").pressure
     np.testing.assert_allclose(found, made.pressure, atol=1e-2)
     added = np.abs(made.pressure - even.pressure)
@@ -245,7 +245,7 @@ def test_a_record_of_rough_rails_is_written_by_the_command(tmp_path: Path) -> No
         (lambda: Roughness(amplitude=-1.0), "not negative"),
         (lambda: Rolling(pad=1e6, unsprung=0.0), "unsprung"),
         (lambda: foundation_stiffness(np.ones(1), TRACK, Rolling(pad=1e6)), "softer than"),
-        (lambda: rolling_rail(np.arange(99) / 1e3, SPEED, LOAD, 1, TRACK, ROLLING,
+        (lambda: roll_on_rail(np.arange(99) / 1e3, SPEED, LOAD, 1, TRACK, ROLLING,
                               Roughness(amplitude=40.0, highest=300.0), 0), "leaves the rail"),
     ],
 )  # fmt: skip
@@ -260,11 +260,11 @@ def test_a_scene_names_its_roughness(tmp_path: Path) -> None:
     bogie = "bogie = { lead = 0.5, rest = 0, roughness = { rail = 'average', highest = 300 } }"
     path.write_text(SCENE.replace(pressure, bogie), encoding="utf-8")
     rough, smooth = (
-        scene_load(path, changes) for changes in ((), ("track.bogie.roughness.amplitude=0",))
+        load_scene(path, changes) for changes in ((), ("track.bogie.roughness.amplitude=0",))
     )
     assert isinstance(rough, TrackPrepared)
     assert isinstance(smooth, TrackPrepared)
     assert np.abs(rough.load.values - smooth.load.values).max() > 10.0
     path.write_text(SCENE.replace(pressure, bogie.replace("average", "rusty")), encoding="utf-8")
     with pytest.raises(SceneError, match="rail"):
-        scene_load(path)
+        load_scene(path)

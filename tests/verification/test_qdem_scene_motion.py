@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.errors import SceneError
-from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import scene_load
+from qdem_fem.files.errors import SceneError
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.checks import load_scene
 
 SIDES = np.array([0.02, 0.03, 0.05])
 ORIGIN = np.array([0.1, -0.2, 0.05])
@@ -41,7 +41,7 @@ def loaded(folder: Path, velocity: Any = None, spin: Any = None, *overrides: str
         )
     path = folder / "scene.toml"
     path.write_text(text)
-    run, bodies = simulation_of(scene_load(path, overrides))
+    run, bodies = simulation_of(load_scene(path, overrides))
     return run, bodies["brick"]
 
 
@@ -80,17 +80,17 @@ def test_nothing_moves_where_the_scene_names_no_motion(tmp_path: Path) -> None:
     run, brick = loaded(tmp_path)
     assert run.energy().kinetic == 0.0
     assert not brick.velocity.any()
-    parameters = scene_load(tmp_path / "scene.toml").scene.parameters()
+    parameters = load_scene(tmp_path / "scene.toml").scene.parameters()
     assert not {"velocity", "spin"} & set(parameters["body"][0])
     assert any(
-        "cause of motion" in text for text in scene_load(tmp_path / "scene.toml").scene.left_out()
+        "cause of motion" in text for text in load_scene(tmp_path / "scene.toml").scene.left_out()
     )
 
 
 def test_motion_is_a_cause_of_motion(tmp_path: Path) -> None:
     """The report does not say that nothing moves it."""
     loaded(tmp_path, (1.0, 0.0, 0.0))
-    left_out = scene_load(tmp_path / "scene.toml").scene.left_out()
+    left_out = load_scene(tmp_path / "scene.toml").scene.left_out()
     assert not any("cause of motion" in text for text in left_out)
 
 
@@ -118,10 +118,10 @@ def test_a_body_joined_to_its_images_does_not_turn(tmp_path: Path) -> None:
         text = SCENE.replace("VELOCITY", "velocity = [1, 0, 0]")
         path.write_text(text.replace("SPIN", "spin = [0, 0, 1]" * spin) + sides)
         if not spin:
-            assert simulation_of(scene_load(path, []))[0].energy().kinetic > 0
+            assert simulation_of(load_scene(path, []))[0].energy().kinetic > 0
             continue
         with pytest.raises(SceneError, match=r"body\.0\.spin: a body that \[\[periodic\]\] joins"):
-            scene_load(path, [])
+            load_scene(path, [])
 
 
 def test_the_key_file_names_both() -> None:

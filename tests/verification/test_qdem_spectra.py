@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from qdem_fem.errors import UsageError
-from qdem_fem.spectra import (
+from qdem_fem.files.errors import UsageError
+from qdem_fem.report.spectra import (
     FloatArray,
     amplitude_spectrum,
+    find_peak_frequencies,
     fourier_spectrum,
     frequency_response,
     parzen_smoothed,
-    peak_frequencies,
 )
 
 
@@ -135,7 +135,7 @@ def test_one_damped_cosine_is_found(
     time = start + np.linspace(0, periods / frequency, samples)
     decay = 2 * np.pi * frequency * ratio
     values = scale * (offset + damped(time, frequency, decay, 1.0, phase))
-    (mode,) = peak_frequencies(time, values)
+    (mode,) = find_peak_frequencies(time, values)
     rounding = 1e-8 + 1e-15 * start * frequency
     assert mode.frequency == pytest.approx(frequency, rel=rounding)
     assert mode.decay == pytest.approx(decay, rel=1e-5, abs=1e-6 * frequency)
@@ -152,7 +152,7 @@ def test_noisy_cosine_within_a_thousandth() -> None:
         time = np.linspace(0, 2 / 27, 400)
         values = damped(time, 27, generator.uniform(0, 10), 1e-4, generator.uniform(0, 6))
         values += 1e-7 * generator.standard_normal(400)
-        (mode,) = peak_frequencies(time, values)
+        (mode,) = find_peak_frequencies(time, values)
         assert mode.frequency == pytest.approx(27, rel=1e-3)
 
 
@@ -164,7 +164,7 @@ def test_modes_of_a_beam_are_told_apart() -> None:
     values = 1e-5 * generator.standard_normal(len(time))
     for frequency, amplitude in zip(expected, (1, 0.1, 0.02), strict=True):
         values += damped(time, frequency, 0.01 * frequency, amplitude, generator.uniform(0, 6))
-    modes = peak_frequencies(time, values, 3)
+    modes = find_peak_frequencies(time, values, 3)
     assert [mode.frequency for mode in modes] == pytest.approx(expected, rel=1e-3)
     assert [mode.amplitude for mode in modes] == pytest.approx([1, 0.1, 0.02], rel=0.01)
 
@@ -172,9 +172,9 @@ def test_modes_of_a_beam_are_told_apart() -> None:
 def test_nothing_is_found_in_nothing() -> None:
     """A constant record has no modes; a sum of two cosines has no third."""
     time = np.linspace(0, 1, 200)
-    assert peak_frequencies(time, np.full(200, 2.0), 2) == []
+    assert find_peak_frequencies(time, np.full(200, 2.0), 2) == []
     two = damped(time, 7) + damped(time, 23.5, 1.0, 0.3)
-    assert len(peak_frequencies(time, two, 5)) == 2
+    assert len(find_peak_frequencies(time, two, 5)) == 2
 
 
 @pytest.mark.parametrize(

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
-from qdem_fem.errors import StepWarning
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import StepWarning
+from qdem_fem.mesh.generation import make_box_mesh
 
 MATERIAL = q.Material(1e6, 0.2, 1e3)
 
 
 def flattened(share: float) -> tuple[np.ndarray, np.ndarray]:
     """A box of tetrahedra with an inner node pushed towards a face of one of its elements."""
-    mesh = box_mesh((1.0, 1.0, 1.0), (3, 3, 3), "kuhn")
+    mesh = make_box_mesh((1.0, 1.0, 1.0), (3, 3, 3), "kuhn")
     nodes = mesh.nodes.copy()
     inner = int(np.argmin(np.linalg.norm(nodes - 1 / 3, axis=1)))
     element = mesh.elements[(mesh.elements == inner).any(axis=1)][0]

@@ -13,35 +13,40 @@ import pytest
 from matplotlib import image
 
 import qdem_fem as q
-from qdem_fem import energies, kinetic_damping
 from qdem_fem.cli import Progress
-from qdem_fem.energy_account import EnergyAccount, energy_facts
-from qdem_fem.errors import CheckpointError, EnergyLost, NotConverged, SceneError
-from qdem_fem.grain_grading import Grading
-from qdem_fem.grain_set import grains_make
-from qdem_fem.load_rail import Track, seat_share
-from qdem_fem.load_train import Train
-from qdem_fem.material import Material
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.pictures_bodies import picture_deformed, spheres_bearing
-from qdem_fem.run_folder import RunFolder
-from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.scene_run import run_dynamic
-from qdem_fem.sleeper_mesh import SleeperShape
-from qdem_fem.track_bed import Bed, bed_read, bed_write, scatter
-from qdem_fem.track_bodies import TrackBox, grains_nodes, lattice_loose, sleeper_slice
-from qdem_fem.track_figures import (
+from qdem_fem.element.material import Material
+from qdem_fem.files.errors import CheckpointError, EnergyLost, NotConverged, SceneError
+from qdem_fem.grains.grading import Grading
+from qdem_fem.grains.sets import make_grains
+from qdem_fem.march import energies, kinetic_damping
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.report.deformed import draw_deformed, find_bearing_spheres
+from qdem_fem.report.track import (
     acceleration_spectrum,
     accelerations,
     mobility,
     peaks_of,
     velocities,
 )
-from qdem_fem.track_load import RISE, bogie_series
-from qdem_fem.track_recipe import BedRecipe, grains_of
-from qdem_fem.track_scene import TrackPrepared
-from qdem_fem.track_table import BogieTable, TrackTable
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.scene.energy_account import EnergyAccount, list_energy_facts
+from qdem_fem.scene.run import run_dynamic
+from qdem_fem.scene.run_folder import RunFolder
+from qdem_fem.track.bed import Bed, bed_read, scatter, write_bed
+from qdem_fem.track.bodies import (
+    TrackBox,
+    make_loose_lattice,
+    make_sleeper_slice,
+    place_grain_nodes,
+)
+from qdem_fem.track.bogie import RISE, make_bogie_series
+from qdem_fem.track.enter import TrackPrepared
+from qdem_fem.track.loads.rail import Track, seat_share
+from qdem_fem.track.loads.train import Train
+from qdem_fem.track.recipe import BedRecipe, grains_of
+from qdem_fem.track.sleeper_mesh import SleeperShape
+from qdem_fem.track.table import BogieTable, TrackTable
 from trackbed.command import main
 from validation.bench.track_trials import SCENE
 
@@ -60,7 +65,9 @@ RECIPE = BedRecipe(
 def stacked(rigid: bool) -> q.Simulation:
     """Two cubes of 5 cm, one above the other, a little apart, above the ground."""
     bodies = [
-        q.Body(box_mesh((0.05, 0.05, 0.05), (1, 1, 1), origin=(0.0, 0.0, z)), STONE, rigid=rigid)
+        q.Body(
+            make_box_mesh((0.05, 0.05, 0.05), (1, 1, 1), origin=(0.0, 0.0, z)), STONE, rigid=rigid
+        )
         for z in (0.0101, 0.0803)
     ]
     contact = q.SphereContact(RADIUS, STIFFNESS, 0.5, (GROUND,))
@@ -72,7 +79,7 @@ def test_cubes_come_to_rest_on_springs_that_bear_their_weight(rigid: bool, each:
     # The ground bears both; four mirrored springs of 2 k give way by W/(8 k) if the cube is rigid.
     # What is unbalanced, 1 % of the force on a vertex, leaves at most some per cent of a body's.
     run = stacked(rigid)
-    rest = kinetic_damping.rest_find(run, 1e-2, 1e-3, 0.0, 2.0, look=10 if rigid else 40, each=each)
+    rest = kinetic_damping.find_rest(run, 1e-2, 1e-3, 0.0, 2.0, look=10 if rigid else 40, each=each)
     weight = 9.81 * kinetic_damping.masses(run)
     assert run.contacts is not None
     assert rest.unbalanced <= 1e-2
@@ -92,13 +99,18 @@ def test_grounded_is_what_stands_on_the_ground_over_others(surface: bool) -> Non
 
     def standing(bottom: float, apart: float, held: str = "", gravity: Any = GRAVITY) -> list[bool]:
         bodies = [
-            q.Body(box_mesh((0.05,) * 3, (1, 1, 1), origin=(0, 0, z)), STONE, name=name, rigid=True)
+            q.Body(
+                make_box_mesh((0.05,) * 3, (1, 1, 1), origin=(0, 0, z)),
+                STONE,
+                name=name,
+                rigid=True,
+            )
             for name, z in (("lower", bottom), ("upper", bottom + 0.05 + apart))
         ]
         run = q.Simulation(bodies, gravity=gravity, threads=1, contact=contact)
         if held:
             run.fix(bodies[1], np.arange(8), held)
-        return kinetic_damping.grounded(run).tolist()
+        return kinetic_damping.find_grounded(run).tolist()
 
     on_ground = gap / 2 - 1e-4
     assert standing(on_ground, gap - 1e-4) == [True, True]
@@ -116,14 +128,16 @@ def test_what_falls_is_not_stopped_in_the_air(fall: bool) -> None:
     Without ``fall`` both are stopped behind their collision, and p is what gravity gave since.
     """
     bodies = [
-        q.Body(box_mesh((0.05,) * 3, (1, 1, 1), origin=(0, 0, z)), STONE, name=str(z), rigid=True)
+        q.Body(
+            make_box_mesh((0.05,) * 3, (1, 1, 1), origin=(0, 0, z)), STONE, name=str(z), rigid=True
+        )
         for z in (1.0, 1.09)
     ]
     contact = q.SphereContact(RADIUS, STIFFNESS, 0.5, (GROUND,))
     run = q.Simulation(bodies, gravity=GRAVITY, threads=1, contact=contact)
     bodies[1].velocity = np.tile([0.0, 0.0, -1.0], (8, 1))
     with pytest.raises(NotConverged):
-        kinetic_damping.rest_find(run, 0.0, 0.0, 0.0, 0.05, look=10, fall=fall)
+        kinetic_damping.find_rest(run, 0.0, 0.0, 0.0, 0.05, look=10, fall=fall)
     downward = -sum(body.velocity[:, 2].mean() for body in bodies)
     expected = 1.0 + 2 * 9.81 * run.time
     assert run.time < 0.3  # both are still in the air
@@ -138,8 +152,8 @@ def test_what_falls_is_not_stopped_in_the_air(fall: bool) -> None:
 def test_grains_that_fall_in_a_column_do_not_stand_as_a_tower(scattered: bool) -> None:
     """Eight of the paper's grains in one column of the lattice: plumb, some stand on each other,
     four high; scattered, all lie on the ground."""
-    grains = grains_make(8, 1, None, Grading(np.array([0.022, 0.030]), np.array([0.0, 1.0])))
-    placed = lattice_loose(grains_nodes(grains), [(0.0, 0.09, 0.0, 0.09)], 0.0, 0.012, 1)
+    grains = make_grains(8, 1, None, Grading(np.array([0.022, 0.030]), np.array([0.0, 1.0])))
+    placed = make_loose_lattice(place_grain_nodes(grains), [(0.0, 0.09, 0.0, 0.09)], 0.0, 0.012, 1)
     material = Material(30e9, 0.2, 2700.0)
     bodies = [
         q.Body(replace(grains.mesh(k), nodes=nodes), material, name=str(k), rigid="lumped")
@@ -150,7 +164,7 @@ def test_grains_that_fall_in_a_column_do_not_stand_as_a_tower(scattered: bool) -
     contact = q.SphereContact(0.012, 1.613e5, 0.577, (GROUND,), contacts=1)
     run = q.Simulation(bodies, gravity=GRAVITY, threads=1, contact=contact)
     with suppress(NotConverged):  # by its rounding a machine may leave eight grains rocking
-        kinetic_damping.rest_find(run, 0.3, 0.1, 0.2, 3.0, fall=True)
+        kinetic_damping.find_rest(run, 0.3, 0.1, 0.2, 3.0, fall=True)
     top = max(float((body.nodes + body.displacement)[:, 2].mean()) for body in bodies)
     assert top < 0.05 if scattered else top > 0.1
 
@@ -167,7 +181,8 @@ def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(
     sunk, omega = mass * 9.81 / (8 * STIFFNESS), np.sqrt(8 * STIFFNESS / mass)
     places = ((0.0, RADIUS - sunk), (0.2, 2.0))
     bodies = [
-        q.Body(box_mesh(size, (1, 1, 1), origin=(x, 0.0, z)), STONE, rigid=True) for x, z in places
+        q.Body(make_box_mesh(size, (1, 1, 1), origin=(x, 0.0, z)), STONE, rigid=True)
+        for x, z in places
     ]
     contact = q.SphereContact(RADIUS, STIFFNESS, 0.5, (GROUND,))
     run = q.Simulation(bodies, gravity=GRAVITY, threads=1, contact=contact, step=0.1 / omega)
@@ -175,13 +190,13 @@ def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(
     rings = []
 
     def keep(_state: kinetic_damping.Damping) -> None:
-        ring = kinetic_damping.kinetic_each(run)[0]
+        ring = kinetic_damping.find_kinetic_each(run)[0]
         lift = bodies[0].displacement[:, 2].mean()
         rings.append((ring + 4 * STIFFNESS * lift**2) / (mass * (sunk / 3 * omega) ** 2 / 2))
 
     most = 3.5 * 200 * run.step
     with pytest.raises(NotConverged):
-        kinetic_damping.rest_find(run, 0.0, 0.0, 0.0, most, look=1, each=False, keep=keep)
+        kinetic_damping.find_rest(run, 0.0, 0.0, 0.0, most, look=1, each=False, keep=keep)
     assert len(rings) == 4
     assert bodies[1].velocity[:, 2] == pytest.approx(-9.81 * run.time, rel=1e-9)
     stopped = slow == 2  # velocities half a step behind: omega dt/2 = 0.05 of the energy at most
@@ -191,7 +206,7 @@ def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(
 
 def test_no_equilibrium_in_time_is_told() -> None:
     with pytest.raises(NotConverged, match=r"asked.*kinetic energy.*bodies loose"):
-        kinetic_damping.rest_find(stacked(True), 1e-3, 1e-4, 0.0, 1e-3, look=1)
+        kinetic_damping.find_rest(stacked(True), 1e-3, 1e-4, 0.0, 1e-3, look=1)
 
 
 @pytest.mark.parametrize(("share", "last"), [(0.02, 50), (0.5, kinetic_damping.WAIT)])
@@ -208,7 +223,7 @@ def test_what_does_not_rest_is_left_longer_between_stops(
         waits.append(state.wait)
 
     with pytest.raises(NotConverged):
-        kinetic_damping.rest_find(run, 0.0, 0.0, 0.0, 39 * run.step, look=1, keep=keep)
+        kinetic_damping.find_rest(run, 0.0, 0.0, 0.0, 39 * run.step, look=1, keep=keep)
     first = kinetic_damping.WAIT
     doubled = [min(first * 2 ** (n // 2), max(last, first)) for n in range(1, len(waits) + 1)]
     assert waits == doubled
@@ -221,21 +236,21 @@ def test_spheres_that_bear_are_drawn_between_bodies(tmp_path: Path) -> None:
     run = stacked(True)
     for number, body in enumerate(run.bodies):
         body.displacement = np.tile([0.0, 0.0, -2e-4 - 2e-4 * number], (len(body.nodes), 1))
-    bearing = spheres_bearing(run)
+    bearing = find_bearing_spheres(run)
     assert bearing is not None
     assert bearing.nodes.tolist() == list(range(12))
     drawn = []
     for spheres in (None, bearing):
         file = tmp_path / "picture.png"
         view = {"azimuth": -90.0, "elevation": 0.0, "magnification": 1.0}
-        picture_deformed(file, run.bodies, bearing=spheres, **view)
+        draw_deformed(file, run.bodies, bearing=spheres, **view)
         pixels = image.imread(file)[:, :450, :3]  # without the colour bar
         cubes = np.flatnonzero((np.ptp(pixels, axis=2) > 0.15).sum(axis=1) > 50)
         at = int(np.argmax(np.diff(cubes)))
         drawn.append(bool((pixels[(cubes[at] + cubes[at + 1]) // 2] < 0.97).any()))
     assert drawn == [False, True]
-    block = q.Simulation([q.Body(box_mesh((1, 1, 1), (1, 1, 1)), STONE)])
-    assert spheres_bearing(block) is None
+    block = q.Simulation([q.Body(make_box_mesh((1, 1, 1), (1, 1, 1)), STONE)])
+    assert find_bearing_spheres(block) is None
 
 
 def shaken(folder: Path, text: str = "") -> tuple[object, ...]:
@@ -262,7 +277,7 @@ def shaken(folder: Path, text: str = "") -> tuple[object, ...]:
         + text,
         encoding="utf-8",
     )
-    prepared = scene_load(path)
+    prepared = load_scene(path)
     return prepared, *simulation_of(prepared), RunFolder(folder / "run")
 
 
@@ -279,7 +294,7 @@ def test_what_viscosity_takes_closes_the_account(tmp_path: Path) -> None:
 def test_a_run_whose_account_does_not_close_stops(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(energies, "viscous_half", lambda run: -float(run.motion.work[2]))
+    monkeypatch.setattr(energies, "find_viscous_half", lambda run: -float(run.motion.work[2]))
     prepared, run, bodies, folder = shaken(tmp_path)
     with (
         folder.locked(),  # type: ignore[attr-defined]
@@ -290,14 +305,14 @@ def test_a_run_whose_account_does_not_close_stops(
 
 
 def test_account_of_energies_is_the_same_row_by_row() -> None:
-    """As `energy_facts` of all rows; a maximum that is past still counts."""
+    """As `list_energy_facts` of all rows; a maximum that is past still counts."""
     random = np.random.default_rng(3)
     names = ("kinetic", "elastic", "contact", "friction", "external")
     rows = {name: np.cumsum(random.normal(size=20)) ** 2 for name in names}
     account = EnergyAccount()
     for cuts in ((0, 1), (1, 4), (4, 20)):
         account.take({name: one[slice(*cuts)] for name, one in rows.items()})
-    whole = energy_facts(rows)
+    whole = list_energy_facts(rows)
     assert account.relative == whole["relative_imbalance"]
     assert account.missing == whole["greatest_imbalance"]
     assert account.last == {name: whole[name] for name in names}
@@ -327,14 +342,14 @@ def test_where_bodies_touch_the_account_is_looked_at(
         + touch * (text == "[contact]"),
         encoding="utf-8",
     )
-    assert scene_load(path).scene.audit == allowed
+    assert load_scene(path).scene.audit == allowed
 
 
 def test_loose_grains_touch_neither_each_other_nor_walls_nor_sleeper() -> None:
     band = (0.13, 0.29)
-    grains = grains_nodes(grains_of(RECIPE))
+    grains = place_grain_nodes(grains_of(RECIPE))
     rooms = [(0.0, 0.2, 0.0, band[0]), (0.0, 0.2, band[1], 0.42)]
-    placed = lattice_loose(grains, rooms, 0.0, RECIPE.radius, 5)
+    placed = make_loose_lattice(grains, rooms, 0.0, RECIPE.radius, 5)
     assert len(placed) == 8
     for i, nodes in enumerate(placed):
         assert (nodes >= RECIPE.radius).all()
@@ -347,7 +362,7 @@ def test_loose_grains_touch_neither_each_other_nor_walls_nor_sleeper() -> None:
 
 
 def test_slice_of_a_sleeper_reaches_from_wall_to_wall() -> None:
-    block = sleeper_slice(RECIPE.shape, RECIPE.box, 0.3, RECIPE.radius, (8, 4, 3))
+    block = make_sleeper_slice(RECIPE.shape, RECIPE.box, 0.3, RECIPE.radius, (8, 4, 3))
     ends = block.nodes[block.node_sets["ends"], 0]
     assert ends.min() - RECIPE.radius == pytest.approx(0.0, abs=2e-6)
     assert ends.max() + RECIPE.radius == pytest.approx(0.2, abs=2e-6)
@@ -360,7 +375,7 @@ def test_a_bed_is_read_as_written_and_refused_for_another_recipe(tmp_path: Path)
     path = tmp_path / "bed.npz"
     nodes = [np.arange(6.0).reshape(2, 3), np.ones((1, 3))]
     bed = Bed("rest", nodes, np.full((3, 3), 0.5), {"contact_slid": np.ones(2)}, {"rest": {}})
-    bed_write(path, RECIPE, bed)
+    write_bed(path, RECIPE, bed)
     found = bed_read(path, RECIPE)
     assert [x.tolist() for x in found.positions] == [(x + 0.5).tolist() for x in nodes]
     assert found.contact["contact_slid"].tolist() == [1.0, 1.0]
@@ -373,7 +388,7 @@ def test_a_bed_is_read_as_written_and_refused_for_another_recipe(tmp_path: Path)
 
 def test_the_load_of_a_bogie_is_that_of_its_axles_and_begins_and_ends_at_rest() -> None:
     train, track = Train(cars=1), Track()
-    series = bogie_series(train, track, 0.4, 3.0, 0.05)
+    series = make_bogie_series(train, track, 0.4, 3.0, 0.05)
     force = -series.values[:, 2]
     assert force[0] == 0.0
     assert not force[series.times > (6.0 + 2.1) / 32.0].any()
@@ -398,7 +413,7 @@ def test_accelerations_and_spectra_of_known_motions() -> None:
     assert peaks_of(frequency, size, 1) == pytest.approx([320.0], abs=2.5)
     force = np.zeros((len(time), 3))
     force[:, 2] = swing
-    from qdem_fem.scene_series import TimeSeries
+    from qdem_fem.tables.series import TimeSeries
 
     frequency, ratio = mobility(time, 2e-6 * swing, TimeSeries(time, force))
     at = np.argmin(np.abs(frequency - 320.0))  # V = 2 pi f 2e-6 F
@@ -412,7 +427,7 @@ def test_mobility_of_a_grain_that_drops_off(samples: int, interval: float) -> No
     highest, as means over intervals have it.  Of the blow J these are J/2, J, J/2: |F| =
     J (1 + cos(2 pi f dt)).  (Central differences have a zero at the highest frequency, and
     smoothing spread what it was divided by over all others.)"""
-    from qdem_fem.scene_series import TimeSeries
+    from qdem_fem.tables.series import TimeSeries
 
     time = interval * np.arange(samples)
     middle, slip, impulse = samples // 2, 2e-5, 3.0
@@ -444,14 +459,14 @@ def test_a_wrong_track_is_refused_with_a_sentence(
     path = tmp_path / "scene.toml"
     path.write_text(SCENE.replace(*change), encoding="utf-8")
     with pytest.raises(SceneError, match=said.replace("{", r"\{").replace("...", r"\.\.\.")):
-        scene_load(path)
+        load_scene(path)
 
 
 def test_a_dry_run_prepares_no_bed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """It tells what comes first, within a second, and writes nothing."""
     path = tmp_path / "scene.toml"
     path.write_text(SCENE, encoding="utf-8")
-    prepared = scene_load(path)
+    prepared = load_scene(path)
     assert isinstance(prepared, TrackPrepared)
     count = prepared.recipe.below + prepared.recipe.beside
     assert main(["qdem", str(path), "--dry-run"]) == 0
@@ -464,7 +479,7 @@ def test_a_dry_run_prepares_no_bed(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_scene_of_the_small_track_is_sound() -> None:
-    prepared = scene_load(Path(__file__).parents[2] / "trackbed" / "scenes" / "track-small.toml")
+    prepared = load_scene(Path(__file__).parents[2] / "trackbed" / "scenes" / "track-small.toml")
     assert isinstance(prepared, TrackPrepared)
     assert prepared.recipe.below + prepared.recipe.beside == 300
     assert prepared.scene.simulation.duration == pytest.approx(prepared.load.times[-1], abs=1e-3)

@@ -7,15 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qdem_fem import track_scene, track_stand
-from qdem_fem.errors import SceneError
-from qdem_fem.load_rail import QUIET, Track, seat_share
-from qdem_fem.load_record import load_record_read
-from qdem_fem.load_train import Train
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.track_cli import SEAT_AREA
-from qdem_fem.track_load import RISE, bogie_series
-from qdem_fem.track_scene import TrackPrepared
+from qdem_fem.files.errors import SceneError
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.track import enter as track_scene
+from qdem_fem.track import stand as track_stand
+from qdem_fem.track.bogie import RISE, make_bogie_series
+from qdem_fem.track.commands import SEAT_AREA
+from qdem_fem.track.enter import TrackPrepared
+from qdem_fem.track.loads.rail import QUIET, Track, seat_share
+from qdem_fem.track.loads.record import load_record_read
+from qdem_fem.track.loads.train import Train
 from trackbed.command import main
 from validation.bench.track_trials import SCENE
 
@@ -32,7 +33,7 @@ def load_of(folder: Path, bogie: str, *overrides: str) -> tuple[np.ndarray, np.n
     path = folder / "scene.toml"
     pressure = SCENE[SCENE.index("pressure = {") :].split("\n")[0]
     path.write_text(SCENE.replace(pressure, f"bogie = {{ {bogie} }}"), encoding="utf-8")
-    prepared = scene_load(path, overrides)
+    prepared = load_scene(path, overrides)
     assert isinstance(prepared, TrackPrepared)
     return prepared.load.times, -prepared.load.values[:, 2]
 
@@ -83,7 +84,7 @@ def test_wheels_are_round_by_default(tmp_path: Path) -> None:
         assert (default == none).all()
     train = Train(cars=1)
     _, default = load_of(tmp_path, "lead = 2.0")
-    assert (-bogie_series(train, Track(), SHARE, 2.0, 0.05).values[:, 2] == default).all()
+    assert (-make_bogie_series(train, Track(), SHARE, 2.0, 0.05).values[:, 2] == default).all()
 
 
 @pytest.mark.parametrize(
@@ -156,13 +157,13 @@ def test_a_record_of_the_load_belongs_to_the_run(tmp_path: Path) -> None:
     pressure = SCENE[SCENE.index("pressure = {") :].split("\n")[0]
     record = 'pressure = { csv = "record.csv", value = "p" }'
     path.write_text(SCENE.replace(pressure, record), encoding="utf-8")
-    digests = [scene_load(path).files["record.csv"]]
+    digests = [load_scene(path).files["record.csv"]]
     (tmp_path / "record.csv").write_text("time,p\n0,0\n0.004,701e3\n", encoding="utf-8")
-    digests.append(scene_load(path).files["record.csv"])
+    digests.append(load_scene(path).files["record.csv"])
     assert len(set(digests)) == 2
     path.write_text(SCENE.replace(pressure, record.replace('"p"', '"q"')), encoding="utf-8")
     with pytest.raises(SceneError, match="there is no column q among time, p"):
-        scene_load(path)
+        load_scene(path)
 
 
 @pytest.mark.parametrize(
@@ -196,13 +197,13 @@ def test_the_device_of_a_scene_is_that_of_its_run(
         raise Begun(options)
 
     monkeypatch.setattr(track_scene, "bed_prepare", lambda *_: None)
-    monkeypatch.setattr(track_stand, "bed_judge", lambda *_: None)
-    monkeypatch.setattr(track_stand, "bed_begin", begin)
+    monkeypatch.setattr(track_stand, "judge_bed", lambda *_: None)
+    monkeypatch.setattr(track_stand, "begin_bed", begin)
     load_of(tmp_path, "lead = 1.0")
-    prepared = scene_load(tmp_path / "scene.toml", ("simulation.device=cuda",))
+    prepared = load_scene(tmp_path / "scene.toml", ("simulation.device=cuda",))
     assert isinstance(prepared, TrackPrepared)
     with pytest.raises(Begun) as caught:
-        track_scene.track_enter(prepared)
+        track_scene.enter_track(prepared)
     (options,) = caught.value.args
     assert options["device"] == "cuda"
 

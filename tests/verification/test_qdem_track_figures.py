@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 from scipy.signal import periodogram
 
-from qdem_fem.output import Table
-from qdem_fem.scene_series import TimeSeries
-from qdem_fem.spectra import fourier_spectrum, frequency_response, parzen_smoothed
-from qdem_fem.track_figures import (
+from qdem_fem.files.output import Table
+from qdem_fem.report.spectra import fourier_spectrum, frequency_response, parzen_smoothed
+from qdem_fem.report.track import (
     BANDWIDTH,
     GRAINS,
     LEAST,
     SENSORS,
     acceleration_spectrum,
-    means_between,
+    average_between,
+    draw_track_pictures,
+    list_track_facts,
     mobility,
     peaks_of,
     smoothing,
-    track_facts,
-    track_pictures,
 )
+from qdem_fem.tables.series import TimeSeries
 
 STEP = 1e-4
 
@@ -66,13 +66,13 @@ def test_a_load_sampled_otherwise_is_averaged_over_intervals(every: int) -> None
     """Means of a chain of chords, by hand: each has the area of its trapezoids; and those of a
     parabola sampled finely are its integral's differences, to h^2/12 of its curvature."""
     time = np.array([0.0, 1.0, 2.0, 3.0])
-    assert means_between(time, np.array([0.5, 1.5]), np.array([2.0, 4.0])) == pytest.approx(
+    assert average_between(time, np.array([0.5, 1.5]), np.array([2.0, 4.0])) == pytest.approx(
         [0.5 * 2 + 0.5 * 2.5, 0.5 * 3.5 + 0.5 * 4, 4.0]
     )
     time = 0.1 * every * np.arange(10)
     fine = np.linspace(0, 9, 901)
     expected = np.diff(time**3) / 3 / np.diff(time)
-    assert means_between(time, fine, fine**2)[: len(time) - 1] == pytest.approx(
+    assert average_between(time, fine, fine**2)[: len(time) - 1] == pytest.approx(
         expected, abs=0.01**2 / 6 * 1.01
     )
 
@@ -166,11 +166,11 @@ def test_a_run_too_short_for_spectra_ends_with_the_rest(tmp_path: Path, count: i
     not claimed."""
     rows_written(tmp_path, count)
     load = load_of(np.linspace(0, -1, count))
-    facts = track_facts(tmp_path, load)
+    facts = list_track_facts(tmp_path, load)
     assert facts["B2"]["settlement"] == pytest.approx(-1e-3 * ((count - 1) * STEP) ** 2)
     assert ("peaks" in facts["S1"]) == ("peaks" in facts["B2"]) == (count >= LEAST)
     assert ("peaks" in facts["S1"]) == ("mobility_peaks" in facts["B1"]) == (count >= LEAST)
-    told = dict(track_pictures(tmp_path, load))
+    told = dict(draw_track_pictures(tmp_path, load))
     assert len(told) == (6 if count >= LEAST else 2)
     assert any("not smoothed" in caption for caption in told.values()) == (count >= LEAST)
     assert smoothing(np.linspace(0.0, 0.05, 9)) == "Parzen window of 20 Hz"

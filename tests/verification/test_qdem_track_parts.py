@@ -11,18 +11,19 @@ from scipy.optimize import curve_fit
 from scipy.spatial import cKDTree
 
 import qdem_fem as q
-from qdem_fem import track_bed, track_scene
-from qdem_fem.errors import SceneError
-from qdem_fem.kinetic_damping import Rest
-from qdem_fem.material import Material
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.sleeper_mesh import SleeperShape
-from qdem_fem.sleeper_modes import free_modes
-from qdem_fem.track_bed import Bed, sleeper_guide
-from qdem_fem.track_bodies import TrackBox, grains_nodes
-from qdem_fem.track_layout import TrackLayout
-from qdem_fem.track_recipe import grains_of
-from qdem_fem.track_scene import TrackPrepared, track_enter
+from qdem_fem.element.material import Material
+from qdem_fem.files.errors import SceneError
+from qdem_fem.march.kinetic_damping import Rest
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.track import bed as track_bed
+from qdem_fem.track import enter as track_scene
+from qdem_fem.track.bed import Bed, guide_sleeper
+from qdem_fem.track.bodies import TrackBox, place_grain_nodes
+from qdem_fem.track.enter import TrackPrepared, enter_track
+from qdem_fem.track.layout import TrackLayout
+from qdem_fem.track.recipe import grains_of
+from qdem_fem.track.sleeper_mesh import SleeperShape
+from qdem_fem.track.sleeper_modes import find_free_modes
 from validation.bench.track_trials import SCENE, scene_at
 
 CONCRETE = Material(45e9, 0.167, 2350.0)
@@ -37,7 +38,7 @@ def test_modes_of_a_free_track_sleeper_are_those_of_its_eigenproblem() -> None:
     # shape.  The step bends a frequency by (2 pi f dt)^2/24 = 8e-5 at most; half a mesh of six
     # tetrahedra a cell is no mirror image of the other half, which is left out: 0.15 % here.
     mesh = WHOLE.sleeper(0.3)
-    modes = free_modes(mesh, CONCRETE, 7)
+    modes = find_free_modes(mesh, CONCRETE, 7)
     bending = [i for i, kind in enumerate(modes.kind) if kind == "vertical"]
     for layout, seen, within in ((WHOLE, bending, 2e-4), (HALF, bending[::2], 3e-3)):
         part = layout.sleeper(0.3)
@@ -47,7 +48,7 @@ def test_modes_of_a_free_track_sleeper_are_those_of_its_eigenproblem() -> None:
         shape = modes.shape[seen][:, at]
         body = q.Body(part, CONCRETE)
         run = q.Simulation([body], threads=1)
-        sleeper_guide(run, body, upright=False)
+        guide_sleeper(run, body, upright=False)
         body.displacement = 1e-6 * shape.sum(axis=0)
         weight = shape * run.assembly.mass[:, None]
         read = []
@@ -67,7 +68,9 @@ def test_modes_of_a_free_track_sleeper_are_those_of_its_eigenproblem() -> None:
 def test_bending_modes_are_what_the_printed_measures_allow() -> None:
     # Ten-node tetrahedra: 190, 502 and 932 Hz, where the
     # paper names 200, 400 and 800 Hz of a sleeper whose section it does not print.
-    modes = free_modes(replace(WHOLE, cells=(16, 2, 2)).sleeper(0.0), CONCRETE, 6, quadratic=True)
+    modes = find_free_modes(
+        replace(WHOLE, cells=(16, 2, 2)).sleeper(0.0), CONCRETE, 6, quadratic=True
+    )
     bending = [f for f, kind in zip(modes.frequency, modes.kind, strict=True) if kind == "vertical"]
     assert bending == pytest.approx([190, 502, 932], rel=5e-3)
 
@@ -81,7 +84,7 @@ def scene_of(folder: Path, part: str, *changes: tuple[str, str]) -> TrackPrepare
         text = text.replace(*change)
     path = folder / "scene.toml"
     path.write_text(text, encoding="utf-8")
-    prepared = scene_load(path)
+    prepared = load_scene(path)
     assert isinstance(prepared, TrackPrepared)
     return prepared
 
@@ -90,7 +93,7 @@ def scene_of(folder: Path, part: str, *changes: tuple[str, str]) -> TrackPrepare
 def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
     layout: TrackLayout, tmp_path: Path
 ) -> None:
-    grains = 40 * grains_nodes(grains_of(scene_of(tmp_path, "half").recipe))
+    grains = 40 * place_grain_nodes(grains_of(scene_of(tmp_path, "half").recipe))
     below = np.concatenate(layout.grains_below(grains, 1))
     out = layout.beyond(below[:, 0])
     assert out.max() + layout.radius <= 1.3 + 1e-9
@@ -107,7 +110,7 @@ def test_loose_ballast_keeps_to_its_shoulder_and_off_the_sleeper(
     assert outside.min() >= 2 * layout.radius - 1e-9
 
 
-@pytest.mark.filterwarnings("ignore::qdem_fem.errors.StepWarning")  # contacts set the step
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.errors.StepWarning")  # contacts set the step
 @pytest.mark.parametrize(("part", "seats"), [("half", 1), ("whole", 2)])
 def test_each_rail_seat_takes_its_own_pressure(
     part: str, seats: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -118,13 +121,13 @@ def test_each_rail_seat_takes_its_own_pressure(
     two += "\npressure_other = { times = [0.0, 1.0], values = [2e6, 2e6] }" * (seats - 1)
     prepared = scene_of(tmp_path, part, (one, two))
     layout, recipe = prepared.recipe.layout, prepared.recipe
-    grains = grains_nodes(grains_of(recipe))
+    grains = place_grain_nodes(grains_of(recipe))
     nodes = layout.grains_below(grains[: recipe.below], 1)
     nodes += layout.grains_beside(grains[recipe.below :], 0.5, 2)
     nodes.append(layout.sleeper(0.5).nodes)
     bed = Bed("rest", nodes, np.zeros((sum(map(len, nodes)), 3)), {}, {})
     monkeypatch.setattr(track_scene, "bed_prepare", lambda *given: bed)
-    run, bodies = track_enter(prepared)
+    run, bodies = enter_track(prepared)
     now = np.array([0.0])
     force = [
         (load.weights * load.driver.sample(now)[0]).sum(axis=0) for load in run.conditions.loads
@@ -175,7 +178,7 @@ def test_a_wrong_part_is_refused_with_a_sentence(
 
 @pytest.mark.parametrize(("name", "grains"), [("track-half", 1200), ("track", 5700)])
 def test_scenes_of_half_and_whole_sleepers_are_sound(name: str, grains: int) -> None:
-    prepared = scene_load(SCENES / f"{name}.toml")
+    prepared = load_scene(SCENES / f"{name}.toml")
     assert isinstance(prepared, TrackPrepared)
     recipe = prepared.recipe
     assert recipe.below + recipe.beside == grains
@@ -195,7 +198,7 @@ def test_hard_stages_of_a_periodic_bed_are_stopped_together(
         asked.append(each)
         return Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
 
-    monkeypatch.setattr(track_bed, "rest_find", find)
+    monkeypatch.setattr(track_bed, "find_rest", find)
     recipe = scene_at(tmp_path, *(WIDTH,) * periodic).recipe
     track_bed.bed_prepare(recipe, tmp_path / "bed.npz", 1)
     assert asked == [True] * (len(track_bed.STAGES) - 2) + [not periodic] * 2

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from qdem_fem.errors import SceneError, StepWarning
-from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.track_bed import bed_prepare, bed_read
-from qdem_fem.track_scene import TrackPrepared, contact_of
-from qdem_fem.track_stand import bed_begin
+from qdem_fem.files.errors import SceneError, StepWarning
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.track.bed import bed_prepare, bed_read
+from qdem_fem.track.enter import TrackPrepared, contact_of
+from qdem_fem.track.stand import begin_bed
 from trackbed import command
 from validation.bench.track_trials import SCENE, scene_at
 
@@ -40,7 +40,7 @@ def test_rigid_grains_begin_with_the_forces_of_deformable_ones(folder: Path) -> 
     """To the bit: they lie where those lay.  The sleeper keeps its strain, grains have none."""
     prepared = prepared_in(folder)
     bed, contact = bed_read(prepared.bed_file, prepared.recipe), contact_of(prepared)
-    runs = [bed_begin(prepared.recipe, bed, contact, kind, threads=1)[0] for kind in (False, True)]
+    runs = [begin_bed(prepared.recipe, bed, contact, kind, threads=1)[0] for kind in (False, True)]
     for run in runs:
         assert run.contacts is not None
         run.contacts.refresh()
@@ -56,7 +56,7 @@ def test_rigid_grains_begin_with_the_forces_of_deformable_ones(folder: Path) -> 
     assert hard.step > soft.step
 
 
-@pytest.mark.filterwarnings("ignore::qdem_fem.errors.StepWarning")
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.errors.StepWarning")
 def test_advice_on_a_track_is_checked_with_all_grains_rigid(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -76,7 +76,7 @@ def test_advice_on_a_track_is_checked_with_all_grains_rigid(
     assert check["steps"][0] == check["steps"][1]
 
 
-@pytest.mark.filterwarnings("ignore::qdem_fem.errors.StepWarning")
+@pytest.mark.filterwarnings("ignore::qdem_fem.files.errors.StepWarning")
 def test_a_run_of_rigid_grains_says_what_it_leaves_out_and_stands_for_itself(folder: Path) -> None:
     """The bed is let go once for every kind of grain, and its file keeps all answers."""
     kinds = {"false": "", "true": ", grains rigid", '"lumped"': ", grains rigid (lumped)"}
@@ -96,6 +96,6 @@ def test_rigid_grains_are_refused_on_a_card(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(SCENE, encoding="utf-8")
     with pytest.raises(SceneError, match="rigid grains are computed on the processor"):
-        scene_load(path, ["track.rigid=true", 'simulation.device="cuda"'])
+        load_scene(path, ["track.rigid=true", 'simulation.device="cuda"'])
     with pytest.raises(SceneError, match=r"track\.rigid"):
-        scene_load(path, ['track.rigid="hard"'])
+        load_scene(path, ['track.rigid="hard"'])

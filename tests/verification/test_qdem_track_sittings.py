@@ -10,22 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from qdem_fem import track_bed
-from qdem_fem.errors import CheckpointError, NotConverged
-from qdem_fem.kinetic_damping import Rest
-from qdem_fem.rigid_conditions import hold_of
-from qdem_fem.rigid_mass import RigidMass
-from qdem_fem.rigid_step import FREE, STILL
-from qdem_fem.track_bed import (
-    STAGES,
-    Bed,
-    bed_prepare,
-    bed_read,
-    bed_write,
-    part_of,
-    stage_run,
-)
-from qdem_fem.track_recipe import BedRecipe, grains_of
+from qdem_fem.bodies.rigid_mass import RigidMass
+from qdem_fem.files.errors import CheckpointError, NotConverged
+from qdem_fem.march.kinetic_damping import Rest
+from qdem_fem.rigid.holds import find_hold
+from qdem_fem.rigid.step import FREE, STILL
+from qdem_fem.track import bed as track_bed
+from qdem_fem.track.bed import STAGES, Bed, bed_prepare, bed_read, part_of, run_stage, write_bed
+from qdem_fem.track.recipe import BedRecipe, grains_of
 from validation.bench.track_trials import scene_at
 
 JUDGEMENTS = 3
@@ -50,7 +42,7 @@ def fallen(recipe: BedRecipe, part: Path | None, killed_after: int | None = None
         if seen == killed_after:
             raise Killed
 
-    return stage_run(recipe, grains_of(recipe), "bed", None, 1, progress, part)
+    return run_stage(recipe, grains_of(recipe), "bed", None, 1, progress, part)
 
 
 def told(bed: Bed) -> tuple[bytes, dict[str, Any]]:
@@ -112,12 +104,12 @@ def test_what_a_kill_left_of_a_stage_that_is_done_is_not_read(
 ) -> None:
     """Between the bed's file and the removal of the part: the next stages begin all the same."""
     recipe, path = recipe_at(tmp_path), tmp_path / "bed.npz"
-    bed_write(path, recipe, whole)
+    write_bed(path, recipe, whole)
     parts = {part_of(path, stage) for stage in STAGES}
     assert len(parts) == len(STAGES)
     part_of(path, "bed").write_bytes(b"left by a kill")
     nothing = Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
-    monkeypatch.setattr(track_bed, "rest_find", lambda *given, **more: nothing)
+    monkeypatch.setattr(track_bed, "find_rest", lambda *given, **more: nothing)
     assert bed_prepare(recipe, path, 1).stage == "rest"
     assert not [part for part in parts - {part_of(path, "bed")} if part.exists()]
 
@@ -125,7 +117,7 @@ def test_what_a_kill_left_of_a_stage_that_is_done_is_not_read(
 def test_patience_is_no_part_of_a_bed(whole: Bed, tmp_path: Path) -> None:
     """A bed is read by a recipe of more patience, and files of before, which name it, are too."""
     recipe, path = recipe_at(tmp_path), tmp_path / "bed.npz"
-    bed_write(path, recipe, whole)
+    write_bed(path, recipe, whole)
     assert bed_read(path, replace(recipe, patience=99.0)).stage == "bed"
     with np.load(path) as archive:
         arrays = dict(archive)
@@ -151,6 +143,6 @@ def test_many_held_nodes_of_a_rigid_body(components: str, turning: int) -> None:
     which = np.tile(np.arange(len(components)), len(arm))
     places = np.repeat(arm, len(components), axis=0)
     nothing = np.zeros(len(which), dtype=int)
-    hold = hold_of(own, places, which, nothing, np.zeros(len(which)), "body")
+    hold = find_hold(own, places, which, nothing, np.zeros(len(which)), "body")
     assert hold.given.tolist() == [0, 0, -1 if components == "xy" else 0]
     assert hold.turning == turning

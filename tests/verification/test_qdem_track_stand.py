@@ -17,18 +17,18 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
-from qdem_fem import track_stand
-from qdem_fem.contact_sphere_state import SphereContacts
-from qdem_fem.errors import NotConverged
-from qdem_fem.kinetic_damping import masses, rest_find
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.track_bed import Bed, bed_read, bed_write
-from qdem_fem.track_bodies import grains_nodes
-from qdem_fem.track_recipe import grains_of
-from qdem_fem.track_scene import TrackPrepared, contact_of
-from qdem_fem.track_stand import bed_begin, bed_judge, bed_stand
+from qdem_fem.contact.sphere_state import SphereContacts
+from qdem_fem.files.errors import NotConverged
+from qdem_fem.march.kinetic_damping import find_rest, masses
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.track import stand as track_stand
+from qdem_fem.track.bed import Bed, bed_read, write_bed
+from qdem_fem.track.bodies import place_grain_nodes
+from qdem_fem.track.enter import TrackPrepared, contact_of
+from qdem_fem.track.recipe import grains_of
+from qdem_fem.track.stand import begin_bed, judge_bed, let_bed_stand
 from tests.verification.test_qdem_track import RADIUS, RECIPE, STIFFNESS, STONE
 from validation.bench.track_trials import SCENE
 
@@ -47,7 +47,7 @@ def bed(monkeypatch: pytest.MonkeyPatch) -> Bed:
 
     def bodies(*_: object, **__: object) -> dict[str, q.Body]:
         size, apart = (0.05, 0.05, 0.05), 0.05 + 2 * RADIUS
-        made = [box_mesh(size, (1, 1, 1), origin=(0.0, 0.0, z)) for z in (0.0, apart)]
+        made = [make_box_mesh(size, (1, 1, 1), origin=(0.0, 0.0, z)) for z in (0.0, apart)]
         return {
             name: q.Body(mesh, STONE, name=name, rigid=True)
             for name, mesh in zip(("held", "sleeper"), made, strict=True)
@@ -56,12 +56,12 @@ def bed(monkeypatch: pytest.MonkeyPatch) -> Bed:
     def hold(run: q.Simulation, *_: object, **__: object) -> None:
         run.fix(run.bodies[0], np.arange(8), "xyz")
 
-    monkeypatch.setattr(track_stand, "bodies_of_bed", bodies)
-    monkeypatch.setattr(track_stand, "sleeper_guide", hold)
+    monkeypatch.setattr(track_stand, "make_bed_bodies", bodies)
+    monkeypatch.setattr(track_stand, "guide_sleeper", hold)
     monkeypatch.setattr(track_stand, "grains_of", lambda recipe: None)
     nodes = [body.nodes for body in bodies().values()]
-    run, _ = bed_begin(SLOPING, Bed("rest", nodes, np.zeros((16, 3)), {}, {}), contact(0.5))
-    rest_find(run, 1e-3, 1e-4, 0.0, 2.0, look=5)
+    run, _ = begin_bed(SLOPING, Bed("rest", nodes, np.zeros((16, 3)), {}, {}), contact(0.5))
+    find_rest(run, 1e-3, 1e-4, 0.0, 2.0, look=5)
     assert isinstance(run.contacts, SphereContacts)
     moved = np.concatenate([body.displacement for body in run.bodies])
     return Bed("rest", nodes, moved, run.contacts.stored(), {"rest": {}})
@@ -69,8 +69,8 @@ def bed(monkeypatch: pytest.MonkeyPatch) -> Bed:
 
 def test_a_bed_with_friction_to_spare_stands(bed: Bed, tmp_path: Path) -> None:
     path = tmp_path / "bed.npz"
-    bed_write(path, SLOPING, bed)
-    stand = bed_judge(SLOPING, bed, path, contact(0.5), TIME, 0.01)
+    write_bed(path, SLOPING, bed)
+    stand = judge_bed(SLOPING, bed, path, contact(0.5), TIME, 0.01)
     assert stand.pairs == 4
     assert stand.at_limit == 0.0
     assert stand.median == pytest.approx(0.2 / 0.5, rel=0.1)
@@ -84,13 +84,13 @@ def test_a_bed_with_too_little_is_refused_and_remembered(
     what the springs give way by, W (sin - 0.15 cos)/(4 k_t)."""
     path = tmp_path / "bed.npz"
     with pytest.raises(NotConverged, match=r"sliders take .* at Coulomb's limit .0\.01 asked"):
-        bed_judge(SLOPING, bed, path, contact(0.15), TIME, 0.01)
+        judge_bed(SLOPING, bed, path, contact(0.15), TIME, 0.01)
     kept = bed_read(path, SLOPING)
-    monkeypatch.setattr(track_stand, "bed_stand", None)  # told from the file
-    stand = bed_judge(SLOPING, kept, path, contact(0.15), TIME, 1.0)
+    monkeypatch.setattr(track_stand, "let_bed_stand", None)  # told from the file
+    stand = judge_bed(SLOPING, kept, path, contact(0.15), TIME, 1.0)
     assert asdict(stand) in list(kept.stands.values())
     assert stand.at_limit == 0.5  # the upper ones, which bear less
-    run, bodies = bed_begin(SLOPING, bed, contact(0.15))
+    run, bodies = begin_bed(SLOPING, bed, contact(0.15))
     before = bodies["sleeper"].displacement[:, 0].mean()
     weight = float(masses(run)[1] * 9.81)
     run.advance(TIME)
@@ -102,7 +102,7 @@ def test_a_bed_with_too_little_is_refused_and_remembered(
 
 def test_files_of_before_are_read(bed: Bed, tmp_path: Path) -> None:
     path = tmp_path / "bed.npz"
-    bed_write(path, SLOPING, bed)
+    write_bed(path, SLOPING, bed)
     with np.load(path) as archive:
         arrays = {name: archive[name] for name in archive.files}
     head = json.loads(str(arrays.pop("head")))
@@ -115,15 +115,15 @@ def scene_in_the_air(folder: Path, text: Callable[[str], str]) -> TrackPrepared:
     """The track of 20 grains, its bed a file of grains that do not touch."""
     path = folder / "scene.toml"
     path.write_text(text(SCENE), encoding="utf-8")
-    prepared = scene_load(path)
+    prepared = load_scene(path)
     assert isinstance(prepared, TrackPrepared)
     layout, recipe = prepared.recipe.layout, prepared.recipe
-    grains = grains_nodes(grains_of(recipe))
+    grains = place_grain_nodes(grains_of(recipe))
     nodes: list[Any] = layout.grains_below(grains[: recipe.below], 1)
     nodes += layout.grains_beside(grains[recipe.below :], 0.6, 2)
     nodes.append(layout.sleeper(0.6).nodes)
     moved = np.zeros((sum(map(len, nodes)), 3))
-    bed_write(prepared.bed_file, recipe, Bed("rest", nodes, moved, {}, {}))
+    write_bed(prepared.bed_file, recipe, Bed("rest", nodes, moved, {}, {}))
     return prepared
 
 
@@ -141,5 +141,5 @@ def test_skin_and_friction_of_a_scene_are_the_runs(tmp_path: Path) -> None:
 def test_a_bed_of_grains_in_the_air_takes_nothing(tmp_path: Path) -> None:
     prepared = scene_in_the_air(tmp_path, str)
     bed = bed_read(prepared.bed_file, prepared.recipe)
-    stand = bed_stand(prepared.recipe, bed, contact_of(prepared), 1e-5)
+    stand = let_bed_stand(prepared.recipe, bed, contact_of(prepared), 1e-5)
     assert (stand.pairs, stand.creep, stand.at_limit) == (0, 0.0, 0.0)

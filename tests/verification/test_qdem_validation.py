@@ -9,8 +9,8 @@ import pytest
 from scipy.linalg import eigh
 
 from qdem_fem import Body, Material, Simulation
-from qdem_fem.mesh_generation import ring_mesh
-from qdem_fem.spectra import peak_frequencies
+from qdem_fem.mesh.generation import make_ring_mesh
+from qdem_fem.report.spectra import find_peak_frequencies
 from validation.bench.qdem import judge, static, vibration, waves
 from validation.bench.qdem.checks import below, meets, near, orders
 from validation.bench.qdem.closed_forms import bar_speed
@@ -82,7 +82,7 @@ def free_frequency(body: Body, start: FloatArray, shape: FloatArray, guess: floa
         values.append(float((mass[:, None] * shape * body.displacement).sum()))
         run.advance(stride * run.step)
     time = stride * run.step * np.arange(len(values), dtype=np.float64)
-    return peak_frequencies(time, np.array(values), count=3, floor=1e-4)[0].frequency
+    return find_peak_frequencies(time, np.array(values), count=3, floor=1e-4)[0].frequency
 
 
 def nearest_eigenfrequency(body: Body, shape: FloatArray) -> float:
@@ -105,7 +105,7 @@ def nearest_eigenfrequency(body: Body, shape: FloatArray) -> float:
 @pytest.mark.parametrize("kind", ["breathing", "bending"])
 def test_ring_against_its_own_eigenvalues(kind: str) -> None:
     """A free ring, all modes of the same mesh by LAPACK; the thin ring's frequency is a guess."""
-    mesh = ring_mesh(RADIUS - WIDTH / 2, RADIUS + WIDTH / 2, DEPTH, (1, 48, 1))
+    mesh = make_ring_mesh(RADIUS - WIDTH / 2, RADIUS + WIDTH / 2, DEPTH, (1, 48, 1))
     angle = np.arctan2(mesh.nodes[:, 1], mesh.nodes[:, 0])
     radial = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     around = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=1)

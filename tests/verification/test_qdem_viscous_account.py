@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import qdem_fem as q
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 
-pytestmark = pytest.mark.filterwarnings("ignore::qdem_fem.errors.StepWarning")  # contacts set it
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::qdem_fem.files.errors.StepWarning"
+)  # contacts set it
 SIDE, RADIUS, SPEED = 0.05, 0.012, 1.0
 GROUND = q.ContactPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -16,7 +18,7 @@ GROUND = q.ContactPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 def thrown(stiffness: float, viscosity: float, gap: float) -> q.Simulation:
     """A cube of 27 cells that falls at `SPEED` on the ground, which it meets after ``gap`` [m]."""
     stone = q.Material(30e9, 0.2, 2700.0, shear_viscosity=viscosity)
-    body = q.Body(box_mesh((SIDE,) * 3, (3, 3, 3), origin=(0.0, 0.0, RADIUS + gap)), stone)
+    body = q.Body(make_box_mesh((SIDE,) * 3, (3, 3, 3), origin=(0.0, 0.0, RADIUS + gap)), stone)
     contact = q.SphereContact(RADIUS, stiffness, 0.5, (GROUND,))
     run = q.Simulation([body], gravity=(0, 0, -9.81), threads=1, safety=0.3, contact=contact)
     body.velocity = np.tile([0.0, 0.0, -SPEED], (len(body.nodes), 1))
@@ -60,7 +62,7 @@ def account_gap(steps: int) -> float:
     while it still flows, so that the half step up to now is a part of the account.
     """
     dough = q.Material(1e5, 0.2, 1000.0, shear_viscosity=100.0, bulk_viscosity=100.0)
-    body = q.Body(box_mesh((SIDE,) * 3, (2, 2, 2)), dough)
+    body = q.Body(make_box_mesh((SIDE,) * 3, (2, 2, 2)), dough)
     time = 1e-3
     run = q.Simulation([body], threads=1, step=time / steps)
     body.velocity = (body.nodes - SIDE / 2) * np.array([1.0, 0.0, 0.0])

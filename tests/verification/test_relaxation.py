@@ -11,20 +11,20 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 from scipy.spatial.distance import pdist
 
-from adapters.contact_law import equivalent_radius, hertz_stiffness, normal_force
-from adapters.container import Container, Walls
+from adapters.bed.contact_law import equivalent_radius, hertz_stiffness, normal_force
+from adapters.bed.container import Container, Walls
+from adapters.bed.overlaps import find_behind_discs, measure_rows, neighbours
+from adapters.bed.state import Contacts, FloatArray, State
 from adapters.errors import NotConverged, UsageError
-from adapters.overlaps import behind_discs, neighbours, rows_at
-from adapters.relaxation import equilibrium_overlap, relax, relax_bare
-from adapters.relaxation_kernel import (
-    hertz_energy_gradient,
-    multipliers_solve,
-    rows_change,
-    rows_move,
-    rows_norm,
+from adapters.relaxation.kernel import (
+    add_hertz_energy,
+    estimate_norm,
+    fill_changes,
+    fill_moves,
+    solve_multipliers,
 )
-from adapters.relaxation_measured import Relaxation, RelaxationNotConverged
-from adapters.state import Contacts, FloatArray, State
+from adapters.relaxation.measured import Relaxation, RelaxationNotConverged
+from adapters.relaxation.methods import bound_equilibrium_overlap, relax, relax_bare
 from tests.deepest_overlap import deepest
 from tests.made_beds import STIFFNESS, bed_made, jump, state_at_rest
 
@@ -64,15 +64,15 @@ def column(count: int, overlap: FloatArray) -> Bed:
 def test_hertz_potential_is_that_of_eq_5(settled: Bed) -> None:
     """grad psi is the force of eq. 5: against the energy's central differences and a NumPy twin."""
     state, walls = settled
-    behind = behind_discs(state.position, walls)
+    behind = find_behind_discs(state.position, walls)
     rows = neighbours(state.position, state.radius, walls)
     other = np.where(rows.second >= 0, state.radius[np.maximum(rows.second, 0)], np.inf)
     lambda_n = normal_force(1.0, STIFFNESS.grain, 1 / (1 / state.radius[rows.first] + 1 / other))
 
     def energy(position: FloatArray) -> tuple[float, FloatArray]:
-        near = rows_at(position, state.radius, rows.first, rows.second, walls, behind)
+        near = measure_rows(position, state.radius, rows.first, rows.second, walls, behind)
         gradient = np.zeros_like(position)
-        value = hertz_energy_gradient(
+        value = add_hertz_energy(
             near.first, near.second, near.normal, near.overlap, lambda_n, gradient
         )
         return value, gradient
@@ -107,8 +107,8 @@ def test_move_and_change_are_transposes(bed: Bed) -> None:
     mu = generator.standard_normal(len(rows) + 1)
     v = generator.standard_normal(state.position.shape)
     move, change = np.empty_like(v), np.empty(len(rows) + 1)
-    rows_move(rows.first, rows.second, rows.normal, 0.05, mu, move)
-    rows_change(rows.first, rows.second, rows.normal, 0.05, v, change)
+    fill_moves(rows.first, rows.second, rows.normal, 0.05, mu, move)
+    fill_changes(rows.first, rows.second, rows.normal, 0.05, v, change)
     assert mu @ change == pytest.approx(-np.sum(move * v), rel=1e-10)
 
 
@@ -132,10 +132,10 @@ def test_multipliers_against_scipy(seed: int) -> None:
             j[c, 3 * second[c] : 3 * second[c] + 3] = normal[c]
     j[m, 2::3] = share
     gram = j @ j.T + slack * np.eye(m + 1)
-    norm = rows_norm(first, second, normal, share, n, 200)
+    norm = estimate_norm(first, second, normal, share, n, 200)
     assert norm == pytest.approx(np.linalg.eigvalsh(j @ j.T).max(), rel=1e-2)
     mu = np.zeros(m + 1)
-    products, error = multipliers_solve(
+    products, error = solve_multipliers(
         first, second, normal, share, slack, two_sided, right, norm, 1e-10, 5000, n, mu
     )
     assert error <= 1e-10
@@ -255,14 +255,15 @@ def test_residual_force_counts_carried_friction() -> None:
 
 
 def test_cap_is_above_the_heaviest_contact_of_a_column() -> None:
-    """In a column every contact carries all weight above; none passes `equilibrium_overlap`."""
+    """In a column every contact carries all weight above; none passes
+    `bound_equilibrium_overlap`."""
     state, _ = column(6, np.zeros(6))
     weight = GRAVITY * state.mass
     radius = equivalent_radius(3e-3, 3e-3)
     carried = (0.75 * weight[1:].sum() / (STIFFNESS.grain * np.sqrt(radius))) ** (2 / 3)
-    cap = equilibrium_overlap(state, STIFFNESS, GRAVITY)
+    cap = bound_equilibrium_overlap(state, STIFFNESS, GRAVITY)
     assert carried < cap < 1.2 * carried
-    loaded = equilibrium_overlap(state, STIFFNESS, GRAVITY, load=7 * weight.sum())
+    loaded = bound_equilibrium_overlap(state, STIFFNESS, GRAVITY, load=7 * weight.sum())
     assert loaded == pytest.approx(4 * cap)
 
 
@@ -426,7 +427,7 @@ def test_hard_cases_end_valid(bed: Bed, make: object, bare: bool) -> None:
     if bare:
         found = relax_bare(state.moved(estimate), walls, STIFFNESS)
         # overlaps come to within 1 % of the mean carried one, which is no more than the cap
-        limit = 1.01 * equilibrium_overlap(state.moved(estimate), STIFFNESS, GRAVITY)
+        limit = 1.01 * bound_equilibrium_overlap(state.moved(estimate), STIFFNESS, GRAVITY)
     else:
         found = relax(estimate, state, walls, STIFFNESS)
         limit = 1.01 * found.before.max_penetration
@@ -446,7 +447,9 @@ def test_radii_of_one_to_twenty() -> None:
     state = state_at_rest(gas, radius)
     found = relax_bare(state, walls, STIFFNESS)
     assert found.estimated.max_penetration > 1e-3
-    assert deepest(found.position, radius, walls) <= equilibrium_overlap(state, STIFFNESS, GRAVITY)
+    assert deepest(found.position, radius, walls) <= bound_equilibrium_overlap(
+        state, STIFFNESS, GRAVITY
+    )
 
 
 @pytest.mark.parametrize("height", [3e-3, 0.03, -0.02, -1.0])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adapters.container import Container
-from adapters.overlaps import neighbours
-from adapters.relaxation import relax
-from adapters.state import FloatArray, State
+from adapters.bed.container import Container
+from adapters.bed.overlaps import neighbours
+from adapters.bed.state import FloatArray, State
+from adapters.relaxation.methods import relax
 from tests.made_beds import STIFFNESS, state_at_rest
 
 RADIUS, OVERLAP = 3.2e-3, 6e-8

@@ -12,19 +12,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from adapters.container import Container, Walls
+from adapters.bed.container import Container, Walls
+from adapters.bed.state import FloatArray, State
 from adapters.errors import UsageError
-from adapters.relaxation import relax
-from adapters.relaxation_measured import RelaxationNotConverged
-from adapters.relaxation_rearranged import ENOUGH, LEAST, MOST, OVERLAP_MAX, rearrange
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray, State
+from adapters.relaxation.measured import RelaxationNotConverged
+from adapters.relaxation.methods import relax
+from adapters.relaxation.rearranged import ENOUGH, LEAST, MOST, OVERLAP_MAX, rearrange
+from adapters.scene.file import load_scene
 from tests.deepest_overlap import deepest
 from tests.made_beds import STIFFNESS, state_at_rest
 from trackbed.scenes import scene_path
 
 BEDS = Path(__file__).parents[1] / "jammed_beds.npz"
-SCENE = scene_load(scene_path("karrech-coarse"), ["material.grain.young=1e9"])
+SCENE = load_scene(scene_path("karrech-coarse"), ["material.grain.young=1e9"])
 GAIN = 120e-6
 JAMMED = ((3, 0), (3, 1), (5, 1))
 """Packing and member."""

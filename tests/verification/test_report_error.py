@@ -13,29 +13,29 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapters.errors import UsageError
-from adapters.laws import law_named
-from adapters.report_error import (
+from adapters.files.run_folder import Outcome, RunFolder
+from adapters.laws import get_law
+from adapters.procedure.history import (
+    AVERAGED,
+    History,
+    cycles_computed,
+    failed_jumps,
+    history_of,
+    list_jumped_spans,
+    read_history,
+    sum_cost,
+)
+from adapters.report.error import (
     Beds,
     comparison,
     curve_fitted,
+    find_last_common_cycle,
     gained_time,
-    jump_figures,
-    last_common_cycle,
+    measure_jump,
     relative_error,
     speed_up,
     stopped_early,
 )
-from adapters.report_history import (
-    AVERAGED,
-    History,
-    cost_total,
-    cycles_computed,
-    failed_jumps,
-    history_of,
-    history_read,
-    jumped_spans,
-)
-from adapters.run_folder import Outcome, RunFolder
 
 A = 3e-5
 """Settlement a ln(1 + N) of the hand-made full run [m]."""
@@ -123,7 +123,7 @@ def test_relative_error_is_signed(value: float, reference: float, error: float) 
 def test_cost_counts_start_up_once() -> None:
     """The start-up is a part of the engine's time; every other purpose adds."""
     cost = {"engine": 5.0, "start_up": 2.0, "parse": 0.5, "fit": 0.25, "relax": 1.0, "other": 0.125}
-    assert cost_total(cost) == 6.875
+    assert sum_cost(cost) == 6.875
 
 
 def test_history_spreads_a_windows_cost_over_its_cycles() -> None:
@@ -134,7 +134,7 @@ def test_history_spreads_a_windows_cost_over_its_cycles() -> None:
     assert history.cpu_s[history.row(70)] == pytest.approx(50 * CYCLE_S + 3.0)
     assert history.cpu_s[-1] == pytest.approx(80 * CYCLE_S + 3.0)
     assert history.computed(100) == 80
-    assert jumped_spans(PROCEDURE) == [(50, 70)]
+    assert list_jumped_spans(PROCEDURE) == [(50, 70)]
     assert cycles_computed(100, [(50, 70)]) == 80
     with pytest.raises(UsageError, match="60"):
         history.row(60)
@@ -245,7 +245,7 @@ def test_a_law_that_holds_is_extrapolated_without_error() -> None:
     """Fitting c + a ln N to a settlement of that form gives the full run at any cost."""
     rows = [row(n, settlement=1e-4 + A * log(n)) for n in range(1, 101)]
     full = history_of([Outcome("window", 0, 100, rows, {"engine": 400.0})])
-    line = curve_fitted(full, law_named("log"), 10, 100, [11, 12, 20, 50, 99])
+    line = curve_fitted(full, get_law("log"), 10, 100, [11, 12, 20, 50, 99])
     assert line.computed.tolist() == [12, 20, 50, 99]  # two cycles say nothing of their own error
     assert np.allclose(line.settlement_error, 0, atol=1e-9)
     assert np.allclose(line.cpu_s, CYCLE_S * line.computed)
@@ -257,7 +257,7 @@ def test_the_steps_of_a_jump_add_up() -> None:
         [window(0, 50), jump(50, 70, 1.0, 1.1 * settled(70)), window(70, 100, 5, settlement=2e-4)]
     )
     full = full_run()
-    figures = jump_figures("jump_000050_1", jump(50, 70, 1.0, 1.1 * settled(70)), own, full)
+    figures = measure_jump("jump_000050_1", jump(50, 70, 1.0, 1.1 * settled(70)), own, full)
     assert figures.estimated == pytest.approx(1.1 * settled(70) - settled(50) + 1e-7)
     assert figures.truth == pytest.approx(settled(70) - settled(50))
     assert figures.relaxation_change == pytest.approx(-1e-7)
@@ -275,7 +275,7 @@ def test_bar_of_the_coordination_number(coordination: float, ok: bool) -> None:
     """A relaxation keeps the coordination number of the state before within 3 %, both ways."""
     outcome = jump(50, 70, 1.0)
     outcome.notes["relaxation"]["relaxed"]["coordination_number"] = coordination
-    figures = jump_figures("x", outcome, history_of(PROCEDURE), None)
+    figures = measure_jump("x", outcome, history_of(PROCEDURE), None)
     assert figures.coordination_ok is ok
     assert isnan(figures.truth)
 
@@ -287,13 +287,13 @@ def test_bar_of_the_mean_height(share: float, ok: bool) -> None:
     record = outcome.notes["relaxation"]
     own = record["before"]["mean_height"] - record["estimated"]["mean_height"]
     record["relaxed"]["mean_height"] = record["estimated"]["mean_height"] + share * own
-    assert jump_figures("x", outcome, history_of(PROCEDURE), None).height_ok is ok
+    assert measure_jump("x", outcome, history_of(PROCEDURE), None).height_ok is ok
 
 
 def test_a_jump_without_relaxation_is_not_judged() -> None:
     """A scene that asks for no relaxation leaves no measures, and no verdict."""
     outcome = Outcome("jump", 50, 70, [row(70)], {}, notes={"relaxation": {"method": "none"}})
-    figures = jump_figures("x", outcome, history_of(PROCEDURE), None)
+    figures = measure_jump("x", outcome, history_of(PROCEDURE), None)
     assert figures.coordination_ok is None
     assert figures.height_ok is None
 
@@ -301,10 +301,10 @@ def test_a_jump_without_relaxation_is_not_judged() -> None:
 def test_common_cycle() -> None:
     """Run and control are compared at the last cycle both have, never inside a jump."""
     own = history_of(PROCEDURE)
-    assert last_common_cycle(own, full_run(75)) == 75
-    assert last_common_cycle(history_of(PROCEDURE[:4]), full_run(75)) == 70
-    assert last_common_cycle(history_of(PROCEDURE[:4]), full_run(50)) == 50
-    assert last_common_cycle(own, history_of([])) == 0
+    assert find_last_common_cycle(own, full_run(75)) == 75
+    assert find_last_common_cycle(history_of(PROCEDURE[:4]), full_run(75)) == 70
+    assert find_last_common_cycle(history_of(PROCEDURE[:4]), full_run(50)) == 50
+    assert find_last_common_cycle(own, history_of([])) == 0
 
 
 def folder_of(path: Path, outcomes: tuple[Outcome, ...]) -> RunFolder:
@@ -324,14 +324,14 @@ def test_two_folders_are_compared(tmp_path: Path) -> None:
     own = folder_of(tmp_path / "own", PROCEDURE)
     stages = (PROCEDURE[0], *(window(first, first + 25) for first in range(0, 100, 25)))
     full = folder_of(tmp_path / "full", stages)
-    mine, truth = history_read(own), history_read(full)
-    cycle = last_common_cycle(mine, truth)
+    mine, truth = read_history(own), read_history(full)
+    cycle = find_last_common_cycle(mine, truth)
     found = comparison("own", mine, cycle, truth, cycle, 1000.0)
     assert found.speed_up == pytest.approx(400 / 323)
     assert found.settlement_error == 0
     assert found.speed_up_with_preparation == pytest.approx(1400 / 1323)
-    none = history_read(folder_of(tmp_path / "none", PROCEDURE[:1]))
-    assert last_common_cycle(mine, none) == 0
+    none = read_history(folder_of(tmp_path / "none", PROCEDURE[:1]))
+    assert find_last_common_cycle(mine, none) == 0
     with pytest.raises(UsageError):
         comparison("own", mine, 0, none, 0, 1000.0)
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_lcp.gyroscopic import Floats, angular_momentum
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polyhedra import ballast_stone
-from rigid_lcp.polyhedron import Polyhedron, box
-from rigid_lcp.rotations import quaternion_of_rotation, rotate, unit_quaternion
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
-from rigid_lcp.sphere import Sphere
+from rigid_lcp.motion.gyroscopic import Floats, angular_momentum
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp.shapes.rotations import quaternion_of_rotation, rotate, unit_quaternion
+from rigid_lcp.shapes.sphere import Sphere
+from rigid_lcp.shapes.stones import ballast_stone
 
 G = 9.81
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from rigid_lcp.abrasion import friction_work, worn_stiffness, worn_volume
-from rigid_lcp.elastic_limit import elastic_limit
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.friction_problem import BodySpace, friction_problem
+from rigid_lcp.friction.problem.definition import BodySpace, friction_problem
+from rigid_lcp.unique.elastic_limit import elastic_limit
+from rigid_lcp.wear.abrasion import friction_work, worn_stiffness, worn_volume
 
 
 def test_work_of_a_sliding_block():

@@ -1,4 +1,5 @@
-"""Sweeps in body space: every visit is the exact answer of `rigid_lcp.local_contact`.
+"""Sweeps in body space: every visit is the exact answer of
+`rigid_lcp.friction.sweeps.local_contact`.
 
 A twin in plain NumPy visits one contact after another (Jean 1999): ``q_c = u_c - W_cc y_c`` with
 ``u = W y + q`` of all forces at present, ``r_c`` by `solve_contact`.  The kernels carry body
@@ -14,11 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rigid_lcp.body_sweeps import REGULAR, contacts_packed, inverses
-from rigid_lcp.contact_blocks import body_blocks, velocities_relative
-from rigid_lcp.contact_sweeps import visit_all
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.gauss_seidel import sweep_blocks
+from rigid_lcp.friction.methods.gauss_seidel import sweep_blocks
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.sweeps.blocks import find_relative_velocities, lay_out_bodies
+from rigid_lcp.friction.sweeps.body_kernel import REGULAR, inverses, pack_contacts
+from rigid_lcp.friction.sweeps.contact_kernel import visit_all
 from tests.rigid_local import solve_contact
 
 Floats = NDArray[np.float64]
@@ -69,7 +70,7 @@ def test_a_sweep_is_that_of_the_exact_local_solutions(
     seed: int, dim: int, contacts: int, mu: float, part: float
 ) -> None:
     problem = some_problem(seed, dim, contacts, mu)
-    bodies = body_blocks(problem)
+    bodies = lay_out_bodies(problem)
     assert bodies is not None
     random = np.random.default_rng(seed + 1)
     force, last = random.normal(size=(2, contacts, dim))
@@ -104,10 +105,10 @@ def test_blocks_of_the_bodies_make_w(dim: int, full: bool) -> None:
     masses = [m @ m.T if full else np.diag(np.diag(m) ** 2 + 0.1) for m in root]
     space = BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.block_diag(masses)), size)
     problem = friction_problem(space, random.normal(size=4 * dim), 0.4, dim)
-    bodies = body_blocks(problem)
+    bodies = lay_out_bodies(problem)
     assert bodies is not None
     r = random.normal(size=(4, dim))
-    u = velocities_relative(bodies.body, bodies.block, bodies.body_velocity(r))
+    u = find_relative_velocities(bodies.body, bodies.block, bodies.body_velocity(r))
     w = space.matrix.toarray()
     np.testing.assert_allclose(u.ravel(), w @ r.ravel(), rtol=1e-10, atol=1e-10)
     own = [w[k * dim : (k + 1) * dim, k * dim : (k + 1) * dim] for k in range(4)]
@@ -137,9 +138,9 @@ def test_inverses_invert_or_are_zero(dim: int) -> None:
 
 def test_packed_rows_hold_what_a_visit_reads() -> None:
     problem = some_problem(5, 2, 3, 0.4)
-    bodies = body_blocks(problem)
+    bodies = lay_out_bodies(problem)
     assert bodies is not None
-    rows = contacts_packed(
+    rows = pack_contacts(
         bodies.block, bodies.local, problem.offset.reshape(-1, 2), problem.friction
     )
     assert rows.shape == (3, 21)

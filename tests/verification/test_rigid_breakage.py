@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_lcp.breakage import Breakage, breaks
 from rigid_lcp.errors import SceneError, ShapeError
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
-from rigid_lcp.strength import brazilian_tension
-from rigid_lcp.wear import Wear
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
+from rigid_lcp.wear.breakage import Breakage, breaks
+from rigid_lcp.wear.corners import Wear
+from rigid_lcp.wear.strength import brazilian_tension
 
 GRAVITY = 9.81
 
@@ -61,7 +61,7 @@ def test_a_pressed_diamond_breaks_at_its_strength(share):
 
 def test_grains_that_turn_to_dust_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """Far above the strength every part breaks again: told, unless a smallest volume ends it."""
-    monkeypatch.setattr("rigid_lcp.breakage.DUST", 4)
+    monkeypatch.setattr("rigid_lcp.wear.breakage.DUST", 4)
     with pytest.raises(
         SceneError, match=r"2 grains have broken into .* parts, which go on to break"
     ):
@@ -96,7 +96,7 @@ def test_parts_are_the_whole_and_do_not_burst():
 def test_parts_below_the_smallest_and_stronger_small_ones_hold():
     """Weibull: halves of the area are 2^(1/m) stronger; below ``smallest`` nothing breaks."""
     rule = Breakage(1e5, modulus=3.0, reference_volume=0.02)
-    assert rule.strength_of(0.01) == pytest.approx(1e5 * 2 ** (1 / 3), rel=1e-12)
+    assert rule.draw_strength(0.01) == pytest.approx(1e5 * 2 ** (1 / 3), rel=1e-12)
     run = press(5e3, 1.0)
     run.breakage = None
     run.advance(1e-3)
@@ -152,7 +152,7 @@ def test_breakage_that_is_refused():
 def test_a_pressed_cube_breaks_in_space():
     """Point load F / d^2 of the greatest pair: a cube between floor and plate in 3D splits in two
     halves along the force, with its mass, and the pile stays."""
-    from rigid_lcp.polyhedron import box
+    from rigid_lcp.shapes.polyhedron import box
 
     scene = Scene(3)
     scene.add(HalfSpace([0, 0, 1]), friction=0.5)

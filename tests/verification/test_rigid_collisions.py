@@ -11,9 +11,9 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.collisions import Collision, Floats, Law, collide
+from rigid_lcp.collision.impulses import Collision, Floats, Law, collide
 from rigid_lcp.errors import ProblemError, UsageError
-from rigid_lcp.friction_problem import BodySpace
+from rigid_lcp.friction.problem.definition import BodySpace
 from tests.rigid_collision_sets import (
     cradle,
     cradle_answer,

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rigid_lcp.cones import natural_map, natural_residual
-from rigid_lcp.friction_problem import friction_problem
+from rigid_lcp.friction.problem.cones import natural_map, natural_residual
+from rigid_lcp.friction.problem.definition import friction_problem
 
 Floats = NDArray[np.float64]
 ROUND_OFF = 1e-12

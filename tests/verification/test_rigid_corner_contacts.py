@@ -7,18 +7,18 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.equations import inertial_acceleration, relative_velocity
-from rigid_lcp.motion import Motion, motion_displaced
-from rigid_lcp.polyhedron import Polyhedron
-from rigid_lcp.rotations import (
+from rigid_lcp.motion.equations import inertial_acceleration, relative_velocity
+from rigid_lcp.motion.state import Motion, displace_motion
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.polyhedron import Polyhedron
+from rigid_lcp.shapes.rotations import (
     Floats,
     quaternion_of_rotation,
     quaternion_product,
     rotate,
     unit_quaternion,
 )
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
 from tests.rigid_solids import CUBE, coal_distance, contacts
 from tests.verification.test_rigid_hard_geometry_3d import (
     FAMILIES,
@@ -110,7 +110,7 @@ def test_rates_are_the_derivatives_of_the_gap(seed: int, form: str) -> None:
     motion = Motion(position, turns, rates[:, :3], rates[:, 3:])
     h, gaps, keys = 1e-4, [], []
     for t in (-h, 0.0, h):
-        there = motion_displaced(motion, t * rates)
+        there = displace_motion(motion, t * rates)
         found = contacts(shapes, there.position, there.angle, margin=0.05)
         gaps.append(float(found.gap.min()))
         keys.append(int(found.key[np.argmin(found.gap)]))

@@ -7,26 +7,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.dantzig import Event, dantzig
-from rigid_lcp.dantzig_drive import move_contact
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.factor_updates import (
+from rigid_lcp.friction.methods.dantzig import Event, dantzig
+from rigid_lcp.friction.pivots.drive import move_contact
+from rigid_lcp.friction.pivots.shift import change_shift
+from rigid_lcp.friction.pivots.state import Floats, Pivots, start_pivots
+from rigid_lcp.friction.pivots.updates import (
     BREAKING,
     SLIDING_DOWN,
     SLIDING_UP,
     STATIC,
-    inverse_border,
-    inverse_drop,
-    reduced_refresh,
+    border_inverse,
+    refresh_reduced,
+    shrink_inverse,
     slide_sign,
 )
-from rigid_lcp.friction_problem import friction_problem
-from rigid_lcp.pivot_shift import shift_change
-from rigid_lcp.pivot_state import (
-    Floats,
-    Pivots,
-    pivots_state,
-)
+from rigid_lcp.friction.problem.definition import friction_problem
 from tests.rigid_networks import network, stored, tower
 
 TOLERANCE = 1e-12
@@ -64,13 +60,13 @@ def test_bordering_and_dropping_give_the_inverse(size: int, seed: int) -> None:
     b = g.normal(size=(size + 1, size + 1)) + 4.0 * np.eye(size + 1)
     room = np.zeros((size + 1, size + 1))
     room[:size, :size] = np.linalg.inv(b[:size, :size])
-    complement = inverse_border(room, size, b[:size, size].copy(), b[size, :size].copy(), b[-1, -1])
+    complement = border_inverse(room, size, b[:size, size].copy(), b[size, :size].copy(), b[-1, -1])
     expected = b[-1, -1] - b[size, :size] @ np.linalg.solve(b[:size, :size], b[:size, size])
     allowed = 1e-13 * np.linalg.cond(b) ** 2
     assert complement == pytest.approx(expected, abs=allowed * abs(b).max())
     assert room == pytest.approx(np.linalg.inv(b), abs=allowed)
     place = int(g.integers(size + 1))
-    assert inverse_drop(room, size + 1, place)
+    assert shrink_inverse(room, size + 1, place)
     left = list(range(size))
     if place < size:
         left[place] = size  # the last takes the empty seat
@@ -80,7 +76,7 @@ def test_bordering_and_dropping_give_the_inverse(size: int, seed: int) -> None:
 def test_a_singular_border_changes_nothing() -> None:
     """``[[1, 1], [1, 1]]`` has no inverse."""
     room = np.eye(2)
-    assert inverse_border(room, 1, np.ones(1), np.ones(1), 1.0) == 0.0
+    assert border_inverse(room, 1, np.ones(1), np.ones(1), 1.0) == 0.0
     assert (room == np.eye(2)).all()
 
 
@@ -88,7 +84,7 @@ def test_a_singular_border_changes_nothing() -> None:
 def test_the_inverse_follows_the_lists(seed: int) -> None:
     """After random moves between all lists the inverse is that of eq. 28, built anew in NumPy."""
     problem = network(20, 0.4, seed)
-    state = pivots_state(problem, 1e-2, 0.0, None, False)
+    state = start_pivots(problem, 1e-2, 0.0, None, False)
     g = np.random.default_rng(seed)
     state.reduced.kind[:] = BREAKING
     ways = {
@@ -105,9 +101,9 @@ def test_the_inverse_follows_the_lists(seed: int) -> None:
     matrix = matrix_of_lists(state)
     held = state.reduced.inverse[:size, :size] @ matrix
     assert held == pytest.approx(np.eye(size), abs=1e-9)
-    assert reduced_refresh(state.geometry, state.reduced)
+    assert refresh_reduced(state.geometry, state.reduced)
     assert state.reduced.inverse[:size, :size] @ matrix == pytest.approx(np.eye(size), abs=1e-12)
-    assert shift_change(state, 0.5 * state.shift[0])
+    assert change_shift(state, 0.5 * state.shift[0])
     halved = matrix_of_lists(state)
     assert np.diag(matrix - halved) == pytest.approx(0.5e-2 * state.unit, rel=1e-9)
 

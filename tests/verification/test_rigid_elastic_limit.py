@@ -11,8 +11,8 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.elastic_limit import elastic_limit, state_reached_from
-from rigid_lcp.friction_problem import BodySpace, friction_problem
+from rigid_lcp.friction.problem.definition import BodySpace, friction_problem
+from rigid_lcp.unique.elastic_limit import elastic_limit, relax_from
 from tests.rigid_elastic import find_least_forces
 from tests.rigid_static_problems import (
     GRAVITY,
@@ -107,7 +107,7 @@ def test_friction_can_be_mobilised_in_more_ways_than_one():
     problem = pyramid(4, 0.9)
     near = elastic_limit(problem)
     start = np.random.default_rng(0).normal(size=30) * np.abs(near.r).max()
-    far = state_reached_from(problem, start)
+    far = relax_from(problem, start)
     assert near.solved
     assert far.solved
     assert max(near.residual, far.residual) < 1e-12

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.elastic_network import (
+from rigid_lcp.unique.elastic_network import (
     ElasticNetwork,
     slider_energy,
     slider_forces,
     slider_slope,
 )
-from rigid_lcp.micro_displacements import coulomb_spring, free_motion, mass_free_jacobian
+from rigid_lcp.unique.micro_displacements import coulomb_spring, free_motion, mass_free_jacobian
 from tests.rigid_static_problems import pyramid
 
 

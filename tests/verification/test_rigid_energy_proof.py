@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import BodySpace, solve_friction
-from rigid_lcp.energy_proof import CERTAIN, energy_least, gives_energy
-from rigid_lcp.friction_problem import friction_problem
+from rigid_lcp.friction.problem.definition import friction_problem
+from rigid_lcp.friction.problem.energy_proof import CERTAIN, find_least_energy, gives_energy
 from validation.bench.rigid.packings import packing
 
 
@@ -21,7 +21,7 @@ def one_contact(coupling: float, mu: float):
 def test_least_energy_of_one_contact_is_the_closed_form(mu):
     """(1 - 3 s + s^2) / (1 + s^2) falls as s grows from 0 to 1, so its least is at the edge s = mu;
     W itself has the eigenvalue -0.5, outside the cone."""
-    energy, force = energy_least(one_contact(1.5, mu))
+    energy, force = find_least_energy(one_contact(1.5, mu))
     assert energy == pytest.approx((1 - 3 * mu + mu**2) / (1 + mu**2), rel=1e-6)
     assert force[1] == pytest.approx(mu * force[0], abs=1e-6)
 
@@ -31,7 +31,7 @@ def test_energy_is_given_from_the_friction_that_reaches_where_it_is_negative(mu,
     """1 - 3 s + s^2 is negative from s = (3 - 5^(1/2)) / 2 = 0.38197 on."""
     problem = one_contact(1.5, mu)
     assert gives_energy(problem) is given
-    energy, force = energy_least(problem)
+    energy, force = find_least_energy(problem)
     assert np.sign(force @ problem.delassus @ force) == np.sign(energy)
     assert abs(force[1]) <= mu * force[0] * (1 + 1e-12)
 
@@ -44,7 +44,7 @@ def test_a_w_of_bodies_never_gives_energy(seed, dim, mu):
     contacts = int(generator.integers(1, 8))
     jacobian = generator.standard_normal((contacts * dim, 3)) * 10.0 ** generator.integers(-6, 6)
     problem = friction_problem(jacobian @ jacobian.T, np.ones(contacts * dim), mu, dim)
-    assert energy_least(problem)[0] >= -1e-12 > -CERTAIN
+    assert find_least_energy(problem)[0] >= -1e-12 > -CERTAIN
 
 
 def test_the_proof_is_not_asked_of_bodies():

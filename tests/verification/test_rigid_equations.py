@@ -8,19 +8,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rigid_lcp.contacts import Contacts, contact_rows
-from rigid_lcp.disc import Disc
-from rigid_lcp.equations import (
+from rigid_lcp.contact.arrays import Contacts, contact_rows
+from rigid_lcp.motion.equations import (
     body_space,
-    contact_offset,
+    find_contact_offset,
     inertial_acceleration,
     jacobian,
     relative_velocity,
 )
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.motion import Motion, motion_displaced, motion_with_rates
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene, World, world_of
+from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
+from rigid_lcp.motion.world import Scene, World, make_world
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
 
 Floats = NDArray[np.float64]
 PAIRS = {
@@ -40,7 +40,7 @@ def touching(name: str, seed: int) -> tuple[World, Motion, Contacts]:
     scene = Scene(2)
     for shape in (upper, lower):
         scene.add(shape, density=2.0)
-    world, motion = world_of(scene)
+    world, motion = make_world(scene)
     position, angle = motion.position.copy(), motion.angle.copy()
     angle[:] = generator.uniform(0, 2 * np.pi, 2)
     if name == "vertex on face":
@@ -57,14 +57,14 @@ def touching(name: str, seed: int) -> tuple[World, Motion, Contacts]:
     contacts = contacts[np.array([np.argmin(contacts.gap)])]
     move = np.zeros((2, 3))
     move[0, :2] = -contacts.gap[0] * contacts.normal[0]
-    motion = motion_displaced(motion, move)
+    motion = displace_motion(motion, move)
     rates = generator.normal(size=(2, 3))
     if isinstance(lower, HalfSpace):
         rates[1] = 0.0
-    motion = motion_with_rates(motion, rates)
+    motion = replace_rates(motion, rates)
     contacts = again(world, motion, contacts)
     rates[0, :2] -= relative_velocity(contacts, motion)[0, 0] * contacts.normal[0]
-    return world, motion_with_rates(motion, rates), contacts
+    return world, replace_rates(motion, rates), contacts
 
 
 def again(world: World, motion: Motion, contacts: Contacts) -> Contacts:
@@ -86,8 +86,8 @@ def test_gap_rate(name: str, seed: int) -> None:
     for freedom in range(6 if lower_moves else 3):
         move = np.zeros((2, 3))
         move.ravel()[freedom] = h
-        ahead = again(world, motion_displaced(motion, move), contacts).gap[0]
-        behind = again(world, motion_displaced(motion, -move), contacts).gap[0]
+        ahead = again(world, displace_motion(motion, move), contacts).gap[0]
+        behind = again(world, displace_motion(motion, -move), contacts).gap[0]
         assert rows[freedom] == pytest.approx((ahead - behind) / (2 * h), abs=1e-9)
 
 
@@ -100,13 +100,13 @@ def test_normal_inertial_terms(name: str, seed: int) -> None:
     """
     world, motion, contacts = touching(name, seed)
     h = 1e-3
-    gap = [again(world, motion_displaced(motion, k * h * motion.rates), contacts).gap[0]
+    gap = [again(world, displace_motion(motion, k * h * motion.rates), contacts).gap[0]
            for k in (-1, 0, 1)]  # fmt: skip
     assert abs(gap[2] - gap[0]) < 1e-5  # the gap rate is zero
     expected = (gap[0] - 2 * gap[1] + gap[2]) / h**2
     assert inertial_acceleration(contacts, motion)[0, 0] == pytest.approx(expected, abs=1e-4)
     # Richardson: a quarter of the error at half the step
-    half = [again(world, motion_displaced(motion, k * h / 2 * motion.rates), contacts).gap[0]
+    half = [again(world, displace_motion(motion, k * h / 2 * motion.rates), contacts).gap[0]
             for k in (-1, 0, 1)]  # fmt: skip
     finer = (half[0] - 2 * half[1] + half[2]) / (h / 2) ** 2
     best = (4 * finer - expected) / 3
@@ -121,7 +121,7 @@ def test_tangential_inertial_terms(name: str, seed: int) -> None:
     h = 1e-5
     slip = []
     for k in (-1, 1):
-        there = motion_displaced(motion, k * h * motion.rates)
+        there = displace_motion(motion, k * h * motion.rates)
         slip.append(relative_velocity(again(world, there, contacts), there)[0, 1])
     expected = (slip[1] - slip[0]) / (2 * h)
     assert inertial_acceleration(contacts, motion)[0, 1] == pytest.approx(expected, abs=1e-8)
@@ -149,7 +149,7 @@ def test_matrix_of_a_box_at_rest() -> None:
     scene = Scene(2)
     scene.add(Polygon.rectangle(2.0, 1.0), density=3.0, position=(0, 0.5))
     scene.add(HalfSpace((0, 1)))
-    world, motion = world_of(scene)
+    world, motion = make_world(scene)
     contacts = world.contacts(motion, 1e-9)
     bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
     mass, inertia = 6.0, 6.0 * (4 + 1) / 12
@@ -157,15 +157,15 @@ def test_matrix_of_a_box_at_rest() -> None:
     normal = bodies.matrix.toarray()[::2, ::2]
     np.testing.assert_allclose(normal[0, 0], 1 / mass + 1 / inertia)
     np.testing.assert_allclose(normal[0, 1], 1 / mass - 1 / inertia)
-    free = motion_with_rates(motion, world.accelerations(motion, None))
-    np.testing.assert_allclose(contact_offset(contacts, motion, free), [-9.81, 0, -9.81, 0])
+    free = replace_rates(motion, world.accelerations(motion, None))
+    np.testing.assert_allclose(find_contact_offset(contacts, motion, free), [-9.81, 0, -9.81, 0])
 
 
 def test_driven_body_has_velocity_but_no_columns() -> None:
     scene = Scene(2)
     scene.add(Polygon.rectangle(1, 1), density=1.0, position=(0, 1.0))
     scene.add(Polygon.rectangle(4, 1), fixed=True, velocity=(0.5, 0))
-    world, motion = world_of(scene)
+    world, motion = make_world(scene)
     contacts = world.contacts(motion, 1e-9)
     assert jacobian(contacts, motion.position, world.columns, 1).shape == (4, 3)
     np.testing.assert_allclose(np.abs(relative_velocity(contacts, motion)[:, 1]), 0.5)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.friction_problem import friction_problem
-from rigid_lcp.solver import solve_friction
+from rigid_lcp.friction.auto.solve import solve_friction
+from rigid_lcp.friction.problem.definition import friction_problem
 from validation.bench.rigid import examination_beds as beds
 from validation.bench.rigid.examination import family_named
 from validation.bench.rigid.examination_beds import Posed, kicked, tilted

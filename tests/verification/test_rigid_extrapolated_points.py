@@ -11,15 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-import rigid_lcp.extrapolated_points as module
+import rigid_lcp.friction.attempts.extrapolated_points as module
 from rigid_lcp import solve_friction
-from rigid_lcp.body_factorisation import factorisation
-from rigid_lcp.extrapolated_points import POINTS, extrapolated_points
-from rigid_lcp.friction_problem import FrictionProblem, friction_problem
-from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.proximal_newton import proximal_newton, proximal_point
-from rigid_lcp.solver_paths import turn_from_paths
-from rigid_lcp.solver_trial import Trial
+from rigid_lcp.friction.attempts.extrapolated_points import POINTS, extrapolated_points
+from rigid_lcp.friction.attempts.proximal_newton import find_proximal_point, proximal_newton
+from rigid_lcp.friction.auto.paths import turn_from_paths
+from rigid_lcp.friction.auto.trial import Trial
+from rigid_lcp.friction.linear.factorisation import factorisation
+from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
 from validation.bench.rigid.examination import family_named
 from validation.bench.rigid.packings import packing
 
@@ -57,7 +57,7 @@ def test_a_drift_ends_where_the_ground_gives_way(monkeypatch: pytest.MonkeyPatch
     problem = squeezed_row()
     start = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
     linear, alpha = factorisation(problem), POINTS.first_shift / problem.rho
-    once, found, _ = proximal_point(problem, start, alpha, linear, 1e-14, 5)
+    once, found, _ = find_proximal_point(problem, start, alpha, linear, 1e-14, 5)
     assert found
     squeeze = np.array([1.0, 0.0, 1.0, 0.0, 0.0, -1.0]) / 3.0
     assert squeeze @ once == pytest.approx(APPROACH / (3.0 * alpha), rel=1e-4)

@@ -11,8 +11,8 @@ import pytest
 
 from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, Sphere
 from rigid_lcp.errors import NotConverged, SceneError
-from rigid_lcp.finite_states import is_finite
-from rigid_lcp.scene import world_of
+from rigid_lcp.motion.finite_states import is_finite
+from rigid_lcp.motion.world import make_world
 
 METHODS = pytest.mark.parametrize("method", ["time-stepping", "acceleration"])
 SPACES = pytest.mark.parametrize("dim", [2, 3])
@@ -140,7 +140,7 @@ def test_every_number_of_a_state_is_looked_at(dim, what, bad):
     for fixed in (False, True):
         scene.add(shape, density=None if fixed else 1.0, fixed=fixed)
     for body in (0, 1):
-        world, motion = world_of(scene)
+        world, motion = make_world(scene)
         assert is_finite(world, motion)
         getattr(motion, what)[body] = bad
         assert not is_finite(world, motion)
@@ -151,5 +151,5 @@ def test_great_but_finite_energies_are_finite(speed):
     """``m v^2 / 2`` is 1.6e230 J or 1.6e246 J; the bound, with I = 1.6e250 for m, is no number."""
     scene = Scene(gravity=(0, 0))
     scene.add(Disc(1e50), density=1e50, velocity=(speed, 0))
-    world, motion = world_of(scene)
+    world, motion = make_world(scene)
     assert is_finite(world, motion)

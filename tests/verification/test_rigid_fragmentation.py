@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.disc import Disc
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.fragmentation import broken_scene, fragment, polygon_moments, polygon_split
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene, world_of
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.world import Scene, make_world
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
+from rigid_lcp.wear.fragmentation import fragment, polygon_moments, split_body, split_polygon
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -81,7 +81,7 @@ def test_parts_are_polygons_on_either_side(seed):
     whole = grain(seed)
     point = polygon_moments(whole)[1]
     along = np.array([np.cos(seed), np.sin(seed)])
-    left, right = polygon_split(whole, point, along)
+    left, right = split_polygon(whole, point, along)
     normal = np.array([-along[1], along[0]])
     assert ((left - point) @ normal).min() > -1e-12
     assert ((right - point) @ normal).max() < 1e-12
@@ -93,7 +93,7 @@ def test_parts_are_polygons_on_either_side(seed):
 
 def test_a_line_through_vertices():
     """The diagonal of a square: two triangles, no vertex twice."""
-    left, right = polygon_split(SQUARE, (0, 0), (1, 1))
+    left, right = split_polygon(SQUARE, (0, 0), (1, 1))
     assert len(left) == len(right) == 3
 
 
@@ -110,7 +110,7 @@ def test_a_line_through_vertices():
 )
 def test_what_can_not_be_split(vertices, point, direction, words):
     with pytest.raises(ShapeError, match=words):
-        polygon_split(vertices, point, direction)
+        split_polygon(vertices, point, direction)
 
 
 def pile():
@@ -133,7 +133,7 @@ def test_a_pile_stays_when_a_grain_of_it_breaks(body, point, direction):
     run = Simulation(pile())
     run.advance(0.05)
     before = run.energy
-    scene = broken_scene(run.world.scene, run.motion, body, point, direction)
+    scene = split_body(run.world.scene, run.motion, body, point, direction)
     run = Simulation(scene)
     assert run.overlap < 1e-12
     assert run.energy == pytest.approx(before, rel=1e-12)
@@ -151,9 +151,9 @@ def test_a_spinning_body_of_a_scene_keeps_its_motion(far):
     scene.add(
         Polygon(grain(4)), density=2000, angle=0.7, velocity=(1, 2), spin=3.0, position=(far, far)
     )
-    world, motion = world_of(scene)
-    broken = broken_scene(scene, motion, 0, motion.position[0], (1, 0.3))
-    parts, state = world_of(broken)
+    world, motion = make_world(scene)
+    broken = split_body(scene, motion, 0, motion.position[0], (1, 0.3))
+    parts, state = make_world(broken)
     assert parts.energy(state) == pytest.approx(world.energy(motion), rel=1e-14)
     assert parts.mass.sum() == pytest.approx(world.mass.sum(), rel=1e-14)
     momentum = (parts.mass[:, None] * state.velocity).sum(axis=0)
@@ -161,14 +161,14 @@ def test_a_spinning_body_of_a_scene_keeps_its_motion(far):
 
 
 def test_a_spinning_polyhedron_of_a_scene_keeps_its_motion():
-    from rigid_lcp.polyhedron import box
+    from rigid_lcp.shapes.polyhedron import box
 
     scene = Scene(dim=3, gravity=(0, 0, 0))
     turned = np.array([0.9, 0.1, 0.3, 0.3])
     scene.add(box(1, 0.7, 0.5), density=2000, angle=turned, velocity=(1, 2, 0), spin=(1, 3, 2))
-    world, motion = world_of(scene)
-    broken = broken_scene(scene, motion, 0, motion.position[0] + 0.05, (1, 0.3, 0.2))
-    parts, state = world_of(broken)
+    world, motion = make_world(scene)
+    broken = split_body(scene, motion, 0, motion.position[0] + 0.05, (1, 0.3, 0.2))
+    parts, state = make_world(broken)
     assert parts.energy(state) == pytest.approx(world.energy(motion), rel=1e-12)
     assert parts.mass.sum() == pytest.approx(world.mass.sum(), rel=1e-12)
 
@@ -176,23 +176,23 @@ def test_a_spinning_polyhedron_of_a_scene_keeps_its_motion():
 def test_a_plane_that_leaves_no_sound_parts_is_refused():
     """2e-6 of the way below corners of a flat stone: parts without edges that could be kept apart.
     Once a run that broke worn stones ended there with a word about corners to be merged."""
-    from rigid_lcp.detection_3d import shapes_3d
-    from rigid_lcp.polyhedron import Polyhedron
+    from rigid_lcp.contact.detection_space import shapes_3d
+    from rigid_lcp.shapes.polyhedron import Polyhedron
 
     flat = Polyhedron(np.random.default_rng(2).normal(size=(8, 3)) * [1.0, 1.0, 0.02])
     scene = Scene(dim=3)
     scene.add(flat, density=2700, position=(0, 0, 0))
-    _, motion = world_of(scene)
+    _, motion = make_world(scene)
     with pytest.raises(ShapeError, match=r"kept apart\n.*move the plane"):
-        broken_scene(scene, motion, 0, (1 - 2e-6) * flat.vertices[1], flat.vertices[1])
-    made = broken_scene(scene, motion, 0, 0.99 * flat.vertices[1], flat.vertices[1])
+        split_body(scene, motion, 0, (1 - 2e-6) * flat.vertices[1], flat.vertices[1])
+    made = split_body(scene, motion, 0, 0.99 * flat.vertices[1], flat.vertices[1])
     shapes_3d([each.shape for each in made.bodies], np.ones(2, dtype=bool))
 
 
 def test_bodies_that_can_not_break():
     scene = pile()
     scene.add(Disc(0.2), density=2700, position=(5, 0.2))
-    _, motion = world_of(scene)
+    _, motion = make_world(scene)
     for body in (0, 5):
         with pytest.raises(ShapeError, match="can be split"):
-            broken_scene(scene, motion, body, (0, 0), (1, 0))
+            split_body(scene, motion, body, (0, 0), (1, 0))

@@ -11,9 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction_problem import BodySpace, friction_problem
-from rigid_lcp.frictionless import Floats, face_solver, frictionless, lcp, normal_matrix
-from rigid_lcp.normal_matrices import normal_sweeps
+from rigid_lcp.friction.attempts.frictionless import (
+    Floats,
+    build_face_solver,
+    build_normal_matrix,
+    frictionless,
+    lcp,
+)
+from rigid_lcp.friction.problem.definition import BodySpace, friction_problem
+from rigid_lcp.friction.sweeps.normal_matrices import normal_sweeps
 from tests.rigid_networks import network, network_bodies, stored, tower
 from validation.bench.rigid.packings import packing
 
@@ -184,7 +190,7 @@ def test_normal_part_of_w() -> None:
         offset = space.jacobian @ velocity
         expected = space.matrix.toarray()[::2, ::2]
         for w in (space, space.matrix):
-            found = normal_matrix(friction_problem(w, offset, 0.0, 2))
+            found = build_normal_matrix(friction_problem(w, offset, 0.0, 2))
             assert found.toarray() == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
@@ -192,15 +198,15 @@ def test_normal_part_of_w() -> None:
 @pytest.mark.parametrize("skew", [0.0, 1e-3])
 def test_faces(most: float, skew: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """``A + shift`` of some contacts in any order, by a band and by sparse LU, against numpy."""
-    monkeypatch.setattr("rigid_lcp.frictionless.BAND_MOST", most)
+    monkeypatch.setattr("rigid_lcp.friction.attempts.frictionless.BAND_MOST", most)
     g = np.random.default_rng(5)
     a = network(40, 0.0).delassus[::2][:, ::2].tocsr()
     a.data *= 1 + skew * g.normal(size=a.nnz)
     inside = g.permutation(a.shape[0])[:25].astype(np.int32)
     right = g.normal(size=25)
     expected = np.linalg.solve(a.toarray()[np.ix_(inside, inside)] + 0.1 * np.eye(25), right)
-    assert face_solver(a, inside, 0.1)(right) == pytest.approx(expected, rel=1e-10)
-    assert face_solver(a, inside[:0], 0.1)(right[:0]).shape == (0,)
+    assert build_face_solver(a, inside, 0.1)(right) == pytest.approx(expected, rel=1e-10)
+    assert build_face_solver(a, inside[:0], 0.1)(right[:0]).shape == (0,)
 
 
 def test_what_can_not_be_posed_is_refused() -> None:

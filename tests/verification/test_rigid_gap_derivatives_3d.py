@@ -8,13 +8,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rigid_lcp.contacts import Contacts, contact_frames
-from rigid_lcp.detection_3d import detect_3d, shapes_3d
-from rigid_lcp.equations import inertial_acceleration, relative_velocity
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.motion import Motion, motion_displaced
-from rigid_lcp.rotations import quaternion_of_rotation, quaternion_product, rotate
-from rigid_lcp.sphere import Sphere
+from rigid_lcp.contact.arrays import Contacts, contact_frames
+from rigid_lcp.contact.detection_space import detect_3d, shapes_3d
+from rigid_lcp.motion.equations import inertial_acceleration, relative_velocity
+from rigid_lcp.motion.state import Motion, displace_motion
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_product, rotate
+from rigid_lcp.shapes.sphere import Sphere
 from tests.rigid_solids import CUBE, UPRIGHT, contacts, near_pair
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ def test_gap_rate_is_the_derivative_of_the_gap(seed: int) -> None:
     h = 1e-7
 
     def gaps(t: float) -> dict[int, float]:
-        there = motion_displaced(motion, t * rates)
+        there = displace_motion(motion, t * rates)
         found = detect_3d(arrays, there.position, there.angle, 0.05)
         return dict(zip(found.key.tolist(), found.gap.tolist(), strict=True))
 
@@ -74,7 +74,7 @@ def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
     h = 1e-4
 
     def gaps(t: float) -> dict[int, float]:
-        there = motion_displaced(motion, t * rates)
+        there = displace_motion(motion, t * rates)
         found = detect_3d(arrays, there.position, there.angle, 0.05)
         return dict(zip(found.key.tolist(), found.gap.tolist(), strict=True))
 
@@ -101,7 +101,7 @@ def test_inertial_terms_are_the_second_derivative_of_the_gap(seed: int) -> None:
 def test_inertial_terms_at_edges(seed: int, form: str) -> None:
     """Normals across edges turn with both bodies: a cube's edge over another's, or under a sphere.
 
-    Without `rigid_lcp.equations` a sphere that rolls along an edge would seem to lift off it
+    Without `rigid_lcp.motion.equations` a sphere that rolls along an edge would seem to lift off it
     with v^2 / R.
     """
     generator = np.random.default_rng(seed)
@@ -124,7 +124,7 @@ def test_inertial_terms_at_edges(seed: int, form: str) -> None:
     assert found.edge_b.any()
     gaps = []
     for t in (-h, 0.0, h):
-        there = motion_displaced(motion, t * rates)
+        there = displace_motion(motion, t * rates)
         gaps.append(contacts(shapes, there.position, there.angle, margin=0.1).gap[0])
     second = (gaps[0] - 2 * gaps[1] + gaps[2]) / h**2
     exact = inertial_acceleration(found, motion)[0, 0]
@@ -170,7 +170,7 @@ def test_tangential_inertial_terms(form: str, seed: int) -> None:
         rates[1] = 0.0
 
     def velocity(t: float) -> tuple[Contacts, Floats]:
-        there = motion_displaced(Motion(place, turns, rates[:, :3], rates[:, 3:]), t * rates)
+        there = displace_motion(Motion(place, turns, rates[:, :3], rates[:, 3:]), t * rates)
         found = contacts(shapes, there.position, there.angle, margin=1.0)
         found = found[found.key == key]
         along = relative_velocity(found, there)

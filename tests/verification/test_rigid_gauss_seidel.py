@@ -10,10 +10,10 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.contact_blocks import body_blocks
 from rigid_lcp.errors import UsageError
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.gauss_seidel import Sweeper, gauss_seidel
+from rigid_lcp.friction.methods.gauss_seidel import Sweeper, gauss_seidel
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.sweeps.blocks import lay_out_bodies
 from tests.rigid_local import solve_contact
 from validation.bench.rigid.packings import tower
 
@@ -64,7 +64,7 @@ def test_sweeps_are_those_of_the_definition(dim: int, factors: bool) -> None:
     order = list(range(12))
     expected = plain_sweep(problem, plain_sweep(problem, start, order), order[::-1])
     problem = problem if factors else as_matrix(problem)
-    assert (body_blocks(problem) is not None) == factors
+    assert (lay_out_bodies(problem) is not None) == factors
     force = start.reshape(-1, dim).copy()
     sweeper = Sweeper(problem, np.arange(12), symmetric=True, momentum=False)
     sweeper.sweep(force)
@@ -176,7 +176,7 @@ def test_factors_that_are_none_of_pairs_fall_back_to_the_matrix() -> None:
     coupled = sp.csr_array(np.eye(9) + np.diag(np.full(6, 0.2), 3) + np.diag(np.full(6, 0.2), -3))
     for space in (three, BodySpace(three.jacobian, coupled, 3)):
         problem = friction_problem(space, jacobian @ np.ones(9), 0.3, 2)
-        assert body_blocks(problem) is None
+        assert lay_out_bodies(problem) is None
         assert gauss_seidel(problem, tolerance=1e-10, sweeps=5000).solved
 
 

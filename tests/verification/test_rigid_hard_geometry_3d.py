@@ -7,17 +7,17 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.manifold_3d import MOST
-from rigid_lcp.polyhedra import ballast_stone
-from rigid_lcp.polyhedron import Polyhedron, box
-from rigid_lcp.rotations import (
+from rigid_lcp.contact.manifold import MOST
+from rigid_lcp.contact.separation import PARALLEL
+from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp.shapes.rotations import (
     Floats,
     quaternion_of_rotation,
     quaternion_product,
     rotate,
     unit_quaternion,
 )
-from rigid_lcp.separation_3d import PARALLEL
+from rigid_lcp.shapes.stones import ballast_stone
 from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, coal_distance, contacts
 
 
@@ -40,7 +40,7 @@ def separating_axes(shapes: list[Polyhedron], turns: Floats) -> Floats:
 
 
 def separation(shapes: list[Polyhedron], position: Floats, turns: Floats, axes: Floats) -> float:
-    """Plain twin of `rigid_lcp.separation_3d`: the widest gap between both along any axis [m].
+    """Plain twin of `rigid_lcp.contact.separation`: the widest gap between both along any axis [m].
 
     For bodies that overlap it is the depth exactly, negative; else a lower bound of the distance.
     """

@@ -7,11 +7,11 @@ from math import radians, tan
 import numpy as np
 import pytest
 
-from rigid_lcp.disc import Disc
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
 from tests.rigid_hopper import WALL, jam
 from tests.rigid_motions import stack_drop
 from validation.bench.rigid.hard_scenes import (

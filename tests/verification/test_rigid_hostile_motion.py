@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigid_lcp.acceleration_forces import forces_found, forces_if_lasting
-from rigid_lcp.disc import Disc
 from rigid_lcp.errors import NotConverged
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.acceleration_forces import find_forces, try_lasting_forces
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
 from tests.rigid_motions import rocking_block, rocking_block_answer
 from tests.rigid_networks import tower, tower_bodies
 from validation.bench.rigid.scenes import FLOOR, G, gravity_on
@@ -180,7 +180,7 @@ def test_lasting_contacts_are_solved_at_once(slides: bool) -> None:
     slip = np.zeros((problem.contacts, 1))
     if slides:
         slip[:2], friction[:2] = 1.0, 0.2
-    found = forces_if_lasting(tower_bodies(boxes), offset, friction, slip)
+    found = try_lasting_forces(tower_bodies(boxes), offset, friction, slip)
     assert found is not None
     assert found.residual < 1e-13
     r, u = found.r.reshape(-1, 2), (problem.delassus @ found.r + offset).reshape(-1, 2)
@@ -199,7 +199,7 @@ def test_contacts_that_part_are_no_lasting_ones() -> None:
     lifted = problem.offset.copy()
     lifted[::2] = np.where(np.arange(problem.contacts) < 4, lifted[::2], 1.0)
     slip = np.zeros((problem.contacts, 1))
-    assert forces_if_lasting(bodies, lifted, problem.friction, slip) is None
-    found, error = forces_found(bodies, lifted, problem.friction, slip, 1e-12, 9.81)
+    assert try_lasting_forces(bodies, lifted, problem.friction, slip) is None
+    found, error = find_forces(bodies, lifted, problem.friction, slip, 1e-12, 9.81)
     assert error < 1e-11
     assert (found.r[::2] == 0).any()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.scene.simulation import Method, Simulation
 from tests import rigid_motions as motions
 from tests.rigid_motions import rocking_block_answer
 

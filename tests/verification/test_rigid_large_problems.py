@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from rigid_lcp import solver_trial
-from rigid_lcp.contact_sweeps import MANY_CONTACTS, carrying
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.solver import solve_friction
+from rigid_lcp.friction.auto import trial as solver_trial
+from rigid_lcp.friction.auto.solve import solve_friction
+from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.sweeps.contact_kernel import MANY_CONTACTS, carrying
 from validation.bench.rigid.packings import crystal, tower
 
 COPIES, BOXES, HELD = 500, 3, 3

@@ -8,8 +8,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rigid_lcp.cones import natural_map
-from rigid_lcp.sliding_direction import direction_near, directions_all, roots_real
+from rigid_lcp.friction.problem.cones import natural_map
+from rigid_lcp.friction.sweeps.sliding_direction import (
+    find_all_directions,
+    find_direction_near,
+    find_real_roots,
+)
 from tests.rigid_local import solve_contact
 
 Floats = NDArray[np.float64]
@@ -166,7 +170,7 @@ def test_real_roots_of_a_quartic(roots: list[float], width: float) -> None:
     """
     real = np.array(roots[: len(roots) // 2 * 2])
     whole = np.poly1d(real, r=True) * np.poly1d([1, -2, 1 + width**2]) ** ((4 - len(real)) // 2)
-    found, count = roots_real(np.ascontiguousarray(whole.coeffs[::-1]))
+    found, count = find_real_roots(np.ascontiguousarray(whole.coeffs[::-1]))
     gaps = np.diff(np.sort(real))
     if len(gaps) == 0 or gaps.min() > 0.05:
         assert count == len(real)
@@ -183,11 +187,11 @@ def test_no_direction_is_missed(seed: int) -> None:
     d = np.array([np.cos(angle), np.sin(angle)])
     v = g[:, None] + bend @ d
     across = d[0] * v[1] - d[1] * v[0]
-    found, count = directions_all(*g, *bend.ravel(), 10.0)
+    found, count = find_all_directions(*g, *bend.ravel(), 10.0)
     assert count == np.count_nonzero(across[1:] * across[:-1] < 0)
     for direction in found[:count]:
         moved = g + bend @ direction
         assert abs(direction[0] * moved[1] - direction[1] * moved[0]) < 1e-13
         assert np.linalg.norm(direction) == pytest.approx(1.0, rel=1e-14)
-        *again, converged = direction_near(*g, *bend.ravel(), *direction)
+        *again, converged = find_direction_near(*g, *bend.ravel(), *direction)
         assert not converged or np.dot(again, direction) == pytest.approx(1.0, abs=1e-12)

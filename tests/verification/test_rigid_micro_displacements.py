@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from rigid_lcp.elastic_limit import elastic_limit
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction_problem import friction_problem
-from rigid_lcp.micro_displacements import (
+from rigid_lcp.friction.problem.definition import friction_problem
+from rigid_lcp.unique.elastic_limit import elastic_limit
+from rigid_lcp.unique.micro_displacements import (
     coulomb_spring,
     free_motion,
     mass_free_jacobian,

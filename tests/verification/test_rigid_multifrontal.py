@@ -13,11 +13,11 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.body_factorisation import BlockSystem, SingularSystem
-from rigid_lcp.dense_tiles import DEPTH
-from rigid_lcp.elimination_order import FEW_BLOCKS, minimum_degree, symmetric_pattern
-from rigid_lcp.elimination_tree import EliminationTree, elimination_tree
-from rigid_lcp.multifrontal import factor_fronts, solve_fronts
+from rigid_lcp.friction.linear.factorisation import BlockSystem, SingularSystem
+from rigid_lcp.sparse.dense_tiles import DEPTH
+from rigid_lcp.sparse.elimination_order import FEW_BLOCKS, minimum_degree, symmetric_pattern
+from rigid_lcp.sparse.elimination_tree import EliminationTree, elimination_tree
+from rigid_lcp.sparse.multifrontal import factor_fronts, solve_fronts
 
 ROUND_OFF = np.finfo(float).eps
 
@@ -126,7 +126,7 @@ def grid(side: int) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([one, two, own]), np.concatenate([two, one, own])
 
 
-def columns_of(tree: EliminationTree) -> list[set[int]]:
+def split_columns(tree: EliminationTree) -> list[set[int]]:
     """Rows of each column of the factors as the tree says, in the order of elimination."""
     found = []
     for f in range(len(tree.parent)):
@@ -155,7 +155,7 @@ def test_the_tree_holds_the_rows_that_elimination_fills(seed):
     for k in range(blocks):
         for i in below[k]:
             below[i] |= {j for j in below[k] if j > i}
-    for filled, kept in zip(below, columns_of(tree), strict=True):
+    for filled, kept in zip(below, split_columns(tree), strict=True):
         assert filled <= kept
     assert (tree.parent[:-1] > np.arange(len(tree.parent) - 1)).sum() == (tree.parent >= 0).sum()
 

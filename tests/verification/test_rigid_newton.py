@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from rigid_lcp.body_factorisation import (
+from rigid_lcp.friction.linear.factorisation import (
     BodyFactorisation,
     ContactFactorisation,
     DenseFactorisation,
     SingularSystem,
 )
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.interior_point import Path, coulomb_velocity, interior_point
-from rigid_lcp.lorentz_cones import (
+from rigid_lcp.friction.linear.lorentz_cones import (
     cone_divide,
     cone_product,
     cone_scale,
@@ -22,7 +20,9 @@ from rigid_lcp.lorentz_cones import (
     cone_scaling_square,
     cone_step,
 )
-from rigid_lcp.newton import alart_curnier, newton
+from rigid_lcp.friction.methods.interior_point import Path, coulomb_velocity, interior_point
+from rigid_lcp.friction.methods.newton import alart_curnier, newton
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 
 
 def inside(generator: np.random.Generator, contacts: int, dim: int) -> np.ndarray:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import rigid_lcp as r
-from rigid_lcp.motion import Motion
-from rigid_lcp.overlap_removal import lift_paid, overlap_removed
-from rigid_lcp.scene import World, world_of
+from rigid_lcp.motion.overlap_removal import pay_lift, remove_overlap
+from rigid_lcp.motion.state import Motion
+from rigid_lcp.motion.world import World, make_world
 from validation.bench.rigid.scenes import poured
 
 Floats = NDArray[np.float64]
@@ -25,7 +25,7 @@ def pair_in_flight(depth: float, speed: float) -> tuple[World, Motion]:
     scene = r.Scene(2)
     scene.add(r.Polygon.rectangle(1, 1), density=2.0, position=(0, 5), velocity=(0, speed))
     scene.add(r.Polygon.rectangle(1, 1), density=1.0, position=(1 - depth, 5.3), spin=0.2)
-    return world_of(scene)
+    return make_world(scene)
 
 
 def angular_momentum(world: World, motion: Motion) -> float:
@@ -40,7 +40,7 @@ def angular_momentum(world: World, motion: Motion) -> float:
 def test_bodies_in_flight(depth: float, speed: float) -> None:
     """Centre of mass, momentum and energy are kept; angular momentum changes by sum m dx x v."""
     world, motion = pair_in_flight(depth, speed)
-    apart = overlap_removed(world, motion)
+    apart = remove_overlap(world, motion)
     gap = world.contacts(apart, 0.0).gap.min(initial=0.0)
     assert gap > -1e-9
     np.testing.assert_array_equal(apart.rates, motion.rates)
@@ -62,8 +62,8 @@ def test_spinning_boxes_in_space_keep_their_energy() -> None:
     scene = r.Scene(3, (0, 0, 0))
     scene.add(r.box(1, 0.5, 0.2), density=2.0, spin=(1, 2, 3))
     scene.add(r.box(1, 0.5, 0.2), density=1.0, position=(0.9, 0.1, 0.19), spin=(-3, 1, 2))
-    world, motion = world_of(scene)
-    apart = overlap_removed(world, motion)
+    world, motion = make_world(scene)
+    apart = remove_overlap(world, motion)
     assert np.abs(apart.angle - motion.angle).max() > 1e-4
     assert world.energy(apart) == pytest.approx(world.energy(motion), rel=1e-14)
     assert world.contacts(apart, 0.0).gap.min(initial=0.0) >= -1e-9 * world.length
@@ -84,8 +84,8 @@ def test_a_small_grain_squeezed_between_large_ones(
         place = (side * (1.1 - 0.1 * depth), 0)
         scene.add(r.Disc(1.0), density=1.0, position=place)
     scene.add(small, density=1.0, position=(0, 0.1 * aside), angle=angle)
-    world, motion = world_of(scene)
-    apart = overlap_removed(world, motion)
+    world, motion = make_world(scene)
+    apart = remove_overlap(world, motion)
     assert world.contacts(apart, 0.0).gap.min(initial=0.0) >= -1e-9 * world.length
 
 
@@ -103,24 +103,24 @@ def test_the_lift_is_paid(dim: int, speed: float) -> None:
     place[-1], along[0] = 0.5 - depth, speed
     scene.add(shape, density=2.0, position=place, velocity=along)
     scene.add(r.HalfSpace(np.eye(dim)[-1]))
-    world, end = world_of(scene)
-    parted = overlap_removed(world, end)
+    world, end = make_world(scene)
+    parted = remove_overlap(world, end)
     assert parted.position[0, -1] == pytest.approx(0.5, abs=1e-12)
     energy = world.energy(end)
-    paid = lift_paid(world, end, parted, energy)
+    paid = pay_lift(world, end, parted, energy)
     squared = max(0.0, speed**2 - 2 * G * depth)
     assert paid.velocity[0, 0] == pytest.approx(squared**0.5, rel=1e-9, abs=1e-15)
     if squared > 0:
         assert world.energy(paid) == pytest.approx(energy, rel=1e-14)
     else:
         assert world.energy(paid) - energy <= world.mass[0] * G * depth * (1 + 1e-9)
-    lossy = lift_paid(world, end, parted, energy + 1.1 * world.mass[0] * G * depth)
+    lossy = pay_lift(world, end, parted, energy + 1.1 * world.mass[0] * G * depth)
     assert lossy is parted
     floor = scene.bodies[1]
     scene.bodies[1] = replace(floor, velocity=0.1 * np.eye(dim)[0])
-    moving, _ = world_of(scene)
+    moving, _ = make_world(scene)
     moved = replace(parted, velocity=np.array([along, 0.1 * np.eye(dim)[0]]))
-    assert lift_paid(moving, moved, moved, energy - 1.0) is moved
+    assert pay_lift(moving, moved, moved, energy - 1.0) is moved
 
 
 @pytest.mark.parametrize(("seed", "step"), [(1, 1e-3), (5, 4e-3), (6, 8e-3)])

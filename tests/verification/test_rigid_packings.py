@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.solver import solve_auto
+from rigid_lcp.friction.auto.solve import solve_auto
+from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
 from validation.bench.rigid.packings import (
     DENSITY,
     GRAVITY,

@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 
 import rigid_lcp as r
-from rigid_lcp import passed_collisions
-from rigid_lcp.passed_collisions import LOSSY_ROUNDS
-from rigid_lcp.report import report_write
-from rigid_lcp.run_folder import RunFolder
-from rigid_lcp.scene_file import scene_read
-from rigid_lcp.scene_run import scene_run, simulation_of, summary_of
+from rigid_lcp.collision import passing as passed_collisions
+from rigid_lcp.collision.passing import LOSSY_ROUNDS
+from rigid_lcp.report.page import write_report
+from rigid_lcp.scene.file import scene_read
+from rigid_lcp.scene.run import scene_run, simulation_of, summary_of
+from rigid_lcp.scene.run_folder import RunFolder
 
 
 def billiard(ratio: float, step: float, dim: int = 2, e: float = 1.0) -> r.Simulation:
@@ -125,7 +125,7 @@ def test_a_run_tells_what_was_cut_off(tmp_path: Path, monkeypatch: pytest.Monkey
             scene_run(file, run, folder, resume=resume, progress=lambda *_: None)
             summary = summary_of(file, scene, run, folder)
             assert summary["steps_cut_off"] >= 1
-            page = report_write(folder, scene, {"provenance": {}}, summary, draw=False)
+            page = write_report(folder, scene, {"provenance": {}}, summary, draw=False)
         assert "collisions ran out of rounds" in page.read_text()
 
 
@@ -223,5 +223,5 @@ def test_bodies_that_part_by_turning_need_no_round() -> None:
         restitution=one, friction=0 * one, gap=-1e-3 * one, before=-0.27 * one,
         offset=np.array([[0.27, 0.0]]), turning=0.27 * one, slow=0.0, h=1e-3, touching=0.0,
     )  # fmt: skip
-    assert passed_collisions.bouncing(closing).all()
+    assert passed_collisions.find_bouncing(closing).all()
     assert not passed_collisions.needs_impulse(closing, 1e-12).any()

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.dantzig import dantzig
 from rigid_lcp.errors import ProblemError
-from rigid_lcp.force_proof import forces_insufficient
-from rigid_lcp.friction_problem import FrictionSolution, friction_problem
-from rigid_lcp.pivoting import pivoting
+from rigid_lcp.friction.methods.dantzig import dantzig
+from rigid_lcp.friction.methods.pivoting import pivoting
+from rigid_lcp.friction.problem.definition import FrictionSolution, friction_problem
+from rigid_lcp.friction.problem.force_proof import prove_forces_insufficient
 from tests.rigid_networks import network, stored, tower
 
 TOLERANCE = 1e-12
@@ -197,4 +197,4 @@ def test_a_contact_that_bears_on_much_mass(light: float) -> None:
     found = pivoting(problem)
     assert found.solved
     assert found.r[2] == pytest.approx(1 / light)
-    assert not forces_insufficient(problem, np.zeros(2, dtype=np.int64))
+    assert not prove_forces_insufficient(problem, np.zeros(2, dtype=np.int64))

@@ -10,10 +10,10 @@ from scipy.spatial import ConvexHull, Delaunay
 from scipy.spatial.transform import Rotation
 
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.gyroscopic import Floats, angular_momentum
-from rigid_lcp.polyhedra import ballast_stone, cut, fragments
-from rigid_lcp.polyhedron import Polyhedron, box
-from rigid_lcp.rotations import rotate, unit_quaternion
+from rigid_lcp.motion.gyroscopic import Floats, angular_momentum
+from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp.shapes.rotations import rotate, unit_quaternion
+from rigid_lcp.shapes.stones import ballast_stone, cut, fragments
 
 seeds = st.integers(0, 10_000)
 

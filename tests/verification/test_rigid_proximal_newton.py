@@ -9,10 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rigid_lcp.body_factorisation import factorisation
-from rigid_lcp.friction_problem import FrictionProblem, friction_problem
-from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.proximal_newton import hopeless, proximal_newton, proximal_point
+from rigid_lcp.friction.attempts.proximal_newton import (
+    find_proximal_point,
+    hopeless,
+    proximal_newton,
+)
+from rigid_lcp.friction.linear.factorisation import factorisation
+from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
 from validation.bench.rigid.packings import tower
 
 Floats = NDArray[np.float64]
@@ -58,7 +62,7 @@ def test_a_proximal_point_is_the_answer_of_the_shifted_problem() -> None:
     problem = jammed(3, 12, 8, 2)
     centre = gauss_seidel(problem, tolerance=1e-10, sweeps=3).r
     alpha = 1.0 / problem.rho
-    force, found, _ = proximal_point(problem, centre, alpha, factorisation(problem), 1e-14, 20)
+    force, found, _ = find_proximal_point(problem, centre, alpha, factorisation(problem), 1e-14, 20)
     assert found
     shifted = friction_problem(
         sp.csr_array(problem.delassus + alpha * sp.eye_array(24)),

@@ -10,10 +10,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 import rigid_lcp as r
-from rigid_lcp.body_factorisation import factorisation
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.refinement import gmres, refined
-from rigid_lcp.sticking import sticking
+from rigid_lcp.friction.attempts.refinement import gmres, refined
+from rigid_lcp.friction.attempts.sticking import sticking
+from rigid_lcp.friction.linear.factorisation import factorisation
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from validation.bench.rigid.scenes import light_on_heavy, stack
 
 Floats = NDArray[np.float64]

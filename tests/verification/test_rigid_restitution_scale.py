@@ -7,18 +7,18 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.acceleration_forces import forces_found
-from rigid_lcp.disc import Disc
+from rigid_lcp.collision.passing import Closing, Impulses
+from rigid_lcp.collision.restitution_scale import StepVelocities, gains_energy
 from rigid_lcp.errors import NotConverged
-from rigid_lcp.friction_problem import BodySpace
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.passed_collisions import Closing, Impulses
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.polyhedron import box
-from rigid_lcp.restitution_scale import StepVelocities, gains_energy
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Method, Simulation
-from rigid_lcp.sphere import Sphere
+from rigid_lcp.friction.problem.definition import BodySpace
+from rigid_lcp.motion.acceleration_forces import find_forces
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Method, Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
+from rigid_lcp.shapes.polyhedron import box
+from rigid_lcp.shapes.sphere import Sphere
 
 Floats = NDArray[np.float64]
 ROUND_OFF = 1e-13
@@ -93,7 +93,7 @@ def test_forces_without_bound_are_not_accepted() -> None:
     bodies = BodySpace(sp.csr_array(np.array(rows)), sp.csr_array(sp.eye_array(3)), 3)
     offset, friction = np.array([-1.5, -1.0, -1.5, -1.0]), np.array([2.0, 2.0])
     with pytest.raises(NotConverged, match="residual"):
-        forces_found(bodies, offset, friction, np.zeros((2, 1)), 1e-12, 9.81)
+        find_forces(bodies, offset, friction, np.zeros((2, 1)), 1e-12, 9.81)
 
 
 def gas(dim: int, seed: int) -> Scene:

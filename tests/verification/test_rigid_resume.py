@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from rigid_lcp.run_folder import FRAME, RunFolder
-from rigid_lcp.scene_file import SceneFile, scene_read
-from rigid_lcp.scene_run import scene_run, simulation_of
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.scene.file import SceneFile, scene_read
+from rigid_lcp.scene.run import scene_run, simulation_of
+from rigid_lcp.scene.run_folder import FRAME, RunFolder
+from rigid_lcp.scene.simulation import Simulation
 from tests.rigid_runs import SLIDING_BLOCK, WORN_AND_BROKEN, WORN_IN_SPACE, frame_bits
 
 POURED = """

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from rigid_lcp.errors import SceneError, ShapeError
-from rigid_lcp.gyroscopic import (
+from rigid_lcp.motion.gyroscopic import (
     Floats,
     angular_momentum,
     free_rotation,
@@ -18,16 +18,16 @@ from rigid_lcp.gyroscopic import (
     principal_inertia,
     world_inertia,
 )
-from rigid_lcp.polyhedron import box
-from rigid_lcp.rotations import (
+from rigid_lcp.shapes.polyhedron import box
+from rigid_lcp.shapes.rotations import (
     quaternion_of_matrix,
     quaternion_of_rotation,
     quaternion_product,
     quaternion_rate,
-    quaternion_rotated,
     rotate,
     rotate_back,
     rotation_matrix,
+    turn_quaternion,
     unit_quaternion,
 )
 
@@ -83,14 +83,14 @@ def test_constant_spin_is_integrated_exactly() -> None:
     spin = np.array([3.0, -2.0, 5.0])
     q = IDENTITY
     for _ in range(1000):
-        q = quaternion_rotated(q, 1e-3 * spin)
+        q = turn_quaternion(q, 1e-3 * spin)
     # each of 1000 products may lose 2 ulp, at random
-    assert np.abs(q - quaternion_rotated(IDENTITY, spin)).max() < 1000**0.5 * 10 * ROUND_OFF
+    assert np.abs(q - turn_quaternion(IDENTITY, spin)).max() < 1000**0.5 * 10 * ROUND_OFF
 
 
 def test_rate_is_the_derivative_of_the_turn() -> None:
     q, spin, h = random_rotations(1)[0], np.array([1.0, 2.0, -0.5]), 1e-6
-    ahead, behind = quaternion_rotated(q, h * spin), quaternion_rotated(q, -h * spin)
+    ahead, behind = turn_quaternion(q, h * spin), turn_quaternion(q, -h * spin)
     # central difference: h^2 |w|^3 / 24 = 2e-12 of truncation, 1e-16 / h = 1e-10 of round-off
     assert np.allclose((ahead - behind) / (2 * h), quaternion_rate(q, spin), atol=5e-10)
 

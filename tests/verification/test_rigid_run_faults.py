@@ -18,8 +18,8 @@ from typing import Any
 import pytest
 
 import trackbed
-from rigid_lcp.run_folder import RunFolder
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.scene.run_folder import RunFolder
+from rigid_lcp.scene.simulation import Simulation
 from tests.forked_commands import Commands
 from tests.rigid_runs import SLIDING_BLOCK, frame_bits
 from trackbed import command

@@ -9,15 +9,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rigid_lcp.disc import Disc
 from rigid_lcp.errors import NoSolution, NotConverged
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.lasting_contacts import first_fall
-from rigid_lcp.motion import Motion
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.polyhedron import box
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.motion.lasting_contacts import find_first_fall
+from rigid_lcp.motion.state import Motion
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Method, Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
+from rigid_lcp.shapes.polyhedron import box
 from tests.rigid_motions import (
     bouncing_time,
     disc_on_incline_acceleration,
@@ -243,7 +243,7 @@ def test_where_a_gap_closes_is_located(seed: int) -> None:
 )
 def test_first_fall(values: tuple[float, ...], expected: float | None) -> None:
     """Roots of cubics that are known; the cubic of ends is met at its ends."""
-    found = first_fall(*values)
+    found = find_first_fall(*values)
     if expected is not None:
         assert found == pytest.approx(expected, abs=1e-10)
     elif values[0] < 0:
@@ -323,9 +323,9 @@ def test_painleve() -> None:
 
 def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forces that were not found stop the run, with their residual."""
-    import rigid_lcp.acceleration_forces as integrator
+    import rigid_lcp.motion.acceleration_forces as integrator
 
-    right = integrator.impulses_found
+    right = integrator.find_impulses
 
     def wrong(*args: object, **keys: object) -> object:
         from dataclasses import replace
@@ -333,8 +333,8 @@ def test_residual_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
         found = right(*args, **keys)  # type: ignore[arg-type]
         return replace(found, residual=1e-3, status="not converged", message="stopped")
 
-    monkeypatch.setattr(integrator, "impulses_found", wrong)
-    monkeypatch.setattr(integrator, "forces_if_lasting", lambda *_: None)
+    monkeypatch.setattr(integrator, "find_impulses", wrong)
+    monkeypatch.setattr(integrator, "try_lasting_forces", lambda *_: None)
     run = block_on_incline(0.1, 0.5, method="acceleration")
     with pytest.raises(NotConverged, match="residual"):
         run.advance(0.01)

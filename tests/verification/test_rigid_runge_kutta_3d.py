@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigid_lcp.gyroscopic import angular_momentum
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polyhedron import Polyhedron, box
-from rigid_lcp.rotations import quaternion_of_rotation, rotate
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Method, Simulation
-from rigid_lcp.sphere import Sphere
+from rigid_lcp.motion.gyroscopic import angular_momentum
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Method, Simulation
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp.shapes.rotations import quaternion_of_rotation, rotate
+from rigid_lcp.shapes.sphere import Sphere
 from tests import rigid_motions as motions
 from tests.rigid_motions import STONE
 from tests.rigid_motions import STONE_SPIN as SPIN

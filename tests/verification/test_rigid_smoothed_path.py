@@ -9,11 +9,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigid_lcp import smoothed_path as smoothed
-from rigid_lcp.body_factorisation import factorisation
-from rigid_lcp.friction_problem import FrictionProblem, FrictionSolution, friction_problem
-from rigid_lcp.interior_point import Path, interior_point
-from rigid_lcp.smoothed_path import path_begin, smoothed_map, smoothed_path, smoothed_point
+from rigid_lcp.friction.attempts import smoothed_path as smoothed
+from rigid_lcp.friction.attempts.smoothed_path import (
+    begin_path,
+    find_smoothed_point,
+    smoothed_map,
+    smoothed_path,
+)
+from rigid_lcp.friction.linear.factorisation import factorisation
+from rigid_lcp.friction.methods.interior_point import Path, interior_point
+from rigid_lcp.friction.problem.definition import (
+    FrictionProblem,
+    FrictionSolution,
+    friction_problem,
+)
 from validation.bench.rigid.packings import packing, tower
 
 Floats = NDArray[np.float64]
@@ -114,8 +123,8 @@ def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(
     """``x o s = sigma e``: the product is sigma, and what is beside the axis nothing."""
     monkeypatch.setattr(smoothed, "SMOOTHED", replace(smoothed.SMOOTHED, found=1e-9))
     linear = factorisation(kicked)
-    force, sigma = path_begin(kicked, linear)
-    force, found, _ = smoothed_point(kicked, force, sigma, linear, 60)
+    force, sigma = begin_path(kicked, linear)
+    force, found, _ = find_smoothed_point(kicked, force, sigma, linear, 60)
     assert found
     rho = kicked.contact_rho
     eps = smoothed.SMOOTHED.roundings[0] * np.sqrt(sigma) / rho.mean()
@@ -175,6 +184,6 @@ def test_what_has_no_solution_ends_and_says_so() -> None:
 
 def test_other_paths_differ() -> None:
     """Every rounding in turn, and with those that come again another sigma."""
-    paths = [smoothed.other_path(hop) for hop in range(1, smoothed.SMOOTHED.hops + 1)]
+    paths = [smoothed.choose_other_path(hop) for hop in range(1, smoothed.SMOOTHED.hops + 1)]
     assert len(set(paths)) == smoothed.SMOOTHED.hops
     assert {rounding for rounding, _ in paths} == set(smoothed.SMOOTHED.roundings)

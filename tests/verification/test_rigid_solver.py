@@ -1,6 +1,7 @@
 """`solve_friction` on closed forms, on hard small cases, and on real problems where they are given.
 
-A solution is judged by its residual (`rigid_lcp.cones`); forces are compared only where they are
+A solution is judged by its residual (`rigid_lcp.friction.problem.cones`); forces are compared only
+where they are
 unique.
 """
 
@@ -16,15 +17,24 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp import BodySpace, solve_friction, solver_paths, solver_sweeps, solver_trial
-from rigid_lcp.body_factorisation import factorisation
-from rigid_lcp.friction_problem import FrictionProblem, friction_problem
-from rigid_lcp.problem_files import read_problem
-from rigid_lcp.solver import solve_auto
-from rigid_lcp.solver_paths import CONVEX, SHARP, convex_path, sharp_path, smoothed_further
-from rigid_lcp.solver_plan import ALL_PATHS, LAST, run_plan, step_friction
-from rigid_lcp.solver_sweeps import TURNS
-from rigid_lcp.solver_trial import LIMITS, Trial
+from rigid_lcp import BodySpace, solve_friction
+from rigid_lcp.friction.auto import paths as solver_paths
+from rigid_lcp.friction.auto import sweeps as solver_sweeps
+from rigid_lcp.friction.auto import trial as solver_trial
+from rigid_lcp.friction.auto.paths import (
+    CONVEX,
+    SHARP,
+    follow_convex_path,
+    follow_sharp_path,
+    smooth_further,
+)
+from rigid_lcp.friction.auto.plan import ALL_PATHS, LAST, run_plan, step_friction
+from rigid_lcp.friction.auto.solve import solve_auto
+from rigid_lcp.friction.auto.sweeps import TURNS
+from rigid_lcp.friction.auto.trial import LIMITS, Trial
+from rigid_lcp.friction.files.formats import read_problem
+from rigid_lcp.friction.linear.factorisation import factorisation
+from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
 from validation.bench.rigid.packings import packing
 
 FOLDER = Path(os.environ.get("TRACKBED_DATA", "")) / "friction_problems"
@@ -252,14 +262,14 @@ def test_the_sharp_path_solves_in_few_steps_what_the_smoothed_one_leaves(monkeyp
     order of the two rests on."""
     problem = packing(60, 3, seed=1, friction=0.3)
     path = Trial(problem, None, 1e-12)
-    assert not convex_path(path)
+    assert not follow_convex_path(path)
     sharp, smoothed = (Trial(problem, None, 1e-12) for _ in range(2))
     smoothed.linear = sharp.linear = factorisation(problem)
-    assert sharp_path(sharp)
+    assert follow_sharp_path(sharp)
     assert problem.residual(sharp.best.r) <= 1e-12
     assert sharp.work["factorisations"] <= 40
     smoothed.path_point = path.path_point
-    assert not smoothed_further(smoothed)
+    assert not smooth_further(smoothed)
     found = solve_auto(problem)
     assert found.solved
     assert "smoothed path points" not in found.work

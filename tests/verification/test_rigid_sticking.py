@@ -7,10 +7,10 @@ import pytest
 import scipy.sparse as sp
 
 from rigid_lcp import solve_friction
-from rigid_lcp.body_factorisation import factorisation
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.gauss_seidel import gauss_seidel
-from rigid_lcp.sticking import STICKING, heaviness, seem_to_stick, sticking
+from rigid_lcp.friction.attempts.sticking import STICKING, heaviness, seem_to_stick, sticking
+from rigid_lcp.friction.linear.factorisation import factorisation
+from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from tests.rigid_networks import GRAVITY, STEP, tower
 from validation.bench.rigid.packings import tower as packed_tower
 

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_lcp.contacts import contact_frames
-from rigid_lcp.disc import Disc
+from rigid_lcp.collision.passing import Closing, find_bouncing, find_contact_shift
+from rigid_lcp.contact.arrays import contact_frames
 from rigid_lcp.errors import NotConverged
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.passed_collisions import Closing, bouncing, contact_shift
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
 from tests.rigid_motions import (
     balls_in_a_row,
     bouncing_time,
@@ -150,7 +150,7 @@ def test_normal_work_is_never_positive(e: float, start: float, before: float, fr
     """
     h = 1e-3
     closing = one_contact(e, start + h / 2 * before, before, free, h)
-    shift = contact_shift(closing, bouncing(closing))[0, 0]
+    shift = find_contact_shift(closing, find_bouncing(closing))[0, 0]
     assert before - shift <= 1e-12
 
 
@@ -246,7 +246,7 @@ def test_poured_grains_come_to_rest() -> None:
 def test_bodies_may_come_to_rest(turning: float, gap: float, before: float, free: float) -> None:
     """``u_N+ = turning`` at rest: allowed where nothing bounces, as jammed grains need it."""
     closing = one_contact(0.0, gap, before, free, 1e-3)
-    shift = contact_shift(closing, bouncing(closing), np.array([turning]))[0, 0]
+    shift = find_contact_shift(closing, find_bouncing(closing), np.array([turning]))[0, 0]
     assert turning + shift >= 0.0
 
 

@@ -13,14 +13,14 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from rigid_lcp.disc import Disc
-from rigid_lcp.elastic_limit import elastic_limit, state_reached_from
-from rigid_lcp.equations import body_space, contact_offset
-from rigid_lcp.friction_problem import FrictionProblem, friction_problem
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.micro_displacements import micro_displacements
-from rigid_lcp.motion import motion_with_rates
-from rigid_lcp.scene import Scene, world_of
+from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
+from rigid_lcp.motion.equations import body_space, find_contact_offset
+from rigid_lcp.motion.state import replace_rates
+from rigid_lcp.motion.world import Scene, make_world
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.unique.elastic_limit import elastic_limit, relax_from
+from rigid_lcp.unique.micro_displacements import micro_displacements
 from tests.rigid_elastic import find_least_forces
 from tests.rigid_static_problems import beam, difference, pyramid, table, tower
 from validation.bench.rigid.static_grains import pyramid as pile
@@ -37,11 +37,13 @@ def box_of_discs(rows: int, friction: float, seed: int) -> FrictionProblem:
             scene.add(Disc(0.1), density=10 ** rng.uniform(2, 4), position=place, friction=friction)
     for normal, offset in (((0, 1), 0.0), ((1, 0), -0.1), ((-1, 0), 0.1 - 0.2 * rows)):
         scene.add(HalfSpace(normal, offset), friction=friction)
-    world, motion = world_of(scene)
+    world, motion = make_world(scene)
     contacts = world.contacts(motion, 1e-7 * world.length)
     space = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
-    free = motion_with_rates(motion, world.accelerations(motion, None))
-    return friction_problem(space, contact_offset(contacts, motion, free), contacts.friction, 2)
+    free = replace_rates(motion, world.accelerations(motion, None))
+    return friction_problem(
+        space, find_contact_offset(contacts, motion, free), contacts.friction, 2
+    )
 
 
 @pytest.mark.parametrize(("friction", "seed"), [(1.0, 0), (1.0, 1), (5.0, 0), (5.0, 3)])
@@ -66,7 +68,7 @@ def test_a_box_has_more_states_than_one():
         rng = np.random.default_rng(seed)
         for size in (0.03, 0.1, 1.0):
             noise = rng.normal(size=len(first.displacement))
-            far = state_reached_from(problem, size * np.abs(first.displacement).max() * noise)
+            far = relax_from(problem, size * np.abs(first.displacement).max() * noise)
             if far.solved:
                 assert problem.residual(far.r) < 1e-12
                 others.append(difference(far.r, first.r))

@@ -10,21 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.disc import Disc
 from rigid_lcp.errors import SceneError, ShapeError, UsageError
-from rigid_lcp.fragmentation import polygon_moments
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.motion import Motion
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
-from rigid_lcp.wear import (
-    Wear,
-    contact_stiffness_worn,
-    scene_worn,
-    wear_start,
-)
-from rigid_lcp.worn_polygon import chamfered, corners_taken, cut_depth, polygon_worn
+from rigid_lcp.motion.state import Motion
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
+from rigid_lcp.wear.corners import Wear, contact_stiffness_worn, replace_worn, start_wear
+from rigid_lcp.wear.fragmentation import polygon_moments
+from rigid_lcp.wear.polygons import chamfer_corners, cut_depth, take_corners, wear_polygon
 
 GRAVITY = 9.81
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -112,9 +107,9 @@ def test_what_stays_keeps_every_points_velocity():
     motion = Motion(
         np.array([[1.0, 2.0]]), np.array([0.4]), np.array([[0.3, -0.2]]), np.array([2.0])
     )
-    state = wear_start(scene)
+    state = start_wear(scene)
     state.pending[:] = [0.01, 0.0, 0.03, 0.002]
-    worn, after = scene_worn(scene, motion, state)
+    worn, after = replace_worn(scene, motion, state)
     body = worn.bodies[0]
     arm = body.position - motion.position[0]
     assert body.velocity == pytest.approx([0.3 - 2 * arm[1], -0.2 + 2 * arm[0]], rel=1e-14)
@@ -161,11 +156,11 @@ def test_worn_polygons_lose_exactly_what_they_shall(seed, corners, share):
     shape = Polygon(np.column_stack([np.cos(angle), np.sin(angle)]))
     scene = Scene(2)
     scene.add(shape, density=1.0)
-    grain, area = wear_start(scene).grains[0], shape.area
+    grain, area = start_wear(scene).grains[0], shape.area
     for _ in range(4):
         pending = rng.uniform(0, 1, len(grain.vertices)) * (rng.random(len(grain.vertices)) < 0.7)
         pending *= share * area / 4 / max(pending.sum(), 1e-9)
-        made, left = polygon_worn(grain, pending) or (None, None)
+        made, left = wear_polygon(grain, pending) or (None, None)
         if made is None:
             continue
         now = polygon_moments(made.vertices)[0]
@@ -183,23 +178,23 @@ def test_chamfer_by_chamfer_is_one_chamfer_of_the_sum():
     """Wear in ten parts at any of a corner's ends is wear at once: the square's corner."""
     scene = Scene(2)
     scene.add(Polygon(SQUARE), density=1.0)
-    grain = wear_start(scene).grains[0]
+    grain = start_wear(scene).grains[0]
     for k in range(10):
         pending = np.zeros(len(grain.vertices))
         pending[np.flatnonzero(grain.owner == 2)[k % 2 if k else 0]] = 1e-3
-        grain, _ = polygon_worn(grain, pending)
-    once, _ = chamfered(grain.sharp, np.array([0, 0, 1e-2, 0]))
+        grain, _ = wear_polygon(grain, pending)
+    once, _ = chamfer_corners(grain.sharp, np.array([0, 0, 1e-2, 0]))
     assert grain.vertices == pytest.approx(once, abs=1e-14)
     assert grain.total[grain.owner == 2] == pytest.approx(1e-2)
 
 
 def test_corner_larger_than_its_edges():
     """A straight cut across the bisector takes neighbours with it: area to 1e-12."""
-    left, nearest = corners_taken(SQUARE, np.array([0.4, 0.0, 0.0, 0.0]))
+    left, nearest = take_corners(SQUARE, np.array([0.4, 0.0, 0.0, 0.0]))
     assert polygon_moments(left)[0] == pytest.approx(0.6, rel=1e-12)
     assert len(nearest) == len(left)
     with pytest.raises(ShapeError, match="cut more often"):
-        corners_taken(SQUARE, np.array([0.6, 0.0, 0.0, 0.0]))
+        take_corners(SQUARE, np.array([0.6, 0.0, 0.0, 0.0]))
     with pytest.raises(ShapeError, match=r"^wear of \S.* at 0\.\d+ s: .*\n.*cut more often"):
         slope(step=1e-2, wear=Wear(1.0, every=5)).advance(0.5)
 
@@ -208,9 +203,9 @@ def test_wear_too_small_to_cut_waits_at_its_corner():
     """One corner worn by 0.01, another by 1e-20 of the area: a chamfer of 1e-10 m is no edge."""
     scene = Scene(2)
     scene.add(Polygon(SQUARE), density=1.0)
-    grain = wear_start(scene).grains[0]
-    assert polygon_worn(grain, np.full(4, 1e-20)) is None
-    made, left = polygon_worn(grain, np.array([0.01, 0.0, 1e-20, 0.0]))
+    grain = start_wear(scene).grains[0]
+    assert wear_polygon(grain, np.full(4, 1e-20)) is None
+    made, left = wear_polygon(grain, np.array([0.01, 0.0, 1e-20, 0.0]))
     assert len(made.vertices) == 5
     assert left.sum() == 1e-20
     assert made.owner[np.argmax(left)] == 2

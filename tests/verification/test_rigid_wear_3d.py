@@ -11,17 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.motion import Motion
-from rigid_lcp.polyhedra import ballast_stone
-from rigid_lcp.polyhedron import Polyhedron, box
-from rigid_lcp.rotations import quaternion_of_rotation, quaternion_product
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
-from rigid_lcp.sphere import Sphere
-from rigid_lcp.wear import Wear, contact_stiffness_worn, scene_worn, wear_start
-from rigid_lcp.wear_3d import energy_of, solids_rubbed
-from rigid_lcp.worn_polyhedron import cut_depth, polyhedron_worn, rubbed, unworn
+from rigid_lcp.motion.state import Motion
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_product
+from rigid_lcp.shapes.sphere import Sphere
+from rigid_lcp.shapes.stones import ballast_stone
+from rigid_lcp.wear.corners import Wear, contact_stiffness_worn, replace_worn, start_wear
+from rigid_lcp.wear.polyhedra import cut_depth, rub_edges, unworn, wear_polyhedron
+from rigid_lcp.wear.solids import energy_of, rub_solids
 from tests.rigid_solids import CUBE, contacts
 
 GRAVITY = 9.81
@@ -97,11 +97,11 @@ def test_crossing_edges_share_the_wear_and_become_chamfers():
     for turn, high in ((lower, 0.0), (upper, 2**0.5)):
         scene.add(CUBE, density=1.0, position=[0, 0, high], angle=turn)
     found = contacts([CUBE, CUBE], [[0, 0, 0], [0, 0, 2**0.5]], [lower, upper])
-    state = wear_start(scene)
-    solids_rubbed(state, found, np.array([0.02]))
+    state = start_wear(scene)
+    rub_solids(state, found, np.array([0.02]))
     for grain in state.grains:
         assert grain.pending == pytest.approx([0.01])
-        made, _ = polyhedron_worn(grain)
+        made, _ = wear_polyhedron(grain)
         assert len(made.shape.faces) == 7
         depth = (0.5**0.5) - (made.shape.distances[np.argmax(made.shape.normals @ grain.normal[0])])
         moved = (made.shape.vertices @ grain.normal[0]).max()
@@ -114,17 +114,17 @@ def test_crossing_edges_share_the_wear_and_become_chamfers():
 def test_chamfer_by_chamfer_is_one_chamfer_of_the_sum():
     """Wear in ten parts, at any corner or edge of the chamfer, is wear at once."""
     corner = np.array([int(np.argmax(CUBE.vertices.sum(axis=1)))])
-    grain = rubbed(unworn(CUBE), corner, 1e-3)
+    grain = rub_edges(unworn(CUBE), corner, 1e-3)
     for k in range(10):
-        grain, _ = polyhedron_worn(grain)
+        grain, _ = wear_polyhedron(grain)
         if k == 9:
             break
         on = np.flatnonzero(grain.shape.vertices @ grain.normal[0] > 0.2)
         height = grain.shape.vertices @ grain.normal[0]
         on = np.flatnonzero(height > height.max() - 1e-9)
-        grain = rubbed(grain, on[: 1 + k % 2], 1e-3)
+        grain = rub_edges(grain, on[: 1 + k % 2], 1e-3)
     assert len(grain.normal) == 1
-    once, _ = polyhedron_worn(rubbed(unworn(CUBE), corner, 1e-2))
+    once, _ = wear_polyhedron(rub_edges(unworn(CUBE), corner, 1e-2))
     assert grain.shape.volume == pytest.approx(0.99, rel=1e-13)
     assert np.sort(grain.shape.vertices, axis=0) == pytest.approx(
         np.sort(once.shape.vertices, axis=0), abs=1e-12
@@ -165,8 +165,8 @@ def test_worn_polyhedra_lose_exactly_what_they_shall(seed, share, form):
         for _ in range(4):
             ends = grain.shape.edges[rng.integers(len(grain.shape.edges)), :2]
             volume = share * shape.volume * rng.random()
-            grain, asked = rubbed(grain, ends[: 1 + rng.integers(2)], volume), asked + volume
-        made = polyhedron_worn(grain)
+            grain, asked = rub_edges(grain, ends[: 1 + rng.integers(2)], volume), asked + volume
+        made = wear_polyhedron(grain)
         if made is not None:
             grain, place = made[0], place + made[1]
     gone = shape.volume - grain.shape.volume
@@ -179,9 +179,9 @@ def test_worn_polyhedra_lose_exactly_what_they_shall(seed, share, form):
 
 def test_wear_too_small_to_cut_waits_and_too_much_is_refused():
     corner = np.array([0])
-    assert polyhedron_worn(rubbed(unworn(CUBE), corner, 1e-18)) is None
+    assert wear_polyhedron(rub_edges(unworn(CUBE), corner, 1e-18)) is None
     with pytest.raises(ShapeError, match="cut more often"):
-        polyhedron_worn(rubbed(unworn(CUBE), corner, 0.6))
+        wear_polyhedron(rub_edges(unworn(CUBE), corner, 0.6))
     with pytest.raises(ShapeError, match=r"^wear of \S.* at 0\.\d+ s: .*\n.*cut more often"):
         slope(step=1e-2, wear=Wear(1.0, every=5)).advance(0.5)
 
@@ -199,9 +199,11 @@ def test_what_stays_keeps_every_points_velocity():
         np.array([[0.0, 0, 1]]), turn[None], np.array([[0.3, -0.2, 0.1]]),
         np.array([[1.0, 2.0, -1.0]]),
     )  # fmt: skip
-    state = wear_start(scene)
-    state.grains[0] = rubbed(rubbed(state.grains[0], np.array([0]), 0.03), np.array([5]), 0.01)
-    worn, after = scene_worn(scene, motion, state)
+    state = start_wear(scene)
+    state.grains[0] = rub_edges(
+        rub_edges(state.grains[0], np.array([0]), 0.03), np.array([5]), 0.01
+    )
+    worn, after = replace_worn(scene, motion, state)
     body = worn.bodies[0]
     arm = body.position - motion.position[0]
     assert np.linalg.norm(arm) > 1e-3
@@ -268,9 +270,9 @@ def test_a_ball_wears_what_it_rubs_and_not_itself():
     scene.add(CUBE, density=1.0, position=[0, 0, 0])
     scene.add(Sphere(0.3), density=1.0, position=[0.1, 0.2, 0.8])
     for place, wears in (([0.1, 0.2, 0.8], 0), ([0.1, 0.6, 0.6], 2), ([0.6, 0.6, 0.6], 1)):
-        state = wear_start(scene)
+        state = start_wear(scene)
         found = contacts([CUBE, Sphere(0.3)], [[0, 0, 0], place], margin=0.5)
-        solids_rubbed(state, found, np.array([0.01]))
+        rub_solids(state, found, np.array([0.01]))
         height = CUBE.vertices @ state.grains[0].normal.T
         on = 0 if wears == 0 else int((height[:, 0] > height[:, 0].max() - 1e-9).sum())
         assert on == wears

@@ -12,26 +12,26 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.stats import kstest, truncnorm
 
-from adapters.container import Container
-from adapters.errors import NotConverged, SceneError
-from adapters.radii import (
+from adapters.bed.container import Container
+from adapters.bed.radii import (
     PAPER_RELATIVE_DENSITY,
     RadiusDistribution,
-    grain_count_expected,
-    radii_sample,
+    expect_grain_count,
+    sample_radii,
 )
-from adapters.sample import (
+from adapters.bed.sample import (
     GRAVITY,
-    bed_height,
     coordination_number,
+    draw_sample_start,
+    find_sample_mass,
+    measure_bed_height,
+    measure_sample,
+    measure_volume_below,
     pairs_in_contact,
     relative_density,
-    sample_figures,
-    sample_mass,
-    sample_start,
-    volume_below,
 )
-from adapters.state import Contacts, FloatArray, State, contacts_none
+from adapters.bed.state import Contacts, FloatArray, State, make_no_contacts
+from adapters.errors import NotConverged, SceneError
 
 TABLE_1 = RadiusDistribution("normal", 3.2e-3, 5.651e-4, 2.0)
 QUARTER = Container("cylinder", ("x", "y"), radius=0.075)
@@ -68,7 +68,7 @@ def test_radii_follow_their_law(law: RadiusDistribution) -> None:
 
     The mean volume is within five standard errors of the sample.
     """
-    radius = radii_sample(law, 20_000, seed=3)
+    radius = sample_radii(law, 20_000, seed=3)
     assert law.smallest <= radius.min()
     assert radius.max() <= law.greatest
     cut = law.truncation
@@ -98,9 +98,9 @@ def test_mean_volume_is_the_integral(mean: float, relative: float, truncation: f
 
 def test_radii_are_reproducible() -> None:
     """The same seed gives the same radii, another seed others; constant radii are the mean."""
-    assert np.array_equal(radii_sample(TABLE_1, 99, 1), radii_sample(TABLE_1, 99, 1))
-    assert not np.array_equal(radii_sample(TABLE_1, 99, 1), radii_sample(TABLE_1, 99, 2))
-    assert radii_sample(RadiusDistribution("constant", 2e-3), 3, 1).tolist() == [2e-3] * 3
+    assert np.array_equal(sample_radii(TABLE_1, 99, 1), sample_radii(TABLE_1, 99, 1))
+    assert not np.array_equal(sample_radii(TABLE_1, 99, 1), sample_radii(TABLE_1, 99, 2))
+    assert sample_radii(RadiusDistribution("constant", 2e-3), 3, 1).tolist() == [2e-3] * 3
 
 
 def test_table_1_does_not_give_the_papers_weight() -> None:
@@ -113,7 +113,7 @@ def test_table_1_does_not_give_the_papers_weight() -> None:
     assert 4 * quarter == pytest.approx(15.83, abs=5e-3)
     grains = 1085 * TABLE_1.volume_mean * 2710 * GRAVITY
     assert grains == pytest.approx(4.25, abs=5e-3)
-    filled = grain_count_expected(TABLE_1, QUARTER, 0.060) * TABLE_1.volume_mean * 2710 * GRAVITY
+    filled = expect_grain_count(TABLE_1, QUARTER, 0.060) * TABLE_1.volume_mean * 2710 * GRAVITY
     assert filled == pytest.approx(quarter, rel=1e-3)
 
 
@@ -136,8 +136,8 @@ def test_start_is_inside_and_without_overlap(
     Walls as the engine gets them, with a lid at the height the start reports.
     """
     law = RadiusDistribution("uniform", 3e-3, spread * 3e-3)
-    radius = radii_sample(law, count, seed)
-    position, height = sample_start(radius, container, density, seed)
+    radius = sample_radii(law, count, seed)
+    position, height = draw_sample_start(radius, container, density, seed)
     for i, j in pairs_in_contact(position, radius):
         raise AssertionError(f"grains {i} and {j} overlap")
     walls = container.walls(piston_height=height)
@@ -149,7 +149,7 @@ def test_start_is_inside_and_without_overlap(
     assert filled <= density * (1 + 1e-12)
     if height > 4 * radius.max():
         assert filled == pytest.approx(density, rel=1e-12)
-    again, _ = sample_start(radius, container, density, seed)
+    again, _ = draw_sample_start(radius, container, density, seed)
     assert np.array_equal(position, again)
 
 
@@ -174,7 +174,7 @@ def test_start_is_uniform_in_the_section(container: Container) -> None:
     Within five standard errors of 4,000 grains of 0.1 mm; quarter disc 4R/(3 pi) from each mirror.
     """
     radius = np.full(4000, 1e-4)
-    position, _ = sample_start(radius, container, 0.01, seed=5)
+    position, _ = draw_sample_start(radius, container, 0.01, seed=5)
     arc = 4 * container.radius / (3 * pi)
     for axis, size in enumerate((container.size_x, container.size_y)):
         mirrored = "xy"[axis] in container.symmetry
@@ -197,20 +197,20 @@ def test_start_is_uniform_in_the_section(container: Container) -> None:
 def test_grains_as_wide_as_the_container(container: Container, fits: float) -> None:
     """Spheres that just fit find their one place across, without an endless search; wider ones
     are refused."""
-    position, _ = sample_start(np.full(5, fits), container, 0.05, 1)
+    position, _ = draw_sample_start(np.full(5, fits), container, 0.05, 1)
     walls = container.walls()
     for point, normal in zip(walls.plane_point, walls.plane_normal, strict=True):
         assert ((position - point) @ normal >= fits * (1 - 1e-6)).all()
     assert (np.hypot(position[:, 0], position[:, 1]) + fits <= walls.cylinder_radius + 1e-7).all()
     with pytest.raises(SceneError, match="does not fit"):
-        sample_start(np.full(5, fits * (1 + 1e-9)), container, 0.05, 1)
+        draw_sample_start(np.full(5, fits * (1 + 1e-9)), container, 0.05, 1)
 
 
 def test_start_at_the_densest_a_scene_allows() -> None:
     """Relative density 0.15 is reached with radii spread by a factor of ten."""
     law = RadiusDistribution("uniform", 3e-3, 0.47 * 3e-3)
-    radius = radii_sample(law, 1000, 2)
-    position, height = sample_start(radius, QUARTER, 0.15, 2)
+    radius = sample_radii(law, 1000, 2)
+    position, height = draw_sample_start(radius, QUARTER, 0.15, 2)
     assert len(pairs_in_contact(position, radius)) == 0
     assert relative_density(position, radius, QUARTER, height) == pytest.approx(0.15, rel=1e-12)
 
@@ -218,7 +218,7 @@ def test_start_at_the_densest_a_scene_allows() -> None:
 def test_start_that_is_too_dense_is_refused() -> None:
     """Random addition can not reach a packed bed, and says so with a remedy."""
     with pytest.raises(NotConverged, match="start looser"):
-        sample_start(radii_sample(TABLE_1, 200, 1), QUARTER, 0.5, 1)
+        draw_sample_start(sample_radii(TABLE_1, 200, 1), QUARTER, 0.5, 1)
 
 
 # ---------------------------------------------------------------------------------- volumes
@@ -233,7 +233,7 @@ def test_cap_is_the_integral_of_discs(height: float, centre: float, radius: floa
     """Volume below a plane = integral of pi (r^2 - (z - c)^2) up to the plane."""
     top = min(max(height, centre - radius), centre + radius)
     discs, _ = quad(lambda z: pi * (radius**2 - (z - centre) ** 2), centre - radius, top)
-    cap = volume_below(np.array([[0, 0, centre]]), np.array([radius]), height)
+    cap = measure_volume_below(np.array([[0, 0, centre]]), np.array([radius]), height)
     assert cap == pytest.approx(discs, rel=1e-9, abs=1e-9 * radius**3)
 
 
@@ -242,8 +242,8 @@ def test_cap_is_the_integral_of_discs(height: float, centre: float, radius: floa
 def test_relative_density_is_monte_carlo(seed: int, low: float, thickness: float) -> None:
     """Density of a layer = share of random points inside grains, within five standard errors."""
     container = Container("cylinder", ("x", "y"), radius=0.04)
-    radius = radii_sample(TABLE_1, 60, seed)
-    position, height = sample_start(radius, container, 0.1, seed)
+    radius = sample_radii(TABLE_1, 60, seed)
+    position, height = draw_sample_start(radius, container, 0.1, seed)
     bottom, top = low * height, (low + thickness) * height
     generator = np.random.default_rng(seed)
     point = generator.uniform((0, 0, bottom), (0.04, 0.04, top), (40_000, 3))
@@ -270,7 +270,7 @@ def test_cubic_lattice() -> None:
     for bottom, top in ((0.5, 1.0), (1.0, 2.5), (2.5, 5.0)):
         layer = relative_density(position, radius, box, top, bottom)
         assert layer == pytest.approx(pi / 6, rel=1e-13)
-    assert bed_height(position, radius) == pytest.approx(5.0, rel=1e-14)
+    assert measure_bed_height(position, radius) == pytest.approx(5.0, rel=1e-14)
 
 
 @given(
@@ -280,7 +280,7 @@ def test_cubic_lattice() -> None:
 def test_layers_add_up(millimetres: list[int], seed: int) -> None:
     """The layers of a profile hold together what the whole slab holds."""
     edges = np.array(millimetres) / 1000
-    radius = radii_sample(TABLE_1, 50, seed)
+    radius = sample_radii(TABLE_1, 50, seed)
     position = np.random.default_rng(seed).uniform(0, 1, (50, 3))
     layers = np.array(
         [relative_density(position, radius, QUARTER, b, a) for a, b in pairwise(edges)]
@@ -325,7 +325,7 @@ def test_rattlers_do_not_count_as_carrying() -> None:
 
 def test_gas_has_no_contacts() -> None:
     """Without any contact every figure is zero and every grain a rattler."""
-    found = coordination_number(contacts_none(), np.arange(4), {})
+    found = coordination_number(make_no_contacts(), np.arange(4), {})
     assert (found.grains, found.with_walls, found.without_rattlers) == (0, 0, 0)
     assert found.rattler_share == 1
 
@@ -338,7 +338,7 @@ def test_figures_of_a_stack() -> None:
     """
     radius, d = np.full(3, 0.01), 0.02
     position = np.array([[0.015, 0.015, 0.01 + d * i] for i in range(3)])
-    mass = sample_mass(radius, 2710.0)
+    mass = find_sample_mass(radius, 2710.0)
     weight = float(mass.sum()) * 9.81
     state = State(
         np.arange(1, 4),
@@ -351,7 +351,7 @@ def test_figures_of_a_stack() -> None:
         {"floor": np.array([[0, 0, weight], [0, 0, 0], [0, 0, 0]])},
     )
     box = Container("box", size_x=0.03, size_y=0.03)
-    figures = sample_figures(state, box)
+    figures = measure_sample(state, box)
     assert figures.weight == pytest.approx(3 * 2710 * 4 / 3 * pi * 0.01**3 * 9.81, rel=1e-14)
     assert figures.apparent_weight == pytest.approx(weight)
     assert figures.height == pytest.approx(3 * d)

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters import sweep_member, sweep_run
-from adapters.run_folder import RunFolder
-from adapters.sweep import Member, Sweep
-from adapters.sweep_member import Ended
+from adapters.files.run_folder import RunFolder
+from adapters.procedure.sweep import member as sweep_member
+from adapters.procedure.sweep import run as run_sweep
+from adapters.procedure.sweep.member import Ended
+from adapters.procedure.sweep.plan import Member, Sweep
 from tests.forked_commands import processes_in
 from tests.small_bed import small_bed
 from trackbed import command
@@ -65,7 +66,7 @@ def in_process(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
         with screen, redirect_stdout(screen), redirect_stderr(screen):
             return command.main(words), 0.0, 0.0
 
-    monkeypatch.setattr(sweep_member, "process_run", run)
+    monkeypatch.setattr(sweep_member, "run_process", run)
     return ran
 
 
@@ -189,7 +190,7 @@ def test_wrong_use(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     """A scheduler that does not answer, and flags that can not be, end with exit code 2."""
-    monkeypatch.setattr("adapters.sweep_cluster.CONNECT_S", 1)
+    monkeypatch.setattr("adapters.procedure.sweep.cluster.CONNECT_S", 1)
     assert command.main(["sweep", str(scene), "--into", str(tmp_path / "sweep"), *words]) == 2
     assert sentence in capsys.readouterr().err
 
@@ -270,7 +271,7 @@ def test_stopped_it_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     """SIGTERM while the second member runs: exit code 130, what to do; then finished."""
-    into, run = tmp_path / "sweep", sweep_member.process_run
+    into, run = tmp_path / "sweep", sweep_member.run_process
 
     def stopped_in_the_second(
         words: Sequence[str], folder: Path, watch: Callable[[], None]
@@ -284,7 +285,7 @@ def test_stopped_it_goes_on(
 
     words = (scene, "--seeds", 3, "--into", into)
     with monkeypatch.context() as context:
-        context.setattr(sweep_member, "process_run", stopped_in_the_second)
+        context.setattr(sweep_member, "run_process", stopped_in_the_second)
         code, told, said = sweep(capsys, *words)
     assert code == 130
     assert told is None
@@ -302,15 +303,15 @@ def test_a_signal_loses_no_result(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     """SIGTERM just when a member's end is looked at: it counts as finished all the same."""
-    into, look, sent = tmp_path / "sweep", sweep_run.result_of, []
+    into, look, sent = tmp_path / "sweep", run_sweep.find_result, []
 
-    def signalled(one: Sweep, member: Member, ended: Ended | None) -> sweep_run.Result:
+    def signalled(one: Sweep, member: Member, ended: Ended | None) -> run_sweep.Result:
         if ended is not None and not sent:
             sent.append(member.name)
             os.kill(os.getpid(), signal.SIGTERM)
         return look(one, member, ended)
 
-    monkeypatch.setattr(sweep_run, "result_of", signalled)
+    monkeypatch.setattr(run_sweep, "find_result", signalled)
     assert sweep(capsys, scene, "--seeds", 2, "--into", into)[0] == 130
     states = {
         one["member"]: one["state"]

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adapters import contact_law as law
-from adapters.state import FloatArray
+from adapters.bed import contact_law as law
+from adapters.bed.state import FloatArray
 from tests.tangential_rules import (
     LOOPS,
     force_incremental,

@@ -7,7 +7,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from trackbed.whole_files import write_whole
+from trackbed.run_files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,6 +6,8 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
+__all__ = ["scene_names", "scene_path", "scene_template", "scene_verb"]
+
 VERB_OF_TABLE = {"sample": "run", "simulation": "qdem", "run": "rigid"}
 """A table of a scene file, and the verb that reads it."""
 

@@ -122,9 +122,9 @@ def environment() -> dict[str, str]:
 
 
 def read_trackbed(path: str) -> Any:
-    from adapters.dump import dump_frames
+    from adapters.files.dump import read_frames
 
-    frames = list(dump_frames(path))
+    frames = list(read_frames(path))
     return frames[-1].column("x")
 
 

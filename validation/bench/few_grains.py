@@ -11,14 +11,14 @@ from typing import Protocol
 
 import numpy as np
 
-from adapters import contact_law
-from adapters.contact_law import Collision
-from adapters.dump import dump_frames
-from adapters.engine_liggghts import LiggghtsEngine
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import Contacts, FloatArray
-from adapters.window import contacts_of_frame
+from adapters.bed import contact_law
+from adapters.bed.contact_law import Collision
+from adapters.bed.state import Contacts, FloatArray
+from adapters.engines.liggghts import LiggghtsEngine
+from adapters.files.dump import read_frames
+from adapters.files.window import read_contacts
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
 
 RADIUS = 3.2e-3
@@ -66,7 +66,7 @@ class Track:
 
 def table_1(*overrides: str) -> Scene:
     """Grains, walls and contact law of the paper's Table 1 (``karrech.toml``), changed."""
-    return scene_load(scene_path("karrech"), overrides)
+    return load_scene(scene_path("karrech"), overrides)
 
 
 def grain_mass(scene: Scene) -> float:
@@ -133,10 +133,8 @@ def track_run(
         scene_part = folder / "scene.in"
         scene_part.write_text(materials(scene_part.read_text()))
         engine.run(scene, "in.few", folder, lambda: None, digests)
-        frames = list(dump_frames(folder / "grains.dump"))
-        contacts = tuple(
-            contacts_of_frame(frame) for frame in dump_frames(folder / "contacts.dump")
-        )
+        frames = list(read_frames(folder / "grains.dump"))
+        contacts = tuple(read_contacts(frame) for frame in read_frames(folder / "contacts.dump"))
     position, velocity, spin, force = (
         np.array([frame.block(*(letter + axis for axis in "xyz")) for frame in frames])
         for letter in ("", "v", "omega", "f")

@@ -9,12 +9,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from adapters.dump import dump_frames
-from adapters.engine_lammps import LammpsEngine
-from adapters.lammps_decks import TANGENTIAL_RULES
-from adapters.scene import Scene
-from adapters.state import FloatArray
-from adapters.window import contacts_of_frame
+from adapters.bed.state import FloatArray
+from adapters.engines.lammps import LammpsEngine
+from adapters.engines.lammps_decks import TANGENTIAL_RULES
+from adapters.files.dump import read_frames
+from adapters.files.window import read_contacts
+from adapters.scene.tables import Scene
 from validation.bench.few_grains import RADIUS, Track, TrackRun
 
 DECK = """\
@@ -73,10 +73,8 @@ def track_run(
         scene_part = folder / "scene.in"
         scene_part.write_text(materials(scene_part.read_text()))
         engine.run(scene, "in.few", folder, lambda: None, digests)
-        frames = list(dump_frames(folder / "states.dump"))
-        contacts = tuple(
-            contacts_of_frame(frame) for frame in dump_frames(folder / "contacts.dump")
-        )
+        frames = list(read_frames(folder / "states.dump"))
+        contacts = tuple(read_contacts(frame) for frame in read_frames(folder / "contacts.dump"))
     position, velocity, spin, force = (
         np.array([frame.block(*columns.split()) for frame in frames]) for columns in VECTORS
     )

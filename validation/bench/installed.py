@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from adapters.engine import engine_named, real_engines
+from adapters.engines.contract import get_engine, list_real_engines
 from adapters.errors import EngineMissing
 
 
 def list_installed() -> list[str]:
     """Their names; raises `EngineMissing` if there is none."""
     present = []
-    for name in real_engines():
+    for name in list_real_engines():
         try:
-            engine_named(name).version()
+            get_engine(name).version()
         except EngineMissing:
             continue
         present.append(name)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.track_scene import TrackPrepared
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.track.enter import TrackPrepared
 
 SCENE = """
 [track]
@@ -37,13 +37,13 @@ energy_interval = 1e-4
 audit = 1e-3
 """
 """A track of 20 grains under one blow of 10 ms, with the stiffness, viscosity and spheres of
-Table 1; the peak is the pressure of `qdem_fem.load_train` under an axle of 100 kN."""
+Table 1; the peak is the pressure of `qdem_fem.track.loads.train` under an axle of 100 kN."""
 
 
 def scene_at(folder: Path, *overrides: str) -> TrackPrepared:
     """The track of 20 grains, its files in a folder."""
     path = folder / "scene.toml"
     path.write_text(SCENE, encoding="utf-8")
-    prepared = scene_load(path, overrides)
+    prepared = load_scene(path, overrides)
     assert isinstance(prepared, TrackPrepared)
     return prepared

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from qdem_fem.assembly import NO_PROBES
-from qdem_fem.errors import LibraryMissing
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.bodies.assembly import NO_PROBES
+from qdem_fem.files.errors import LibraryMissing
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem_gpu.beam import FORCE, MATERIAL, SIZE
 from validation.bench.qdem_gpu.contact import contacts_compare
 from validation.bench.qdem_gpu.packing import packing_checks
@@ -59,9 +59,9 @@ def run(quick: bool) -> list[Check]:
     for name, error in twins_in_simulator().items():
         checks.append(_at_most(f"GPU kernel in the simulator over CPU kernel: {name}", error, 1.0))
     try:
-        from qdem_fem.cuda_assembly import gpu_require
+        from qdem_fem.kernel.cuda.assembly import require_gpu
 
-        gpu_require()
+        require_gpu()
     except LibraryMissing as error:
         absent = f"GPUs used: no speed of a GPU was measured ({error.what})"
         return [*checks, Check(absent, 0.0, "finite", True)]
@@ -146,7 +146,7 @@ def twin(
     conditions: Conditions,
 ) -> tuple[q.Simulation, q.Body]:  # fmt: skip
     """A block of 24 elements with a random motion, and its simulation at half the critical step."""
-    mesh = box_mesh((1.0, 0.5, 0.5), (2, 2, 1), "kuhn")
+    mesh = make_box_mesh((1.0, 0.5, 0.5), (2, 2, 1), "kuhn")
     material = q.Material(
         young=1e6, poisson=0.3, density=1000.0, shear_viscosity=50.0 * viscous,
         bulk_viscosity=20.0 * viscous,
@@ -203,10 +203,10 @@ def stop_apart(speed: float, steps: int) -> float:
     results = []
     for device in DEVICES:
         run, body = twin(device, "finger", "float64", False, no_condition)
-        assembly, (loads, held) = run.assembly, run.packed_lists()
+        assembly, (loads, held) = run.assembly, run.pack_lists()
         velocity = np.zeros(body.nodes.shape)
         velocity[np.argmax(body.nodes.sum(axis=1))] = speed
-        assembly.field_set("velocity", velocity)
+        assembly.set_field("velocity", velocity)
         done, bad = assembly.window(
             steps, run.step, loads, held, NO_PROBES, np.ones((steps + 1, 1)), None, np.zeros(3)
         )
@@ -222,7 +222,7 @@ def stop_apart(speed: float, steps: int) -> float:
 
 def beam(elements: int, precision: Precision) -> tuple[q.Simulation, q.Body]:
     """The paper's cantilever on the GPU, at 0.9 of the critical step."""
-    mesh = box_mesh(SIZE, CELLS[elements], "five")
+    mesh = make_box_mesh(SIZE, CELLS[elements], "five")
     young, poisson, density = MATERIAL
     body = q.Body((mesh.nodes, mesh.elements), q.Material(young, poisson, density), name="beam")
     run = q.Simulation([body], precision=precision, device="cuda")
@@ -245,7 +245,7 @@ def traffic(run: q.Simulation) -> int:
 
 def copy_bandwidth(size: int = 1 << 30, repeats: int = 20) -> float:
     """Bytes read and written a second by a copy within the GPU, the best of five [B/s]."""
-    from qdem_fem.cuda_step import cuda
+    from qdem_fem.kernel.cuda.step import cuda
 
     source, target = (cuda.device_array(size, np.uint8) for _ in range(2))
     seconds = []

@@ -69,7 +69,7 @@ def figures_row(checks: Sequence[Check], **more: Any) -> Row:
     } | more
 
 
-def checks_of(rows: Sequence[Row], page: str = "") -> list[Check]:
+def list_checks(rows: Sequence[Row], page: str = "") -> list[Check]:
     """The figures of all rows, each held against its bar anew."""
     return [
         Check(name, value, bar, meets(value, bar), unit, page)

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import qdem_fem as q
-from qdem_fem.errors import StepWarning
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import StepWarning
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem.grains import grain_mesh
 
 Floats = NDArray[np.float64]
@@ -31,7 +31,9 @@ def cube(
     cells: int, place: Any = (0, 0, 0), material: q.Material = STONE, name: str = "cube"
 ) -> q.Body:
     """A cube of ``cells**3 * 5`` tetrahedra with its least corner at ``place`` [m]."""
-    return q.Body(box_mesh((SIDE,) * 3, (cells,) * 3, "five", tuple(place)), material, name=name)
+    return q.Body(
+        make_box_mesh((SIDE,) * 3, (cells,) * 3, "five", tuple(place)), material, name=name
+    )
 
 
 FACES_OF = {"surface": "points", "overlaps": "overlaps"}
@@ -93,7 +95,7 @@ def sizes(model: str, safety: float = 0.5) -> tuple[q.Simulation, float]:
     size = 4 * edge
     block, lift = cube(1), 0.8 * edge / 2 if model == "spheres" else 0.0
     chip = q.Body(
-        box_mesh((size,) * 3, (4, 4, 4), "kuhn", (0.012, 0.009, SIDE + lift + 1e-7)), STONE,
+        make_box_mesh((size,) * 3, (4, 4, 4), "kuhn", (0.012, 0.009, SIDE + lift + 1e-7)), STONE,
         name="chip",
     )  # fmt: skip
     touch = contact(model, stiffness=1e6, edge=edge)
@@ -122,7 +124,7 @@ def stacked(model: str) -> tuple[q.Simulation, float]:
     gap, bodies = reach(model, 0.001, 0.001) + 1e-6, []
     for k in range(4):
         place = (0.001 * k, -0.001 * k, k * (SIDE / 2 + gap))
-        plate = box_mesh((2 * SIDE, 2 * SIDE, SIDE / 2), (4, 4, 1), "five", place)
+        plate = make_box_mesh((2 * SIDE, 2 * SIDE, SIDE / 2), (4, 4, 1), "five", place)
         bodies.append(q.Body(plate, STONE, name=f"plate {k}"))
         thrown(bodies[-1], (0.02, 0, -0.1))
     wall = q.ContactPlane((0, 0, -(gap if model != "spheres" else 0.5 * gap)), (0, 0, 1))

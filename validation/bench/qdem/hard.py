@@ -19,10 +19,10 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import eigsh
 
 from qdem_fem import Material
-from qdem_fem.errors import StepWarning
-from qdem_fem.mass_scaling import element_step
-from qdem_fem.mesh import mesh_read
-from qdem_fem.mesh_generation import Pattern, box_mesh, jitter
+from qdem_fem.bodies.mass_scaling import find_element_step
+from qdem_fem.files.errors import StepWarning
+from qdem_fem.mesh.generation import Pattern, jitter, make_box_mesh
+from qdem_fem.mesh.tetrahedra import read_mesh
 from validation.bench.qdem.checks import below, between, reported
 from validation.bench.qdem.closed_forms import CONCRETE_BEAM
 from validation.bench.qdem.judge import FloatArray, cantilever_p2, free_dof
@@ -79,7 +79,7 @@ def static_checks(name: str, problem: Problem, tolerance: float = 1e-8) -> list[
 
 def sliver_problem(altitude: float) -> Problem:
     """The cube with a sliver, clamped at x = 0 and pulled down at x = 1."""
-    return replace(clamped(mesh_read(box_with_sliver(altitude)), CONCRETE), force=FORCE)
+    return replace(clamped(read_mesh(box_with_sliver(altitude)), CONCRETE), force=FORCE)
 
 
 def sliver_checks(altitude: float = 0.01) -> list[Check]:
@@ -93,7 +93,7 @@ def sliver_checks(altitude: float = 0.01) -> list[Check]:
         critical_check(name, critical, critical_judge(problem)),
         reported(f"{name}: steps, times those of the even mesh", even / critical),
         reported(f"{name}: critical step over that of the fastest element alone",
-                 critical / element_step(body).min()),
+                 critical / find_element_step(body).min()),
         motion_check(name, problem),
     ]  # fmt: skip
 
@@ -158,7 +158,7 @@ def locking_checks(meshes: tuple[Cells, ...], finest_p2: Cells) -> list[Check]:
 
 def near_critical_problem() -> Problem:
     """An irregular cube of 384 elements, clamped on one side."""
-    return clamped(jitter(box_mesh((1.0, 1.0, 1.0), (4, 4, 4)), 0.2, seed=1), CONCRETE)
+    return clamped(jitter(make_box_mesh((1.0, 1.0, 1.0), (4, 4, 4)), 0.2, seed=1), CONCRETE)
 
 
 def near_critical_checks(steps: int) -> list[Check]:

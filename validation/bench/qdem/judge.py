@@ -21,7 +21,7 @@ import scipy.sparse as sparse
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.linalg import splu
 
-from qdem_fem.errors import LibraryMissing, NotConverged, UsageError
+from qdem_fem.files.errors import LibraryMissing, NotConverged, UsageError
 from validation.bench.qdem.closed_forms import CONCRETE_BEAM, Beam
 
 FloatArray = NDArray[np.float64]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -42,7 +42,7 @@ def box_with_sliver(altitude: float, cells: int = 4) -> tuple[Floats, Integers]:
     The middle node is pushed towards the face opposite to it in one of its elements; four of
     them share that plane.  Returns nodes (n, 3) [m] and elements (m, 4).
     """
-    mesh = box_mesh((1.0, 1.0, 1.0), (cells, cells, cells))
+    mesh = make_box_mesh((1.0, 1.0, 1.0), (cells, cells, cells))
     nodes = mesh.nodes.copy()
     node = int(np.argmin(np.linalg.norm(nodes - 0.5, axis=1)))
     corners = mesh.elements[np.flatnonzero((mesh.elements == node).any(axis=1))[0]]
@@ -65,7 +65,7 @@ def box_graded(ratio: float, cells: int = 12) -> tuple[Floats, Integers]:
     from 1/ratio, the innermost cube, to 1, each by the same factor.  Kuhn's tetrahedra do not
     cross the planes between the sides of the shells, so none is turned over.
     """
-    mesh = box_mesh((1.0, 1.0, 1.0), (cells, cells, cells))
+    mesh = make_box_mesh((1.0, 1.0, 1.0), (cells, cells, cells))
     shell = mesh.nodes.max(axis=1)
     inside = shell > 0
     moved = np.zeros_like(shell)

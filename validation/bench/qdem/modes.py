@@ -12,7 +12,7 @@ import scipy.sparse as sparse
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import eigsh, lobpcg
 
-from qdem_fem.errors import NotConverged, UsageError
+from qdem_fem.files.errors import NotConverged, UsageError
 from validation.bench.qdem.judge import FloatArray, free_dof, multigrid, rigid_motions
 
 

@@ -15,9 +15,9 @@ import numpy as np
 import scipy.sparse as sparse
 
 from qdem_fem import Body, Material, Series, Simulation
-from qdem_fem.mesh import TetMesh
-from qdem_fem.mesh_generation import Pattern, box_mesh
-from qdem_fem.series import Value
+from qdem_fem.files.series import Value
+from qdem_fem.mesh.generation import Pattern, make_box_mesh
+from qdem_fem.mesh.tetrahedra import TetMesh
 from validation.bench.qdem import judge as qdem_judge
 from validation.bench.qdem.closed_forms import CONCRETE_BEAM
 from validation.bench.qdem.judge import BoolArray, FloatArray, IntArray
@@ -110,7 +110,7 @@ class Problem:
 def cantilever(cells: tuple[int, int, int], pattern: Pattern = "kuhn") -> Problem:
     """Section 3.1: the concrete beam, clamped at x = 0, 200 N on the nodes of the free end."""
     beam = CONCRETE_BEAM
-    mesh = box_mesh((beam.length, beam.width, beam.height), cells, pattern)
+    mesh = make_box_mesh((beam.length, beam.width, beam.height), cells, pattern)
     material = Material(beam.young, beam.poisson, beam.density)
     return clamped(mesh, material)
 

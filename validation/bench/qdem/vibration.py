@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from qdem_fem.spectra import Mode, peak_frequencies
+from qdem_fem.report.spectra import Mode, find_peak_frequencies
 from validation.bench.qdem.checks import below, between, orders, reported
 from validation.bench.qdem.judge import FloatArray, IntArray, free_dof
 from validation.bench.qdem.problem import Problem, tip_node
@@ -67,7 +67,7 @@ def unload(problem: Problem, frequency: float, periods: float) -> Record:
 def first_mode(record: Record) -> Mode:
     """The strongest cosine of u_z."""
     # a mesh without mirror symmetry mixes in the other bending mode, so one cosine is not enough
-    return peak_frequencies(record.time, record.value[:, 2], count=4, floor=1e-5)[0]
+    return find_peak_frequencies(record.time, record.value[:, 2], count=4, floor=1e-5)[0]
 
 
 def first_frequency(problem: Problem, periods: float = 6.0) -> tuple[Mode, float]:
@@ -105,7 +105,7 @@ def five_frequencies(problem: Problem, periods: float = 15.0) -> Frequencies:
     fitted = [
         mode.frequency
         for axis in (1, 2)
-        for mode in peak_frequencies(record.time, record.value[:, axis], count=8, floor=1e-4)
+        for mode in find_peak_frequencies(record.time, record.value[:, axis], count=8, floor=1e-4)
     ]
     found = [min(fitted, key=lambda one: abs(one - f)) for f in judge]
     return Frequencies(judge, np.array(found), record)

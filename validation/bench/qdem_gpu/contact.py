@@ -10,9 +10,9 @@ from unittest.mock import patch
 import numpy as np
 
 import qdem_fem as q
-from qdem_fem.contact_sphere_state import SphereContacts
-from qdem_fem.errors import ContactTooDeep
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.contact.sphere_state import SphereContacts
+from qdem_fem.files.errors import ContactTooDeep
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem_gpu.search import searches_compare
 
 SIDE, RADIUS = 0.03, 0.006
@@ -37,7 +37,7 @@ def two_cubes(
         touch = {"periodic": q.PeriodicWidth("y", 0.08)}
         shift += (0, 0.08, 0)
     bodies = [
-        q.Body(box_mesh((SIDE,) * 3, (1, 1, 1), "kuhn", tuple(origin)), STONE, name=name)
+        q.Body(make_box_mesh((SIDE,) * 3, (1, 1, 1), "kuhn", tuple(origin)), STONE, name=name)
         for name, origin in (("below", np.zeros(3)), ("above", shift))
     ]
     stiffness = {"below": 1e6, "above": 2e6}
@@ -64,7 +64,7 @@ def state_of(run: q.Simulation) -> dict[str, Any]:
         "energies": np.array([energy.contact, energy.friction, energy.kinetic, energy.elastic]),
         "counts": np.array([contacts.renewals, contacts.lasted, len(touching.first)]),
         "skin": np.array([contacts.skin, run.steps_done]),
-        "bound": np.array([contacts.stiffness_now()]),
+        "bound": np.array([contacts.bound_present_stiffness()]),
     }  # fmt: skip
 
 
@@ -75,8 +75,8 @@ def processor_idle(run: q.Simulation) -> Iterator[list[str]]:
     if run.device == "cpu":
         yield []
         return
-    from qdem_fem.cuda_assembly import CudaAssembly
-    from qdem_fem.cuda_contact_state import DeviceContact
+    from qdem_fem.contact.cuda.arrays import DeviceContact
+    from qdem_fem.kernel.cuda.assembly import CudaAssembly
 
     copies: list[str] = []
     fetch, read = DeviceContact.fetch, CudaAssembly._read
@@ -91,8 +91,8 @@ def processor_idle(run: q.Simulation) -> Iterator[list[str]]:
 
     refused = AssertionError("the processor was asked")
     with (
-        patch("qdem_fem.contact_sphere_state.pairs_renew", side_effect=refused),
-        patch("qdem_fem.contact_state.advance_of", side_effect=refused),
+        patch("qdem_fem.contact.sphere_state.pairs_renew", side_effect=refused),
+        patch("qdem_fem.contact.state.advance_of", side_effect=refused),
         patch.object(DeviceContact, "fetch", fetch_noted),
         patch.object(CudaAssembly, "_read", read_noted),
     ):

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 import qdem_fem as q
-from qdem_fem.contact_sphere_state import SphereContacts
+from qdem_fem.contact.sphere_state import SphereContacts
 from validation.bench.qdem.grains import FRICTION, GRAIN, RADIUS, STIFFNESS, lattice
 from validation.bench.qdem_gpu.search import differing
 from validation.case import Check
@@ -54,7 +54,7 @@ def packing_checks(side: int, steps: int = 200, repeats: int = 5) -> list[Check]
     apart = [name for name in differing(expected.pairs, contacts.pairs) if name in LISTS]
     pairs = len(contacts.pairs.second)
     step = seconds_of(lambda: run.advance(steps * run.step, sampling=1.0), repeats) / steps
-    look = seconds_of(contacts.pairs_find, repeats)
+    look = seconds_of(contacts.find_pairs, repeats)
     name = f"GPU, packing of {side**3:,} grains, {len(contacts.nodes):,} spheres"
     return [
         Check(

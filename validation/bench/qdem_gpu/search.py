@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from qdem_fem.contact_kernel import Contact, Planes, Spheres
-from qdem_fem.contact_search import Pairs, pairs_renew, walls_near
-from qdem_fem.periodic import PeriodicWidth
+from qdem_fem.contact.search.pairs import Pairs, find_near_walls, renew_pairs
+from qdem_fem.contact.search.periodic import PeriodicWidth
+from qdem_fem.contact.spheres.law import Contact, Planes, Spheres
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -70,8 +70,8 @@ def contact_of(given: Cloud, seed: int) -> Contact:
     """Contact of a cloud where it was; some pairs and walls touch, and hold springs at random."""
     random, count, walls = np.random.default_rng(seed), len(given.radius), len(given.point)
     number, stiffness = np.arange(count), 1 + given.radius
-    near = walls_near(given.before, given.radius, given.point, given.normal, given.skin)
-    old = pairs_renew(None, given.before, given.radius, given.body, given.skin, near, given.side)
+    near = find_near_walls(given.before, given.radius, given.point, given.normal, given.skin)
+    old = renew_pairs(None, given.before, given.radius, given.body, given.skin, near, given.side)
     old.touching[:] = random.random(len(old.second)) < 0.6
     springs = random.normal(size=(2, len(old.second), 3))
     held = random.normal(size=(2, walls, count, 3)) * (random.random((walls, count, 1)) < 0.3)
@@ -85,8 +85,8 @@ def contact_of(given: Cloud, seed: int) -> Contact:
 
 def lists_processor(given: Cloud, seed: int) -> Pairs:
     """The list of a cloud where it is, with the history of the old one."""
-    near = walls_near(given.position, given.radius, given.point, given.normal, given.skin)
-    return pairs_renew(
+    near = find_near_walls(given.position, given.radius, given.point, given.normal, given.skin)
+    return renew_pairs(
         contact_of(given, seed).pairs, given.position, given.radius, given.body, given.skin, near,
         given.side,
     )  # fmt: skip
@@ -94,12 +94,12 @@ def lists_processor(given: Cloud, seed: int) -> Pairs:
 
 def lists_gpu(given: Cloud, seed: int) -> Pairs:
     """`lists_processor`, found on a GPU."""
-    from qdem_fem.cuda_contact_state import DeviceContact
-    from qdem_fem.cuda_step import cuda
+    from qdem_fem.contact.cuda.arrays import DeviceContact
+    from qdem_fem.kernel.cuda.step import cuda
 
     contact = contact_of(given, seed)
     there = DeviceContact(contact, given.side)
-    there.lists_renew(cuda.to_device(given.position), given.skin, given.skin / 2)
+    there.renew_lists(cuda.to_device(given.position), given.skin, given.skin / 2)
     found: Pairs = there.fetch(contact).pairs
     return found
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem
 from validation.bench.rigid.friction_problems import GRAINS
 from validation.bench.rigid.packings import (
     GRAVITY,

@@ -13,8 +13,8 @@ from functools import cache
 import numpy as np
 import scipy.sparse as sp
 
-from rigid_lcp.friction_problem import BODY_SIZE, BodySpace, friction_problem
-from rigid_lcp.solver import solve_friction
+from rigid_lcp.friction.auto.solve import solve_friction
+from rigid_lcp.friction.problem.definition import BODY_SIZE, BodySpace, friction_problem
 from validation.bench.rigid.examination_beds import (
     FRICTIONS,
     SIZES,

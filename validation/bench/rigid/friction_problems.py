@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.problem_files import read_problem
+from rigid_lcp.friction.files.formats import read_problem
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from validation.bench.rigid.packings import crystal, packing, tower
 
 NONUNIQUE = "nonunique_discs_125"

@@ -12,12 +12,12 @@ from math import cos, sin, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.disc import Disc
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.polyhedron import box
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
+from rigid_lcp.shapes.polyhedron import box
 from validation.bench.rigid.scenes import DENSITY, FLOOR, G, card_house_friction, stack
 
 Floats = NDArray[np.float64]

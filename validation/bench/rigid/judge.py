@@ -1,6 +1,7 @@
 """A second judge of forces, apart from the solver's own: plain NumPy in extended precision.
 
-The natural residual of `rigid_lcp.cones`, from W or its factors alone: nothing of the solver's
+The natural residual of `rigid_lcp.friction.problem.cones`, from W or its factors alone: nothing of
+the solver's
 kernels is used, and round-off of the sums is 1e-19 where long double has 80 bits.
 """
 
@@ -12,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.friction_problem import FrictionProblem
+from rigid_lcp.friction.problem.definition import FrictionProblem
 
 Floats = NDArray[np.float64]
 Extended = NDArray[np.longdouble]

@@ -17,8 +17,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
-from rigid_lcp.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from validation.bench.rigid.deposition import bed_poured, pairs_touching
 
 Floats = NDArray[np.float64]

@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigid_lcp.equations import body_space
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.equations import body_space
+from rigid_lcp.scene.simulation import Simulation
 from validation.bench.rigid.scenes import arch
 
 BALANCED = 1e-9

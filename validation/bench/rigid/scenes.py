@@ -11,12 +11,12 @@ from math import cos, pi, sin, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.disc import Disc
-from rigid_lcp.half_space import HalfSpace
-from rigid_lcp.motion import Motion
-from rigid_lcp.polygon import Polygon
-from rigid_lcp.scene import Scene
-from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.motion.state import Motion
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.simulation import Method, Simulation
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.polygon import Polygon
 
 Floats = NDArray[np.float64]
 G = 9.81

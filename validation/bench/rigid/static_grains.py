@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.friction_problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

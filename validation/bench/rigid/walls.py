@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.friction_problem import BODY_SIZE, BodySpace
+from rigid_lcp.friction.problem.definition import BODY_SIZE, BodySpace
 from validation.bench.rigid.packings import contact_jacobian
 
 Floats = NDArray[np.float64]

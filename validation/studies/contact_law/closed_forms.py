@@ -2,7 +2,7 @@
 
 Symbols as in Chung and Ooi (2011): V_n, V_t speeds of approach of the contact point along normal
 and tangent, omega spin, mu friction, e restitution; primes mark what is after the impact.  Hertz'
-collision itself is `adapters.contact_law.hertz_collision`.  Between rebound without sliding and
+collision itself is `adapters.bed.hertz_collision`.  Between rebound without sliding and
 rebound that slides all the time there is no closed form for a spring that stiffens: there an
 engine's own law is integrated, in units of m*, V_n and the stiffness of eq. 5.
 """
@@ -14,9 +14,9 @@ from math import gamma, sqrt
 
 import numpy as np
 
-from adapters import contact_law
-from adapters.contact_law import CONTACT_TIME_FACTOR, DAMPING_FACTOR
-from adapters.state import FloatArray
+from adapters.bed import contact_law
+from adapters.bed.contact_law import CONTACT_TIME_FACTOR, DAMPING_FACTOR
+from adapters.bed.state import FloatArray
 from validation.studies.contact_law.engine_runs import law_damps, law_pulls
 
 

@@ -16,13 +16,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from adapters.contact_law import DAMPING_FACTOR, damping_of_rebound, restitution_of_alpha
-from adapters.dump import dump_frames
-from adapters.engine_lammps import LammpsEngine
-from adapters.engine_liggghts import LiggghtsEngine
-from adapters.engine_yade import PARAMETERS, YadeEngine
-from adapters.scene import Scene
-from adapters.state import FloatArray
+from adapters.bed.contact_law import DAMPING_FACTOR, damping_of_rebound, restitution_of_alpha
+from adapters.bed.state import FloatArray
+from adapters.engines.lammps import LammpsEngine
+from adapters.engines.liggghts import LiggghtsEngine
+from adapters.engines.yade import PARAMETERS, YadeEngine
+from adapters.files.dump import read_frames
+from adapters.scene.tables import Scene
 from validation.bench import few_grains, few_grains_lammps
 from validation.bench.few_grains_lammps import VECTORS
 
@@ -197,7 +197,7 @@ def run_by_deck(
                 deck.format(every=every, time_step=time_step, columns=columns, lines=lines)
             )
             engine.run(scene, "in.impacts", folder, lambda: None, digests)
-            frames = list(dump_frames(folder / states))
+            frames = list(read_frames(folder / states))
         time = time_step * np.array([frame.time_step for frame in frames])
         vectors = (np.array([f.block(*names.split()) for f in frames]) for names in VECTORS)
         return Motion(time, *vectors)
@@ -227,7 +227,7 @@ def run_by_script(edit: Callable[[str], str]) -> ImpactRun:
             (folder / PARAMETERS).write_text(edit(json.dumps(content)))
             (folder / "impacts.py").write_text(YADE_SCRIPT)
             engine.run(scene, "impacts.py", folder, lambda: None, digests)
-            frames = list(dump_frames(folder / "states.dump"))
+            frames = list(read_frames(folder / "states.dump"))
             force = np.loadtxt(folder / "force.txt").reshape(-1, count, 3)
         time = time_step * np.array([frame.time_step for frame in frames])
         position, velocity, spin = (

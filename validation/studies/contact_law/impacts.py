@@ -7,9 +7,9 @@ from math import pi
 
 import numpy as np
 
-from adapters import contact_law
-from adapters.scene import Scene
-from adapters.state import FloatArray
+from adapters.bed import contact_law
+from adapters.bed.state import FloatArray
+from adapters.scene.tables import Scene
 from validation.bench.few_grains import table_1
 from validation.studies.contact_law.engine_runs import Motion, Start, impact_run, restitution_given
 from validation.studies.contact_law.settings import RIGID, STEPS, Setting

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from adapters import contact_law
-from adapters.engine import engine_named
-from adapters.state import FloatArray
+from adapters.bed import contact_law
+from adapters.bed.state import FloatArray
+from adapters.engines.contract import get_engine
 from validation.case import Check
 from validation.studies.contact_law.closed_forms import (
     contact_time,
@@ -323,7 +323,7 @@ def measure_engine(engine: str) -> Row:
         {"name": check.name, "value": check.value, "bar": check.bar, "ok": bool(check.ok)}
         for check in checks
     ]
-    return {"checks": told, "impulses": impulses, "engine": engine_named(engine).version()}
+    return {"checks": told, "impulses": impulses, "engine": get_engine(engine).version()}
 
 
 PARTS: dict[str, Callable[[], Row]] = {

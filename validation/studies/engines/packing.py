@@ -7,16 +7,21 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.checks import check_state, check_window
-from adapters.engine import Engine, EngineStart, engine_named
-from adapters.engine_lammps import LammpsEngine
-from adapters.overlaps import neighbours
-from adapters.radii import radii_sample
-from adapters.sample import SURFACE_SHARE, bed_height, relative_density, sample_start
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray
-from adapters.window import Window, state_read, window_read
+from adapters.bed.overlaps import neighbours
+from adapters.bed.radii import sample_radii
+from adapters.bed.sample import (
+    SURFACE_SHARE,
+    draw_sample_start,
+    measure_bed_height,
+    relative_density,
+)
+from adapters.bed.state import FloatArray
+from adapters.engines.contract import Engine, EngineStart, get_engine
+from adapters.engines.lammps import LammpsEngine
+from adapters.files.window import Window, read_state, read_window
+from adapters.procedure.checks import check_state, check_window
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
 
 CYCLES = 50
@@ -52,7 +57,7 @@ class Way:
 
     def made(self) -> Engine:
         """The engine itself."""
-        return LammpsEngine(self.rule) if self.rule else engine_named(self.engine)
+        return LammpsEngine(self.rule) if self.rule else get_engine(self.engine)
 
     def scene(self, seed: int) -> Scene:
         """The scene of the bed of a seed, as this way has it."""
@@ -97,7 +102,7 @@ class Figures:
 
 def bed_scene(seed: int, *settings: str) -> Scene:
     """The coarse scene of a seed under `SETTINGS` and more."""
-    return scene_load(scene_path("karrech-coarse"), [*SETTINGS, f"sample.seed={seed}", *settings])
+    return load_scene(scene_path("karrech-coarse"), [*SETTINGS, f"sample.seed={seed}", *settings])
 
 
 def measure_window(window: Window, start: FloatArray, scene: Scene) -> Figures:
@@ -107,7 +112,7 @@ def measure_window(window: Window, start: FloatArray, scene: Scene) -> Figures:
     """
     mean_height = window.position[:, :, 2].mean(axis=1)
     curve = mean_height[0] - mean_height
-    top = SURFACE_SHARE * bed_height(start, window.radius)
+    top = SURFACE_SHARE * measure_bed_height(start, window.radius)
     walls = scene.container.walls()
     pairs, density = [], []
     for position in window.position[-LAST:]:
@@ -128,15 +133,15 @@ def measure_window(window: Window, start: FloatArray, scene: Scene) -> Figures:
 def rain_bed(seed: int, folder: Path) -> tuple[FloatArray, FloatArray]:
     """Positions (n, 3) and radii (n,) [m] of the settled bed of a seed, by LIGGGHTS' rain."""
     scene = bed_scene(seed, 'engine.name="liggghts"')
-    radius = radii_sample(scene.sample.grain_radius.law, scene.grain_count, seed)
-    position, height = sample_start(
+    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, seed)
+    position, height = draw_sample_start(
         radius, scene.container, scene.sample.relative_density_start, seed
     )
-    engine = engine_named("liggghts")
+    engine = get_engine("liggghts")
     folder.mkdir(parents=True)
     decks = engine.write_preparation(scene, position, radius, height, folder)
     engine.run(scene, "in.prepare", folder, lambda: None, decks)
-    return state_read(folder, engine.wall_names(scene, piston=False)).position, radius
+    return read_state(folder, engine.wall_names(scene, piston=False)).position, radius
 
 
 def run_way(
@@ -162,14 +167,14 @@ def run_way(
     decks = engine.write_preparation(scene, position, radius, top, settled)
     leave_out_pull(way, settled)
     rest = engine.run(scene, "in.prepare", settled, lambda: None, decks)
-    state = state_read(settled, engine.wall_names(scene, piston=False))
+    state = read_state(settled, engine.wall_names(scene, piston=False))
     check_state(scene, state)
     face = float((state.position[:, 2] + radius).max())
     begin = EngineStart(settled / "end.restart", state.time_step, 0, face, first=True)
     decks = engine.write_cycles(scene, begin, cycles, loaded)
     leave_out_pull(way, loaded)
     done = engine.run(scene, "in.cycles", loaded, lambda: None, decks)
-    window = window_read(loaded, 0, engine.wall_names(scene, piston=True), face)
+    window = read_window(loaded, 0, engine.wall_names(scene, piston=True), face)
     check_window(scene, window, cycles)
     common = bed_scene(seed, 'engine.name="liggghts"')
     figures = measure_window(window, start, common if way.engine == "yade" else scene)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from adapters.state import FloatArray
+from adapters.bed.state import FloatArray
 from validation.study import mean_interval
 
 Row = dict[str, Any]

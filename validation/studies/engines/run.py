@@ -10,9 +10,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from adapters.engine import engine_named
+from adapters.bed.state import FloatArray
+from adapters.engines.contract import get_engine
 from adapters.errors import TrackbedError
-from adapters.state import FloatArray
 from validation.studies.engines.packing import SEEDS, WAYS, Way, rain_bed, run_way
 from validation.studies.engines.speed import (
     count_contacts,
@@ -71,7 +71,7 @@ def time_engine(engine: str, tiles: tuple[int, int], repeat: int) -> Row:
         "steps_cpu_s": cost,
         "start_up_s": runs[0][0] - cost * short / (long - short),
         "contacts_per_grain": count_contacts(runs[1][1]),
-        "engine": engine_named(engine).version(),
+        "engine": get_engine(engine).version(),
     }
 
 

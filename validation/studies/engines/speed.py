@@ -14,16 +14,16 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from adapters.dump import dump_frames
-from adapters.engine import engine_named
-from adapters.engine_process import engine_failure, process_run
+from adapters.bed.sample import GRAVITY, pairs_in_contact
+from adapters.bed.state import FloatArray, load_state
+from adapters.engines.contract import get_engine
+from adapters.engines.process import explain_engine_failure, run_process
 from adapters.errors import NotCredible
-from adapters.procedure import run_scene
-from adapters.progress import Progress
-from adapters.sample import GRAVITY, pairs_in_contact
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray, state_load
+from adapters.files.dump import read_frames
+from adapters.procedure.progress import Progress
+from adapters.procedure.run import run_scene
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 
 COLUMNS = "id x y z vx vy vz radius mass"
 
@@ -114,7 +114,7 @@ def scene_of_tiles(engine: str, tiles: tuple[int, int], more: str = "", **materi
     with TemporaryDirectory() as temporary:
         path = Path(temporary) / "bed.toml"
         path.write_text(write_scene(engine, tiles, **material) + more)
-        return scene_load(path)
+        return load_scene(path)
 
 
 def write_scene(engine: str, tiles: tuple[int, int], **material: float) -> str:
@@ -137,7 +137,7 @@ def settle_tile(work: Path, young: float = TABLE_1["young"]) -> tuple[FloatArray
         path = work / "tile.toml"
         path.write_text(write_scene("auto", (1, 1), **MIRROR, young=young))
         run_scene(path, folder, progress=Progress(quiet=True))
-    state = state_load(folder / "preparation" / "state.npz")
+    state = load_state(folder / "preparation" / "state.npz")
     return state.position, state.radius
 
 
@@ -173,16 +173,16 @@ def run_bed(
     Centres [m], shape (n, 3), radii [m], shape (n,).  Raises `EngineFailed`, and `NotCredible` when
     the bed fell apart.
     """
-    engine = engine_named(scene.engine.name)
+    engine = get_engine(scene.engine.name)
     folder.mkdir(parents=True)
     height = float((position[:, 2] + radius).max())
     engine.write_preparation(scene, position, radius, height, folder)
     name = "speed.py" if engine.name == "yade" else "in.speed"
     (folder / name).write_text(write_deck(engine.name, steps))
-    status, cpu_s, _ = process_run(engine.command(scene, name), folder, lambda: None)
+    status, cpu_s, _ = run_process(engine.command(scene, name), folder, lambda: None)
     if status != 0:
-        raise engine_failure(status, folder)
-    (frame,) = dump_frames(folder / "end.dump")
+        raise explain_engine_failure(status, folder)
+    (frame,) = read_frames(folder / "end.dump")
     check_end(frame.values, len(radius))
     return cpu_s, frame.values
 

@@ -1,6 +1,7 @@
 """Known up to N_c cycles, what is the settlement at 10 N_c, and how far is that wrong?
 
-**Question.** Which law of settlement, alone or by the votes of `adapters.fit_auto`, errs least ten
+**Question.** Which law of settlement, alone or by the votes of `adapters.laws.fit.outlook`, errs
+least ten
 times ahead, does its band hold the truth, and does it refuse what no slow law can tell?
 
 **Answer.** docs/laws.md.

@@ -7,8 +7,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from adapters.fit_refusal import UNCERTAIN
-from adapters.fit_regime import WHY_NOT
+from adapters.laws.fit.refusal import UNCERTAIN
+from adapters.laws.fit.regime import WHY_NOT
 from validation.studies.laws.bars import check_bars
 from validation.studies.laws.run import LAWS, MEMBERS, REGIME_CUTS
 from validation.study import format_checks, format_table

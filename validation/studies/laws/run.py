@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from adapters.bed.state import FloatArray
 from adapters.errors import UsageError
-from adapters.fit_auto import outlook
-from adapters.fit_refusal import UNCERTAIN, failure, refusals
-from adapters.fit_regime import REGIMES
-from adapters.laws import law_named
-from adapters.state import FloatArray
+from adapters.laws import get_law
+from adapters.laws.fit.outlook import outlook
+from adapters.laws.fit.refusal import UNCERTAIN, failure, refusals
+from adapters.laws.fit.regime import REGIMES
 from validation.studies.laws.series import (
     OTHER_CUTS,
     REACH,
@@ -55,7 +55,7 @@ def data_folder() -> Path:
 
 def predict_by_law(name: str) -> Callable[[LawCase], float]:
     """Last reading and the increment of one law fitted to all readings."""
-    law = law_named(name)
+    law = get_law(name)
 
     def predict(case: LawCase) -> float:
         parameters = law.fit(case.cycle, case.settlement)
@@ -236,7 +236,7 @@ def time_many_grains(grains: int = 1000, cycles: int = 50) -> Row:
     displacement = np.log(cycle)[:, None, None] + noise
     cost: dict[str, float] = {}
     for name in ("log", "hyperbolic", "stretched-exponential"):
-        law, seconds = law_named(name), []
+        law, seconds = get_law(name), []
         for _ in range(3):
             start = time.process_time()
             law.fit(cycle, displacement)

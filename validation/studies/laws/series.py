@@ -3,7 +3,8 @@
 A case is what is known up to about a cycle N_c and the value at ``REACH`` times the last known
 cycle.  Real ballast is read from the folder that TRACKBED_DATA names: 12 cyclic triaxial tests on
 ballast (Sun, Indraratna and Nimbalkar 2016, digitised in erolsson/railway_ballast).  Nothing in
-`adapters.fit_auto` was fitted to any of them; the families are drawn with a seed that no choice was
+`adapters.laws.fit.outlook` was fitted to any of them; the families are drawn with a seed that no
+choice was
 made on.
 """
 
@@ -15,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from adapters.state import FloatArray
+from adapters.bed.state import FloatArray
 
 REACH = 10.0
 """Predicted over last known cycle."""

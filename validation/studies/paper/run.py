@@ -8,13 +8,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from adapters.laws import law_named
-from adapters.overlaps import neighbours
-from adapters.relaxation import relax
-from adapters.relaxation_measured import RelaxationNotConverged
-from adapters.residual import error_of_coordinates, error_of_displacement
-from adapters.scene_file import scene_load
-from adapters.state import FloatArray, State
+from adapters.bed.overlaps import neighbours
+from adapters.bed.state import FloatArray, State
+from adapters.laws import get_law
+from adapters.laws.fit.residual import measure_coordinates_error, measure_displacement_error
+from adapters.relaxation.measured import RelaxationNotConverged
+from adapters.relaxation.methods import relax
+from adapters.scene.file import load_scene
 from trackbed.scenes import scene_path
 from validation.studies.laws.run import data_folder
 
@@ -42,7 +42,7 @@ def judge_jump(position: FloatArray, twin: FloatArray, k_i: int, k: int, h: int)
     window = position[k_i : k_i + k + 1]
     estimates = {NOTHING: first}
     for name in LAWS:
-        law = law_named(name)
+        law = get_law(name)
         rows = slice(law.first_state, None)
         parameters = law.fit(cycle[rows], window[rows] - position[0])
         estimates[name] = first + law.increment(parameters, cycle[-1], cycle[-1] + h)
@@ -50,9 +50,9 @@ def judge_jump(position: FloatArray, twin: FloatArray, k_i: int, k: int, h: int)
         estimates[OTHER] = first + twin[k_i + k + h] - twin[k_i + k]
     errors = {
         name: (
-            error_of_coordinates(last, estimate),
-            error_of_displacement(position[0], last, estimate),
-            error_of_displacement(first, last, estimate),
+            measure_coordinates_error(last, estimate),
+            measure_displacement_error(position[0], last, estimate),
+            measure_displacement_error(first, last, estimate),
         )
         for name, estimate in estimates.items()
     }
@@ -78,7 +78,7 @@ def relax_cell() -> Row:
     Eight equal grains at the corners of a cube touch the one in its middle, far from any wall.  The
     paper's method holds the eight, its frontier.
     """
-    scene = scene_load(scene_path("karrech"))
+    scene = load_scene(scene_path("karrech"))
     radius, walls = np.full(9, scene.sample.grain_radius.mean), scene.container.walls()
     corners = np.array(list(product((-1, 1), repeat=3))) / np.sqrt(3)
     middle = np.array([[0.03, 0.03, 0.03]])

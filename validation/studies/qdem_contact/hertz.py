@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 import qdem_fem as q
-from qdem_fem.errors import NotConverged
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import NotConverged
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem.checks import orders, reported
 from validation.bench.qdem.judge import stiffness
 from validation.case import Check
@@ -46,7 +46,7 @@ CLOSED_FORCE = (
 
 def cap_mesh(cells: int, across: int) -> tuple[Floats, NDArray[np.int64]]:
     """A block over the paraboloid ``z = r^2/(2 R)``, ``across`` cells from side to side; [m]."""
-    mesh = box_mesh((2.0, 2.0, 1.0), (across, across, cells), "kuhn", (-1.0, -1.0, 0.0))
+    mesh = make_box_mesh((2.0, 2.0, 1.0), (across, across, cells), "kuhn", (-1.0, -1.0, 0.0))
     s = mesh.nodes
     graded = s * (1 + GRADE * np.abs(s)) / (1 + GRADE)
     nodes = SIZE * graded

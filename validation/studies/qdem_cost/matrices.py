@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from qdem_fem.errors import LibraryMissing
-from qdem_fem.ordering import order_for_locality
+from qdem_fem.files.errors import LibraryMissing
+from qdem_fem.kernel.cpu.ordering import order_for_locality
 from validation.bench.qdem.judge import FloatArray, IntArray, lumped_mass, stiffness
 
 ENVIRONMENT = {"MKL_DYNAMIC": "FALSE", "OMP_DYNAMIC": "FALSE", "MKL_THREADING_LAYER": "INTEL"}

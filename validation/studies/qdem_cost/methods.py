@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import eigsh
 
 import qdem_fem as q
-from qdem_fem.ordering import order_for_locality
+from qdem_fem.kernel.cpu.ordering import order_for_locality
 from validation.bench.qdem.judge import factorised, lame, lumped_mass, stiffness
 from validation.studies.qdem_cost.questions import BEAM, LOAD, Question, bar_mesh, end_middle
 

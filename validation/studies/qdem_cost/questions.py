@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from qdem_fem.mesh import TetMesh
-from qdem_fem.mesh_generation import box_mesh
-from qdem_fem.surface import faces_within, pressure_forces, surface_faces
+from qdem_fem.mesh.generation import make_box_mesh
+from qdem_fem.mesh.surface import find_faces_within, find_surface_faces, pressure_forces
+from qdem_fem.mesh.tetrahedra import TetMesh
 from validation.bench.qdem.closed_forms import CONCRETE_BEAM
 
 FloatArray = NDArray[np.float64]
@@ -79,7 +79,7 @@ class Question:
             force = np.zeros_like(mesh.nodes)
             force[loaded, 2] = LOAD / loaded.sum()
             return force
-        faces = faces_within(surface_faces(mesh.elements), loaded)
+        faces = find_faces_within(find_surface_faces(mesh.elements), loaded)
         return self.amplitude * pressure_forces(mesh.nodes, faces, len(mesh.nodes))
 
     def error(self, times: FloatArray, displacement: FloatArray, wanted: FloatArray) -> float:
@@ -109,7 +109,7 @@ QUESTIONS = {question.name: question for question in (BENDING, TRAVEL)}
 
 def bar_mesh(cells: list[int]) -> TetMesh:
     """The bar in five tetrahedra a cell."""
-    return box_mesh(SIZE, (cells[0], cells[1], cells[2]), "five")
+    return make_box_mesh(SIZE, (cells[0], cells[1], cells[2]), "five")
 
 
 def end_middle(nodes: FloatArray) -> int:

@@ -22,8 +22,8 @@ import numpy as np
 from numba import njit, prange, set_num_threads
 
 import qdem_fem as q
-from qdem_fem.errors import LibraryMissing
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.files.errors import LibraryMissing
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem_gpu.beam import FORCE, MATERIAL, SIZE
 from validation.studies.qdem_cost.matrices import (
     ENVIRONMENT,
@@ -103,7 +103,7 @@ def start_matrix(one: Contestant, nodes: Any, elements: Any) -> tuple[Callable[[
 
 def measure_speed(one: Contestant, cells: tuple[int, int, int]) -> dict[str, float]:
     """Million elements times steps a second of wall, and where the tip is after the warm-up [m]."""
-    mesh = box_mesh(SIZE, cells, "five")
+    mesh = make_box_mesh(SIZE, cells, "five")
     start = start_qdem if one.who == "qdem" else start_matrix
     advance, displacement = start(one, mesh.nodes, mesh.elements)
     tip = float(displacement()[np.isclose(mesh.nodes[:, 0], SIZE[0]), 2].mean())

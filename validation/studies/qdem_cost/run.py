@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.mesh_generation import box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 from validation.bench.qdem_gpu.beam import SIZE
 from validation.studies.qdem_cost.methods import Answer, answer_by
 from validation.studies.qdem_cost.questions import QUESTIONS
@@ -92,7 +92,7 @@ def ask(question: str) -> Row:
 
 def race_kernels() -> Row:
     """The race, and the bandwidth that a step would need at least."""
-    mesh = box_mesh(SIZE, RACE_CELLS, "five")
+    mesh = make_box_mesh(SIZE, RACE_CELLS, "five")
     return {
         "elements": len(mesh.elements),
         "bytes_per_element": bytes_per_element(len(mesh.elements), len(mesh.nodes)),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from validation.bench.qdem.checks import checks_of
+from validation.bench.qdem.checks import list_checks
 from validation.case import Check
 from validation.studies.qdem_track.bogie import FRICTIONS
 from validation.study import Row
@@ -17,7 +17,7 @@ STALE = "made before grains were scattered as they begin to fall; not what the c
 
 def check_bars(rows: Sequence[Row]) -> list[Check]:
     """Every figure of the record, judged anew."""
-    checks = checks_of(rows, PAGE)
+    checks = list_checks(rows, PAGE)
     for row in rows:
         for friction in FRICTIONS if "runs" in row else ():
             name = f"300 grains, friction {friction:g}: missing in the account of energies, worst"

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.errors import UsageError
-from qdem_fem.load_train import Train
-from qdem_fem.mesh_checks import FloatArray
-from qdem_fem.output import table_read
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.spectra import fourier_spectrum, parzen_smoothed
-from qdem_fem.track_figures import BANDWIDTH, GRAINS, HIGHEST, acceleration_spectrum, mobility
-from qdem_fem.track_scene import TrackPrepared, TrackScene
-from qdem_fem.track_table import BogieTable
+from qdem_fem.files.errors import UsageError
+from qdem_fem.files.output import table_read
+from qdem_fem.mesh.checks import FloatArray
+from qdem_fem.report.spectra import fourier_spectrum, parzen_smoothed
+from qdem_fem.report.track import BANDWIDTH, GRAINS, HIGHEST, acceleration_spectrum, mobility
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.track.enter import TrackPrepared, TrackScene
+from qdem_fem.track.loads.train import Train
+from qdem_fem.track.table import BogieTable
 from validation.studies.qdem_track.trials import run_scene
 
 SCENE = Path(__file__).parents[3] / "trackbed" / "scenes" / "track-small.toml"
@@ -56,7 +56,7 @@ def measure_packing(folder: Path, seed: int, friction: float) -> dict[str, Any]:
     """One run of a packing: points, and smoothed spectra of load, sleeper and a grain."""
     path = folder / SCENE.name
     path.write_text(SCENE.read_text(encoding="utf-8"), encoding="utf-8")
-    prepared = scene_load(path, [
+    prepared = load_scene(path, [
         f"track.seed={seed}", f"track.bed=bed-{seed}.npz", f"contact.friction={friction}"
     ])  # fmt: skip
     assert isinstance(prepared, TrackPrepared)

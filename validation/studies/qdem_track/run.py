@@ -8,11 +8,11 @@ import warnings
 from itertools import product
 from pathlib import Path
 
-from qdem_fem.errors import StepWarning
-from qdem_fem.scene_checks import scene_load
-from qdem_fem.track_bed import STAGES, bed_read
-from qdem_fem.track_scene import TrackPrepared, contact_of
-from qdem_fem.track_stand import bed_begin
+from qdem_fem.files.errors import StepWarning
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.track.bed import STAGES, bed_read
+from qdem_fem.track.enter import TrackPrepared, contact_of
+from qdem_fem.track.stand import begin_bed
 from validation.bench.qdem.checks import figures_row, reported
 from validation.studies.qdem_track.bogie import FRICTIONS, SCENE, SEEDS, measure_packing
 from validation.studies.qdem_track.trials import (
@@ -44,7 +44,7 @@ def packings() -> Row:
 
 def paper_scale() -> Row:
     """A step of the paper's track from its bed at rest, one thread, all bodies deformable."""
-    prepared = scene_load(SCENE.with_name("track.toml"))
+    prepared = load_scene(SCENE.with_name("track.toml"))
     assert isinstance(prepared, TrackPrepared)
     recipe = prepared.recipe
     bed = bed_read(prepared.bed_file, recipe)
@@ -53,7 +53,7 @@ def paper_scale() -> Row:
             f"{prepared.bed_file} is at stage {bed.stage}: trackbed qdem goes on there"
         )
     table = prepared.scene.simulation
-    run = bed_begin(
+    run = begin_bed(
         recipe, bed, contact_of(prepared), strain=table.strain, step=table.step,
         safety=table.safety, threads=1, mass_scaling=table.mass_scaling,
     )[0]  # fmt: skip

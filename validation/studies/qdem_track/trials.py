@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.energy_account import energy_facts
-from qdem_fem.output import table_read
-from qdem_fem.run_folder import RunFolder
-from qdem_fem.scene_build import simulation_of
-from qdem_fem.scene_run import run_dynamic
-from qdem_fem.track_bed import bed_prepare
-from qdem_fem.track_figures import track_facts
-from qdem_fem.track_scene import TrackPrepared
+from qdem_fem.files.output import table_read
+from qdem_fem.report.track import list_track_facts
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.energy_account import list_energy_facts
+from qdem_fem.scene.run import run_dynamic
+from qdem_fem.scene.run_folder import RunFolder
+from qdem_fem.track.bed import bed_prepare
+from qdem_fem.track.enter import TrackPrepared
 from validation.bench.qdem.checks import reported
 from validation.bench.track_trials import scene_at
 from validation.case import Check
@@ -41,9 +41,9 @@ class Trial:
     """A run from a prepared bed to its end."""
 
     facts: dict[str, Any]
-    """`track_facts`"""
+    """`list_track_facts`"""
     energy: dict[str, float]
-    """`energy_facts`"""
+    """`list_energy_facts`"""
     rests: dict[str, dict[str, float]]
     step: float
     """[s]"""
@@ -59,8 +59,8 @@ def run_scene(prepared: TrackPrepared, folder: Path) -> Trial:
     with place.locked():
         done = run_dynamic(prepared, run, bodies, place, resume=False, progress=Quiet())
     return Trial(
-        facts=track_facts(place.path, prepared.load),
-        energy=energy_facts(table_read(place.path / "energy.csv")),
+        facts=list_track_facts(place.path, prepared.load),
+        energy=list_energy_facts(table_read(place.path / "energy.csv")),
         rests=bed_prepare(prepared.recipe, prepared.bed_file).rests,
         step=run.step,
         cpu=done.cost["cpu_s"],

@@ -2,6 +2,6 @@
 
 from functools import partial
 
-from validation.bench.qdem.checks import checks_of
+from validation.bench.qdem.checks import list_checks
 
-check_bars = partial(checks_of, page="docs/qdem-validation.md")
+check_bars = partial(list_checks, page="docs/qdem-validation.md")

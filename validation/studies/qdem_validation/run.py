@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.mesh_generation import Pattern
+from qdem_fem.mesh.generation import Pattern
 from validation.bench.qdem import judge
 from validation.bench.qdem.checks import below, figures_row, near, reported
 from validation.bench.qdem.closed_forms import cantilever_frequencies

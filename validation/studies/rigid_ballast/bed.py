@@ -10,10 +10,10 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.motion import Motion, motion_with_rates
-from rigid_lcp.scene import Scene, world_of
-from rigid_lcp.scene_file import loads_of, scene_build, scene_read
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.state import Motion, replace_rates
+from rigid_lcp.motion.world import Scene, make_world
+from rigid_lcp.scene.file import loads_of, scene_build, scene_read
+from rigid_lcp.scene.simulation import Simulation
 from validation.studies.rigid_ballast.soft import soft_advance, soft_grains
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ def prepare_bed(seed: int) -> tuple[Scene, Motion]:
     scene = scene_build(file)
     run = Simulation(scene, step=PREPARED_STEP, tolerance=PREPARED_TOLERANCE, loads=loads_of(file))
     run.advance(TAMPED)
-    return scene, motion_with_rates(run.motion, 0 * run.motion.rates)
+    return scene, replace_rates(run.motion, 0 * run.motion.rates)
 
 
 def load_at(time: Floats | float) -> Floats:
@@ -76,7 +76,7 @@ def sleeper_of(scene: Scene) -> int:
 
 def overlap_of(scene: Scene, motion: Motion) -> float:
     """Greatest overlap of any two bodies in a state [m]."""
-    return max(0.0, -float(world_of(scene)[0].contacts(motion, 0.0).gap.min(initial=0.0)))
+    return max(0.0, -float(make_world(scene)[0].contacts(motion, 0.0).gap.min(initial=0.0)))
 
 
 def load_rigid(
@@ -111,7 +111,7 @@ def load_soft(
     scene: Scene, start: Motion, cycles: int, stiffness: float, share: float
 ) -> Iterator[Moment]:
     """The same load cycles by soft grains of normal stiffness ``stiffness`` [N/m]."""
-    world = world_of(scene)[0]
+    world = make_world(scene)[0]
     run = soft_grains(world, start, stiffness, FRICTION, share)
     body, spent = sleeper_of(scene), 0.0
     for part in range(2 * cycles + 1):

@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 from rigid_lcp.errors import RigidError
-from rigid_lcp.motion import Motion
-from rigid_lcp.scene import Scene
+from rigid_lcp.motion.state import Motion
+from rigid_lcp.motion.world import Scene
 from validation.studies.rigid_ballast.bed import Moment, load_rigid, load_soft, prepare_bed
 from validation.studies.rigid_ballast.soft import STEP_SHARE
 from validation.studies.rigid_ballast.space import measure_space

@@ -1,6 +1,7 @@
 """The rival: soft grains (Molecular Dynamics) of the same polygons, contacts and loads.
 
-Geometry and contact points are those of `rigid_lcp.detection_2d`; only the law differs.  At every
+Geometry and contact points are those of `rigid_lcp.contact.detection_plane`; only the law differs.
+At every
 contact point with overlap ``d = -gap`` and velocity u of body a over body b
 
     f_N = max(0, k d - c u_N)        spring and dashpot, no tension
@@ -19,10 +20,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigid_lcp.detection_2d import Shapes2D, pair_contacts, shapes_2d, widest_face
-from rigid_lcp.motion import Motion
-from rigid_lcp.near_pairs import HALF_SPACE, POLYGON, bounding_boxes, near_pairs, place_shapes
-from rigid_lcp.scene import World
+from rigid_lcp.contact.detection_plane import Shapes2D, pair_contacts, shapes_2d, widest_face
+from rigid_lcp.contact.near_pairs import HALF_SPACE, POLYGON, bound_shapes, near_pairs, place_shapes
+from rigid_lcp.motion.state import Motion
+from rigid_lcp.motion.world import World
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -123,7 +124,7 @@ def pairs_listed(
 ) -> Ints:  # fmt: skip
     """Pairs of bodies that are nearer than ``skin`` [m], a lower bound of their distance taken."""
     margin = np.full(len(kind), 0.5 * skin)
-    boxes = bounding_boxes(first, vertices, radius, position, margin)
+    boxes = bound_shapes(first, vertices, radius, position, margin)
     pairs = near_pairs(kind, boxes, movable)
     near = np.zeros(len(pairs), dtype=np.bool_)
     for row in range(len(pairs)):

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.motion import Motion
-from rigid_lcp.polyhedron import box
-from rigid_lcp.rotations import rotate
-from rigid_lcp.scene import Scene
-from rigid_lcp.scene_file import scene_build, scene_read
-from rigid_lcp.simulation import Simulation
+from rigid_lcp.motion.state import Motion
+from rigid_lcp.motion.world import Scene
+from rigid_lcp.scene.file import scene_build, scene_read
+from rigid_lcp.scene.simulation import Simulation
+from rigid_lcp.shapes.polyhedron import box
+from rigid_lcp.shapes.rotations import rotate
 
 SCENE = Path(__file__).parents[3] / "trackbed" / "scenes" / "sleeper-3d.toml"
 STONES, BLOCK = 100, (0.12, 0.09, 0.06)

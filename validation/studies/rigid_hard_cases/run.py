@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.errors import NoSolution, RigidError
-from rigid_lcp.simulation import Method, Simulation
+from rigid_lcp.scene.simulation import Method, Simulation
 from validation.bench.rigid import hard_scenes as hard
 from validation.bench.rigid import scenes
 from validation.bench.rigid.rest_limit import arch_limit

@@ -1,7 +1,8 @@
 """Statically indeterminate grains: are the forces of the rigid limit those of ever stiffer springs?
 
 Question: rigid grains with more contact forces than equations of balance have many forces that
-fit; are those of the direct limit (`rigid_lcp.elastic_limit`) the ones molecular dynamics tends to,
+fit; are those of the direct limit (`rigid_lcp.unique.elastic_limit`) the ones molecular dynamics
+tends to,
 do order and start matter, and what do they cost?
 Answer: without friction, and where contacts stick, springs differ by 1/k until round-off; where
 contacts slide, springs keep what slid on the way, and may rest in another state.

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.elastic_limit import elastic_limit, state_reached_from
-from rigid_lcp.friction_problem import FrictionProblem
-from rigid_lcp.micro_displacements import micro_displacements
+from rigid_lcp.friction.problem.definition import FrictionProblem
+from rigid_lcp.unique.elastic_limit import elastic_limit, relax_from
+from rigid_lcp.unique.micro_displacements import micro_displacements
 from validation.bench.rigid.static_grains import Grains, beam, groove, pyramid, renumbered, wedge
 from validation.studies.rigid_indeterminacy.liggghts import liggghts_rest, liggghts_there
 from validation.studies.rigid_indeterminacy.springs import springs_rest
@@ -133,7 +133,7 @@ def measure_scene(scene: Scene) -> Row:
         run = keep(SPRINGS, began, rest.force, stiffness=stiffness, ramp=ramp)
         if scene.slides and ramp >= SLOW:
             # whether the springs' forces are those of another state of eq. 38
-            other = state_reached_from(problem, stiffness * weight * rest.displacement).r
+            other = relax_from(problem, stiffness * weight * rest.displacement).r
             run["other_state"] = float(np.abs(other - answer.r).max()) / weight
             run["from_it"] = float(np.abs(rest.force.ravel() - other).max()) / weight
         if scene.discs and liggghts_there():

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from rigid_lcp.friction_problem import FrictionProblem
+from rigid_lcp.friction.problem.definition import FrictionProblem
 
 Floats = NDArray[np.float64]
 SHIFT = 1e-9

@@ -29,7 +29,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.friction_problem import FrictionProblem, friction_problem
+from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
 from validation.studies.rigid_solvers.newton import newton_polish
 
 Floats = NDArray[np.float64]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from adapters.jump_schedule import jump_lengths
-from adapters.procedure import CONTROL
-from adapters.sample import GRAVITY
-from adapters.scene import Scene
-from adapters.scene_file import scene_load
-from adapters.stages import Variant
+from adapters.bed.sample import GRAVITY
+from adapters.jumps.schedule import schedule_jumps
+from adapters.procedure.run import CONTROL
+from adapters.procedure.stages import Variant
+from adapters.scene.file import load_scene
+from adapters.scene.tables import Scene
 from trackbed.scenes import scene_path
 
 STEP = 1e-10
@@ -46,7 +46,7 @@ class Kind:
         total = "procedure.total_cycles"
         if not any(key.startswith(total) for key in settings):
             own.append(f"{total}={self.end}")
-        return scene_load(scene_path(self.scene_name), [*self.settings, *own, *settings])
+        return load_scene(scene_path(self.scene_name), [*self.settings, *own, *settings])
 
 
 CONFINED = Kind("confined", "paper's bed: 1,085 grains", "karrech", (), 3, 2, 50, 500)
@@ -84,7 +84,7 @@ class Method:
         if not any(key.startswith("procedure.tolerance") for key in self.settings):
             h: int | list[int] = 0
             if self.jumps:
-                h = jump_lengths(self.jumps, kind.last, kind.k_i, window, 5, self.growing)
+                h = schedule_jumps(self.jumps, kind.last, kind.k_i, window, 5, self.growing)
             keys += [f"procedure.k={window}", f"procedure.h={h}"]
         return kind.scene(seed, *keys)
 

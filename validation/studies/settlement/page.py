@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from adapters.report_history import cost_total
-from adapters.state import FloatArray
+from adapters.bed.state import FloatArray
+from adapters.procedure.history import sum_cost
 from validation.studies.settlement.bars import check_bars
 from validation.studies.settlement.beds import EVERY, KINDS, LAWS, Kind, list_methods
 from validation.studies.settlement.reading import (
@@ -143,7 +143,7 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
         }
     engines = ", ".join(dict.fromkeys(row["engine"] for row in rows if row.get("engine")))
     machines = "; ".join(dict.fromkeys(row["origin"]["machine"] for row in rows))
-    spent = sum(cost_total(row["cost"]) for row in rows if not row["method"].startswith("law"))
+    spent = sum(sum_cost(row["cost"]) for row in rows if not row["method"].startswith("law"))
     return parts | {
         "BARS": format_checks(check_bars(rows)),
         "SPENT": f"{spent / 3600:.0f}",

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from adapters.report_history import cost_total
-from adapters.state import FloatArray
+from adapters.bed.state import FloatArray
+from adapters.procedure.history import sum_cost
 from validation.studies.settlement.beds import EVERY, Kind
 from validation.study import mean_interval
 
@@ -114,7 +114,7 @@ def profile_error(rows: Sequence[Row], kind: Kind, method: str) -> float:
 
 def mean_cost(rows: Sequence[Row]) -> float:
     """CPU time behind k_i [s], each packing counting once."""
-    found = by_packing(rows, lambda row: cost_total(row["cost"]))
+    found = by_packing(rows, lambda row: sum_cost(row["cost"]))
     return float(np.mean([each.mean() for each in found.values()]))
 
 

@@ -12,19 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from adapters.engine import EngineStart
-from adapters.engine_liggghts import LiggghtsEngine
+from adapters.bed.sample import relative_density
+from adapters.bed.state import FloatArray
+from adapters.engines.contract import EngineStart
+from adapters.engines.liggghts import LiggghtsEngine
 from adapters.errors import SceneError, TrackbedError
-from adapters.fit_auto import outlook
-from adapters.laws import law_named
-from adapters.procedure import CONTROL, settle
-from adapters.progress import Progress
-from adapters.run_folder import RunFolder
-from adapters.sample import relative_density
-from adapters.scene import Scene
-from adapters.stages import Run, Variant, compute, prepare
-from adapters.state import FloatArray
-from adapters.window import PistonTrack, window_load
+from adapters.files.run_folder import RunFolder
+from adapters.files.window import PistonTrack, load_window
+from adapters.laws import get_law
+from adapters.laws.fit.outlook import outlook
+from adapters.procedure.progress import Progress
+from adapters.procedure.run import CONTROL, settle
+from adapters.procedure.stages import Run, Variant, compute, prepare
+from adapters.scene.tables import Scene
 from validation.studies.settlement.beds import (
     EVERY,
     KINDS,
@@ -179,7 +179,7 @@ def tabulate_cycles(run: Run, kind: Kind) -> dict[int, dict[str, float]]:
         outcome = run.folder.outcome(name)
         if outcome is None or not name.startswith("window"):
             continue
-        window = window_load(run.folder.path / name / "states.npz")
+        window = load_window(run.folder.path / name / "states.npz")
         begun = outcome.last_cycle <= kind.k_i
         steps = packing_steps if begun else run.scene.steps_per_cycle
         stiffness = measure_stiffness(window.piston, steps)
@@ -199,7 +199,7 @@ def measure_layers(run: Run, cycle: int) -> list[float]:
         for one in run.folder.outcomes()
         if one.stage == "window" and one.first_cycle < cycle <= one.last_cycle
     )
-    window = window_load(run.folder.path / name / "states.npz")
+    window = load_window(run.folder.path / name / "states.npz")
     at = int(np.flatnonzero(window.cycle == cycle)[0])
     return [
         relative_density(window.position[at], window.radius, run.scene.container, top, bottom)
@@ -247,7 +247,8 @@ def measure_stiffness(track: PistonTrack, steps_per_cycle: int) -> FloatArray:
 def fit_law(kind: Kind, law: str, cycles: int, seed: int, member: int) -> Row:
     """Settlement at the last cycle by a law fitted to a full run's first cycles: no bed is left.
 
-    ``auto``: the prediction of `adapters.fit_auto` from all cycles since the rain; another: that
+    ``auto``: the prediction of `adapters.laws.fit.outlook` from all cycles since the rain; another:
+    that
     law's value, fitted to the ``cycles`` behind k_i.
     """
     run, _ = go_to_end(kind, None, seed, member)
@@ -258,7 +259,7 @@ def fit_law(kind: Kind, law: str, cycles: int, seed: int, member: int) -> Row:
     if law == "auto":
         predicted = float(outlook(cycle, path[:, None], kind.last).prediction[0])
     else:
-        chosen = law_named(law)
+        chosen = get_law(law)
         ends = np.arange(kind.last - BLOCK + 1.0, kind.last + 1)
         predicted = float(np.mean(chosen.value(chosen.fit(cycle, path), ends)))
     cost = {"engine": sum(found[one]["cpu_s"] for one in range(kind.k_i + 1, end + 1))}

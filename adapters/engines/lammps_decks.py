@@ -1,0 +1,218 @@
+"""Files of one LAMMPS run that depend on the scene: contact laws, walls, columns, moves, contacts.
+
+Static decks live in ``lammps_inputs``; generated are ``parameters.in``, ``scene.in`` (contact law
+and walls), ``piston_wall.in``, ``dump_states.in`` (columns), ``grains.data``, ``moved_x.txt`` and
+its sisters, and the load samples.  `adapters.engines.decks` has what LIGGGHTS needs in the same
+words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isinf, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from adapters.bed import Container, FloatArray, IntArray, State, contact_law
+from adapters.engines.decks import place_piston_atom
+from adapters.files import Frame, read_frames, write_dump
+from adapters.scene import Scene
+
+PARTS_PREPARE = ("in.prepare", "settings.in", "bed.in")
+PARTS_CYCLES = ("in.cycles", "settings.in", "bed.in", "piston.in")
+
+TANGENTIAL_RULES = ("mindlin_rescale/force", "mindlin_rescale", "mindlin/force", "mindlin")
+"""LAMMPS' answers to what becomes of the tangential force when the normal force changes.
+
+The first is the paper's; ``mindlin`` is LIGGGHTS', ``mindlin/force`` YADE's.
+"""
+
+
+def format_contact(
+    modulus: float, shear: float, restitution: float, friction: float, rule: str
+) -> str:
+    """Words of a granular contact law: eqs 5 to 7 for E* = ``modulus`` and G* = ``shear`` [Pa].
+
+    K_n = 4/3 E*, K_t = 8 G*; the damping is that of the ``restitution``, see
+    `adapters.bed.contact_law`; along the tangent it is larger by sqrt(k_t/S_n) = sqrt(4 G*/E*), so
+    that both have the same alpha.  Without ``friction`` there is no tangential force at all.
+    """
+    if friction > 0:
+        ratio = sqrt(4 * shear / modulus)
+        tangential = f"{rule} {8 * shear:.17g} {ratio:.17g} {friction:.17g}"
+    else:
+        tangential = "linear_nohistory 0.0 0.0"
+    normal = f"hertz {4 / 3 * modulus:.17g} {restitution:.17g}"
+    return f"{normal} tangential {tangential} damping coeff_restitution"
+
+
+def format_wall_contact(scene: Scene, rule: str) -> str:
+    """`format_contact` between a grain and a wall."""
+    grain, wall = scene.material.grain, scene.material.wall
+    shear = contact_law.equivalent_shear_modulus(
+        grain.young, grain.poisson, wall.young, wall.poisson
+    )
+    return format_contact(scene.stiffness.wall, shear, scene.restitution, wall.friction, rule)
+
+
+def scene_text(scene: Scene, rule: str) -> str:
+    """``scene.in``: contact law between grains, and every wall that stands still.
+
+    ``rule`` is one of `TANGENTIAL_RULES`.  The cylinder is curved for LAMMPS, which takes
+    1/R* = 1/R - 1/(2 R_c) with its radius R_c where LIGGGHTS takes 1/R* = 1/R.
+    """
+    grain = scene.material.grain
+    shear = contact_law.equivalent_shear_modulus(
+        grain.young, grain.poisson, grain.young, grain.poisson
+    )
+    between = format_contact(scene.stiffness.grain, shear, scene.restitution, grain.friction, rule)
+    wall = format_wall_contact(scene, rule)
+    mirror = format_contact(scene.stiffness.mirror, 0.0, scene.restitution, 0.0, rule)
+    lines = [
+        "# scene.in : generated; contact laws: 4/3 E*, restitution; tangential rule, 8 G*, damping"
+        " ratio, friction",
+        f"pair_coeff * * {between}",
+    ]
+    walls = scene.container.walls()
+    for name, frictionless, point, normal in zip(
+        walls.plane_name,
+        walls.plane_frictionless,
+        walls.plane_point,
+        walls.plane_normal,
+        strict=True,
+    ):
+        axis = int(np.argmax(np.abs(normal)))
+        place = f"{point[axis]:.17g}"
+        sides = f"{place} NULL" if normal[axis] > 0 else f"NULL {place}"
+        law = mirror if frictionless else wall
+        lines.append(
+            f"fix {name} grains wall/gran granular {law} {'xyz'[axis]}plane {sides} contacts"
+        )
+    if np.isfinite(walls.cylinder_radius):
+        lines.append(
+            f"region cylinder cylinder z 0.0 0.0 {walls.cylinder_radius:.17g} INF INF units box"
+        )
+        lines.append(
+            f"fix cylinder grains wall/gran/region granular {wall} region cylinder contacts"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def format_piston_wall(scene: Scene, rule: str) -> str:
+    """``piston_wall.in``: the piston's face at height 0, moved by ``v_piston_position``.
+
+    A whole piston is a plane, a partial one the end of a cylinder of radius ``piston_reach``.
+    """
+    motion = "move NULL NULL v_piston_position units box"
+    if isinf(scene.piston_reach):
+        region = f"plane 0.0 0.0 0.0 0.0 0.0 -1.0 {motion}"
+    else:
+        region = f"cylinder z 0.0 0.0 {scene.piston_reach:.17g} 0.0 INF side out {motion}"
+    return (
+        "# piston_wall.in : generated\n"
+        f"region piston {region}\n"
+        "fix piston_wall grains wall/gran/region granular "
+        f"{format_wall_contact(scene, rule)} region piston contacts\n"
+    )
+
+
+def wall_names(container: Container, piston: bool) -> tuple[str, ...]:
+    """Names of all walls in the order of the columns of ``states.dump``."""
+    walls = container.walls()
+    names = walls.plane_name + (("cylinder",) if np.isfinite(walls.cylinder_radius) else ())
+    return (*names, "piston_wall") if piston else names
+
+
+def format_dump_states(names: tuple[str, ...]) -> str:
+    """``dump_states.in``: full-precision state of the grains at every cycle end.
+
+    The force of a wall on a grain is in columns 2 to 4 of its fix.
+    """
+    columns = ["id", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz"]
+    columns += ["radius", "mass"]
+    first = len(columns) + 1
+    forces = [(name, axis) for name in names for axis in (1, 2, 3)]
+    columns += [f"f_{name}[{axis + 1}]" for name, axis in forces]
+    renamed = " ".join(
+        f"colname {first + i} f_force_{name}[{axis}]" for i, (name, axis) in enumerate(forces)
+    )
+    return (
+        "# dump_states.in : generated\n"
+        f"dump states grains custom ${{steps_per_cycle}} states.dump {' '.join(columns)}\n"
+        f"dump_modify states sort id first yes format float %.17g {renamed}\n"
+    )
+
+
+def write_moved(folder: Path, container: Container, moved: State) -> None:
+    """``moved_x.txt``, ``moved_y.txt``, ``moved_z.txt``: new places of grains and piston by id."""
+    piston = (*place_piston_atom(container, moved.radius), moved.piston_height)
+    identifier = np.append(moved.identifier, moved.identifier.max() + 1)
+    for axis, name in enumerate("xyz"):
+        rows = zip(identifier, [*moved.position[:, axis], piston[axis]], strict=True)
+        text = "".join(f"{i} {place:.17g}\n" for i, place in rows)
+        (folder / f"moved_{name}.txt").write_text(f"{len(identifier)}\n{text}")
+
+
+COLUMNS = tuple(f"c_contact[{i}]" for i in range(1, 13))
+"""Pair, normal and tangential force on the first grain, tangential spring, overlap."""
+
+
+def write_contacts(scene: Scene, folder: Path) -> None:
+    """Write ``contacts.dump`` from ``pairs.dump`` and ``states.dump``, and remove the first.
+
+    Raises `DumpError` when one of the two is malformed.
+    """
+    write_dump(folder / "contacts.dump", convert_contact_frames(scene, folder))
+    (folder / "pairs.dump").unlink()
+
+
+def convert_contact_frames(scene: Scene, folder: Path) -> Iterator[Frame]:
+    states = read_frames(folder / "states.dump")
+    for pairs, grains in zip(read_frames(folder / "pairs.dump"), states, strict=True):
+        values = convert_contacts(scene, pairs.values, grains)
+        columns = COLUMNS if values.shape[1] == len(COLUMNS) else COLUMNS[:6]
+        yield Frame(pairs.time_step, columns, values, pairs.bounds, "entries", pairs.boundary)
+
+
+def convert_contacts(scene: Scene, pairs: FloatArray, grains: Frame) -> FloatArray:
+    """Rows of `COLUMNS`, shape (m, 12); without friction pair, normal force, overlap, (m, 6).
+
+    ``pairs``, shape (m, 9) or (m, 6): identifiers, normal force and, with friction, tangential
+    force on the first grain [N], distance of the centres [m]; ``grains`` of the same instant.
+    """
+    held = np.searchsorted(grains.column("id"), pairs[:, :2])
+    radius = grains.column("radius")[held]
+    overlap = radius.sum(axis=1) - pairs[:, -1]
+    if pairs.shape[1] == 6:
+        return np.column_stack([pairs[:, :5], overlap])
+    spring = find_elastic_displacement(scene, pairs[:, 5:8], overlap, grains, held)
+    return np.column_stack([pairs[:, :8], spring, overlap])
+
+
+def find_elastic_displacement(
+    scene: Scene, force: FloatArray, overlap: FloatArray, grains: Frame, held: IntArray
+) -> FloatArray:
+    """Displacement delta_t that carries the elastic part of F_t = -k_t delta_t - c_t v_t [m].
+
+    ``force`` F_t on the first grain [N], shape (m, 3); ``overlap`` [m]; ``held`` rows of the two
+    grains, shape (m, 2).  LAMMPS keeps a force, or a displacement, and shows neither.
+    """
+    grain = scene.material.grain
+    shear = contact_law.equivalent_shear_modulus(
+        grain.young, grain.poisson, grain.young, grain.poisson
+    )
+    radius, mass = grains.column("radius")[held], grains.column("mass")[held]
+    reduced = radius.prod(axis=1) / radius.sum(axis=1)
+    stiffness = contact_law.tangential_stiffness(overlap, shear, reduced)
+    alpha = contact_law.alpha_of_restitution(scene.restitution)
+    reduced_mass = mass.prod(axis=1) / mass.sum(axis=1)
+    damping = 2 * contact_law.DAMPING_FACTOR * alpha * np.sqrt(reduced_mass * stiffness)
+    position, velocity = grains.block("x", "y", "z")[held], grains.block("vx", "vy", "vz")[held]
+    spin = grains.block("omegax", "omegay", "omegaz")[held]
+    normal = position[:, 0] - position[:, 1]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    approach = velocity[:, 0] - velocity[:, 1]
+    sliding = approach - np.einsum("ma,ma->m", approach, normal)[:, None] * normal
+    sliding -= np.cross(np.einsum("mi,mia->ma", radius, spin), normal)
+    return -(force + damping[:, None] * sliding) / stiffness[:, None]

@@ -1,0 +1,100 @@
+"""How long a bed settles and how a piston is seated: the same on every engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, sqrt
+
+import numpy as np
+
+from adapters.bed import GRAVITY
+from adapters.scene import Scene
+
+EQUILIBRIUM_RATIO = 1e-6
+"""Kinetic (translational) over potential energy at which a bed counts as settled; section 2.3."""
+
+SETTLE_TIMES = 40
+"""Falling times after which a bed that still moves is given up."""
+
+SEAT_SPEED = 0.1
+"""Greatest speed of the piston while it finds the bed [m/s]."""
+
+SEAT_SHARE = 1.0
+"""Force that seats the piston, over the peak of the load."""
+
+SEAT_DRAG_SHARE = 0.5
+"""Greatest drag of the seating times the time step over the piston's mass: an explicit step turns
+a drag above 2 into growing oscillations, and one above 1 into oscillations."""
+
+
+@dataclass(frozen=True)
+class SettlePlan:
+    """Time steps of the rain of grains."""
+
+    check_steps: int
+    """Between two looks at the energies; load cycles then start at multiples of their length."""
+    check_limit: int
+    """Looks after which a bed that still moves is given up."""
+    minimum_steps: int
+    """Before the first look that counts: at the start nothing moves yet."""
+    history_steps: int
+    """Between two rows of ``history.txt``."""
+
+
+@dataclass(frozen=True)
+class SeatPlan:
+    """How the piston is pressed on the bed and let go before the first cycle."""
+
+    force: float
+    """That presses [N], held up by a viscous drag of force over speed."""
+    speed: float
+    """Greatest speed [m/s]."""
+    steps: int
+    release_force: float
+    """That of the load's first instant [N]."""
+    release_steps: int
+
+
+def count_cycle_steps(scene: Scene) -> int:
+    """Time steps of a load cycle; those of 0.02 s in a scene without a load."""
+    return scene.steps_per_cycle or ceil(0.02 / scene.time_step)
+
+
+def plan_settling(scene: Scene, height: float) -> SettlePlan:
+    """Plan of the rain of grains from below ``height`` [m]."""
+    fall_steps = sqrt(2 * height / GRAVITY) / scene.time_step
+    # Cycles start at multiples of steps_per_cycle, so that the load's phase is the step's.
+    cycle = count_cycle_steps(scene)
+    check_steps = cycle * ceil(0.01 / (cycle * scene.time_step))
+    return SettlePlan(
+        check_steps,
+        ceil(SETTLE_TIMES * fall_steps / check_steps),
+        ceil(1.2 * fall_steps),
+        max(check_steps // 4, 1),
+    )
+
+
+def plan_seating(scene: Scene) -> SeatPlan:
+    """Plan of the seating of the piston, in whole cycles.
+
+    A piston that is light for its load is pressed by less than the peak, so that its drag, force
+    over speed, is one that the time step can follow.
+    """
+    assert scene.loading is not None
+    steps = scene.steps_per_cycle
+    peak = float(scene.stress_at(np.linspace(0, 1, 1001)).max()) * scene.loaded_area
+    followed = SEAT_DRAG_SHARE * scene.loading.piston_mass * SEAT_SPEED / scene.time_step
+    press_s = 2 * scene.sample.grain_radius.greatest / SEAT_SPEED
+    cycles = ceil(press_s / (steps * scene.time_step))
+    return SeatPlan(
+        min(SEAT_SHARE * peak, followed),
+        SEAT_SPEED,
+        cycles * steps,
+        float(scene.stress_at(0.0)) * scene.loaded_area,
+        ceil(cycles / 2) * steps,
+    )
+
+
+def frictional(scene: Scene) -> bool:
+    """Whether the scene names any friction: without it no contact has a tangential force."""
+    return scene.material.grain.friction > 0 or scene.material.wall.friction > 0

@@ -1,0 +1,291 @@
+"""YADE (Debian's 2023.02a) as an engine: static scripts, one JSON file, fresh processes."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adapters.bed import DAMPING_FACTOR, GRAVITY, Container, FloatArray, damping_of_rebound
+from adapters.engines.contract import EngineStart
+from adapters.engines.decks import (
+    MIRROR_YOUNG,
+    PISTON_MARGIN,
+    bound_box,
+    bound_section,
+    clip_convex,
+    copy_deck,
+)
+from adapters.engines.plan import EQUILIBRIUM_RATIO, frictional, plan_seating, plan_settling
+from adapters.engines.process import ProcessEngine, Program
+from adapters.scene import GrainRadius, Scene
+
+SCRIPTS = {"in.prepare": "prepare.py", "in.cycles": "cycles.py"}
+"""Script of each deck."""
+
+PARAMETERS = "params.json"
+
+BEGUN = re.compile("Running script")
+LOOP_TIME = re.compile(r"^LOOP (\S+) s", re.MULTILINE)
+BANNER = re.compile(r"Yade version: ((\d{4})\S*)")
+PROGRAM = Program("YADE", "--version", BANNER, (2023,), "sudo apt-get install yade")
+"""From 2023 on walls are known to be flat when asked (``hertzian``)."""
+
+
+class YadeEngine(ProcessEngine):
+    """Writes the parameters of a window, runs ``yade``, and knows its manners.
+
+    YADE exits 0 with NaN and with escaped grains; the script's last line ``COMPLETE step N`` is
+    the sentinel looked for here, `adapters.procedure.checks` does the rest.  ``-x`` has it exit 1
+    after an
+    exception, ``-n`` open no window, ``-j1`` repeat itself bit for bit.
+    """
+
+    name = "yade"
+    auto_order = 2
+    begun, loop_time = BEGUN, LOOP_TIME
+    launch = "launch it without MPI: YADE runs in one process"
+
+    def version(self) -> str:
+        """Version banner such as ``Yade 2023.02a``; raises `EngineMissing`."""
+        path = shutil.which("yade")
+        return f"Yade {PROGRAM.version(None if path is None else [path])}"
+
+    def command(self, scene: Scene, deck: str) -> list[str]:
+        """Command line that runs ``deck`` in its folder."""
+        yade = ["yade", "-n", "-x", "-j1", SCRIPTS.get(deck, deck), PARAMETERS]
+        return [*scene.engine.launcher, *yade]
+
+    def wall_names(self, scene: Scene, piston: bool) -> tuple[str, ...]:
+        """Names of the walls whose forces ``states.dump`` holds; see
+        `adapters.engines.contract.Engine`."""
+        names = scene.container.walls().plane_name
+        return (*names, "piston") if piston else names
+
+    def write_preparation(
+        self, scene: Scene, position: FloatArray, radius: FloatArray, height: float, folder: Path
+    ) -> dict[str, str]:
+        """Write the rain of grains; see `adapters.engines.contract.Engine`."""
+        content = gather_shared_parameters(scene, height)
+        content["settle"] = asdict(plan_settling(scene, height))
+        content["settle"]["equilibrium_ratio"] = EQUILIBRIUM_RATIO
+        content["grains"] = {"position": position.tolist(), "radius": radius.tolist()}
+        return self._write(folder, "prepare.py", content)
+
+    def write_cycles(
+        self, scene: Scene, start: EngineStart, cycles: int, folder: Path
+    ) -> dict[str, str]:
+        """Write a window of load cycles; see `adapters.engines.contract.Engine`."""
+        assert scene.loading is not None
+        shutil.copyfile(start.restart, folder / "start.restart")
+        steps = scene.steps_per_cycle
+        content = gather_shared_parameters(scene, start.piston_height)
+        content["piston"] = {
+            "mass": scene.loading.piston_mass,
+            "height": start.piston_height,
+            **cover_piston(scene.container, scene.piston_reach, scene.sample.grain_radius),
+        }
+        content["window"] = {
+            "start": start.kind,
+            "cycles": cycles,
+            "steps_per_cycle": steps,
+            "track_steps": steps // scene.samples_per_cycle,
+            "load": _load(scene),
+        }
+        if start.first:
+            content["window"]["seat"] = asdict(plan_seating(scene))
+        if start.moved is not None:
+            content["window"]["moved"] = start.moved.position.tolist()
+        if start.kind == "perturbed":
+            content["window"]["perturbation"] = start.perturbation
+        return self._write(folder, "cycles.py", content)
+
+    @staticmethod
+    def _write(folder: Path, script: str, content: dict[str, Any]) -> dict[str, str]:
+        """The parameters and the static scripts; returns the digests of the scripts."""
+        (folder / PARAMETERS).write_text(json.dumps(content, indent=1, allow_nan=False) + "\n")
+        return copy_deck(folder, (script, "bed.py", "record.py"), "yade_scripts")
+
+
+def _load(scene: Scene) -> dict[str, Any]:
+    """The load as forces [N] on the piston: a mean and a sine, or a period of samples."""
+    assert scene.loading is not None
+    samples = scene.loading.samples
+    if samples is not None:
+        force = samples.stress * scene.loaded_area
+        time = samples.time - samples.time[0]
+        return {
+            "waveform": "series",
+            "mean_force": 0.0,
+            "time": time.tolist(),
+            "force": force.tolist(),
+        }
+    return {
+        "waveform": "sine",
+        "mean_force": scene.loading.mean * scene.loaded_area,  # type: ignore[operator]
+        "amplitude": scene.loading.amplitude * scene.loaded_area,  # type: ignore[operator]
+        "frequency": scene.loading.frequency,
+    }
+
+
+VERLET_SHARE = 0.1
+"""How far a grain moves before YADE looks for new neighbours, in mean radii."""
+
+
+DISC_CORNERS = 96
+"""Corners of the polygon that stands for a disc-shaped piston."""
+
+
+RIM_WIDTH = 0.2
+"""How far inside a piston's rim grains still meet the rim, in mean radii: further than one moves in
+a load cycle, or than a contact is wide."""
+
+
+NO_WEIGHT = 1.0
+"""Density of walls [kg/m^3]: nothing depends on it, and YADE wants one."""
+
+
+def damping_ratio(scene: Scene) -> float:
+    """YADE's ``betan`` = ``betas``, the a of c = 2 a sqrt(m* S) with S the tangent stiffness.
+
+    YADE never lets a contact pull, so one damping cannot serve both of a scene's keys:
+
+    * ``viscous_alpha`` names the viscous force: a = sqrt(5/6) alpha, that of the other engines
+      (see `adapters.bed.contact_law`).  Grains then rebound faster, e = 0.335 instead of 0.2145 for
+      alpha = 0.44, since the end of the collision, where eq. 7 pulls, is missing;
+    * ``restitution`` names the rebound: a is that which makes it, without a pull.
+    """
+    grain = scene.material.grain
+    if grain.viscous_alpha is not None:
+        return DAMPING_FACTOR * grain.viscous_alpha
+    return damping_of_rebound(scene.restitution)
+
+
+def gather_shared_parameters(scene: Scene, height: float) -> dict[str, Any]:
+    """What both scripts need: materials, contact law, walls, box up to ``height`` [m]."""
+    material = scene.material
+    container = scene.container
+    materials = {
+        "grain": _material(material.grain.young, material.grain.poisson, material.grain.density),
+        "wall": _material(material.wall.young, material.wall.poisson),
+    }
+    if container.symmetry:
+        materials["mirror"] = _material(MIRROR_YOUNG, material.grain.poisson)
+    radius = np.array([scene.sample.grain_radius.greatest])
+    return {
+        "grain_count": scene.grain_count,
+        "time_step": scene.time_step,
+        "gravity": GRAVITY,
+        "verlet_distance": VERLET_SHARE * scene.sample.grain_radius.mean,
+        "frictional": frictional(scene),
+        "materials": materials,
+        "pairs": _pairs(scene),
+        "box": np.column_stack(bound_box(container, radius, height)).tolist(),
+        "walls": list_walls(container, height),
+    }
+
+
+def _material(young: float, poisson: float, density: float = NO_WEIGHT) -> dict[str, float]:
+    return {"young": young, "poisson": poisson, "density": density}
+
+
+def _pairs(scene: Scene) -> list[dict[str, float | str]]:
+    """Damping and friction of each pair of materials that can meet.
+
+    A pair without friction has no tangential damping either: YADE takes a spring of length zero
+    for one that sticks, and would brake what should slide freely.
+    """
+    damping = damping_ratio(scene)
+    friction = {"grain": scene.material.grain.friction, "wall": scene.material.wall.friction}
+    if scene.container.symmetry:
+        friction["mirror"] = 0.0
+    return [
+        {
+            "first": "grain",
+            "second": other,
+            "damping_normal": damping,
+            "damping_tangential": damping if mu > 0 else 0.0,
+            "friction": mu,
+        }
+        for other, mu in friction.items()
+    ]
+
+
+def list_walls(container: Container, height: float) -> list[dict[str, Any]]:
+    """Planes along the axes, and a triangle for each side of a cylinder, up to ``height`` [m]."""
+    walls = container.walls()
+    sides = iter(container.side_angles())
+    result: list[dict[str, Any]] = []
+    for name, mirror, point, normal in zip(
+        walls.plane_name,
+        walls.plane_frictionless,
+        walls.plane_point,
+        walls.plane_normal,
+        strict=True,
+    ):
+        wall: dict[str, Any] = {"name": name, "material": "mirror" if mirror else "wall"}
+        if name.startswith("cylinder"):
+            wall["vertices"] = cover_side(container, next(sides), height).tolist()
+        else:
+            axis = int(np.argmax(np.abs(normal)))
+            sense = int(np.sign(normal[axis]))
+            wall |= {"axis": axis, "position": point.tolist(), "sense": sense}
+        result.append(wall)
+    return result
+
+
+def cover_side(container: Container, angle: float, height: float) -> FloatArray:
+    """Corners [m], shape (3, 3), of a triangle that covers one side of the polygon.
+
+    One triangle, not two: where two of a plane meet, a grain would touch both and be pushed
+    twice.  What of it lies beyond the side lies outside the container, and nothing touches it.
+    ``angle`` [rad] of the outward normal, ``height`` [m] up to which the side is covered.
+    """
+    width = 2 * container.radius * np.tan(np.pi / container.sides)
+    margin = width
+    corners = np.array([[-width, -margin], [width, -margin], [0.0, 2 * height + 2 * margin]])
+    outward = np.array([np.cos(angle), np.sin(angle)])
+    along = np.array([-outward[1], outward[0]])
+    plane = container.radius * outward + corners[:, :1] * along
+    return np.column_stack([plane, corners[:, 1]])
+
+
+def cover_piston(container: Container, reach: float, grain: GrainRadius) -> dict[str, Any]:
+    """The piston's face: ``triangles``, horizontal corners [m], shape (t, 3, 2), normal down.
+
+    A whole piston (``reach`` infinite) is one triangle over the section and somewhat more.  A
+    partial one, a disc of radius ``reach`` [m], is a plane for grains whose centres are within
+    ``plane_reach`` [m] of the axis, and triangles for those further out.  ``grain``: radii.
+    """
+    margin = PISTON_MARGIN * grain.greatest
+    if np.isinf(reach):
+        low, high = bound_section(container)
+        corner = np.array(low) - margin
+        across = 2 * (np.array(high) + margin - corner)
+        face = [corner, corner + np.array([0.0, across[1]]), corner + np.array([across[0], 0.0])]
+        return {"triangles": np.array([face]).tolist()}
+    angle = -np.linspace(0.0, 2 * np.pi, DISC_CORNERS + 1)[:-1]
+    circle = reach * np.column_stack([np.cos(angle), np.sin(angle)])
+    floor = [-margin if axis in container.symmetry else -np.inf for axis in "xy"]
+    return {
+        "triangles": cover_rim(clip_convex(circle, floor)).tolist(),
+        "plane_reach": max(reach - RIM_WIDTH * grain.mean, 0.0),
+    }
+
+
+def cover_rim(corners: FloatArray) -> FloatArray:
+    """Triangles (n, 3, 2) from the origin to the sides of a convex polygon (n, 2) around it.
+
+    YADE pushes a grain on a seam of two triangles from both.  These seams go straight to the
+    corners, so that near the rim, where alone grains meet them, there is as little as can be.
+    """
+    after = np.roll(corners, -1, axis=0)
+    return np.stack([np.zeros_like(corners), corners, after], axis=1)
+
+
+ENGINE = YadeEngine()

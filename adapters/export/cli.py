@@ -1,0 +1,53 @@
+"""The verb ``trackbed export``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from adapters.cli import add_json_flag, add_run_argument, print_json
+
+OPENED_BY = {
+    "vtu": "ParaView; colour grains by displacement, glyph: sphere, scale: radius, factor 2",
+    "ovito": "OVITO; contacts by its modifier Load trajectory",
+    "stl": "ParaView, CAD or an engine's mesh walls",
+    "csv": "a spreadsheet, pandas or R",
+}
+"""Format -> what opens it."""
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``export`` to its parser."""
+    add_run_argument(parser)
+    parser.add_argument(
+        "--to", required=True, choices=OPENED_BY, metavar="FORMAT", help=" or ".join(OPENED_BY)
+    )
+    parser.add_argument(
+        "--into", type=Path, metavar="FOLDER", help="default: RUN/export (or the variant's)"
+    )
+    parser.add_argument(
+        "--every", type=int, default=1, metavar="N", help="only every Nth cycle, and the last"
+    )
+    parser.add_argument(
+        "--variant", default="", metavar="NAME", help="a run beside it, such as control"
+    )
+    add_json_flag(parser)
+    parser.set_defaults(command=run_export)
+
+
+def run_export(arguments: argparse.Namespace) -> int:
+    """Write a run, finished or not, in the format of another tool; print what to open."""
+    from adapters.export.formats import export_run
+    from adapters.export.instants import read_exported_run
+
+    into = arguments.into or arguments.run_folder / arguments.variant / "export"
+    run = read_exported_run(arguments.run_folder, arguments.variant)
+    files = export_run(run, arguments.to, into, arguments.every)
+    if arguments.json:
+        size = sum(path.stat().st_size for path in files)
+        print_json({"to": arguments.to, "bytes": size, "files": [str(path) for path in files]})
+    else:
+        for path in (path for path in files if path.parent == into):
+            print(path)
+        print(f"open it in {OPENED_BY[arguments.to]}")
+    return 0

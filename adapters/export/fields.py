@@ -1,0 +1,65 @@
+"""What other tools get of grains and contacts: only what the scene names, in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.bed import IntArray
+from adapters.export.instants import ExportedRun, Instant
+
+Array = NDArray[np.float64] | NDArray[np.int64]
+
+
+def gather_grain_fields(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+    """Fields of the grains by name, shape (n,) or (n, 3).
+
+    ``id``; ``radius`` [m]; ``displacement`` since cycle 0 [m], where there are load cycles;
+    ``velocity`` [m/s]; ``coordination``, contacts with other grains.
+    """
+    state = instant.state
+    fields: dict[str, Array] = {"id": state.identifier, "radius": state.radius}
+    if run.loaded:
+        fields["displacement"] = instant.displacement
+    return fields | {"velocity": state.velocity, "coordination": instant.coordination}
+
+
+def gather_placed_grain_fields(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+    """`gather_grain_fields` with the places of the centres [m] behind ``id``, without a name."""
+    fields = gather_grain_fields(run, instant)
+    return {"id": fields.pop("id"), "": instant.state.position} | fields
+
+
+def gather_contact_fields(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+    """Fields of the contacts between grains by name, shape (m,) or (m, 3).
+
+    ``normal_force`` [N], positive where it pushes the grains apart; ``tangential_force`` on the
+    grain named first [N], where there is friction.
+    """
+    contacts, pair = instant.state.contacts, contact_rows(instant)
+    apart = instant.state.position[pair[:, 0]] - instant.state.position[pair[:, 1]]
+    push = np.einsum("ma,ma->m", contacts.normal_force, apart)
+    fields: dict[str, Array] = {"normal_force": push / np.linalg.norm(apart, axis=1)}
+    if run.frictional:
+        fields["tangential_force"] = contacts.tangential_force
+    return fields
+
+
+def contact_rows(instant: Instant) -> IntArray:
+    """Rows of the two grains of every contact among the grains, shape (m, 2)."""
+    return np.searchsorted(instant.state.identifier, instant.state.contacts.pair)
+
+
+def split_columns(fields: Mapping[str, Array], join: str) -> Iterator[tuple[str, Array]]:
+    """Fields as columns: the components of a vector are name, ``join`` and x, y or z.
+
+    A vector without a name is a place: its components are x, y and z.
+    """
+    for name, values in fields.items():
+        if values.ndim == 1:
+            yield name, values
+        else:
+            for axis, column in zip("xyz", values.T, strict=True):
+                yield (name + join if name else "") + axis, column

@@ -1,0 +1,127 @@
+"""The instants of a run that other tools are given: the bed before loading, every cycle end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from adapters.bed import FloatArray, IntArray, State, neighbours
+from adapters.errors import UsageError
+from adapters.procedure import CONTROL, Record, Track, read_run_record
+from adapters.scene import Scene
+
+
+@dataclass(frozen=True)
+class Instant:
+    """The bed at the end of a load cycle; at cycle 0 before loading."""
+
+    state: State
+    displacement: FloatArray
+    """Of every grain since cycle 0 [m], shape (n, 3)."""
+    coordination: IntArray
+    """Contacts of every grain with other grains, shape (n,); their mean is the run's table's."""
+
+    @property
+    def cycle(self) -> int:
+        """Cycles done, jumped ones included."""
+        return self.state.cycle
+
+
+@dataclass(frozen=True)
+class ExportedRun:
+    """One run of a scene, as its finished stages left it."""
+
+    scene: Scene
+    track: Track
+
+    @property
+    def loaded(self) -> bool:
+        """Whether load cycles were computed: without them nothing moves and there is no piston."""
+        return bool(self.track.windows)
+
+    @property
+    def frictional(self) -> bool:
+        """Whether contacts between grains have a tangential force."""
+        return self.scene.material.grain.friction > 0
+
+    def states(self, every: int = 1) -> Iterator[State]:
+        """The bed before loading, at every multiple of ``every`` cycles, and at the last one.
+
+        A jump's end is the first state of the window after it: forces and contacts are then the
+        engine's own.  A jump that no window follows yet is left out.
+        """
+        yield self.track.start()
+        done, last = 0, self.last_cycle
+        for name, _ in self.track.windows:
+            window = self.track.window(name)
+            for index, cycle in enumerate(window.cycle.tolist()):
+                if cycle > done and (cycle % every == 0 or cycle == last):
+                    yield window.state(index)
+            done = int(window.cycle[-1])
+
+    def instants(self, every: int = 1) -> Iterator[Instant]:
+        """`states`, with what is asked of them."""
+        start = self.track.start().position
+        walls = self.scene.container.walls()  # only pairs of grains are counted
+        for state in self.states(every):
+            touching = neighbours(state.position, state.radius, walls)
+            grains = touching.second >= 0
+            both = np.concatenate([touching.first[grains], touching.second[grains]])
+            coordination = np.bincount(both, minlength=len(state.radius))
+            yield Instant(state, state.position - start, coordination)
+
+    @property
+    def last_cycle(self) -> int:
+        """Last cycle end computed; 0 before loading."""
+        return max((outcome.last_cycle for _, outcome in self.track.windows), default=0)
+
+    def piston_heights(self, every: int = 1) -> Iterator[tuple[int, float]]:
+        """Cycle and height of the piston's face [m] at each of `states`."""
+        first = self.track.window(self.track.windows[0][0]).piston_start
+        for state in self.states(every):
+            yield state.cycle, state.piston_height if state.cycle else first
+
+    def piston_samples(self) -> Iterator[dict[str, FloatArray | IntArray]]:
+        """All samples of the piston, window by window: cycles done, forces [N], height [m]."""
+        for name, _ in self.track.windows:
+            window = self.track.window(name)
+            steps = window.piston.time_step - window.time_step[0]
+            yield {
+                "cycle": window.first_cycle + steps / self.scene.steps_per_cycle,
+                "target_force": window.piston.target_force,
+                "contact_force": window.piston.contact_force,
+                "height": window.piston.height,
+            }
+
+
+def read_exported_run(run_folder: Path, variant: str = "") -> ExportedRun:
+    """A run of the folder: the procedure, or ``control`` and the like beside it.
+
+    Raises `UsageError` for a folder or variant that is not there, or not yet prepared.
+    """
+    record = read_run_record(run_folder)
+    tracks = _tracks(record)
+    if variant not in tracks:
+        known = ", ".join(sorted(filter(None, tracks))) or "none"
+        raise UsageError(
+            f"there is no run {variant} beside this one; there are: {known}",
+            where=str(run_folder),
+            remedy="trackbed run SCENE --control makes the control",
+        )
+    track = tracks[variant]
+    if track.preparation is None:
+        raise UsageError(
+            "the bed is not prepared yet, so there is nothing to export",
+            where=str(run_folder),
+            remedy="wait for it, or go on with: trackbed resume RUN",
+        )
+    return ExportedRun(record.scene, track)
+
+
+def _tracks(record: Record) -> dict[str, Track]:
+    """All runs of a record by name; the procedure's is empty."""
+    tracks = {"": record.run} | {track.name: track for track in record.others}
+    return tracks if record.control is None else tracks | {CONTROL: record.control}

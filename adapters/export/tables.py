@@ -1,0 +1,110 @@
+"""Grains, contacts and piston as text: dumps for OVITO, CSV for everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from adapters.bed import FloatArray
+from adapters.engines import bound_section
+from adapters.export.fields import (
+    Array,
+    gather_contact_fields,
+    gather_placed_grain_fields,
+    split_columns,
+)
+from adapters.export.instants import ExportedRun, Instant
+from adapters.export.meshes import whole_file
+from adapters.files import Frame, Kind, write_dump
+
+ENGINE_NAME = {"velocity": "v"}
+"""Field -> its name in a dump, where engines and OVITO have a shorter one."""
+
+
+def export_ovito(run: ExportedRun, into: Path, every: int) -> list[Path]:
+    """``grains.dump`` and ``contacts.dump``: text dumps whose time step is the number of cycles.
+
+    OVITO knows every column of the grains by its name.  Its modifier "Load trajectory" takes the
+    contacts for bonds when it is set that the first two columns are "Particle Identifiers"; the
+    forces are magnitudes there, as a bond's colour and width ask for.
+    """
+    box = _box(run)
+
+    def grains() -> Iterator[Frame]:
+        for instant in run.instants(every):
+            fields = gather_placed_grain_fields(run, instant)
+            named = {ENGINE_NAME.get(name, name): values for name, values in fields.items()}
+            yield _frame(instant, dict(split_columns(named, "")), box, "atoms")
+
+    def contacts() -> Iterator[Frame]:
+        for instant in run.instants(every):
+            yield _frame(instant, _contact_columns(run, instant), box, "entries")
+
+    write_dump(into / "grains.dump", grains())
+    write_dump(into / "contacts.dump", contacts())
+    return [into / "grains.dump", into / "contacts.dump"]
+
+
+def _contact_columns(run: ExportedRun, instant: Instant) -> dict[str, Array]:
+    fields = gather_contact_fields(run, instant)
+    if run.frictional:
+        fields["tangential_force"] = np.linalg.norm(fields["tangential_force"], axis=1)
+    first, second = instant.state.contacts.pair.T
+    return {"id1": first, "id2": second, **fields}
+
+
+def _frame(instant: Instant, columns: Mapping[str, Array], box: FloatArray, kind: Kind) -> Frame:
+    values = np.column_stack([*columns.values()]).astype(float)
+    return Frame(instant.cycle, tuple(columns), values, box, kind)
+
+
+def _box(run: ExportedRun) -> FloatArray:
+    """Low and high of the container, up to the settled bed's top [m], shape (3, 2)."""
+    start = run.track.start()
+    low, high = bound_section(run.scene.container)
+    top = float((start.position[:, 2] + start.radius).max())
+    return np.array([*zip(low, high, strict=True), (0.0, top)])
+
+
+def export_csv(run: ExportedRun, into: Path, every: int) -> list[Path]:
+    """``grains.csv``, ``contacts.csv`` and ``piston.csv``: long tables, a column ``cycle`` first.
+
+    SI units; every number is written so that it reads back the same.  ``settlement.csv`` of the
+    run folder has a row a cycle already.  The piston's table holds all its samples.
+    """
+
+    def grains() -> Iterator[dict[str, Array]]:
+        for instant in run.instants(every):
+            fields = split_columns(gather_placed_grain_fields(run, instant), "_")
+            yield _at(instant, dict(fields))
+
+    def contacts() -> Iterator[dict[str, Array]]:
+        for instant in run.instants(every):
+            first, second = instant.state.contacts.pair.T
+            fields = split_columns(gather_contact_fields(run, instant), "_")
+            yield _at(instant, {"id1": first, "id2": second, **dict(fields)})
+
+    tables = {"grains": grains(), "contacts": contacts()}
+    if run.loaded:
+        tables["piston"] = run.piston_samples()
+    for name, parts in tables.items():
+        write_csv_rows(into / f"{name}.csv", parts)
+    return [into / f"{name}.csv" for name in tables]
+
+
+def _at(instant: Instant, columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Columns with the number of the cycle before them."""
+    length = len(next(iter(columns.values())))
+    return {"cycle": np.full(length, instant.cycle), **columns}
+
+
+def write_csv_rows(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
+    """Write tables of the same columns one below the other."""
+    with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as stream:
+        for number, columns in enumerate(parts):
+            if number == 0:
+                stream.write(",".join(columns) + "\n")
+            rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+            stream.writelines(",".join(map(repr, row)) + "\n" for row in rows)

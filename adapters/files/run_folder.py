@@ -1,0 +1,377 @@
+"""The run folder: finished stages, the manifest, the events, one writer at a time.
+
+A stage (``preparation``, ``window_000020``, ``jump_000040_1``) is worked in ``partial/`` and
+renamed to its place when its ``outcome.json`` is written: what stands in its place is whole.
+Nothing is overwritten; what does not belong any more is moved to ``discarded/``.  A folder of
+another name, such as a copy of a stage, is no stage and is left alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from adapters.errors import EngineFailed, NotCredible, UsageError
+from trackbed.errors import NO_ROOM, DiskFull
+from trackbed.run_files import (
+    append_line,
+    digest_file,
+    lock_folder,
+    read_object,
+    refuse_format,
+    refuse_links,
+    seal_file,
+    sync_folder,
+    write_whole,
+)
+
+COLUMNS = (
+    "cycle",
+    "settlement",
+    "kind",
+    "coordination_number",
+    "relative_density",
+    "piston_height",
+    "elastic_deflection",
+    "force_error",
+    "maximum_overlap",
+    "kinetic_translational",
+    "kinetic_rotational",
+)
+"""Columns of ``settlement.csv``: SI units; kind is ``computed``, ``healing`` or ``jumped``."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a finished stage left behind, besides its files."""
+
+    stage: str
+    """``preparation``, ``window`` or ``jump``."""
+    first_cycle: int
+    """Cycles done before the stage."""
+    last_cycle: int
+    """Cycles done after it."""
+    rows: list[dict[str, Any]]
+    """One row of ``settlement.csv`` for each cycle end, by the names in `COLUMNS`."""
+    cost: dict[str, float]
+    """CPU time by purpose [s]: engine, start_up (part of engine), parse, fit, relax, other."""
+    checks: dict[str, float] = field(default_factory=dict)
+    """Figures the validators judged."""
+    notes: dict[str, Any] = field(default_factory=dict)
+    """What else the report tells: time step, piston mesh, command, relaxation."""
+
+
+NEEDED = ("*.npz", "end.restart")
+"""Files of a stage that a run goes on from; the others may be removed to save space."""
+
+FREE_LEAST = 2**20
+"""Free space below which a disk counts as full when an engine has failed [bytes]."""
+
+MANIFEST = ("scene", "overrides", "control")
+"""What a manifest must hold for its run to be resumed."""
+
+ASKED_ON = "asked to go on cycle by cycle"
+"""Event of a run whose user wants every cycle computed where no jump is allowed."""
+
+STAGES = ("preparation", "jump", "window")
+"""Kinds of stages; at one cycle in this order: a jump of h = 0 comes before its window."""
+
+STAGE = re.compile(r"preparation|jump_\d{6,}_\d+|window_\d{6,}")
+"""Name of a stage's folder."""
+
+SEAL = "seal"
+"""Key of an ``outcome.json`` with the SHA-256 of the others; older records have none."""
+
+
+def place_stage(name: str) -> tuple[int, int, str]:
+    """Sorting key of a stage's name: its first cycle, its kind, its attempt."""
+    kind, *numbers = name.split("_")
+    return (int(numbers[0]) if numbers else -1, STAGES.index(kind), name)
+
+
+class RunFolder:
+    """Finished stages of one run under ``path``."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._known: dict[str, tuple[list[tuple[str, tuple[int, ...]]], bool, Outcome, str]] = {}
+        """Of stages read before: identities of their files, whether their digests were looked at,
+        outcome, and rows of the table."""
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Hold the folder's only writer's lock; see `trackbed.run_files.lock_folder`."""
+        with lock_folder(self.path, "lock"):
+            yield
+
+    def event(self, what: str, **details: object) -> None:
+        """Append one line to ``events.jsonl``."""
+        line = {
+            "time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+            "event": what,
+            **details,
+        }
+        append_line(self.path / "events.jsonl", json.dumps(line))
+
+    def asked_on(self, now: bool) -> bool:
+        """Whether this run was asked to compute where it may not jump, ``now`` or ever before."""
+        if now and not any(event["event"] == ASKED_ON for event in self.events()):
+            self.event(ASKED_ON)
+        return now or any(event["event"] == ASKED_ON for event in self.events())
+
+    def events(self) -> list[dict[str, Any]]:
+        """All events; a last line cut short by a crash is left out."""
+        path = self.path / "events.jsonl"
+        text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+        events = []
+        for line in text.splitlines():
+            try:
+                events.append(json.loads(line))
+            except json.JSONDecodeError:
+                continue
+        return events
+
+    def outcome(self, name: str, *, verify: bool = True) -> Outcome | None:
+        """Outcome of a finished stage; None when it is not there, or not as it was left.
+
+        ``verify`` looks into the files that a run goes on from, once for this `RunFolder`; else
+        their sizes are all that is compared.
+        """
+        folder = self.path / name
+        try:
+            if name in self._known:
+                files, verified, outcome, _ = self._known[name]
+                looked_at = files if verify else files[:1]
+                same = all(_identify(path) == found for path, found in looked_at)
+                if same and verified >= verify:
+                    return outcome
+            outcome = _read_outcome(folder)
+            names = ("outcome.json", *outcome.notes.get("files", ()))
+            files = [(path, _identify(path)) for path in (f"{folder}/{one}" for one in names)]
+            found = _sizes(folder)
+            whole = outcome.notes.get("files", found) == found
+            digests = outcome.notes.get("digests", {}) if verify and whole else {}
+            whole &= all(digest_file(folder / one) == digest for one, digest in digests.items())
+        except (OSError, ValueError, TypeError, AttributeError):
+            whole = False
+        if not whole:
+            self._known.pop(name, None)
+            return None
+        rows = [",".join(_cell(row.get(column)) for column in COLUMNS) for row in outcome.rows]
+        self._known[name] = files, verify, outcome, "".join(f"{row}\n" for row in rows)
+        return outcome
+
+    def stage_names(self) -> list[str]:
+        """Names of all stage folders in the order of the run."""
+        if not self.path.exists():
+            return []
+        with os.scandir(self.path) as entries:
+            names = [
+                entry.name for entry in entries
+                if STAGE.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False)
+            ]  # fmt: skip
+        return sorted(names, key=place_stage)
+
+    def outcomes(self) -> list[Outcome]:
+        """Outcomes of all finished stages in order; failed jumps are left out."""
+        finished = (self.outcome(name, verify=False) for name in self._kept_stages())
+        return [outcome for outcome in finished if outcome is not None]
+
+    def _kept_stages(self) -> list[str]:
+        """Names of all stage folders in order, without those of failed jumps."""
+        names = self.stage_names()
+        return [name for name in names if not (name.startswith("jump") and self.failure(name))]
+
+    def failure(self, name: str) -> str:
+        """Why a jump was given up, or an empty text."""
+        path = self.path / name / "failed.json"
+        if not path.exists():
+            return ""
+        try:
+            return str(json.loads(path.read_text(encoding="utf-8"))["why"])
+        except (ValueError, TypeError, KeyError):
+            return "the record of its failure is damaged"
+
+    def failure_details(self, name: str) -> dict[str, Any]:
+        """What `give_up` was told of a failed jump besides the reason; empty when that is all."""
+        try:
+            text = (self.path / name / "failed.json").read_text(encoding="utf-8")
+            return {key: value for key, value in json.loads(text).items() if key != "why"}
+        except (OSError, ValueError, AttributeError):
+            return {}
+
+    def give_up(self, name: str, why: str, **details: object) -> None:
+        """Mark a jump as failed, for good: its attempt is not made again on resume.
+
+        ``details`` are kept with the reason; see `failure_details`.
+        """
+        folder = self.path / name
+        folder.mkdir(exist_ok=True)
+        write_whole(folder / "failed.json", json.dumps({"why": why, **details}) + "\n")
+        self.event("jump failed", stage=name, why=why)
+        self.write_settlement()
+
+    def begin(self, name: str) -> Path:
+        """An empty folder to work stage ``name`` in.
+
+        What is there already is unfinished, damaged, or comes after it: it is moved away.
+        """
+        refuse_links(self.path)
+        for other in self.stage_names():
+            if place_stage(other) >= place_stage(name):
+                self.discard(self.path / other)
+        partial = self.path / "partial"
+        if partial.exists():
+            for leftover in sorted(partial.iterdir()):
+                self.discard(leftover)
+        folder = partial / name
+        folder.mkdir(parents=True)
+        return folder
+
+    def finish(self, folder: Path, outcome: Outcome) -> Path:
+        """Write the outcome and move the stage to its place; then rewrite ``settlement.csv``.
+
+        The outcome's notes get the sizes and digests of the `NEEDED` files, which `outcome` looks
+        for; all of it is on the disk when the stage is in its place.
+        """
+        sizes = _sizes(folder)
+        digests = {name: seal_file(folder / name) for name in sizes}
+        outcome = replace(outcome, notes=outcome.notes | {"files": sizes, "digests": digests})
+        record = json.loads(json.dumps(asdict(outcome)))
+        text = json.dumps(record | {SEAL: _digest(record)}, indent=1)
+        write_whole(folder / "outcome.json", text + "\n")
+        sync_folder(folder)
+        place = self.path / folder.name
+        folder.rename(place)
+        sync_folder(self.path)
+        self._known.pop(folder.name, None)
+        self.write_settlement()
+        return place
+
+    def discard(self, folder: Path) -> None:
+        """Move ``folder`` to ``discarded/`` under a free name, if it exists."""
+        if not folder.exists():
+            return
+        home = self.path / "discarded"
+        home.mkdir(exist_ok=True)
+        number = 1
+        while (home / f"{folder.name}.{number}").exists():
+            number += 1
+        folder.rename(home / f"{folder.name}.{number}")
+        self.event("discarded", stage=folder.name, to=f"discarded/{folder.name}.{number}")
+
+    def write_settlement(self) -> None:
+        """Write ``settlement.csv`` from the outcomes of all finished stages."""
+        names = self._kept_stages()
+        kept = [name for name in names if name in self._known or self.outcome(name, verify=False)]
+        rows = [self._known[name][3] for name in kept]
+        write_whole(self.path / "settlement.csv", ",".join(COLUMNS) + "\n" + "".join(rows))
+
+    def manifest(self) -> dict[str, Any]:
+        """The manifest; raises `UsageError` when this is no run folder."""
+        content = read_object(self.path / "manifest.json") or {}
+        if not content.keys() >= set(MANIFEST):
+            raise UsageError(
+                "this is not a run folder (no readable manifest.json)",
+                where=str(self.path),
+                remedy="give the folder that trackbed run made; if it was stopped in its first "
+                "second, start it again with: trackbed run SCENE",
+            )
+        refuse_format(self.path, content)
+        return content
+
+    def share_start(self, other: RunFolder, last_cycle: int) -> None:
+        """Link the stages of ``other`` up to ``last_cycle`` into this run: same work, same bits."""
+        for name in other.stage_names():
+            outcome = other.outcome(name)
+            here = self.path / name
+            if (
+                outcome is None
+                or outcome.stage == "jump"
+                or outcome.last_cycle > last_cycle
+                or here.exists()
+            ):
+                continue
+            temporary = self.path / f".{name}.linked"
+            shutil.rmtree(temporary, ignore_errors=True)
+            shutil.copytree(other.path / name, temporary, copy_function=_link)
+            temporary.rename(here)
+        self.write_settlement()
+
+
+def _digest(record: dict[str, Any]) -> str:
+    """SHA-256 of an outcome as JSON, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest()
+
+
+def _read_outcome(folder: Path) -> Outcome:
+    """The record of a stage; raises `ValueError` and others for one that is none or was changed."""
+    record = json.loads((folder / "outcome.json").read_text(encoding="utf-8"))
+    if (seal := record.pop(SEAL, None)) is not None and seal != _digest(record):
+        raise ValueError("changed since it was written")
+    return Outcome(**record)
+
+
+def _identify(path: str) -> tuple[int, ...]:
+    """What tells a file from a changed one, without reading it."""
+    found = os.lstat(path)
+    return found.st_ino, found.st_size, found.st_mtime_ns
+
+
+def _sizes(folder: Path) -> dict[str, int]:
+    """Size of each of the `NEEDED` files [bytes]."""
+    paths = sorted(path for pattern in NEEDED for path in folder.glob(pattern))
+    return {path.name: path.stat().st_size for path in paths}
+
+
+def _link(source: str, target: str) -> None:
+    try:
+        os.link(source, target)
+    except OSError:  # another file system, or one without hard links
+        shutil.copy2(source, target)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+@contextmanager
+def name_full_disk(path: Path) -> Iterator[None]:
+    """Turn the system's "no space left" into a sentence that says what is safe.
+
+    An engine does not always notice: what it left is cut short, and the disk tells why.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in NO_ROOM:
+            raise
+        raise _disk_full(path, str(error.strerror)) from error
+    except DiskFull as error:
+        raise _disk_full(path, f"{error.where} {error.what}") from error
+    except (EngineFailed, NotCredible) as error:
+        free = shutil.disk_usage(path).free
+        if free >= FREE_LEAST or (isinstance(error, EngineFailed) and error.from_outside):
+            raise
+        raise _disk_full(path, f"{free} bytes left") from error
+
+
+def _disk_full(path: Path, why: str) -> EngineFailed:
+    full = EngineFailed(
+        f"the disk is full ({why})",
+        where=str(path),
+        remedy="free some space, then: trackbed resume RUN; finished windows are whole",
+    )
+    full.from_outside = True
+    return full

@@ -1,0 +1,127 @@
+"""A settlement series, one value a cycle, read from a table, a run folder or dumps."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from adapters.bed import FloatArray
+from adapters.errors import UsageError
+from adapters.files.settlement import Series
+from adapters.files.settlement_table import SUFFIXES, read_table_series
+
+
+def too_few(
+    count: int, fewest: int, purpose: str, *, where: str, left_out: int = 0, else_do: str = ""
+) -> UsageError:
+    """The error of a series of ``count`` cycles, where ``purpose`` (to fit ..., to tell ...) needs
+    ``fewest``; ``left_out`` rows before them were given but not taken."""
+    gone = f", as {left_out} earlier rows are left out" if left_out else ""
+    back = ", or leave fewer rows out (--from-cycle, --load-change)" if left_out else ""
+    given = "1 cycle is" if count == 1 else f"{count} cycles are"
+    return UsageError(
+        f"{given} too few {purpose}{gone}",
+        where=where,
+        remedy=f"give at least {fewest} computed cycles{back}{else_do}",
+    )
+
+
+def read_series(
+    paths: Sequence[Path],
+    steps_per_cycle: float | None = None,
+    columns: Sequence[str] = (),
+    unit: str | None = None,
+) -> Series:
+    """The series of one table, one run folder, or dumps with one frame a cycle end.
+
+    A table is a file named as in `settlement_table.SUFFIXES`, but for dumps of such names;
+    ``columns`` are its columns of cycles and settlement, where they have unusual names; ``unit``
+    is one of `settlement_table.UNITS`, where the table does not say.
+
+    Dumps may be one file of many frames or many files, taken in natural order of their names
+    (``2.dump`` before ``10.dump``); a frame that repeats the time step before it is skipped.
+    Settlement is the drop of the mean height of the grains since the first frame.  Frames are
+    cycles 0, 1, 2 ...; with ``steps_per_cycle`` their time step counts: give it when the first
+    frame is not the start of the loading.
+
+    Raises `UsageError` or `DumpError`, naming file, line and column.
+    """
+    if not paths:
+        raise UsageError("no series was named", remedy="give a CSV file, a run folder or dumps")
+    tables = [path for path in paths if path.is_dir() or _is_table(path)]
+    if tables and len(paths) > 1:
+        raise UsageError(
+            "only dumps can be joined to one series",
+            where=str(tables[0]),
+            remedy="give one CSV file, or one run folder, or dumps",
+        )
+    if tables:
+        path = tables[0]
+        if path.is_dir() and unit not in (None, "m"):
+            raise UsageError(f"a run's settlement is in m, not in {unit}", where=str(path))
+        table = path / "settlement.csv" if path.is_dir() else path
+        return replace(read_table_series(table, columns, unit), where=str(table))
+    if columns:
+        raise UsageError("dumps have no columns of cycles and settlement", where=str(paths[0]))
+    if unit not in (None, "m"):
+        raise UsageError(f"dumps are in m, not in {unit}", where=str(paths[0]))
+    return replace(read_dump_series(paths, steps_per_cycle), where=str(paths[0]))
+
+
+def read_dump_series(paths: Sequence[Path], steps_per_cycle: float | None = None) -> Series:
+    """Settlement of the same grains in every frame of dumps; see `read_series`."""
+    from adapters.files.dump import read_frames
+
+    if steps_per_cycle is not None and not (steps_per_cycle > 0 and isfinite(steps_per_cycle)):
+        raise UsageError(f"steps per cycle must be positive, not {steps_per_cycle:g}")
+    steps: list[int] = []
+    heights: list[float] = []
+    grains: FloatArray | None = None
+    for path in sorted(paths, key=_natural):
+        for frame in read_frames(path):
+            where = f"{path}, time step {frame.time_step}"
+            identifiers = frame.column("id")
+            if grains is None:
+                grains = identifiers
+            elif not np.array_equal(grains, identifiers):
+                raise UsageError(
+                    "the grains are not those of the first frame",
+                    where=where,
+                    remedy="give dumps of one sample, from the start of its loading on",
+                )
+            if steps and frame.time_step == steps[-1]:
+                continue
+            if steps and frame.time_step < steps[-1]:
+                raise UsageError(
+                    f"the time step falls from {steps[-1]}",
+                    where=where,
+                    remedy="name the files so that their numbers ascend with time",
+                )
+            steps.append(frame.time_step)
+            heights.append(float(frame.column("z").mean()))
+    if steps_per_cycle is None:
+        cycle = np.arange(len(steps), dtype=float)
+    else:
+        cycle = np.array(steps) / steps_per_cycle
+    return Series(cycle, heights[0] - np.array(heights))
+
+
+def _is_table(path: Path) -> bool:
+    """Whether a file is a table by its name, and not a dump by its first word."""
+    suffix = path.suffix.lower()
+    certain = suffix in (SUFFIXES[0], SUFFIXES[-1])
+    if certain or suffix not in SUFFIXES or not path.is_file():
+        return certain
+    with path.open("rb") as stream:
+        return not stream.read(64).lstrip().startswith(b"ITEM:")
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Sorting key by which 2 comes before 10: digits as numbers, the rest as text."""
+    parts = re.findall(r"\d+|\D+", str(path))
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]

@@ -1,0 +1,124 @@
+"""A table of cycles and settlement as laboratories, loggers and spreadsheets write them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from adapters.errors import UsageError
+from adapters.files.settlement import UNKNOWN, Series
+from trackbed.series_file import BRACKETED, Table, find_column, read_table
+
+SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".xlsx")
+"""Names of tables; the middle ones may be dumps too, which begin with ``ITEM:``."""
+UNITS = {"m": "m", "cm": "cm", "mm": "mm", "um": "um", "µm": "um", "μm": "um", "%": "%", "-": "1"}
+"""Units a header may give, as in ``settlement_mm`` or ``Settlement [mm]``, and their names."""
+CYCLE_NAMES = ("cycle", "cycles", "n")
+SETTLEMENT_NAMES = {"settlement": "m", "strain": "1", "axial strain": "1"}
+"""Columns that are found without being named, and their unit where neither header nor user gives
+one; of other columns, and of a table without a header, it is then not known."""
+KINDS = ("computed", "healing", "jumped")
+"""What a row of a run's table may be; only computed ones are data for a law."""
+REMEDY = (
+    "the first line names the columns, such as cycle,settlement or cycle,settlement_mm (units are "
+    "m, cm, mm, um, %); for other names: --columns CYCLE SETTLEMENT"
+)
+STRAIN = "strain is told by 1 or %"
+
+
+def read_table_series(path: Path, names: Sequence[str] = (), unit: str | None = None) -> Series:
+    """The series of a table as `trackbed.series_file` reads it.
+
+    ``names`` are the two columns, where they are not the usual ones; ``unit`` is the settlement's,
+    one of `UNITS`, where the header does not give it.
+
+    Columns are `CYCLE_NAMES` and `SETTLEMENT_NAMES`, with a unit behind them; two columns of
+    numbers need no header.  Rows may be in any order.  Of a column ``kind`` only rows ``computed``
+    are taken; other columns are ignored.
+
+    Raises `UsageError`, which names line and column, for what is no number or not finite, negative
+    cycles and a cycle that is given twice: what such rows mean only their author knows; and for a
+    ``unit`` that is not the header's.
+    """
+    unit = _name_unit(unit)
+    wanted: list[tuple[str, ...]] = [CYCLE_NAMES, tuple(SETTLEMENT_NAMES)]
+    if names:
+        wanted = [(name.strip().lower(),) for name in names]
+    table = read_table(path, wanted)
+    places, title = [0, 1], "settlement"
+    if table.header:
+        try:
+            places = [find_column(table, one, UNITS) for one in wanted]
+            kinds = [table.split_title(n, UNITS)[0] == "kind" for n in range(len(table.header))]
+            if any(kinds):
+                table = _computed_rows(table, find_column(table, ("kind",), UNITS))
+        except UsageError as error:
+            remedy = REMEDY if "column" in error.what else error.remedy
+            raise UsageError(error.what, where=error.where, remedy=remedy) from None
+        title = table.header[places[1]]
+        unit = _find_unit(table, places[1], unit)
+    if not table.rows:
+        raise UsageError("there is no computed cycle in the table", where=str(path))
+    cycle, settlement = table.read_numbers(places, ("cycle", title))
+    if cycle.min() < 0:
+        row = int(np.argmax(cycle < 0))
+        raise UsageError(f"cycle {cycle[row]:g} is negative", where=table.where(row, "cycle"))
+    order = np.argsort(cycle, kind="stable")
+    cycle, settlement = cycle[order], settlement[order]
+    again = np.flatnonzero(np.diff(cycle) == 0)
+    if len(again):
+        first, second = (int(order[again[0] + step]) for step in (0, 1))
+        raise UsageError(
+            f"cycle {cycle[again[0]]:g} was given in line {table.lines[first]} already",
+            where=table.where(second, "cycle"),
+            remedy="keep one reading of a cycle; stages whose count starts anew: a file each",
+        )
+    return Series(cycle, settlement, unit or UNKNOWN)
+
+
+def _name_unit(given: str | None) -> str | None:
+    """The unit that the user gives, by its name in `UNITS`."""
+    unit = None if given is None else UNITS.get(given.strip().lower(), given)
+    if unit is not None and unit not in UNITS.values():
+        raise UsageError(
+            f"{unit} is no unit of settlement or strain",
+            remedy=f"the units are {', '.join(dict.fromkeys(UNITS.values()))}; 1 is plain strain",
+        )
+    return unit
+
+
+def _find_unit(table: Table, place: int, given: str | None) -> str:
+    """The unit of the settlement: the header's, or the one that the user gives."""
+    where = f"{table.path}:{table.header_line}"
+    title = table.header[place]
+    name, found = table.split_title(place, UNITS)
+    unit = UNITS.get(found.lower(), "")
+    if given and unit and given != unit:
+        raise UsageError(
+            f"the column {title} is in {unit}, not in {given}", where=where,
+            remedy="leave --unit out",
+        )  # fmt: skip
+    if given and SETTLEMENT_NAMES.get(name) == "1" and given not in ("1", "%"):
+        raise UsageError(f"the column {title} has no length, {given}", where=where, remedy=STRAIN)
+    if given and not unit and (other := BRACKETED.fullmatch(title)):
+        raise UsageError(
+            f"the column {title} is in {other[2]}, which is not known, and not in {given}",
+            where=where,
+            remedy="convert it, or name the column without a unit",
+        )
+    return unit or given or SETTLEMENT_NAMES.get(name, UNKNOWN)
+
+
+def _computed_rows(table: Table, place: int) -> Table:
+    """The table without rows that no engine computed and without transients."""
+    kinds = [row[place].strip() for row in table.rows]
+    for row, kind in enumerate(kinds):
+        if kind not in KINDS:
+            raise UsageError(
+                f"'{kind}' is no kind of row",
+                where=table.where(row, "kind"),
+                remedy=f"the kinds are {', '.join(KINDS)}",
+            )
+    return table.keep_rows([row for row, kind in enumerate(kinds) if kind == "computed"])

@@ -1,0 +1,399 @@
+"""Which jump comes next, and whether one that was made is kept: the controller, without an engine.
+
+Every function is pure; a run is the sequence of what it observed, so a run that was killed takes
+the same decisions again (`adapters.procedure.controlled` carries them out).
+
+`tolerance` bounds the error of the settlement that the bed gains from the start of a jump of h
+cycles at N to the end of the m healing cycles behind it, over the total settlement:
+
+    |gained - true| <= tolerance * |u(N + h + m)|,
+
+u counted from the prepared bed, before its first load cycle; "true" is what the bed would have
+gained on the mean, had every cycle been computed.  It is a bound a jump; how errors of several
+jumps add up is estimated by `adapters.jumps.band`.
+
+A bed that was moved settles more than it would have (`adapters.jumps.slopes`): rates are those of
+the bed itself, and what it is ahead of them by, all earlier jumps and the cycles behind them
+together, is taken off the next jump with what the bed will settle more behind that one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import exp, inf
+
+import numpy as np
+from scipy.special import stdtrit
+
+from adapters.bed import FloatArray
+from adapters.jumps.forecast import Forecast, bound_gain_by_laws, fit_forecast
+from adapters.jumps.rates import (
+    Stretch,
+    bound_cycles,
+    estimate_noise,
+    fit_slope_trend,
+    fit_state_trend,
+    measure_rates,
+)
+from adapters.jumps.slopes import Landing, estimate_slopes, reseating, unmoved
+from adapters.laws.fit import FIRST_WINDOW, WHY_NOT, WHY_NOT_PISTON, BoolArray, Regime
+
+PROBABILITY = 0.9
+"""Chance with which a jump is to hold its tolerance."""
+SHORTEST_WINDOW, LONGEST_WINDOW = 10, 100
+"""Fewest and most cycles k of a window: grains are fitted on the one, a kill loses the other."""
+GROWTH = 2.0
+"""Longest jump over the last one that was kept."""
+REACH = 2.0
+"""Greatest ratio of the cycles after a jump to those before."""
+STATE_CHANGE = 0.05
+"""Greatest change of coordination number or elastic deflection that a jump may pass over."""
+SAFETY = 0.9
+"""Share of the tolerance that is aimed at."""
+MEMORY = 10.0
+"""Stretches that ended before N / 10 are forgotten: what a law of one exponent can span."""
+STATES = ("coordination", "deflection")
+"""Columns of a `Stretch` that a jump leaves as they are, and that are compared behind it."""
+ATTEMPTS = 4
+"""Jumps tried from one state; then cycles are computed before the next."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the scene says."""
+
+    tolerance: float
+    healing: int
+    """Cycles m behind a jump that are kept out of the fit."""
+    total_cycles: int
+    cycle_by_cycle: bool = False
+    """Where no jump is allowed: True computes on, False refuses."""
+
+    @property
+    def shortest_jump(self) -> int:
+        """A shorter jump skips fewer cycles than its healing keeps from the fit: it never pays."""
+        return max(2, self.healing)
+
+
+@dataclass(frozen=True, eq=False)
+class Control:
+    """What is known at a state with every cycle since the last jump computed."""
+
+    cycle: int
+    settlement: float
+    """Since the preparation [m]."""
+    windows: tuple[Stretch, ...] = ()
+    """Computed cycles that still count, healing ones left out."""
+    behind: tuple[Stretch, ...] = ()
+    """The same with healing cycles from the second on, which show kappa best."""
+    landings: tuple[Landing, ...] = ()
+    """Jumps that were kept."""
+    kappa: float = 0.0
+    """Of `adapters.jumps.slopes`."""
+    ahead: float = 0.0
+    """What the bed has settled beyond its own rates, all jumps together [m]."""
+    reseated: float = 0.0
+    """What it settled more because it was moved [m]."""
+    curve_cycle: tuple[float, ...] = ()
+    curve_settlement: tuple[float, ...] = ()
+    """The run's own curve since the past was forgotten last [m]."""
+    last_jump: int = 0
+    """Length of the last jump that was kept; 0 before the first."""
+    longest: float = inf
+    """Longest jump by the errors observed."""
+    last_error: float = 1.0
+    """Realised error of the last jump over its tolerance."""
+    drift: tuple[float, float] = (0.0, 0.0)
+    """What rates exceeded their forecasts by, summed upwards and downwards (`jump_check`)."""
+    attempts: int = 0
+    """Jumps from this state that were taken back."""
+    window: int = FIRST_WINDOW
+    """Cycles of the last window."""
+
+    @cached_property
+    def stretches(self) -> tuple[Stretch, ...]:
+        """`windows` of the bed itself, without what jumps made it settle more."""
+        return tuple(unmoved(one, self.landings, self.kappa) for one in self.windows)
+
+    @property
+    def share(self) -> float:
+        """What the bed settles more behind a jump, over what it is moved by; from 0 to 1."""
+        moved = sum(one.moved for one in self.landings)
+        return min(max(self.reseated / moved, 0.0), 1.0) if moved else 0.0
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What to do from a state, and why.
+
+    ``jump_run`` turns ``refuse`` into the error `JumpRefused`, with which ``trackbed run`` and
+    ``trackbed resume`` end, exit code 6.
+    """
+
+    cycle: int
+    """Cycles done since the start of the run, with those jumped over."""
+    action: str
+    """``jump``, ``compute``, ``refuse`` or ``end``."""
+    window: int
+    """Cycles k to compute: behind the healing cycles of a jump, or at once."""
+    jump: int = 0
+    """Cycles h."""
+    gain: float = 0.0
+    """Settlement expected over the h cycles [m]."""
+    moved: float = 0.0
+    """Settlement that the mean grain is moved by [m]."""
+    correction: float = 0.0
+    """What is to be gained beyond ``gain``, for the errors of earlier jumps [m]."""
+    half_width: float = 0.0
+    """How far that can be off with `PROBABILITY`, before it is tried [m]."""
+    limits: tuple[tuple[str, float], ...] = ()
+    """Longest jump by each rule [cycles]."""
+    binding: str = ""
+    """The rule that set h."""
+    regime: str = ""
+    """One of `fit_regime.REGIMES`, of the bed or, where that is refused, of the piston; empty
+    before the first cycles to be fitted."""
+    exponent: float = 0.0
+    """beta: the rate goes as N^(beta - 1)."""
+    bound: int | None = None
+    """Cycles k of the paper's bound (eq. 15) for the same error; not used."""
+    attempt: int = 1
+    """Which try of a jump from this cycle it is, from 1."""
+    why: str = ""
+    """One sentence, or the part of one that follows "up to cycle N" where it refuses."""
+
+
+def begin(cycle: int, settlement: float) -> Control:
+    """The state after the first k_i cycles, which are not fitted."""
+    return Control(cycle, settlement)
+
+
+def observe(control: Control, stretch: Stretch, settlement: float) -> Control:
+    """The state after a window computed from ``control`` without a jump.
+
+    Errors observed count less the longer ago they are: their limit doubles with every window.
+    """
+    behind = joined(control.behind, stretch)
+    kappa = estimate_slopes(behind, control.landings).kappa()[0] if control.landings else 0.0
+    more = kappa * float(reseating(stretch, control.landings).sum())
+    cycles, curve = trace_curve(stretch, settlement)
+    return replace(
+        control,
+        cycle=stretch.last_cycle,
+        settlement=settlement,
+        windows=joined(control.windows, stretch),
+        behind=behind,
+        kappa=kappa,
+        ahead=control.ahead + more,
+        reseated=control.reseated + more,
+        curve_cycle=control.curve_cycle + cycles,
+        curve_settlement=control.curve_settlement + curve,
+        longest=control.longest * GROWTH,
+        attempts=0,
+        window=len(stretch.gain),
+    )
+
+
+def joined(stretches: tuple[Stretch, ...], new: Stretch) -> tuple[Stretch, ...]:
+    """Memory with a new stretch; windows that follow one another become one stretch."""
+    if stretches and stretches[-1].last_cycle == new.first_cycle:
+        last = stretches[-1]
+        parts = (
+            np.concatenate([getattr(last, name), getattr(new, name)])
+            for name in ("gain", "coordination", "deflection")
+        )
+        stretches, new = stretches[:-1], Stretch(last.first_cycle, *parts)
+    kept = [one for one in stretches if one.last_cycle * MEMORY >= new.last_cycle]
+    return (*kept, new)
+
+
+def trace_curve(stretch: Stretch, settlement: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    cycles = stretch.first_cycle + 1.0 + np.arange(len(stretch.gain))
+    values = settlement - stretch.gain.sum() + np.cumsum(stretch.gain)
+    return tuple(cycles.tolist()), tuple(values.tolist())
+
+
+def decide(control: Control, settings: Settings, piston: Regime | None = None) -> Decision:
+    """Jump, compute, refuse or end; a pure function of what was observed.
+
+    ``piston``: regime of a piston that can sink into the bed; None where it covers all of it.
+    """
+    left = settings.total_cycles - control.cycle
+    if left <= 0:
+        return Decision(control.cycle, "end", 0, why="all cycles are done")
+    if not control.stretches:
+        return Decision(
+            control.cycle, "compute", min(FIRST_WINDOW, left), why="the first cycles to be fitted"
+        )
+    forecast = fit_forecast(measure_rates(control.stretches))
+    regime = forecast.regime
+    known = Decision(
+        control.cycle,
+        "compute",
+        min(control.window, left),
+        regime=regime.name,
+        exponent=regime.exponent,
+        attempt=control.attempts + 1,
+    )
+    for one, why_not in ((regime, WHY_NOT), (piston, WHY_NOT_PISTON)):
+        if one is not None and not one.jump_allowed:
+            return replace(
+                known,
+                action="compute" if settings.cycle_by_cycle else "refuse",
+                regime=one.name,
+                exponent=one.exponent,
+                why=why_not[one.name],
+            )
+    room = left - settings.healing - SHORTEST_WINDOW
+    if room < settings.shortest_jump:
+        return replace(known, why="the end is too near for a jump")
+    grid = np.unique(np.geomspace(1, room, 80).round())
+    widths = estimate_widths(control, forecast, grid)
+    limits = limit_jump(control, settings, forecast, grid, widths)
+    binding = min(limits, key=lambda name: limits[name])
+    jump = int(min(limits[binding], room))
+    if limits[binding] > room:
+        binding = "end"
+    window = window_of(control, settings, forecast, limits)
+    width = float(np.interp(jump, grid, np.hypot(*widths)))
+    gain = float(forecast.gain(control.cycle, control.cycle + float(jump)))
+    moved = (gain - control.ahead) / (1 + control.share)
+    moved = moved if moved * gain > 0 else 0.0
+    total = abs(control.settlement + gain)
+    known = replace(
+        known,
+        limits=tuple((name, float(value)) for name, value in limits.items()),
+        binding=binding,
+        bound=bound_cycles(
+            control.stretches[-1], settings.tolerance * total / max(jump, 1), PROBABILITY
+        ),
+    )
+    if control.attempts >= ATTEMPTS:
+        return replace(known, window=min(window, left), why="jumps from here were taken back")
+    if jump < settings.shortest_jump:
+        why = f"no jump pays: {binding} allows {jump} cycles, healing takes {settings.healing}"
+        return replace(known, window=min(window, left), why=why)
+    return replace(
+        known,
+        action="jump",
+        jump=jump,
+        window=min(window, left - jump - settings.healing),
+        gain=gain,
+        moved=moved,
+        correction=moved * (1 + control.share) - gain,
+        half_width=width,
+        why=f"{binding} allows {jump} cycles",
+    )
+
+
+def limit_jump(
+    control: Control,
+    settings: Settings,
+    forecast: Forecast,
+    grid: FloatArray,
+    widths: tuple[FloatArray, FloatArray],
+) -> dict[str, float]:
+    """Longest jump [cycles] by each rule.
+
+    ``grid``: lengths that are tried, ascending, from 1, shape (h,); ``widths``: `estimate_widths`
+    them.
+
+    - *slope* (Cojocaru and Karlsson 2006): the slope w = du/d ln N changes by g a unit of ln N, so
+      holding it errs by g x^2 / 2, x = ln((N + h) / N).  Only what g exceeds its standard error by
+      counts: a noisy slope is no curvature.
+    - *noise*, *laws*: half-width of the gain from the noise of the rates, and from the exponent
+      and the slow laws' spread; both together within the tolerance.  The limit has the
+      name of the greater part.  And a rate that noise hides, so that its sign is not known, is not
+      extrapolated, for many such jumps would add up; unless all cycles left gain too little.
+    - *state*: coordination number and elastic deflection change by their trend, beyond its
+      standard error, no more than `STATE_CHANGE`.
+    - *observed*: by the errors of the jumps before, see `accept` and `reject`.
+    - *growth*: `GROWTH` times the last jump that was kept; the first one as long as its window.
+    - *reach*: `REACH` times the cycles done.
+    """
+    here = float(control.cycle)
+    gains = forecast.gain(here, here + grid)
+    allowed = SAFETY * settings.tolerance * np.abs(control.settlement + gains)
+    slope, slope_error = fit_slope_trend(measure_rates(control.stretches))
+    curvature = max(abs(slope) - slope_error, 0.0)
+    missed = 0.5 * curvature * np.log1p(grid / here) ** 2
+    noise, law = widths
+    both = np.hypot(noise, law)
+    idle = noise[-1] <= allowed[-1]
+    last = _longest(grid, (both <= allowed) & ((noise <= gains) | idle))
+    place = min(int(np.searchsorted(grid, max(last, 1.0))), len(grid) - 1)
+    name = "noise" if noise[place] >= law[place] else "laws"
+    first = control.last_jump == 0
+    return {
+        "slope": _longest(grid, missed <= allowed),
+        name: last,
+        "state": min(limit_by_state(control, name) for name in STATES),
+        "observed": control.longest,
+        "growth": float(control.window) if first else GROWTH * control.last_jump,
+        "reach": here * (REACH - 1),
+    }
+
+
+def _longest(grid: FloatArray, allowed: BoolArray) -> float:
+    """Last of the ``grid`` up to which all are ``allowed``; inf where all are, 0 where none."""
+    if allowed.all():
+        return inf
+    first = int(np.argmin(allowed))
+    return float(grid[first - 1]) if first else 0.0
+
+
+def limit_by_state(control: Control, name: str) -> float:
+    mean, slope, error = fit_state_trend(control.stretches, name)
+    change = max(abs(slope) - error, 0.0)
+    if change <= 0 or mean == 0:
+        return inf
+    return control.cycle * (exp(min(STATE_CHANGE * abs(mean) / change, 50.0)) - 1)
+
+
+def estimate_widths(
+    control: Control, forecast: Forecast, lengths: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Half-widths of the gain over jumps of ``lengths`` cycles [m]: noise, laws; shape (h,) each.
+
+    *laws* is the greater of the exponents' and of how far the slow laws, fitted to the run's own
+    curve, lie from the forecast.
+    """
+    here = float(control.cycle)
+    noise, form = forecast.half_widths(here, here + lengths, PROBABILITY)
+    curve = np.array(control.curve_cycle), np.array(control.curve_settlement)
+    low, high = bound_gain_by_laws(*curve, here + lengths, PROBABILITY)
+    gain = forecast.gain(here, here + lengths)
+    apart = np.maximum(high - gain, gain - low)
+    return noise, np.maximum(form, np.where(np.isfinite(apart), apart, 0.0))
+
+
+def window_of(
+    control: Control, settings: Settings, forecast: Forecast, limits: dict[str, float]
+) -> int:
+    """Cycles k of the next window: those with the most cycles gained for each one computed.
+
+    With k more cycles of long-run variance S the rate is known to s^-2 = s_0^-2 + k / S, and the
+    noise alone allows h(k) = N (exp(tolerance u / (t s N)) - 1), Student's t.  Where the other
+    rules allow more than that, k grows; without noise the shortest window does.  A rate whose sign
+    the noise would hide allows none.  Where no k makes a jump pay, twice the last window.
+    """
+    here = float(control.cycle)
+    sizes = np.unique(np.geomspace(SHORTEST_WINDOW, LONGEST_WINDOW, 20).round())
+    variance = float(estimate_noise(control.stretches).variance[-1])
+    known = float(1 / (forecast.weight @ forecast.error**2)) if forecast.error.any() else inf
+    others = min(value for name, value in limits.items() if name not in ("noise", "laws"))
+    student = float(stdtrit(forecast.freedom, (1 + PROBABILITY) / 2))
+    if variance > 0:
+        error = 1 / np.sqrt(known + sizes / variance)
+        allowed = SAFETY * settings.tolerance * abs(control.settlement)
+        reach = np.minimum(allowed / np.maximum(student * error * here, 1e-300), 50.0)
+        certain = student * error <= abs(float(forecast.rate @ forecast.weight))
+        jumps = np.where(certain, np.minimum(here * np.expm1(reach), GROWTH * others), 0.0)
+    else:
+        jumps = np.full_like(sizes, others)
+    pays = jumps >= settings.shortest_jump
+    if not pays.any():
+        return min(2 * control.window, LONGEST_WINDOW)
+    gained = np.where(pays, 1 + np.minimum(jumps, 1e9) / (sizes + settings.healing), 0.0)
+    return int(sizes[int(np.argmax(gained))])

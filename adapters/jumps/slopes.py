@@ -1,0 +1,148 @@
+"""Slopes du / d ln N of a bed from all cycles computed, and what jumps add to them.
+
+The logarithm has one slope a; a bed of few grains has bursts, so that a window's own slope can be
+several times its mean.  Here a is a random walk in ln N, as its drift is not known beforehand,
+
+    Var[a(N_2) - a(N_1)] = (`DRIFT` a_mean)^2 |ln(N_2 / N_1)|,
+
+seen through the noise of each block of computed cycles; its best linear unbiased estimate
+(ordinary kriging, Matheron 1963) weighs the nearest blocks alone where cycles are quiet, and all
+of them where they are not.
+
+A bed that was moved by G may settle more than it would have: in the first cycle, as contacts that
+were moved do not bear yet, and by some kappa G / n in the n-th (docs/jumps.md).
+kappa is one number for a run, 0 with standard deviation `RESEATING` before any cycle is seen; the
+blocks behind jumps show it, since 1 / n falls much faster than 1 / N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import sqrt
+
+import numpy as np
+
+from adapters.bed import FloatArray
+from adapters.jumps.rates import Stretch, estimate_noise
+
+DRIFT = 1.0
+"""Standard deviation of the slope's change over a unit of ln N, over the mean slope."""
+RESEATING = 0.1
+"""Standard deviation of kappa."""
+LONGEST_BLOCK = 0.35
+"""Greatest ln(end / start) of a block, so that it has one slope."""
+LONGEST_RESEATING = 1.1
+"""The same of cycles n since a jump, so that kappa is separable from the slope."""
+
+
+@dataclass(frozen=True)
+class Landing:
+    """Where a jump ended."""
+
+    cycle: int
+    """Cycles done behind it."""
+    moved: float
+    """G, by which the mean grain was moved [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Slopes of b blocks of computed cycles, and the covariance that they are read with."""
+
+    place: FloatArray
+    """ln N in the middle of each block, shape (b,)."""
+    slope: FloatArray
+    """Settlement over the length in ln N [m], shape (b,)."""
+    reseated: FloatArray
+    """What kappa = 1 adds to each slope [m], shape (b,)."""
+    system: FloatArray
+    """Kriging's matrix over the walk's variance in a unit of ln N, shape (b + 1, b + 1)."""
+    walk: float = 1.0
+    """That variance [m^2]."""
+
+    def at(self, places: FloatArray) -> FloatArray:
+        """Estimate of a [m] at places (p,) of ln N, not below 0: no bed rises for long."""
+        known = np.ones((len(self.slope) + 1, len(places)))
+        known[:-1] = -np.abs(self.place[:, None] - places) / 2
+        weights = np.linalg.solve(self.system, known)[:-1]
+        return np.maximum(self.slope @ weights, 0.0)
+
+    def kappa(self) -> tuple[float, float]:
+        """Estimate of kappa and its standard error; below 0 too, or noise would slow every bed."""
+        if not self.reseated.any():
+            return 0.0, RESEATING
+        known = np.append(RESEATING**2 / self.walk * self.reseated, 0.0)
+        weights = np.linalg.solve(self.system, known)[:-1]
+        explained = float(weights @ self.reseated)  # share of the prior variance
+        error = RESEATING * sqrt(min(max(1 - explained, 0.0), 1.0))
+        return float(self.slope @ weights), error
+
+
+def estimate_slopes(stretches: Sequence[Stretch], landings: Sequence[Landing] = ()) -> Slopes:
+    """Blocks of ``stretches`` with their covariance: walk, noise, and kappa behind ``landings``."""
+    pieces = [piece for one in stretches for piece in cut_slope_blocks(one, landings)]
+    blocks = [block for block, _ in pieces]
+    span = np.array([np.log(one.last_cycle / one.first_cycle) for one in blocks])
+    slope = np.array([one.gain.sum() for one in blocks]) / span
+    reseated = np.array([extra for _, extra in pieces]) / span
+    place = np.array([0.5 * np.log(one.first_cycle * one.last_cycle) for one in blocks])
+    cycles = np.array([len(one.gain) for one in blocks])
+    noise = estimate_noise(blocks).variance * cycles / span**2
+    kappa = 0.0
+    for _ in range(2):  # the walk's scale is the mean slope without what jumps add to it
+        mean = float((slope - kappa * reseated) @ span) / float(span.sum())
+        walk = (DRIFT * (mean if mean > 0 else float(np.abs(slope).mean()))) ** 2 or 1.0
+        system = assemble_kriging(place, noise / walk, reseated, walk)
+        slopes = Slopes(place, slope, reseated, system, walk)
+        kappa, _ = slopes.kappa()
+    return slopes
+
+
+def assemble_kriging(
+    place: FloatArray, noise: FloatArray, reseated: FloatArray, walk: float = 1.0
+) -> FloatArray:
+    """Kriging's matrix of blocks at ``place`` (b,), over the walk's variance in a unit of ln N.
+
+    ``noise`` (b,) is over that too, ``walk`` [m^2] is that.  Stationary is only the walk's change:
+    its level is free, hence the Lagrange multiplier in the last row.
+    """
+    count = len(place)
+    system = np.zeros((count + 1, count + 1))
+    system[:count, :count] = np.diag(noise) - np.abs(place[:, None] - place) / 2
+    system[:count, :count] += RESEATING**2 / walk * np.outer(reseated, reseated)
+    system[:count, count] = system[count, :count] = 1
+    return system
+
+
+def cut_slope_blocks(one: Stretch, landings: Sequence[Landing] = ()) -> list[tuple[Stretch, float]]:
+    """A stretch cut at equal ratios of N, behind a jump of n; with each, what kappa = 1 adds [m].
+
+    No longer than `LONGEST_BLOCK` and `LONGEST_RESEATING`; a cycle is the shortest block.
+    Stretches begin behind cycle 0.
+    """
+    first, last = one.first_cycle, one.last_cycle
+    start = max((landing.cycle for landing in landings if landing.cycle <= first), default=0)
+    longest = LONGEST_RESEATING if start else LONGEST_BLOCK
+    from_first = max(first - start, 1)
+    count = max(1, int(np.ceil(np.log((last - start) / from_first) / longest)))
+    edges = np.unique(np.geomspace(from_first, last - start, count + 1).round().astype(int))
+    edges[0] = first - start
+    parts = [one.part(a + start - first, b + start - first) for a, b in pairwise(edges.tolist())]
+    return [(part, float(reseating(part, landings).sum())) for part in parts]
+
+
+def reseating(stretch: Stretch, landings: Sequence[Landing]) -> FloatArray:
+    """What kappa = 1 adds to the gain of each cycle of a stretch [m], shape (k,): sum of G / n."""
+    cycle = stretch.first_cycle + 1.0 + np.arange(len(stretch.gain))
+    more = np.zeros(len(cycle))
+    for one in landings:
+        if one.cycle <= stretch.first_cycle:
+            more += one.moved / (cycle - one.cycle)
+    return more
+
+
+def unmoved(stretch: Stretch, landings: Sequence[Landing], kappa: float) -> Stretch:
+    """The stretch of the bed itself, without what jumps made it settle more."""
+    return replace(stretch, gain=stretch.gain - kappa * reseating(stretch, landings))

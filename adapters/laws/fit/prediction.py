@@ -1,0 +1,218 @@
+"""Fit a law to a settlement series, predict, and say how far the prediction can be off."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from adapters.bed import FloatArray
+from adapters.errors import JumpRefused, NotConverged, UsageError
+from adapters.files import Series, read_series, too_few
+from adapters.laws.fit.band import estimate_prediction_band
+from adapters.laws.fit.candidates import ROWS_FEWEST, thinned
+from adapters.laws.fit.outlook import TO_TELL, LawSaid, compare_laws, outlook
+from adapters.laws.fit.refusal import Refusal, failed, failure, refusals
+from adapters.laws.fit.regime import find_regimes
+from adapters.laws.fit.residual import bound_cycles_for_error, fit_error_term
+from adapters.laws.form import Law
+
+__all__ = ["Prediction", "Series", "count_cycles_needed", "fit_auto", "fit_series", "read_series"]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A law fitted to a series, and what it says of a later cycle."""
+
+    law: str
+    parameters: dict[str, float]
+    """By name; lengths in ``unit``, rates in ``unit`` per cycle."""
+    prediction: float
+    """Settlement at the cycle asked for, in ``unit``."""
+    band: tuple[float, float]
+    """Low and high end of the settlement at that cycle, in ``unit``; see
+    `estimate_prediction_band`."""
+    unit: str
+    regime: str | None = None
+    """One of `fit_regime.REGIMES`; None where the series is too short to show one."""
+    laws: dict[str, LawSaid] = field(default_factory=dict)
+    """What each slow law says, by name; empty for a law that was named."""
+    failure_excluded: bool | None = None
+    """True where no end of the band reaches the user's bound of failure; None without a bound."""
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``trackbed fit --json`` prints.
+
+        The fields by name; of ``laws`` those of `LawSaid`.  ``failure_excluded`` only with
+        ``--fail-at``, and ``count_cycles_needed``, which the command adds, only with ``--error``.
+        """
+        content = {
+            "law": self.law,
+            "parameters": self.parameters,
+            "prediction": self.prediction,
+            "band": list(self.band),
+            "unit": self.unit,
+            "regime": self.regime,
+            "laws": {name: asdict(said) for name, said in self.laws.items()},
+        }
+        if self.failure_excluded is not None:
+            content["failure_excluded"] = self.failure_excluded
+        return content
+
+
+def fit_series(
+    series: Series,
+    law: Law,
+    to_cycle: float,
+    probability: float = 0.9,
+    fail_at: float | None = None,
+) -> Prediction:
+    """Fit ``law`` to all of ``series`` and predict the settlement at ``to_cycle``.
+
+    ``to_cycle`` counts as ``series.cycle`` does; errors name cycles as the user counts them, from
+    before ``series.counted_from``.
+    The prediction is the last settlement of the series plus the law's increment from there on.
+    ``probability`` is the share of cases in which the band should hold the truth; ``fail_at`` is
+    the settlement or strain at which the bed fails, in the unit of the series, where it is known.
+
+    Raises `UsageError` when ``to_cycle`` lies before the last cycle of the series or the series
+    is too short (one row more than the law has parameters), `JumpRefused` when the series or the
+    result reaches ``fail_at``, `NotConverged` when the result is not finite.
+    """
+    cycle, settlement = _training_rows(series, law)
+    last = float(cycle[-1])
+    _check_target(series, last, to_cycle, probability, fail_at)
+    begin = series.counted_from
+    with np.errstate(over="ignore", invalid="ignore"):  # judged below, in one place
+        parameters = law.fit(cycle, settlement)
+        prediction = float(settlement[-1] + law.increment(parameters, last, to_cycle))
+        band = (prediction, prediction)
+        if to_cycle > last:
+            below, above = estimate_prediction_band(law, cycle, settlement, to_cycle, probability)
+            band = (prediction - below, prediction + above)
+    named = dict(zip(law.parameter_names, map(float, parameters), strict=True))
+    if refusal := failed(cycle + begin, settlement, fail_at):
+        raise _refused(refusal, law.name, named, {})
+    if not (np.isfinite(parameters).all() and np.isfinite(band).all()):
+        raise NotConverged(
+            f"the law {law.name} gives no finite settlement at cycle {to_cycle + begin:.10g}",
+            remedy="predict less far, or use the law log",
+        )
+    if refusal := failure(prediction, fail_at, to_cycle + begin):
+        raise _refused(refusal, law.name, named, {})
+    return Prediction(
+        law.name, named, prediction, band, series.unit, find_regime(series),
+        failure_excluded=failure_excluded(band, fail_at),
+    )  # fmt: skip
+
+
+def fit_auto(
+    series: Series, to_cycle: float, probability: float = 0.9, fail_at: float | None = None
+) -> Prediction:
+    """Predict the settlement at ``to_cycle`` from the slow laws together; see `fit_auto.outlook`.
+
+    ``parameters`` of the result: ``exponent`` beta of the tail with its deviation, which the
+    regime follows from, and under each law's name the settlement that it alone predicts (the
+    median of its windows); ``laws`` says which agree.
+
+    Raises `JumpRefused` where `fit_refusal.refusals` says so and ``to_cycle`` lies behind the
+    series; it has ``laws`` too.  Otherwise as `fit_series`: a regime that is refused comes before
+    a result that is not finite.
+    """
+    rows = series.cycle > 0
+    cycle, settlement = series.cycle[rows], series.settlement[rows]
+    if len(cycle) < ROWS_FEWEST:
+        raise too_few(
+            len(cycle), ROWS_FEWEST, TO_TELL, where=series.where or "law auto",
+            left_out=series.left_out, else_do=", or name a law: --law log",
+        )  # fmt: skip
+    _check_target(series, float(cycle[-1]), to_cycle, probability, fail_at)
+    found = outlook(cycle, settlement[:, None], to_cycle, probability)
+    begin, settled = series.counted_from, np.abs(settlement[:, None] - series.begun).max(axis=0)
+    found = replace(found, settled=settled, counted_from=begin)
+    parameters = found.regime[0].parameters()
+    prediction = float(found.prediction[0])
+    refusal = failed(cycle + begin, settlement, fail_at)
+    if refusal is None and isfinite(prediction):
+        refusal = failure(prediction, fail_at, to_cycle + begin)
+    refusal = refusal or refusals(found)[0]
+    said = compare_laws(found, refused=refusal is not None)
+    if refusal:
+        raise _refused(refusal, "auto", parameters, said)
+    alone = {name: one.prediction for name, one in said.items()}
+    parameters |= {name: value for name, value in alone.items() if value is not None}
+    band = (float(found.low[0]), float(found.high[0]))
+    return Prediction(
+        "auto", parameters, prediction, band, series.unit, found.regime[0].name, said,
+        failure_excluded=failure_excluded(band, fail_at),
+    )  # fmt: skip
+
+
+def failure_excluded(band: tuple[float, float], fail_at: float | None) -> bool | None:
+    """Whether ``band`` ends below the bound of failure, of either sign; None without a bound."""
+    return None if fail_at is None else max(map(abs, band)) < fail_at
+
+
+def _refused(
+    refusal: Refusal, law: str, parameters: dict[str, Any], said: dict[str, LawSaid]
+) -> JumpRefused:
+    return JumpRefused(
+        refusal.why,
+        where=f"law {law}",
+        remedy=refusal.remedy,
+        law=law,
+        regime=refusal.regime,
+        parameters={name: value for name, value in parameters.items() if isfinite(value)},
+        laws={name: asdict(one) for name, one in said.items()},
+    )
+
+
+def find_regime(series: Series) -> str | None:
+    """Regime of a series; None where it has fewer than four cycles after the start."""
+    rows = series.cycle > 0
+    if rows.sum() < ROWS_FEWEST:
+        return None
+    return find_regimes(*thinned(series.cycle[rows], series.settlement[rows, None]))[0].name
+
+
+def count_cycles_needed(series: Series, law: Law, error: float, confidence: float) -> int:
+    """Cycles that keep the mean error term below ``error`` with ``confidence`` (eq. 15).
+
+    ``error`` is in the unit of the series; p of eq. 15 is 1 - ``confidence``; the interval
+    [a, b] is the range of the residuals of ``law``.  See `residual.bound_cycles_for_error` for when
+    the bound means little.
+    """
+    cycle, settlement = _training_rows(series, law)
+    residual = fit_error_term(law, cycle, settlement)
+    return bound_cycles_for_error(
+        float(residual.min()), float(residual.max()), error, 1 - confidence
+    )
+
+
+def _check_target(
+    series: Series, last: float, to_cycle: float, probability: float, fail_at: float | None
+) -> None:
+    if not 0 < probability < 1:
+        raise UsageError(f"a probability lies between 0 and 1, not at {probability:g}")
+    if fail_at is not None and not (fail_at > 0 and isfinite(fail_at)):
+        raise UsageError(f"the settlement of failure is a positive number, not {fail_at:g}")
+    if not (isfinite(to_cycle) and to_cycle >= last):
+        raise UsageError(
+            f"cycle {to_cycle + series.counted_from:.10g} does not lie behind the last one of the "
+            f"series, {last + series.counted_from:.10g}",
+            where=series.where,
+            remedy="ask for a later cycle: the earlier ones are known",
+        )
+
+
+def _training_rows(series: Series, law: Law) -> tuple[FloatArray, FloatArray]:
+    """Cycles and settlement that ``law`` can take: cycle 0 only where it has a value there."""
+    rows = (series.cycle > 0) if law.first_state else np.ones(len(series.cycle), bool)
+    cycle, settlement = series.cycle[rows], series.settlement[rows]
+    fewest = law.minimum_cycles + 1
+    if len(cycle) < fewest:
+        purpose = f"to fit the law {law.name} and know its error"
+        raise too_few(len(cycle), fewest, purpose, where=series.where, left_out=series.left_out)
+    return cycle, settlement

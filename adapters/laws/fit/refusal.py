@@ -1,0 +1,106 @@
+"""When a prediction of the slow laws together is refused, and the words for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from adapters.bed import FloatArray
+from adapters.errors import NotConverged
+from adapters.laws.fit.outlook import JUDGED, Outlook
+from adapters.laws.fit.regime import COLLAPSE, WHY_NOT
+
+UNCERTAIN = "uncertain"
+"""In the place of a regime: the tail excludes none, and the band says nothing of the size."""
+WIDEST = 1.0
+"""Half-width of a band over all that settled so far, above which it is no prediction: what is not
+known of the future is then more than what is known of the past."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why there is no prediction; `fit` turns it into the error `JumpRefused`, exit code 6."""
+
+    regime: str
+    """``ratcheting``, ``collapse`` or `UNCERTAIN`."""
+    why: str
+    """One sentence; settlements in the unit of the series, cycles as the user counts them."""
+    remedy: str
+    """What to do."""
+
+
+def refusals(outlook: Outlook) -> list[Refusal | None]:
+    """Why each of n series is not predicted; None where it is.
+
+    - the regime is ratcheting or collapse (90 %): no law says when that ends;
+    - half the width of the band with `JUDGED`, whatever band was asked for, exceeds `WIDEST` times
+      the settlement so far (the largest reading, from the series' own zero): the laws differ by
+      more than all that was ever measured.  The constant is 1, and no number that was fitted.  A
+      series whose zero lies far off (a level of a track above the sea) is never refused for it:
+      give settlement since the load began.
+
+    A prediction for the last cycle itself is a reading, and never refused.  Raises `NotConverged`
+    where the regime allows a prediction and the laws give no finite one.
+    """
+    return [_refusal(outlook, series) for series in range(len(outlook.regime))]
+
+
+def _refusal(outlook: Outlook, series: int) -> Refusal | None:
+    if outlook.to_cycle == outlook.last_cycle:
+        return None
+    regime, begin = outlook.regime[series], outlook.counted_from
+    last, to_cycle = outlook.last_cycle + begin, outlook.to_cycle + begin
+    if not regime.jump_allowed:
+        return Refusal(
+            regime.name,
+            f"up to cycle {last:.10g} {WHY_NOT[regime.name]}: it goes as N^(beta - 1) with "
+            f"beta = {regime.exponent:.2f} ± {regime.deviation:.2f}"
+            + (f", N counted from cycle {begin:.10g}" if begin else "")
+            + ", and no law says when that ends",
+            "compute or measure more cycles, or name a law yourself: --law log, linear ...",
+        )
+    ends = (outlook.low, outlook.high, *outlook.judged)
+    if not np.isfinite([end[series] for end in ends]).all():
+        raise NotConverged(
+            f"the slow laws give no finite settlement at cycle {to_cycle:.10g}",
+            remedy="predict less far, or use the law log",
+        )
+    low, high = (float(end[series]) for end in outlook.judged)
+    settled = float(outlook.settled[series])
+    if high - low > 2 * WIDEST * settled:
+        return Refusal(
+            UNCERTAIN,
+            f"the laws differ too much at cycle {to_cycle:.10g}: from {low:.3g} to {high:.3g} with "
+            f"{JUDGED:.0%}, where {settled:.3g} is all that settled up to cycle {last:.10g}",
+            "measure more cycles, predict less far, or name a law yourself: --law log, power ...",
+        )
+    return None
+
+
+def failed(cycle: FloatArray, settlement: FloatArray, fail_at: float | None) -> Refusal | None:
+    """Collapse where a series, ``settlement`` (k,) at the user's cycles (k,), has reached the
+    user's bound in the same unit, of either sign: whatever would be predicted then."""
+    reached = np.flatnonzero(np.abs(settlement) >= (np.inf if fail_at is None else fail_at))
+    if not len(reached):
+        return None
+    first = reached[0]
+    return Refusal(
+        COLLAPSE,
+        f"{abs(settlement[first]):.3g} was reached at cycle {cycle[first]:.10g}, and {fail_at:g} "
+        "was given as failure (--fail-at): it has failed",
+        "leave out what came behind the failure, or give another bound",
+    )
+
+
+def failure(prediction: float, fail_at: float | None, to_cycle: float) -> Refusal | None:
+    """Collapse where ``prediction``, for the user's cycle ``to_cycle``, reaches the user's bound,
+    in the same unit, of either sign."""
+    if fail_at is None or abs(prediction) < fail_at:
+        return None
+    return Refusal(
+        COLLAPSE,
+        f"{abs(prediction):.3g} is predicted at cycle {to_cycle:.10g}, and {fail_at:g} was given "
+        "as failure (--fail-at): no law of settlement describes what comes then",
+        "ask for an earlier cycle",
+    )

@@ -1,0 +1,166 @@
+"""Which way a settlement series goes: shakedown, steady, ratcheting or collapse.
+
+From the rate of the rate.  With v = du/dN, q = d ln v / d ln N is -1 for the logarithm, 0 for
+a constant rate; beta = q + 1 is the exponent of the tail u = c + a (N^beta - 1) / beta.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from adapters.bed import FloatArray
+
+TAIL = 10.0
+"""The tail is the last decade: cycles from N_k / 10 to the last one, N_k."""
+TAIL_ROWS = 6
+"""Fewest cycles of a tail; where the last decade has fewer, earlier ones join."""
+EXPONENTS = np.linspace(-4.0, 6.0, 201)
+"""Exponents beta that are weighed."""
+PRIOR = 0.5
+"""Half-width of beta's distribution (Cauchy's) before any data: half of it between rates that fall
+as N^-1.5 and as N^-0.5, about the logarithm; its long tails let an explosion be seen as one."""
+RESOLUTION = 1e-3
+"""Deviation of a reading at best, of the whole range: a digit of a curve of 300 is off by as much.
+A bed that has settled but for its last digit is at rest, whichever way that digit goes."""
+CERTAIN = 0.9
+"""Probability from which a bed is said to shake down, to ratchet or to collapse."""
+
+SHAKEDOWN, STEADY, RATCHETING, COLLAPSE = REGIMES = (
+    "shakedown",
+    "steady",
+    "ratcheting",
+    "collapse",
+)
+WHY_NOT = {
+    RATCHETING: "the settlement rate falls too slowly (ratcheting)",
+    COLLAPSE: "the settlement rate grows (collapse)",
+}
+"""Regimes in which nothing bounds what comes after the data, and the words for it."""
+WHY_NOT_PISTON = {
+    RATCHETING: "the rate at which the piston sinks falls too slowly (ratcheting)",
+    COLLAPSE: "the rate at which the piston sinks grows (collapse)",
+}
+"""The same of a piston that breaks into a bed whose mean grain may even rise."""
+
+
+@dataclass(frozen=True)
+class Regime:
+    """Regime of one series, and the exponent it follows from."""
+
+    name: str
+    exponent: float
+    """Mean of beta; the rate falls as N^(beta - 1)."""
+    deviation: float
+    """Standard deviation of beta."""
+    bounded: float
+    """Probability of beta < 0: that the total has an end."""
+
+    @property
+    def jump_allowed(self) -> bool:
+        """True where the rate falls fast enough for a slow law to go on."""
+        return self.name not in WHY_NOT
+
+    def parameters(self) -> dict[str, Any]:
+        """For ``parameters`` of the command's JSON."""
+        return {"exponent": self.exponent, "exponent_deviation": self.deviation}
+
+
+def select_tail(cycle: FloatArray, decades: float = 1.0) -> slice:
+    """Rows of the last ``decades``, at least `TAIL_ROWS` of them where there are so many."""
+    first = int(np.searchsorted(cycle, cycle[-1] / TAIL**decades * (1 - 1e-9)))
+    return slice(max(0, min(first, len(cycle) - TAIL_ROWS)), None)
+
+
+def tail_column(ratio: FloatArray, exponent: FloatArray) -> FloatArray:
+    """(x^beta - 1) / beta of x = N / N_k, ln x where beta is 0; arguments broadcast."""
+    log = np.log(ratio)
+    small = np.abs(exponent) < 1e-9
+    return np.where(small, log, np.expm1(exponent * log) / np.where(small, 1.0, exponent))
+
+
+def weigh_exponents(cycle: FloatArray, displacement: FloatArray) -> FloatArray:
+    """Probability of each of `EXPONENTS`, shape (g, n), for series (k, n) at cycles > 0, (k,).
+
+    Least squares on the tail for every beta; Student's likelihood (the noise is not known) with as
+    many degrees of freedom as there are `independent` residuals.  A tail without any movement
+    gives the prior.
+    """
+    rows = select_tail(cycle)
+    ratio = cycle[rows] / cycle[-1]
+    series = displacement[rows] - displacement[rows].mean(axis=0)
+    columns = tail_column(ratio[:, None], EXPONENTS)
+    columns = columns - columns.mean(axis=0)
+    columns /= np.linalg.norm(columns, axis=0)
+    along = columns.T @ series
+    total = (series * series).sum(axis=0)
+    reading = len(ratio) * (RESOLUTION * np.ptp(displacement, axis=0)) ** 2
+    missed = np.where(total > 0, np.maximum(total - along**2, 0.0) + reading, 1.0)
+    best = missed.argmin(axis=0)
+    residual = series - columns[:, best] * along[best, np.arange(series.shape[1])]
+    counted = np.maximum(independent(residual), 4.0)
+    fit = np.log(missed / missed.min(axis=0))
+    weight = np.exp(-(counted - 2) / 2 * fit) / (1 + (EXPONENTS[:, None] / PRIOR) ** 2)
+    return np.asarray(weight / weight.sum(axis=0))
+
+
+def independent(residual: FloatArray) -> FloatArray:
+    """How many of k residuals (k, n) count: k (1 - rho) / (1 + rho), rho of neighbours, >= 0.
+
+    What an engine computes is a sum of increments, so neighbouring cycles are off alike.
+    """
+    square = np.maximum((residual * residual).sum(axis=0), np.finfo(float).tiny)
+    alike = np.clip((residual[1:] * residual[:-1]).sum(axis=0) / square, 0.0, 0.99)
+    return np.asarray(len(residual) * (1 - alike) / (1 + alike))
+
+
+ROUND_OFF = 1e-12
+"""Relative difference of means of equal readings."""
+
+
+def fit_tail_residual(
+    cycle: FloatArray, displacement: FloatArray, exponent: FloatArray
+) -> FloatArray:
+    """Tail less c + a (N^beta - 1) / beta fitted to it, shape (rows, n), ``exponent`` (n,)."""
+    rows = select_tail(cycle)
+    series = displacement[rows] - displacement[rows].mean(axis=0)
+    column = tail_column((cycle[rows] / cycle[-1])[:, None], exponent)
+    column = column - column.mean(axis=0)
+    slope = (column * series).sum(axis=0) / (column * column).sum(axis=0)
+    return np.asarray(series - slope * column)
+
+
+def find_regimes(cycle: FloatArray, displacement: FloatArray) -> list[Regime]:
+    """Regime of each of n series (k, n) at ascending cycles > 0, (k,), k >= 3.
+
+    The tail says what the bed does, not what it will do: real ballast at 30 to 40 Hz ratchets for
+    some hundred cycles and then shakes down.
+    """
+    weight = weigh_exponents(cycle, displacement)
+    tail = displacement[select_tail(cycle)]
+    still = np.ptp(tail, axis=0) <= ROUND_OFF * np.abs(tail).max(axis=0)  # means differ by that
+    return [find_regime_of_weight(*each) for each in zip(weight.T, still, strict=True)]
+
+
+def find_regime_of_weight(weight: FloatArray, still: bool) -> Regime:
+    """Regime where `EXPONENTS` have the probabilities ``weight``, (g,); each needs `CERTAIN`.
+
+    - *collapse*: beta > 1, a rate that grows;
+    - *ratcheting*: beta > 1/2, a rate nearer to a constant one than to that of the logarithm;
+    - *shakedown*: beta < 0, a total that stays bounded; or nothing moves (``still``);
+    - *steady* otherwise: unbounded, ever slower, or none of these for certain.
+    """
+    fast, growing = (float(weight[limit < EXPONENTS].sum()) for limit in (0.5, 1))
+    bounded = float(weight[EXPONENTS < -1e-9].sum())
+    mean = float(EXPONENTS @ weight)
+    deviation = sqrt(max(float(EXPONENTS**2 @ weight) - mean**2, 0.0))
+    if still or bounded > CERTAIN:
+        name = SHAKEDOWN
+    elif fast > CERTAIN:
+        name = COLLAPSE if growing > CERTAIN else RATCHETING
+    else:
+        name = STEADY
+    return Regime(name, mean, deviation, bounded)

@@ -1,0 +1,244 @@
+"""A run whose jumps choose themselves: carries out what `adapters.jumps.control` decides.
+
+Nothing is kept between two stages but the run folder: a run that is resumed goes through the same
+decisions on the finished stages, and finds there what it would do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from math import isfinite, nan
+from typing import Any
+
+import numpy as np
+
+from adapters.errors import EngineFailed, JumpRefused, NotConverged, NotCredible
+from adapters.files import Outcome, name_full_disk
+from adapters.jumps import (
+    Control,
+    Decision,
+    Landing,
+    Settings,
+    Stretch,
+    accept,
+    begin,
+    decide,
+    estimate_slopes,
+    fit_forecast,
+    joined,
+    judge,
+    measure_rates,
+    observe,
+    reject,
+    unmoved,
+)
+from adapters.laws.fit import Regime
+from adapters.procedure import stages
+from adapters.procedure.history import sum_cost
+from adapters.procedure.record import CHECK, DECISION
+from adapters.procedure.seating import seat, warn_if_hung
+from adapters.procedure.stages import Bed, Run
+
+
+def settle_controlled(run: Run, bed: Bed) -> Bed:
+    """From the bed after k_i cycles to the end: windows and jumps as the controller decides.
+
+    Where jumps wait for a piston that hangs, nothing of the cycles before is known to it behind.
+    Raises `JumpRefused` where the bed, or a piston on a part of it, ratchets or collapses, unless
+    the run was asked to go on.
+    """
+    procedure = run.scene.procedure
+    assert procedure is not None
+    assert procedure.tolerance is not None
+    settings = Settings(
+        procedure.tolerance, procedure.healing_cycles, procedure.total_cycles, run.cycle_by_cycle
+    )
+    journal = Journal(run)
+    rows = _rows(run, bed)
+    control = begin(bed.cycle, float(rows[-1]["settlement"]))
+    while True:
+        if (seated := seat(run, bed, procedure.carried_cycles)).cycle > bed.cycle:
+            bed = seated
+            control = begin(bed.cycle, float(_rows(run, bed)[-1]["settlement"]))
+        decision = decide(control, settings, find_piston_regime(run, control))
+        if decision.action == "end":
+            return bed
+        journal.write(DECISION, decision.cycle, decision.attempt, asdict(decision))
+        if decision.action == "refuse":
+            raise refused(run, decision)
+        if decision.action == "compute":
+            bed = stages.compute(run, bed, decision.window)
+            rows = _rows(run, bed)
+            stretch = make_stretch(rows, control.settlement)
+            control = observe(control, stretch, float(rows[-1]["settlement"]))
+        else:
+            warn_if_hung(run, bed)
+            bed, control = jump_and_check(run, bed, control, decision, settings, journal)
+
+
+def find_piston_regime(run: Run, control: Control) -> Regime | None:
+    """Regime of a piston on a part of the section, from the windows that still count.
+
+    Such a piston may break into the bed while grains beside it rise as much as those under it
+    sink: what the mean grain settles by does not show it.  None where the piston covers all of the
+    section, where no window is known yet, and where it does not sink.
+    """
+    assert run.scene.loading is not None
+    if run.scene.loading.area_share == 1 or not control.stretches:
+        return None
+    lowered = [
+        replace(one, rows=[row | {"settlement": -row["piston_height"]} for row in one.rows])
+        for one in run.folder.outcomes()
+    ]
+    sunk: tuple[Stretch, ...] = ()
+    for stretch in list_stretches(lowered, control.stretches[0].first_cycle, control.cycle):
+        sunk = joined(sunk, stretch)
+    return find_sinking_regime(sunk, control.landings)
+
+
+def find_sinking_regime(sunk: Sequence[Stretch], landings: Sequence[Landing]) -> Regime | None:
+    """Regime of what a piston has ``sunk`` by, less what it sinks more behind ``landings``: jumps
+    lower it by what they move the mean grain by.  That excess does not fall with N, and would pass
+    for ratcheting where jumps grow.  None where it does not sink."""
+    kappa = estimate_slopes(sunk, landings).kappa()[0] if landings else 0.0
+    forecast = fit_forecast(measure_rates([unmoved(one, landings, kappa) for one in sunk]))
+    return forecast.regime if forecast.rate @ forecast.weight > 0 else None
+
+
+def jump_and_check(
+    run: Run, bed: Bed, control: Control, decision: Decision, settings: Settings, journal: Journal
+) -> tuple[Bed, Control]:
+    """The jump, the window behind it, and the verdict; a jump taken back leaves the bed before it.
+
+    The bed before a jump is a finished stage and stays; the window behind a jump that is not
+    kept goes to ``discarded/``, what it cost to the jump's record.
+    """
+    name = f"jump_{bed.cycle:06d}_{decision.attempt}"
+    if run.folder.failure(name):
+        error = run.folder.failure_details(name).get("error", nan)
+        return bed, reject(control, decision, float(error), settings)
+    healing = settings.healing
+    try:
+        with name_full_disk(run.folder.path):
+            moved = stages.jump(run, bed, decision.jump, decision.attempt, decision.moved)
+            after = stages.compute(run, moved, healing + decision.window, healing)
+    except (EngineFailed, NotCredible, NotConverged) as error:
+        if isinstance(error, EngineFailed) and error.from_outside:
+            raise
+        run.folder.give_up(name, str(error))
+        run.progress.say(f"the jump of {decision.jump} cycles from {bed.cycle} failed: {error}")
+        return bed, reject(control, decision, nan, settings)
+    rows = _rows(run, after)
+    settlement = float(rows[-1]["settlement"])
+    stretch = make_stretch(rows, float(read_jump_row(run, name)["settlement"]))
+    check = judge(control, decision, settings, stretch, settlement)
+    record = {"jump": decision.jump, "window": healing + decision.window, **asdict(check)}
+    journal.write(CHECK, decision.cycle, decision.attempt, record)
+    if check.accepted:
+        return after, accept(control, decision, check, settings, stretch, settlement)
+    why = (
+        f"taken back: the bed gained {1e6 * check.gained:.3g} um, and the rates on both sides give "
+        f"{1e6 * check.expected:.3g} um: an error of {100 * check.error:+.3g} % of the total"
+    )
+    outcomes = [run.folder.outcome(stage) for stage in (name, after.window)]
+    lost_s = sum(sum_cost(outcome.cost) for outcome in outcomes if outcome is not None)
+    lost = {"lost_s": lost_s, "lost_cycles": healing + decision.window}
+    run.folder.give_up(name, why, error=check.error, **lost)
+    run.folder.discard(run.folder.path / after.window)
+    run.folder.write_settlement()
+    run.progress.say(f"the jump of {decision.jump} cycles from {bed.cycle} was {why}")
+    return bed, reject(control, decision, check.error, settings)
+
+
+def make_stretch(rows: list[dict[str, Any]], before: float) -> Stretch:
+    """Cycles of a table's ``rows``; ``before``: settlement at the end of the cycle before [m]."""
+    settlement = np.array([before, *(row["settlement"] for row in rows)], float)
+    return Stretch(
+        int(rows[0]["cycle"]) - 1,
+        np.diff(settlement),
+        np.array([row["coordination_number"] for row in rows], float),
+        np.array([row["elastic_deflection"] for row in rows], float),
+    )
+
+
+def list_stretches(
+    outcomes: Sequence[Outcome], begin: int, end: int, left_out: int | None = None
+) -> tuple[Stretch, ...]:
+    """Cycles computed from cycle ``begin`` to ``end``, a stretch a window.
+
+    Of its healing cycles the first ``left_out`` are left out; None: all.
+    """
+    stretches: list[Stretch] = []
+    settlement = 0.0
+    for outcome in outcomes:
+        if outcome.last_cycle > end:
+            break
+        rows = [{"settlement": settlement, "cycle": outcome.first_cycle}, *outcome.rows]
+        settlement = float(rows[-1]["settlement"])
+        healed = sum(row["kind"] != "computed" for row in outcome.rows)
+        healed = healed if left_out is None else min(healed, left_out)
+        first = max(healed, begin - outcome.first_cycle)
+        if outcome.stage == "window" and first < len(outcome.rows):
+            stretches.append(make_stretch(rows[first + 1 :], float(rows[first]["settlement"])))
+    return tuple(stretches)
+
+
+def refused(run: Run, decision: Decision) -> JumpRefused:
+    """The error of a run that may not jump."""
+    return JumpRefused(
+        f"up to cycle {decision.cycle} {decision.why}: it goes as N^(beta - 1) with beta = "
+        f"{decision.exponent:.2f}, and no law says when that ends",
+        where=str(run.folder.path),
+        remedy="every cycle so far is kept; to compute the others one by one: "
+        "trackbed resume RUN --cycle-by-cycle",
+        regime=decision.regime,
+        parameters={"exponent": decision.exponent},
+    )
+
+
+class Journal:
+    """Events of a controlled run, each once, however often the run was resumed."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self._known = {
+            (event["event"], event["cycle"], event["attempt"], event.get("action"))
+            for event in run.folder.events()
+            if event["event"] in (DECISION, CHECK)
+        }
+        self._silent: set[str] = set()
+
+    def write(self, what: str, cycle: int, attempt: int, content: Mapping[str, Any]) -> None:
+        """One event, unless it is there; a run that cannot jump says so on the screen, once."""
+        key = (what, cycle, attempt, content.get("action"))
+        if key in self._known:
+            return
+        self._known.add(key)
+        details = {name: _finite(value) for name, value in content.items()}
+        self._run.folder.event(what, **(details | {"cycle": cycle, "attempt": attempt}))
+        why = str(content.get("why", ""))
+        if what == DECISION and content["action"] == "compute" and content["binding"]:
+            kind = why.partition(":")[0]
+            if kind not in self._silent:
+                self._run.progress.say(f"cycle {cycle}: {why}; computing on")
+            self._silent.add(kind)
+
+
+def _finite(value: Any) -> Any:
+    """The same with None for numbers that are not finite, which JSON does not have."""
+    if isinstance(value, list | tuple):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _rows(run: Run, bed: Bed) -> list[dict[str, Any]]:
+    outcome = run.folder.outcome(bed.window)
+    assert outcome is not None
+    return outcome.rows
+
+
+def read_jump_row(run: Run, name: str) -> dict[str, Any]:
+    outcome = run.folder.outcome(name)
+    assert outcome is not None
+    return outcome.rows[-1]

@@ -1,0 +1,196 @@
+"""A run whose windows and jumps have given lengths k and h, as in Fig. 10 of Karrech et al. (2007).
+
+What the mean grain settles by is its law's or, where the scene says so, that of all cycles
+computed (`adapters.jumps.history`).  A jump that fails is tried again: shorter, or over the same
+cycles with a share of the move, whose rest the next jump is asked for.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from adapters.errors import EngineFailed, NotConverged, NotCredible
+from adapters.files import Outcome, name_full_disk
+from adapters.jumps import Jumped, find_asked_gain
+from adapters.procedure import stages
+from adapters.procedure.controlled import list_stretches
+from adapters.procedure.seating import SEATING, counted_from, seat, warn_if_hung
+from adapters.procedure.stages import Bed, Run
+
+RETRIES = 3
+"""How often a failed jump is tried again, by its law each time half as long."""
+SHARES = (1.0, 0.5, 0.25, 0.0)
+"""Of the move, by history, in each of the tries: the bed has no room for more."""
+GROWTH = 2.0
+"""Of what a bed had room for, the most that the next jump by history tries to move it by."""
+
+
+def settle_fixed(run: Run, bed: Bed) -> Bed:
+    """From the bed after k_i cycles to the end: k cycles and a jump of h, again and again.
+
+    Where less is left than the shortest h, cycles are computed; where jumps waited for the piston,
+    the last is one of what is left, if it skips no fewer cycles than its healing costs.
+    """
+    p = run.scene.procedure
+    assert p is not None
+    k = p.window_cycles
+    if bed.cycle < p.total_cycles:
+        bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
+    for number in range(p.total_cycles):
+        if not run.variant.jumps:
+            break
+        bed = seat(run, bed, p.carried_cycles + k)
+        shortest = max(p.healing_cycles, 1) if counted_from(run, bed) else min(p.h or (0,))
+        longest = p.total_cycles - bed.cycle - p.healing_cycles - k
+        h = 0 if run.variant.still else min(p.jump_cycles(number), longest)
+        if longest < shortest:
+            break
+        warn_if_hung(run, bed)
+        bed = jump_and_heal(run, bed, h)
+    while bed.cycle < p.total_cycles:
+        bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
+    return bed
+
+
+def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
+    """A jump of ``h`` cycles and the window after it; a failed jump is tried again.
+
+    By its law half as long.  By history with one of `SHARES` of the move, or of the room that jumps
+    before it found: the next jump knows the rest and adds it.  Where the jump and
+    its retries failed: `compute_on` if the run may compute what it cannot jump, else raises
+    `NotCredible`.
+    """
+    p = run.scene.procedure
+    assert p is not None
+    why = ""
+    for attempt in range(1, RETRIES + 2):
+        name = f"jump_{bed.cycle:06d}_{attempt}"
+        why = run.folder.failure(name)
+        if not why:
+            try:
+                with name_full_disk(run.folder.path):
+                    gain = find_history_gain(run, bed, h)
+                    share = 1.0
+                    if gain is not None:
+                        room = find_known_room(run.folder.outcomes(), bed.cycle)
+                        share = SHARES[attempt - 1] * (min(1.0, room / gain) if gain else 1.0)
+                    new = run.folder.outcome(name) is None
+                    moved = stages.jump(run, bed, h, attempt, gain, share)
+                    if new and gain:
+                        say_settled(run, name, gain, share)
+                    cycles = p.healing_cycles + p.window_cycles
+                    return stages.compute(run, moved, cycles, p.healing_cycles)
+            except (EngineFailed, NotCredible, NotConverged) as error:
+                if isinstance(error, EngineFailed) and error.from_outside:
+                    raise
+                why = str(error)
+                run.folder.give_up(name, why)
+                run.progress.say(f"the jump of {h} cycles from {bed.cycle} failed: {why}")
+        if p.settlement == "law":
+            h = h // 2 if h > 1 else h
+    failed = f"the jump from cycle {bed.cycle} failed {RETRIES + 1} times, the last time: {why}"
+    if run.cycle_by_cycle:
+        run.progress.say(f"{failed}; computing on")
+        return compute_on(run, bed)
+    raise NotCredible(
+        failed,
+        where=str(run.folder.path),
+        remedy="more cycles k before the jump, a shorter h, or windows in its place: "
+        "trackbed resume RUN --cycle-by-cycle; the cycles before it are kept",
+    )
+
+
+def say_settled(run: Run, name: str, asked: float, share: float) -> None:
+    """Say where a jump settled the bed by other than ``asked`` [m], a ``share`` of which it tried.
+
+    Smallest moves settle by what they try; grains that change places by some more or less.
+    """
+    jump = run.folder.outcome(name)
+    assert jump is not None
+    settled = (
+        f"settles the bed by {1e6 * jump.notes['gain']:.3g} um where it owes {1e6 * asked:.3g}"
+    )
+    if "hops" in jump.notes["relaxation"]:
+        run.progress.say(f"the jump {settled}: grains changed places")
+    elif share < 1:
+        run.progress.say(f"the jump {settled}: no room for more was found, by it or the one before")
+
+
+def compute_on(run: Run, bed: Bed) -> Bed:
+    """Windows in place of a jump: one at the first place that no jump leaves, twice as many at each
+    further one, so that tries stay few where none succeeds."""
+    p = run.scene.procedure
+    assert p is not None
+    last_tries = (
+        n for n in run.folder.stage_names() if re.fullmatch(rf"jump_\d+_{RETRIES + 1}", n)
+    )
+    places = sum(
+        bool(run.folder.failure(name)) and int(name.split("_")[1]) <= bed.cycle
+        for name in last_tries
+    )
+    end = min(p.total_cycles, bed.cycle + p.window_cycles * 2 ** (places - 1))
+    while bed.cycle < end:
+        bed = stages.compute(run, bed, min(p.window_cycles, end - bed.cycle))
+    return bed
+
+
+def find_history_gain(run: Run, bed: Bed, h: int) -> float | None:
+    """Settlement over a jump [m] by all cycles in which the bed carried the piston, but the first
+    of them; None: by the law.
+
+    Cycles count from the last in which it hung: from there on the bed takes the load for the first
+    time, and settles by ln of these, as one does that carried its piston from the rain on.
+    """
+    p = run.scene.procedure
+    assert p is not None
+    if p.settlement == "law" or h == 0:
+        return None
+    hung, outcomes = counted_from(run, bed), run.folder.outcomes()
+    left_out = max(1, round(SEATING * p.k_i))
+    begin = hung + (min(left_out, p.carried_cycles) if hung else left_out)  # k cycles are left
+    known = [
+        replace(one, first_cycle=one.first_cycle - hung)
+        for one in list_stretches(outcomes, begin, bed.cycle, left_out=1)
+    ]
+    jumps = [
+        replace(one, cycles=one.cycles - hung)
+        for one in list_jumps(outcomes, bed.cycle)
+        if one.cycles[0] >= begin
+    ]
+    return find_asked_gain(known, h, jumps)
+
+
+def find_known_room(outcomes: Sequence[Outcome], end: int) -> float:
+    """What the next jump by history may try to move the mean grain by [m]; inf: all that is asked.
+
+    Debts grow behind a jump without room, and shares of them with them: a bed that settles by 30 um
+    a jump would be asked for a quarter of 500.  So a jump tries no more than `GROWTH` times what
+    the one before found room for, half of its smallest try where it found none.
+    """
+    room = np.inf
+    for one in outcomes:
+        if one.stage != "jump" or one.last_cycle > end or not one.notes.get("asked"):
+            continue
+        tried, got = min(room, one.notes["asked"]), one.notes["gain"]
+        if one.notes["attempt"] == 1:
+            room = max(room, GROWTH * got)
+        else:
+            room = GROWTH * got if got else tried * min(filter(None, SHARES)) / 2
+    return float(room)
+
+
+def list_jumps(outcomes: Sequence[Outcome], end: int) -> list[Jumped]:
+    """Jumps kept up to cycle ``end``, each with the window behind it."""
+    outcomes = [one for one in outcomes if one.last_cycle <= end]
+    found = []
+    for before, jump, behind in zip(outcomes, outcomes[1:], outcomes[2:], strict=False):
+        if jump.stage == "jump" and jump.rows:
+            rows = [one.rows[-1] for one in (before, jump, behind)]
+            cycles = np.array([row["cycle"] for row in rows], int)
+            settled = np.array([row["settlement"] for row in rows], float)
+            found.append(Jumped(cycles, settled))
+    return found

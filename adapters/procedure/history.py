@@ -1,0 +1,163 @@
+"""A run as a table of its cycles with their cost, from its stages; and what failed jumps lost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from datetime import datetime
+from itertools import pairwise
+from math import nan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from adapters.bed import FloatArray, IntArray
+from adapters.errors import UsageError
+from adapters.files import Outcome, RunFolder, place_stage
+
+AVERAGED = 10
+"""Computed cycles at the end over which coordination number and deflection are averaged: both
+scatter from one cycle to the next."""
+
+
+@dataclass(frozen=True)
+class History:
+    """A run at the ends of its cycles, r rows in ascending cycles; nan where not measured."""
+
+    cycle: IntArray
+    kind: tuple[str, ...]
+    """``computed``, ``healing`` or ``jumped``."""
+    settlement: FloatArray
+    """Mean settlement of the grains since the preparation [m]."""
+    coordination_number: FloatArray
+    """Contacts with other grains, mean over all grains."""
+    relative_density: FloatArray
+    elastic_deflection: FloatArray
+    """Rise of the piston on unloading [m]."""
+    force_error: FloatArray
+    """Root mean square of the piston's force error in the cycle over the peak force."""
+    maximum_overlap: FloatArray
+    """Greatest overlap of grains, and of grains with walls [m]."""
+    cpu_s: FloatArray
+    """CPU time from the start of loading to the row [s]."""
+
+    def row(self, cycle: int) -> int:
+        """Index of a cycle's row; raises `UsageError` when it was not computed."""
+        found = np.flatnonzero(self.cycle == cycle)
+        if not len(found):
+            raise UsageError(f"there is no row of cycle {cycle}")
+        return int(found[0])
+
+    def computed(self, cycle: int) -> int:
+        """Cycles computed until ``cycle``: rows that are not jumps."""
+        return int(((self.cycle <= cycle) & self.engine_rows).sum())
+
+    @property
+    def engine_rows(self) -> NDArray[np.bool_]:
+        """Which rows the engine computed, shape (r,)."""
+        return np.array([kind != "jumped" for kind in self.kind], bool)
+
+    def late_mean(self, name: str, cycle: int) -> float:
+        """Mean of a column over the computed rows among the last `AVERAGED` cycles to ``cycle``."""
+        late = (self.cycle > cycle - AVERAGED) & (self.cycle <= cycle) & self.engine_rows
+        values = getattr(self, name)[late]
+        values = values[np.isfinite(values)]
+        return float(values.mean()) if len(values) else nan
+
+
+def sum_cost(cost: Mapping[str, float]) -> float:
+    """CPU time of a stage [s]; ``start_up`` is a part of ``engine``."""
+    return sum(seconds for purpose, seconds in cost.items() if purpose != "start_up")
+
+
+def history_of(outcomes: Sequence[Outcome], lost: Sequence[tuple[int, float]] = ()) -> History:
+    """The table of a run from its stages; a window's cost is spread evenly over its cycles.
+
+    ``lost``: after which cycle failed attempts lost how much CPU time [s].  The preparation has
+    no rows and is left out of the cost.
+    """
+    rows, cpu, spent = [], [], 0.0
+    for outcome in outcomes:
+        if outcome.stage == "preparation":
+            continue
+        cost = sum_cost(outcome.cost)
+        for number, row in enumerate(outcome.rows, start=1):
+            rows.append(row)
+            failed = sum(seconds for cycle, seconds in lost if cycle < row["cycle"])
+            cpu.append(spent + failed + cost * number / len(outcome.rows))
+        spent += cost
+    columns = {
+        column.name: np.array([_number(row.get(column.name)) for row in rows])
+        for column in fields(History)[2:-1]
+    }
+    return History(
+        cycle=np.array([row["cycle"] for row in rows], np.int64),
+        kind=tuple(row["kind"] for row in rows),
+        **columns,
+        cpu_s=np.array(cpu),
+    )
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else nan
+
+
+def read_history(folder: RunFolder) -> History:
+    """The table of the run in ``folder``, what its failed jumps lost included."""
+    lost = [(jump.first_cycle, jump.lost_s) for jump in failed_jumps(folder)]
+    return history_of(folder.outcomes(), lost)
+
+
+def list_jumped_spans(outcomes: Sequence[Outcome]) -> list[tuple[int, int]]:
+    """Cycles before and after each jump."""
+    return [(o.first_cycle, o.last_cycle) for o in outcomes if o.stage == "jump" and o.rows]
+
+
+def cycles_computed(cycle: int, spans: Sequence[tuple[int, int]]) -> int:
+    """Cycles among the first ``cycle`` that were computed; ``cycle`` lies outside the jumps."""
+    return cycle - sum(last - first for first, last in spans if last <= cycle)
+
+
+@dataclass(frozen=True)
+class FailedJump:
+    """A jump that was given up."""
+
+    stage: str
+    first_cycle: int
+    why: str
+    lost_s: float
+    """What it cost and no finished stage bears [s]; see `find_lost_time`."""
+
+
+def failed_jumps(folder: RunFolder) -> tuple[FailedJump, ...]:
+    """The jumps of a run that were given up, in order."""
+    events = folder.events()
+    return tuple(
+        FailedJump(stage, place_stage(stage)[0], why, _lost_s(folder, stage, events))
+        for stage in folder.stage_names()
+        if (why := folder.failure(stage))
+    )
+
+
+def _lost_s(folder: RunFolder, stage: str, events: Sequence[dict[str, Any]]) -> float:
+    """What a failed jump lost [s]: as it was noted where the jump was taken back."""
+    noted = folder.failure_details(stage).get("lost_s")
+    return find_lost_time(stage, folder.outcome(stage), events) if noted is None else float(noted)
+
+
+def find_lost_time(stage: str, outcome: Outcome | None, events: Sequence[dict[str, Any]]) -> float:
+    """Time of a failed jump that no finished stage bears [s].
+
+    Python's own goes over to the next stage.  A jump that was finished and then failed in the
+    window behind it lost its own cost and the engine's, of which only the elapsed time is known:
+    from the event before the failure to the failure.
+    """
+    if outcome is None:
+        return 0.0
+    lost = sum_cost(outcome.cost)
+    for before, event in pairwise(events):
+        if event["event"] == "jump failed" and event.get("stage") == stage:
+            ended, began = (datetime.fromisoformat(e["time"]) for e in (event, before))
+            lost += (ended - began).total_seconds()
+    return lost

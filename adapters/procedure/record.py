@@ -1,0 +1,166 @@
+"""A run folder as its report reads it: as far as the run has come, changing nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from adapters.bed import FloatArray, State, load_state
+from adapters.errors import UsageError
+from adapters.files import Outcome, RunFolder, Window, load_window
+from adapters.jumps import Band, estimate_band
+from adapters.procedure.history import FailedJump, History, failed_jumps, history_of
+from adapters.scene import Scene, load_scene
+
+CONTROL = "control"
+"""Folder inside a run that holds the full run beside it."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """One run of the scene: the procedure, its control, or another variant beside it."""
+
+    name: str
+    folder: RunFolder
+    outcomes: tuple[Outcome, ...]
+    """Finished stages in order, failed jumps left out."""
+    names: tuple[str, ...]
+    """Their folders."""
+    failed_jumps: tuple[FailedJump, ...]
+    discarded: tuple[str, ...]
+    """Stages whose unfinished or superseded work was moved away; empty folders left out."""
+    events: tuple[dict[str, Any], ...]
+
+    @cached_property
+    def history(self) -> History:
+        """The table of the run, with the CPU time at each row."""
+        return history_of(self.outcomes, [(j.first_cycle, j.lost_s) for j in self.failed_jumps])
+
+    @property
+    def preparation(self) -> Outcome | None:
+        """The outcome of the rain of grains, once it is done."""
+        return next((o for o in self.outcomes if o.stage == "preparation"), None)
+
+    @property
+    def jumps(self) -> list[tuple[str, Outcome]]:
+        """Folder and outcome of every jump that was kept."""
+        return [
+            pair for pair in zip(self.names, self.outcomes, strict=True) if pair[1].stage == "jump"
+        ]
+
+    @property
+    def windows(self) -> list[tuple[str, Outcome]]:
+        """Folder and outcome of every window."""
+        return [
+            pair
+            for pair in zip(self.names, self.outcomes, strict=True)
+            if pair[1].stage == "window"
+        ]
+
+    def start(self) -> State:
+        """The bed before the first load cycle."""
+        return load_state(self.folder.path / "preparation" / "state.npz")
+
+    def window(self, name: str) -> Window:
+        """States and piston of one window."""
+        return load_window(self.folder.path / name / "states.npz")
+
+    def position(self, cycle: int) -> FloatArray:
+        """Centres at the end of a cycle [m], shape (n, 3); raises `UsageError` for a jumped one."""
+        if cycle == 0:
+            return self.start().position
+        for name, outcome in self.windows:
+            if outcome.first_cycle < cycle <= outcome.last_cycle:
+                return self.window(name).state(cycle - outcome.first_cycle).position
+        for name, outcome in self.jumps:
+            if outcome.last_cycle == cycle:
+                return load_state(self.folder.path / name / "relaxed.npz").position
+        raise UsageError(f"no state was computed at cycle {cycle}", where=str(self.folder.path))
+
+    def before(self, jump: Outcome) -> State | None:
+        """The computed state a jump starts from."""
+        for name, outcome in self.windows:
+            if outcome.last_cycle == jump.first_cycle:
+                return self.window(name).state(-1)
+        return None
+
+
+@dataclass(frozen=True)
+class Record:
+    """All that the report shows."""
+
+    path: Path
+    manifest: dict[str, Any]
+    scene: Scene
+    run: Track
+    control: Track | None
+    """None when there is none, or it has not yet a cycle of its own."""
+    others: tuple[Track, ...]
+    """Further runs of the scene inside the folder, such as one from a perturbed state."""
+
+
+def read_run_record(path: Path) -> Record:
+    """Read the run folder ``path``; raises `UsageError` when it is none."""
+    folder = RunFolder(path)
+    manifest = folder.manifest()
+    scene = load_scene(path / "scene.toml", manifest["overrides"])
+    beside = {
+        inner.name: read_track(inner.name, RunFolder(inner))
+        for inner in sorted(path.iterdir())
+        if (inner / "settlement.csv").exists()
+    }
+    control = beside.pop(CONTROL, None)
+    if control is not None and not len(control.history.cycle):
+        control = None
+    others = tuple(track for track in beside.values() if len(track.history.cycle))
+    return Record(path, manifest, scene, read_track("this run", folder), control, others)
+
+
+def read_track(name: str, folder: RunFolder) -> Track:
+    """One run's finished stages, failures and events."""
+    stages = [
+        (stage, outcome)
+        for stage in folder.stage_names()
+        if (outcome := folder.outcome(stage, verify=False)) is not None
+        and not folder.failure(stage)
+    ]
+    home = folder.path / "discarded"
+    discarded = sorted(p.name for p in home.iterdir() if any(p.iterdir())) if home.exists() else []
+    return Track(
+        name=name,
+        folder=folder,
+        outcomes=tuple(outcome for _, outcome in stages),
+        names=tuple(stage for stage, _ in stages),
+        failed_jumps=failed_jumps(folder),
+        discarded=tuple(discarded),
+        events=tuple(folder.events()),
+    )
+
+
+Event = dict[str, Any]
+
+
+DECISION, CHECK = "decision", "jump checked"
+"""Events of a controlled run: what was decided and why; a jump beside what was computed behind."""
+
+
+def list_decisions(events: Sequence[Event]) -> list[Event]:
+    """Decisions in the order of the run, each once; fields of `jump_control.Decision`."""
+    found = {(e["cycle"], e["attempt"], e["action"]): e for e in events if e["event"] == DECISION}
+    return list(found.values())
+
+
+def list_checks(events: Sequence[Event]) -> dict[tuple[int, int], Event]:
+    """Checks by the cycle a jump started from and its attempt; fields of `jump_check.Check`."""
+    return {(e["cycle"], e["attempt"]): e for e in events if e["event"] == CHECK}
+
+
+def estimate_band_of_run(track: Track) -> Band | None:
+    """Settlement where the run is, with its band; None for a run without a tolerance."""
+    if not list_decisions(track.events) or not len(track.history.cycle):
+        return None
+    kept = [check for check in list_checks(track.events).values() if check["accepted"]]
+    return estimate_band(int(track.history.cycle[-1]), float(track.history.settlement[-1]), kept)

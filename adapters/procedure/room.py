@@ -1,0 +1,107 @@
+"""Where a moved bed finds room: positions without overlaps, and the piston on top of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from adapters.bed import GRAVITY, FloatArray, State
+from adapters.errors import NotConverged
+from adapters.relaxation import rearrange, relax
+from adapters.scene import Scene
+
+
+def find_room(
+    scene: Scene,
+    before: State,
+    target: FloatArray,
+    piston_height: float,
+    generator: np.random.Generator | None = None,
+) -> tuple[FloatArray, dict[str, Any], float]:
+    """Relaxed positions (n, 3), the relaxation's record, and the piston's height, in metres.
+
+    By the scene's relaxation, under a piston at ``piston_height``.  With a ``generator``, and a
+    piston that goes down, in a bed without room so: below the piston where it was; without room
+    there, either, and if ``procedure.jammed`` says so, by grains that change places.  Raises
+    `RelaxationNotConverged`.
+    """
+    assert scene.procedure is not None
+    try:
+        return *relaxed(scene, before, target, piston_height), piston_height
+    except NotConverged:
+        if generator is None or piston_height >= before.piston_height:
+            raise
+    try:
+        return relax_below(scene, before, target)
+    except NotConverged:
+        if scene.procedure.jammed == "less":
+            raise
+    return relax_by_rearranging(scene, before, target, piston_height, generator)
+
+
+def relaxed(
+    scene: Scene, before: State, target: FloatArray, piston_height: float
+) -> tuple[FloatArray, dict[str, Any]]:
+    """Relaxed positions of the ``target`` ones, (n, 3) in metres, and the relaxation's record.
+
+    Raises `RelaxationNotConverged`.
+    """
+    procedure = scene.procedure
+    assert procedure is not None
+    if procedure.relaxation == "none":
+        return target, {"method": "none"}
+    relaxation = relax(
+        target,
+        before,
+        scene.container.walls(before.piston_height, scene.piston_reach),
+        scene.stiffness,
+        method=procedure.relaxation,
+        gravity=GRAVITY,
+        walls_after=scene.container.walls(piston_height, scene.piston_reach),
+    )
+    return relaxation.position, relaxation.record()
+
+
+def relax_below(
+    scene: Scene, before: State, target: FloatArray
+) -> tuple[FloatArray, dict[str, Any], float]:
+    """As `relaxed` with the piston where it was; then its height on top of the bed [m].
+
+    Where grains have no room under a piston that went down: the bed settles below one that waits.
+    """
+    position, record = relaxed(scene, before, target, before.piston_height)
+    top = find_top_under(position, before.radius, scene.piston_reach)
+    return position, record | {"piston": "on the bed"}, min(top, before.piston_height)
+
+
+def relax_by_rearranging(
+    scene: Scene,
+    before: State,
+    target: FloatArray,
+    piston_height: float,
+    generator: np.random.Generator,
+) -> tuple[FloatArray, dict[str, Any], float]:
+    """Of grains that change places under the lowered piston; then its height on top of them [m]."""
+    reach = scene.piston_reach
+    relaxation, hops = rearrange(
+        target,
+        before,
+        scene.container.walls(before.piston_height, reach),
+        scene.stiffness,
+        generator,
+        walls_after=scene.container.walls(piston_height, reach),
+        gravity=GRAVITY,
+    )
+    top = find_top_under(relaxation.position, before.radius, reach)
+    record = relaxation.record() | {"piston": "on the bed", "hops": hops}
+    return relaxation.position, record, min(top, before.piston_height)
+
+
+def find_top_under(position: FloatArray, radius: FloatArray, reach: float) -> float:
+    """Highest place [m] of grains under a piston of radius ``reach`` [m].
+
+    ``position`` (n, 3) and ``radius`` (n,) in metres.
+    """
+    under = np.hypot(position[:, 0], position[:, 1]) - radius < reach
+    return float((position[:, 2] + radius)[under].max())

@@ -1,0 +1,242 @@
+"""The settlement procedure of Karrech et al. (2007), Fig. 10, and the runs made of it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from adapters.engines import find_engine, get_engine, interruptible, list_real_engines
+from adapters.errors import EngineMissing, SceneError, UsageError
+from adapters.files import RunFolder, name_full_disk
+from adapters.procedure import stages
+from adapters.procedure.controlled import settle_controlled
+from adapters.procedure.fixed import settle_fixed
+from adapters.procedure.progress import Progress
+from adapters.procedure.stages import Bed, Clock, Run, Variant
+from adapters.scene import Scene, flatten_keys, load_scene
+from trackbed.run_files import write_whole
+
+OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
+"""What may be in a run folder before its manifest is written."""
+
+CONTROL = Variant("control", jumps=False)
+CONTROL_STILL = Variant("control_still", still=True)
+
+
+def make_perturbed_control(member: int) -> Variant:
+    """A control from a state that differs by ``member`` times 1e-10 m in one grain."""
+    return Variant(f"control_perturbed_{member}", jumps=False, perturbation=member * 1e-10)
+
+
+def settle(run: Run) -> Bed:
+    """The flow chart, Fig. 10: rain, k_i cycles, then k cycles and a jump of h until the end."""
+    p = run.scene.procedure
+    assert p is not None
+    bed = stages.prepare(run)
+    bed = stages.compute(run, bed, p.k_i)
+    bed = replace(bed, start=replace(bed.start, perturbation=run.variant.perturbation))
+    if p.tolerance is not None and run.variant.jumps and not run.variant.still:
+        return settle_controlled(run, bed)
+    return settle_fixed(run, bed)
+
+
+def run_scene(
+    scene_path: Path,
+    run_path: Path,
+    *,
+    control: bool = False,
+    overrides: Sequence[str] = (),
+    dry_run: bool = False,
+    cycle_by_cycle: bool = False,
+    progress: Progress | None = None,
+) -> None:
+    """Run a scene in the folder ``run_path``; with ``control``, every cycle beside it too.
+
+    A folder that holds the same scene is resumed; one that holds another is refused with the
+    differences.  ``dry_run`` writes the first decks and prints the engine's command line.
+    ``cycle_by_cycle``: where a controlled run may not jump, compute instead of `JumpRefused`.
+    """
+    scene = load_scene(scene_path, overrides)
+    progress = progress or Progress()
+    if scene.engine.name == "auto":  # from here on, and in the manifest, by its name
+        try:
+            name = find_engine().name
+        except EngineMissing:
+            if not dry_run:
+                raise
+            name = list_real_engines()[0]  # decks can be looked at without it
+        overrides = [*overrides, f'engine.name="{name}"']
+        scene = load_scene(scene_path, overrides)
+        progress.say(f"engine: {scene.engine.name}")
+    for warning in scene.warnings:
+        progress.say(f"warning: {warning}")
+    if dry_run:
+        _dry_run(scene, run_path)
+        return
+    folder = RunFolder(run_path)
+    with interruptible(), name_full_disk(run_path), folder.locked():
+        settle_manifest(folder, scene, scene_path, overrides, control)
+        _run_all(folder, scene, control, folder.asked_on(cycle_by_cycle), progress)
+
+
+def resume(
+    run_path: Path, *, cycle_by_cycle: bool = False, progress: Progress | None = None
+) -> None:
+    """Go on with the run in ``run_path`` from its last whole stage; see `run_scene`."""
+    folder = RunFolder(run_path)
+    manifest = folder.manifest()
+    scene = load_scene(run_path / "scene.toml", manifest["overrides"])
+    with interruptible(), name_full_disk(run_path), folder.locked():
+        refuse_differences(manifest["scene"], record_scene(scene), run_path)
+        folder.event("resumed")
+        asked = folder.asked_on(cycle_by_cycle)
+        _run_all(folder, scene, manifest["control"], asked, progress or Progress())
+
+
+def _run_all(
+    folder: RunFolder, scene: Scene, control: bool, cycle_by_cycle: bool, progress: Progress
+) -> None:
+    try:
+        run_variant(folder, scene, Variant(), progress, cycle_by_cycle)
+        if control:
+            run_variant(folder, scene, CONTROL, progress)
+    except BaseException as error:
+        with name_full_disk(folder.path):
+            folder.event("stopped", why=str(error) or type(error).__name__)
+        raise
+
+
+def run_variant(
+    folder: RunFolder,
+    scene: Scene,
+    variant: Variant,
+    progress: Progress,
+    cycle_by_cycle: bool = False,
+) -> RunFolder:
+    """Run one variant of a scene: the procedure in ``folder`` itself, others in a folder inside.
+
+    The control shares the stages before the first jump: the same work would give the same bits.
+    """
+    engine = get_engine(scene.engine.name)
+    folder.event("engine", name=engine.name, version=engine.version(), variant=variant.name)
+    if variant.name == "procedure":
+        here = folder
+    else:
+        here = RunFolder(folder.path / variant.name)
+        here.path.mkdir(exist_ok=True)
+        here.share_start(folder, count_shared_cycles(folder, scene, variant))
+        progress.say(variant.name.replace("_", " "))
+    run = Run(scene, here, engine, variant, progress, cycle_by_cycle)
+    if variant.name == "procedure":
+        run.clock = Clock(0.0)  # it bears the start-up of Python; the others come in its wake
+    progress.start()
+    if scene.procedure is None or scene.loading is None:
+        stages.prepare(run)
+    else:
+        settle(run)
+    here.write_settlement()  # a run killed after its last stage may miss a row
+    return here
+
+
+def count_shared_cycles(folder: RunFolder, scene: Scene, variant: Variant) -> int:
+    """Cycles up to which a variant's stages are those of the procedure in ``folder``.
+
+    Up to k_i where a grain is moved there; else the first window, and where jumps waited for the
+    piston all windows before the first jump.
+    """
+    p = scene.procedure
+    assert p is not None
+    if variant.perturbation:
+        return p.k_i
+    first = p.k_i + p.window_cycles
+    if p.seating == "any":
+        return first
+    jumps = (one.first_cycle for one in folder.outcomes() if one.stage == "jump")
+    return max(first, next(jumps, p.total_cycles))
+
+
+def record_scene(scene: Scene) -> dict[str, Any]:
+    """The effective parameters of a scene, as the manifest keeps them; a load series as values."""
+    record = scene.model_dump(mode="json")
+    if scene.loading is not None and scene.loading.samples is not None:
+        record["loading"]["series"] = {
+            name: values.tolist() for name, values in vars(scene.loading.samples).items()
+        }
+    return record
+
+
+def settle_manifest(
+    folder: RunFolder, scene: Scene, scene_path: Path, overrides: Sequence[str], control: bool
+) -> None:
+    """Write the manifest of a new run, or refuse a folder that holds another scene's run."""
+    from trackbed.run_files import record_provenance
+
+    path = folder.path / "manifest.json"
+    if path.exists():
+        manifest = folder.manifest()
+        refuse_differences(manifest["scene"], record_scene(scene), folder.path)
+        if control and not manifest["control"]:
+            write_whole(path, json.dumps(manifest | {"control": True}, indent=1) + "\n")
+        folder.event("resumed")
+        return
+    strangers = [p.name for p in folder.path.iterdir() if p.name not in OWN_FILES]
+    if strangers:
+        raise UsageError(
+            f"the folder holds something else ({', '.join(sorted(strangers)[:3])}), no manifest",
+            where=str(folder.path),
+            remedy="give an empty or new folder: --run-folder FOLDER",
+        )
+    shutil.copyfile(scene_path, folder.path / "scene.toml")
+    kept = list(overrides)
+    if scene.loading is not None and scene.loading.series is not None:
+        shutil.copyfile(scene.loading.series, folder.path / "load_series.csv")
+        kept.append('loading.series="load_series.csv"')
+    import sys
+
+    manifest = {
+        "scene": record_scene(scene),
+        "overrides": kept,
+        "control": control,
+        "variant": asdict(Variant()),
+        "provenance": record_provenance(sys.argv),
+    }
+    write_whole(path, json.dumps(manifest, indent=1) + "\n")
+    folder.event("started")
+
+
+def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> None:
+    """Raise `SceneError` with every parameter that differs from the run's manifest."""
+    before, now = flatten_keys(old), flatten_keys(new)
+    lines = [
+        f"{key}: {before.get(key)!r} in the run, {now.get(key)!r} now"
+        for key in sorted(before.keys() | now.keys())
+        if before.get(key) != now.get(key)
+    ]
+    if lines:
+        raise SceneError(
+            "the scene differs from the one this run was started with:\n  " + "\n  ".join(lines),
+            where=str(path),
+            remedy="take the parameters back, or start a new run: --run-folder FOLDER",
+        )
+
+
+def _dry_run(scene: Scene, run_path: Path) -> None:
+    """Write the decks of the rain of grains and print the command that runs them."""
+    import shlex
+
+    from adapters.bed import draw_sample_start, sample_radii
+
+    engine = get_engine(scene.engine.name)
+    folder = run_path / "dry_run"
+    folder.mkdir(parents=True, exist_ok=True)
+    radius = sample_radii(scene.sample.grain_radius.law, scene.grain_count, scene.sample.seed)
+    position, height = draw_sample_start(
+        radius, scene.container, scene.sample.relative_density_start, scene.sample.seed
+    )
+    engine.write_preparation(scene, position, radius, height, folder)
+    print(f"cd {shlex.quote(str(folder))}")
+    print(shlex.join(engine.command(scene, "in.prepare")))

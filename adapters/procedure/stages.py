@@ -1,0 +1,392 @@
+"""The three stages of a run: rain of grains, a window of load cycles, a jump.
+
+Each is done once: a finished stage is read back, an unfinished one is done again from its start.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adapters.bed import (
+    SURFACE_SHARE,
+    FloatArray,
+    State,
+    draw_sample_start,
+    load_state,
+    measure_bed_height,
+    measure_sample,
+    neighbours,
+    relative_density,
+    sample_radii,
+    save_state,
+)
+from adapters.engines import Engine, EngineRun, EngineStart
+from adapters.files import (
+    Outcome,
+    RunFolder,
+    Window,
+    load_window,
+    read_state,
+    read_window,
+    save_window,
+)
+from adapters.laws import get_law
+from adapters.moves import get_move
+from adapters.procedure import checks
+from adapters.procedure.progress import Progress
+from adapters.procedure.room import find_room, find_top_under
+from adapters.scene import Scene
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Which of the runs of a scene this is."""
+
+    name: str = "procedure"
+    jumps: bool = True
+    """False computes every cycle: the control."""
+    still: bool = False
+    """True jumps over no cycle: dump, relax, resubmit, which shows what that alone costs."""
+    perturbation: float = 0.0
+    """Displacement [m] of one grain after the first k_i cycles: how far two equal runs part."""
+
+
+class Clock:
+    """CPU time of this process by purpose, from one finished stage to the next."""
+
+    def __init__(self, start_s: float | None = None) -> None:
+        """Count from ``start_s`` of this process's CPU time [s]; 0 counts Python's start-up too."""
+        self._start = time.process_time() if start_s is None else start_s
+        self._parts: dict[str, float] = {}
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Count the CPU time of a block under ``name`` [s]."""
+        start = time.process_time()
+        try:
+            yield
+        finally:
+            self._parts[name] = self._parts.get(name, 0.0) + time.process_time() - start
+
+    def lap(self, engine_s: float = 0.0, start_up_s: float = 0.0) -> dict[str, float]:
+        """Costs since the last lap [s], the engine's and its start-up's among them."""
+        now = time.process_time()
+        other = now - self._start - sum(self._parts.values())
+        cost = {"engine": engine_s, "start_up": start_up_s, **self._parts, "other": other}
+        self._start, self._parts = now, {}
+        return cost
+
+
+@dataclass
+class Run:
+    """A run in progress: what to do, where, with what."""
+
+    scene: Scene
+    folder: RunFolder
+    engine: Engine
+    variant: Variant
+    progress: Progress
+    cycle_by_cycle: bool = False
+    """Where no jump is allowed: True computes every cycle, False refuses."""
+    clock: Clock = field(default_factory=Clock)
+    computed_here: int = 0
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Where a run is: the saved state the next window starts from."""
+
+    cycle: int
+    """Cycles done, jumped ones included."""
+    start: EngineStart
+    window: str = ""
+    """Name of the stage with the last computed window."""
+    healing: int = 0
+    """First cycles of that window to keep out of the fit."""
+
+
+def prepare(run: Run, start: tuple[FloatArray, float] | None = None) -> Bed:
+    """Rain of grains under gravity until equilibrium (section 2.3).
+
+    ``start``: centres of the grains [m], shape (n, 3), and the height that they fill [m], instead
+    of the scene's random ones.
+    """
+    scene, name = run.scene, "preparation"
+    outcome = run.folder.outcome(name)
+    if outcome is None:
+        sample = scene.sample
+        run.progress.say(f"rain of {scene.grain_count} grains")
+        radius = sample_radii(sample.grain_radius.law, scene.grain_count, sample.seed)
+        position, height = start or draw_sample_start(
+            radius, scene.container, sample.relative_density_start, sample.seed
+        )
+        folder = _begin(run, name)
+        decks = run.engine.write_preparation(scene, position, radius, height, folder)
+        done = run.engine.run(scene, "in.prepare", folder, lambda: None, decks)
+        with run.clock.part("parse"):
+            state = read_state(folder, run.engine.wall_names(scene, piston=False))
+            checks.check_state(scene, state)
+            save_state(state, folder / "state.npz")
+        bed = measure_bed_height(state.position, state.radius)
+        notes = {
+            "figures": asdict(measure_sample(state, scene.container)),
+            "density_height": SURFACE_SHARE * bed,
+            "mean_height": float(state.position[:, 2].mean()),
+            "time_step": state.time_step,
+            **_run_notes(done),
+        }
+        cost = run.clock.lap(done.cpu_s, done.start_up_s)
+        _finish(run, folder, Outcome(name, 0, 0, [], cost, notes=notes))
+        outcome = run.folder.outcome(name)
+    assert outcome is not None
+    state = load_state(run.folder.path / name / "state.npz")
+    top = find_top_under(state.position, state.radius, scene.piston_reach)
+    restart = run.folder.path / name / "end.restart"
+    return Bed(0, EngineStart(restart, state.time_step, 0, top, first=True))
+
+
+def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
+    """A window of ``cycles`` load cycles, fresh process; the first ``healing`` are not fitted."""
+    name = f"window_{bed.cycle:06d}"
+    outcome = run.folder.outcome(name)
+    if outcome is None:
+        folder = _begin(run, name)
+        decks = run.engine.write_cycles(run.scene, bed.start, cycles, folder)
+        done = run.engine.run(run.scene, "in.cycles", folder, _watch(run, bed, folder), decks)
+        with run.clock.part("parse"):
+            window = read_window(
+                folder,
+                bed.cycle,
+                run.engine.wall_names(run.scene, piston=True),
+                bed.start.piston_height,
+            )
+            figures = checks.check_window(run.scene, window, cycles)
+            save_window(window, folder / "states.npz")
+            for text in ("states.dump", "contacts.dump"):
+                (folder / text).unlink()
+            rows = settlement_rows(run, window, healing)
+        notes = {
+            "time_step": int(window.time_step[-1]),
+            "piston_mesh": bed.start.piston_mesh,
+            "piston_height": float(window.piston.height[-1]),
+            **_run_notes(done),
+        }
+        cost = run.clock.lap(done.cpu_s, done.start_up_s)
+        run.computed_here += cycles
+        outcome = Outcome(
+            "window", bed.cycle, bed.cycle + cycles, rows, cost, checks=figures, notes=notes
+        )
+        _finish(run, folder, outcome)
+    return find_bed_behind(run.folder, name, outcome, healing)
+
+
+def find_bed_behind(folder: RunFolder, name: str, outcome: Outcome, healing: int = 0) -> Bed:
+    """Where the finished window ``name`` leaves a run in ``folder``; ``healing``: `compute`."""
+    start = EngineStart(
+        folder.path / name / "end.restart",
+        outcome.notes["time_step"],
+        outcome.notes["piston_mesh"],
+        outcome.notes["piston_height"],
+    )
+    return Bed(outcome.last_cycle, start, name, healing)
+
+
+def jump(
+    run: Run, bed: Bed, h: int, attempt: int, gain: float | None = None, share: float = 1.0
+) -> Bed:
+    """Estimate the bed ``h`` cycles on (eqs 16, 17), relax it (eq. 29), hand it back at rest.
+
+    ``gain``: settlement of the mean grain [m] where that is not to be the scene's law's; the bed is
+    moved by a ``share`` of what is estimated then.
+    """
+    name = f"jump_{bed.cycle:06d}_{attempt}"
+    folder = run.folder.path / name
+    if run.folder.outcome(name) is None:
+        folder = _begin(run, name)
+        with run.clock.part("parse"):
+            window = load_window(run.folder.path / bed.window / "states.npz")
+        before, target, piston_height = estimate(run, window, bed.healing, h)
+        if gain is None:
+            height = window.position[bed.healing :, :, 2]
+            checks.check_rise(run.scene, height, (target - before.position)[:, 2])
+        else:
+            target, piston_height = settle_by(gain, before, target)
+            target = before.position + share * (target - before.position)
+            piston_height = before.piston_height + share * (piston_height - before.piston_height)
+        with run.clock.part("relax"):
+            generator = None
+            if gain is not None:
+                generator = np.random.default_rng([run.scene.sample.seed, bed.cycle, attempt])
+            position, record, piston_height = find_room(
+                run.scene, before, target, piston_height, generator
+            )
+        after = before.moved(
+            position,
+            velocity=np.zeros_like(target),
+            spin=np.zeros_like(target),
+            piston_height=piston_height,
+            cycle=bed.cycle + h,
+        )
+        save_state(before.moved(target), folder / "estimated.npz")
+        save_state(after, folder / "relaxed.npz")
+        notes = {"h": h, "attempt": attempt, "relaxation": record}
+        if gain is not None:
+            settled = float((before.position - position)[:, 2].mean())
+            notes |= {"gain": settled if "hops" in record else share * gain, "asked": gain}
+        rows = [_row(run, after, "jumped")] if h else []
+        cost = run.clock.lap()
+        folder = _finish(
+            run, folder, Outcome("jump", bed.cycle, bed.cycle + h, rows, cost, notes=notes)
+        )
+    moved = load_state(folder / "relaxed.npz")
+    start = EngineStart(
+        bed.start.restart,
+        bed.start.time_step,
+        bed.start.piston_mesh + 1,
+        moved.piston_height,
+        moved=moved,
+    )
+    return Bed(bed.cycle + h, start, bed.window, bed.healing)
+
+
+def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, FloatArray, float]:
+    """State before a jump, estimated positions after it (n, 3) and the piston's height, in metres.
+
+    The grains move as ``procedure.move`` says, by a window without its ``healing`` first cycles.
+    The piston follows the law of its own heights, so that a loose grain cannot lift it; it is
+    never placed above where it is.
+    """
+    procedure = run.scene.procedure
+    assert procedure is not None
+    with run.clock.part("fit"):
+        law, move = get_law(procedure.law), get_move(procedure.move)
+        cycle = window.cycle[healing:].astype(float)
+        position = window.position[healing:]
+        field_ = move.displacement(cycle, position, window.radius, law, h, run.scene.container)
+        heights = window.piston_heights()[healing:]
+        parameters = law.fit(cycle[law.first_state :], heights[law.first_state :])
+        drop = float(law.increment(parameters, cycle[-1], cycle[-1] + h))
+        drop = min(drop, 0.0) if h and move.moves_piston else 0.0
+    before = window.state(-1)
+    return before, before.position + field_, before.piston_height + drop
+
+
+def settle_by(gain: float, before: State, target: FloatArray) -> tuple[FloatArray, float]:
+    """Estimated positions (n, 3) and piston height whose mean grain has settled by ``gain``, in m.
+
+    The rest is a uniform vertical strain, zero at the lowest grain.  The piston goes down as a
+    bed does that is strained evenly by the whole gain, and is never placed above where it is.  A
+    law of its own heights in the window is left aside as that of the grains is: in a long jump from
+    a short window its noise would press the piston into the grains by a part of a radius.
+    """
+    rest = before.position[:, 2].mean() - target[:, 2].mean() - gain
+    height = before.position[:, 2] - before.position[:, 2].min()
+    mean = float(height.mean()) or 1.0
+    target = target.copy()
+    target[:, 2] += rest * height / mean if height.any() else rest
+    above = before.piston_height - float(before.position[:, 2].min())
+    return target, before.piston_height - max(gain, 0.0) * above / mean
+
+
+def settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, Any]]:
+    """One row of ``settlement.csv`` for each cycle of a window."""
+    steps = run.scene.steps_per_cycle
+    errors = window.piston.force_error(steps)
+    deflections = window.piston.elastic_deflection(steps)
+    rows = []
+    for c in range(1, len(window) + 1):
+        row = _row(run, window.state(c), "healing" if c <= healing else "computed")
+        row["elastic_deflection"] = float(deflections[c - 1])
+        row["force_error"] = float(errors[c - 1])
+        rows.append(row)
+    return rows
+
+
+def _row(run: Run, state: State, kind: str) -> dict[str, Any]:
+    preparation = run.folder.outcome("preparation")
+    assert preparation is not None
+    container = run.scene.container
+    walls = container.walls(state.piston_height, run.scene.piston_reach)
+    touching = neighbours(state.position, state.radius, walls)
+    grains = int((touching.second >= 0).sum())
+    inertia = 0.4 * state.mass * state.radius**2
+    return {
+        "cycle": state.cycle,
+        "settlement": preparation.notes["mean_height"] - float(state.position[:, 2].mean()),
+        "kind": kind,
+        "coordination_number": 2 * grains / len(state.radius),
+        "relative_density": relative_density(
+            state.position, state.radius, container, preparation.notes["density_height"]
+        ),
+        "piston_height": state.piston_height,
+        "maximum_overlap": float(touching.overlap.max(initial=0.0)),
+        "kinetic_translational": 0.5 * float(state.mass @ (state.velocity**2).sum(axis=1)),
+        "kinetic_rotational": 0.5 * float(inertia @ (state.spin**2).sum(axis=1)),
+    }
+
+
+def _run_notes(done: EngineRun) -> dict[str, Any]:
+    return {"command": done.command, "wall_s": done.wall_s, "decks": done.decks}
+
+
+def _begin(run: Run, name: str) -> Path:
+    if (run.folder.path / name).exists():
+        run.progress.say(f"{name} is damaged: it is computed again, the old is in discarded/")
+    return run.folder.begin(name)
+
+
+def _finish(run: Run, folder: Path, outcome: Outcome) -> Path:
+    place = run.folder.finish(folder, outcome)
+    run.folder.event(
+        "finished", stage=folder.name, cycles=[outcome.first_cycle, outcome.last_cycle]
+    )
+    if outcome.rows:
+        row = outcome.rows[-1]
+        run.progress.say(
+            f"{folder.name}: cycle {row['cycle']}, settlement {1e6 * row['settlement']:.2f} um"
+        )
+    return place
+
+
+def _watch(run: Run, bed: Bed, folder: Path) -> Callable[[], None]:
+    """A function that shows progress from what the engine has written so far."""
+    procedure = run.scene.procedure
+    assert procedure is not None
+    outcomes = run.folder.outcomes()
+    computed = sum(o.last_cycle - o.first_cycle for o in outcomes if o.stage == "window")
+    rows = [row for outcome in outcomes for row in outcome.rows]
+    settlement = rows[-1]["settlement"] if rows else None
+
+    def watch() -> None:
+        here = run.engine.cycles_done(run.scene, bed.start, folder)
+        run.progress.cycles(
+            done=bed.cycle + here,
+            total=procedure.total_cycles,
+            computed=computed + here,
+            settlement=settlement,
+            computed_here=run.computed_here + here,
+            to_compute=count_cycles_to_compute(run, bed.cycle + here),
+        )
+
+    return watch
+
+
+def count_cycles_to_compute(run: Run, cycle: int) -> int:
+    """Cycles still to be computed from ``cycle`` on, as an estimate for the time left."""
+    procedure = run.scene.procedure
+    assert procedure is not None
+    left = procedure.total_cycles - cycle
+    if not run.variant.jumps:
+        return left
+    block = procedure.window_cycles + procedure.healing_cycles
+    if procedure.h is None:
+        jumps = [o.last_cycle - o.first_cycle for o in run.folder.outcomes() if o.stage == "jump"]
+        return round(left * block / (block + (jumps[-1] if jumps else 0)))
+    return round(left * block / (block + procedure.h[-1]))

@@ -1,0 +1,102 @@
+"""How far a run is, from its folder."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import asdict, dataclass
+from math import isfinite, nan
+from pathlib import Path
+from typing import Any
+
+from adapters.procedure.history import sum_cost
+from adapters.procedure.record import Record, Track, estimate_band_of_run, read_run_record
+from trackbed.run_files import is_written
+
+
+@dataclass(frozen=True)
+class Status:
+    """How far a run is; SI units, None for what is not known yet."""
+
+    run_folder: str
+    state: str
+    """``running``, ``finished`` or ``stopped``."""
+    why: str
+    """Why it stopped, the first of the run's last words."""
+    cycle: int
+    """Load cycles done."""
+    total_cycles: int
+    """0 for a scene without loading."""
+    cycles_computed: int
+    cycles_jumped: int
+    jumps: int
+    failed_jumps: int
+    settlement_m: float | None
+    speed_up_so_far: float | None
+    """Cycles done over cycles computed; the report gives the ratio of CPU times."""
+    cpu_s: float
+    """CPU time of all finished stages, preparation included [s]."""
+    band_m: tuple[float, float] | None
+    """Of a run with a tolerance: a full run would be between them with probability 0.9."""
+    control_cycle: int | None
+    """Cycles the full run beside it has done; None without one."""
+    next: str
+    """The command that goes on from here."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Fields by name, as ``trackbed status --json`` prints them."""
+        return asdict(self)
+
+
+def status(run_folder: Path) -> Status:
+    """How far the run in ``run_folder`` is; raises `UsageError` when it is no run folder."""
+    record = read_run_record(run_folder)
+    history = record.run.history
+    cycle = int(history.cycle[-1]) if len(history.cycle) else 0
+    computed = history.computed(cycle)
+    state = "running" if is_written(run_folder, "lock") else "stopped"
+    if state == "stopped" and _is_finished(record):
+        state = "finished"
+    ratio = cycle / computed if computed else nan
+    band = estimate_band_of_run(record.run)
+    procedure = record.scene.procedure if record.scene.loading is not None else None
+    verb = {"running": "status", "stopped": "resume", "finished": "report"}[state]
+    last = record.run.events[-1] if record.run.events else {}
+    return Status(
+        run_folder=str(run_folder),
+        state=state,
+        why=_why(last) if state == "stopped" else "",
+        cycle=cycle,
+        total_cycles=procedure.total_cycles if procedure is not None else 0,
+        cycles_computed=computed,
+        cycles_jumped=cycle - computed,
+        jumps=len(record.run.jumps),
+        failed_jumps=len(record.run.failed_jumps),
+        settlement_m=float(history.settlement[-1]) if cycle else None,
+        speed_up_so_far=ratio if isfinite(ratio) else None,
+        cpu_s=sum(sum_cost(outcome.cost) for outcome in record.run.outcomes),
+        band_m=None if band is None else (band.low, band.high),
+        control_cycle=_cycle(record.control) if record.control is not None else None,
+        next=f"trackbed {verb} {shlex.quote(str(run_folder))}",
+    )
+
+
+def _why(event: dict[str, Any]) -> str:
+    """The first line of a stop's reason; empty when the run was killed and left none."""
+    words = str(event.get("why", "")) if event.get("event") == "stopped" else ""
+    return words.partition("\n")[0]
+
+
+def _cycle(track: Track) -> int:
+    return int(track.history.cycle[-1])
+
+
+def _is_finished(record: Record) -> bool:
+    """All cycles of the run are done, and of its control when it was asked for one."""
+    if record.scene.loading is None or record.scene.procedure is None:
+        return record.run.preparation is not None
+    tracks = [record.run, record.control] if record.manifest.get("control") else [record.run]
+    total = record.scene.procedure.total_cycles
+    return all(
+        track is not None and len(track.history.cycle) > 0 and _cycle(track) == total
+        for track in tracks
+    )

@@ -1,0 +1,1 @@
+"""Several seeds and values of a scene's keys, side by side."""

@@ -1,0 +1,110 @@
+"""The verb ``trackbed sweep``; what it computes with is loaded when it runs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from adapters.cli import add_json_flag, add_scene_arguments, list_overrides, print_json
+from adapters.errors import SweepIncomplete, UsageError
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``sweep``."""
+    add_scene_arguments(parser)
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=V1,V2,...", dest="assignments",
+        help="values of a key of the scene, such as loading.frequency=10,20,50; may be repeated, "
+        "every combination is a member",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seeds", type=int, metavar="N",
+        help="so many samples of each, seeds counted up from the scene's sample.seed",
+    )  # fmt: skip
+    parser.add_argument(
+        "--into", type=Path, required=True, metavar="FOLDER",
+        help="members, tables and picture; a sweep that is there is continued",
+    )  # fmt: skip
+    parser.add_argument(
+        "--scheduler", default="local", metavar="WHERE",
+        help="local (default: in this process), slurm, or the address of a Dask scheduler",
+    )  # fmt: skip
+    parser.add_argument(
+        "--cluster-config", type=Path, metavar="FILE",
+        help="TOML with the keywords of dask_jobqueue.SLURMCluster, for --scheduler slurm",
+    )  # fmt: skip
+    parser.add_argument(
+        "--workers", type=int, metavar="N",
+        help="members at a time on this machine (default: its processors), or SLURM jobs",
+    )  # fmt: skip
+    parser.add_argument(
+        "--dry-run", action="store_true", help="check every member and print its command"
+    )
+    add_json_flag(parser)
+    parser.set_defaults(command=run_sweep_command, overrides=[])
+
+
+def run_sweep_command(arguments: argparse.Namespace) -> int:
+    """Run a sweep; `SweepIncomplete` when a member failed, after all others are finished."""
+    from adapters.procedure import Progress
+    from adapters.procedure.sweep.cluster import check_libraries
+    from adapters.procedure.sweep.plan import check_folder, plan_sweep
+    from adapters.procedure.sweep.results import write_results
+    from adapters.procedure.sweep.run import Cluster, list_dry_run, make_sweep_record, run_sweep
+
+    if arguments.workers is not None and arguments.workers < 1:
+        raise UsageError("there must be a worker at least", where="--workers")
+    if arguments.cluster_config is not None and arguments.scheduler != "slurm":
+        raise UsageError("it is read for --scheduler slurm only", where="--cluster-config")
+    sweep = plan_sweep(
+        arguments.scene, arguments.into, arguments.assignments, arguments.seeds,
+        list_overrides(arguments),
+    )  # fmt: skip
+    if arguments.dry_run:
+        check_folder(sweep)
+        print("\n".join(list_dry_run(sweep)))
+        return 0
+    check_libraries(arguments.scheduler)
+    cluster = Cluster(arguments.scheduler, arguments.cluster_config, arguments.workers)
+    progress = Progress()
+    for warning in dict.fromkeys(text for one in sweep.members for text in one.scene.warnings):
+        progress.say(f"warning: {warning}")
+    results = run_sweep(sweep, cluster, progress)
+    bands, paths = write_results(sweep, results)
+    if arguments.json:
+        last = [
+            {
+                "settings": dict(band.settings), "seeds": band.seeds, "cycle": int(band.cycle[-1]),
+                "mean_m": float(band.mean[-1]), "band_m": _half(band.half[-1]),
+            }
+            for band in bands
+            if len(band.cycle)
+        ]  # fmt: skip
+        print_json(
+            make_sweep_record(sweep, cluster, results) | {"settlements": last, "files": paths}
+        )
+    else:
+        for band in bands:
+            if len(band.cycle):
+                half = _half(band.half[-1])
+                spread = "" if half is None else f" +- {1e6 * half:.2f}"
+                print(
+                    f"{band.group}: {1e6 * band.mean[-1]:.2f}{spread} um at cycle "
+                    f"{band.cycle[-1]:.0f}, {band.seeds} of {band.asked} seeds"
+                )
+        print("\n".join(paths.values()))
+    failed = [result for result in results if result.state != "finished"]
+    if failed:
+        lines = [f"  {one.member}, exit code {one.exit_code}: {one.sentence}" for one in failed]
+        raise SweepIncomplete(
+            f"{len(failed)} of {len(results)} members failed, the others are finished:\n"
+            + "\n".join(lines),
+            where=str(arguments.into),
+            remedy="remove the cause and give the same command again: it runs only these",
+        )
+    return 0
+
+
+def _half(value: Any) -> float | None:
+    return float(value) if value == value else None

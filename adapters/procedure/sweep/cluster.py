@@ -1,0 +1,92 @@
+"""The Dask cluster a sweep runs on: in this process, one that is there already, or SLURM jobs."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+from adapters.errors import EngineMissing, UsageError
+
+LOCAL, SLURM = "local", "slurm"
+"""Names for ``--scheduler``; anything else is the address of a scheduler."""
+
+CONNECT_S = 30
+"""How long a scheduler may take to answer [s]."""
+
+EXTRA = "pip install 'trackbed[sweep]'"
+
+
+def check_libraries(scheduler: str) -> None:
+    """Raise `EngineMissing` before anything starts where a library of the extra is missing."""
+    from importlib.util import find_spec
+
+    needed = ["distributed", "pyarrow", *["dask_jobqueue"] * (scheduler == SLURM)]
+    missing = [name for name in needed if find_spec(name) is None]
+    if missing:
+        raise EngineMissing(f"a sweep needs {', '.join(missing)}", remedy=EXTRA)
+
+
+@contextmanager
+def open_client(
+    scheduler: str, config: Path | None, workers: int | None, members: int
+) -> Iterator[Any]:
+    """A `distributed.Client`, closed at the end, and with it what was started for it.
+
+    ``workers``: members at a time on this machine, or SLURM jobs; default: as many as processors,
+    or as ``members``.  Raises `UsageError` where the scheduler does not answer or the configuration
+    is wrong.
+    """
+    import distributed
+
+    with ExitStack() as stack:
+        if scheduler == LOCAL:
+            cores = len(os.sched_getaffinity(0))
+            place: Any = distributed.LocalCluster(
+                n_workers=1,
+                threads_per_worker=min(workers or cores, members),
+                processes=False,
+                dashboard_address=None,
+                memory_limit=None,
+            )
+            stack.enter_context(place)
+        elif scheduler == SLURM:
+            place = stack.enter_context(_slurm(config))
+            jobs = workers or members
+            place.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # a job that is lost is replaced
+        else:
+            place = scheduler
+        try:
+            client = stack.enter_context(distributed.Client(place, timeout=CONNECT_S))
+        except (OSError, ValueError) as error:
+            raise UsageError(
+                f"no Dask scheduler answers ({error})",
+                where=f"--scheduler {scheduler}",
+                remedy="give local, slurm, or the address that dask-scheduler printed, such as "
+                "tcp://node1:8786",
+            ) from error
+        yield client
+
+
+def _slurm(config: Path | None) -> Any:
+    """A `dask_jobqueue.SLURMCluster` with the keywords of a TOML file, besides Dask's own files."""
+    from dask_jobqueue.slurm import SLURMCluster
+
+    keywords: dict[str, Any] = {}
+    if config is not None:
+        try:
+            keywords = tomllib.loads(config.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise UsageError(f"cannot read it as TOML ({error})", where=str(config)) from error
+    try:
+        return SLURMCluster(**keywords)
+    except (TypeError, ValueError) as error:
+        raise UsageError(
+            f"dask-jobqueue does not take this ({error})",
+            where=str(config) if config else "--scheduler slurm",
+            remedy="write the keywords of dask_jobqueue.SLURMCluster to --cluster-config FILE: "
+            'cores = 1, processes = 1, memory = "2GB", walltime = "24:00:00", queue = "..."',
+        ) from error

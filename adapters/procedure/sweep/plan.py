@@ -1,0 +1,233 @@
+"""A sweep: a scene with several values of its keys, several seeds; every member a run of its own.
+
+A member is known by its settings: its folder is named after them, so that the same command goes on
+with what it finds, and one with more values or seeds adds to it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from adapters.errors import SceneError, UsageError
+from adapters.files import RunFolder
+from adapters.procedure import record_scene, refuse_differences
+from adapters.scene import Scene, load_scene
+
+SEED = "sample.seed"
+"""The key that ``--seeds`` counts up."""
+
+NAME_LONGEST = 120
+"""Longest name of a member's folder [characters]; a longer one is cut, with a digest."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """One run of a sweep."""
+
+    name: str
+    """Name of its folder, from its settings."""
+    settings: Mapping[str, str]
+    """Dotted key -> value as TOML text, of the keys swept over; the seed is kept apart."""
+    seed: int
+    overrides: tuple[str, ...]
+    """KEY=VALUE of everything that differs from the scene file."""
+    scene: Scene
+    """The scene, checked."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What a sweep is to run."""
+
+    scene_path: Path
+    folder: Path
+    members: tuple[Member, ...]
+
+    def run_folder(self, member: Member) -> Path:
+        """Where a member runs."""
+        return self.folder / "members" / member.name
+
+    def log(self, member: Member) -> Path:
+        """Folder of what a member printed, the last time it ran."""
+        return self.folder / "logs" / member.name
+
+    @property
+    def stop_file(self) -> Path:
+        """Where it exists, the members stop, wherever they run."""
+        return self.folder / "stop"
+
+    def groups(self) -> dict[str, list[Member]]:
+        """Members that differ by their seed alone, by the settings in which groups differ."""
+        first = self.members[0].settings
+        varied = {k for one in self.members for k, v in one.settings.items() if v != first[k]}
+        found: dict[str, list[Member]] = {}
+        for member in self.members:
+            settings = {key: value for key, value in member.settings.items() if key in varied}
+            found.setdefault(format_settings(settings), []).append(member)
+        return found
+
+
+def format_settings(settings: Mapping[str, str]) -> str:
+    """Settings in one line; ``the scene`` when there is none."""
+    return ", ".join(f"{key}={value}" for key, value in settings.items()) or "the scene"
+
+
+def split_values(text: str) -> list[str]:
+    """The values of ``10,20,50``: TOML texts between commas outside brackets, braces and quotes.
+
+    Raises `UsageError` for an empty value, or one given twice.
+    """
+    values, start, depth, quote = [], 0, 0, ""
+    for place, character in enumerate(text):
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "\"'":
+            quote = character
+        elif character in "[{":
+            depth += 1
+        elif character in "]}":
+            depth -= 1
+        elif character == "," and depth == 0:
+            values.append(text[start:place].strip())
+            start = place + 1
+    values.append(text[start:].strip())
+    for value in values:
+        if not value or values.count(value) > 1:
+            what = f"the value {value} is given twice" if value else "a value is empty"
+            raise UsageError(
+                f"{what} in {text!r}", where="--set",
+                remedy="write table.key=value,value, such as --set loading.frequency=10,20,50",
+            )  # fmt: skip
+    return values
+
+
+def parse_axes(assignments: Sequence[str]) -> dict[str, list[str]]:
+    """Key -> values of every ``KEY=V1,V2,...``; raises `UsageError` for a key given twice."""
+    axes: dict[str, list[str]] = {}
+    for assignment in assignments:
+        key, equals, text = (part.strip() for part in assignment.partition("="))
+        if not equals or not key:
+            raise UsageError(
+                f"cannot read {assignment!r}", where="--set",
+                remedy="write table.key=value,value, such as --set loading.frequency=10,20,50",
+            )  # fmt: skip
+        if key in axes:
+            raise UsageError(
+                f"{key} is given twice", where="--set", remedy="give all its values at once"
+            )
+        axes[key] = split_values(text)
+    return axes
+
+
+def name_member(settings: Mapping[str, str], seed: int) -> str:
+    """A folder's name: the settings, with a digest where they cannot all be part of it."""
+    text = ",".join([*(f"{key}={value}" for key, value in settings.items()), f"{SEED}={seed}"])
+    name = re.sub(r"[^\w.,=+-]", "-", text)[:NAME_LONGEST]
+    return name if name == text else f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+
+def plan_sweep(
+    scene_path: Path,
+    folder: Path,
+    assignments: Sequence[str],
+    seeds: int | None,
+    fixed: Sequence[str] = (),
+) -> Sweep:
+    """The members: the product of all values of ``assignments``, each with ``seeds`` seeds.
+
+    Seeds count up from the scene's own; ``fixed`` overrides hold for every member and are no part
+    of its name.  Every member's scene is checked.  Raises `UsageError`, or `SceneError` that names
+    the member.
+    """
+    axes = parse_axes(assignments)
+    if seeds is not None and seeds < 1:
+        raise UsageError(f"there must be a seed at least, not {seeds}", where="--seeds")
+    if seeds is not None and SEED in axes:
+        raise UsageError(f"--seeds sets {SEED}", where="--set", remedy="give one of the two")
+    own_seeds = axes.pop(SEED, None)
+    members = []
+    for values in itertools.product(*axes.values()):
+        settings = dict(zip(axes, values, strict=True))
+        overrides = [*fixed, *(f"{key}={value}" for key, value in settings.items())]
+        if own_seeds is None:
+            first = _scene(scene_path, overrides, settings).sample.seed
+            chosen = [str(first + number) for number in range(seeds or 1)]
+        else:
+            chosen = own_seeds
+        for seed in chosen:
+            with_seed = (*overrides, f"{SEED}={seed}")
+            scene = _scene(scene_path, with_seed, settings)
+            name = name_member(settings, scene.sample.seed)
+            members.append(Member(name, settings, scene.sample.seed, with_seed, scene))
+    _refuse_twins(members)
+    return Sweep(scene_path.absolute(), folder, tuple(members))
+
+
+def _scene(path: Path, overrides: Sequence[str], settings: Mapping[str, str]) -> Scene:
+    """A member's scene, checked; every member must have load cycles to compare."""
+    try:
+        scene = load_scene(path, overrides)
+    except SceneError as error:
+        raise SceneError(
+            f"member {format_settings(settings)} is not valid: {error.what}",
+            where=error.where, remedy=error.remedy,
+        ) from error  # fmt: skip
+    if scene.loading is None or scene.procedure is None:
+        raise SceneError(
+            "a sweep compares settlements, and this scene has no load cycles",
+            where=str(path), remedy="add the tables [loading] and [procedure]",
+        )  # fmt: skip
+    return scene
+
+
+def _refuse_twins(members: Sequence[Member]) -> None:
+    """Raise `UsageError` for two members with the same scene, such as ``10`` and ``10.0``."""
+    seen: dict[str, Member] = {}
+    for member in members:
+        twin = seen.setdefault(repr(record_scene(member.scene)), member)
+        if twin is not member:
+            raise UsageError(
+                f"{twin.name} and {member.name} are the same scene", where="--set",
+                remedy="give each value once",
+            )  # fmt: skip
+
+
+def check_folder(sweep: Sweep) -> None:
+    """Raise when the folder cannot be that of this sweep, or holds members that differ.
+
+    `UsageError` for a folder of something else, `SceneError` with the differences where the scene
+    was changed since a member was started.
+    """
+    folder = sweep.folder
+    if not folder.exists():
+        return
+    strangers = sorted(path.name for path in folder.iterdir())
+    if strangers and not (folder / "sweep.json").exists() and set(strangers) != {"lock"}:
+        raise UsageError(
+            f"the folder holds something else ({', '.join(strangers[:3])}), no sweep",
+            where=str(folder), remedy="give an empty or new folder: --into FOLDER",
+        )  # fmt: skip
+    for member in sweep.members:
+        path = sweep.run_folder(member)
+        if not (path / "manifest.json").exists():
+            continue
+        before, now = RunFolder(path).manifest()["scene"], record_scene(member.scene)
+        if now["engine"]["name"] == "auto":  # the run has the name it stood for
+            now["engine"]["name"] = before["engine"]["name"]
+        refuse_differences(before, now, path)
+
+
+def find_pinned_engine(sweep: Sweep) -> str | None:
+    """What ``auto`` stood for when members of this sweep were started; None if none was."""
+    for member in sweep.members:
+        path = sweep.run_folder(member)
+        if (path / "manifest.json").exists():
+            record: dict[str, Any] = RunFolder(path).manifest()["scene"]
+            return str(record["engine"]["name"])
+    return None

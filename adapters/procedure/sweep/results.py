@@ -1,0 +1,194 @@
+"""What a sweep leaves for other tools: tables as CSV and Parquet, mean settlement with its band.
+
+================ =====================================================================
+``members``      a row for each member: settings, state, settlement, cost, its error
+``settlement``   a row for each cycle of each member, as in its ``settlement.csv``
+``band``         a row for each cycle of each setting: mean over seeds, confidence band
+================ =====================================================================
+
+The tables are derived from the run folders and can be written again at any time.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from adapters.bed import FloatArray
+from adapters.files import COLUMNS, RunFolder
+from adapters.procedure.sweep.plan import SEED, Member, Sweep
+from adapters.procedure.sweep.run import Result
+from adapters.scene import flatten_keys
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+CONFIDENCE = 0.95
+"""Probability that a band holds the mean, for seeds whose settlements are normal."""
+
+SAMPLE_FIGURES = ("coordination_number", "relative_density")
+"""Columns of the last row that the table of members has too."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Settlement over the finished seeds of one setting, at the cycles that all of them have."""
+
+    group: str
+    settings: Mapping[str, Any]
+    seeds: int
+    """Finished members."""
+    asked: int
+    """Members in all."""
+    cycle: FloatArray
+    """Load cycles, shape (c,)."""
+    mean: FloatArray
+    """Mean settlement [m], shape (c,)."""
+    half: FloatArray
+    """Half the width of the confidence band [m], shape (c,); nan for a single seed."""
+
+
+def estimate_mean(values: FloatArray, confidence: float = CONFIDENCE) -> tuple[Any, Any]:
+    """Mean over axis 0 and half the t interval, t_(n-1) s/sqrt(n); nan for one sample.
+
+    ``values`` of shape (n, ...), a sample in each row; independent and normal.
+    """
+    from scipy.special import stdtrit
+
+    n = len(values)
+    mean = values.mean(axis=0)
+    if n < 2:
+        return mean, np.full_like(mean, np.nan)
+    factor = float(stdtrit(n - 1, 0.5 + confidence / 2)) / sqrt(n)
+    return mean, factor * values.std(axis=0, ddof=1)
+
+
+def type_settings(member: Member) -> dict[str, Any]:
+    """Values of the keys swept over, as the checked scene has them; lists as JSON text."""
+    values = flatten_keys(member.scene.model_dump(mode="json"))
+    typed = {key: values.get(key) for key in member.settings}
+    return {k: json.dumps(v) if isinstance(v, list) else v for k, v in typed.items()}
+
+
+def settlement_rows(sweep: Sweep, member: Member) -> list[dict[str, Any]]:
+    """Rows of ``settlement.csv`` of a member, by the names in `COLUMNS`."""
+    outcomes = RunFolder(sweep.run_folder(member)).outcomes()
+    return [row for outcome in outcomes for row in outcome.rows]
+
+
+def estimate_bands(sweep: Sweep, finished: set[str]) -> list[Band]:
+    """The band of every setting of which a member is ``finished``."""
+    bands = []
+    for group, members in sweep.groups().items():
+        curves = [
+            {int(row["cycle"]): float(row["settlement"]) for row in settlement_rows(sweep, member)}
+            for member in members
+            if member.name in finished
+        ]
+        if not curves:
+            continue
+        cycles = sorted(set.intersection(*map(set, curves)))
+        values = np.array([[curve[cycle] for cycle in cycles] for curve in curves])
+        mean, half = estimate_mean(values)
+        settings = type_settings(members[0])
+        cycle = np.array(cycles, float)
+        bands.append(Band(group, settings, len(curves), len(members), cycle, mean, half))
+    return bands
+
+
+def write_results(sweep: Sweep, results: Sequence[Result]) -> tuple[list[Band], dict[str, str]]:
+    """Write the tables and the picture; the bands, and the path of every file."""
+    by_name = {result.member: result for result in results}
+    bands = estimate_bands(
+        sweep, {result.member for result in results if result.state == "finished"}
+    )
+    member_rows, curve_rows = [], []
+    for member in sweep.members:
+        key = {"member": member.name, **type_settings(member), SEED: member.seed}
+        rows = settlement_rows(sweep, member)
+        curve_rows += [key | {name: row.get(name) for name in COLUMNS} for row in rows]
+        figures = {name: rows[-1].get(name) if rows else None for name in SAMPLE_FIGURES}
+        result = vars(by_name[member.name]).items()
+        result_row = {name: value for name, value in result if name not in ("member", "seed")}
+        member_rows.append(key | result_row | figures)
+    band_rows = [
+        {
+            **band.settings, "cycle": int(cycle), "seeds": band.seeds, "mean_m": float(mean),
+            "low_m": _number(mean - half), "high_m": _number(mean + half),
+        }
+        for band in bands
+        for cycle, mean, half in zip(band.cycle, band.mean, band.half, strict=True)
+    ]  # fmt: skip
+    tables = {"members": member_rows, "settlement": curve_rows, "band": band_rows}
+    paths: dict[str, str] = {}
+    for name, rows in tables.items():
+        paths |= save_table(sweep.folder / name, rows)
+    if bands:
+        from trackbed.report import save_figure
+
+        picture = save_figure(lambda: draw_bands(bands), sweep.folder / "settlement.png")
+        paths["picture"] = str(picture)
+    return bands, paths
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def save_table(stem: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Write rows to ``stem.csv`` and ``stem.parquet``, atomically; their paths by name.
+
+    A column whose values are of several kinds becomes text.
+    """
+    import pyarrow as pa
+    from pyarrow import csv, parquet
+
+    names = list(rows[0]) if rows else []
+    columns = {}
+    for name in names:
+        values = [row[name] for row in rows]
+        try:
+            columns[name] = pa.array(values)
+        except (pa.ArrowInvalid, pa.ArrowTypeError):
+            columns[name] = pa.array([None if value is None else str(value) for value in values])
+    table = pa.table(columns)
+    paths = {}
+    for kind, write in (("csv", csv.write_csv), ("parquet", parquet.write_table)):
+        path = stem.with_name(f"{stem.name}.{kind}")
+        temporary = stem.with_name(f".{stem.name}.partial.{kind}")
+        write(table, temporary)
+        temporary.replace(path)
+        paths[f"{stem.name}.{kind}"] = str(path)
+    return paths
+
+
+def draw_bands(bands: Sequence[Band]) -> Figure:
+    """Mean settlement of every setting with its band, against load cycles, linear and log."""
+    from matplotlib import colormaps
+    from matplotlib.figure import Figure
+
+    from adapters.report import WIDTH
+
+    figure = Figure(figsize=(WIDTH, 3.9))
+    linear, logarithmic = figure.subplots(1, 2, sharey=True)
+    for number, band in enumerate(bands):
+        colour = colormaps["viridis"](0.05 + 0.85 * number / max(len(bands) - 1, 1))
+        label = f"{band.group} ({band.seeds} of {band.asked} seeds)"
+        for panel in (linear, logarithmic):
+            panel.plot(band.cycle, 1e6 * band.mean, color=colour, label=label)
+            low, high = band.mean - band.half, band.mean + band.half
+            panel.fill_between(band.cycle, 1e6 * low, 1e6 * high, color=colour, alpha=0.2, lw=0.8)
+    linear.set(ylabel="mean settlement of the grains (µm)", xlabel="load cycles", xlim=(0, None))
+    linear.invert_yaxis()
+    logarithmic.set(xscale="log", xlabel="load cycles (logarithmic)")
+    logarithmic.xaxis.set_major_formatter("{x:g}")
+    logarithmic.set_title(f"mean over seeds, {100 * CONFIDENCE:.0f} % band", loc="right")
+    handles, labels = linear.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2, columnspacing=1.2)
+    return figure

@@ -1,0 +1,235 @@
+"""Running a sweep: what is finished is left alone, the rest goes to a Dask cluster."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from adapters.engines import interruptible
+from adapters.errors import Interrupted, UsageError
+from adapters.files import RunFolder, name_full_disk
+from adapters.procedure import Progress, status
+from adapters.procedure.sweep.cluster import open_client
+from adapters.procedure.sweep.member import (
+    STOPPED,
+    Ended,
+    find_worker_engine,
+    make_member_command,
+    run_member,
+)
+from adapters.procedure.sweep.plan import Member, Sweep, check_folder, find_pinned_engine
+from trackbed.run_files import write_whole
+
+STOP_S = 30
+"""How long members may take to stop when the sweep is interrupted [s]."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """How far a member is; SI units, None for what is not known."""
+
+    member: str
+    seed: int
+    state: str
+    """``finished``, ``failed``, ``stopped`` or ``waiting``."""
+    exit_code: int | None
+    """That of ``trackbed run``; minus the signal when one ended it."""
+    sentence: str
+    """What it said of its error."""
+    cycle: int
+    """Load cycles done."""
+    cycles_computed: int
+    settlement_m: float | None
+    speed_up: float | None
+    """Cycles done over cycles computed."""
+    cpu_s: float
+    """CPU time of its finished stages [s]."""
+    run_folder: str
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Where a sweep runs."""
+
+    scheduler: str = "local"
+    """``local``, ``slurm`` or the address of a Dask scheduler."""
+    config: Path | None = None
+    """TOML file with the keywords of `dask_jobqueue.SLURMCluster`."""
+    workers: int | None = None
+    """Members at a time here, or SLURM jobs."""
+
+
+def find_result(sweep: Sweep, member: Member, ended: Ended | None) -> Result:
+    """How far a member is, from its run folder and how its command ended, if it ran."""
+    folder = sweep.run_folder(member)
+    here = None
+    try:
+        here = status(folder)
+        done = here.state == "finished"
+    except UsageError:  # no run folder yet
+        done = False
+    state, exit_code, sentence = "waiting", None, ""
+    if ended is not None:
+        exit_code, sentence = ended.exit_code, ended.sentence
+        state = "stopped" if ended == STOPPED else "failed"
+    if done and (ended is None or ended.finished):
+        state, exit_code, sentence = "finished", 0, ""
+    return Result(
+        member=member.name,
+        seed=member.seed,
+        state=state,
+        exit_code=exit_code,
+        sentence=sentence,
+        cycle=here.cycle if here else 0,
+        cycles_computed=here.cycles_computed if here else 0,
+        settlement_m=here.settlement_m if here else None,
+        speed_up=here.speed_up_so_far if here else None,
+        cpu_s=here.cpu_s if here else 0.0,
+        run_folder=str(folder.relative_to(sweep.folder)),
+    )
+
+
+def run_sweep(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result]:
+    """Run every member that is not finished; how far each is afterwards, in the sweep's order.
+
+    A member that fails is named at once and holds no other up.  Raises `Interrupted` on SIGTERM
+    and Ctrl-C, when all members are stopped.
+    """
+    check_folder(sweep)
+    try:
+        with interruptible(), name_full_disk(sweep.folder), RunFolder(sweep.folder).locked():
+            return _run_pending(sweep, cluster, progress)
+    except Interrupted as stop:
+        what = str(stop).partition("\n")[0]
+        raise Interrupted(f"{what}\n  -> the same command goes on with the sweep") from None
+
+
+def _run_pending(sweep: Sweep, cluster: Cluster, progress: Progress) -> list[Result]:
+    results = {member.name: find_result(sweep, member, None) for member in sweep.members}
+    _record(sweep, cluster, results)
+    pending = [m for m in sweep.members if results[m.name].state != "finished"]
+    progress.say(f"{len(sweep.members)} members, {len(sweep.members) - len(pending)} finished")
+    sweep.stop_file.unlink(missing_ok=True)
+    if pending:
+        _run(sweep, cluster, pending, results, progress)
+    return list(results.values())
+
+
+def _run(
+    sweep: Sweep,
+    cluster: Cluster,
+    pending: Sequence[Member],
+    results: dict[str, Result],
+    progress: Progress,
+) -> None:
+    """Hand the members to the cluster, and take the results in as they come."""
+    with open_client(cluster.scheduler, cluster.config, cluster.workers, len(pending)) as client:
+        from distributed import as_completed, wait
+
+        engine = choose_engine(sweep, pending, client, progress)
+        futures = {
+            client.submit(
+                run_member,
+                sweep.scene_path,
+                sweep.run_folder(member).absolute(),
+                [*member.overrides, *engine],
+                sweep.log(member).absolute(),
+                sweep.stop_file.absolute(),
+                pure=False,
+            ): member
+            for member in pending
+        }
+
+        def take(future: Any) -> None:
+            member = futures[future]
+            result = find_result(sweep, member, _ended(future))
+            results[member.name] = result
+            _record(sweep, cluster, results)
+            done = sum(one.state in ("finished", "failed") for one in results.values())
+            if result.state != "stopped":
+                progress.say(f"{done} of {len(results)}: {sum_up_result(result)}")
+
+        taken = set()
+        try:
+            for future in as_completed(futures):
+                take(future)
+                taken.add(future)  # behind it: a signal within is to lose no result
+        except (KeyboardInterrupt, Exception):
+            sweep.stop_file.touch()
+            wait([*futures], timeout=STOP_S)
+            for future in futures.keys() - taken:
+                take(future)
+            raise
+
+
+def choose_engine(
+    sweep: Sweep, pending: Sequence[Member], client: Any, progress: Progress
+) -> list[str]:
+    """The override that gives every member the same engine, where the scene says ``auto``.
+
+    Asked of a worker: an engine that is here may not be there.  Raises `EngineMissing`.
+    """
+    if all(member.scene.engine.name != "auto" for member in pending):
+        return []
+    name = find_pinned_engine(sweep)
+    if name is None:
+        name, version = client.submit(find_worker_engine, "auto", pure=False).result()
+        progress.say(f"engine: {name} ({version})")
+    return [f'engine.name="{name}"']
+
+
+def _ended(future: Any) -> Ended:
+    """How a member ended; one whose workers died again and again failed as its engine does."""
+    if not future.done():
+        return STOPPED
+    try:
+        ended: Ended = future.result()
+        return ended
+    except Exception as error:
+        return Ended(5, f"its worker failed: {error or type(error).__name__}")
+
+
+def sum_up_result(result: Result) -> str:
+    """A member's end in one line."""
+    if result.state == "finished" and result.settlement_m is not None:
+        return f"{result.member}: settlement {1e6 * result.settlement_m:.2f} um"
+    first = result.sentence.partition("\n")[0]
+    return f"{result.member} {result.state}, exit code {result.exit_code}: {first}"
+
+
+def _record(sweep: Sweep, cluster: Cluster, results: dict[str, Result]) -> None:
+    """Write ``sweep.json``: how far every member is."""
+    content = make_sweep_record(sweep, cluster, list(results.values()))
+    write_whole(sweep.folder / "sweep.json", json.dumps(content, indent=1) + "\n")
+
+
+def make_sweep_record(sweep: Sweep, cluster: Cluster, results: Sequence[Result]) -> dict[str, Any]:
+    """A sweep as ``sweep.json`` keeps it."""
+    settings = {member.name: dict(member.settings) for member in sweep.members}
+    states = [result.state for result in results]
+    return {
+        "scene": str(sweep.scene_path),
+        "scheduler": cluster.scheduler,
+        "counts": {state: states.count(state) for state in sorted(set(states))},
+        "members": [
+            {"member": result.member, "settings": settings[result.member], **asdict(result)}
+            for result in results
+        ],
+    }
+
+
+def list_dry_run(sweep: Sweep) -> list[str]:
+    """The command line of every member, and whether it is finished."""
+    import shlex
+
+    lines = []
+    for member in sweep.members:
+        words = make_member_command(
+            sweep.scene_path, sweep.run_folder(member).absolute(), member.overrides
+        )
+        state = find_result(sweep, member, None).state
+        lines.append(f"# {member.name}: {state}\n{shlex.join(words)}")
+    return lines

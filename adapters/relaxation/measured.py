@@ -1,0 +1,256 @@
+"""A bed that is to be relaxed, what grains may touch in it, and what a relaxation changed."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from adapters.bed import (
+    Bed,
+    BoolArray,
+    FloatArray,
+    HertzStiffness,
+    IntArray,
+    Neighbours,
+    State,
+    Walls,
+    bed_measure,
+    check_bed,
+    find_behind_discs,
+    measure_rows,
+    neighbours,
+    normal_force,
+    overlap_under_force,
+    wall_names,
+)
+from adapters.errors import NotConverged, UsageError
+from adapters.relaxation.printed import Energy
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What does not change while the centres of ``n`` grains move."""
+
+    radius: FloatArray
+    """Radii [m], (n,)."""
+    walls: Walls
+    behind: BoolArray
+    """Which grains lie behind each plane that ends, (n, p): `adapters.bed.find_behind_discs`."""
+    stiffness: HertzStiffness
+
+    def rows(self, position: FloatArray, first: IntArray, second: IntArray) -> Neighbours:
+        """The given rows at ``position`` [m], (n, 3)."""
+        return measure_rows(position, self.radius, first, second, self.walls, self.behind)
+
+    def search(self, position: FloatArray, gap: float) -> Neighbours:
+        """All rows nearer than ``gap`` [m] at ``position`` [m], (n, 3)."""
+        return neighbours(position, self.radius, self.walls, gap, self.behind)
+
+    def taken(self, order: IntArray) -> Surroundings:
+        """The same with the grains in another order."""
+        return Surroundings(self.radius[order], self.walls, self.behind[order], self.stiffness)
+
+    def row_stiffness(self, rows: Neighbours) -> FloatArray:
+        """lambda = 4/3 E* sqrt(R*) of each row [N/m^1.5]."""
+        modulus_of_wall = np.array(
+            [
+                self.stiffness.mirror if mirror else self.stiffness.wall
+                for mirror in self.walls.plane_frictionless
+            ]
+            + [self.stiffness.wall]
+        )
+        pair = rows.second >= 0
+        other = np.where(pair, self.radius[np.where(pair, rows.second, 0)], np.inf)
+        modulus = np.where(
+            pair, self.stiffness.grain, modulus_of_wall[np.where(pair, 0, -1 - rows.second)]
+        )
+        radius = 1 / (1 / self.radius[rows.first] + 1 / other)
+        return np.asarray(normal_force(1.0, 1.0, radius) * modulus)
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """Relaxed positions, and what was changed to reach them."""
+
+    position: FloatArray
+    """Centres [m], (n, 3)."""
+    method: str
+    """One of `METHODS`, or ``rearranged``."""
+    converged: bool
+    before: Bed
+    """Measures of the state before the jump."""
+    estimated: Bed
+    """Measures of the estimated positions."""
+    relaxed: Bed
+    """Measures of the relaxed positions."""
+    energy: float
+    """Hertz energy of all contacts plus that of the weights above z = 0 [J]."""
+    residual_force: float
+    """Root mean square over the grains of the unbalanced force [N]: Hertz contacts, weight, and
+    the tangential forces that surviving contacts carried before (when the state names them)."""
+    residual_force_before: float
+    """The same in the state before the jump [N]: its kinetic rest, and friction if unnamed."""
+    evaluations: int
+    """Evaluations of all contacts; for ``smallest-move`` products with its matrix count too."""
+    cpu_s: float
+    """Processor time [s]."""
+    largest_move: float
+    """Greatest distance of a grain from its estimate [m]."""
+    median_move: float
+    """Median distance of a grain from its estimate [m]."""
+
+    @property
+    def coordination_change(self) -> float:
+        """Relative change of the coordination number over the jump; a sound jump stays in 3 %."""
+        before = self.before.coordination_with_walls
+        return self.relaxed.coordination_with_walls / before - 1 if before else 0.0
+
+    def record(self) -> dict[str, Any]:
+        """All but the positions, for the run folder and the command line."""
+        record = asdict(self)
+        del record["position"]
+        record["coordination_change"] = self.coordination_change
+        return record
+
+
+class RelaxationNotConverged(NotConverged):
+    """A relaxation stopped short of its tolerance; ``best`` is what it had reached."""
+
+    best: Relaxation
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """The bed that a jump estimates, the state it came from, and what both touch."""
+
+    position: FloatArray
+    """Estimated centres [m], (n, 3)."""
+    before: State
+    scene_before: Surroundings
+    scene: Surroundings
+    """The same with the piston where it is now."""
+    carried: Neighbours
+    """Contacts of ``before``."""
+    gravity: float
+    """Acceleration along -z [m/s^2]."""
+
+    @property
+    def mean_weight(self) -> float:
+        """Mean weight of a grain [N]."""
+        return self.gravity * float(self.before.mass.mean())
+
+    @property
+    def length(self) -> float:
+        """Overlap of two mean grains under the mean weight [m]."""
+        stiffness, radius = self.scene.stiffness.grain, self.scene.radius.mean()
+        return float(overlap_under_force(self.mean_weight, stiffness, radius / 2))
+
+    def weight(self) -> FloatArray:
+        """Weight of each grain [N], (n, 3)."""
+        force = np.zeros_like(self.position)
+        force[:, 2] = -self.gravity * self.before.mass
+        return force
+
+    def energy(self, force: FloatArray) -> Energy:
+        """The functional of eq. 29 with a ``force`` (n, 3) [N] on the grains."""
+        around = self.scene
+        return Energy(
+            around.radius, force, self.position, around.rows, around.search, around.row_stiffness
+        )
+
+
+def estimated(
+    position: FloatArray,
+    before: State,
+    walls: Walls,
+    walls_after: Walls | None,
+    stiffness: HertzStiffness,
+    gravity: float,
+) -> Estimated:
+    """Arguments of `relax` taken together; raises `UsageError` for what is no bed."""
+    position = np.ascontiguousarray(position, float)
+    radius = np.ascontiguousarray(before.radius, float)
+    after = walls if walls_after is None else walls_after
+    check_bed(position, radius)
+    if wall_names(after) != wall_names(walls):
+        raise UsageError(
+            f"the walls before, {wall_names(walls)}, are not those after, {wall_names(after)}",
+            remedy="the same walls belong to both; a piston may only move",
+        )
+    if not (len(radius) and gravity > 0):
+        raise UsageError("a relaxation wants grains and gravity above 0")
+    behind = find_behind_discs(before.position, walls)
+    scene_before = Surroundings(radius, walls, behind, stiffness)
+    scene = Surroundings(radius, after, behind, stiffness)
+    carried = scene_before.search(before.position, 0.0)
+    return Estimated(position, before, scene_before, scene, carried, gravity)
+
+
+def measure_relaxation(
+    bed: Estimated,
+    relaxed: FloatArray,
+    method: str,
+    converged: bool,
+    evaluations: int,
+    started: float,
+) -> Relaxation:
+    """What a relaxation to ``relaxed`` (n, 3) [m] changed, ``started`` at a CPU time [s]."""
+    before, scene, gravity = bed.before, bed.scene, bed.gravity
+    touching = scene.search(relaxed, 0.0)
+    move = np.linalg.norm(relaxed - bed.position, axis=1)
+    return Relaxation(
+        position=relaxed,
+        method=method,
+        converged=converged,
+        before=bed_measure(before.position, bed.carried),
+        estimated=bed_measure(bed.position, scene.search(bed.position, 0.0)),
+        relaxed=bed_measure(relaxed, touching),
+        energy=_energy(scene, relaxed, touching, before, gravity),
+        residual_force=_residual_force(scene, touching, before, gravity),
+        residual_force_before=_residual_force(bed.scene_before, bed.carried, before, gravity),
+        evaluations=evaluations,
+        cpu_s=time.process_time() - started,
+        largest_move=float(move.max(initial=0.0)),
+        median_move=float(np.median(move)) if len(move) else 0.0,
+    )
+
+
+def _energy(
+    scene: Surroundings, position: FloatArray, touching: Neighbours, state: State, gravity: float
+) -> float:
+    """Hertz energy 2/5 lambda delta^(5/2) plus m g z [J]."""
+    hertz = 0.4 * scene.row_stiffness(touching) @ touching.overlap**2.5
+    return float(hertz + gravity * state.mass @ position[:, 2])
+
+
+def _residual_force(
+    scene: Surroundings, touching: Neighbours, state: State, gravity: float
+) -> float:
+    """Root mean square of the unbalanced force over the grains [N]."""
+    force = np.zeros((len(scene.radius), 3))
+    force[:, 2] = -gravity * state.mass
+    pair = touching.second >= 0
+    normal = (scene.row_stiffness(touching) * touching.overlap**1.5)[:, None] * touching.normal
+    np.add.at(force, touching.first, normal)
+    np.add.at(force, touching.second[pair], -normal[pair])
+    held = np.searchsorted(state.identifier, state.contacts.pair)
+    alive = np.isin(_pair_key(held), _pair_key(np.column_stack([touching.first, touching.second])))
+    np.add.at(force, held[alive, 0], state.contacts.tangential_force[alive])
+    np.add.at(force, held[alive, 1], -state.contacts.tangential_force[alive])
+    for wall, name in enumerate(wall_names(scene.walls)):
+        rows = touching.second == -1 - wall
+        # the engine names a mesh wall after its fix: the piston's is piston_wall
+        force_on_grains = state.wall_force.get(name, state.wall_force.get(f"{name}_wall"))
+        if force_on_grains is not None:
+            push = force_on_grains[touching.first[rows]]
+            along = np.einsum("ma,ma->m", push, touching.normal[rows])
+            force[touching.first[rows]] += push - along[:, None] * touching.normal[rows]
+    return float(np.sqrt(np.mean(np.sum(force**2, axis=1)))) if len(force) else 0.0
+
+
+def _pair_key(pair: IntArray) -> IntArray:
+    """One number for each pair of grain indices, (m, 2)."""
+    return np.asarray((pair.min(axis=1) << 32) + pair.max(axis=1))

@@ -1,0 +1,235 @@
+"""The smallest move that gives a force network back the overlaps that it carried.
+
+Among all positions x the one nearest to the estimated ones x_hat,
+
+    minimise  1/2 sum_beta |x_beta - x_hat_beta|^2
+    with      delta_c(x) = delta_c    in each contact c of the network            (two-sided)
+              delta_c(x) <= -gap      for every other pair, and grain and wall    (one-sided)
+              mean height of x = mean height of x_hat,
+
+solved as a sequence of linearised problems, each in its multipliers mu: x = x_hat - J^T mu with
+J = d delta/dx.  Spheres are convex, so a linearised "stay apart" is on the safe side.
+
+The *network* is every pair with delta > -gap before the jump: contacts, and those so near that
+they close under the next load.  It turns over: a pair outside that is pressed (mu > 0) takes the
+place, and the overlap, of a member that is torn (mu < 0), the most pressed for the most torn.
+So the number of contacts and the distribution of overlaps are those of before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from adapters.bed import BoolArray, FloatArray, IntArray, Neighbours
+from adapters.relaxation.kernel import estimate_norm, fill_changes, fill_moves, solve_multipliers
+
+SLACK = 1e-5
+"""Weight of the multipliers in their own equations: keeps redundant contacts solvable."""
+SWAP_SHARE = 0.5
+"""Share of the pressed pairs that join the network at a time."""
+SKIN = 0.2
+"""Reach of the neighbour list beyond contact, in median radii."""
+NEAREST_ITERATIONS = 20
+"""Iterations that look for the nearest positions; later ones only for the next that fit."""
+OPEN_ITERATIONS, OPEN_SHARE = 25, 0.1
+"""Iterations after which contacts of the network that cannot be closed are let go, and the
+share of them each time."""
+ACCEPT_ITERATIONS, ITERATIONS_MAX = 45, 100
+"""Iterations after which any bed without overlaps beyond those of the network will do, and the
+most of them."""
+STEP_MAX = 0.5
+"""Greatest step of a grain in its own radii: beyond it the linearised contacts mislead."""
+PRODUCTS_NEAREST, PRODUCTS_FIT = 100, 1000
+"""Most products with J J^T in one linearised problem: of the first iterations, whose normals
+still turn, and of the later ones."""
+
+Geometry = Callable[[FloatArray, IntArray, IntArray], Neighbours]
+Search = Callable[[FloatArray, float], Neighbours]
+
+
+@dataclass
+class _Rows:
+    """All rows of a linearised problem, sorted by ``key``."""
+
+    key: IntArray
+    first: IntArray
+    second: IntArray
+    member: BoolArray
+    """True for a contact of the network."""
+    target: FloatArray
+    """Overlap of a member, greatest overlap of any other row [m]."""
+    multiplier: FloatArray
+    """mu of each row, and that of the mean height last."""
+
+
+@dataclass(frozen=True)
+class SmallestMove:
+    """Outcome of `find_smallest_move`."""
+
+    position: FloatArray
+    """Centres [m], (n, 3)."""
+    converged: bool
+    violation: float
+    """Greatest error of an overlap [m]."""
+    evaluations: int
+    """Evaluations of all overlaps, the products with J J^T counted in."""
+    swaps: int
+    """Contacts of the network that changed places."""
+
+
+def find_smallest_move(
+    estimate: FloatArray,
+    start: FloatArray,
+    radius: FloatArray,
+    network: Neighbours,
+    bounded: Neighbours,
+    gap: float,
+    geometry: Geometry,
+    search: Search,
+    *,
+    keep_height: bool,
+    tolerance: float,
+    accepted: float,
+    evaluations_max: int,
+) -> SmallestMove:
+    """Move grains from ``estimate`` (n, 3) [m] as little as the network allows.
+
+    ``start`` (n, 3) is where the iteration begins.  The overlaps of ``network`` are those to get
+    back, those of ``bounded`` are upper bounds of these pairs [m]; all others stay ``gap`` [m]
+    apart.  ``tolerance`` [m] is the greatest error of an overlap.  Where the demands contradict
+    each other, late iterations end as soon as no overlap is above ``accepted`` [m].  Gives up
+    after about ``evaluations_max`` evaluations.
+    """
+    n = len(radius)
+    height_share = 1 / np.sqrt(n) if keep_height else 0.0
+    skin = SKIN * float(np.median(radius))
+    x, anchor = start.copy(), estimate
+    rows = start_rows(network, bounded, n)
+    listed_at = None
+    violation, norm, evaluations, swaps = np.inf, 1.0, 0, 0
+    for iteration in range(ITERATIONS_MAX):
+        if evaluations > evaluations_max:
+            break
+        if listed_at is None or np.linalg.norm(x - listed_at, axis=1).max() > skin / 2:
+            rows, listed_at = renew_rows(rows, search(x, skin), gap, n), x
+            near = geometry(x, rows.first, rows.second)
+            norm = estimate_norm(rows.first, rows.second, near.normal, height_share, n, 20)
+        near = geometry(x, rows.first, rows.second)
+        evaluations += 1
+        excess = near.overlap - rows.target
+        error = np.where(rows.member, np.abs(excess), np.maximum(excess, 0.0))
+        violation = float(error.max(initial=0.0))
+        lift = height_share * float((x - estimate)[:, 2].sum())
+        swapped = 0
+        if 0 < iteration < NEAREST_ITERATIONS and violation < skin / 10:
+            swapped = _swap(rows, gap)
+            swaps += swapped
+        done = violation <= tolerance or (
+            iteration >= ACCEPT_ITERATIONS and near.overlap.max() <= accepted + tolerance
+        )
+        if iteration and not swapped and done and abs(lift) <= tolerance:
+            return SmallestMove(x, True, violation, evaluations, swaps)
+        products_max = PRODUCTS_NEAREST
+        if iteration >= NEAREST_ITERATIONS:
+            anchor, products_max = x, PRODUCTS_FIT
+            if iteration >= OPEN_ITERATIONS:
+                _open(rows, excess, tolerance)
+            rows.multiplier[:] = 0.0
+        # x = anchor - J^T mu in delta(x_k) + J (x - x_k) = target, the slack's share put back
+        right = np.empty(len(rows.key) + 1)
+        fill_changes(rows.first, rows.second, near.normal, height_share, anchor - x, right)
+        right[:-1] += near.overlap - rows.target
+        right[-1] = height_share * float((anchor - estimate)[:, 2].sum())
+        right += SLACK * rows.multiplier
+        products, _ = solve_multipliers(
+            rows.first,
+            rows.second,
+            near.normal,
+            height_share,
+            SLACK,
+            np.append(rows.member, True),
+            right,
+            norm,
+            max(0.3 * tolerance, 0.1 * violation),
+            products_max,
+            n,
+            rows.multiplier,
+        )
+        evaluations += products
+        move = np.empty((n, 3))
+        fill_moves(rows.first, rows.second, near.normal, height_share, rows.multiplier, move)
+        step = anchor + move - x
+        length, limit = np.linalg.norm(step, axis=1), STEP_MAX * radius
+        x = x + step * np.minimum(1.0, limit / np.maximum(length, limit))[:, None]
+    return SmallestMove(x, False, violation, evaluations, swaps)
+
+
+def _key(first: IntArray, second: IntArray, n: int) -> IntArray:
+    """One number for each row of n grains, the same wherever the row is listed."""
+    return (first << 32) + np.where(second >= 0, second, n - 1 - second)
+
+
+def start_rows(network: Neighbours, bounded: Neighbours, n: int) -> _Rows:
+    """Members of the network and rows with a bound of their own."""
+    first = np.concatenate([network.first, bounded.first])
+    second = np.concatenate([network.second, bounded.second])
+    key = _key(first, second, n)
+    order = np.argsort(key)
+    return _Rows(
+        key[order],
+        first[order],
+        second[order],
+        (np.arange(len(key)) < len(network))[order],
+        np.concatenate([network.overlap, bounded.overlap])[order],
+        np.zeros(len(key) + 1),
+    )
+
+
+def renew_rows(rows: _Rows, near: Neighbours, gap: float, n: int) -> _Rows:
+    """Rows nearby, and those of ``rows`` whose target is not that of any pair."""
+    key = _key(near.first, near.second, n)
+    own = rows.member | (rows.target != -gap)
+    extra = own & ~np.isin(rows.key, key)
+    key = np.concatenate([key, rows.key[extra]])
+    order = np.argsort(key)
+    key = key[order]
+    first = np.concatenate([near.first, rows.first[extra]])[order]
+    second = np.concatenate([near.second, rows.second[extra]])[order]
+    member, target = np.zeros(len(key), bool), np.full(len(key), -gap)
+    multiplier = np.append(np.zeros(len(key)), rows.multiplier[-1])
+    known = np.isin(rows.key, key)
+    place = np.searchsorted(key, rows.key[known])
+    member[place], target[place] = rows.member[known], rows.target[known]
+    multiplier[place] = rows.multiplier[:-1][known]
+    return _Rows(key, first, second, member, target, multiplier)
+
+
+def _swap(rows: _Rows, gap: float) -> int:
+    """Let the most pressed rows outside the network take the places of its most torn members.
+
+    Pairs of grains replace pairs and wall contacts wall contacts; forces that would move a grain
+    by less than ``gap`` [m] change nothing.  Returns how many changed places.
+    """
+    mu, swapped = rows.multiplier[:-1], 0
+    for kind in (rows.second >= 0, rows.second < 0):
+        pressed = np.flatnonzero(kind & ~rows.member & (mu > gap))
+        torn = np.flatnonzero(kind & rows.member & (mu < -gap))
+        count = min(int(np.ceil(SWAP_SHARE * len(pressed))), len(torn))
+        pressed = pressed[np.argsort(-mu[pressed])[:count]]
+        torn = torn[np.argsort(mu[torn])[:count]]
+        rows.target[pressed] = np.sort(rows.target[torn])[::-1]
+        rows.target[torn] = -gap
+        rows.member[pressed], rows.member[torn] = True, False
+        mu[torn] = 0.0
+        swapped += count
+    return swapped
+
+
+def _open(rows: _Rows, excess: FloatArray, tolerance: float) -> None:
+    """Let go of the widest open members of the network; their overlap stays an upper bound."""
+    gaping = np.flatnonzero(rows.member & (excess < -tolerance) & (rows.multiplier[:-1] < 0))
+    count = int(np.ceil(OPEN_SHARE * len(gaping)))
+    rows.member[gaping[np.argsort(excess[gaping])[:count]]] = False

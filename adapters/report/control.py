@@ -1,0 +1,94 @@
+"""The section of a report on jump control: every decision, why this length, what came of it."""
+
+from __future__ import annotations
+
+from html import escape
+from math import inf
+
+from adapters.jumps import PROBABILITY
+from adapters.procedure import Record, estimate_band_of_run, list_checks, list_decisions
+from trackbed.report import micrometres, paragraph, per_cent, plain, section, table
+
+
+def control(record: Record) -> str:
+    """Decisions and checks of a controlled run; empty for another."""
+    procedure, track = record.scene.procedure, record.run
+    band = estimate_band_of_run(track)
+    if procedure is None or procedure.tolerance is None or band is None:
+        return ""
+    checks = list_checks(track.events)
+    rows = []
+    for decision in list_decisions(track.events):
+        check = checks.get((decision["cycle"], decision["attempt"]), {})
+        check = check if decision["action"] == "jump" else {}
+        limits = [(name, inf if value is None else value) for name, value in decision["limits"]]
+        others = ", ".join(f"{name} {value:.0f}" for name, value in limits if value < 1e6)
+        moved = "moved" if "moved" in decision else "gain"  # older runs have one for both
+        bound = "" if decision["bound"] is None else plain(decision["bound"], "d")
+        rows.append(
+            (
+                plain(decision["cycle"], "d"),
+                escape(decision["action"]),
+                plain(decision["jump"], "d") if decision["jump"] else "",
+                plain(decision["window"], "d"),
+                bound,
+                micrometres(decision["gain"]) if decision["jump"] else "",
+                micrometres(decision[moved]) if decision["jump"] else "",
+                micrometres(decision["half_width"]) if decision["jump"] else "",
+                per_cent(check["error"], "+.2f") if check else "",
+                plain(check["deviation"], "+.1f") if check else "",
+                ("kept" if check["accepted"] else "taken back") if check else "",
+                escape(decision["why"]) + (f" ({escape(others)})" if others else ""),
+            )
+        )
+    definition = paragraph(
+        f"Tolerance: {per_cent(procedure.tolerance)}, on the error of the settlement gained from "
+        "the start of a jump to the end of its healing cycles, over the total settlement since "
+        "the preparation. The realised error compares that gain with the rates computed on both "
+        "sides of the jump; above twice the tolerance the jump is taken back. Jumps taken back: "
+        f"{sum(not check['accepted'] for check in checks.values())}."
+    )
+    kept = [check for check in checks.values() if check["accepted"] and "kappa" in check]
+    if kept:  # older runs have no kappa
+        definition += paragraph(
+            f"Behind its {len(kept)} jumps the bed settled by "
+            f"{micrometres(sum(check['reseated'] for check in kept))} µm more because it was moved "
+            f"(in the n-th cycle {kept[-1]['kappa']:.3f} / n of what it was moved by)."
+        )
+    ends = f"{micrometres(band.low)} to {micrometres(band.high)} µm"
+    mean = f"{micrometres(band.mean_low)} to {micrometres(band.mean_high)} µm"
+    return section(
+        "Jump control",
+        definition,
+        paragraph(
+            f"At cycle {band.cycle} the bed has settled by {micrometres(band.settlement)} µm; with "
+            f"the errors observed behind its jumps taken out, {micrometres(band.corrected)} µm. "
+            f"With probability {PROBABILITY:g} a full run from the same state ends within {ends}, "
+            f"the mean of many within {mean}. Standard deviations: "
+            f"{micrometres(band.jumps)} µm from the noise of the computed rates, "
+            f"{micrometres(band.laws)} µm from the form of the law, {micrometres(band.scatter)} µm "
+            "from the bursts of the other run."
+        ),
+        table(
+            "Every decision. <i>k</i>: cycles computed next; beside it the paper's lower bound for "
+            "independent increments (eq. 15). <i>Moved by</i>: the gain expected less what the bed "
+            "is ahead of its own rates by, and what it will settle more because it was moved. The "
+            "last column names the rule that set <i>h</i>, and the longest jump by each.",
+            (
+                "cycle",
+                "",
+                "<i>h</i>",
+                "<i>k</i>",
+                "eq. 15",
+                "gain expected (µm)",
+                "moved by (µm)",
+                "half-width (µm)",
+                "realised error",
+                "rate off by (standard errors)",
+                "",
+                "why",
+            ),
+            rows,
+            words=frozenset({11}),
+        ),
+    )

@@ -1,0 +1,385 @@
+"""The scene: what is simulated, in SI units, as the tables and keys of a scene file.
+
+`adapters.scene.load_scene` reads a scene; ``trackbed/scenes/karrech.toml`` explains every key.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from math import ceil, inf, nan, sqrt
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import (
+    BeforeValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from adapters.bed import (
+    Container,
+    FloatArray,
+    RadiusDistribution,
+    contact_law,
+    count_sides,
+    expect_grain_count,
+)
+from adapters.files import LoadSeries, read_load_series
+from adapters.laws.fit import FIRST_WINDOW
+from adapters.moves import DEFAULT as MOVE_DEFAULT
+from adapters.scene.checks import COUNT_GREATEST, find_problems, find_warnings
+from trackbed.scene_files import NonNegative, Positive, Table
+
+TRACK_SAMPLES = 100
+"""Least number of samples of the piston's record in a cycle."""
+
+FLAT_WALLED = ("yade",)
+"""Engines without a cylinder: planes tangent to it take its place."""
+
+Share = Annotated[float, Field(ge=1e-6, le=1, allow_inf_nan=False)]
+Poisson = Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False)]
+Restitution = Annotated[float, Field(gt=0.05, le=1, allow_inf_nan=False)]
+ViscousAlpha = Annotated[
+    float, Field(ge=0, lt=contact_law.alpha_of_restitution(0.05), allow_inf_nan=False)
+]
+Count = Annotated[int, Field(ge=1, le=COUNT_GREATEST)]
+
+
+def _as_schedule(value: object) -> object:
+    return [value] if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+class GrainRadius(Table):
+    """Distribution of the grains' radii."""
+
+    distribution: Literal["normal", "uniform", "constant"]
+    mean: Positive
+    """Mean radius [m]."""
+    standard_deviation: NonNegative = 0.0
+    """Of the normal distribution before it is cut, or of the uniform one [m]."""
+    truncation: Annotated[float, Field(ge=0.1, le=10, allow_inf_nan=False)] = 2.0
+    """Standard deviations of a normal distribution kept on either side of the mean."""
+
+    @property
+    def law(self) -> RadiusDistribution:
+        """The distribution itself, with bounds and moments."""
+        return RadiusDistribution(
+            self.distribution, self.mean, self.standard_deviation, self.truncation
+        )
+
+    @property
+    def smallest(self) -> float:
+        """Lower bound of the radii [m]."""
+        return self.law.smallest
+
+    @property
+    def greatest(self) -> float:
+        """Upper bound of the radii [m]."""
+        return self.law.greatest
+
+
+class Sample(Table):
+    """The grains and the container they are poured into."""
+
+    container: Literal["cylinder", "box"]
+    radius: Positive | None = None
+    """Radius of the cylinder [m]."""
+    size_x: Positive | None = None
+    """Length of the box along x [m]."""
+    size_y: Positive | None = None
+    """Length of the box along y [m]."""
+    symmetry: Annotated[tuple[Literal["x", "y"], ...], Field(strict=False)] = ()
+    """Axes whose plane through the origin is a mirror."""
+    count: Count | None = None
+    """Number of grains."""
+    fill_height: Positive | None = None
+    """Height of the settled bed [m], instead of ``count``."""
+    relative_density_start: Annotated[float, Field(ge=1e-3, le=0.15, allow_inf_nan=False)] = 0.05
+    """Relative density of the random start, before the rain."""
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
+    """Seed of radii and start positions."""
+    grain_radius: GrainRadius
+
+
+class GrainMaterial(Table):
+    """Material of the grains."""
+
+    young: Positive
+    """Young's modulus [Pa]."""
+    poisson: Poisson
+    density: Positive
+    """Mass density [kg/m^3]."""
+    viscous_alpha: ViscousAlpha | None = None
+    """Viscous coefficient alpha_n = alpha_t of eq. 7."""
+    restitution: Restitution | None = None
+    """Coefficient of restitution, instead of ``viscous_alpha``."""
+    friction: NonNegative
+    """Coulomb's coefficient between grains."""
+
+
+class WallMaterial(Table):
+    """Material of floor, walls and piston; symmetry planes are rigid and frictionless."""
+
+    young: Positive
+    """Young's modulus [Pa]."""
+    poisson: Poisson
+    friction: NonNegative
+    """Coulomb's coefficient between grain and wall."""
+
+
+class Material(Table):
+    """Materials of grains and walls."""
+
+    grain: GrainMaterial
+    wall: WallMaterial
+
+
+class Loading(Table):
+    """The cyclic load on the piston."""
+
+    waveform: Literal["sine", "series"] = "sine"
+    amplitude: Positive | None = None
+    """Stress from trough to peak [Pa] of a sine."""
+    mean: NonNegative | None = None
+    """Mean stress [Pa] of a sine."""
+    frequency: Positive | None = None
+    """Cycles a second [Hz] of a sine."""
+    series: str | None = None
+    """CSV file with one period; `adapters.files.load_series`."""
+    area_share: Share = 1.0
+    """Part of the container's section under the piston."""
+    piston_mass: Positive
+    """Mass [kg] of the part of the piston inside the scene."""
+
+    @cached_property
+    def samples(self) -> LoadSeries | None:
+        """The series; None for a sine."""
+        return None if self.series is None else read_load_series(Path(self.series))
+
+    @property
+    def period(self) -> float:
+        """Duration of a cycle [s]."""
+        if self.samples is not None:
+            return self.samples.period
+        assert self.frequency is not None
+        return 1 / self.frequency
+
+    def stress_at(self, phase: float | FloatArray) -> FloatArray:
+        """Stress [Pa] on the loaded area at a ``phase`` in cycles (any real number).
+
+        A sine is mean - amplitude/2 cos(2 pi phase): its troughs are at whole cycles.
+        """
+        if self.samples is not None:
+            return self.samples.stress_at(phase)
+        assert self.mean is not None
+        assert self.amplitude is not None
+        return np.asarray(self.mean - self.amplitude / 2 * np.cos(2 * np.pi * np.asarray(phase)))
+
+
+class Procedure(Table):
+    """Numbers of cycles computed and jumped (Fig. 10 of the paper)."""
+
+    k_i: Annotated[int, Field(ge=1)]
+    """First cycles, computed before anything is fitted."""
+    k: Annotated[int, Field(ge=2)] | None = None
+    """Cycles computed and fitted before each jump."""
+    h: (
+        Annotated[
+            tuple[Annotated[int, Field(ge=0)], ...],
+            BeforeValidator(_as_schedule),
+            Field(strict=False, min_length=1),
+        ]
+        | None
+    ) = None
+    """Cycles of the first, second, ... jump; the last repeats; 0 resubmits without a jump."""
+    tolerance: Annotated[float, Field(ge=1e-9, le=0.5, allow_inf_nan=False)] | None = None
+    """Error of the settlement gained in a jump over the total settlement, instead of k and h."""
+    healing_cycles: Annotated[int, Field(ge=0)] = 5
+    """Cycles computed after a jump and kept out of the fit."""
+    law: str = "log"
+    """Law of the residual displacement."""
+    move: str = MOVE_DEFAULT
+    """What a jump moves: a way of `adapters.moves`."""
+    settlement: Literal["law", "history"] = "law"
+    """What the mean grain settles by in a jump of h cycles: its law, or all cycles computed."""
+    seating: Literal["any", "waits"] = "any"
+    """Whether the k_i first cycles count from where the bed carries the piston."""
+    seating_cycles: Annotated[int, Field(ge=1)] | None = None
+    """Where they do and a piston hung: cycles that count in place of k_i; k_i where not given."""
+    jammed: Literal["less", "rearranged"] = "less"
+    """Where a jump by history finds no room: it moves the bed by less, or grains change places."""
+    relaxation: str = "smallest-move"
+    """How a moved bed gets rid of its overlaps: of `adapters.relaxation.methods.METHODS`, or
+    "none"."""
+    total_cycles: Count
+    """Cycles computed and jumped at the end."""
+
+    @model_serializer(mode="wrap")
+    def _without_newer_defaults(self, whole: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Stored runs are older than these keys: at their defaults they are left out."""
+        newer = {"move": MOVE_DEFAULT, "tolerance": None, "settlement": "law"}
+        newer |= {"seating": "any", "seating_cycles": None, "jammed": "less"}
+        record: dict[str, Any] = whole(self)
+        return {
+            key: value for key, value in record.items() if key not in newer or value != newer[key]
+        }
+
+    def jump_cycles(self, jump: int) -> int:
+        """Cycles of jump number ``jump`` = 0, 1, ...; 0 where the jumps choose themselves."""
+        return self.h[min(jump, len(self.h) - 1)] if self.h else 0
+
+    @property
+    def carried_cycles(self) -> int:
+        """Cycles that the bed carries its piston before windows are fitted, where runs wait."""
+        return self.seating_cycles or self.k_i
+
+    @property
+    def window_cycles(self) -> int:
+        """Cycles of the first window that is fitted."""
+        return FIRST_WINDOW if self.k is None else self.k
+
+
+class Engine(Table):
+    """The engine and its time step."""
+
+    name: str = "auto"
+    """Engine; ``auto`` is the first that is installed: liggghts, lammps, yade; ``fake`` writes
+    analytic states, for tests."""
+    time_step: Positive | None = None
+    """Longest time step [s]."""
+    rayleigh_share: Share | None = None
+    """Longest time step as a share of the smallest grain's Rayleigh time, instead."""
+    launcher: Annotated[tuple[Annotated[str, Field(min_length=1)], ...], Field(strict=False)] = ()
+    """Words before the engine's command line, such as ("mpirun", "-np", "4")."""
+
+
+class Scene(Table):
+    """All of a scene.  Raises pydantic's ValidationError unless every check holds."""
+
+    sample: Sample
+    material: Material
+    loading: Loading | None = None
+    procedure: Procedure | None = None
+    engine: Engine
+
+    @model_validator(mode="after")
+    def _checked(self) -> Scene:
+        problems = find_problems(flatten_keys(self.model_dump(exclude_none=True)))
+        if problems:
+            text = "; ".join(f"{problem.key}: {problem.what}" for problem in problems)
+            raise PydanticCustomError("scene", "{text}", {"text": text})
+        return self
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what is allowed but doubtful."""
+        return tuple(
+            f"{problem.key}: {problem.what}"
+            for problem in find_warnings(flatten_keys(self.model_dump(exclude_none=True)))
+        )
+
+    @property
+    def container(self) -> Container:
+        """The container's geometry, as the scene's engine has it."""
+        sample = self.sample
+        sides = 0
+        if sample.radius is not None and self.engine.name in FLAT_WALLED:
+            sides = count_sides(sample.radius, sample.grain_radius.mean)
+        given = (sample.radius, sample.size_x, sample.size_y)
+        radius, size_x, size_y = (nan if size is None else size for size in given)
+        return Container(sample.container, sample.symmetry, radius, size_x, size_y, sides)
+
+    @property
+    def loaded_area(self) -> float:
+        """Area under the piston [m^2]; 0 without loading."""
+        return 0.0 if self.loading is None else self.loading.area_share * self.container.area
+
+    @property
+    def piston_reach(self) -> float:
+        """Radius of a piston that covers a part of a cylinder [m]; inf when it covers all."""
+        if self.loading is None or self.loading.area_share == 1:
+            return inf
+        return self.container.radius * sqrt(self.loading.area_share)
+
+    @property
+    def restitution(self) -> float:
+        """Coefficient of restitution, from ``viscous_alpha`` where that is given."""
+        grain = self.material.grain
+        if grain.restitution is not None:
+            return grain.restitution
+        assert grain.viscous_alpha is not None
+        return contact_law.restitution_of_alpha(grain.viscous_alpha)
+
+    @property
+    def stiffness(self) -> contact_law.HertzStiffness:
+        """Equivalent moduli of grains, walls and mirror planes."""
+        grain, wall = self.material.grain, self.material.wall
+        return contact_law.hertz_stiffness(grain.young, grain.poisson, wall.young, wall.poisson)
+
+    @property
+    def rayleigh_time(self) -> float:
+        """Rayleigh time [s] of the smallest grain the radius distribution allows."""
+        grain = self.material.grain
+        return contact_law.rayleigh_time(
+            self.sample.grain_radius.smallest, grain.density, grain.young, grain.poisson
+        )
+
+    @property
+    def time_step(self) -> float:
+        """Time step [s]: the longest the engine table allows that divides the load's period.
+
+        With a load series it divides the interval between two samples.  A cycle has a multiple
+        of `TRACK_SAMPLES` steps, so that the piston's record holds its end.
+        """
+        if self.engine.time_step is not None:
+            longest = self.engine.time_step
+        else:
+            assert self.engine.rayleigh_share is not None
+            longest = self.engine.rayleigh_share * self.rayleigh_time
+        if self.loading is None:
+            return longest
+        interval = self.loading.period / self.samples_per_cycle
+        return interval / ceil(interval / longest * (1 - 1e-12))
+
+    @property
+    def steps_per_cycle(self) -> int:
+        """Time steps of one load cycle; 0 without loading."""
+        return 0 if self.loading is None else round(self.loading.period / self.time_step)
+
+    @property
+    def samples_per_cycle(self) -> int:
+        """Samples of the piston's record in a cycle; a load sample falls on one of them."""
+        samples = None if self.loading is None else self.loading.samples
+        intervals = 1 if samples is None else len(samples.time) - 1
+        return intervals * ceil(TRACK_SAMPLES / intervals)
+
+    @property
+    def grain_count(self) -> int:
+        """Number of grains; from ``fill_height`` where that is given."""
+        if self.sample.count is not None:
+            return self.sample.count
+        assert self.sample.fill_height is not None
+        return expect_grain_count(
+            self.sample.grain_radius.law, self.container, self.sample.fill_height
+        )
+
+    def stress_at(self, phase: float | FloatArray) -> FloatArray:
+        """Stress [Pa] on the loaded area at a ``phase`` in cycles; 0 without loading."""
+        if self.loading is None:
+            return np.zeros_like(np.asarray(phase, float))
+        return self.loading.stress_at(phase)
+
+
+def flatten_keys(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Values of nested tables by dotted key."""
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            flat |= flatten_keys(value, f"{prefix}{key}.")
+        else:
+            flat[prefix + key] = value
+    return flat

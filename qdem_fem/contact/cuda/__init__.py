@@ -1,0 +1,9 @@
+"""Contact of spheres on a GPU."""
+
+from qdem_fem.contact.cuda.sphere_state import (
+    CudaSphereContacts,
+)
+
+__all__ = [
+    "CudaSphereContacts",
+]

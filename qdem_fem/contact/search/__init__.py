@@ -1,0 +1,37 @@
+"""Which pairs may touch."""
+
+from qdem_fem.contact.search import (
+    cells,
+)
+from qdem_fem.contact.search.pairs import (
+    NO_IMAGE,
+    Pairs,
+    choose_skin,
+    find_near_walls,
+    make_pairs,
+    renew_pairs,
+)
+from qdem_fem.contact.search.periodic import (
+    PeriodicWidth,
+    check_extents,
+    check_joined,
+    extents,
+    find_joined_twins,
+    find_partners,
+)
+
+__all__ = [
+    "NO_IMAGE",
+    "Pairs",
+    "PeriodicWidth",
+    "cells",
+    "check_extents",
+    "check_joined",
+    "choose_skin",
+    "extents",
+    "find_joined_twins",
+    "find_near_walls",
+    "find_partners",
+    "make_pairs",
+    "renew_pairs",
+]

@@ -1,0 +1,251 @@
+"""The contacts of spheres at surface vertices: their arrays, bounds, energies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.contact.bounds import bound_spring_network
+from qdem_fem.contact.outside import find_outsides
+from qdem_fem.contact.search import (
+    NO_IMAGE,
+    Pairs,
+    choose_skin,
+    find_near_walls,
+    make_pairs,
+    renew_pairs,
+)
+from qdem_fem.contact.spheres import (
+    NEAR,
+    SKIN,
+    Contact,
+    Planes,
+    SphereContact,
+    Spheres,
+    make_plane_arrays,
+    pair_stiffness,
+    tangential_stiffness,
+)
+from qdem_fem.contact.state import Contacts, ContactTouching, Floats, Integers
+from qdem_fem.contact.system import System
+
+PARTED = 1 + 1e-9
+"""By how much a list reaches farther than what has parted, for round-off."""
+PAIR_ARRAYS = ("first", "second", "touching", "spring", "pull")
+CONTACT_ARRAYS = ("start", "position", "force", "slid")
+PLANE_ARRAYS = ("spring", "force")
+
+
+class SphereContacts(Contacts):
+    """Spheres at the surface vertices of all bodies of a simulation, and what they remember."""
+
+    kernel: Contact
+
+    def __init__(self, run: System, asked: SphereContact) -> None:
+        outside = [
+            replace(o, node=o.node[o.own], reference=o.reference[o.own], own=o.own[o.own])
+            for o in find_outsides(run, asked.periodic, 0.0)
+        ]
+        super().__init__(run, asked, outside)
+        counts = np.diff(self.first_vertex)
+
+        def by_body(values: list[float]) -> Floats:
+            return np.repeat(np.array(values, dtype=float), counts)
+
+        normal = by_body([asked.of_body(b.name, "normal_stiffness") for b in run.bodies])
+        radius = by_body([asked.of_body(b.name, "radius") for b in run.bodies])
+        poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
+        self.one = pair_stiffness(normal, normal.max(initial=0.0))
+        self.skin = float(SKIN * radius.min() if asked.skin is None else asked.skin)
+        free = asked.skin is None and asked.contacts != NEAR
+        self.skins = (self.skin, float(radius.min()) if free else self.skin)
+        """Least and greatest skin [m]."""
+        self.deep = float(radius.max())
+        self.reach = 2 * self.deep + self.skin
+        size, walls = len(self.nodes), len(asked.planes)
+        zero = np.zeros((size, 3))
+        self.kernel = Contact(
+            Spheres(
+                self.reference, 4 * self.place, self.force_at,
+                np.repeat(np.arange(len(counts)), counts), radius, normal,
+                tangential_stiffness(normal, poisson),
+            ),
+            make_pairs(
+                np.zeros(size + 1, np.int64), np.zeros(0, np.int64), np.zeros((size, 0), bool),
+                NO_IMAGE if asked.periodic is None else np.zeros((0, 3)),
+            ),
+            Planes(
+                *make_plane_arrays(asked.planes, asked.friction),
+                np.zeros((walls, size, 3)), np.zeros((walls, size, 3)),
+            ),
+            float(asked.friction), self.skin / 2, zero + np.inf, zero.copy(), zero.copy(),
+            np.zeros(size),
+        )  # fmt: skip
+
+    @property
+    def pairs(self) -> Pairs:
+        """The present list of pairs."""
+        found: Pairs = self.kernel.pairs
+        return found
+
+    def forget(self) -> None:
+        """Let go of all springs."""
+        self.pairs.touching[:] = 0
+        self.kernel.force[:] = 0.0
+        self.kernel.planes.spring[:] = 0.0
+        self.kernel.planes.force[:] = 0.0
+
+    def renew_lists(self, position: Floats) -> None:
+        """Look for pairs around vertices at (c, 3) [m]; the skin follows how fast they move."""
+        least, most = self.skins
+        room = least + self.room / 2
+        self.skin = choose_skin(
+            self.skin, self.lasted, self.idle(), len(self.nodes), least, min(most, room)
+        )  # fmt: skip
+        self.pairs_look(position, max(self.skin, min(self.parted(position), self.deep, room)))
+
+    def idle(self) -> int:
+        """Pairs of the list that do not touch."""
+        return len(self.pairs.second) - int(self.pairs.touching.sum())
+
+    def pairs_look(self, position: Floats, skin: float) -> None:
+        """List the pairs within ``skin`` [m] of each other at (c, 3) [m]."""
+        spheres = self.kernel.spheres
+        pairs = renew_pairs(
+            self.pairs, position, spheres.radius, spheres.body, skin,
+            self.walls(position, skin), self.asked.periodic,
+        )  # fmt: skip
+        self.kernel = self.kernel._replace(pairs=pairs, half_skin=self.skin / 2)
+        self.kernel.start[:] = position
+
+    def parted(self, position: Floats) -> float:
+        """By how much what touched in the last step is apart at (c, 3) [m].
+
+        A list has to hold it for one step more, in which its spring is let go.
+        """
+        radius, planes, ends = self.kernel.spheres.radius, self.kernel.planes, self._ends()
+        between = position[ends[:, 0]] - position[ends[:, 1]]
+        if self.asked.periodic is not None:
+            between -= self.pairs.image[self.pairs.touching.astype(bool)]
+        gaps = [np.linalg.norm(between, axis=1) - radius[ends].sum(axis=1)]
+        for point, normal, force in zip(planes.point, planes.normal, planes.force, strict=True):
+            held = force.any(axis=1)
+            along = np.einsum("ck,k->c", position[held] - point, normal)
+            gaps.append(along - radius[held])
+        return PARTED * float(np.concatenate(gaps).max(initial=0.0))
+
+    def walls(self, position: Floats, skin: float) -> NDArray[np.bool_]:
+        """Which vertices at (c, 3) [m] touch which walls, or may on a way of ``skin`` [m]."""
+        radius, planes = self.kernel.spheres.radius, self.kernel.planes
+        return find_near_walls(position, radius, planes.point, planes.normal, skin)
+
+    def tell_deepest(self) -> tuple[str, str]:
+        """The pair that overlaps most, and what to do."""
+        touching, radius = self.touching(), self.kernel.spheres.radius
+        worst = "a vertex is in a wall by more than its radius"
+        if len(touching.overlap):
+            at = int(np.argmax(touching.overlap))
+            one, other = (self.name_node(int(n[at])) for n in (touching.first, touching.second))
+            if touching.overlap[at] >= radius.min():
+                worst = f"{one} and {other} overlap by {touching.overlap[at]:.3g} m"
+        return (
+            f"{worst}; spheres of radius {radius.min():.3g} m no longer tell inside from outside",
+            "begin with bodies apart by two radii, load more slowly, or take a greater "
+            "normal_stiffness",
+        )
+
+    def bound_present_stiffness(self) -> float:
+        """`bound_spring_network` of the contacts there are now [1/s^2]."""
+        walls = (self.kernel.planes.force != 0).any(axis=2).sum(axis=0)
+        springs = self._springs(self._ends(), walls)
+        return bound_spring_network(*springs, self.inverse_mass, self.bound_rigid)
+
+    def find_near_springs(self) -> tuple[Integers, Floats, Floats]:
+        """`Contacts.find_near_springs`"""
+        self.refresh()
+        return self._springs(self._ends(every=True), np.diff(self.pairs.wall_first))
+
+    def _springs(self, ends: Integers, walls: Integers) -> tuple[Integers, Floats, Floats]:
+        """k_n of pairs (p, 2), and of so many walls (c,) of each vertex [N/m], behind the pairs."""
+        normal = self.kernel.spheres.normal
+        stiffness = pair_stiffness(normal[ends[:, 0]], normal[ends[:, 1]])
+        return ends, stiffness, 2 * normal * walls
+
+    def _ends(self, *, every: bool = False) -> Integers:
+        """Vertices (p, 2) of the pairs that touch, or of all in the list."""
+        first, second = self.pairs.first, self.pairs.second
+        at = np.arange(len(second)) if every else np.flatnonzero(self.pairs.touching)
+        return np.column_stack([np.searchsorted(first, at, side="right") - 1, second[at]])
+
+    def touching(self) -> ContactTouching:
+        """Pairs that touch now, by their nodes."""
+        ends, held = self._ends(), self.pairs.touching.astype(bool)
+        apart = self.kernel.position[ends[:, 0]] - self.kernel.position[ends[:, 1]]
+        if self.asked.periodic is not None:
+            apart -= self.pairs.image[held]
+        overlap = self.kernel.spheres.radius[ends].sum(axis=1) - np.linalg.norm(apart, axis=1)
+        return ContactTouching(
+            self.nodes[ends[:, 0]],
+            self.nodes[ends[:, 1]],
+            self.pairs.pull[held],
+            self.pairs.spring[held],
+            overlap,
+        )
+
+    def energy(self) -> tuple[float, float]:
+        """Energy in the springs, and work that the sliders took since the start [J]."""
+        self.refresh()
+        spheres, planes = self.kernel.spheres, self.kernel.planes
+        ends, touching = self._ends(), self.touching()
+        normal, tangential = (
+            pair_stiffness(k[ends[:, 0]], k[ends[:, 1]])
+            for k in (spheres.normal, spheres.tangential)
+        )
+        twice = (normal * touching.overlap**2).sum()
+        twice += (tangential * (touching.spring**2).sum(axis=1)).sum()
+        for w, n in enumerate(planes.normal):
+            overlap = (planes.force[w] @ n) / (2 * spheres.normal)
+            twice += (2 * spheres.normal * overlap**2).sum()
+            twice += (2 * spheres.tangential * (planes.spring[w] ** 2).sum(axis=1)).sum()
+        return 0.5 * float(twice), float(self.kernel.slid.sum())
+
+    def plane_force(self, number: int) -> Floats:
+        """Force of the bodies on a wall [N], (3,)."""
+        self.refresh()
+        return -np.asarray(self.kernel.planes.force[number].sum(axis=0))
+
+    def find_touching_bodies(self) -> tuple[Integers, Integers]:
+        """`Contacts.find_touching_bodies`"""
+        self.refresh()
+        body = self.kernel.spheres.body
+        pressed = (self.kernel.planes.force != 0).any(axis=(0, 2))
+        return body[self._ends()], body[pressed]
+
+    def stored(self) -> dict[str, NDArray[Any]]:
+        """Everything that the next step reads, to the bit."""
+        self.refresh()
+        arrays = {f"contact_{name}": getattr(self.pairs, name) for name in PAIR_ARRAYS}
+        if self.asked.periodic is not None:
+            arrays["contact_image"] = self.pairs.image
+        arrays |= {f"contact_{name}": getattr(self.kernel, name) for name in CONTACT_ARRAYS}
+        return arrays | {
+            f"contact_plane_{name}": getattr(self.kernel.planes, name) for name in PLANE_ARRAYS
+        }
+
+    def restore(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Take what `stored` gave."""
+        given = {name: arrays[f"contact_{name}"].copy() for name in PAIR_ARRAYS + CONTACT_ARRAYS}
+        walls = self.walls(given["start"], self.skin)
+        image = NO_IMAGE if self.asked.periodic is None else arrays["contact_image"].copy()
+        pairs = make_pairs(given["first"], given["second"], walls, image)
+        held = {name: arrays[f"contact_plane_{name}"].copy() for name in PLANE_ARRAYS}
+        self.kernel = self.kernel._replace(
+            pairs=pairs._replace(**{name: given[name] for name in PAIR_ARRAYS}),
+            planes=self.kernel.planes._replace(**held),
+            **{name: given[name] for name in CONTACT_ARRAYS},
+        )
+        self.stale, self._near = False, None

@@ -1,0 +1,147 @@
+"""The arrays of the contact of surfaces: what there is, what is near, what touches.
+
+See `qdem_fem.contact.surface.options` for the law.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+
+class Surface(NamedTuple):
+    """Nodes, faces, points and sharp edges of all surfaces."""
+
+    reference: Any
+    """(c, 3) reference position of the vertices [m]"""
+    place: Any
+    """(c,) of its first component in the displacement"""
+    force_at: Any
+    """(c,) of its first component in the windows of forces"""
+    face: Any
+    """(f, 3) vertices, outward"""
+    face_area: Any
+    """(f,) [m^2]"""
+    face_body: Any
+    """(f,)"""
+    fan_first: Any
+    """(c + 1,) first entry of a vertex in ``fan_face``"""
+    fan_face: Any
+    """the faces around every vertex"""
+    point_node: Any
+    """(q, 3) vertices of its face, or three times the vertex that it is"""
+    point_share: Any
+    """(q, 3) barycentric coordinates between them"""
+    point_face: Any
+    """(q,) its face; -1 for a vertex"""
+    point_area: Any
+    """(q,) [m^2]"""
+    point_body: Any
+    """(q,)"""
+    edge: Any
+    """(e, 2) vertices"""
+    edge_opposite: Any
+    """(e, 2) what is across the edge in its two faces"""
+    edge_area: Any
+    """(e,) [m^2]"""
+    edge_body: Any
+    """(e,)"""
+    modulus: Any
+    """(b,) p [Pa/m]"""
+    shear: Any
+    """(b,) p_t [Pa/m]"""
+
+
+class Near(NamedTuple):
+    """What may touch, and what it remembers."""
+
+    point: Any
+    """(n,) point"""
+    body: Any
+    """(n,) the body it is near to"""
+    first: Any
+    """(n + 1,) its first entry in ``face``"""
+    face: Any
+    """faces of that body near to it"""
+    free: Any
+    """(n,) way of all vertices from ``start`` up to which the point can not get in [m]"""
+    weight: Any
+    """(n,) area as the contact sees it, kept while it lasts [m^2]; negative: does not touch"""
+    spring: Any
+    """(n, 3) [m]"""
+    image: Any
+    """(n, 3) from the body to the image that it is near to [m]; (0,) where nothing is periodic"""
+    edges: Any
+    """(m, 2) pairs of edges"""
+    edge_image: Any
+    """(m, 3) from the second edge to its image [m]; (0,) where nothing is periodic"""
+    edge_free: Any
+    """(m,) way of all vertices from ``start`` up to which the edges can not touch [m]"""
+    edge_weight: Any
+    """(m,) [m^2]"""
+    edge_start: Any
+    """(m,) depth at which it began [m]"""
+    edge_spring: Any
+    """(m, 3) [m]"""
+
+
+class Overlaps(NamedTuple):
+    """Pairs of faces of two bodies that may overlap, and what they remember."""
+
+    faces: Any
+    """(m, 2)"""
+    free: Any
+    """(m,) way of all vertices from ``start`` up to which they can not overlap [m]"""
+    area: Any
+    """(m,) of the overlap, times its weight [m^2]; negative: they do not overlap"""
+    spring: Any
+    """(m, 3) [m]"""
+    share: Any
+    """(m, 6) coordinates of the centre of pressure in the two faces"""
+    pull: Any
+    """(m, 6, 3) forces on their corners [N]"""
+    account: Any
+    """(m, 3) energy, work of the slider in this step [J], depth [m]"""
+    image: Any
+    """(m, 3) from the second face to its image [m]; (0,) where nothing is periodic"""
+
+
+class Walls(NamedTuple):
+    """Rigid walls, and what each point remembers of each."""
+
+    point: Any
+    """(w, 3) [m]"""
+    normal: Any
+    """(w, 3)"""
+    friction: Any
+    """(w,)"""
+    weight: Any
+    """(w, q) [m^2] of points, or (w, q + f) and of faces; negative: does not touch"""
+    spring: Any
+    """(w, q, 3) [m], or (w, q + f, 3)"""
+    force: Any
+    """(w, 3) of the bodies on the wall [N]"""
+
+
+class SurfaceTouch(NamedTuple):
+    """All that a step of contact reads and writes."""
+
+    surface: Any
+    near: Any
+    overlaps: Any
+    clipped: Any
+    """Whether faces bear by their overlaps, not by points within them."""
+    walls: Any
+    friction: Any
+    half_skin: Any
+    depth: Any
+    """Greatest depth [m]."""
+    start: Any
+    """(c, 3) positions when it was last looked what is near [m]"""
+    position: Any
+    """(c, 3) [m]"""
+    force: Any
+    """(c, 3) [N]"""
+    account: Any
+    """Energy in the springs now, and work that sliders took since the start [J]; looks in vain."""
+    acting: Any
+    """(c,) all vertices"""

@@ -1,0 +1,156 @@
+"""Compiled geometry of triangles and edges: nearest points, depths, normals.
+
+Vectors are tuples of three numbers.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.contact.spheres import minus, row
+from qdem_fem.kernel import exact, inlined
+
+TIE = 1e-9
+"""Relative difference of squared distances below which two faces are equally near."""
+
+
+@exact
+def face_closest(p: Any, a: Any, b: Any, c: Any) -> Any:  # pragma: no cover
+    """Barycentric coordinates of the point of triangle abc nearest to p (Ericson 2005, 5.1.5)."""
+    abx, aby, abz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    acx, acy, acz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    apx, apy, apz = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    d1 = abx * apx + aby * apy + abz * apz
+    d2 = acx * apx + acy * apy + acz * apz
+    if d1 <= 0.0 and d2 <= 0.0:
+        return 1.0, 0.0, 0.0
+    bpx, bpy, bpz = p[0] - b[0], p[1] - b[1], p[2] - b[2]
+    d3 = abx * bpx + aby * bpy + abz * bpz
+    d4 = acx * bpx + acy * bpy + acz * bpz
+    if d3 >= 0.0 and d4 <= d3:
+        return 0.0, 1.0, 0.0
+    vc = d1 * d4 - d3 * d2
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = d1 / (d1 - d3)
+        return 1.0 - v, v, 0.0
+    cpx, cpy, cpz = p[0] - c[0], p[1] - c[1], p[2] - c[2]
+    d5 = abx * cpx + aby * cpy + abz * cpz
+    d6 = acx * cpx + acy * cpy + acz * cpz
+    if d6 >= 0.0 and d5 <= d6:
+        return 0.0, 0.0, 1.0
+    vb = d5 * d2 - d1 * d6
+    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        w = d2 / (d2 - d6)
+        return 1.0 - w, 0.0, w
+    va = d3 * d6 - d5 * d4
+    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        return 0.0, 1.0 - w, w
+    inverse = 1.0 / (va + vb + vc)
+    return 1.0 - (vb + vc) * inverse, vb * inverse, vc * inverse
+
+
+@inlined
+def blend(field: Any, nodes: Any, share: Any) -> Any:  # pragma: no cover
+    """A field (c, 3) at barycentric coordinates between three nodes."""
+    i, j, k = nodes
+    a, b, c = share
+    return (
+        a * field[i, 0] + b * field[j, 0] + c * field[k, 0],
+        a * field[i, 1] + b * field[j, 1] + c * field[k, 1],
+        a * field[i, 2] + b * field[j, 2] + c * field[k, 2],
+    )
+
+
+@inlined
+def velocity_of(velocity: Any, place: Any, nodes: Any, share: Any) -> Any:  # pragma: no cover
+    """Velocity at barycentric coordinates between three nodes [m/s]."""
+    i, j, k = place[nodes[0]], place[nodes[1]], place[nodes[2]]
+    a, b, c = share
+    return (
+        a * velocity[i] + b * velocity[j] + c * velocity[k],
+        a * velocity[i + 1] + b * velocity[j + 1] + c * velocity[k + 1],
+        a * velocity[i + 2] + b * velocity[j + 2] + c * velocity[k + 2],
+    )
+
+
+@inlined
+def dot(a: Any, b: Any) -> float:  # pragma: no cover
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def cross(a: Any, b: Any) -> Any:  # pragma: no cover
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined
+def scaled(factor: float, a: Any) -> Any:  # pragma: no cover
+    """``factor`` times a vector."""
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+@inlined
+def less(a: Any, b: Any) -> Any:  # pragma: no cover
+    """``a - b``"""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@exact
+def segments_apart(w: Any, u: Any, v: Any) -> float:  # pragma: no cover
+    """Distance [m] of the segments ``w + s u`` and ``t v``, s and t from 0 to 1 (Ericson 2005)."""
+    uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
+    determinant = uu * vv - uv * uv
+    s = 0.0
+    if determinant > 0.0:
+        s = min(1.0, max(0.0, (uv * vw - vv * uw) / determinant))
+    t = (uv * s + vw) / vv
+    if t < 0.0:
+        t, s = 0.0, min(1.0, max(0.0, -uw / uu))
+    elif t > 1.0:
+        t, s = 1.0, min(1.0, max(0.0, (uv - uw) / uu))
+    d = less(w, less(scaled(t, v), scaled(s, u)))
+    return np.sqrt(dot(d, d))
+
+
+@exact
+def face_normal(position: Any, face: Any, f: int) -> Any:  # pragma: no cover
+    """Unit normal of a face."""
+    i, j, k = face[f, 0], face[f, 1], face[f, 2]
+    n = cross(minus(position, j, position, i), minus(position, k, position, i))
+    return scaled(1.0 / np.sqrt(dot(n, n)), n)
+
+
+@exact
+def depth_of(p: Any, position: Any, face: Any, faces: Any) -> Any:  # pragma: no cover
+    """``(g, n, f, share)``: depth of p under the nearest of ``faces``, negative outside.
+
+    Of faces equally near, as around an edge, the one whose plane is farthest tells the side.
+    """
+    nearest, plane, found = np.inf, 0.0, -1
+    for f in faces:
+        i, j, k = face[f, 0], face[f, 1], face[f, 2]
+        share = face_closest(p, row(position, i), row(position, j), row(position, k))
+        d = less(p, blend(position, (i, j, k), share))
+        square = dot(d, d)
+        if square > nearest * (1.0 + TIE):
+            continue
+        height = dot(less(p, row(position, i)), face_normal(position, face, f))
+        if square < nearest * (1.0 - TIE) or abs(height) > abs(plane):
+            nearest, plane, found = min(square, nearest), height, f
+    if found < 0:
+        return -np.inf, (0.0, 0.0, 0.0), -1, (0.0, 0.0, 0.0)
+    i, j, k = face[found, 0], face[found, 1], face[found, 2]
+    share = face_closest(p, row(position, i), row(position, j), row(position, k))
+    n = face_normal(position, face, found)
+    away = less(blend(position, (i, j, k), share), p)
+    length = np.sqrt(dot(away, away))
+    if plane >= 0.0:
+        return -length, n, found, share
+    if -plane < length * (1.0 - TIE):  # the nearest point is on an edge that bends inwards
+        n = scaled(1.0 / length, away)
+    return length, n, found, share

@@ -1,0 +1,273 @@
+"""The compiled contact of surfaces: points in faces, edges across edges, one time step at a time.
+
+One thread; sums in the order of the lists.  See `qdem_fem.contact.surface.options` for the law.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from qdem_fem.contact.spheres import (
+    GO_ON,
+    LOOK_AGAIN,
+    TOO_DEEP,
+    image_less,
+    minus,
+    put_row,
+    row,
+    series,
+    slider,
+)
+from qdem_fem.contact.spheres import law as contact_kernel
+from qdem_fem.contact.surface import clip as contact_surface_clip
+from qdem_fem.contact.surface import geometry as contact_surface_geometry
+from qdem_fem.contact.surface import overlaps as contact_surface_overlaps
+from qdem_fem.contact.surface.geometry import (
+    blend,
+    cross,
+    depth_of,
+    dot,
+    face_normal,
+    less,
+    scaled,
+    segments_apart,
+    velocity_of,
+)
+from qdem_fem.contact.surface.overlaps import overlaps_forces, wall_faces_forces
+from qdem_fem.kernel import digest_sources, exact, inlined
+
+FLAT = 50
+"""Power of a cosine: a vertex or an edge 1 degree from flat bears under 1 %, 10 degrees, half."""
+PARALLEL = 1e-6
+"""Square of the sine of the angle between edges below which they do not cross."""
+SOURCES = contact_kernel, contact_surface_geometry, contact_surface_clip, contact_surface_overlaps
+
+
+@inlined
+def add_force(force: Any, nodes: Any, share: Any, f: Any, sign: float) -> None:  # pragma: no cover
+    """Share a force out to three nodes."""
+    for k in range(3):
+        force[nodes[0], k] += sign * share[0] * f[k]
+        force[nodes[1], k] += sign * share[1] * f[k]
+        force[nodes[2], k] += sign * share[2] * f[k]
+
+
+@inlined
+def law(
+    c: Any, spring: Any, at: int, n: Any, g: float, way: Any, k_n: float, k_t: float,
+    friction: float,
+) -> Any:  # fmt: skip  # pragma: no cover
+    """Force on the one that is inside by ``g`` along n; springs and the account are kept."""
+    push = k_n * max(g, 0.0)
+    s, loss = slider(row(spring, at), n, way, k_t, friction * push)
+    put_row(spring, at, s)
+    c.account[0] += 0.5 * push * max(g, 0.0) + 0.5 * k_t * dot(s, s)
+    c.account[1] += loss
+    return push * n[0] - k_t * s[0], push * n[1] - k_t * s[1], push * n[2] - k_t * s[2]
+
+
+@exact
+def point_weight(surface: Any, x: Any, q: int, n: Any) -> float:  # pragma: no cover
+    """Area [m^2] with which point q begins to touch what has the normal n."""
+    own = surface.point_face[q]
+    if own >= 0:
+        return surface.point_area[q] * max(0.0, -dot(face_normal(x, surface.face, own), n))
+    vertex, area, flat = surface.point_node[q, 0], 0.0, 0.0
+    for at in range(surface.fan_first[vertex], surface.fan_first[vertex + 1]):
+        f = surface.fan_face[at]
+        against = max(0.0, -dot(face_normal(x, surface.face, f), n))
+        area += surface.face_area[f] / 3.0 * against
+        flat = max(flat, against)
+    return area * (1.0 - flat**FLAT)
+
+
+@exact
+def edge_flatness(surface: Any, x: Any, e: int, n: Any, sign: float) -> float:  # pragma: no cover
+    """Greatest ``sign n_f n`` of the two faces of a sharp edge."""
+    i, j = surface.edge[e, 0], surface.edge[e, 1]
+    flat = 0.0
+    for k in range(2):
+        m = cross(minus(x, j, x, i), minus(x, surface.edge_opposite[e, k], x, i))
+        # of either sense: the sign is that of the side the rest of the body is not on
+        if dot(m, minus(x, surface.edge_opposite[e, 1 - k], x, i)) > 0.0:
+            m = scaled(-1.0, m)
+        flat = max(flat, sign * dot(m, n) / np.sqrt(dot(m, m)))
+    return flat
+
+
+@exact
+def points_forces(c: Any, velocity: Any, step: float, moved: float) -> float:  # pragma: no cover
+    """Forces of points in other bodies; greatest depth.
+
+    ``moved`` [m]: greatest way of a vertex from ``start``.  A point outside by ``g`` is not in
+    before it and a face have moved by ``g`` in all, each by ``moved`` then and now at most.
+    """
+    surface, near, x = c.surface, c.near, c.position
+    deepest = 0.0
+    for at in range(near.point.size):
+        if moved < near.free[at]:
+            continue
+        q = near.point[at]
+        nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
+        share = row(surface.point_share, q)
+        p = image_less(blend(x, nodes, share), near.image, at)
+        faces = near.face[near.first[at] : near.first[at + 1]]
+        g, n, f, below = depth_of(p, x, surface.face, faces)
+        near.free[at] = -0.5 * g - moved if g > -np.inf else -1.0
+        if g <= 0.0 and near.weight[at] < 0.0:
+            continue
+        if g > 0.0 and near.weight[at] < 0.0:
+            near.weight[at] = point_weight(surface, x, q, n)
+        deepest = max(deepest, g if near.weight[at] > 0.0 else 0.0)
+        other = near.body[at]
+        half = 0.5 * max(near.weight[at], 0.0)
+        k_n = half * series(surface.modulus[surface.point_body[q]], surface.modulus[other])
+        k_t = half * series(surface.shear[surface.point_body[q]], surface.shear[other])
+        under = surface.face[f, 0], surface.face[f, 1], surface.face[f, 2]
+        way = scaled(
+            step,
+            less(
+                velocity_of(velocity, surface.place, nodes, share),
+                velocity_of(velocity, surface.place, under, below),
+            ),
+        )
+        force = law(c, near.spring, at, n, g, way, k_n, k_t, c.friction)
+        add_force(c.force, nodes, share, force, 1.0)
+        add_force(c.force, under, below, force, -1.0)
+        if g <= 0.0:
+            near.weight[at] = -1.0
+    return deepest
+
+
+@exact
+def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # pragma: no cover
+    """Forces of sharp edges across sharp edges of other bodies.
+
+    ``moved`` as of `points_forces`: edges that touch are no farther apart than the greatest depth.
+    """
+    surface, near, x = c.surface, c.near, c.position
+    for at in range(near.edges.shape[0]):
+        if moved < near.edge_free[at]:
+            continue
+        a, b = near.edges[at, 0], near.edges[at, 1]
+        i, j, k, m = surface.edge[a, 0], surface.edge[a, 1], surface.edge[b, 0], surface.edge[b, 1]
+        u, v = minus(x, j, x, i), minus(x, m, x, k)
+        w = image_less(minus(x, i, x, k), near.edge_image, at)
+        uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
+        determinant = uu * vv - uv * uv
+        g, n, s, t = -1.0, (0.0, 0.0, 0.0), 0.0, 0.0
+        if determinant > PARALLEL * uu * vv:
+            s, t = (uv * vw - vv * uw) / determinant, (uu * vw - uv * uw) / determinant
+            if 0.0 < s < 1.0 and 0.0 < t < 1.0:
+                n = cross(u, v)
+                n = scaled(1.0 / np.sqrt(dot(n, n)), n)
+                if dot(minus(x, surface.edge_opposite[b, 0], x, k), n) > 0.0:
+                    n = scaled(-1.0, n)
+                # n is outward of b where both its faces fall away from it, and inward of a
+                if (
+                    dot(minus(x, surface.edge_opposite[b, 0], x, k), n) < 0.0
+                    and dot(minus(x, surface.edge_opposite[b, 1], x, k), n) < 0.0
+                    and dot(minus(x, surface.edge_opposite[a, 0], x, i), n) > 0.0
+                    and dot(minus(x, surface.edge_opposite[a, 1], x, i), n) > 0.0
+                ):
+                    g = -dot(w, n)
+                    if g > c.depth:
+                        g = -1.0
+        near.edge_free[at] = -1.0
+        if g <= 0.0 and near.edge_weight[at] < 0.0:
+            near.edge_free[at] = 0.5 * (segments_apart(w, u, v) - c.depth) - moved
+            continue
+        one, two = (1.0 - s, s, 0.0), (1.0 - t, t, 0.0)
+        nodes, under = (i, j, i), (k, m, k)
+        way = scaled(
+            step,
+            less(
+                velocity_of(velocity, surface.place, nodes, one),
+                velocity_of(velocity, surface.place, under, two),
+            ),
+        )
+        if near.edge_weight[at] < 0.0:  # the ends of an edge are its vertices': it fades to them
+            flat = edge_flatness(surface, x, a, n, -1.0) * edge_flatness(surface, x, b, n, 1.0)
+            fade = 16.0 * s * (1.0 - s) * t * (1.0 - t) * (1.0 - flat**FLAT)
+            near.edge_weight[at] = fade * min(surface.edge_area[a], surface.edge_area[b])
+            # what slides onto an edge begins without a force
+            near.edge_start[at] = 0.0 if step == 0.0 or g + dot(way, n) <= 0.0 else g
+        body, other = surface.edge_body[a], surface.edge_body[b]
+        k_n = near.edge_weight[at] * series(surface.modulus[body], surface.modulus[other])
+        k_t = near.edge_weight[at] * series(surface.shear[body], surface.shear[other])
+        g_eff = g - near.edge_start[at] if g > 0.0 else 0.0
+        force = law(c, near.edge_spring, at, n, g_eff, way, k_n, k_t, c.friction)
+        add_force(c.force, nodes, one, force, 1.0)
+        add_force(c.force, under, two, force, -1.0)
+        if g <= 0.0:
+            near.edge_weight[at] = -1.0
+
+
+@exact
+def walls_forces(c: Any, velocity: Any, step: float) -> float:  # pragma: no cover
+    """Forces of the walls on points; greatest depth."""
+    surface, walls, x = c.surface, c.walls, c.position
+    deepest = 0.0
+    for w in range(walls.point.shape[0]):
+        n = row(walls.normal, w)
+        total = (0.0, 0.0, 0.0)
+        for q in range(surface.point_area.size):
+            nodes = surface.point_node[q, 0], surface.point_node[q, 1], surface.point_node[q, 2]
+            share = row(surface.point_share, q)
+            g = -dot(less(blend(x, nodes, share), row(walls.point, w)), n)
+            if g <= 0.0 and walls.weight[w, q] < 0.0:
+                continue
+            if g > 0.0 and walls.weight[w, q] < 0.0:
+                walls.weight[w, q] = point_weight(surface, x, q, n)
+            deepest = max(deepest, g if walls.weight[w, q] > 0.0 else 0.0)
+            weight = 2.0 * max(walls.weight[w, q], 0.0)
+            k_n = weight * surface.modulus[surface.point_body[q]]
+            k_t = weight * surface.shear[surface.point_body[q]]
+            way = scaled(step, velocity_of(velocity, surface.place, nodes, share))
+            force = law(c, walls.spring[w], q, n, g, way, k_n, k_t, walls.friction[w])
+            add_force(c.force, nodes, share, force, 1.0)
+            total = less(total, force)
+            if g <= 0.0:
+                walls.weight[w, q] = -1.0
+        put_row(walls.force, w, total)
+    return deepest
+
+
+def build_surface_step(made_from: str) -> Any:
+    """One step; ``made_from`` makes the sources it calls a part of its key on disk."""
+
+    @njit(error_model="numpy", cache=True)
+    def advance_surface(
+        c: Any, displacement: Any, velocity: Any, step: float
+    ) -> int:  # pragma: no cover
+        """Contact at the new displacement; as `qdem_fem.contact.spheres.advance`."""
+        stamp = made_from  # noqa: F841  (makes it a part of the key)
+        far = 0.0
+        for i in range(c.position.shape[0]):
+            at, moved = c.surface.place[i], 0.0
+            for k in range(3):
+                c.position[i, k] = c.surface.reference[i, k] + displacement[at + k]
+                c.force[i, k] = 0.0
+                moved += (c.position[i, k] - c.start[i, k]) ** 2
+            far = max(far, moved)
+        if far > c.half_skin**2:
+            return LOOK_AGAIN
+        c.account[0] = 0.0
+        moved = np.sqrt(far)
+        deepest = max(points_forces(c, velocity, step, moved), walls_forces(c, velocity, step))
+        edges_forces(c, velocity, step, moved)
+        if c.clipped:
+            deepest = max(
+                deepest,
+                overlaps_forces(c, velocity, step, moved),
+                wall_faces_forces(c, velocity, step),
+            )
+        return TOO_DEEP if deepest > c.depth else GO_ON
+
+    return advance_surface
+
+
+surface_step: Any = build_surface_step(digest_sources(__file__, *SOURCES))

@@ -1,0 +1,83 @@
+"""Saint Venant-Kirchhoff: ``P = F S``, ``S = lambda tr(E) I + 2 mu E``, ``E = (F^T F - I)/2``.
+
+Objective, derives from a potential; softens under compression.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numpy.typing import ArrayLike
+
+from qdem_fem.element.kinematics import (
+    IDENTITY,
+    FloatArray,
+    energy_quadratic,
+    isotropic,
+    strain_green,
+)
+from qdem_fem.element.stress import Nine, viscous_current
+
+viscous_numbers = viscous_current
+
+
+class Svk(NamedTuple):
+    """St. Venant-Kirchhoff; ``half`` is 0.5 in the kernel's precision."""
+
+    half: Any
+
+
+LAW = Svk
+strain_of = strain_green
+
+
+def stress_nominal(H: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike) -> FloatArray:
+    """P = F S [Pa], S = lambda tr(E) I + 2 mu E; P = dW/dF of W = lambda/2 tr(E)^2 + mu E : E.
+
+    Softens under compression, and loses all stiffness below a stretch of 0.58.
+    """
+    return (IDENTITY + H) @ isotropic(strain_of(H), lame_first, lame_second)
+
+
+def energy_stored(
+    H: FloatArray, volume: FloatArray, lame_first: ArrayLike, lame_second: ArrayLike
+) -> FloatArray:
+    """Stored energy of every element [J], (m,): the potential of the stress."""
+    return energy_quadratic(strain_of(H), volume, lame_first, lame_second)
+
+
+def stress_numbers(h: Nine, lame_first: Any, lame_second: Any, half: Any) -> tuple[Nine, Any]:
+    """St. Venant-Kirchhoff, ``P = F S``, ``S = lambda tr(E) I + 2 mu E``, ``E = (F^T F - I)/2``.
+
+    Conservative and exact under rotation.  Returns ``P`` and ``J``.  Not for strong compression:
+    it softens, and has no stiffness at ``F = 0.58 I``.
+    """
+    h0, h1, h2, h3, h4, h5, h6, h7, h8 = h
+    xx = (h0 + h0) + (h0 * h0 + h3 * h3 + h6 * h6)  # 2 E
+    yy = (h4 + h4) + (h1 * h1 + h4 * h4 + h7 * h7)
+    zz = (h8 + h8) + (h2 * h2 + h5 * h5 + h8 * h8)
+    xy = (h1 + h3) + (h0 * h1 + h3 * h4 + h6 * h7)
+    xz = (h2 + h6) + (h0 * h2 + h3 * h5 + h6 * h8)
+    yz = (h5 + h7) + (h1 * h2 + h4 * h5 + h7 * h8)
+    pressure = lame_first * half * (xx + yy + zz)
+    sxx, syy, szz = (
+        pressure + lame_second * xx,
+        pressure + lame_second * yy,
+        pressure + lame_second * zz,
+    )
+    sxy, sxz, syz = lame_second * xy, lame_second * xz, lame_second * yz
+    stress = (
+        sxx + (h0 * sxx + h1 * sxy + h2 * sxz),
+        sxy + (h0 * sxy + h1 * syy + h2 * syz),
+        sxz + (h0 * sxz + h1 * syz + h2 * szz),
+        sxy + (h3 * sxx + h4 * sxy + h5 * sxz),
+        syy + (h3 * sxy + h4 * syy + h5 * syz),
+        syz + (h3 * sxz + h4 * syz + h5 * szz),
+        sxz + (h6 * sxx + h7 * sxy + h8 * sxz),
+        syz + (h6 * sxy + h7 * syy + h8 * syz),
+        szz + (h6 * sxz + h7 * syz + h8 * szz),
+    )  # fmt: skip
+    one = half + half
+    f0, f4, f8 = one + h0, one + h4, one + h8
+    jacobian = f0 * (f4 * f8 - h5 * h7) + h1 * (h5 * h6 - h3 * f8) + h2 * (h3 * h7 - f4 * h6)
+    return stress, jacobian

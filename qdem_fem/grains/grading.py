@@ -1,0 +1,98 @@
+"""Grading curves: which share of the mass passes which sieve, and sizes drawn from a curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from qdem_fem.files import MeshError
+from qdem_fem.mesh import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Grading:
+    """Mass share that passes each sieve; between two sieves even in the logarithm of size.
+
+    Raises `MeshError` for sieves that do not grow, or shares that do not grow from 0 to 1.
+    """
+
+    sieves: FloatArray
+    """Sides of the square holes [m], (k,), growing."""
+    passing: FloatArray
+    """Share of the mass that passes [-], (k,), from 0 to 1."""
+
+    def __post_init__(self) -> None:
+        for name in ("sieves", "passing"):
+            object.__setattr__(self, name, np.array(getattr(self, name), float))
+        d, p = self.sieves, self.passing
+        sound = d.ndim == 1 and d.shape == p.shape and len(d) >= 2
+        sound = sound and bool(np.isfinite(d).all() and d[0] > 0 and (np.diff(d) > 0).all())
+        if not (sound and p[0] == 0 and p[-1] == 1 and (np.diff(p) >= 0).all()):
+            raise MeshError(
+                f"sieves {d.tolist()} with passing {p.tolist()} are no grading curve",
+                where="grading",
+                remedy="give growing sieves in metres and as many shares, growing from 0 to 1",
+            )
+
+    def passing_at(self, size: ArrayLike) -> FloatArray:
+        """Share of the mass of grains that pass a hole of ``size`` [m]."""
+        return np.interp(np.log(size), np.log(self.sieves), self.passing)
+
+
+@dataclass(frozen=True, eq=False)
+class GradingLimits:
+    """What a standard allows to pass each sieve."""
+
+    name: str
+    sieves: FloatArray
+    """[m], (k,)."""
+    least: FloatArray
+    most: FloatArray
+
+    def kept_by(self, passing: FloatArray) -> bool:
+        """Whether shares (k,) lie within the limits."""
+        return bool(((self.least <= passing) & (passing <= self.most)).all())
+
+
+EN_13450_A = GradingLimits(
+    "EN 13450:2013, Table 1, railway ballast 31.5/50, category A",
+    np.array([0.0224, 0.0315, 0.040, 0.050, 0.063]),
+    np.array([0.00, 0.01, 0.30, 0.70, 1.00]),
+    np.array([0.03, 0.25, 0.65, 0.99, 1.00]),
+)
+"""Shares passing by mass; besides, at least half the mass lies between 31.5 and 50 mm.
+
+Not compared with a printed copy of the standard."""
+BALLAST = Grading(EN_13450_A.sieves, np.array([0.0, 0.13, 0.475, 0.845, 1.0]))
+"""Midway between the limits of `EN_13450_A`, with nothing below 22.4 mm: 71.5 % from 31.5 to 50."""
+
+PAPER_SIZE = Grading(np.array([0.045, 0.055]), np.array([0.0, 1.0]))
+"""The paper's grains, "around 5 cm" (section 4), which is coarser than `BALLAST` by number."""
+
+
+def draw_sizes(grading: Grading, count: int, generator: np.random.Generator) -> FloatArray:
+    """Sieve sizes [m], (count,), of grains of like shape whose masses follow the curve.
+
+    Even in ln D by mass is D^-4 dD by number, as the mass of a grain goes with D^3.  One size is
+    drawn from each of ``count`` slices of equal number, then they are shuffled: the curve is met
+    as well as that many grains can.
+    """
+    low, high = grading.sieves[:-1], grading.sieves[1:]
+    mass = np.diff(grading.passing) / np.log(high / low)
+    number = np.concatenate([[0.0], np.cumsum(mass * (low**-3.0 - high**-3.0) / 3)])
+    share = (np.arange(count) + generator.random(count)) / count * number[-1]
+    at = np.clip(np.searchsorted(number, share, side="right") - 1, 0, len(low) - 1)
+    rest = share - number[at]
+    # mass, not number, is what an empty interval lacks: it is never drawn from
+    inverse = low[at] ** -3.0 - 3 * rest / np.where(mass[at] > 0, mass[at], 1.0)
+    sizes = np.clip(inverse ** (-1 / 3), low[at], high[at])
+    return np.asarray(generator.permutation(sizes))
+
+
+def passing_of(sizes: FloatArray, masses: FloatArray, sieves: FloatArray) -> FloatArray:
+    """Share of the mass of grains, (k,), that passes each sieve: ``sizes`` (n,) [m] at most it."""
+    order = np.argsort(sizes)
+    total = np.concatenate([[0.0], np.cumsum(masses[order])])
+    return np.asarray(total[np.searchsorted(sizes[order], sieves, side="right")] / total[-1])

@@ -1,0 +1,254 @@
+"""Random grains: a hull of corners, its edges bent outward or inward, stretched along three axes.
+
+The corners lie on the unit sphere, far from one another; each edge of their hull has a node in the
+middle, which is lifted from the flat faces (lift 0: a polyhedron of flat faces) towards the sphere
+(lift 1).  Lifts set the roundness, the stretch sets the sphericity, and both are solved for.
+A stretch is affine and moves no node across a plane of others: what is convex stays convex.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.spatial import ConvexHull
+
+from qdem_fem.files import MeshError
+from qdem_fem.grains.measures import (
+    edge_angles,
+    find_surface_edges,
+    polyhedron_integrals,
+    quarter_faces,
+    roundness_wadell,
+    sphericity_true,
+    surface_area,
+)
+from qdem_fem.grains.meshing import make_grain_elements, place_apex_and_spokes, signed_radius_ratios
+from qdem_fem.mesh import FloatArray, IntArray
+
+CANDIDATES = 10
+"""Random points of which the one farthest from the corners so far becomes a corner."""
+LIFT_LEAST, LIFT_MOST = -0.2, 1.05
+LIFT_STEPS = 6
+"""Lifts that are tried, evenly, before a bracket is halved."""
+STRETCH_MOST = 1.2
+"""Largest logarithmic stretch of the longest axis."""
+ROUNDNESS_WITHIN = 0.01
+"""How near the asked roundness counts as met; it jumps where a node ceases to be a ridge."""
+HALVINGS_MOST = 8
+BENT_INWARD = 1e-9
+"""Angle between normals below which an edge of a convex grain may not be bent inward [rad]."""
+BENT_MOST = 0.6
+"""Most that an edge of a dented grain may be bent inward [rad]; others are drawn again."""
+LOWERED = 0.9
+"""Factor on the lift of a node whose neighbour's edge is bent inward."""
+DRAWS_MOST = 60
+"""Sets of corners that are drawn for one grain, before its wish counts as out of reach."""
+RATIO_LEAST = 0.2
+"""Smallest radius ratio of a tetrahedron; a grain with a flatter one is drawn again."""
+
+
+@dataclass(frozen=True)
+class GrainRecipe:
+    """What random grains are to be like.
+
+    Raises `MeshError` for values that no grain of this kind can have.
+    """
+
+    sphericity: float = 0.82
+    """psi, `qdem_fem.grains.sphericity_true` [-]."""
+    sphericity_scatter: float = 0.03
+    """Half the width of the uniform distribution of psi over the grains [-]."""
+    roundness: float = 0.68
+    """`qdem_fem.grains.roundness_wadell` [-], about 0.62 to 0.85 at this mesh size."""
+    roundness_scatter: float = 0.03
+    concavity: float = 0.0
+    """Depth of random dents in the middle of edges, in lifts, to 0.4 [-]; 0: convex grains."""
+    corners: tuple[int, int] = (8, 9)
+    """Fewest and most corners M; a grain has 8 (2 M - 4) tetrahedra and 5 M - 5 nodes."""
+
+    def __post_init__(self) -> None:
+        low, high = self.corners
+        spread = (self.sphericity_scatter, self.roundness_scatter)
+        for what, sound in (
+            (f"sphericity {self.sphericity} +- {spread[0]}",
+             spread[0] >= 0 and self.sphericity - spread[0] >= 0.4
+             and self.sphericity + spread[0] <= 0.97),
+            (f"roundness {self.roundness} +- {spread[1]}",
+             spread[1] >= 0 and self.roundness - spread[1] >= 0.3
+             and self.roundness + spread[1] <= 1),
+            (f"concavity {self.concavity}", 0 <= self.concavity <= 0.4),
+            (f"corners {self.corners}", 6 <= low <= high <= 40),
+        ):  # fmt: skip
+            if not sound:
+                raise MeshError(
+                    f"no grain has {what}",
+                    where="grain recipe",
+                    remedy="use sphericity 0.4 to 0.97, roundness 0.3 to 1, scatters of 0 or more "
+                    "within them, concavity 0 to 0.4, 6 to 40 corners",
+                )
+
+
+@dataclass(frozen=True)
+class GrainForm:
+    """A grain of no particular size."""
+
+    corner_faces: IntArray
+    """Triangles of the hull of the M corners, (2 M - 4, 3), outward."""
+    nodes: FloatArray
+    """M corners, the middle of every edge of `find_surface_edges` of ``corner_faces``, and the
+    inner
+    nodes of `qdem_fem.grains.place_apex_and_spokes`; centroid at zero, (5 M - 5, 3)."""
+    sphericity: float
+    roundness: float
+
+
+def corners_apart(generator: np.random.Generator, count: int) -> FloatArray:
+    """Points on the unit sphere (count, 3), each the best of some random ones (Mitchell 1991)."""
+    chosen = np.empty((0, 3))
+    while len(chosen) < count:
+        tries = generator.standard_normal((CANDIDATES, 3))
+        tries /= np.linalg.norm(tries, axis=1)[:, None]
+        nearest = (tries @ chosen.T).max(axis=1, initial=-1.0)
+        chosen = np.vstack([chosen, tries[np.argmin(nearest)]])
+    return chosen
+
+
+def find_hull_faces(points: FloatArray) -> IntArray:
+    """Outward triangles (2 n - 4, 3) of the convex hull of points (n, 3) on a sphere about 0."""
+    faces = ConvexHull(points).simplices.astype(np.int64)
+    a, b, c = points[faces].transpose(1, 0, 2)
+    inward = np.einsum("fi,fi->f", a, np.cross(b, c)) < 0
+    faces[inward, 1:] = faces[inward, :0:-1]
+    return faces
+
+
+def draw_grain(generator: np.random.Generator, recipe: GrainRecipe) -> GrainForm:
+    """One random grain; the same for the same state of ``generator``.
+
+    Corners are drawn again, up to `DRAWS_MOST` times, where those drawn can not be given the
+    sphericity and roundness that were drawn first, or leave a sliver.  Raises `MeshError` if none
+    will do.
+    """
+    psi = recipe.sphericity + recipe.sphericity_scatter * generator.uniform(-1, 1)
+    roundness = recipe.roundness + recipe.roundness_scatter * generator.uniform(-1, 1)
+    reached: list[float] = []
+    for _ in range(DRAWS_MOST):
+        count = int(generator.integers(recipe.corners[0], recipe.corners[1] + 1))
+        drawn = _Drawn(generator, count, recipe.concavity)
+        form = drawn.solved(psi, roundness, reached)
+        if form is not None:
+            return form
+    got = f"roundness {min(reached):.2f} to {max(reached):.2f}" if reached else "less sphericity"
+    raise MeshError(
+        f"none of {DRAWS_MOST} random grains has sphericity {psi:.3f} and roundness "
+        f"{roundness:.3f} without a sliver or a deep dent; reached was {got}",
+        where="grain recipe",
+        remedy="ask for a roundness well within that range, more sphericity, or other corners",
+    )
+
+
+class _Drawn:
+    """Random corners, dents, direction and kind of stretch of one grain; lift and stretch open."""
+
+    def __init__(self, generator: np.random.Generator, count: int, concavity: float) -> None:
+        points = corners_apart(generator, count)
+        self.corner_faces = find_hull_faces(points)
+        edges = find_surface_edges(self.corner_faces)
+        middles = points[edges.nodes].mean(axis=1)
+        self.count, self.concavity = count, concavity
+        self.dents = concavity * generator.random(len(middles))
+        self.flat = np.vstack([points, middles])
+        self.outward = middles / np.linalg.norm(middles, axis=1)[:, None] - middles
+        self.faces = quarter_faces(self.corner_faces, edges)
+        self.edges = find_surface_edges(self.faces)
+        kind = generator.uniform(-0.5, 1)  # -1/2: a rod, 1: a disc (Zingg 1935)
+        self.axes = np.array([1.0, kind, -1.0 - kind])
+        self.turn = np.linalg.qr(generator.standard_normal((3, 3)))[0]
+        self.turn *= np.sign(np.linalg.det(self.turn))
+
+    def lifted(self, lift: float) -> FloatArray:
+        """Nodes on the unit sphere (n, 3); lifts of a convex grain are lowered until it is."""
+        lifts = lift - self.dents
+        for _ in range(1000):
+            nodes = self.flat.copy()
+            nodes[self.count :] += lifts[:, None] * self.outward
+            if self.concavity > 0:
+                break
+            _, angle = edge_angles(nodes, self.faces, self.edges)
+            inward = np.unique(self.edges.opposite[angle < -BENT_INWARD])
+            inward = inward[inward >= self.count] - self.count
+            if not len(inward):
+                break
+            lifts[inward] *= LOWERED
+        return nodes
+
+    def stretched(self, nodes: FloatArray, psi: float) -> FloatArray | None:
+        """Nodes of sphericity ``psi``, or None where they have less without any stretch.
+
+        Stretches keep the volume.
+        """
+        volume = polyhedron_integrals(nodes, self.faces).volume
+
+        def excess(size: float) -> float:
+            area = surface_area(nodes * np.exp(size * self.axes), self.faces)
+            return sphericity_true(volume, area) - psi
+
+        if excess(0.0) < 0 or excess(STRETCH_MOST) > 0:
+            return None
+        size = brentq(excess, 0.0, STRETCH_MOST, xtol=1e-12)
+        return nodes * np.exp(size * self.axes)
+
+    def solved(self, psi: float, roundness: float, reached: list[float]) -> GrainForm | None:
+        """The grain of this sphericity and roundness, None if these corners can not have both.
+
+        What roundness was had on the way is noted in ``reached``.
+        """
+
+        def tried(lift: float) -> tuple[float, FloatArray] | None:
+            nodes = self.stretched(self.lifted(lift), psi)
+            if nodes is None:
+                return None
+            reached.append(roundness_wadell(nodes, self.faces, self.edges))
+            return reached[-1] - roundness, nodes
+
+        least = LIFT_LEAST if self.concavity > 0 else 0.0
+        below: float | None = None
+        for lift in np.linspace(least, LIFT_MOST, LIFT_STEPS):
+            found = tried(float(lift))
+            if found is None:
+                below = None
+            elif abs(found[0]) <= ROUNDNESS_WITHIN:
+                return self._form(found[1], psi, reached[-1])
+            elif found[0] < 0:
+                below = float(lift)
+            elif below is not None:
+                return self._halved(below, float(lift), psi, tried, reached)
+        return None
+
+    def _halved(
+        self, below: float, above: float, psi: float, tried: Any, reached: list[float]
+    ) -> GrainForm | None:
+        """The bracket of two lifts halved until the roundness is near enough; None if it jumps."""
+        for _ in range(HALVINGS_MOST):
+            middle = (below + above) / 2
+            found = tried(middle)
+            if found is None:
+                return None
+            if abs(found[0]) <= ROUNDNESS_WITHIN:
+                return self._form(found[1], psi, reached[-1])
+            below, above = (middle, above) if found[0] < 0 else (below, middle)
+        return None
+
+    def _form(self, surface: FloatArray, psi: float, roundness: float) -> GrainForm | None:
+        """The grain of a solved surface, None where a dent is deep or its mesh has a sliver."""
+        _, angle = edge_angles(surface, self.faces, self.edges)
+        if angle.min() < -BENT_MOST:
+            return None
+        turned = surface @ self.turn.T
+        inner = place_apex_and_spokes(turned, self.faces, self.count)
+        nodes = np.vstack([turned, inner]) - inner[0]
+        worst = signed_radius_ratios(nodes, make_grain_elements(nodes, self.corner_faces)).min()
+        return GrainForm(self.corner_faces, nodes, psi, roundness) if worst >= RATIO_LEAST else None

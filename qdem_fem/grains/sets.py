@@ -1,0 +1,156 @@
+"""Many grains: made by seed on any number of processors, saved, loaded, meshed.
+
+trackbed grains --count 5700 --seed 1 --out grains.npz
+"""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from qdem_fem.files import MeshError
+from qdem_fem.grains.grading import BALLAST, Grading, draw_sizes
+from qdem_fem.grains.hulls import GrainRecipe, draw_grain
+from qdem_fem.grains.measures import Solid, polyhedron_integrals
+from qdem_fem.grains.meshing import make_grain_faces, make_grain_tetrahedra
+from qdem_fem.grains.sieve import find_sieve_size
+from qdem_fem.mesh import FloatArray, IntArray, TetMesh
+
+FORMAT = 1
+BATCH = 50
+"""Grains a process makes at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class GrainSet:
+    """Grains one behind another; grain i has ``corners[i]`` = M corners."""
+
+    corners: IntArray
+    """M of each grain, (g,)."""
+    nodes: FloatArray
+    """Nodes of all grains [m], (sum of 5 M - 5, 3), the centroid of each at zero."""
+    corner_faces: IntArray
+    """Triangles of their corners, (sum of 2 M - 4, 3), by the numbers within the grain."""
+    sizes: FloatArray
+    """`qdem_fem.grains.find_sieve_size` [m], (g,)."""
+    sphericity: FloatArray
+    roundness: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def parts(self, grain: int) -> tuple[FloatArray, IntArray]:
+        """Nodes (5 M - 5, 3) [m] and corner faces (2 M - 4, 3) of a grain."""
+        before = self.corners[:grain]
+        node, face, own = 5 * (before - 1), 2 * (before - 2), self.corners[grain]
+        start, first = int(node.sum()), int(face.sum())
+        return (
+            self.nodes[start : start + 5 * (own - 1)],
+            self.corner_faces[first : first + 2 * (own - 2)],
+        )
+
+    def mesh(self, grain: int) -> TetMesh:
+        """Its tetrahedra, for `qdem_fem.Body`."""
+        return make_grain_tetrahedra(*self.parts(grain))
+
+    def solid(self, grain: int) -> Solid:
+        """Volume and inertia of its polyhedron, for unit density."""
+        nodes, corner_faces = self.parts(grain)
+        return polyhedron_integrals(nodes, make_grain_faces(corner_faces))
+
+    @property
+    def tetrahedra(self) -> IntArray:
+        """How many each grain has, (g,)."""
+        return np.asarray(8 * (2 * self.corners - 4))
+
+
+def make_grains(
+    count: int, seed: int, recipe: GrainRecipe | None = None, grading: Grading = BALLAST,
+    workers: int = 1,
+) -> GrainSet:  # fmt: skip
+    """``count`` random grains whose sieve sizes follow ``grading``.
+
+    Grain i depends on ``seed``, i and the recipe only; sizes on ``seed``, ``count`` and the
+    grading: the same set for any number of ``workers`` (processes).  Raises `MeshError` for a
+    recipe that random grains do not meet, a count below one, or a seed below zero.
+    """
+    if count < 1 or workers < 1 or seed < 0:
+        raise MeshError(
+            f"{count} grains of seed {seed} on {workers} processors",
+            where="grains_make",
+            remedy="use a seed of 0 or more, and 1 or more of the others",
+        )
+    sizes = draw_sizes(grading, count, np.random.default_rng([seed, count]))
+    make = partial(_make_batch, recipe=recipe or GrainRecipe(), seed=seed)
+    batches = [range(at, min(at + BATCH, count)) for at in range(0, count, BATCH)]
+    if workers == 1:
+        made = [make(batch) for batch in batches]
+    else:
+        with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+            made = list(pool.map(make, batches))
+    forms = [form for batch in made for form in batch]
+    scales = sizes / np.array([form[2] for form in forms])
+    return GrainSet(
+        corners=np.array([form[1].max() + 1 for form in forms]),
+        nodes=np.concatenate([s * form[0] for s, form in zip(scales, forms, strict=True)]),
+        corner_faces=np.concatenate([form[1] for form in forms]),
+        sizes=sizes,
+        sphericity=np.array([form[3] for form in forms]),
+        roundness=np.array([form[4] for form in forms]),
+    )
+
+
+def _make_batch(
+    grains: range, recipe: GrainRecipe, seed: int
+) -> list[tuple[FloatArray, IntArray, float, float, float]]:
+    """Nodes, corner faces, sieve size, sphericity and roundness of grains of no set size."""
+    made = []
+    for grain in grains:
+        form = draw_grain(np.random.default_rng([seed, grain, FORMAT]), recipe)
+        size = find_sieve_size(form.nodes)
+        made.append((form.nodes, form.corner_faces, size, form.sphericity, form.roundness))
+    return made
+
+
+def save_grains(path: str | os.PathLike[str], grains: GrainSet) -> None:
+    """Write a set of grains, atomically, as .npz: 24 bytes a node, 3 bytes a face."""
+    target = Path(path)
+    temporary = target.with_name(target.name + ".partial")
+    with temporary.open("wb") as stream:
+        np.savez(
+            stream,
+            format=np.array(FORMAT),
+            corners=grains.corners.astype(np.uint8),
+            nodes=grains.nodes,
+            corner_faces=grains.corner_faces.astype(np.uint8),
+            shape=np.stack([grains.sizes, grains.sphericity, grains.roundness]),
+        )
+    temporary.replace(target)
+
+
+def load_grains(path: str | os.PathLike[str]) -> GrainSet:
+    """Read what `save_grains` wrote, to the last digit; raises `MeshError` for another file."""
+    where = f"grains {os.fspath(path)!r}"
+    remedy = "give a file that grains_save or trackbed grains wrote"
+    try:
+        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
+            number = int(file["format"])
+            corners = file["corners"].astype(np.int64)
+            nodes, faces, shape = file["nodes"], file["corner_faces"], file["shape"]
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise MeshError(f"not a set of grains ({error})", where=where, remedy=remedy) from error
+    wanted = ((5 * corners.sum() - 5 * len(corners), 3), (2 * corners.sum() - 4 * len(corners), 3))
+    if number != FORMAT or (nodes.shape, faces.shape) != wanted or shape.shape != (3, len(corners)):
+        raise MeshError(
+            f"format {number}, nodes {nodes.shape}, faces {faces.shape} for {len(corners)} grains",
+            where=where,
+            remedy=remedy,
+        )
+    return GrainSet(corners, nodes, faces.astype(np.int64), *shape)

@@ -1,0 +1,65 @@
+"""The sieve size of a grain: the smallest square hole it passes."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from qdem_fem.mesh import FloatArray
+
+STARTS, KEPT, ROUNDS, TRIES = 3000, 16, 34, 12
+FIRST_TURN, SHRINK = 0.3, 0.75
+"""Random turns of the first round [rad], and their factor from round to round: 0.3 to 2e-5."""
+
+
+def find_sieve_size(nodes: FloatArray) -> float:
+    """Side D [m] of the smallest square hole that a rigid body passes without turning.
+
+    ``nodes`` (n, 3) [m]: all corners of its convex hull.  With w(a) = max a.x - min a.x, the width
+    along a unit vector a,
+
+        D = min over orthogonal a, b of max(w(a), w(b)),
+
+    as a square with sides along a and b holds the body's shadow if it is as wide as both; the body
+    moves along a x b.  2 r for a sphere, the edge of a cube, edge/sqrt(2) for a regular
+    tetrahedron, min(b, (b + c)/sqrt(2)) for a box a >= b >= c.  A body that turns on its way may
+    pass a smaller hole: D is an upper bound of that.
+
+    The definition is that of a grain's sieving size in Math. Probl. Eng. 2021, 6659285; here the
+    minimum over all rotations is searched from `STARTS` fixed ones, the best `KEPT` of them refined
+    by shrinking random turns, the same for every grain.
+    """
+    x = nodes - nodes.mean(axis=0)
+    frames, turns = _rotations()
+    frames = _best(x, frames)
+    for turn in turns:
+        tries = np.einsum("kil,tlj->ktij", frames, turn)
+        tries[:, 0] = frames
+        width = _hole(x, tries)
+        best = width.argmin(axis=1)
+        frames = tries[np.arange(len(frames)), best]
+    return float(_hole(x, frames).min())
+
+
+@cache
+def _rotations() -> tuple[FloatArray, FloatArray]:
+    """Frames to start from (s, 2, 3), and turns (rounds, tries, 3, 3) that get smaller."""
+    generator = np.random.default_rng(0)
+    starts = Rotation.from_quat(generator.standard_normal((STARTS, 4))).as_matrix()[:, :2]
+    size = FIRST_TURN * SHRINK ** np.arange(ROUNDS)
+    vectors = size[:, None, None] * generator.standard_normal((ROUNDS, TRIES, 3))
+    turns = Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().transpose(0, 2, 1)
+    return starts, turns.reshape(ROUNDS, TRIES, 3, 3)
+
+
+def _hole(x: FloatArray, frames: FloatArray) -> FloatArray:
+    """max(w(a), w(b)) [m] of frames (..., 2, 3)."""
+    along = frames @ x.T
+    return np.asarray((along.max(axis=-1) - along.min(axis=-1)).max(axis=-1))
+
+
+def _best(x: FloatArray, frames: FloatArray) -> FloatArray:
+    """The `KEPT` frames with the smallest holes."""
+    return frames[np.argsort(_hole(x, frames), kind="stable")[:KEPT]]

@@ -1,0 +1,167 @@
+"""From a mesh to the kernel's arrays: order, chunks, windows of forces, pieces of the motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from qdem_fem.kernel.cpu.arrays import Layout
+from qdem_fem.kernel.cpu.lanes import count_lane
+from qdem_fem.kernel.cpu.ordering import order_for_locality
+
+ALIGNMENT = 64
+"""Bytes of a cache line: a node's four numbers never straddle two of them."""
+LARGE_PAGE = 1 << 21
+"""Bytes of a large page of memory."""
+CHUNK_ELEMENTS = 32_768
+CHUNKS_LEAST, CHUNKS_MOST = 4, 256
+PARALLEL_ELEMENTS = 2_048
+"""Fewer elements than this make one chunk."""
+PIECE_NODES = 2_048
+INTERLEAVE = 16
+"""Elements of a block stand this far apart in the order, so that few of them share a node."""
+
+Floats = NDArray[np.floating]
+Integers = NDArray[np.int64]
+
+
+def aligned_zeros(count: int, dtype: DTypeLike) -> Floats:
+    """Zeros that begin on a cache line, or, if there are many, on a large page.
+
+    NumPy asks the system for large pages where it does not clear the memory itself; they spare
+    translations of addresses.
+    """
+    kind = np.dtype(dtype)
+    size = count * kind.itemsize
+    alignment = ALIGNMENT if size < LARGE_PAGE // 2 else LARGE_PAGE
+    raw = np.empty(size + 2 * alignment, dtype=np.uint8)
+    start = -raw.ctypes.data % alignment
+    zeros = raw[start : start + size].view(kind)
+    zeros[:] = 0
+    return zeros
+
+
+def count_chunks(n_elements: int) -> int:
+    """Chunks of a mesh: a number of the mesh alone, so that results do not depend on threads."""
+    if n_elements < PARALLEL_ELEMENTS:
+        return 1
+    wanted = max(CHUNKS_LEAST, min(CHUNKS_MOST, n_elements // CHUNK_ELEMENTS))
+    return 1 << (wanted.bit_length() - 1)
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A mesh in the kernel's order."""
+
+    layout: Layout
+    node_order: Integers
+    """User's number of every kernel node, (n,)."""
+    node_place: Integers
+    """Kernel's number of every user node, (n,)."""
+    element_order: Integers
+    """User's number of every kernel element, (m,)."""
+    window_count: int
+    """Numbers in the windows of forces."""
+    node_window: Integers
+    """A shift of a window that holds the node, by kernel number, (n,); -1 for unused nodes."""
+
+
+def build_layout(
+    elements: Integers,
+    n_nodes: int,
+    element_rows: Floats,
+    dtype: DTypeLike,
+    loose: Integers | None = None,
+) -> Packed:
+    """Order a mesh for locality and lay its data out in blocks of lanes.
+
+    ``loose``: nodes of no element that forces act on all the same, in a window of their own
+    that no piece of the motion looks at.
+
+    ``elements`` (m, 4); ``element_rows`` (m, 11 or 13): gradients of corners 1 to 3 [1/m], then
+    Lame constants and viscosities times volume.  The last block is filled up with copies of
+    the last element that have no stiffness.
+    """
+    node_order, element_order = order_for_locality(elements, n_nodes)
+    node_place = np.empty(n_nodes, dtype=np.int64)
+    node_place[node_order] = np.arange(n_nodes)
+    lanes = count_lane(np.dtype(dtype))
+    element_order = _interleaved(element_order, lanes)
+    m = len(element_order)
+    if not m:
+        return _add_loose(_layout_empty(node_order, node_place, element_rows), loose)
+    blocks = -(-m // lanes)
+    filled = np.concatenate([element_order, np.full(blocks * lanes - m, element_order[-1])])
+
+    corners = node_place[elements[filled]].reshape(blocks, lanes, 4)
+    width = element_rows.shape[1]
+    rows = aligned_zeros(blocks * width * lanes, dtype)
+    by_block = rows.reshape(blocks, width, lanes)
+    by_block[:] = element_rows[filled].reshape(blocks, lanes, width).transpose(0, 2, 1)
+    by_block[-1, 9:, lanes - (blocks * lanes - m) :] = 0.0
+
+    chunks = min(count_chunks(m), blocks)
+    chunk_block = blocks * np.arange(chunks + 1) // chunks
+    window_low = np.minimum.reduceat(corners.min(axis=(1, 2)), chunk_block[:-1])
+    window_stop = np.maximum.reduceat(corners.max(axis=(1, 2)), chunk_block[:-1]) + 1
+    # a cache line between the windows keeps two threads from writing to the same one
+    sizes = 4 * (window_stop - window_low) + ALIGNMENT // 4
+    sizes += -sizes % (ALIGNMENT // 4)
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    chunk_shift = starts[:-1] - 4 * window_low
+
+    used = int(window_stop.max())
+    cuts = np.unique(
+        np.concatenate([window_low, window_stop, np.arange(0, used, PIECE_NODES), [0, used]])
+    )
+    holds = (window_low <= cuts[:-1, None]) & (window_stop >= cuts[1:, None])
+    chunk_of = np.where(holds.sum(axis=1) == 1, np.argmax(holds, axis=1), chunks)
+    held = np.flatnonzero(holds.any(axis=1))  # a node between two windows is in no element
+    order = held[np.argsort(chunk_of[held], kind="stable")]
+    piece, window = np.nonzero(holds[order])
+    node_window = np.full(n_nodes, -1, dtype=np.int64)
+    for k in held:
+        node_window[cuts[k] : cuts[k + 1]] = chunk_shift[np.argmax(holds[k])]
+    layout = Layout(
+        corners=np.ascontiguousarray(4 * corners.transpose(0, 2, 1)).astype(np.int32).ravel(),
+        rows=rows,
+        chunk_block=chunk_block.astype(np.int64),
+        chunk_shift=chunk_shift.astype(np.int64),
+        piece_first=cuts[:-1][order].astype(np.int64),
+        piece_stop=cuts[1:][order].astype(np.int64),
+        chunk_piece=np.searchsorted(chunk_of[order], np.arange(chunks + 1)).astype(np.int64),
+        piece_window=np.searchsorted(piece, np.arange(len(order) + 1)).astype(np.int64),
+        window_shift=chunk_shift[window].astype(np.int64),
+    )
+    packed = Packed(layout, node_order, node_place, element_order, int(starts[-1]), node_window)
+    return _add_loose(packed, loose)
+
+
+def _layout_empty(node_order: Integers, node_place: Integers, element_rows: Floats) -> Packed:
+    """The layout without any element: no chunk, no piece."""
+    none, end = np.zeros(0, np.int64), np.zeros(1, np.int64)
+    corners = np.zeros(0, np.int32)
+    layout = Layout(
+        corners, element_rows.ravel(), end, none, none, none, end, end.copy(), none
+    )  # fmt: skip
+    return Packed(layout, node_order, node_place, none, 0, np.full(len(node_order), -1))
+
+
+def _add_loose(packed: Packed, loose: Integers | None) -> Packed:
+    """A window more, for the forces on ``loose`` nodes."""
+    if loose is None or not len(loose):
+        return packed
+    place, start = packed.node_place[loose], packed.window_count
+    window = packed.node_window.copy()
+    window[place] = start + 4 * (np.arange(len(place)) - place)
+    return replace(packed, window_count=start + 4 * len(place), node_window=window)
+
+
+def _interleaved(order: Integers, lanes: int) -> Integers:
+    """Take the lanes of a block from ``INTERLEAVE`` elements apart."""
+    tile = lanes * INTERLEAVE
+    whole = len(order) // tile * tile
+    tiles = order[:whole].reshape(-1, lanes, INTERLEAVE).transpose(0, 2, 1)
+    return np.concatenate([tiles.ravel(), order[whole:]])

@@ -1,0 +1,329 @@
+"""The compiled time step: forces of the elements (eqs. 1-11), then the motion of the nodes.
+
+Elements are worked on in chunks, each with its own window of nodal forces
+(`qdem_fem.kernel.cpu.layout`),
+so that threads never write to the same place; the order of all sums is fixed by the layout,
+not by the threads, and a run gives the same bits on any number of them.
+
+A scene pays for what it names: the strain measure is chosen by the type of ``law``, and an
+argument that is ``None`` (viscosity, gravity) takes its branch out of the compiled code.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+from numba import config, njit, prange
+from numba.core import types
+from numba.extending import overload
+
+from qdem_fem.element import MEASURES, stress
+from qdem_fem.kernel import digest_sources
+from qdem_fem.kernel.cpu import lanes
+from qdem_fem.kernel.cpu.lanes import (
+    clear_row,
+    count_lane,
+    gather_edges,
+    lanes_not_positive,
+    lanes_sum,
+    lanes_zero,
+    load_lanes,
+    load_row,
+    scatter_pulls,
+    stack_align,
+    store_row,
+)
+
+MATHEMATICS: Any = {"error_model": "numpy", "fastmath": {"contract", "nsz", "arcp", "reassoc"}}
+"""Fused multiply-add and reassociation are allowed; NaN and infinity keep their meaning."""
+compiled: Any = partial(njit, **MATHEMATICS)
+inlined: Any = partial(njit, forceinline=True, **MATHEMATICS)
+INLINED: Any = {"forceinline": True, **MATHEMATICS}
+
+if not {"NUMBA_THREADING_LAYER", "NUMBA_THREADING_LAYER_PRIORITY"} & set(os.environ):
+    # numba's first choice, TBB, takes ten times longer to start a loop than OpenMP does
+    settings: Any = config
+    settings.THREADING_LAYER_PRIORITY = ["omp", "tbb", "workqueue"]
+
+ROWS_ELASTIC, ROWS_VISCOUS = 11, 13
+"""Numbers an element brings: nine gradients, lambda V, mu V; with viscosity also those of it."""
+
+
+LAWS: dict[str, type] = {name: measure.LAW for name, measure in MEASURES.items()}
+BY_LAW = {measure.LAW: measure for measure in MEASURES.values()}
+element_gradient = inlined(stress.element_gradient)
+element_pulls = inlined(stress.element_pulls)
+matrix_product = inlined(stress.matrix_product)
+
+
+def elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
+    """``(P V, J)`` of the strain measure that the type of ``law`` names."""
+    return BY_LAW[type(law)].stress_numbers(h, lame_first, lame_second, law.half)
+
+
+def viscous_pulls(
+    law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
+) -> Any:
+    """``(pulls, J, power)`` with viscosity, linear beside ``small``, else current (eq. 7).
+
+    The power is what viscosity takes of the motion [W].
+    """
+    measure = BY_LAW[type(law)]
+    if hasattr(measure, "pulls_viscous"):
+        return measure.pulls_viscous(h, w, g, lame_first, lame_second, first, second, law.half)
+    p, jacobian = elastic_stress(law, h, lame_first, lame_second)
+    rate = stress.element_gradient(w, g)
+    q = measure.viscous_numbers(h, rate, first, second, law.half)
+    pulls = stress.element_pulls(tuple(a + b for a, b in zip(p, q, strict=True)), g)
+    return pulls, jacobian, stress.matrix_product(q, rate)
+
+
+@overload(elastic_stress, strict=False, jit_options=INLINED)
+def _elastic_stress(law: Any, h: Any, lame_first: Any, lame_second: Any) -> Any:
+    chosen = inlined(BY_LAW[law.instance_class].stress_numbers)
+    return lambda law, h, lame_first, lame_second: chosen(h, lame_first, lame_second, law.half)
+
+
+@overload(viscous_pulls, strict=False, jit_options=INLINED)
+def _viscous_pulls(
+    law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any, second: Any
+) -> Any:
+    measure = BY_LAW[law.instance_class]
+    if hasattr(measure, "pulls_viscous"):
+        fused = inlined(measure.pulls_viscous)
+        return lambda law, h, w, g, lame_first, lame_second, first, second: fused(
+            h, w, g, lame_first, lame_second, first, second, law.half
+        )
+    elastic, viscous = inlined(measure.stress_numbers), inlined(measure.viscous_numbers)
+
+    def composed(
+        law: Any, h: Any, w: Any, g: Any, lame_first: Any, lame_second: Any, first: Any,
+        second: Any,
+    ) -> Any:  # fmt: skip
+        p, jacobian = elastic(h, lame_first, lame_second, law.half)
+        rate = element_gradient(w, g)
+        q = viscous(h, rate, first, second, law.half)
+        return element_pulls(add(p, q), g), jacobian, matrix_product(q, rate)
+
+    return composed
+
+
+@inlined()
+def add(p: Any, q: Any) -> Any:
+    """Sum of two matrices in rows."""
+    return (
+        p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3], p[4] + q[4], p[5] + q[5],
+        p[6] + q[6], p[7] + q[7], p[8] + q[8],
+    )  # fmt: skip
+
+
+@compiled()
+def chunk_forces(
+    law: Any, viscous: Any, corners: Any, rows: Any, first_block: int, stop_block: int,
+    displacement: Any, velocity: Any, forces: Any, shift: int,
+) -> tuple[float, float]:  # fmt: skip
+    """Forces of the blocks of elements of one chunk (eqs. 1-10), added to its window.
+
+    ``displacement`` [m], ``velocity`` [m/s], ``forces`` [N]: flat, four numbers a node.
+    Returns how many of its elements are inverted or not finite, and the power that viscosity
+    takes [W].
+    """
+    stack_align()
+    width = lane_count_of(rows)
+    bad: Any = lanes_zero(rows)
+    taken: Any = lanes_zero(rows)
+    for block in range(first_block, stop_block):
+        at = block * block_size(viscous) * width
+        g = (
+            load_lanes(rows, at), load_lanes(rows, at + width), load_lanes(rows, at + 2 * width),
+            load_lanes(rows, at + 3 * width), load_lanes(rows, at + 4 * width),
+            load_lanes(rows, at + 5 * width), load_lanes(rows, at + 6 * width),
+            load_lanes(rows, at + 7 * width), load_lanes(rows, at + 8 * width),
+        )  # fmt: skip
+        h = element_gradient(gather_edges(displacement, corners, block), g)
+        first, second = load_lanes(rows, at + 9 * width), load_lanes(rows, at + 10 * width)
+        if viscous is None:
+            p, jacobian = elastic_stress(law, h, first, second)
+            pulls = element_pulls(p, g)
+        else:
+            rate = gather_edges(velocity, corners, block)
+            pulls, jacobian, power = viscous_pulls(
+                law, h, rate, g, first, second, load_lanes(rows, at + 11 * width),
+                load_lanes(rows, at + 12 * width),
+            )  # fmt: skip
+            taken = taken + power
+        bad = bad + lanes_not_positive(jacobian)
+        scatter_pulls(forces, corners, block, shift, pulls, viscous)
+    return lanes_sum(bad), lanes_sum(taken)
+
+
+def lane_count_of(rows: Any) -> int:
+    """Lanes of a block of this array."""
+    return count_lane(rows.dtype)
+
+
+@overload(lane_count_of, strict=False)
+def _lane_count_of(rows: Any) -> Any:
+    width = count_lane(rows.dtype)
+    return lambda rows: width
+
+
+def block_size(viscous: Any) -> int:
+    """Rows of a block."""
+    return ROWS_ELASTIC if viscous is None else ROWS_VISCOUS
+
+
+@overload(block_size, strict=False)
+def _block_size(viscous: Any) -> Any:
+    size = ROWS_ELASTIC if isinstance(viscous, types.NoneType) else ROWS_VISCOUS
+    return lambda viscous: size
+
+
+@compiled()
+def piece_motion(
+    start: int, stop: int, shifts: Any, first: int, last: int, forces: Any, inverse_mass: Any,
+    displacement: Any, velocity: Any, step: Any, gravity: Any, k: int,
+) -> None:  # fmt: skip
+    """Velocity Verlet for the nodes ``start`` to ``stop``: ``v += dt f/m``, ``u += dt v``.
+
+    ``shifts[first:last]`` are the windows of forces that hold these nodes; they are summed
+    (eq. 11) and emptied.
+    """
+    for window in range(first + 1, last):
+        for at in range(4 * start, 4 * stop, 4):
+            here, there = at + shifts[first], at + shifts[window]
+            store_row(forces, here, load_row(forces, here) + load_row(forces, there))
+            clear_row(forces, there)
+    for node in range(start, stop):
+        at = 4 * node
+        here = at + shifts[first]
+        change = load_row(forces, here) * (step * inverse_mass[node])
+        clear_row(forces, here)
+        if gravity is not None:
+            change = change + load_row(gravity, 4 * k) * step
+        faster = load_row(velocity, at) + change
+        store_row(velocity, at, faster)
+        store_row(displacement, at, load_row(displacement, at) + faster * step)
+
+
+@compiled()
+def apply_loads(loads: Any, table_row: Any, forces: Any) -> None:
+    """Add the loads to the forces."""
+    for i in range(loads.force_at.size):
+        forces[loads.force_at[i]] += loads.weight[i] * table_row[loads.series[i]]
+
+
+@compiled()
+def loads_power(loads: Any, table_row: Any, velocity: Any) -> float:
+    """Power of the loads [W]."""
+    power = 0.0
+    for i in range(loads.node_at.size):
+        power += loads.weight[i] * table_row[loads.series[i]] * velocity[loads.node_at[i]]
+    return power
+
+
+@compiled()
+def apply_constraints(held: Any, table_row: Any, state: Any, step: float) -> float:
+    """Hold rollers in their planes and components at their values; returns the work done [J]."""
+    displacement, velocity = state.displacement, state.velocity
+    for i in range(held.roller_at.size):
+        at, normal = held.roller_at[i], held.roller_normal[i]
+        for field in (displacement, velocity):
+            across = 0.0
+            for c in range(3):
+                across += field[at + c] * normal[c]
+            for c in range(3):
+                field[at + c] -= across * normal[c]
+    work = 0.0
+    for i in range(held.node_at.size):
+        at = held.node_at[i]
+        target = held.weight[i] * table_row[held.series[i]]
+        before = displacement[at] - step * velocity[at]
+        given = (target - before) / step
+        impulse = (given - velocity[at]) / state.inverse_mass[at // 4]
+        work += 0.5 * impulse * (given + held.previous[i])
+        held.previous[i] = given
+        velocity[at] = given
+        displacement[at] = target
+    return work
+
+
+@compiled()
+def take_probes(probes: Any, done: int, displacement: Any) -> None:
+    """Record the probes when the step number asks for it."""
+    if done >= probes.first and (done - probes.first) % probes.stride == 0:
+        sample = (done - probes.first) // probes.stride
+        if sample < probes.record.shape[0]:
+            for i in range(probes.node_at.size):
+                for c in range(3):
+                    probes.record[sample, i, c] = displacement[probes.node_at[i] + c]
+
+
+def build_window(variant: str) -> Any:
+    """The compiled loop over time steps, on ``"threads"`` or on ``"one thread"``.
+
+    Its compiled form is kept on disk.  ``made_from`` is a part of its key there, so that a change
+    of the stress or of the lanes, which are other files, is never answered by an old kernel.
+    """
+    made_from = variant + digest_sources(stress, lanes, *MEASURES.values())
+
+    @compiled(parallel=variant == "threads", cache=True)
+    def window(
+        law: Any, viscous: Any, layout: Any, state: Any, loads: Any, held: Any, probes: Any,
+        table: Any, gravity: Any, work: Any, step: Any, steps: int,
+    ) -> tuple[int, float]:  # fmt: skip
+        """Compute up to ``steps`` time steps; returns how many, and the count of bad elements.
+
+        ``law``: one of `LAWS`; ``viscous``: True or None; ``table`` (steps + 1, series):
+        amplitudes at the times of the steps; ``gravity`` (4 (steps + 1),) [m/s^2] or None;
+        ``work`` (3,) [J], of the loads, of prescribed motion and taken by viscosity, is added to.
+        Stops after a step that met an inverted element or NaN.
+        """
+        stamp = made_from  # noqa: F841  (makes it a part of the key)
+        corners, rows, chunk_block, chunk_shift = layout[0], layout[1], layout[2], layout[3]
+        piece_first, piece_stop, chunk_piece = layout[4], layout[5], layout[6]
+        piece_window, window_shift = layout[7], layout[8]
+        displacement, velocity, forces, inverse_mass = state[0], state[1], state[2], state[3]
+        bad, taken = np.zeros(chunk_shift.size), np.zeros(chunk_shift.size)
+        shared = chunk_piece[-1]
+        for k in range(steps):
+            apply_loads(loads, table[k], forces)
+            work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
+            for c in prange(chunk_shift.size):
+                bad[c], taken[c] = chunk_forces(
+                    law, viscous, corners, rows, chunk_block[c], chunk_block[c + 1], displacement,
+                    velocity, forces, chunk_shift[c],
+                )  # fmt: skip
+                # no other chunk needs these nodes; while they are in the cache, they move
+                for p in range(chunk_piece[c], chunk_piece[c + 1]):
+                    piece_motion(
+                        piece_first[p], piece_stop[p], window_shift, piece_window[p],
+                        piece_window[p + 1], forces, inverse_mass, displacement, velocity, step,
+                        gravity, k,
+                    )  # fmt: skip
+            for s in prange(piece_first.size - shared):
+                piece_motion(
+                    piece_first[shared + s], piece_stop[shared + s], window_shift,
+                    piece_window[shared + s], piece_window[shared + s + 1], forces, inverse_mass,
+                    displacement, velocity, step, gravity, k,
+                )  # fmt: skip
+            work[1] += apply_constraints(held, table[k + 1], state, step)
+            if viscous is not None:
+                work[2] += step * taken.sum()
+            work[0] += 0.5 * step * loads_power(loads, table[k], velocity)
+            take_probes(probes, k + 1, displacement)
+            inverted = bad.sum()
+            if inverted > 0.0:
+                return k + 1, inverted
+        return steps, 0.0
+
+    return window
+
+
+@cache
+def choose_window_kernel(threads: int) -> Any:
+    """The loop for so many threads; one thread pays for no barrier."""
+    return build_window("threads" if threads > 1 else "one thread")

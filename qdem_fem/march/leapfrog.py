@@ -1,0 +1,139 @@
+"""Velocities level with the displacements, and half a step behind them, as the kernel takes them.
+
+Velocity Verlet in its leapfrog form: ``v(k+1/2) = v(k-1/2) + dt f(u(k), v(k-1/2))/m``.  What the
+user sets and sees is ``v(k)``; `take_velocities_behind` and `level_velocities` go from one to the
+other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.march.state import State
+
+Floats = NDArray[np.float64]
+
+
+def find_velocity(run: State) -> Floats:
+    """Velocity at the time of the displacement [m/s], (n, 3)."""
+    velocity = run.assembly.field("velocity")
+    if run.motion.behind:
+        displacement = run.assembly.field("displacement")
+        change = 0.5 * run.step * _accelerations(run, displacement, velocity)
+        _, held = run.pack_lists()
+        table = run.conditions.table(run.time + run.step * np.arange(2.0))
+        ahead = held.weight * (table[1] - table[0])[held.series] / run.step
+        ahead_free = velocity + change
+        if run.absorbers is not None:
+            ahead_free = run.absorbers.slowed(ahead_free, run.step)
+        flat = _by_place(run, ahead_free)
+        flat[held.node_at] = 0.5 * (_by_place(run, velocity)[held.node_at] + ahead)
+        velocity = flat.reshape(-1, 4)[run.assembly.place, :3]
+    if run.rigid is not None:
+        velocity[run.rigid.nodes] = run.rigid.velocity_field(run.acting())
+    return velocity
+
+
+def take_velocities_behind(run: State) -> None:
+    """Take the velocities half a step back, if they are not there yet."""
+    if not run.motion.behind:
+        displacement = run.assembly.field("displacement")
+        velocity = run.assembly.field("velocity")
+        change = _accelerations(run, displacement, velocity)
+        if run.absorbers is not None:
+            change = change - run.absorbers.decelerations(velocity)
+        behind = velocity - 0.5 * run.step * change
+        run.motion.work[:2] -= find_half_work(run, behind, velocity)
+        if run.absorbers is not None:
+            run.motion.absorbed -= run.absorbers.find_half_taken(behind, velocity, run.step)
+        if run.rigid is not None:
+            run.rigid.kick_half(-1, run.acting(), run.motion.work)
+        _, held = run.pack_lists()
+        held.previous[:] = _by_place(run, behind)[held.node_at]
+        run.assembly.set_field("velocity", behind)
+        run.motion.work[2] -= find_viscous_half(run)
+        run.motion.behind = True
+
+
+def level_velocities(run: State) -> None:
+    """Bring the velocities to the time of the displacements, if they are behind."""
+    if run.motion.behind:
+        behind, level = run.assembly.field("velocity"), find_velocity(run)
+        run.motion.work[:2] += find_half_work(run, behind, level)
+        run.motion.work[2] += find_viscous_half(run)
+        if run.absorbers is not None:
+            run.motion.absorbed += run.absorbers.find_half_taken(behind, level, run.step)
+        if run.rigid is not None:
+            run.rigid.kick_half(1, run.acting(), run.motion.work)
+        run.assembly.set_field("velocity", level)
+        run.motion.behind = False
+
+
+def admit_state(run: State) -> None:
+    """Put a displacement that the user set where the conditions allow: else they would in a step.
+
+    Velocities are left to the first step, which counts the work of giving them.
+    """
+    _, held = run.pack_lists()
+    table = run.conditions.table(np.array([run.time]))[0]
+    set_by_user = run.assembly.field("displacement")
+    flat = _by_place(run, run.assembly.hold(set_by_user, held))
+    flat[held.node_at] = held.weight * table[held.series]
+    admitted = flat.reshape(-1, 4)[run.assembly.place, :3]
+    if not np.array_equal(admitted, set_by_user):
+        run.assembly.set_field("displacement", admitted)
+
+
+def find_half_work(run: State, behind: Floats, level: Floats) -> Floats:
+    """Work in the half step up to now [J], (2,): of loads, of prescribed motion; not on rigid ones.
+
+    ``behind`` and ``level``: velocities (n, 3) [m/s] half a step ago and now.
+    """
+    loads, held = run.pack_lists()
+    table = run.conditions.table(np.array([run.time]))[0]
+    mean = _by_place(run, 0.5 * (behind + level))
+    force = loads.weight * table[loads.series]
+    work = np.array([0.5 * run.step * float(force @ mean[loads.node_at]), 0.0])
+    if held.weight.any():  # the impulse that moved the nodes as they were told
+        free = find_free_accelerations(run, run.assembly.field("displacement"), behind)
+        missing = _by_place(run, level - behind - 0.5 * run.step * free)
+        inverse = np.asarray(run.assembly.state.inverse_mass, dtype=float)
+        mass = 1 / inverse[held.node_at // 4]
+        work[1] = mass @ (missing * mean)[held.node_at]
+    return work
+
+
+def find_viscous_half(run: State) -> float:
+    """What viscosity takes up to now beyond what the steps have counted [J]; velocities are behind.
+
+    A step counts ``dt f_D(u(k), v(k-1/2)) v(k-1/2)``, and the force does ``dt f_D (v(k-1/2) +
+    v(k+1/2))/2``.  As ``f_D`` is linear in v, their sums differ by a quarter of the first and the
+    last of them, in second order; the half step up to now is due besides.
+    """
+    return 0.75 * run.step * run.assembly.viscous_power() if run.viscous else 0.0
+
+
+def find_free_accelerations(run: State, displacement: Floats, velocity: Floats) -> Floats:
+    """What the forces would make of all nodes now if none were held [m/s^2], (n, 3)."""
+    loads, _ = run.pack_lists()
+    now = np.full(2, run.time)
+    free = run.assembly.accelerations(
+        displacement, velocity, loads, run.conditions.table(now), run.gravity_at(now)
+    )
+    if run.absorbers is not None:
+        free = free + run.absorbers.spring_accelerations(displacement)
+    return free if run.contacts is None else free + run.contacts.accelerations()
+
+
+def _accelerations(run: State, displacement: Floats, velocity: Floats) -> Floats:
+    """Accelerations now [m/s^2], (n, 3), zero where held."""
+    change = find_free_accelerations(run, displacement, velocity)
+    return run.assembly.hold(change, run.pack_lists()[1])
+
+
+def _by_place(run: State, field: Floats) -> Floats:
+    """A nodal field (n, 3) in the kernel's order, four numbers a node."""
+    flat = np.zeros((run.assembly.n_nodes, 4))
+    flat[run.assembly.place, :3] = field
+    return flat.ravel()

@@ -1,0 +1,231 @@
+"""A simulation: bodies, conditions and the march in time (eq. 11 and Newton's second law)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil, nan
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.bodies import Body, Held, Roller
+from qdem_fem.contact import choose_assembly
+from qdem_fem.element import Strain
+from qdem_fem.files import ConditionError, Driver, Value, is_real
+from qdem_fem.march.checkpoint import read_checkpoint, write_checkpoint
+from qdem_fem.march.conditioned_bodies import ConditionedBodies
+from qdem_fem.march.contacts import Contact, check_contact_options
+from qdem_fem.march.dynamic_relaxation import StaticAnswer, relax
+from qdem_fem.march.energies import Energy, find_energy
+from qdem_fem.march.leapfrog import find_velocity, level_velocities
+from qdem_fem.march.options import (
+    bounds_check,
+    check_bodies,
+    check_numbers,
+    check_rigid_options,
+    number_bodies,
+    words_check,
+)
+from qdem_fem.march.reactions import reaction
+from qdem_fem.march.state import SAFETY
+from qdem_fem.march.steps import march
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+STEPS_MOST = 2**53
+"""Numbers of steps are exact as floats up to here."""
+SAMPLES = 1000
+"""Samples of an advance whose sampling is not given."""
+
+
+@dataclass(frozen=True)
+class History:
+    """Displacement of the probes; ``history["tip"]`` is (k, 3) [m]."""
+
+    time: Floats
+    """(k,) [s]"""
+    values: dict[str, Floats]
+
+    def __getitem__(self, name: str) -> Floats:
+        return self.values[name]
+
+
+class Simulation(ConditionedBodies):
+    """Explicit dynamics of one or several bodies.
+
+    ``strain``: ``"finger"`` (the paper), ``"small"``, ``"svk"`` or ``"corotational"``;
+    ``precision``: ``"float64"`` or ``"float32"``; ``step`` [s], or ``safety`` times the critical
+    step; ``gravity`` [m/s^2], three components, constant or a series; ``threads``: all by
+    default, the result does not depend on it; ``mass_scaling`` [s]: raise the density of
+    elements whose own critical step is shorter than this; ``device``: ``"cpu"``, or ``"cuda"``
+    for a GPU (`qdem_fem.kernel.cuda.assembly`), whose results repeat to round-off only;
+    ``contact``:
+    how bodies touch, a `qdem_fem.SphereContact` or `SurfaceContact`; not at all by default.
+
+    Bodies of one name are numbered, as messages name them.  In single precision a free body has
+    a frame of its own (`qdem_fem.bodies.frames`), renewed when an advance begins: bits then depend
+    on how a march is divided into advances.
+
+    Velocity Verlet, as in the paper: ``v(k+1/2) = v(k-1/2) + dt f(u(k), v(k-1/2))/m``,
+    ``u(k+1) = u(k) + dt v(k+1/2)``.  Not for quasi-static problems over long times, where an
+    implicit method is cheaper (section 3.2 of the paper says so itself).
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        *,
+        strain: Strain = "finger",
+        precision: Literal["float64", "float32"] = "float64",
+        step: float | None = None,
+        safety: float = SAFETY,
+        gravity: Value | None = None,
+        threads: int | None = None,
+        mass_scaling: float | None = None,
+        device: Literal["cpu", "cuda"] = "cpu",
+        contact: Contact | None = None,
+    ) -> None:
+        if not isinstance(bodies, Iterable):
+            raise ConditionError(f"{bodies!r} is no list of bodies", where="simulation")
+        own = list(bodies)
+        check_bodies(own)
+        number_bodies(own)
+        words_check(strain=strain, precision=precision, device=device)
+        check_numbers(step=step, safety=safety, threads=threads, mass_scaling=mass_scaling)
+        bounds_check(safety=safety, threads=threads)
+        check_contact_options(contact, precision, device)
+        choose_assembly(device)
+        check_rigid_options(own, precision, device)
+        super().__init__(
+            own, strain, precision, threads, mass_scaling, device,
+            None if gravity is None else Driver(gravity, 3, "gravity"),
+            contact=contact, given_step=None if step is None else float(step), safety=safety,
+        )  # fmt: skip
+        for body in self.bodies:
+            body.mover = self
+
+    @property
+    def added_mass(self) -> dict[str, float]:
+        """What mass scaling added to each body, over its own mass [-]: the error it may make."""
+        mass = self.assembly.mass
+        added = {}
+        for body, start in zip(self.bodies, self.first_node, strict=False):
+            if body.rigid:
+                added[body.name] = 0.0
+                continue
+            own = float((body.material.density * body.gradients[1]).sum())
+            nodes = np.unique(self.master[start : start + len(body.nodes)])
+            added[body.name] = float(mass[nodes].sum()) / own - 1 if self.mass_scaling else 0.0
+        return added
+
+    def advance(
+        self,
+        duration: float,
+        probes: Mapping[str, Any] | None = None,
+        sampling: float | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> History:
+        """March on by ``duration`` [s], rounded up to whole steps.
+
+        ``probes``: selections of nodes of the only body, or pairs ``(body, selection)``; their
+        mean displacement is recorded every ``sampling`` [s], rounded to whole steps, at
+        multiples of it.  ``progress`` is called with the time after every window of steps.
+
+        Raises `Unstable` when the motion grows without bound, `ElementInverted` when an element
+        turns inside out; the state is then that of the step at fault.
+        """
+        if not (is_real(duration) and 0 <= duration < STEPS_MOST * self.step):
+            raise ConditionError(f"a duration of {duration!r} s", where="advance")
+        if sampling is not None and not (is_real(sampling) and sampling > 0):
+            raise ConditionError(f"a sampling every {sampling!r} s", where="advance")
+        if probes is not None and not isinstance(probes, Mapping):
+            raise ConditionError(
+                "probes have no names", where="advance", remedy='give {"name": nodes}'
+            )
+        steps = ceil(duration / self.step * (1 - 1e-12) - 1e-9)
+        stride = max(1, round((sampling or duration / SAMPLES) / self.step)) if steps else 1
+        chosen = {name: self._probe(name, probe) for name, probe in (probes or {}).items()}
+        every = np.concatenate([*chosen.values(), np.zeros(0, int)])
+        samples = march(self, steps, stride, every, progress)
+        values, column = {}, 0
+        for name, nodes in chosen.items():
+            values[name] = samples.record[:, column : column + len(nodes)].mean(axis=1)
+            column += len(nodes)
+        return History(samples.step_numbers * self.step, values)
+
+    def relax(self, tolerance: float = 1e-8, max_steps: int = 100_000) -> StaticAnswer:
+        """Bring deformable bodies to rest in equilibrium with the loads of the present time.
+
+        Until the residual is below ``tolerance`` of the loads; time stands still, and `advance`
+        goes on from there.  See `qdem_fem.march.relax` for what is raised.
+        """
+        if self.contact is not None:
+            raise ConditionError(
+                "bodies in contact have no static answer here",
+                where="relax",
+                remedy="march, with viscosity, until they rest",
+            )
+        if self.rigid is not None:
+            raise ConditionError(
+                "rigid bodies have no static answer here", where="relax", remedy="march"
+            )
+        if self.conditions.absorbing:
+            raise ConditionError(
+                "absorbing faces have no static answer here",
+                where="relax",
+                remedy="fix them, relax, and remove the fix before absorb",
+            )
+        return relax(self, tolerance, max_steps)
+
+    def reaction(self, condition: Held | Roller) -> Floats:
+        """Total force [N], (3,), that `fix`, `prescribe` or `roller` exerts on the body now."""
+        return reaction(self, condition)
+
+    def velocities(self, bodies: Sequence[Body]) -> Floats:
+        """`Body.velocity` of some bodies, one after the other, computed once [m/s], (n, 3)."""
+        whole = find_velocity(self)
+        return np.concatenate([whole[self._own(body)] for body in bodies])
+
+    def energy(self) -> Energy:
+        """Energies now [J], see `Energy`."""
+        return find_energy(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write the state to a file (`qdem_fem.march.write_checkpoint`)."""
+        write_checkpoint(self, path)
+
+    def restore(self, path: str | Path) -> None:
+        """Go on from a state that `save` wrote: to the same bits, as if never interrupted.
+
+        The simulation has the meshes, materials, options and conditions of the saved one; else
+        `CheckpointError` says what differs.
+        """
+        read_checkpoint(self, path)
+
+    # --- what the bodies ask for ---------------------------------------------------------------
+
+    def field_of(self, body: Body, name: str) -> Floats:
+        """``displacement`` [m] or ``velocity`` [m/s] of a body's nodes now, (n, 3)."""
+        own = self._own(body)
+        return find_velocity(self)[own] if name == "velocity" else self.assembly.field(name, own)
+
+    def set_field(self, body: Body, name: str, values: Floats) -> None:
+        """Set one of them; before the arrays are made the body keeps it."""
+        if not self.begun:
+            return
+        level_velocities(self)
+        if self.rigid is not None and body.rigid:
+            self.rigid.set_field(body, name, values)
+        self.assembly.set_field(name, values, self._own(body))
+        self.motion.put_in = nan
+        if name == "displacement":
+            self.motion.displacement_set = True
+            self.note_displacement_changed()
+
+    def _own(self, body: Body) -> slice:
+        start = self._offset(body)
+        return slice(start, start + len(body.nodes))

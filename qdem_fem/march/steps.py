@@ -1,0 +1,250 @@
+"""The march in time: windows of compiled steps, the account of energies, and its alarms."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import isnan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.bodies import Body
+from qdem_fem.element import displacement_gradient, volume_change
+from qdem_fem.files import ElementInverted, StepWarning, Unstable
+from qdem_fem.kernel.cpu import Probes
+from qdem_fem.march.energies import find_energy
+from qdem_fem.march.leapfrog import admit_state, take_velocities_behind
+from qdem_fem.march.state import State
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+WINDOW_STEPS = 4096
+GRAVITY_STEPS = 16
+"""Steps over which the momentum is interpolated for the work of a gravity that changes."""
+GROWTH = 10.0
+"""Kinetic energy over all energy ever put in, above which a motion is called unstable."""
+
+
+def march(
+    run: State,
+    steps: int,
+    stride: int,
+    nodes: Integers,
+    progress: Callable[[float], None] | None,
+) -> Samples:
+    """Compute ``steps``; returns the displacement of ``nodes`` every ``stride`` steps.
+
+    Raises `Unstable` and
+    `ElementInverted`; `StepWarning` when an element makes the step short, or it is too long.
+    """
+    motion, assembly = run.motion, run.assembly
+    if steps:
+        motion.step = run.step
+    if motion.displacement_set:
+        admit_state(run)
+        motion.displacement_set = False
+    if run.contacts is not None:
+        run.contacts.refresh()
+    if isnan(motion.put_in):
+        motion.put_in = find_set_energy(run)
+    step_check(run)
+    take_velocities_behind(run)
+    loads, held = run.pack_lists()
+    samples = Samples(motion.steps_done, steps, stride, len(nodes))
+    if samples.first_step == motion.steps_done and len(samples.record):
+        samples.record[0] = assembly.field("displacement")[nodes]
+    most = max(16, min(WINDOW_STEPS, assembly.window_work // max(1, len(assembly.elements))))
+    if run.gravity is not None and run.gravity.varying is not None:
+        most = GRAVITY_STEPS
+    end = motion.steps_done + steps
+    window = assembly.window
+    if run.contacts is not None:
+        window = run.contacts.window
+    elif run.rigid is not None or run.absorbers is not None:
+        window = partial(run_window_alone, run)
+    try:
+        while motion.steps_done < end:
+            assembly.renew_frames()
+            count = min(most, end - motion.steps_done, assembly.steps_most(run.step))
+            times = run.step * (motion.steps_done + np.arange(count + 1, dtype=float))
+            probes = samples.probes(4 * assembly.place[nodes], motion.steps_done)
+            gravity = run.gravity_at(times)
+            before = moment(run) if gravity is not None else None
+            done, bad = window(
+                count, run.step, loads, held, probes, run.conditions.table(times), gravity,
+                motion.work,
+            )  # fmt: skip
+            motion.steps_done += done
+            if gravity is not None and before is not None and done:
+                after = moment(run)
+                motion.gravity_work += gravity_work(gravity[: done + 1], before, after, run.step)
+            motion_check(run, bad)
+            if run.contacts is not None:
+                run.contacts.step_check(
+                    run.step, run.elements_critical_step.value, last=motion.steps_done == end
+                )
+            if progress is not None:
+                progress(run.time)
+    finally:
+        if run.rigid is not None:
+            run.rigid.follow()
+    return samples
+
+
+def run_window_alone(run: State, *given: Any) -> tuple[int, float]:
+    """`Assembly.window` of a system with rigid bodies or absorbing faces that touch nothing."""
+    from qdem_fem.contact import window_run
+
+    done, bad, _ = window_run(run, None, *given)
+    return done, bad
+
+
+class Samples:
+    """Displacements at the step numbers of a march that are multiples of ``stride``.
+
+    Of the state that the march begins with only at time zero: an earlier march has it else.
+    """
+
+    def __init__(self, start: int, steps: int, stride: int, nodes: int) -> None:
+        self.stride = stride
+        self.first_step = (start // stride + 1) * stride if start else 0
+        count = max(0, (start + steps - self.first_step) // stride + 1)
+        self.record = np.zeros((count, nodes, 3))
+        """(samples, nodes, 3) [m]"""
+
+    @property
+    def step_numbers(self) -> Floats:
+        """(samples,)"""
+        return self.first_step + self.stride * np.arange(len(self.record), dtype=float)
+
+    def probes(self, node_at: Integers, steps_done: int) -> Probes:
+        """What the kernel writes from step ``steps_done`` on: the samples after it."""
+        taken = max(0, (steps_done - self.first_step) // self.stride + 1)
+        ahead = self.first_step + taken * self.stride - steps_done
+        return Probes(node_at, self.record[taken:], self.stride, ahead)
+
+
+def step_check(run: State) -> None:
+    """Warn, once for the present conditions, of a step that is above the critical one or short."""
+    critical = run.critical_step
+    remark = "" if run.given_step is not None else critical.remark
+    if run.step > critical.value:
+        remark = (
+            f"the step of {run.step:.4g} s is {run.step / critical.value:.4g} times the critical "
+            f"one, which {critical.governor} governs: the motion will grow without bound"
+        )
+    if remark and run.warned != critical.value:
+        run.warned = critical.value
+        warnings.warn(remark, StepWarning, stacklevel=4)
+
+
+def find_set_energy(run: State) -> float:
+    """Energy of the state that the march begins with [J]."""
+    still = not any(run.assembly.field(name).any() for name in ("displacement", "velocity"))
+    if still and run.contacts is None:
+        return 0.0
+    energy = find_energy(run)
+    return energy.kinetic + abs(energy.elastic) + energy.contact + energy.foundation
+
+
+def sum_energy_put_in(run: State) -> float:
+    """All energy that was ever put in [J]."""
+    return run.motion.put_in + abs(run.motion.work[:2]).sum() + abs(run.motion.gravity_work)
+
+
+def moment(run: State) -> tuple[Floats, Floats]:
+    """``sum m u`` [kg m] and ``sum m v`` [kg m/s] half a step before, (3,) each."""
+    place, speed = run.assembly.moment()
+    if run.rigid is not None:
+        place, speed = (a + b for a, b in zip((place, speed), run.rigid.moment(), strict=True))
+    return place, speed
+
+
+def gravity_work(
+    gravity: Floats,
+    before: tuple[Floats, Floats],
+    after: tuple[Floats, Floats],
+    step: float,
+) -> float:
+    """Work of gravity (k + 1, 3) [m/s^2] in a window of k steps [J], from `moment` at its ends.
+
+    ``sum dt (g(t_k) + g(t_k+1))/2 P(k+1/2)``: its mean multiplies the way of the centre of mass,
+    exactly; for the rest the momentum P within the window is the derivative of the cubic through
+    places and momenta at its ends.
+    """
+    acting = 0.5 * (gravity[:-1] + gravity[1:])
+    mean = acting.mean(axis=0)
+    work = float(mean @ (after[0] - before[0]))
+    if not (acting - mean).any():
+        return work
+    (start, first), (end, last) = ((m - 0.5 * step * p, p) for m, p in (before, after))
+    count = len(acting)
+    s = np.arange(1, count + 1)[:, None] / count
+    way = (end - start) / (count * step)
+    momentum = 6 * s * (1 - s) * way + (1 - s) * (1 - 3 * s) * first + s * (3 * s - 2) * last
+    return work + float(step * ((acting - mean) * momentum).sum())
+
+
+def motion_check(run: State, bad: float) -> None:
+    """Raise when the state can not be right: energy from nothing, or ``bad`` elements."""
+    kinetic = run.assembly.kinetic() + (0.0 if run.rigid is None else run.rigid.kinetic())
+    put_in = sum_energy_put_in(run)
+    ratio = run.step / run.critical_step.value
+    if not kinetic <= GROWTH * put_in and (ratio > 1 or not np.isfinite(kinetic)):
+        critical = run.critical_step
+        raise Unstable(
+            f"the motion grew without bound: {kinetic:.3g} J of kinetic energy from "
+            f"{put_in:.3g} J put in; the step of {run.step:.4g} s is {ratio:.3f} times the "
+            f"critical one of {critical.value:.4g} s, which {critical.governor} governs",
+            where=f"t = {run.time:.6g} s, step {run.steps_done}",
+            remedy="take a step below the critical one (safety 0.9 does), or mend the mesh",
+        )
+    if bad > 0:
+        raise_inverted(run)
+
+
+def raise_inverted(run: State) -> None:
+    """Raise `ElementInverted` with the element that is most inside out.
+
+    The kernel met it at the displacement before the last step, and may have left it sound.
+    """
+    now = run.assembly.field("displacement")
+    before = now - run.step * run.assembly.field("velocity")
+    found = find_inverted(run.bodies, before) or find_inverted(run.bodies, now)
+    name, element, said = found or ("a body", -1, "an element was turned inside out")
+    raise ElementInverted(
+        said,
+        where=f"t = {run.time:.6g} s, step {run.steps_done}",
+        remedy=f"what moves {name} crushes it: lower the load or the speed, mesh finer there, or "
+        "take a shorter step (the critical one is that of the undeformed mesh)",
+        element=element,
+    )
+
+
+def find_inverted(bodies: Sequence[Body], displacement: Floats) -> tuple[str, int, str] | None:
+    """The body and element whose volume is most negative, and a sentence; None if none is."""
+    found: list[tuple[float, str, int, int]] = []
+    start = 0
+    for body in bodies:
+        if body.rigid:
+            start += len(body.nodes)
+            continue
+        moved = displacement[start : start + len(body.nodes)]
+        start += len(body.nodes)
+        jacobian = 1 + volume_change(displacement_gradient(body.gradients[0], body.elements, moved))
+        wrong = np.flatnonzero(~(jacobian > 0))
+        if wrong.size:
+            worst = int(wrong[np.argmin(np.nan_to_num(jacobian[wrong], nan=-np.inf))])
+            found.append((float(jacobian[worst]), body.name, worst, wrong.size))
+    if not found:
+        return None
+    volume, name, element, count = min(found)
+    said = (
+        f"element {element} of {name} was turned inside out (its volume is {volume:.3g} times "
+        f"what it was; {count} such elements)"
+    )
+    return name, element, said

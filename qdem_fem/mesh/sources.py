@@ -1,0 +1,135 @@
+"""What a mesh can be given as: arrays, scikit-fem, meshio, a file.  Nothing is checked here yet.
+
+Neither scikit-fem nor meshio is imported: their meshes are told by what they hold, and meshio
+is loaded only to read a file.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.files import MeshError
+from trackbed.mesh_file import list_groups, read_mesh_file
+
+_ACCEPTED = (
+    "give a skfem.MeshTet, a meshio.Mesh, a pair (nodes, elements) of arrays, "
+    "or the path of a mesh file"
+)
+_KEEP_CORNERS = (
+    "mesh with linear elements (gmsh: Mesh.ElementOrder = 1), or keep the four corners of each "
+    "element, `elements[:, :4]`"
+)
+_OTHER_SOLIDS = ("hexahedron", "wedge", "pyramid", "polyhedron", "VTK_LAGRANGE_HEX")
+"""How meshio's names of solid cells with other shapes begin."""
+
+
+@dataclass(frozen=True)
+class MeshParts:
+    """Nodes, elements and named sets as they were given, of any type and not checked."""
+
+    nodes: Any
+    elements: Any
+    node_sets: dict[str, Any] = field(default_factory=dict)
+    element_sets: dict[str, Any] = field(default_factory=dict)
+
+
+def read_mesh_parts(source: Any, where: str) -> MeshParts:
+    """Take a mesh apart; see `qdem_fem.mesh.read_mesh` for what ``source`` may be.
+
+    Raises `MeshError` if the source is of no known kind, or holds no linear tetrahedra.
+    """
+    if isinstance(source, (str, os.PathLike)):
+        return _parts_of_meshio(read_mesh_file(source, where), where)
+    if isinstance(source, (tuple, list)):
+        if len(source) != 2:
+            raise MeshError(
+                f"a mesh of arrays is a pair (nodes, elements), not {len(source)} items",
+                where=where,
+                remedy=_ACCEPTED,
+            )
+        return MeshParts(source[0], source[1])
+    if hasattr(source, "points") and hasattr(source, "cells"):
+        return _parts_of_meshio(source, where)
+    if hasattr(source, "p") and hasattr(source, "t"):
+        return _parts_of_skfem(source, where)
+    raise MeshError(
+        f"an object of type {type(source).__name__} is no mesh", where=where, remedy=_ACCEPTED
+    )
+
+
+def _parts_of_skfem(mesh: Any, where: str) -> MeshParts:
+    """``p`` is (3, n), ``t`` is (4, m); boundaries hold facets, subdomains hold elements."""
+    kind = type(mesh).__name__
+    shape = getattr(getattr(mesh, "elem", None), "__name__", "ElementTetP1")
+    if "Tet" not in shape:
+        raise MeshError(
+            f"a {kind} has no tetrahedra",
+            where=where,
+            remedy="split its cells first, as skfem's `to_meshtet` does where a mesh has it",
+        )
+    if shape != "ElementTetP1":
+        raise MeshError(
+            f"a {kind} is of higher order; QDEM has linear tetrahedra only",
+            where=where,
+            remedy="skfem.MeshTet.from_mesh(mesh) keeps the corners",
+        )
+    node_sets: dict[str, Any] = {}
+    boundaries = getattr(mesh, "boundaries", None) or {}
+    try:
+        for name, facets in boundaries.items():
+            node_sets[name] = np.unique(mesh.facets[:, np.asarray(facets, dtype=np.int64)])
+    except (IndexError, TypeError, ValueError) as error:
+        raise MeshError(
+            f"the boundaries of the {kind} can not be read: {error}",
+            where=where,
+            remedy="name facets of the mesh only",
+        ) from error
+    subdomains = getattr(mesh, "subdomains", None) or {}
+    return MeshParts(np.asarray(mesh.p).T, np.asarray(mesh.t).T, node_sets, dict(subdomains))
+
+
+def _parts_of_meshio(mesh: Any, where: str) -> MeshParts:
+    """All blocks of tetrahedra joined; sets and physical groups of every block by name."""
+    kinds = [block.type for block in mesh.cells]
+    others = sorted({kind for kind in kinds if kind.startswith(_OTHER_SOLIDS)})
+    if others:
+        raise MeshError(
+            f"the mesh holds solid cells that are no tetrahedra ({', '.join(others)}); without "
+            "them the body would have holes",
+            where=where,
+            remedy="split them into tetrahedra, or remove their blocks if they are no part of it",
+        )
+    curved = sorted({kind for kind in kinds if kind.startswith("tetra") and kind != "tetra"})
+    if curved:
+        raise MeshError(
+            f"the mesh holds elements of higher order ({', '.join(curved)}); "
+            "QDEM has linear tetrahedra only",
+            where=where,
+            remedy=_KEEP_CORNERS,
+        )
+    blocks = [block.data for block in mesh.cells if block.type == "tetra"]
+    if sum(len(block) for block in blocks) == 0:
+        counts: Counter[str] = Counter()
+        for block in mesh.cells:
+            counts[block.type] += len(block.data)
+        found = ", ".join(f"{count} of type {kind}" for kind, count in counts.items()) or "no cells"
+        raise MeshError(
+            f"the mesh holds no tetrahedra, only {found}" if counts else "the mesh holds no cells",
+            where=where,
+            remedy="mesh the volume with tetrahedra (gmsh: `mesh.generate(3)`), and save them",
+        )
+    try:
+        elements = np.concatenate(blocks)
+        node_sets, element_sets = list_groups(mesh, "tetra")
+    except (IndexError, TypeError, ValueError, AttributeError, KeyError) as error:
+        raise MeshError(
+            f"cells and sets of the meshio mesh do not fit together: {error}",
+            where=where,
+            remedy="make the mesh again with meshio.Mesh, which checks this",
+        ) from error
+    return MeshParts(mesh.points, elements, node_sets, element_sets)

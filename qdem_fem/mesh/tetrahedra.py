@@ -1,0 +1,211 @@
+"""Tetrahedral meshes: read and checked once, then gradients, volumes and lumped masses."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from qdem_fem.files import MeshError
+from qdem_fem.mesh.checks import (
+    FloatArray,
+    IntArray,
+    Problem,
+    duplicates_problems,
+    flat_problems,
+    indices_problems,
+    named,
+    raise_problems,
+    take_elements,
+    take_nodes,
+    take_set,
+)
+from qdem_fem.mesh.sources import MeshParts, read_mesh_parts
+
+_BLOCK = 1 << 14
+"""Elements worked on at once: what they need stays in the cache of a core."""
+_SLIVER = 1e-2
+"""Six volumes over the product of three edges below which gradients are made in extended
+precision; few or no elements of a sound mesh are below it."""
+
+
+def _none() -> IntArray:
+    return np.zeros(0, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class TetMesh:
+    """Linear tetrahedra in the reference configuration; every element is right-handed.
+
+    Made by `read_mesh`, which checks it, or by `qdem_fem.mesh.generation`.
+    """
+
+    nodes: FloatArray
+    """Coordinates X [m], (n, 3)."""
+    elements: IntArray
+    """The nodes of each element, (m, 4), with (X1 - X0) x (X2 - X0) . (X3 - X0) > 0."""
+    flipped: IntArray = field(default_factory=_none)
+    """Elements that were left-handed as given, and whose last two nodes were swapped, (k,)."""
+    unused: IntArray = field(default_factory=_none)
+    """Nodes of no element, (j,); they have no mass and do not move."""
+    node_sets: dict[str, IntArray] = field(default_factory=dict)
+    """Named nodes, each sorted."""
+    element_sets: dict[str, IntArray] = field(default_factory=dict)
+    """Named elements, each sorted."""
+
+
+def read_mesh(source: Any, *, where: str = "") -> TetMesh:
+    """Take a mesh in any form that users have, check it, and make every element right-handed.
+
+    ``source`` is one of
+
+    - a pair ``(nodes, elements)``: coordinates (n, 3) [m], and node numbers (m, 4) from 0;
+    - a ``skfem.MeshTet``: its boundaries become node sets, its subdomains element sets;
+    - a ``meshio.Mesh``: its blocks of tetrahedra are joined, cells of surfaces and lines only make
+      node sets, hexahedra and other solid cells are refused;
+      cell sets, point sets and gmsh's physical groups keep their names, a group without a name
+      has its number;
+    - the path of a file that meshio reads;
+    - a `TetMesh`, which is checked again.
+
+    ``where`` names the mesh in errors, a path also names itself.  The arrays are copied.
+    Left-handed elements are mended and listed in ``flipped``, nodes of no element are listed in
+    ``unused``; nodes at the same place are no error, as cracks are made of them.
+
+    Raises `MeshError`, which names all problems found: shape or type, coordinates that are not
+    finite, indices out of range, a node twice in an element, elements that repeat, elements
+    without volume (see `qdem_fem.mesh.checks.FLAT`), sets that name what is not there, no
+    tetrahedra, elements of higher order, a file that can not be read.
+    """
+    if isinstance(source, (str, os.PathLike)):
+        where = f"{where}, " * bool(where) + f"mesh file {os.fspath(source)!r}"
+    where = where or "mesh"
+    if isinstance(source, TetMesh):
+        parts = MeshParts(source.nodes, source.elements, source.node_sets, source.element_sets)
+    else:
+        parts = read_mesh_parts(source, where)
+
+    nodes, problems = take_nodes(parts.nodes)
+    elements, found = take_elements(parts.elements)
+    problems += found
+    if len(nodes) == 0 and not problems:
+        problems.append(Problem("there are no nodes", "give coordinates (n, 3) in metres"))
+    if len(nodes) == 0 or len(elements) == 0:
+        raise_problems(problems, where)
+
+    sound, found = indices_problems(elements, len(nodes))
+    problems += found
+    problems += duplicates_problems(elements, sound, len(nodes))
+    lost = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
+    if len(lost):
+        sound &= ~np.isin(elements, lost).any(axis=1)
+    volume, found = flat_problems(nodes, elements, sound)
+    problems += found
+    node_sets, found = _sets_taken(parts.node_sets, "node", len(nodes))
+    problems += found
+    element_sets, found = _sets_taken(parts.element_sets, "element", len(elements))
+    raise_problems(problems + found, where)
+
+    flipped = np.flatnonzero(volume < 0)
+    elements[flipped, 2:] = elements[flipped, :1:-1]
+    if isinstance(source, TetMesh):
+        flipped = np.union1d(flipped, source.flipped)
+    used = np.zeros(len(nodes), bool)
+    used[elements.reshape(-1)] = True
+    return TetMesh(nodes, elements, flipped, np.flatnonzero(~used), node_sets, element_sets)
+
+
+def element_gradients(nodes: FloatArray, elements: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Gradients of the linear shape functions, and volumes: rows of dX^-1 (paper, eq. 1).
+
+    ``nodes`` (n, 3) [m], right-handed ``elements`` (m, 4).  Returns ``gradients`` (m, 3, 3)
+    [1/m], row a - 1 is grad_X N_a for a = 1, 2, 3 (grad_X N_0 is minus their sum), and
+    ``volumes`` (m,) [m^3].  With edges e_a = X_a - X_0 and 6 V = e_1 . (e_2 x e_3)
+
+        grad N_1 = e_2 x e_3 / 6 V,   grad N_2 = e_3 x e_1 / 6 V,   grad N_3 = e_1 x e_2 / 6 V.
+
+    The determinant of a sliver loses as many digits as it is flat, and its gradients magnify
+    what is lost; slivers are therefore worked out in extended precision where the machine has it.
+
+    Raises `MeshError` if a volume is not positive.  Not for the deformed configuration: QDEM
+    needs gradients there nowhere.
+    """
+    gradients = np.empty((len(elements), 3, 3))
+    volumes = np.empty(len(elements))
+    for start in range(0, len(elements), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        x = nodes[elements[part]].transpose(1, 2, 0)
+        gradient, sixfold, lengths = _cofactors(x)
+        gradients[part], volumes[part] = gradient.transpose(2, 0, 1), sixfold / 6
+        slivers = np.flatnonzero(sixfold < _SLIVER * lengths)
+        if len(slivers):
+            gradient, sixfold, _ = _cofactors(x[:, :, slivers].astype(np.longdouble))
+            gradients[start + slivers] = gradient.transpose(2, 0, 1)
+            volumes[start + slivers] = sixfold / 6
+    bad = np.flatnonzero(~(volumes > 0))
+    if len(bad):
+        raise MeshError(
+            f"no positive volume: {named('element', bad)}; "
+            f"element {bad[0]} has {volumes[bad[0]]:.3g} m^3",
+            where="mesh",
+            remedy="pass the mesh through mesh_read first",
+        )
+    return gradients, volumes
+
+
+def _cofactors(x: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], ...]:
+    """Gradients (3, 3, k), six volumes (k,), product of three edge lengths (k,), of x (4, 3, k)."""
+    e = x[1:] - x[0]
+    gradient = np.empty_like(e)
+    for a in range(3):
+        (bx, by, bz), (cx, cy, cz) = e[(a + 1) % 3], e[(a + 2) % 3]
+        gradient[a, 0] = by * cz - bz * cy
+        gradient[a, 1] = bz * cx - bx * cz
+        gradient[a, 2] = bx * cy - by * cx
+    sixfold = e[0, 0] * gradient[0, 0] + e[0, 1] * gradient[0, 1] + e[0, 2] * gradient[0, 2]
+    squares = e[:, 0] ** 2 + e[:, 1] ** 2 + e[:, 2] ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):  # no volume: the caller says which
+        gradient /= sixfold
+    return gradient, sixfold, np.sqrt(squares[0]) * np.sqrt(squares[1]) * np.sqrt(squares[2])
+
+
+def altitudes(gradients: FloatArray) -> FloatArray:
+    """Smallest of the four altitudes of each element [m], (m,), of ``gradients`` (m, 3, 3) [1/m].
+
+    The altitude over the face opposite node a is 1 / |grad N_a|.
+    """
+    smallest = np.empty(len(gradients))
+    for start in range(0, len(gradients), _BLOCK):
+        g = np.ascontiguousarray(gradients[start : start + _BLOCK].transpose(1, 2, 0))
+        squares = [(row * row).sum(axis=0) for row in (*g, g.sum(axis=0))]
+        smallest[start : start + _BLOCK] = 1 / np.sqrt(np.max(squares, axis=0))
+    return smallest
+
+
+def lumped_mass(
+    elements: IntArray, volumes: FloatArray, density: float | FloatArray, n_nodes: int
+) -> FloatArray:
+    """Mass of each node [kg], (n,): a quarter of rho V_0 of each of its elements (paper, 2.4).
+
+    ``volumes`` (m,) [m^3] of the reference configuration, ``density`` [kg/m^3] one or (m,).
+    Nodes of no element get zero.
+    """
+    quarter = np.broadcast_to(np.asarray(density) * volumes / 4, volumes.shape)
+    mass = np.zeros(n_nodes)
+    for corner in elements.T:
+        mass += np.bincount(corner, weights=quarter, minlength=n_nodes)
+    return mass
+
+
+def _sets_taken(
+    sets: dict[str, Any], kind: str, count: int
+) -> tuple[dict[str, IntArray], list[Problem]]:
+    taken: dict[str, IntArray] = {}
+    problems: list[Problem] = []
+    for name, raw in sets.items():
+        taken[str(name)], found = take_set(raw, kind, str(name), count)
+        problems += found
+    return taken, problems

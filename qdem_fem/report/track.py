@@ -1,0 +1,170 @@
+"""What a track run shows, after section 4: settlement, accelerations, spectra, mobility.
+
+Displacements are counted from the prepared state.  Velocities and accelerations are first and
+second differences of displacements sampled at 10 kHz: of a harmonic motion they are short by
+sinc(f dt) and sinc^2(f dt), at 1 kHz by 1.6 and 3.3 %.  That is put right in the spectrum of
+accelerations; mobility divides mean velocities over an interval by mean forces over it, which are
+as short.  Neither has a zero below half the rate of samples, where round-off would be divided by
+it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.files import table_read
+from qdem_fem.mesh import FloatArray
+from qdem_fem.report import figures as pictures
+from qdem_fem.report.spectra import fourier_spectrum, frequency_response, parzen_smoothed
+from qdem_fem.tables import TimeSeries
+
+GRAINS = ("B1", "B2", "B3", "B2a")
+SENSORS = ("S1", "S2", "S3")
+BANDWIDTH = 20.0
+"""Of the Parzen window [Hz], as in Figs. 9 to 12."""
+FREQUENCY = "frequency (Hz)"
+HIGHEST = 1000.0
+"""Frequency up to which the paper reads its spectra [Hz]."""
+LEAST = 5
+"""Samples of a record that has spectra: with rest before them, second differences leave four."""
+
+
+def velocities(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Times half-way between samples and velocity [m/s] there, (k - 1,) each, of an even series of
+    displacements (k,) [m]."""
+    return (time[1:] + time[:-1]) / 2, np.diff(values) / _interval(time)
+
+
+def accelerations(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Times and acceleration [m/s2], (k - 2,) each, of an even series of displacements (k,) [m]."""
+    return time[1:-1], np.diff(values, 2) / _interval(time) ** 2
+
+
+def acceleration_spectrum(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Frequencies [Hz] and smoothed linear spectrum [m/s] of the acceleration of a point that is
+    displaced by ``values`` [m] from rest; up to `HIGHEST`.
+
+    Before the first sample it rests there.  Without that the blow is missing which gives it the
+    velocity v of the first interval, and v is left at all frequencies: of a grain that is let go
+    and rings, more below 400 Hz than all of its motion there.
+    """
+    begin = time[0] - _interval(time)
+    rested = np.concatenate([[begin], time]), np.concatenate([values[:1], values])
+    frequency, spectrum = fourier_spectrum(*accelerations(*rested))
+    size = np.abs(spectrum) / np.sinc(frequency * _interval(time)) ** 2
+    seen = frequency <= HIGHEST
+    return frequency[seen], parzen_smoothed(frequency, size, BANDWIDTH)[seen]
+
+
+def mobility(
+    time: FloatArray, values: FloatArray, load: TimeSeries
+) -> tuple[FloatArray, FloatArray]:
+    """Frequencies [Hz] and |V|/|F| [m/(s N)] of a grain displaced by ``values`` [m] under a load
+    (k, 3) [N] (Fig. 12), smoothed as spectra are; nan where the load is silent."""
+    when, velocity = velocities(time, values)
+    force = average_between(time, load.times, load.values[:, 2])
+    frequency, ratio = frequency_response(when, force, velocity, BANDWIDTH)
+    seen = frequency <= HIGHEST
+    return frequency[seen], ratio[seen]
+
+
+def average_between(time: FloatArray, times: FloatArray, values: FloatArray) -> FloatArray:
+    """Means (k - 1,) between instants (k,) [s] of a series that is linear between its ``times``
+    (n,) [s], and constant before and behind them."""
+    knots = np.union1d(time, times)
+    between = np.interp(knots, times, values)
+    area = np.cumsum([0.0, *(np.diff(knots) * (between[1:] + between[:-1]) / 2)])
+    return np.diff(area[np.searchsorted(knots, time)]) / np.diff(time)
+
+
+def _interval(time: FloatArray) -> float:
+    """Between two samples of an even series [s]."""
+    return float(time[-1] - time[0]) / (len(time) - 1)
+
+
+def peaks_of(frequency: FloatArray, size: FloatArray, count: int = 5) -> list[float]:
+    """Frequencies of the greatest local peaks of a smooth spectrum [Hz], by height."""
+    inner = size[1:-1]
+    at = 1 + np.flatnonzero((inner > size[:-2]) & (inner >= size[2:]))
+    return [float(frequency[i]) for i in sorted(at, key=lambda i: -float(size[i]))[:count]]
+
+
+def list_track_facts(path: Path, load: TimeSeries) -> dict[str, Any]:
+    """Figures of the run in a folder: greatest and final displacement of each point [m] since the
+    prepared state, along y and down; peaks of spectra and mobility [Hz], of a record of `LEAST`
+    samples or more."""
+    rows = table_read(path / "probes.csv")
+    time = rows["time"]
+    facts: dict[str, Any] = {}
+    for name in (*GRAINS, *SENSORS, "sleeper"):
+        across, up = (rows[f"{name}_{axis}"] - rows[f"{name}_{axis}"][0] for axis in "yz")
+        facts[name] = {
+            "settlement": -float(up[-1]),
+            "settlement_greatest": -float(up.min()),
+            "lateral": float(across[-1]),
+            "lateral_greatest": float(np.abs(across).max()),
+        }
+        if len(time) < LEAST:
+            continue
+        if name != "sleeper":
+            _, acceleration = accelerations(time, up)
+            facts[name]["acceleration_greatest"] = float(np.abs(acceleration).max())
+            facts[name]["peaks"] = peaks_of(*acceleration_spectrum(time, up))
+        if name in GRAINS:
+            facts[name]["mobility_peaks"] = peaks_of(*mobility(time, up, load))
+    return facts
+
+
+def draw_track_pictures(path: Path, load: TimeSeries) -> Iterator[tuple[Path, str]]:
+    """Draw what a track run shows; file and caption of each picture."""
+    rows = table_read(path / "probes.csv")
+    time = rows["time"]
+    moved = {
+        f"{name} {axis}": rows[f"{name}_{axis}"] - rows[f"{name}_{axis}"][0]
+        for name in (*GRAINS, *SENSORS, "sleeper")
+        for axis in "yz"
+    }
+    for axis, word in (("z", "Vertical"), ("y", "Lateral")):
+        target = path / f"picture-track-{axis}.png"
+        names = [f"{name} {axis}" for name in (*GRAINS, "sleeper")]
+        pictures.picture_history(target, {n: (time, moved[n]) for n in names})
+        yield (
+            target,
+            f"{word} displacement of grains and sleeper since the prepared state (Fig. 8).",
+        )
+    if len(time) < LEAST:
+        return
+    target = path / "picture-track-acceleration.png"
+    curves = {s: accelerations(time, moved[f"{s} z"]) for s in SENSORS}
+    pictures.picture_history(target, curves, quantity="acceleration", unit="m/s²")
+    yield target, "Vertical acceleration of the sleeper, sampled at the output's rate (Fig. 9a)."
+    target = path / "picture-track-spectra.png"
+    curves = {s: acceleration_spectrum(time, moved[f"{s} z"]) for s in SENSORS}
+    pictures.picture_history(
+        target, curves, quantity="spectrum", unit="m/s", against=FREQUENCY, logarithmic=True
+    )
+    yield target, f"Linear spectra of these, {smoothing(time)} (Figs. 9b, 10)."
+    target = path / "picture-track-grains.png"
+    curves = {g: acceleration_spectrum(time, moved[f"{g} z"]) for g in GRAINS}
+    pictures.picture_history(
+        target, curves, quantity="spectrum", unit="m/s", against=FREQUENCY, logarithmic=True
+    )
+    yield target, f"The same of grains, {smoothing(time)} (Fig. 11b)."
+    target = path / "picture-track-mobility.png"
+    curves = {g: mobility(time, moved[f"{g} z"], load) for g in GRAINS}
+    pictures.picture_history(
+        target, curves, quantity="mobility", unit="m/(s N)", against=FREQUENCY, logarithmic=True
+    )
+    yield target, f"Mobility of grains: velocity over load, {smoothing(time)} (Fig. 12)."
+
+
+def smoothing(time: FloatArray) -> str:
+    """How spectra of a record at these times [s] are smoothed, in words."""
+    apart = 1 / (time[-1] - time[0])
+    if apart > BANDWIDTH:
+        return f"not smoothed: a record so short has a value every {apart:.3g} Hz"
+    return f"Parzen window of {BANDWIDTH:g} Hz"

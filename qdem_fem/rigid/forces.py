@@ -1,0 +1,207 @@
+"""The rigid bodies of a simulation: their place in a march."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.bodies import stiffness_six
+from qdem_fem.files import ConditionError
+from qdem_fem.kernel.cpu import Constraints, Loads
+from qdem_fem.rigid.holds import find_hold, split_conditions
+from qdem_fem.rigid.state import RigidNow, RigidState
+from qdem_fem.rigid.step import FREE, Rigid
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Acting:
+    """What acts on the rigid bodies of a simulation now, and where its march is."""
+
+    behind: bool
+    """Whether velocities are half a step behind the displacements."""
+    step: float
+    """[s]"""
+    table: Floats
+    """(2, series) what loads and given displacements are times, now and a step later"""
+    gravity: Floats | None
+    """(3,) [m/s^2]"""
+    place: Integers
+    """(c,) the kernel's numbers of vertices that contact acts on"""
+    force: Floats
+    """(c, 3) of contact on them [N]"""
+
+
+class RigidBodies(RigidState):
+    """Bodies with six freedoms each among those of a simulation.
+
+    Made with the simulation's assembly, whose fields have the displacement of all their nodes.
+    """
+
+    def now(self, acting: Acting) -> RigidNow:
+        """The motion at the time of the displacements."""
+        state, step = self._every, acting.step
+        if not acting.behind:
+            return RigidNow(state.velocity.copy(), state.spin.copy())
+        force, torque = self.forces(acting)
+        velocity = state.velocity + 0.5 * step * force / self.mass[:, None]
+        moved = state.given_weight * (acting.table[1] - acting.table[0])[state.given] / step
+        velocity = np.where(state.given < 0, velocity, 0.5 * (state.velocity + moved))
+        return RigidNow(velocity, state.spin + 0.5 * step * torque)
+
+    def forces(self, acting: Acting) -> tuple[Floats, Floats]:
+        """Force [N] and torque about the centre [N m] on each body now, (b, 3) each."""
+        pulls, row = np.zeros((len(self.nodes), 3)), self.of_place[acting.place]
+        pulls[row[row >= 0]] = acting.force[row >= 0]
+        force, torque = self._resultant(self.body, self.arm_now(), pulls)
+        if acting.gravity is not None:
+            force = force + self.mass[:, None] * acting.gravity
+        loads, levers = self.find_loads(acting)
+        return force + loads, torque + levers
+
+    def find_loads(self, acting: Acting) -> tuple[Floats, Floats]:
+        """Force [N] and torque [N m] of the loads on each body now, (b, 3) each."""
+        state = self._every
+        size = state.load_weight * acting.table[0][state.load_series]
+        body = np.repeat(np.arange(len(self.bodies)), np.diff(state.load_first))
+        pulls = size[:, None] * np.eye(3)[state.load_component]
+        arm = self._turned(body, state.load_arm)
+        return self._resultant(body, arm, pulls)
+
+    def _resultant(self, body: Integers, arm: Floats, pulls: Floats) -> tuple[Floats, Floats]:
+        force, torque = np.zeros((2, len(self.bodies), 3))
+        np.add.at(force, body, pulls)
+        np.add.at(torque, body, np.cross(arm, pulls))
+        return force, torque
+
+    def velocity_field(self, acting: Acting) -> Floats:
+        """Velocity of all nodes at the time of the displacements [m/s], (v, 3)."""
+        now = self.now(acting)
+        across = np.cross(self.omega(now.spin)[self.body], self.arm_now())
+        return np.asarray(now.velocity[self.body] + across)
+
+    # --- in a march ----------------------------------------------------------------------------
+
+    def split_lists(
+        self, loads: Loads, held: Constraints, work: Floats
+    ) -> tuple[Loads, Constraints]:
+        """Take from the lists what is on rigid bodies; returns the rest.
+
+        ``work`` (3,) [J]: the account of a march, to which stopping a turn adds.
+        """
+        loads, held, mine, holds = split_conditions(loads, held, self.of_place >= 0)
+        row, component = self.of_place[mine.node_at // 4], mine.node_at % 4
+        order = np.argsort(self.body[row], kind="stable")
+        row = row[order]
+        self._every = self._every._replace(
+            load_first=np.searchsorted(self.body[row], np.arange(len(self.bodies) + 1)),
+            load_component=component[order],
+            load_series=mine.series[order],
+            load_weight=mine.weight[order],
+            load_arm=np.ascontiguousarray(self.arm[row]),
+        )
+        row, component = self.of_place[holds.node_at // 4], holds.node_at % 4
+        for b, body in enumerate(self.bodies):
+            on = self.body[row] == b
+            arm, series, weight = self.arm[row[on]], holds.series[on], holds.weight[on]
+            hold = find_hold(self.own[b], arm, component[on], series, weight, body.name)
+            self._every.given[b], self._every.given_weight[b] = hold.given, hold.weight
+            self._set_turning(b, hold.turning, work)
+        self._seen = None
+        return loads, held
+
+    def _set_turning(self, b: int, turning: int, work: Floats) -> None:
+        """Hold or free the turns of a body; what stops them does work, as it does on shifts."""
+        if turning == self._every.turning[b] == FREE:
+            return
+        before = self.kinetic()
+        omega = self.omega(self._every.spin)[b]
+        self._every.turning[b] = turning
+        held = ~self._turns_free()[b]
+        if self._every.turn[b, 1:][held].any():
+            raise ConditionError(
+                "what is to hold it has turned already, and can not be brought back",
+                where=self.bodies[b].name,
+                remedy="hold a rigid body before it turns",
+            )
+        omega[held] = 0.0
+        self._every.spin[b] = self._inertia_of(b) @ omega
+        work[1] += self.kinetic() - before
+
+    def kick_half(self, sign: int, acting: Acting, work: Floats) -> None:
+        """Take the motion half a step on (``sign`` 1) or back (-1), and note its ``work`` [J]."""
+        behind, now = self._ends(acting)
+        to = now if sign > 0 else behind
+        work[:2] += sign * self.find_half_work(acting)
+        self._every.velocity[:], self._every.spin[:] = to.velocity, to.spin
+
+    def _ends(self, acting: Acting) -> tuple[RigidNow, RigidNow]:
+        """The motion half a step ago, and now."""
+        state, now = self._every, self.now(acting)
+        if acting.behind:
+            return RigidNow(state.velocity.copy(), state.spin.copy()), now
+        force, torque = self.forces(acting)
+        half = 0.5 * acting.step
+        change = np.where(self._every.given < 0, half * force / self.mass[:, None], 0.0)
+        return RigidNow(now.velocity - change, now.spin - half * torque), now
+
+    def find_half_work(self, acting: Acting) -> Floats:
+        """Work in the half step up to now [J], (2,): of loads, of prescribed motion."""
+        behind, now = self._ends(acting)
+        state, half = self._every, 0.5 * acting.step
+        mean = 0.5 * (behind.velocity + now.velocity)
+        turn = 0.5 * (self.omega(behind.spin) + self.omega(now.spin))
+        loads, levers = self.find_loads(acting)
+        force = self.forces(acting)[0]
+        missing = self.mass[:, None] * (now.velocity - behind.velocity) - half * force
+        held = state.given >= 0
+        of_loads = half * (loads * mean + levers * turn).sum()
+        return np.array([of_loads, (missing * mean)[held].sum()])
+
+    def kernel_of(self, probed: Integers, touching: Integers) -> Rigid:
+        """What a step of a march reads: vertices that may touch, and nodes that are probed.
+
+        ``probed``, ``touching``: 4 x kernel number of nodes of any bodies.  Other nodes follow when
+        the march comes back, by `follow`.
+        """
+        if self._seen is None or not np.array_equal(self._seen, probed):
+            needed = np.zeros(len(self.nodes), dtype=bool)
+            for nodes in (touching, probed):
+                row = self.of_place[nodes // 4]
+                needed[row[row >= 0]] = True
+            names = ("node_first", "node_at", "force_at", "arm")
+            vertices = self._vertices(np.flatnonzero(needed))
+            self._following = np.flatnonzero(~needed)
+            self.kernel = self._every._replace(**dict(zip(names, vertices, strict=True)))
+            self._seen = probed.copy()
+        return self.kernel
+
+    def follow(self) -> None:
+        """Put the nodes that no step moves where their bodies are."""
+        at = 4 * self.place[self._following][:, None] + np.arange(3)
+        body, arm = self.body[self._following], self.arm[self._following]
+        moved = self._every.shift[body] + (self._turned(body, arm) - arm)
+        self.assembly.state.displacement[at] = moved
+
+    # --- for the step and the files ------------------------------------------------------------
+
+    def frequency_bound(self, nodes: Integers, stiffness: Floats) -> Floats:
+        """Highest omega^2 [1/s^2] of the body of each node under springs at these nodes, (c,).
+
+        ``nodes`` (c,) in the numbers of all bodies, ``stiffness`` (c,) [N/m] of all springs of a
+        node; zero for nodes of deformable bodies.
+        """
+        row = self.of_place[self.assembly.place[nodes]]
+        mine = row >= 0
+        body = self.body[row[mine]]
+        spring = stiffness_six(body, self.arm[row[mine]], stiffness[mine], len(self.bodies))
+        free = np.concatenate([self._every.given < 0, self._turns_free()], axis=1)
+        spring *= free[:, :, None] & free[:, None, :]
+        highest = np.linalg.eigvalsh(self._root @ spring @ self._root.transpose(0, 2, 1))[:, -1]
+        bound = np.zeros(len(nodes))
+        bound[mine] = highest[body]
+        return bound

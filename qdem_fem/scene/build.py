@@ -1,0 +1,117 @@
+"""A scene becomes a simulation: its meshes, its materials by element, its conditions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from qdem_fem.files import ConditionError, QdemError
+from qdem_fem.tables import BodyTable, TimeSeries, contact_of
+from trackbed.scene_files import Problem, describe_error
+
+if TYPE_CHECKING:
+    from qdem_fem.bodies import Body
+    from qdem_fem.mesh import TetMesh
+    from qdem_fem.tables import Prepared
+
+
+def simulation_of(prepared: Prepared) -> tuple[Any, dict[str, Any]]:
+    """The `qdem_fem.Simulation` of a scene and its bodies by name.
+
+    In a static scene each series gives its last value.  Raises `SceneError` with every condition
+    that the simulation refuses.
+    """
+    from qdem_fem.bodies import Body
+    from qdem_fem.march import Simulation, check_held
+
+    if "track" in prepared.text.data:  # other scenes do not pay for its import
+        from qdem_fem.track import TrackPrepared, enter_track
+
+        assert isinstance(prepared, TrackPrepared)
+        return enter_track(prepared)
+    scene, table = prepared.scene, prepared.scene.simulation
+    bodies = {
+        body.name: Body(
+            prepared.meshes[body.name],
+            _material(body, prepared.meshes[body.name]),
+            name=body.name,
+            rigid=body.rigid,
+        )
+        for body in scene.body
+    }
+    run = Simulation(
+        list(bodies.values()),
+        strain=table.strain,
+        precision=table.precision,
+        step=table.step,
+        safety=table.safety,
+        gravity=table.gravity,
+        threads=table.threads,
+        device=table.device,
+        mass_scaling=table.mass_scaling,
+        contact=contact_of(scene.contact),
+    )
+    problems = []
+    for step in prepared.conditions:
+        arguments = [_argument(value, table.method) for value in step.arguments]
+        try:
+            getattr(run, step.verb)(bodies[step.body], *arguments)
+        except QdemError as error:
+            problems.append(Problem(step.key, describe_error(error)))
+    if table.method == "static" and scene.absorb:
+        problems.append(Problem("absorb.0", "a static answer has no waves: fix these nodes"))
+    for number, moving in enumerate(scene.body):
+        try:
+            begin_motion(bodies[moving.name], moving)
+        except QdemError as error:
+            problems.append(Problem(f"body.{number}", describe_error(error)))
+    prepared.text.refuse(problems)
+    try:
+        run.pack_lists()  # rollers against prescribed motions, what holds rigid bodies
+        if table.method == "static":
+            check_held(run)
+        if scene.contact is not None and scene.contact.periodic is not None:
+            assert run.contacts is not None
+            if (position := run.contacts.positions()) is not None:
+                run.contacts.check_images(position)
+    except ConditionError as error:
+        where = error.where.replace("relax", "fix")
+        if where in bodies:
+            where = f"body.{list(bodies).index(where)}"
+        prepared.text.refuse([Problem(where, describe_error(error))])
+    return run, bodies
+
+
+def begin_motion(body: Body, table: BodyTable) -> None:
+    """Give a body the motion at the start that its table names: ``v + omega x (x - centre)``."""
+    if not table.moves:
+        return
+    velocity, spin = (
+        np.zeros(3) if v is None else np.array(v) for v in (table.velocity, table.spin)
+    )
+    body.velocity = velocity + np.cross(spin, body.nodes - body.rigid_mass.centre)
+
+
+def _argument(value: Any, method: str) -> Any:
+    """What the simulation takes for an argument: a series becomes its own kind of series."""
+    from qdem_fem.files import Series
+
+    if not isinstance(value, TimeSeries):
+        return value
+    if method == "static" or len(value.times) == 1:
+        return value.end()
+    return Series(value.times, value.values)
+
+
+def _material(body: BodyTable, mesh: TetMesh) -> Any:
+    """Material of a body: uniform, or by element where regions differ."""
+    from qdem_fem.element import Material
+
+    values: dict[str, Any] = body.material.model_dump()
+    for name, region in body.regions.items():
+        for key, value in region.model_dump(exclude_none=True).items():
+            if np.ndim(values[key]) == 0:
+                values[key] = np.full(len(mesh.elements), values[key])
+            values[key][mesh.element_sets[name]] = value
+    return Material(**values)

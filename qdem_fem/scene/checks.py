@@ -1,0 +1,242 @@
+"""A scene checked as a whole: meshes, sets, nodes and series, all that is wrong at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ValidationError
+
+from qdem_fem.files import MeshError
+from qdem_fem.tables import (
+    Absorb,
+    BodyTable,
+    Condition,
+    ContactTable,
+    Fix,
+    Load,
+    Mesh,
+    Nodes,
+    NoNodes,
+    Output,
+    Periodic,
+    Prepared,
+    Prescribe,
+    Pressure,
+    Probe,
+    Roller,
+    Scene,
+    SimulationTable,
+    Step,
+    WrongSeries,
+    contact_faults,
+    find_named_nodes,
+    find_output_faults,
+    list_named_files,
+    list_tables,
+    make_body_mesh,
+    scene_read,
+    series_of,
+    unit_vector,
+)
+from trackbed.scene_files import Problem, SceneText, describe_error, suggest_word
+
+if TYPE_CHECKING:
+    from qdem_fem.mesh import TetMesh
+
+IntArray = npt.NDArray[np.int64]
+
+
+def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Prepared:
+    """Read and check a whole scene with its meshes and series.
+
+    Raises `SceneError` with all that is wrong (file, line, key and sentence of each), `UsageError`
+    when the scene or an override can not be read.
+    """
+    text = scene_read(path, overrides, model_of)
+    if "track" in text.data:
+        from qdem_fem.track import track_load
+
+        return track_load(text)
+    problems = list(text.problems)
+    folder = text.path.parent
+    meshes, found = _meshes(text, folder)
+    problems += found
+    names = _body_names(text)
+    conditions: list[Step] = []
+    for key, table in list_tables(text, Condition, Periodic):
+        if names and table.body not in names:
+            near = suggest_word(table.body, names)
+            problems.append(Problem(f"{key}.body", f"there is no body {table.body!r}{near}"))
+        mesh = meshes.get(table.body)
+        for step in _condition(key, table, mesh, folder):
+            if isinstance(step, Problem):
+                problems.append(step)
+            else:
+                conditions.append(step)
+    probes: dict[str, tuple[str, IntArray]] = {}
+    for _, output in list_tables(text, Output):
+        found = list(_probes(output, names, meshes, probes))
+        problems += found
+    problems += find_output_faults(text)
+    problems += find_motion_faults(text)
+    for _, contact in list_tables(text, ContactTable):
+        faults = contact_faults(contact, text.tables.get("simulation"), names)
+        problems += [Problem(*fault) for fault in faults]
+    text.refuse(problems)
+    scene = Scene.model_validate(text.data)
+    return Prepared(scene, text, meshes, conditions, probes, dict(list_named_files(text, folder)))
+
+
+def model_of(data: Mapping[str, Any]) -> type[Scene]:
+    """The tables that a scene may have: those of a track where it names one."""
+    if "track" not in data:
+        return Scene
+    from qdem_fem.track import TrackScene  # other scenes do not pay for its import
+
+    return TrackScene
+
+
+def _body_names(text: SceneText) -> list[str]:
+    """Names of all bodies, sound or not, so that a wrong body makes no other problem."""
+    bodies = text.data.get("body")
+    entries = bodies if isinstance(bodies, list) else []
+    names = [entry.get("name") for entry in entries if isinstance(entry, dict)]
+    return [name for name in names if isinstance(name, str)]
+
+
+def _meshes(text: SceneText, folder: Path) -> tuple[dict[str, TetMesh], list[Problem]]:
+    """The mesh of each body that has a sound one, and what is wrong with bodies."""
+    meshes: dict[str, TetMesh] = {}
+    problems: list[Problem] = []
+    seen: dict[str, str] = {}
+    for key, name, table, regions in list_mesh_tables(text):
+        if name in seen:
+            what = f"{seen[name]} has this name already"
+            problems.append(Problem(f"{key}.name", what))
+            continue
+        seen[name] = key
+        try:
+            mesh = make_body_mesh(table, folder, f"{key}.mesh")
+        except NoNodes as wrong:
+            problems.append(wrong.problem)
+            continue
+        except MeshError as error:
+            problems.append(Problem(f"{key}.mesh", describe_error(error), _of_file(error)))
+            continue
+        for region in regions:
+            if region not in mesh.element_sets:
+                near = suggest_word(region, mesh.element_sets) or "; the mesh has none"
+                what = f"there is no element set {region!r}{near}"
+                problems.append(Problem(f"{key}.regions.{region}", what))
+        meshes[name] = mesh
+    return meshes, problems
+
+
+def list_mesh_tables(text: SceneText) -> Iterator[tuple[str, str, Mesh, list[str]]]:
+    """Key, name, mesh and regions of each body whose mesh is sound, whatever else is wrong."""
+    bodies = text.data.get("body")
+    for index, entry in enumerate(bodies if isinstance(bodies, list) else []):
+        key = f"body.{index}"
+        body = text.tables.get(key)
+        if isinstance(body, BodyTable):
+            yield key, body.name, body.mesh, list(body.regions)
+        elif isinstance(entry, dict) and isinstance(entry.get("name"), str):
+            with suppress(ValidationError):
+                yield key, entry["name"], Mesh.model_validate(entry.get("mesh")), []
+
+
+def _of_file(error: MeshError) -> str:
+    return error.where if error.where.startswith("mesh file") else ""
+
+
+def _condition(
+    key: str, table: Any, mesh: TetMesh | None, folder: Path
+) -> Iterator[Step | Problem]:
+    """The call that a condition stands for, or everything that is wrong with it."""
+    found: list[Problem] = []
+    arguments: list[Any] = []
+
+    def take(make: Any, *words: Any, **named: Any) -> None:
+        try:
+            arguments.append(make(*words, **named))
+        except (NoNodes, WrongSeries) as wrong:
+            found.append(wrong.problem)
+
+    def select(name: str, nodes: Nodes) -> None:
+        if mesh is not None:
+            take(find_named_nodes, nodes, mesh, f"{key}.{name}")
+
+    verb = type(table).__name__.lower()
+    if isinstance(table, Periodic):
+        select("nodes_a", table.nodes_a)
+        select("nodes_b", table.nodes_b)
+    else:
+        select("nodes", table.nodes)
+    if isinstance(table, Fix):
+        arguments.append(table.components)
+    elif isinstance(table, Prescribe):
+        arguments.append(table.component)
+        take(series_of, table.value, f"{key}.value", folder, vector=False)
+    elif isinstance(table, Roller):
+        take(unit_vector, table.normal, f"{key}.normal")
+    elif isinstance(table, Absorb):
+        arguments.append(table.depth)
+    elif isinstance(table, Load):
+        take(series_of, table.force, f"{key}.force", folder, vector=True)
+    elif isinstance(table, Pressure):
+        take(series_of, table.pressure, f"{key}.pressure", folder, vector=False)
+    yield from found
+    if not found and mesh is not None:
+        yield Step(key, verb, table.body, tuple(arguments))
+
+
+def _probes(
+    output: Output,
+    names: Sequence[str],
+    meshes: dict[str, TetMesh],
+    probes: dict[str, tuple[str, IntArray]],
+) -> Iterator[Problem]:
+    """Fill ``probes`` with name -> body and nodes."""
+    for name, probe in output.probes.items():
+        key = f"output.probes.{name}"
+        body = probe.body or (names[0] if len(names) == 1 else None)
+        if body is None:
+            if names:
+                yield Problem(f"{key}.body", "missing: there are several bodies")
+        elif body not in names:
+            if names:
+                near = suggest_word(body, names)
+                yield Problem(f"{key}.body", f"there is no body {body!r}{near}")
+        elif body in meshes:
+            try:
+                probes[name] = (body, find_named_nodes(_without_body(probe), meshes[body], key))
+            except NoNodes as wrong:
+                yield wrong.problem
+
+
+def _without_body(probe: Probe) -> Nodes:
+    return Nodes(**probe.model_dump(exclude={"body"}))
+
+
+def find_motion_faults(text: SceneText) -> Iterator[Problem]:
+    """Bodies said to move at the start of what has no motion, or to turn in what can not."""
+    simulation = text.tables.get("simulation")
+    if not isinstance(simulation, SimulationTable):
+        return
+    joined = {table.body for _, table in list_tables(text, Periodic)}
+    for key, body in list_tables(text, BodyTable):
+        if simulation.method == "static" and body.moves:
+            name = "velocity" if body.velocity is not None else "spin"
+            yield Problem(f"{key}.{name}", 'a static answer has no motion: method = "dynamic"')
+        elif simulation.strain == "small" and body.spin is not None and not body.rigid:
+            what = 'a body that turns is strained by it under strain = "small": take "finger"'
+            yield Problem(f"{key}.spin", what)
+        elif body.spin is not None and body.name in joined:
+            yield Problem(
+                f"{key}.spin", "a body that [[periodic]] joins to its images can not turn"
+            )

@@ -1,0 +1,224 @@
+"""The report of a run: one page, ``report.html``, that loads nothing, and its pictures as PNG."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from qdem_fem.files import table_read
+from qdem_fem.report import Mode
+from qdem_fem.scene.energy_account import STORED
+from qdem_fem.scene.run import Done
+from qdem_fem.scene.run_folder import RunFolder
+from qdem_fem.scene.summary import find_moving_components
+from trackbed.report import bullets, page, picture, table
+from trackbed.run_files import write_whole
+
+
+def write_report(
+    folder: RunFolder, manifest: dict[str, Any], summary: dict[str, Any], done: Done | None,
+    more: Iterable[tuple[Path, str]] = (),
+) -> Path:  # fmt: skip
+    """Write the report of a finished run, and its pictures unless ``done`` is None; its path.
+
+    ``more``: files and captions of further pictures."""
+    pictures = [] if done is None else [*more, *_pictures(folder.path, summary, done)]
+    title = summary["title"] or "QDEM run"
+    body = [
+        f"<h1>{escape(title)}</h1>",
+        _claim(summary),
+        *(picture(path, caption, escape(caption)) for path, caption in pictures),
+        *_bed(summary),
+        *_probes(summary),
+        *_modes(summary),
+        *_meshes(summary),
+        *_step(summary),
+        *_energy(summary),
+        *_left_out(summary),
+        *_cost(summary),
+        *_again(manifest),
+    ]
+    path = folder.path / "report.html"
+    write_whole(path, page(title, body))
+    return path
+
+
+def _pictures(path: Path, summary: dict[str, Any], done: Done) -> Iterator[tuple[Path, str]]:
+    """Draw what there is to draw; file and caption of each picture."""
+    from qdem_fem.report import OUTLINED, draw_deformed, find_bearing_spheres
+    from qdem_fem.report import figures as pictures
+
+    deformed = path / "picture-deformed.png"
+    bodies = list(done.bodies.values())
+    factor = draw_deformed(deformed, bodies, bearing=find_bearing_spheres(done.run))
+    when = "at rest" if done.plan is None else f"at t = {summary['time']:.6g} s"
+    lines = "; thin lines: undeformed" * (len(bodies) <= OUTLINED)
+    yield deformed, f"Bodies {when}, displacement magnified {factor:g} times{lines}."
+    if done.plan is None:
+        return
+    rows, energy = table_read(path / "probes.csv"), table_read(path / "energy.csv")
+    time = rows.pop("time")
+    moving = {name: (time, rows[name]) for name in find_moving_components(rows)}
+    if moving:
+        history = path / "picture-history.png"
+        pictures.picture_history(history, moving)
+        yield history, "Mean displacement of the probes; components that hardly move are left out."
+    modes = summary["modes"]
+    seen = {name: curve for name, curve in moving.items() if name in modes}
+    if seen:
+        spectrum = path / "picture-spectrum.png"
+        found = [Mode(**mode) for of_probe in modes.values() for mode in of_probe]
+        pictures.draw_spectrum(spectrum, seen, found)
+        yield spectrum, "Amplitude spectrum of the whole record (Hann window); dotted: modes."
+    balance = path / "picture-energy.png"
+    pictures.draw_energy(balance, energy)
+    yield balance, "Energies; external is the work of loads, gravity and prescribed motion."
+
+
+def _claim(summary: dict[str, Any]) -> str:
+    bodies = summary["bodies"].values()
+    elements, nodes = (sum(body[key] for body in bodies) for key in ("elements", "nodes"))
+    mesh = f"{elements:,} linear tetrahedra with {nodes:,} nodes"
+    if summary["method"] == "static":
+        answer = summary["static"]
+        text = (
+            f"Static answer by conjugate gradients, {answer['steps']:.0f} evaluations of the "
+            f"forces, {mesh}; residual {answer['residual']:.2g} of the loads, estimated relative "
+            f"error of the displacement {answer['error_estimate']:.2g}."
+        )
+    else:
+        text = (
+            f"{summary['time']:.6g} s of motion in {summary['steps']:,} steps of "
+            f"{summary['step']:.4g} s, {mesh}."
+        )
+    return f'<p class="claim">{escape(text)}</p>'
+
+
+def _probes(summary: dict[str, Any]) -> Iterator[str]:
+    if not summary["probes"]:
+        return
+    yield "<h2>Displacement of the probes</h2>"
+    rows = [
+        (name, axis, *(f"{1e6 * facts[what][i]:.6g}" for what in ("end", "least", "greatest")))
+        for name, facts in summary["probes"].items()
+        for i, axis in enumerate("xyz")
+    ]
+    yield _table(("probe", "component", "end (um)", "least (um)", "greatest (um)"), rows)
+
+
+def _modes(summary: dict[str, Any]) -> Iterator[str]:
+    if not summary["modes"]:
+        return
+    yield "<h2>Modes of the free motion</h2>"
+    yield (
+        "<p>Damped cosines fitted to the record since the last change of a load, strongest "
+        "first.</p>"
+    )
+    rows = [
+        (name, f"{m['frequency']:.6g}", f"{m['decay']:.4g}", f"{1e6 * m['amplitude']:.4g}")
+        for name, modes in summary["modes"].items()
+        for m in modes
+    ]
+    yield _table(("record", "frequency (Hz)", "decay (1/s)", "amplitude (um)"), rows)
+
+
+def _meshes(summary: dict[str, Any]) -> Iterator[str]:
+    yield "<h2>Bodies and meshes</h2>"
+    yield _table(
+        (
+            "body", "elements", "nodes", "surface faces", "turned right-handed", "unused nodes",
+            "smallest altitude (mm)", "in element", "mass (kg)",
+        ),
+        [
+            (
+                name, f"{b['elements']:,}", f"{b['nodes']:,}", f"{b['surface_faces']:,}",
+                str(b["flipped"]), str(b["unused_nodes"]), f"{1e3 * b['smallest_altitude']:.4g}",
+                str(b["thinnest_element"]), f"{b['mass']:.6g}",
+            )
+            for name, b in summary["bodies"].items()
+        ],
+    )  # fmt: skip
+
+
+def _step(summary: dict[str, Any]) -> Iterator[str]:
+    critical = summary["critical_step"]
+    yield "<h2>Time step</h2>"
+    text = "No elastic motion limits the step. "
+    if critical["value"] is not None and critical["element"] < 0:
+        text = f"Critical step {critical['value']:.4g} s, of contact between rigid bodies. "
+    elif critical["value"] is not None:
+        text = (
+            f"Critical step {critical['value']:.4g} s (highest angular frequency "
+            f"{critical['omega']:.4g} 1/s); its motion is strongest in element "
+            f"{critical['element']} of {critical['body']}. "
+        )
+    if summary["method"] != "static":
+        text += f"Used: {summary['step']:.4g} s, {100 * critical['share_used']:.1f} % of it."
+    if critical["remark"]:
+        text += f" Remarkably short: {critical['remark']}."
+    if scaled := summary["mass_scaling"]:
+        text += (
+            f" Mass scaling added {scaled['added_mass']:.4g} kg, {100 * scaled['share']:.3g} % of "
+            "the bodies' own mass: inertia that they do not have."
+        )
+    yield f"<p>{escape(text)}</p>"
+
+
+def _energy(summary: dict[str, Any]) -> Iterator[str]:
+    energy = summary["energy"]
+    yield "<h2>Energy</h2>"
+    if summary["method"] == "static":
+        yield f"<p>Elastic energy {energy['elastic']:.6g} J.</p>"
+        return
+    rows = [(f"{name} at the end", f"{energy[name]:.6g}") for name in energy if name in NAMED]
+    imbalance = f"{energy['greatest_imbalance']:.3g} ({100 * energy['relative_imbalance']:.2g} %)"
+    rows.append(("greatest external - kinetic - elastic on the way", imbalance))
+    yield _table(("energy", "J"), rows)
+
+
+NAMED = (*STORED, "external")
+
+
+def _bed(summary: dict[str, Any]) -> Iterator[str]:
+    """How the prepared bed of a track stands."""
+    if "bed" in summary:
+        yield f"<h2>The prepared bed</h2><p>{escape(summary['bed']['told'].capitalize())}.</p>"
+
+
+def _left_out(summary: dict[str, Any]) -> Iterator[str]:
+    yield "<h2>What is not in this run</h2>"
+    yield bullets(escape(text) for text in summary["left_out"])
+
+
+def _cost(summary: dict[str, Any]) -> Iterator[str]:
+    cost = summary["cost"]
+    yield "<h2>Cost</h2>"
+    rows = [
+        ("CPU time (s)", f"{cost['cpu_s']:.3g}"),
+        ("time on the clock (s)", f"{cost['wall_s']:.3g}"),
+    ]
+    if "million_elements_per_s" in cost:
+        speed = f"{cost['million_elements_per_s']:.3g}"
+        rows.append(("million element-steps per second on the clock", speed))
+    yield _table(("", ""), rows)
+    yield "<p>Advancing alone; without reading, pictures and compilation before the first step.</p>"
+
+
+def _again(manifest: dict[str, Any]) -> Iterator[str]:
+    yield "<h2>To compute it again</h2>"
+    versions = ", ".join(f"{name} {version}" for name, version in manifest["versions"].items())
+    yield f"<pre>{escape(manifest['command'])}</pre>"
+    made = "; ".join([versions, manifest["machine"], manifest["started"]])
+    yield f"<p>{escape(made)}.</p>"
+    asked = json.dumps(manifest["scene"], indent=1)
+    yield f"<details><summary>What was asked, defaults included</summary><pre>{escape(asked)}</pre>"
+    for name, digest in manifest["files"].items():
+        yield f"<p>{escape(name)}: SHA-256 <code>{digest}</code></p>"
+    yield "</details>"
+
+
+def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    return table("", [escape(cell) for cell in header], ([*map(escape, row)] for row in rows))

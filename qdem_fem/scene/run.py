@@ -1,0 +1,308 @@
+"""The run of a scene: advance, record, save; goes on after a kill to the same bits."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import dataclass, field
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.files import EnergyLost, Interrupted, Table, table_read, write_bodies_vtu, write_pvd
+from qdem_fem.scene.energy_account import EnergyAccount
+from qdem_fem.scene.run_folder import RunFolder
+from qdem_fem.tables import Prepared
+from trackbed.run_files import note_signals, write_whole
+
+CHUNK_WORK = 50_000_000
+"""Element-steps between two looks at the clock and the signals: a second or a few."""
+ENERGY = 100
+"""Least steps between rows of energies, unless asked otherwise: a row costs as much as twenty."""
+ENERGIES = ("kinetic", "elastic", "external")
+CONTACT_ENERGIES = ("contact", "friction")
+VISCOUS_ENERGY = ("viscous",)
+ABSORBING_ENERGIES = ("absorbed", "foundation")
+COST = "cost.json"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """When what is written, in time steps; all are multiples of ``sampling``.
+
+    They depend on the scene alone, so that an interrupted run writes what a whole one does.
+    """
+
+    step: float
+    """[s]"""
+    total: int
+    sampling: int
+    chunk: int
+    """Steps that are computed at one go; fixed, as sums over them round differently otherwise."""
+    energy: int
+    fields: int
+    every_field: bool
+    """Whether fields are written on the way, or only at the end."""
+
+    def next_stop(self, done: int) -> int:
+        """Steps at which the computation comes back next."""
+        strides = [self.chunk, self.energy, *([self.fields] if self.every_field else [])]
+        return min(self.total, *(done - done % stride + stride for stride in strides))
+
+    def field_files(self, done: int) -> list[tuple[int, float, str]]:
+        """Step, time [s] and name of all VTU files of a run that has done so many steps."""
+        steps = list(range(0, done + 1, self.fields)) if self.every_field else []
+        if done == self.total and self.total not in steps:
+            steps.append(self.total)
+        return [(n, n * self.step, f"fields_{i:06}.vtu") for i, n in enumerate(steps)]
+
+
+def make_plan(prepared: Prepared, step: float) -> Plan:
+    """When what is written; ``step`` is the time step [s]."""
+    elements = sum(len(mesh.elements) for mesh in prepared.meshes.values())
+    duration, output = prepared.scene.simulation.duration, prepared.scene.output
+    assert duration is not None
+
+    def multiple(interval: float, unit: int) -> int:
+        return unit * max(1, round(interval / (unit * step)))
+
+    sampling = multiple(output.sampling or duration / 2000, 1)
+    return Plan(
+        step=step,
+        total=sampling * max(1, ceil(duration / (sampling * step) - 1e-6)),
+        sampling=sampling,
+        chunk=sampling * max(1, CHUNK_WORK // (elements * sampling)),
+        energy=multiple(output.energy_interval or max(duration / 200, ENERGY * step), sampling),
+        fields=multiple(output.vtu_interval or duration, sampling),
+        every_field=output.vtu_interval is not None,
+    )
+
+
+@dataclass
+class Done:
+    """A run at its end."""
+
+    run: Any
+    """`qdem_fem.Simulation`"""
+    bodies: dict[str, Any]
+    plan: Plan | None
+    """None for a static answer."""
+    cost: dict[str, float]
+    """``cpu_s`` and ``wall_s`` [s] of advancing, all sittings together."""
+    static: dict[str, float] = field(default_factory=dict)
+    """``residual`` and ``error_estimate`` of a static answer [-], ``steps`` it took."""
+
+
+def run_dynamic(
+    prepared: Prepared,
+    run: Any,
+    bodies: dict[str, Any],
+    folder: RunFolder,
+    *,
+    resume: bool,
+    progress: Any,
+) -> Done:
+    """Advance a scene to its duration, from its start or from the last checkpoint.
+
+    ``run`` and ``bodies`` are those of `simulation_of`, ``progress`` is a `qdem_fem.cli.Progress`.
+    Every row and field is the same, bit by bit, however often the run was interrupted.  SIGINT
+    and SIGTERM save the state and raise `Interrupted`.
+    """
+    goes_on = resume and folder.checkpoint.exists()
+    if goes_on:
+        run.restore(folder.checkpoint)
+    probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
+    plan = make_plan(prepared, float(run.step))
+    rows, energies = _tables(folder.path, probes, energy_names(run))
+    output = prepared.scene.output
+    record = _Record(
+        run, list(bodies.values()), plan, folder.path, rows, energies, prepared.scene.audit,
+        output.magnification,
+    )  # fmt: skip
+    if goes_on:
+        record.go_on()
+    else:
+        record.begin(probes)
+    cost = _read_cost(folder.path) if goes_on else {"cpu_s": 0.0, "wall_s": 0.0}
+    record.cost = cost
+    done = Done(run, bodies, plan, cost)
+    saved = time.monotonic()
+    with note_signals() as stop:
+        while run.steps_done < plan.total:
+            record.advance(plan.next_stop(run.steps_done) - run.steps_done, probes)
+            progress.at(run.steps_done, plan.total, run.time)
+            late = time.monotonic() - saved >= prepared.scene.output.checkpoint_interval
+            if stop.name or late or run.steps_done == plan.total:
+                write_checkpoint(done, folder, record)
+                saved = time.monotonic()
+            if stop.name and run.steps_done < plan.total:
+                raise Interrupted(
+                    f"stopped by {stop.name} at t = {run.time:.6g} s; the state is saved in "
+                    f"{folder.checkpoint}\n  -> the same command with --resume goes on from there"
+                )
+    if output.magnification is not None:
+        from qdem_fem.report import series_draw
+
+        files = [(when, folder.path / name) for _, when, name in plan.field_files(plan.total)]
+        pictures = series_draw(run, list(bodies.values()), files, output.magnification)
+        if output.video is not None and pictures:
+            from qdem_fem.report import write_video
+
+            write_video(folder.path / "video.gif", pictures, output.video)
+    return done
+
+
+def run_static(prepared: Prepared, run: Any, bodies: dict[str, Any], folder: RunFolder) -> Done:
+    """Find the static answer of a scene by conjugate gradients; it leaves nothing to resume from.
+
+    Raises `NotConverged` when the tolerance is not reached.
+    """
+    started, cpu = time.perf_counter(), time.process_time()
+    answer = run.relax(tolerance=prepared.scene.simulation.tolerance)
+    cost = {
+        "cpu_s": time.process_time() - cpu,
+        "wall_s": time.perf_counter() - started,
+    }
+    probes = {name: (bodies[body], nodes) for name, (body, nodes) in prepared.probes.items()}
+    rows, energies = _tables(folder.path, probes, energy_names(run))
+    for table in (rows, energies):
+        table.begin()
+    rows.append(np.array([[0.0, *_probed(probes)]]))
+    energies.append(_energy_row(run, 0.0))
+    write_bodies_vtu(folder.path / "fields_000000.vtu", list(bodies.values()))
+    write_pvd(folder.path / "fields.pvd", [(0.0, "fields_000000.vtu")])
+    static = {
+        "residual": float(answer.residual),
+        "error_estimate": float(answer.error_estimate),
+        "steps": float(answer.steps),
+    }
+    return Done(run, bodies, None, cost, static)
+
+
+@dataclass
+class _Record:
+    """What a dynamic run writes on its way."""
+
+    run: Any
+    bodies: list[Any]
+    plan: Plan
+    path: Path
+    rows: Table
+    energies: Table
+    audit: float | None = None
+    """Share of the greatest energy that may be missing."""
+    magnification: float | None = None
+    """Of displacements in pictures beside the VTU files."""
+    cost: dict[str, float] = field(default_factory=dict)
+    """``cpu_s`` and ``wall_s`` of advancing so far [s]."""
+    account: EnergyAccount = field(default_factory=EnergyAccount)
+
+    def begin(self, probes: dict[str, Any]) -> None:
+        """First rows and fields, at t = 0."""
+        self.rows.begin()
+        self.energies.begin()
+        self.rows.append(np.array([[0.0, *_probed(probes)]]))
+        self.take_energy(0.0)
+        self.write_fields()
+
+    def go_on(self) -> None:
+        """Take back what was written behind the checkpoint."""
+        now = (self.run.steps_done + 0.5) * self.plan.step
+        done, plan = self.run.steps_done, self.plan
+        self.rows.cut(now, done // plan.sampling + 1)
+        at_end = done == plan.total and done % plan.energy > 0
+        self.energies.cut(now, done // plan.energy + 1 + at_end)
+        self.account.take(table_read(self.energies.path))
+        kept = {name for _, _, name in self.plan.field_files(self.run.steps_done)}
+        for path in self.path.glob("fields_*.vtu"):
+            if path.name not in kept:
+                path.unlink()
+
+    def advance(self, steps: int, probes: dict[str, Any]) -> None:
+        """Advance and write the rows, energies and fields that fall due."""
+        run, plan = self.run, self.plan
+        start = run.steps_done
+        started, cpu = time.perf_counter(), time.process_time()
+        history = run.advance(steps * plan.step, probes=probes, sampling=plan.sampling * plan.step)
+        self.cost["wall_s"] += time.perf_counter() - started
+        self.cost["cpu_s"] += time.process_time() - cpu
+        new = history.time > (start + 0.5) * plan.step
+        number = np.rint(history.time[new] / plan.step)
+        columns = [history[name][new] for name in probes]
+        self.rows.append(np.column_stack([number * plan.step, *columns]))
+        if run.steps_done % plan.energy == 0 or run.steps_done == plan.total:
+            self.take_energy(run.steps_done * plan.step)
+            self.audit_hold()
+        self.write_fields()
+
+    def take_energy(self, when: float) -> None:
+        """A row of energies at a time [s], into its file and the account."""
+        row = _energy_row(self.run, when)
+        self.energies.append(row)
+        self.account.take(dict(zip(energy_names(self.run), row[:, 1:].T, strict=True)))
+
+    def audit_hold(self) -> None:
+        """Raise `EnergyLost` where the account of energies so far does not close."""
+        missing = self.account.relative
+        if self.audit is not None and missing > self.audit:
+            raise EnergyLost(
+                f"{missing:.2e} of the greatest energy is missing in the account; "
+                f"{self.audit:.2g} is allowed",
+                where=f"t = {self.run.time:.6g} s, step {self.run.steps_done}",
+                remedy="take a shorter step (simulation.safety), look in energy.csv what grows, or "
+                "allow more (output.audit)",
+            )
+
+    def write_fields(self) -> None:
+        """Write the VTU file that is due now, and the list of all."""
+        files = self.plan.field_files(self.run.steps_done)
+        if files and files[-1][0] == self.run.steps_done:
+            target = self.path / files[-1][2]
+            if self.magnification is None:
+                write_bodies_vtu(target, self.bodies)
+            else:
+                from qdem_fem.report import draw_fields
+
+                draw_fields(target, self.run, self.bodies, self.magnification, files[-1][1])
+            write_pvd(self.path / "fields.pvd", [(when, name) for _, when, name in files])
+
+
+def write_checkpoint(done: Done, folder: RunFolder, record: _Record) -> None:
+    """Save the state; the tables reach the disk first, so that they hold all rows up to it."""
+    record.rows.sync()
+    record.energies.sync()
+    done.run.save(folder.checkpoint)
+    write_whole(folder.path / COST, json.dumps(done.cost) + "\n")
+
+
+def _read_cost(path: Path) -> dict[str, float]:
+    try:
+        found = json.loads((path / COST).read_text(encoding="utf-8"))
+        return {name: float(found[name]) for name in ("cpu_s", "wall_s")}
+    except (OSError, ValueError, KeyError, TypeError):  # killed before it was written
+        return {"cpu_s": 0.0, "wall_s": 0.0}
+
+
+def energy_names(run: Any) -> tuple[str, ...]:
+    """Columns of energy.csv beside the time; of what the scene has and counts."""
+    touching = () if run.contact is None else CONTACT_ENERGIES
+    ground = ABSORBING_ENERGIES if run.conditions.absorbing else ()
+    return ENERGIES + touching + VISCOUS_ENERGY * run.viscous + ground
+
+
+def _tables(path: Path, probes: dict[str, Any], energies: tuple[str, ...]) -> tuple[Table, Table]:
+    names = [f"{name}_{axis}" for name in probes for axis in "xyz"]
+    rows = Table(path / "probes.csv", ["time", *names])
+    return rows, Table(path / "energy.csv", ["time", *energies])
+
+
+def _probed(probes: dict[str, Any]) -> list[float]:
+    means = (body.displacement[nodes].mean(axis=0) for body, nodes in probes.values())
+    return [float(component) for mean in means for component in mean]
+
+
+def _energy_row(run: Any, when: float) -> Any:
+    energy = run.energy()
+    return np.array([[when, *(float(getattr(energy, name)) for name in energy_names(run))]])

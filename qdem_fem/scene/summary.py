@@ -1,0 +1,160 @@
+"""What a run came to, in figures: the content of ``result.json`` and of the report."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from qdem_fem.files import table_read
+from qdem_fem.report import Mode, find_peak_frequencies
+from qdem_fem.scene.energy_account import list_energy_facts
+from qdem_fem.scene.run import Done
+from qdem_fem.scene.run_folder import RunFolder
+from qdem_fem.tables import Prepared, TimeSeries
+
+FloatArray = npt.NDArray[np.float64]
+
+MOVING = 1e-3
+"""Share of the greatest displacement below which a component does not count as moving."""
+FREE_SAMPLES = 50
+"""Least number of samples of free motion in which modes are sought."""
+
+
+def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, Any]:
+    """All figures of a finished run; SI units, ready for JSON."""
+    run, cost = done.run, done.cost
+    static = done.plan is None
+    elements = sum(len(body.elements) for body in done.bodies.values() if not body.rigid)
+    element_steps = 0 if done.plan is None else elements * done.plan.total
+    rows, energy = (table_read(folder.path / name) for name in ("probes.csv", "energy.csv"))
+    return {
+        "title": prepared.scene.title,
+        "method": prepared.scene.simulation.method,
+        "time": 0.0 if static else float(run.time),
+        "step": None if static else float(run.step),
+        "steps": 0 if done.plan is None else done.plan.total,
+        "critical_step": tell_critical_step(run),
+        "mass_scaling": list_mass_scaling_facts(run),
+        "bodies": list_body_facts(done.bodies),
+        "cost": {**cost, "million_elements_per_s": element_steps / 1e6 / cost["wall_s"]}
+        if element_steps and cost["wall_s"]
+        else dict(cost),
+        "energy": list_energy_facts(energy),
+        "probes": {name: _probe_facts(rows, name) for name in prepared.probes},
+        "modes": {
+            label: [vars(mode) for mode in modes]
+            for label, modes in modes_of(prepared, rows).items()
+        },
+        "static": done.static,
+        "left_out": prepared.scene.left_out(),
+    }
+
+
+def tell_critical_step(run: Any) -> dict[str, Any]:
+    """The critical step [s], what it hangs on, and its share that is used; None: there is none."""
+    critical = run.critical_step
+    finite = isfinite(critical.value)
+    return {
+        "value": float(critical.value) if finite else None,
+        "omega": float(critical.omega),
+        "body": str(critical.body),
+        "element": int(critical.element),
+        "governor": critical.governor,
+        "remark": str(critical.remark),
+        "share_used": float(run.step) / float(critical.value) if finite else 0.0,
+    }
+
+
+def list_mass_scaling_facts(run: Any) -> dict[str, float]:
+    """Mass that scaling added [kg], and its share of the bodies' own; empty without scaling."""
+    if run.mass_scaling is None:
+        return {}
+    own = {body.name: body_facts(body)["mass"] for body in run.bodies}
+    added = sum(own[name] * share for name, share in run.added_mass.items())
+    return {"added_mass": float(added), "share": float(added / sum(own.values()))}
+
+
+def list_body_facts(bodies: dict[str, Any]) -> dict[str, Any]:
+    """`body_facts` by name; of bodies that are named alike but for a number behind a dash, one
+    entry: sums, and the smallest altitude."""
+    kinds: dict[str, dict[str, dict[str, Any]]] = {}
+    for name, body in bodies.items():
+        stem, _, number = name.rpartition("-")
+        kinds.setdefault(stem if number.isdecimal() else name, {})[name] = body_facts(body)
+    found: dict[str, Any] = {}
+    for kind, by_name in kinds.items():
+        if len(by_name) == 1:
+            found |= by_name
+            continue
+        facts = list(by_name.values())
+        least = min(facts, key=lambda one: float(one["smallest_altitude"]))
+        own = ("smallest_altitude", "thinnest_element")
+        total = {k: least[k] if k in own else sum(one[k] for one in facts) for k in facts[0]}
+        found[f"{len(facts)} of {kind}"] = total
+    return found
+
+
+def body_facts(body: Any) -> dict[str, Any]:
+    """Figures of a body's mesh: counts, what was mended, smallest altitude [m], mass [kg]."""
+    from qdem_fem.mesh import altitudes
+
+    gradients, volumes = body.gradients
+    altitude = altitudes(gradients)
+    thinnest = int(np.argmin(altitude))
+    return {
+        "nodes": len(body.nodes),
+        "elements": len(body.elements),
+        "surface_faces": len(body.surface),
+        "flipped": len(body.mesh.flipped),
+        "unused_nodes": len(body.mesh.unused),
+        "smallest_altitude": float(altitude[thinnest]),
+        "thinnest_element": thinnest,
+        "volume": float(volumes.sum()),
+        "mass": float((volumes * body.material.density).sum()),
+    }
+
+
+def _probe_facts(rows: dict[str, FloatArray], name: str) -> dict[str, list[float]]:
+    xyz = [rows[f"{name}_{axis}"] for axis in "xyz"]
+    return {
+        "end": [float(column[-1]) for column in xyz],
+        "least": [float(column.min()) for column in xyz],
+        "greatest": [float(column.max()) for column in xyz],
+    }
+
+
+def find_moving_components(rows: dict[str, FloatArray]) -> list[str]:
+    """Columns of probes.csv whose range is not negligible, in the order of the file."""
+    ranges = {name: float(np.ptp(column)) for name, column in rows.items() if name != "time"}
+    least = MOVING * max(ranges.values(), default=0.0)
+    return [name for name, extent in ranges.items() if extent > least]
+
+
+def free_from(prepared: Prepared) -> float:
+    """Time [s] from which no load, pressure or prescribed displacement changes any more."""
+    series = [
+        value
+        for step in prepared.conditions
+        for value in step.arguments
+        if isinstance(value, TimeSeries) and len(value.times) > 1
+    ]
+    return max((float(one.times[-1]) for one in series), default=0.0)
+
+
+def modes_of(prepared: Prepared, rows: dict[str, FloatArray]) -> dict[str, list[Mode]]:
+    """Modes in the free motion of each probe's strongest component, by column name."""
+    count = prepared.scene.output.modes
+    free = rows["time"] >= free_from(prepared)
+    found: dict[str, list[Mode]] = {}
+    if not count or free.sum() < FREE_SAMPLES:
+        return found
+    for name in prepared.probes:
+        columns = [f"{name}_{axis}" for axis in "xyz"]
+        column = max(columns, key=lambda one: float(np.ptp(rows[one][free])))
+        modes = find_peak_frequencies(rows["time"][free], rows[column][free], count)
+        if modes:
+            found[column] = modes
+    return found

@@ -1,0 +1,113 @@
+"""The verbs ``trackbed grains`` and ``trackbed train``: parts of a track, written as files."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+SEAT_AREA = 0.13 * 0.17
+"""Of a rail seat [m^2]: a foot of 130 mm on a pad of 170 mm."""
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``grains`` or ``train``; what is not given is the package's own."""
+    {"grains": _register_grains, "train": _register_train}[verb](parser)
+
+
+def _register_grains(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--out", type=Path, required=True, help="the .npz file to write")
+    parser.add_argument("--count", type=int, default=5700, help="grains (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=1, help="default: %(default)s")
+    for shape in ("sphericity", "roundness", "concavity"):
+        parser.add_argument(f"--{shape}", type=float, help="of every grain, 0 to 1")
+    parser.add_argument(
+        "--sizes", type=float, nargs=2, metavar=("LEAST", "GREATEST"),
+        help="sieves, m, in place of EN 13450 31.5/50 A; 0.045 0.055: the paper's grains",
+    )  # fmt: skip
+    parser.add_argument("--workers", type=int, default=1, help="processes (default: %(default)s)")
+    parser.set_defaults(command=grains_command)
+
+
+def _register_train(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--out", type=Path, required=True, help="the .csv file to write")
+    parser.add_argument("--cars", type=int)
+    parser.add_argument("--speed", type=float, help="m/s")
+    parser.add_argument("--axle-load", type=float, help="N")
+    parser.add_argument("--first-share", type=float, help="of an axle load on rail seat 1")
+    parser.add_argument(
+        "--flat", type=float, nargs=3, action="append", default=[],
+        metavar=("AXLE", "PEAK", "DURATION"),
+        help="a flat on both wheels of an axle, counted from 0: force, N, for that time, s, at "
+        "every turn; may be repeated",
+    )  # fmt: skip
+    parser.add_argument("--modulus", type=float, help="of the track's foundation, N/m^2")
+    parser.add_argument(
+        "--roughness", choices=["smooth", "average"], help="of a rail that is not even"
+    )
+    parser.add_argument("--seed", type=int, help="of the roughness (default: 1)")
+    parser.add_argument(
+        "--area", type=float, default=SEAT_AREA, help="of a rail seat, m^2 (default: %(default)g)"
+    )
+    parser.set_defaults(command=train_command)
+
+
+def grains_command(arguments: argparse.Namespace) -> int:
+    """Make random ballast grains, of EN 13450 31.5/50 A or between two sieves, and save them."""
+    import numpy as np
+
+    from qdem_fem.grains import BALLAST, Grading, GrainRecipe, make_grains, save_grains
+
+    _refuse_no_folder(arguments.out)
+    recipe = GrainRecipe(**_given(arguments, "sphericity", "roundness", "concavity"))
+    grading = BALLAST
+    if arguments.sizes is not None:
+        grading = Grading(np.array(arguments.sizes), np.array([0.0, 1.0]))
+    grains = make_grains(
+        arguments.count, arguments.seed, recipe, grading, workers=arguments.workers
+    )
+    save_grains(arguments.out, grains)
+    print(f"{arguments.out}: {len(grains)} grains, {grains.tetrahedra.sum()} tetrahedra")
+    return 0
+
+
+def train_command(arguments: argparse.Namespace) -> int:
+    """Write the made-up record of a passing train."""
+    from qdem_fem.files import UsageError
+    from qdem_fem.track.loads import (
+        Roughness,
+        Track,
+        Train,
+        WheelFlat,
+        load_record_write,
+        make_train_record,
+    )
+
+    _refuse_no_folder(arguments.out)
+    train = Train(**_given(arguments, "cars", "speed", "axle_load", "first_share"))
+    track, rough = Track(**_given(arguments, "modulus")), None
+    if arguments.roughness is not None:
+        rough = Roughness(arguments.roughness, **_given(arguments, "seed"))
+    elif arguments.seed is not None:
+        raise UsageError("--seed is that of a roughness", remedy="give --roughness, too")
+    flats = [WheelFlat(axle, peak, duration) for axle, peak, duration in arguments.flat]
+    record = make_train_record(train, track, arguments.area, flats, roughness=rough)
+    load_record_write(arguments.out, record)
+    print(f"{arguments.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
+    return 0
+
+
+def _given(arguments: argparse.Namespace, *names: str) -> dict[str, Any]:
+    """Those of the named arguments that were given."""
+    return {
+        name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None
+    }
+
+
+def _refuse_no_folder(out: Path) -> None:
+    """Raise `UsageError` where ``out`` can not be written, before minutes of work are lost."""
+    from qdem_fem.files import UsageError
+
+    if out.is_dir() or not out.parent.is_dir():
+        why = "a folder" if out.is_dir() else "in a folder that is not there"
+        raise UsageError(f"{out} is {why}", where="--out", remedy="name a file in a folder that is")

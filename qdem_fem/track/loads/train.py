@@ -1,0 +1,194 @@
+"""Load of a passing train on the rail seats of one sleeper: a made-up record, not a measured one.
+
+The record of the paper's Fig. 5 is not published.  Axles move at constant speed over a rail that is
+an infinite beam on a Winkler foundation (Zimmermann 1888; Hetenyi, Beams on Elastic Foundation,
+1946, ch. 2), and a sleeper takes what the foundation carries over its share of the track.  That
+holds the quasi-static load, to some tens of Hz; of wheel-rail dynamics only what a `WheelFlat` or
+a `qdem_fem.track.loads.roughness.Roughness` names.
+
+    trackbed train --flat 0 60e3 2e-3 --out train.csv
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isfinite, pi
+from typing import Any
+
+import numpy as np
+
+from qdem_fem.files import ConditionError
+from qdem_fem.mesh import FloatArray
+from qdem_fem.track.loads.rail import QUIET, Track, refuse_unless_positive, seat_share
+from qdem_fem.track.loads.record import RATE, LoadRecord
+from qdem_fem.track.loads.rolling import find_rolling_forces
+from qdem_fem.track.loads.roughness import Roughness
+
+LONGEST = 10_000_000
+"""Samples of a record: 17 minutes at 10 kHz."""
+
+
+@dataclass(frozen=True)
+class Train:
+    """Equal cars with two bogies of two axles each.
+
+    Five cars of 20 m at 32 m/s pass in steps of 0.625 s, as the front axles of the paper's cars do
+    (Fig. 7: 0.11, 0.73, 1.35, 1.98, 2.61 s); the other values are assumed.
+    """
+
+    cars: int = 5
+    car_length: float = 20.0
+    """From one car to the next [m]."""
+    bogie_distance: float = 13.8
+    """Between the middles of the bogies of a car [m]."""
+    axle_distance: float = 2.1
+    """Between the axles of a bogie [m]."""
+    axle_load: float = 100e3
+    """Of both wheels [N]."""
+    speed: float = 32.0
+    """[m/s]."""
+    first_share: float = 0.5
+    """Share of an axle load on the rail of seat 1; the paper's two rails differ [-]."""
+
+    def __post_init__(self) -> None:
+        refuse_unless_positive(self, "train")
+        if not (self.axle_distance < self.bogie_distance < self.car_length):
+            raise ConditionError(
+                f"axles {self.axle_distance} m, bogies {self.bogie_distance} m and cars "
+                f"{self.car_length} m apart do not nest",
+                where="train",
+                remedy="give axle_distance < bogie_distance < car_length",
+            )
+        if self.cars != int(self.cars) or not self.first_share < 1:
+            raise ConditionError(
+                f"{self.cars} cars, share {self.first_share} of the load on one rail",
+                where="train",
+                remedy="give a whole number of cars and a share below 1",
+            )
+
+    @property
+    def wheel_loads(self) -> FloatArray:
+        """Of an axle, on the rails of seat 1 and 2 [N], (2,)."""
+        return self.axle_load * np.array([self.first_share, 1 - self.first_share])
+
+    @property
+    def length(self) -> float:
+        """From the first axle to the last [m]."""
+        return (self.cars - 1) * self.car_length + self.bogie_distance + self.axle_distance
+
+    @property
+    def axles(self) -> FloatArray:
+        """Distance of each axle behind the first [m], (4 cars,)."""
+        car = np.array([0.0, self.axle_distance])
+        car = np.concatenate([car, self.bogie_distance + car])
+        return (self.car_length * np.arange(self.cars)[:, None] + car).reshape(-1)
+
+
+@dataclass(frozen=True)
+class WheelFlat:
+    """A flat on both wheels of one axle: a half-sine of force at every turn of the wheel.
+
+    Peak and duration are given, not computed: they depend on speed and contact in ways that no
+    short formula holds.
+    """
+
+    axle: int
+    """Its number from 0, from the front."""
+    peak: float
+    """Of the added force of one wheel on the rail [N]."""
+    duration: float
+    """[s]."""
+    wheel_radius: float = 0.43
+    """[m]."""
+    place: float = 0.0
+    """Where on the rail one of the impacts begins, from the sleeper [m]; others follow at
+    multiples of 2 pi times the radius."""
+
+
+def find_seat_forces(
+    time: FloatArray, train: Train, track: Track, flats: Sequence[WheelFlat] = ()
+) -> FloatArray:
+    """Force on seat 1 and 2 [N], (k, 2), the first axle being over the sleeper at ``time`` 0.
+
+    Raises `ConditionError` as `find_flat_forces`.
+    """
+    front = train.speed * time
+    total = np.zeros((len(time), 2))
+    for axle in train.axles:
+        total += np.outer(seat_share(front - axle, track), train.wheel_loads)
+    if flats:
+        total += find_flat_forces(front, train.axles, train.speed, track, flats)[:, None]
+    return total
+
+
+def find_flat_forces(
+    front: FloatArray, axles: FloatArray, speed: float, track: Track, flats: Sequence[WheelFlat]
+) -> FloatArray:
+    """What flats add to the force on a rail seat [N], (k,), acting where their wheel is.
+
+    ``front`` (k,): how far the first axle is past the sleeper [m]; ``axles`` (b,): distance of each
+    behind the first [m].  Raises `ConditionError` for a flat on an axle that is not one of these,
+    of no size, or longer than a turn of its wheel.
+    """
+    total = np.zeros(len(front))
+    for flat in flats:
+        turn = 2 * pi * flat.wheel_radius
+        sound = isfinite(flat.peak) and 0 < flat.duration * speed <= turn < inf
+        if not (flat.axle in range(len(axles)) and sound):
+            raise ConditionError(
+                f"a flat of {flat.peak} N for {flat.duration} s on axle {flat.axle}, radius "
+                f"{flat.wheel_radius} m",
+                where="train",
+                remedy=f"use an axle from 0 to {len(axles) - 1}, and a duration above zero and "
+                "no longer than a turn of the wheel",
+            )
+        place = front - axles[int(flat.axle)]
+        since = np.mod(place - flat.place, turn) / speed
+        force = np.where(since < flat.duration, flat.peak * np.sin(pi * since / flat.duration), 0.0)
+        total += force * seat_share(place, track)
+    return total
+
+
+def train_spectrum(frequency: FloatArray, train: Train, track: Track) -> np.ndarray[Any, Any]:
+    """Fourier spectrum of the force on seat 1 without flats [N s], complex (k,).
+
+        X(f) = P a/v sinc(f a/v) 4/(4 + (2 pi f L/v)^4) sum over axles of e^(-2 pi i f x_j/v)
+
+    with sinc(x) = sin(pi x)/(pi x): the sum has its peaks at multiples of speed over car length,
+    weighed by 4 cos(pi f b/v) cos(pi f c/v) of bogie distance b and axle distance c (Milne, Le Pen,
+    Thompson, Powrie, J. Sound Vib. 397, 2017, 123-140).
+    """
+    per_metre = frequency / train.speed
+    axles = np.exp(-2j * pi * np.outer(per_metre, train.axles)).sum(axis=1)
+    load = train.first_share * train.axle_load * track.spacing / train.speed
+    beam = 4 / (4 + (2 * pi * per_metre * track.elastic_length) ** 4)
+    return np.asarray(load * np.sinc(per_metre * track.spacing) * beam * axles)
+
+
+def make_train_record(
+    train: Train, track: Track, area: float, flats: Sequence[WheelFlat] = (), rate: float = RATE,
+    roughness: Roughness | None = None,
+) -> LoadRecord:  # fmt: skip
+    """The pressure on both seats of ``area`` [m^2] while the train passes, sampled at ``rate``.
+
+    It begins and ends with the nearest axle `QUIET` elastic lengths and half a spacing away; time
+    0 is the first sample.  ``roughness``: what rolling adds, too.
+    """
+    if not (0 < area < inf and 0 < rate < inf):
+        raise ConditionError(f"area {area} m^2, rate {rate} Hz", where="train",
+                             remedy="give numbers above zero")  # fmt: skip
+    lead = (QUIET * track.elastic_length + track.spacing / 2) / train.speed
+    last = 2 * lead + train.length / train.speed
+    if not last * rate < LONGEST:
+        raise ConditionError(
+            f"the train takes {last:.3g} s to pass, {last * rate:.3g} samples", where="train",
+            remedy=f"give more speed or fewer cars: at most {LONGEST} samples",
+        )  # fmt: skip
+    time = np.arange(int(np.ceil(last * rate)) + 1) / rate
+    force = find_seat_forces(time - lead, train, track, flats)
+    if roughness is not None:
+        force += find_rolling_forces(
+            time - lead, train.speed, train.axles, train.wheel_loads, track, roughness
+        )
+    return LoadRecord(time, force / area)

@@ -1,0 +1,149 @@
+"""What a bed is made of: the recipe, and the bodies that follow from it.
+
+`qdem_fem.track.bed` prepares the bed; its file is that of one recipe.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from qdem_fem.bodies import Body, Rigid
+from qdem_fem.contact.search import PeriodicWidth
+from qdem_fem.contact.spheres import ContactPlane, SphereContact
+from qdem_fem.element import Material
+from qdem_fem.grains import Grading, GrainSet, make_grains
+from qdem_fem.track.bodies import TrackBox
+from qdem_fem.track.layout import Part, TrackLayout
+from qdem_fem.track.sleeper_mesh import SleeperShape
+
+if TYPE_CHECKING:
+    from qdem_fem.mesh import TetMesh
+
+Floats = NDArray[np.float64]
+
+SLEEPER = "sleeper"
+"""Name of the body."""
+
+
+@dataclass(frozen=True)
+class BedRecipe:
+    """Everything that the prepared bed depends on, SI."""
+
+    box: TrackBox
+    below: int
+    """Grains below the sleeper."""
+    beside: int
+    """Grains that fall into the cribs."""
+    seed: int
+    sizes: tuple[float, float]
+    """Least and greatest sieve size of the grains' meshes [m]."""
+    shape: SleeperShape
+    cells: tuple[int, int, int]
+    ballast: Material
+    sleeper: Material
+    radius: float
+    stiffness: tuple[float, float]
+    """k_n of ballast and sleeper [N/m]."""
+    friction: float
+    side_friction: float
+    """Of the walls at the sides; smooth ones are planes of symmetry."""
+    gravity: tuple[float, float, float]
+    softness: float
+    unbalanced: float
+    kinetic: float
+    loose: float
+    """Greatest shares of `Rest` that are equilibrium."""
+    patience: float
+    """Simulated time of a stage after which it is given up [s]."""
+    rigid: bool = True
+    """Whether grains are rigid until the last stage."""
+    periodic: bool = False
+    """Whether the track repeats along y, as in the paper, in place of walls there."""
+    part: Part = "slice"
+    shoulder: tuple[float, float] | None = None
+    """As in `TrackLayout`."""
+
+    @property
+    def layout(self) -> TrackLayout:
+        """Where sleeper and ballast lie."""
+        return TrackLayout(
+            self.part, self.box, self.shape, self.cells, self.radius, self.shoulder
+        )  # fmt: skip
+
+    def planes(self) -> tuple[ContactPlane, ...]:
+        """Ground and sides."""
+        length, width = self.box.length, self.box.width
+        ground = ContactPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+        sides = [
+            ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+            ((length, 0.0, 0.0), (-1.0, 0.0, 0.0)),
+            ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+            ((0.0, width, 0.0), (0.0, -1.0, 0.0)),
+        ]
+        if self.periodic:
+            sides = sides[:2]
+        return (ground, *(ContactPlane(*side, self.side_friction) for side in sides))
+
+    def contact(self, names: Sequence[str], softness: float = 1.0) -> SphereContact:
+        """Spheres of bodies with these names, their springs softer by a factor."""
+        ballast, sleeper = self.stiffness
+        each = {n: softness * (sleeper if n == SLEEPER else ballast) for n in names}
+        width = PeriodicWidth("y", self.box.width) if self.periodic else None
+        return SphereContact(self.radius, each, self.friction, self.planes(), periodic=width)
+
+    def told(self) -> str:
+        """The recipe as a text, equal for equal beds; that of a slice names no part.
+
+        ``patience`` is not in it: it is no part of what has come to rest.
+        """
+        told = asdict(self)
+        del told["patience"]
+        if self.part == "slice":
+            del told["part"], told["shoulder"]
+        return json.dumps(told, sort_keys=True, default=np.ndarray.tolist)
+
+
+def grains_of(recipe: BedRecipe) -> GrainSet:
+    """The grains of a bed."""
+    return _grains_made(recipe.below + recipe.beside, recipe.seed, recipe.sizes)
+
+
+@lru_cache(maxsize=1)  # 30 ms a grain, and a run asks twice
+def _grains_made(count: int, seed: int, sizes: tuple[float, float]) -> GrainSet:
+    return make_grains(count, seed, None, Grading(np.array(sizes), np.array([0.0, 1.0])))
+
+
+def names_of(count: int, sleeper: bool) -> list[str]:
+    """Names of the bodies: ``grain-0`` and so on, and the sleeper."""
+    return [f"grain-{number}" for number in range(count)] + [SLEEPER] * sleeper
+
+
+def make_bed_meshes(recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats]) -> list[TetMesh]:
+    """Meshes of bodies at their places: grains, and the sleeper where nodes are one more."""
+    meshes = [replace(grains.mesh(i), nodes=x) for i, x in enumerate(nodes[: len(grains)])]
+    if len(nodes) > len(grains):
+        meshes.append(replace(recipe.layout.sleeper(0.0), nodes=nodes[-1]))
+    return meshes
+
+
+def make_bed_bodies(
+    recipe: BedRecipe, grains: GrainSet, nodes: Sequence[Floats], *, rigid: Rigid,
+    sleeper_rigid: Rigid | None = None,
+) -> dict[str, Body]:  # fmt: skip
+    """Bodies by name: grains ``rigid`` or not, the sleeper as they are if nothing else is said."""
+    sleeper = len(nodes) > recipe.below + recipe.beside
+    names = names_of(len(nodes) - sleeper, sleeper)
+    other = rigid if sleeper_rigid is None else sleeper_rigid
+    return {
+        name: Body(mesh, recipe.sleeper, name=name, rigid=other)
+        if name == SLEEPER
+        else Body(mesh, recipe.ballast, name=name, rigid=rigid)
+        for name, mesh in zip(names, make_bed_meshes(recipe, grains, nodes), strict=True)
+    }

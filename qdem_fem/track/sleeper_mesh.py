@@ -1,0 +1,163 @@
+"""A mono-block sleeper as a mesh: trapezoidal sections whose height varies along it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from math import isfinite
+
+import numpy as np
+
+from qdem_fem.files import MeshError
+from qdem_fem.mesh import FloatArray, IntArray, TetMesh, make_box_mesh
+
+NEAR = 1e-9
+"""Over the length: distance within which a node lies on a plane."""
+
+
+@dataclass(frozen=True)
+class SleeperShape:
+    """Measures of a sleeper [m]; x along it from 0, y across it about 0, z up from its bottom.
+
+    Length, width and height are those the paper prints of the Type-3 pre-stressed concrete
+    sleeper, which are largest ones; what it leaves open is assumed: sides that lean to
+    ``top_width`` (that gives 168 kg), no waist and no slope of the ends, seats of 0.13 m for the
+    rail foot, 1.132 m apart (gauge 1.067 m and the width of a rail head).
+    """
+
+    length: float = 2.0
+    width: float = 0.24
+    """Of the bottom."""
+    height: float = 0.174
+    """At the rail seats."""
+    top_width: float = 0.17
+    """At ``height``; the sides are planes, so a lower section is wider at its top."""
+    centre_height: float = 0.174
+    end_height: float = 0.174
+    seat_distance: float = 1.132
+    """From the middle of one rail seat to that of the other."""
+    seat_length: float = 0.13
+    """Along the sleeper; a seat is level over it."""
+
+    def __post_init__(self) -> None:
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        wrong = [name for name, value in values.items() if not (isfinite(value) and value > 0)]
+        if not wrong and self.top_width > self.width:
+            wrong = ["top_width"]
+        if not wrong and max(self.centre_height, self.end_height) > self.height:
+            wrong = ["centre_height" if self.centre_height > self.height else "end_height"]
+        if not wrong and not (
+            self.seat_length < self.seat_distance < self.length - self.seat_length
+        ):
+            wrong = ["seat_distance"]
+        if wrong:
+            raise MeshError(
+                f"{wrong[0]} = {values[wrong[0]]} makes no sleeper",
+                where="sleeper",
+                remedy="give lengths above zero in metres: the top no wider than the bottom, the "
+                "height greatest at the seats, the seats apart and within the length",
+            )
+
+    @property
+    def stations(self) -> FloatArray:
+        """Where the slope of the top changes [m], (7,): ends, edges of the seats, centre."""
+        middle, apart, half = self.length / 2, self.seat_distance / 2, self.seat_length / 2
+        right = np.array([0.0, apart - half, apart + half, middle])
+        return np.concatenate([middle - right[:0:-1], middle + right])
+
+    def height_at(self, x: FloatArray) -> FloatArray:
+        """Height h(x) [m], linear between `stations`."""
+        end, seat, centre = self.end_height, self.height, self.centre_height
+        levels = [end, seat, seat, centre, seat, seat, end]
+        return np.interp(x, self.stations, levels)
+
+    def width_at(self, z: FloatArray) -> FloatArray:
+        """Width b(z) [m]."""
+        return self.width - (self.width - self.top_width) * np.asarray(z) / self.height
+
+    def area_at(self, x: FloatArray) -> FloatArray:
+        """Area of the section, integral of b(z) from 0 to h(x) [m^2]."""
+        h = self.height_at(x)
+        return h * (self.width + self.width_at(h)) / 2
+
+    def inertia_at(self, x: FloatArray) -> FloatArray:
+        """Second moment of a section about its level neutral axis [m^4]: that of a trapezoid,
+        h^3 (b^2 + 4 b t + t^2)/(36 (b + t))."""
+        h = self.height_at(x)
+        b, t = self.width, self.width_at(h)
+        return h**3 * (b**2 + 4 * b * t + t**2) / (36 * (b + t))
+
+    @property
+    def volume(self) -> float:
+        """[m^3]; exact: the area is quadratic between stations, which Simpson's rule integrates."""
+        x = self.stations
+        middle = (x[1:] + x[:-1]) / 2
+        parts = self.area_at(x[1:]) + 4 * self.area_at(middle) + self.area_at(x[:-1])
+        return float(np.diff(x) @ parts / 6)
+
+
+def sleeper_mesh(shape: SleeperShape, along: int = 80, across: int = 8, up: int = 6) -> TetMesh:
+    """The sleeper in ``along`` x ``across`` x ``up`` cells of six tetrahedra; volume exact.
+
+    Cells along it are shared out between the `SleeperShape.stations` by their distance, at least
+    one each.  Node sets: ``bottom``, ``top``, ``end-1``, ``end-2``, ``seat-1`` and ``seat-2`` (the
+    nodes of the top over a rail seat, edges included), all that of a box, and single nodes
+    nearest to where the paper measures accelerations on the top: ``S1`` (end), ``S2`` (by the
+    rail), ``S3`` (centre); where exactly is assumed.  Raises `MeshError` for fewer than 6 cells
+    along.
+    """
+    knots = shape.stations
+    cuts = _cells_shared(np.diff(knots) / shape.length, along)
+    mesh = make_box_mesh((1.0, 1.0, 1.0), (along, across, up))
+    grid = np.concatenate(
+        [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots, knots[1:], cuts,
+                                                                 strict=False)]
+        + [knots[-1:]]
+    )  # fmt: skip
+    x = grid[np.rint(mesh.nodes[:, 0] * along).astype(np.int64)]
+    z = mesh.nodes[:, 2] * shape.height_at(x)
+    nodes = np.stack([x, (mesh.nodes[:, 1] - 0.5) * shape.width_at(z), z], axis=1)
+    sets = {
+        new: mesh.node_sets[old]
+        for new, old in (("bottom", "z-min"), ("top", "z-max"), ("end-1", "x-min"),
+                         ("end-2", "x-max"))
+    }  # fmt: skip
+    top, near = sets["top"], NEAR * shape.length
+    seats = shape.length / 2 + shape.seat_distance / 2 * np.array([-1, 1])
+    for number, seat in enumerate(seats, 1):
+        inside = np.abs(nodes[top, 0] - seat) <= shape.seat_length / 2 + near
+        sets[f"seat-{number}"] = top[inside]
+    beside = seats[0] + shape.seat_length / 2
+    for name, place in (("S1", 0.0), ("S2", beside), ("S3", shape.length / 2)):
+        away = np.hypot(nodes[top, 0] - place, nodes[top, 1])
+        sets[name] = top[[int(away.argmin())]]
+    return TetMesh(nodes, mesh.elements, node_sets=sets)
+
+
+def make_half_sleeper(shape: SleeperShape, along: int, across: int, up: int) -> TetMesh:
+    """The half of a sleeper from end 1 to its middle, ``along`` cells long, as `sleeper_mesh`.
+
+    Its node sets without those of the other half, and ``ends``: the plane of symmetry at the
+    middle.  Raises `MeshError` for fewer than 3 cells along.
+    """
+    whole = sleeper_mesh(shape, 2 * along, across, up)
+    middle = shape.length / 2
+    kept = whole.nodes[whole.elements, 0].mean(axis=1) < middle
+    nodes = np.unique(whole.elements[kept])
+    number = np.full(len(whole.nodes), -1)
+    number[nodes] = np.arange(len(nodes))
+    sets = {name: number[old][number[old] >= 0] for name, old in whole.node_sets.items()}
+    sets = {name: mine for name, mine in sets.items() if len(mine)}
+    sets["ends"] = np.flatnonzero(whole.nodes[nodes, 0] > middle - NEAR * shape.length)
+    return TetMesh(whole.nodes[nodes], number[whole.elements[kept]], node_sets=sets)
+
+
+def _cells_shared(shares: FloatArray, count: int) -> IntArray:
+    """``count`` whole cells by shares that add up to one, one each at least."""
+    if count < len(shares):
+        raise MeshError(
+            f"{count} cells along", where="sleeper_mesh", remedy=f"use {len(shares)} or more"
+        )
+    cells = np.ones(len(shares), np.int64)
+    for _ in range(count - len(shares)):
+        cells[int(np.argmax(shares / cells))] += 1
+    return cells

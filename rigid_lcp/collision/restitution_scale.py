@@ -1,0 +1,105 @@
+"""Restitution scaled down where friction would let it make energy.
+
+Newton's restitution acts on normal velocities, whatever friction does beside it.  Where a rod comes
+down at a slant its normal impulse turns the slip round, friction then pushes along the first slip,
+and the rod leaves with more than it came with (Kane's paradox).  Wedged bodies may have no impulses
+at all that let them bounce.  Without restitution neither happens
+(`rigid_lcp.motion.time_stepping`), so
+as much of it is kept as makes none (`rigid_lcp.collision.restitution_scale`).
+
+The work of the impulses p is ``p (u- + u+) / 2`` with the relative velocities u before and after
+the step.  Without restitution that is at most ``sum M (h f / M)^2 / 8`` of the bodies that touch
+each other: what loads f give within a step to bodies that come to rest in it.  So much is allowed.
+
+How much of a restitution makes no energy: bisection, contact by contact.
+
+Used by both integrators: `rigid_lcp.collision.restitution_scale` and `rigid_lcp.collision.impulses`
+say why it may.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.collision.passing import SPEED_ROUND_OFF, Closing, Impulses
+from rigid_lcp.friction.auto import islands
+from rigid_lcp.friction.problem import BodySpace, FrictionProblem
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class StepVelocities:
+    """What a step starts from, for the work of its impulses."""
+
+    before: Floats
+    """Relative velocities at the start, (nc, dim) [m/s]."""
+    free: Floats
+    """At the end without impulses, (nc, dim) [m/s]."""
+    gained: Floats
+    """What loads give each movable body in the step, (nb, size) [m/s, 1/s]."""
+
+
+def gains_energy(
+    bodies: BodySpace, closing: Closing, velocities: StepVelocities, found: Impulses, bounce: Flags
+) -> Flags:
+    """Contacts (nc,) of the islands (`rigid_lcp.friction.auto.islands`) in which some ``bounce``
+    and whose
+    impulses make energy."""
+    gains = np.zeros(len(bounce), dtype=bool)
+    if not closing.friction.any():
+        return gains
+    impulse = found.impulse
+    after = velocities.free + bodies.product(impulse.ravel()).reshape(impulse.shape)
+    parts = 0.5 * (np.abs(impulse) * (np.abs(velocities.before) + np.abs(after))).sum(axis=1)
+    work = 0.5 * (impulse * (velocities.before + after)).sum(axis=1)
+    if not (work > SPEED_ROUND_OFF * parts.sum()).any():
+        return gains
+    allowed = 0.125 * np.einsum(
+        "bi,bij,bj->b", velocities.gained, bodies.mass_blocks, velocities.gained
+    )
+    dim = impulse.shape[1]
+    problem = FrictionProblem(None, closing.offset.ravel(), closing.friction, dim, bodies)
+    first, body, _ = problem.body_jacobians
+    for island in islands(problem):
+        touched = np.unique(np.concatenate([body[first[c] : first[c + 1]] for c in island]))
+        most = allowed[touched].sum() + SPEED_ROUND_OFF * parts[island].sum()
+        gains[island] = bounce[island].any() and work[island].sum() > most
+    return gains
+
+
+RESOLUTION = 1 / 64
+"""To which a share is found [-]; a smaller one is none."""
+
+
+class Share:
+    """The greatest share of the restitution of contacts that makes no energy, by bisection.
+
+    No restitution makes none; it is taken that neither does a smaller share than one that makes
+    none.  Where that is found wrong nothing is kept.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.now = np.ones(count)
+        """What is to be tried next, (count,) [-]."""
+        self._least, self._most = np.zeros(count), np.ones(count)
+
+    def next(self, gains: Flags) -> bool:
+        """Whether another share is to be tried, where those tried now made energy (count,)."""
+        before = self.now
+        self._most = np.where(gains, before, self._most)
+        self._least = np.where(gains, self._least, before)
+        wrong = gains & (before <= self._least)
+        self._least[wrong] = self._most[wrong] = 0.0
+        middle = 0.5 * (self._least + self._most)
+        self.now = np.where(self._most - self._least > RESOLUTION, middle, self._least)
+        return bool((self.now != before).any())
+
+    def leave_out(self) -> None:
+        """No restitution, at the next trial and the last."""
+        self.now = np.zeros_like(self.now)
+        self._least, self._most = self.now.copy(), self.now.copy()

@@ -1,0 +1,112 @@
+"""Contacts between bodies: where, along which normal, how far apart, and what they carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Point contacts of nc pairs of features (eq. 9): a point of body a above body b.
+
+    Bodies are numbered as in the scene, fixed ones included; -1 stands for nothing.
+    """
+
+    body_a: Ints
+    """Body with the vertex (or the disc, the sphere), (nc,)."""
+    body_b: Ints
+    """Body with the face, (nc,)."""
+    point: Floats
+    """Contact points [m], (nc, dim), on the surface of a."""
+    normal: Floats
+    """Unit normals from b to a, (nc, dim)."""
+    gap: Floats
+    """Distances [m], (nc,), negative for an overlap."""
+    key: Ints
+    """Names of the contacts, (nc,): the same two features have the same key at the next step."""
+    radius_a: Floats
+    """Radius of curvature of a's feature at the point [m], (nc,): 0 for a vertex."""
+    radius_b: Floats
+    """Radius of curvature of b's feature [m], (nc,): inf for a face, 0 for a vertex."""
+    friction: Floats
+    """Coulomb's coefficients [-], (nc,)."""
+    restitution: Floats
+    """Coefficients of restitution [-], (nc,)."""
+    edge_a: Floats = field(default_factory=lambda: np.zeros(0))
+    """Unit directions of a's edge at the contact (nc, dim), zero where it is none; 3D only."""
+    edge_b: Floats = field(default_factory=lambda: np.zeros(0))
+    """Unit directions of b's edge, likewise; 3D only."""
+
+    def __post_init__(self) -> None:
+        for name in ("edge_a", "edge_b"):
+            if len(getattr(self, name)) != len(self.normal):
+                object.__setattr__(self, name, np.zeros_like(self.normal))
+
+    def __len__(self) -> int:
+        return len(self.gap)
+
+    @property
+    def dim(self) -> int:
+        """2 or 3."""
+        return self.normal.shape[1]
+
+    def __getitem__(self, rows: Bools | Ints) -> Self:
+        """The contacts ``rows``, a mask or an array of numbers."""
+        return type(self)(**{each.name: getattr(self, each.name)[rows] for each in fields(self)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactForces(Contacts):
+    """Contacts with the forces they carried in the last step."""
+
+    normal_force: Floats
+    """Normal forces [N], (nc,); impulse over the step's length with time stepping."""
+    tangential_force: Floats
+    """Tangential forces [N]: (nc,) along (-n_y, n_x) in 2D, (nc, 3) as vectors in 3D; on a."""
+    status: NDArray[np.str_]
+    """``open``, ``stick`` or ``slide``, (nc,)."""
+
+    @property
+    def force(self) -> Floats:
+        """Forces on body a as vectors [N], (nc, dim)."""
+        tangential = self.tangential_force
+        if self.dim == 2:
+            tangential = tangential[:, None] * choose_tangents(self.normal)[:, 0]
+        return self.normal_force[:, None] * self.normal + tangential
+
+
+def choose_tangents(normal: Floats) -> Floats:
+    """Unit tangents (nc, dim - 1, dim) that make right-handed frames with the normals (nc, dim).
+
+    2D: (-n_y, n_x).  3D: t1 is across n and the axis that n is farthest from.
+    """
+    if normal.shape[1] == 2:
+        return np.stack([-normal[:, 1], normal[:, 0]], axis=1)[:, None, :]
+    axis = np.zeros_like(normal)
+    axis[np.arange(len(normal)), np.argmin(np.abs(normal), axis=1)] = 1.0
+    first = np.cross(axis, normal)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def contact_frames(normal: Floats) -> Floats:
+    """Unit vectors n, t (n, t1, t2) of every contact as rows, (nc, dim, dim)."""
+    return np.concatenate([normal[:, None, :], choose_tangents(normal)], axis=1)
+
+
+def contact_rows(old: Ints, new: Ints) -> tuple[Ints, Bools]:
+    """Where each key of ``new`` stands in ``old`` (any row if it does not), and if it does."""
+    if len(old) == 0:
+        return np.zeros(len(new), dtype=np.int64), np.zeros(len(new), dtype=bool)
+    order = np.argsort(old, kind="stable")
+    place = np.minimum(np.searchsorted(old, new, sorter=order), len(old) - 1)
+    rows = order[place]
+    return rows, old[rows] == new

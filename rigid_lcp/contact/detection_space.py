@@ -1,0 +1,182 @@
+"""Contacts in space: which pairs are near, and the point contacts of every pair (eq. 9).
+
+Polyhedra: corners on faces and crossing edges, else on edges and corners, of each pair the outer
+ones (`rigid_lcp.contact.solids`); spheres: the nearest point of the other body
+(`rigid_lcp.contact.spheres`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigid_lcp.contact.arrays import Contacts
+from rigid_lcp.contact.corners import CORNER_EDGE, CORNERS, EDGE_CORNER
+from rigid_lcp.contact.manifold import (
+    COLUMNS,
+    CORNER_FACE,
+    EDGES,
+    FACE_CORNER,
+    MOST,
+    ROOM,
+    TIE,
+    add_candidate,
+    keep_outer,
+)
+from rigid_lcp.contact.near_pairs import HALF_SPACE, bound_shapes, near_pairs
+from rigid_lcp.contact.placed_solids import (
+    BODY_BITS,
+    FEATURE_BITS,
+    MOST_EDGES,
+    POLYHEDRON,
+    SPHERE,
+    Shapes3D,
+    place_solids,
+    shapes_3d,
+)
+from rigid_lcp.contact.separation import Solids, dot
+from rigid_lcp.contact.solids import find_solid_contacts
+from rigid_lcp.contact.spheres import touch_sphere_plane, touch_sphere_solid, touch_sphere_sphere
+
+__all__ = ["detect_3d", "shapes_3d"]
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def detect_3d(
+    shapes: Shapes3D, position: Floats, quaternion: Floats, margin: Floats | float
+) -> Contacts:
+    """All point contacts with ``gap <= margin[a] + margin[b]``.
+
+    ``position`` (n, 3) [m], ``quaternion`` (n, 4), unit; ``margin`` [m] one number or (n,).  The
+    order of the contacts depends on the numbers of the bodies only.  Friction and restitution are
+    zero: they belong to the scene.
+    """
+    margins = np.full(len(shapes.kind), margin, dtype=float)
+    position = np.ascontiguousarray(position, dtype=float)
+    solids = place_solids(shapes, position, quaternion)
+    boxes = bound_shapes(solids.first_vertex, solids.vertex, shapes.reach, position, margins)
+    pairs = near_pairs(shapes.kind, boxes, shapes.movable)
+    bodies, numbers, key = pair_contacts(
+        pairs, shapes.kind, solids, shapes.reach, position, margins, boxes
+    )
+    zero = np.zeros(len(key))
+    return Contacts(
+        bodies[:, 0], bodies[:, 1], numbers[:, 0:3], numbers[:, 3:6], numbers[:, 6], key,
+        numbers[:, 7], numbers[:, 8], zero, zero.copy(),
+        *edge_directions(shapes.kind, solids, bodies, key),
+    )  # fmt: skip
+
+
+def edge_directions(kind: Ints, solids: Solids, bodies: Ints, key: Ints) -> tuple[Floats, Floats]:
+    """Unit directions (nc, 3) of the edges of a and of b that the contacts' names tell of.
+
+    Zero at corners, faces and spheres.
+    """
+    a, b = bodies[:, 0], bodies[:, 1]
+    directions = np.zeros((2, len(key), 3))
+    feature_a = (key >> FEATURE_BITS) & (2 * MOST_EDGES - 1)
+    feature_b = key & (2 * MOST_EDGES - 1)
+    solid = (kind[a] == POLYHEDRON) & (kind[b] == POLYHEDRON)
+    crossing, on_edge = solid & (feature_a >= MOST_EDGES), solid & (feature_b >= MOST_EDGES)
+    on_sphere = key & ((1 << 2 * FEATURE_BITS) - 1)  # a sphere has no features of its own
+    past_faces = on_sphere - np.diff(solids.first_face)[b]
+    edges = np.diff(solids.first_edge)[b]
+    rolling = (kind[a] == SPHERE) & (kind[b] == POLYHEDRON)
+    rolling &= (past_faces >= 0) & (past_faces < edges)
+    for side, rows, body, edge in (
+        (0, crossing, a, feature_a - MOST_EDGES),
+        (1, on_edge, b, feature_b - MOST_EDGES),
+        (1, rolling, b, past_faces),
+    ):
+        ends = solids.edge[solids.first_edge[body[rows]] + edge[rows]]
+        first, second = (solids.first_vertex[body[rows], None] + ends).T
+        along = solids.vertex[second] - solids.vertex[first]
+        directions[side, rows] = along / np.linalg.norm(along, axis=1)[:, None]
+    return directions[0], directions[1]
+
+
+@njit(cache=True)
+def contact_key(a: int, b: int, feature_a: int, feature_b: int) -> int:
+    """One number for a feature of a on a feature of b; crossing edges count from `MOST_EDGES`."""
+    return ((((a << BODY_BITS) | b) << FEATURE_BITS) | feature_a) << FEATURE_BITS | feature_b
+
+
+@njit(cache=True)
+def pair_contacts(
+    pairs: Ints, kind: Ints, solids: Solids, reach: Floats, position: Floats, margins: Floats,
+    boxes: Floats,
+) -> tuple[Ints, Floats, Ints]:  # fmt: skip
+    """Contacts of the pairs: bodies (nc, 2), numbers (nc, 9), keys (nc,).
+
+    A row of numbers: point (3), normal (3), gap, radii of curvature of a and b.
+    """
+    room = MOST * len(pairs)
+    bodies, numbers, key = (
+        np.empty((room, 2), np.int64),
+        np.empty((room, 9)),
+        np.empty(room, np.int64),
+    )
+    found = np.empty((ROOM, COLUMNS))
+    c = 0
+    for i, j in pairs:
+        margin = margins[i] + margins[j]
+        if kind[i] == SPHERE or kind[j] == SPHERE:
+            sphere, other = (i, j) if kind[i] == SPHERE else (j, i)
+            x, radius, row = position[sphere], reach[sphere], numbers[c]
+            if kind[other] == SPHERE:
+                feature = touch_sphere_sphere(x, radius, position[other], reach[other], row)
+            elif kind[other] == HALF_SPACE:
+                feature = touch_sphere_plane(solids, other, x, radius, row)
+            else:
+                feature = touch_sphere_solid(solids, other, x, radius, row)
+            if row[6] <= margin:
+                bodies[c, 0], bodies[c, 1] = sphere, other
+                key[c] = contact_key(sphere, other, 0, 0) + feature
+                c += 1
+            continue
+        if kind[j] == HALF_SPACE:
+            count = find_corners_on_plane(solids, i, j, margin, reach[i], found)
+        else:
+            size = min(reach[i], reach[j])
+            count = find_solid_contacts(solids, i, j, boxes[i], boxes[j], margin, size, found)
+        for k in range(count):
+            form, first, second = int(found[k, 0]), int(found[k, 1]), int(found[k, 2])
+            a, b, sign = i, j, 1.0
+            if form in (FACE_CORNER, EDGE_CORNER):  # the corner is body j's
+                a, b, sign, first, second = j, i, -1.0, second, first
+            if form == EDGES:
+                first, second = first + MOST_EDGES, second + MOST_EDGES
+            elif form in (CORNER_EDGE, EDGE_CORNER):
+                second += MOST_EDGES
+            elif form == CORNERS:
+                second += solids.first_face[j + 1] - solids.first_face[j]
+            bodies[c, 0], bodies[c, 1] = a, b
+            key[c] = contact_key(a, b, first, second)
+            for axis in range(3):
+                numbers[c, axis] = found[k, 7 + axis]
+                numbers[c, 3 + axis] = sign * found[k, 4 + axis]
+            numbers[c, 6], numbers[c, 7] = found[k, 3], 0.0
+            numbers[c, 8] = np.inf if form <= EDGES else 0.0
+            c += 1
+    return bodies[:c], numbers[:c], key[:c]
+
+
+@njit(cache=True)
+def find_corners_on_plane(
+    solids: Solids, body: int, plane: int, margin: float, size: float, found: Floats
+) -> int:
+    """Corners of a polyhedron near a half-space, the outer ones; returns how many."""
+    count = 0
+    face = solids.first_face[plane]
+    n, level, first = solids.normal[face], solids.offset[face], solids.first_vertex[body]
+    for v in range(first, solids.first_vertex[body + 1]):
+        x = solids.vertex[v]
+        gap = dot(n, x) - level
+        if gap <= margin:
+            count = add_candidate(
+                found, count, CORNER_FACE, v - first, 0, gap, n, 1.0, x, TIE * size
+            )
+    return keep_outer(found, count, size)

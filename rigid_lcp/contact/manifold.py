@@ -1,0 +1,301 @@
+"""Point contacts of two polyhedra: corners on faces and crossing edges, the outer ones.
+
+Two faces upon each other share a polygon.  Its corners are corners of one body on the face of
+the other, or crossings of their edges; each is a contact with the normal and the gap of its own
+two features (eq. 9), also while the faces are slightly tilted.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigid_lcp.contact.separation import NEARLY, Solids, cross, cross_edges, dot
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+TIE = 1e-9
+"""Share of a body's reach below which lengths are equal: round-off never renames a contact."""
+SAME = 1e-6
+"""Contacts of a pair nearer than this share of the reach are one."""
+CORNER_FACE, FACE_CORNER, EDGES = 0, 1, 2
+"""Corner of a on a face of b; corner of b on a face of a; an edge of a across one of b."""
+STEEP = 10.0
+"""How much farther out [m] a contact must be for each metre of gap; faces that share contacts are
+tilted by less than its inverse, see `rigid_lcp.contact.separation.NEARLY`."""
+OUTSIDE = 1e-2
+"""Share of the reach by which a contact must lie outside of those kept to be kept as well."""
+MOST = 12
+"""Contacts kept of a pair."""
+ROOM = 256
+"""Candidates looked at for one pair; there are a few dozen for grains of a hundred corners."""
+COLUMNS = 10
+"""Row of a candidate: kind, feature of a, feature of b, gap, normal from b to a (3), point (3)."""
+
+
+@njit(cache=True)
+def within_face(solids: Solids, body: int, face: int, x: Floats, slack: float) -> bool:
+    """The point projects into the face, or no farther outside than ``slack`` [m]."""
+    base = solids.first_vertex[body]
+    n = solids.normal[face]
+    start, stop = solids.first_corner[face], solids.first_corner[face + 1]
+    for k in range(start, stop):
+        p = solids.vertex[base + solids.loop[k]]
+        q = solids.vertex[base + solids.loop[k + 1 if k + 1 < stop else start]]
+        u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        o0, o1, o2 = cross(u0, u1, u2, n[0], n[1], n[2])
+        outside = o0 * (x[0] - p[0]) + o1 * (x[1] - p[1]) + o2 * (x[2] - p[2])
+        if outside > slack * np.sqrt(o0 * o0 + o1 * o1 + o2 * o2):
+            return False
+    return True
+
+
+@njit(cache=True)
+def add_candidate(
+    found: Floats, count: int, kind: int, feature_a: int, feature_b: int, gap: float,
+    normal: Floats, sign: float, point: Floats, same: float,
+) -> int:  # fmt: skip
+    """Store a candidate, unless one is there within ``same`` [m]; returns how many there are.
+
+    Of two in one place a corner on a face stays before crossing edges, and a's before b's: their
+    normals differ by no more than the tilt of the faces, and names must not change with round-off.
+    """
+    place = count
+    for k in range(count):
+        d0, d1, d2 = (
+            found[k, 7] - point[0], found[k, 8] - point[1], found[k, 9] - point[2],
+        )  # fmt: skip
+        if d0 * d0 + d1 * d1 + d2 * d2 < same * same:
+            if found[k, 0] <= kind:
+                return count
+            place = k
+            break
+    if place >= len(found):
+        return count
+    found[place, 0], found[place, 1], found[place, 2] = kind, feature_a, feature_b
+    found[place, 3] = gap
+    for axis in range(3):
+        found[place, 4 + axis] = sign * normal[axis]
+        found[place, 7 + axis] = point[axis]
+    return max(count, place + 1)
+
+
+@njit(cache=True)
+def find_face_candidates(
+    solids: Solids, face: int, own: int, other: int, own_is_b: bool, edges_other: Ints,
+    margin: float, size: float, found: Floats,
+) -> int:  # fmt: skip
+    """All point contacts of ``other`` with one face of ``own``; returns how many."""
+    count = 0
+    n = solids.normal[face]
+    level = solids.offset[face]
+    first_own, first_other = solids.first_vertex[own], solids.first_vertex[other]
+    sign = 1.0 if own_is_b else -1.0
+    for v in range(first_other, solids.first_vertex[other + 1]):
+        x = solids.vertex[v]
+        gap = dot(n, x) - level
+        if gap <= margin and within_face(solids, own, face, x, TIE * size):
+            here, there = v - first_other, face - solids.first_face[own]
+            if own_is_b:
+                count = add_candidate(
+                    found, count, CORNER_FACE, here, there, gap, n, sign, x, SAME * size
+                )
+            else:
+                count = add_candidate(
+                    found, count, FACE_CORNER, there, here, gap, n, sign, x, SAME * size
+                )
+    opposite = np.cos(NEARLY)
+    start, stop = solids.first_corner[face], solids.first_corner[face + 1]
+    for g in range(solids.first_face[other], solids.first_face[other + 1]):
+        m = solids.normal[g]
+        if -dot(m, n) < opposite:
+            continue
+        for k in range(start, stop):
+            x = solids.vertex[first_own + solids.loop[k]]
+            gap = dot(m, x) - solids.offset[g]
+            if gap <= margin and within_face(solids, other, g, x, TIE * size):
+                here, there = g - solids.first_face[other], solids.loop[k]
+                if own_is_b:
+                    count = add_candidate(
+                        found, count, FACE_CORNER, here, there, gap, m, -sign, x, SAME * size
+                    )
+                else:
+                    count = add_candidate(
+                        found, count, CORNER_FACE, there, here, gap, m, -sign, x, SAME * size
+                    )
+    a, b = (other, own) if own_is_b else (own, other)
+    crossing = np.empty(9)
+    towards = sign * n
+    for f in range(solids.first_edge[own], solids.first_edge[own + 1]):
+        if not edge_of_face(solids, f, start, stop):
+            continue
+        for e in edges_other:
+            edge_a, edge_b = (e, f) if own_is_b else (f, e)
+            if not cross_edges(solids, a, edge_a, b, edge_b, towards, crossing):
+                continue
+            if not (0.0 < crossing[0] < 1.0 and 0.0 < crossing[1] < 1.0):
+                continue
+            normal = crossing[3:6]
+            if crossing[2] > margin or dot(normal, towards) < opposite:
+                continue
+            if -sign * dot(normal, solids.bisector[e]) < solids.seen_about[e]:
+                continue
+            count = add_candidate(
+                found, count, EDGES, edge_a - solids.first_edge[a], edge_b - solids.first_edge[b],
+                crossing[2], normal, 1.0, crossing[6:9], SAME * size,
+            )  # fmt: skip
+    return count
+
+
+@njit(cache=True)
+def edge_of_face(solids: Solids, edge: int, start: int, stop: int) -> bool:
+    """Both corners of the edge belong to the face whose corners are ``loop[start:stop]``."""
+    ends = 0
+    for k in range(start, stop):
+        if solids.loop[k] == solids.edge[edge, 0] or solids.loop[k] == solids.edge[edge, 1]:
+            ends += 1
+    return ends == 2
+
+
+@njit(cache=True)
+def least_gap(found: Floats, count: int) -> float:
+    """Least gap of the candidates [m]; inf without any."""
+    least = np.inf
+    for k in range(count):
+        least = min(least, found[k, 3])
+    return least
+
+
+@njit(cache=True)
+def find_farthest_from(found: Floats, count: int, x: float, y: float, z: float, tie: float) -> int:
+    """Row of the candidate farthest from a point, less `STEEP` gaps; the first within ``tie``."""
+    best, most = 0, -np.inf
+    for k in range(count):
+        away = np.sqrt(
+            (found[k, 7] - x) ** 2 + (found[k, 8] - y) ** 2 + (found[k, 9] - z) ** 2
+        )  # fmt: skip
+        away -= STEEP * found[k, 3]
+        if away > most + tie:
+            best, most = k, away
+    return best
+
+
+@njit(cache=True)
+def find_farthest_along(
+    found: Floats, count: int, start: int, d0: float, d1: float, d2: float, tie: float
+) -> int:
+    """Row of the candidate farthest from row ``start`` along d, less `STEEP` gaps; -1 if none is
+    beyond ``tie`` [m]."""
+    best, most = -1, -np.inf
+    length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    step = tie * length
+    for k in range(count):
+        along = (
+            d0 * (found[k, 7] - found[start, 7])
+            + d1 * (found[k, 8] - found[start, 8])
+            + d2 * (found[k, 9] - found[start, 9])
+        )
+        worth = along - STEEP * length * (found[k, 3] - found[start, 3])
+        if along > step and worth > most + step:
+            best, most = k, worth
+    return best
+
+
+@njit(cache=True)
+def keep_outer_rows(found: Floats, count: int, size: float, kept: Ints, number: int) -> int:
+    """Add to the ``kept`` rows p, q, left, right (-1: none) those that their hull leaves out.
+
+    Edge by edge of the hull, the candidate farthest beyond it by more than `OUTSIDE`: as a stone
+    on a face of five corners may stand on any three of them.  Returns how many rows there are.
+    """
+    ring = np.empty(MOST, np.int64)
+    corners = 0
+    for row in (kept[0], kept[3], kept[1], kept[2]):  # anticlockwise about the normal
+        if row >= 0:
+            ring[corners] = row
+            corners += 1
+    normal = found[kept[0], 4:7]
+    least = OUTSIDE * size
+    added = True
+    while added and 2 < corners < MOST:  # every edge once a round: what is too much goes evenly
+        added, place = False, 0
+        while place < corners < MOST:
+            start, end = found[ring[place]], found[ring[(place + 1) % corners]]
+            u0, u1, u2 = end[7] - start[7], end[8] - start[8], end[9] - start[9]
+            o0, o1, o2 = cross(u0, u1, u2, normal[0], normal[1], normal[2])
+            length = np.sqrt(o0 * o0 + o1 * o1 + o2 * o2)
+            higher = max(start[3], end[3])
+            best, most = -1, least * length
+            for k in range(count):
+                worth = (
+                    o0 * (found[k, 7] - start[7])
+                    + o1 * (found[k, 8] - start[8])
+                    + o2 * (found[k, 9] - start[9])
+                    - STEEP * length * max(found[k, 3] - higher, 0.0)
+                )
+                if worth > most:
+                    best, most = k, worth + TIE * size * length
+            place += 1
+            if best < 0:
+                continue
+            for k in range(corners, place, -1):
+                ring[k] = ring[k - 1]
+            ring[place] = kept[number] = best
+            added, corners, number, place = True, corners + 1, number + 1, place + 1
+    return number
+
+
+@njit(cache=True)
+def keep_outer(found: Floats, count: int, size: float) -> int:
+    """Keep the candidates that bear in the first rows of ``found``: returns how many.
+
+    The farthest from the middle, the farthest from that, and on either side of the line through
+    both the farthest; then what lies outside of these (`keep_outer_rows`), at most `MOST` in all;
+    the
+    deepest of all takes the place of the nearest of them if it is deeper.
+    One that is higher by g must be `STEEP` g farther out to be taken: of a worn corner the ends
+    that touch, not the one beside them.
+    Lengths within `TIE` of each other count as equal: the first is taken.
+    """
+    if count <= 4:
+        return count
+    tie = TIE * size
+    middle = np.zeros(3)
+    deepest = 0
+    for k in range(count):
+        for axis in range(3):
+            middle[axis] += found[k, 7 + axis] / count
+        if found[k, 3] < found[deepest, 3] - tie:
+            deepest = k
+    p = find_farthest_from(found, count, middle[0], middle[1], middle[2], tie)
+    q = find_farthest_from(found, count, found[p, 7], found[p, 8], found[p, 9], tie)
+    u0, u1, u2 = found[q, 7] - found[p, 7], found[q, 8] - found[p, 8], found[q, 9] - found[p, 9]
+    d0, d1, d2 = cross(found[p, 4], found[p, 5], found[p, 6], u0, u1, u2)
+    rows = np.empty(MOST + 4, np.int64)
+    rows[0], rows[1] = p, q
+    rows[2] = find_farthest_along(found, count, p, d0, d1, d2, tie)
+    rows[3] = find_farthest_along(found, count, p, -d0, -d1, -d2, tie)
+    all_rows = keep_outer_rows(found, count, size, rows, 4)
+    kept = np.empty((all_rows, COLUMNS))
+    number, nearest, least, lowest = 0, 0, np.inf, np.inf
+    for row in rows[:all_rows]:
+        if row < 0:
+            continue
+        squares = 0.0
+        for column in range(COLUMNS):
+            kept[number, column] = found[row, column]
+            if column >= 7:
+                squares += (found[row, column] - found[deepest, column]) ** 2
+        if squares < least:
+            nearest, least = number, squares
+        lowest = min(lowest, found[row, 3])
+        number += 1
+    if found[deepest, 3] < lowest - tie:
+        for column in range(COLUMNS):
+            kept[nearest, column] = found[deepest, column]
+    for row in range(number):
+        for column in range(COLUMNS):
+            found[row, column] = kept[row, column]
+    return number

@@ -1,0 +1,1 @@
+"""Friction problems: u = W r + q under unilateral contact and Coulomb's law."""

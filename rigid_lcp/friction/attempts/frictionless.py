@@ -1,0 +1,278 @@
+"""Contacts without friction: the linear complementarity problem of eqs 18, 19 (and 35, 36).
+
+    a = b + A f,   a >= 0,   f >= 0,   a f = 0
+
+with A symmetric and positive semidefinite: the conditions of least ``f A f / 2 + b f`` over f >= 0
+(Gauss's principle).  a is unique then, f only up to self-stress.
+
+Sweeps of projected Gauss-Seidel with momentum say which contacts carry, nearly all of them right.
+The rest is block principal pivoting (Judice and Pires, Comput. Oper. Res. 21 (1994) 587): one
+factorisation gives the forces of those that carry, all contacts that violate a condition change
+sides at once, and where that does not make them fewer for a while, only the last one does, which
+ends for every positive definite A (Murty).  Redundant contacts make A singular; a shift makes it
+regular, and proximal steps with the same factor take it out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse.linalg import splu
+
+from rigid_lcp.errors import ProblemError
+from rigid_lcp.friction.problem import (
+    FrictionProblem,
+    FrictionSolution,
+    friction_problem,
+    judge_forces,
+    prove_forces_insufficient,
+    require_finite,
+    require_matrix,
+    require_number,
+)
+from rigid_lcp.friction.sweeps import (
+    face_band,
+    face_bandwidth,
+    face_rows,
+    normal_products,
+    normal_sweeps,
+    pick_rows,
+)
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Indices = NDArray[np.int32]
+Solve = Callable[[Floats], Floats]
+
+SHIFT = 1e-8
+"""Relative shift of the diagonal: a small one is soon taken out again."""
+SWEEPS, SWEEPS_AT_ONCE, SETTLED = 400, 20, 1
+"""Most sweeps before the first exchange; they end when so few contacts changed sides in 20."""
+SWEEPS_BETWEEN = 100
+"""Sweeps instead of an exchange,"""
+SMOOTHED, SMOOTHINGS, HASTE = 2, 3, 15
+"""as long as more contacts than that are wrong, so many times; with self-stress they mislead, so
+that the exchanges begin again without them where so many do not end."""
+PROXIMAL_STEPS = 20
+BAND_MOST, BAND_OVERHEAD = 1.3e8, 20
+"""Banded Cholesky up to about so many multiplications, the band counted so much wider: half of what
+sparse LU takes in the plane, as much as it where 1,700 spheres touch."""
+SIGN_MARGIN = 1e-13
+"""Relative size of an acceleration or force that counts as zero."""
+PATIENCE = 5
+"""Exchanges at once that may fail to make violations fewer, before one at a time."""
+
+
+def lcp(
+    matrix: Any, offset: ArrayLike, start: Floats | None = None, tolerance: float = 1e-12
+) -> FrictionSolution:
+    """Solve ``a = b + A f >= 0``, ``f >= 0``, ``a f = 0`` (eq. 19) for symmetric semidefinite A.
+
+    ``matrix`` A (nc, nc), scipy sparse or dense; ``offset`` b (nc,); ``start`` f (nc,).
+    The solution has one number a contact in ``r`` (f) and ``u`` (a).
+    Raises `ProblemError` if A or b are malformed.
+    """
+    b = require_finite(offset, "b").ravel()
+    a = require_matrix(matrix, "A")
+    if a.shape != (len(b), len(b)):
+        raise ProblemError(
+            f"A is {a.shape[0]} x {a.shape[1]} and b has {len(b)} numbers", where="A",
+            remedy="give a square A with a row for every number of b",
+        )  # fmt: skip
+    zeros = np.zeros(len(b))
+    place = 2 * np.arange(len(b))
+    wide = sp.csr_array(sp.kron(a, sp.csr_array([[1.0, 0.0], [0.0, 0.0]])))
+    problem = friction_problem(wide, np.column_stack([b, zeros]).ravel(), 0.0, 2)
+    first = None if start is None else require_finite(start, "start").ravel()
+    if first is not None and first.shape != b.shape:
+        raise ProblemError(
+            f"it has {len(first)} numbers and b has {len(b)}", where="start",
+            remedy="give f of all contacts, in the order of b",
+        )  # fmt: skip
+    started = None if first is None else np.column_stack([first, zeros]).ravel()
+    found = frictionless(problem, started, require_number(tolerance, "tolerance"))
+    if not found.solved and prove_forces_insufficient(problem):
+        found = replace(
+            found, status="no solution",
+            message="no f >= 0 makes a = b + A f >= 0 (proved by a linear programme)\n  -> look for"
+            " rows of A that nothing can lift, or an entry of the wrong sign",
+        )  # fmt: skip
+    return FrictionSolution(
+        found.r[place], found.u[place], found.residual, found.status, found.method, found.work,
+        found.message,
+    )  # fmt: skip
+
+
+def frictionless(
+    problem: FrictionProblem,
+    start: Floats | None = None,
+    tolerance: float = 1e-12,
+    *,
+    max_exchanges: int = 60,
+) -> FrictionSolution:
+    """Solve a friction problem without friction (mu = 0), in 2D or 3D.
+
+    ``start`` r (nc * dim,): forces near the solution.  ``work``: ``sweeps``; ``exchanges`` of
+    sides, each with one factorisation; ``proximal`` steps.
+    Not for a W that is not symmetric or has a negative diagonal: use
+    `rigid_lcp.friction.methods.pivoting`.
+    Raises `ProblemError` where a coefficient of friction is not zero.
+    """
+    if problem.friction.any():
+        raise ProblemError(
+            f"friction is {problem.friction.max():g}, and this method knows none", where="mu",
+            remedy="set mu to zero, or use `solve_friction`",
+        )  # fmt: skip
+    dim, nc = problem.dim, problem.contacts
+    if nc == 0:
+        return judge_forces(problem, np.zeros(0), tolerance, "frictionless")
+    a, b = build_normal_matrix(problem), np.ascontiguousarray(problem.offset[::dim])
+    first = np.zeros(nc) if start is None else np.maximum(start[::dim], 0.0)
+    rows = a.indptr, a.indices, a.data
+    sweeps = normal_sweeps(*rows, b, first, SWEEPS, SWEEPS_AT_ONCE, SETTLED)
+    work = {"sweeps": float(sweeps), "exchanges": 0.0, "proximal": 0.0}
+    order = reverse_cuthill_mckee(a, symmetric_mode=True)
+    best, least = np.zeros(nc), np.inf
+    for smoothings, limit in ((SMOOTHINGS, HASTE), (0, max_exchanges)):
+        f, carries = first.copy(), first > 0.0
+        for step in range(PROXIMAL_STEPS):
+            before = work["exchanges"]
+            f, sharper = pivot_principally(
+                a, b, order, f, carries, work, limit, smoothings if step == 0 else 0
+            )
+            better = False
+            for candidate in (sharper, f):
+                force = np.maximum(candidate, 0.0)
+                residual = normal_residual(a, b, force, problem.rho)
+                if residual < least:
+                    best, least, better = force, residual, True
+                if least <= tolerance:
+                    return _solution(problem, best, tolerance, work)
+            if (step > 4 and not better) or work["exchanges"] - before >= limit:
+                break
+            work["proximal"] += 1
+    return _solution(problem, best, tolerance, work)
+
+
+def _solution(
+    problem: FrictionProblem, normal: Floats, tolerance: float, work: dict[str, float]
+) -> FrictionSolution:
+    force = np.zeros(len(problem.offset))
+    force[:: problem.dim] = normal
+    return judge_forces(problem, force, tolerance, "frictionless", work)
+
+
+def pivot_principally(
+    a_matrix: sp.csr_array, b: Floats, order: Indices, before: Floats, carries: Bools,
+    work: dict[str, float], limit: int, smoothings: int,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """One proximal step: forces of ``a = b + A f + shift (f - before)`` that obey eq. 19.
+
+    ``order``: of the contacts, for a small bandwidth.  ``carries`` holds who carries at first, and
+    in the end (changed in place).  The second answer is a few steps further on, with the same
+    factor and no change of sides.
+    """
+    unit = float(a_matrix.diagonal().mean()) or 1.0
+    shift = SHIFT * unit
+    offset = b - shift * before
+    fewest, patience = len(b) + 1, PATIENCE
+    smoothed = False
+    scale = float(np.abs(b).max()) or 1.0
+    f = np.zeros(len(b))
+    while True:
+        work["exchanges"] += 1
+        limit -= 1
+        f[:] = 0.0
+        inside = order[carries[order]]
+        solve = build_face_solver(a_matrix, inside, shift)
+        f[inside] = solve(-offset[inside])
+        a = offset + a_matrix @ f + shift * f
+        size = scale + unit * float(np.abs(f).max())
+        wrong = np.where(carries, f < -SIGN_MARGIN * size / unit, a < -SIGN_MARGIN * size)
+        count = int(wrong.sum())
+        if count == 0 or limit <= 0:
+            break
+        if smoothed and count > 0.7 * fewest:
+            smoothings = 0
+        if count < fewest:
+            fewest, patience = count, PATIENCE
+        else:
+            patience -= 1
+        smoothed = count > SMOOTHED and patience == PATIENCE and smoothings > 0
+        if smoothed:
+            smoothings -= 1
+            f = np.maximum(f, 0.0)
+            rows = a_matrix.indptr, a_matrix.indices, a_matrix.data
+            normal_sweeps(*rows, b, f, SWEEPS_BETWEEN, SWEEPS_BETWEEN, 0)
+            carries[:] = f > 0.0
+        else:
+            if patience < 0:
+                wrong[: int(np.flatnonzero(wrong)[-1])] = False
+            carries ^= wrong
+    sharper = f.copy()
+    for _ in range(5 if len(inside) else 0):
+        change = solve((b + a_matrix @ sharper)[inside])
+        sharper[inside] -= change
+        if np.abs(change).max() <= 1e-14 * np.abs(sharper).max():
+            break
+    return f, sharper
+
+
+def build_normal_matrix(problem: FrictionProblem) -> sp.csr_array:
+    """A: the normal rows and columns of W, (nc, nc), without W where its factors are known."""
+    dim, nc, bodies = problem.dim, problem.contacts, problem.bodies
+    if problem.matrix is None and bodies is not None:
+        rows = pick_rows(*_arrays(bodies.jacobian), dim)
+        start, index, value = normal_products(
+            *rows, *_arrays(bodies.inverse_mass), bodies.jacobian.shape[1]
+        )
+    else:
+        start, index, value = pick_rows(*_arrays(problem.delassus), dim)
+        kept = index % dim == 0
+        start = np.concatenate([[0], np.cumsum(kept)])[start]
+        index, value = index[kept] // dim, value[kept]
+    return sp.csr_array((value, index, start), (nc, nc))
+
+
+def normal_residual(a_matrix: sp.csr_array, b: Floats, f: Floats, rho: float) -> float:
+    """The residual of `rigid_lcp.friction.problem.cones` without friction: ``|min(f, rho a)| /
+    |f|``."""
+    a = rho * (b + a_matrix @ f)
+    error = float(np.linalg.norm(np.minimum(f, a)))
+    return error / (float(np.linalg.norm(f)) or float(np.linalg.norm(a))) if error > 0.0 else 0.0
+
+
+def build_face_solver(a_matrix: sp.csr_array, inside: Indices, shift: float) -> Solve:
+    """Solve with ``A + shift`` of the contacts ``inside``, in an order of small bandwidth.
+
+    Banded Cholesky where that costs little; else, or where A is not symmetric, sparse LU without
+    pivoting.
+    """
+    if len(inside) == 0:
+        return lambda right: right
+    rows = _arrays(a_matrix)
+    width = face_bandwidth(rows[0], rows[1], inside)
+    if len(inside) * (width + BAND_OVERHEAD) ** 2 <= BAND_MOST:
+        band, symmetric = face_band(*rows, inside, shift, width)
+        if symmetric:
+            cholesky, info = scipy.linalg.lapack.dpbtrf(band.T, lower=1, overwrite_ab=1)
+            if info == 0:
+                return lambda right: scipy.linalg.lapack.dpbtrs(cholesky, right, lower=1)[0]
+    start, index, value = face_rows(*rows, inside, shift)
+    columns = sp.csc_array((value, index, start), (len(inside), len(inside)))
+    factor = splu(
+        columns, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, relax=4,
+        options={"SymmetricMode": True},
+    )  # fmt: skip
+    return lambda right: factor.solve(right, "T")  # its rows were taken for columns
+
+
+def _arrays(rows: sp.csr_array) -> tuple[Indices, Indices, Floats]:
+    return rows.indptr, rows.indices, rows.data

@@ -1,0 +1,235 @@
+"""Islands: groups of contacts that can not feel each other, and so are solved apart.
+
+Two contacts feel each other if W has an entry between them: if they share a body that can move.
+A heap and a grain that flies off it are two islands; the ground joins nothing.  Methods whose
+cost grows faster than the number of contacts gain most.
+
+Islands come in the order of their smallest contact, and their contacts in the order of the
+problem, so that nothing depends on how bodies were numbered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numba import njit
+from numpy.typing import NDArray
+
+from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution, judge_forces
+from rigid_lcp.friction.sweeps import NONE, solve_contacts_apart
+from rigid_lcp.sparse import diagonal_blocks
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Indices = NDArray[Any]
+Flags = NDArray[np.bool_]
+Method = Callable[..., FrictionSolution]
+
+ROUNDS = 4
+"""Times the islands are solved again, ten times finer each, until the whole is fine enough."""
+
+
+def islands(problem: FrictionProblem) -> list[Integers]:
+    """Contacts of every island, (contacts of it,) each, by W's pattern or by shared bodies."""
+    contacts, dim = problem.contacts, problem.dim
+    if contacts == 0:
+        return []
+    if problem.bodies is not None:
+        space = problem.bodies
+        rows = space.inverse_mass
+        mass = diagonal_blocks(rows.indptr, rows.indices, rows.data, space.body_size)
+        movable = np.asarray(mass.any(axis=(1, 2)))
+        label, count = label_by_bodies(*problem.body_jacobians, movable)
+    else:
+        rows = problem.delassus
+        label, count = label_by_contacts(rows.indptr, rows.indices, rows.data, dim)
+    if count == 1:
+        return [np.arange(contacts)]
+    order = np.argsort(label, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+
+
+@njit(cache=True)
+def label_by_bodies(
+    first: Integers, body: Integers, block: Floats, movable: Flags
+) -> tuple[Integers, int]:
+    """Number of every contact's island, (nc,), and how many there are.
+
+    J by its blocks; a body that is not ``movable`` joins nothing.
+    """
+    contacts = len(first) - 1
+    parent = np.arange(contacts + len(movable))
+    for c in range(contacts):
+        for k in range(first[c], first[c + 1]):
+            if movable[body[k]] and block[k].any():
+                join(parent, c, contacts + body[k])
+    return order_labels(parent, contacts)
+
+
+@njit(cache=True)
+def label_by_contacts(
+    start: Indices, index: Indices, value: Floats, dim: int
+) -> tuple[Integers, int]:
+    """`label_by_bodies` where only W is known, by rows."""
+    contacts = (len(start) - 1) // dim
+    parent, apart = np.arange(contacts), contacts
+    for row in range(contacts * dim):
+        for k in range(start[row], start[row + 1]):
+            if value[k] != 0.0 and join(parent, row // dim, index[k] // dim):
+                apart -= 1
+        if apart == 1:
+            break
+    return order_labels(parent, contacts)
+
+
+@njit(cache=True)
+def join(parent: Integers, a: int, b: int) -> bool:
+    """Make one tree of those of a and b; the lesser root stays (Galler and Fischer 1964).  Whether
+    they were two."""
+    a, b = root_of(parent, a), root_of(parent, b)
+    parent[max(a, b)] = min(a, b)
+    return a != b
+
+
+@njit(cache=True)
+def root_of(parent: Integers, a: int) -> int:
+    """The root of a tree; the way there is halved."""
+    while parent[a] != a:
+        parent[a] = parent[parent[a]]
+        a = parent[a]
+    return a
+
+
+@njit(cache=True)
+def order_labels(parent: Integers, contacts: int) -> tuple[Integers, int]:
+    """Trees numbered in the order of their smallest contact, which is their root."""
+    label, count = np.empty(contacts, dtype=np.int64), 0
+    for c in range(contacts):
+        root = root_of(parent, c)
+        if root == c:
+            label[c] = count
+            count += 1
+        else:
+            label[c] = label[root]
+    return label, count
+
+
+def cut_out_island(problem: FrictionProblem, contacts: Integers) -> FrictionProblem:
+    """The problem of some contacts alone: their rows, and of the bodies only those they touch."""
+    dim = problem.dim
+    rows = contact_rows(contacts, dim)
+    matrix = None if problem.matrix is None else sp.csr_array(problem.matrix[rows][:, rows])
+    space = None
+    if problem.bodies is not None:
+        size = problem.bodies.body_size
+        jacobian = sp.csr_array(problem.bodies.jacobian[rows])
+        touched = np.unique(jacobian.indices // size)
+        freedoms = contact_rows(touched, size)
+        inverse_mass = problem.bodies.inverse_mass[freedoms][:, freedoms]
+        space = BodySpace(sp.csr_array(jacobian[:, freedoms]), sp.csr_array(inverse_mass), size)
+    return FrictionProblem(matrix, problem.offset[rows], problem.friction[contacts], dim, space)
+
+
+def contact_rows(contacts: Integers, dim: int) -> Integers:
+    """Rows of W that belong to some contacts (or freedoms that belong to bodies), in order."""
+    return (np.asarray(contacts)[:, None] * dim + np.arange(dim)).ravel()
+
+
+def join_islands(
+    problem: FrictionProblem,
+    parts: Sequence[Integers],
+    solutions: Sequence[FrictionSolution],
+    tolerance: float,
+) -> FrictionSolution:
+    """One solution from those of the islands, judged as a whole; their work is summed.
+
+    The status is the worst of the islands': ``no solution`` of one is that of all.
+    """
+    force = np.zeros(problem.contacts * problem.dim)
+    work: dict[str, float] = {"islands": float(len(parts))}
+    for contacts, solution in zip(parts, solutions, strict=True):
+        force[contact_rows(contacts, problem.dim)] = solution.r
+        for name, count in solution.work.items():
+            work[name] = work.get(name, 0.0) + count
+    failed = [k for k, solution in enumerate(solutions) if not solution.solved]
+    worst = next((k for k in failed if solutions[k].status == "no solution"), (failed or [-1])[0])
+    largest = max(solutions, key=lambda solution: len(solution.r), default=None)
+    method = largest.method if largest is not None else "islands"
+    if not failed:
+        return judge_forces(problem, force, tolerance, method, work)
+    message = (
+        f"{len(failed)} of {len(parts)} islands, that of contact {parts[worst][0]}: "
+        + solutions[worst].message
+    )
+    status = solutions[worst].status
+    return judge_forces(
+        problem, force, tolerance, method, work, status=status, message=message
+    )  # fmt: skip
+
+
+def solve_islands(
+    problem: FrictionProblem,
+    method: Method,
+    start: Floats | None = None,
+    tolerance: float = 1e-12,
+    **options: Any,
+) -> FrictionSolution:
+    """Solve every island apart by ``method(problem, start, tolerance, **options)``, and join them.
+
+    Contacts that are islands of their own are solved exactly, without ``method``.  An island
+    measures its residual by its own forces, the whole by all: where the whole comes out above
+    ``tolerance`` although the islands did not, they are solved finer from where they are.
+    """
+    parts = islands(problem)
+    if len(parts) == 1:
+        return method(problem, start, tolerance, **options)
+    force = np.zeros(problem.contacts * problem.dim) if start is None else np.array(start, float)
+    single = np.array([part[0] for part in parts if len(part) == 1], dtype=np.int64)
+    larger = [part for part in parts if len(part) > 1]
+    problems = [cut_out_island(problem, part) for part in larger]
+    alone = solve_singles(problem, single, tolerance)
+    work: dict[str, float] = {}
+    for round_ in range(ROUNDS):
+        finer = tolerance * 0.1**round_
+        begin: list[Floats | None] = [None] * len(larger)
+        if start is not None or round_ > 0:
+            begin = [force[contact_rows(part, problem.dim)] for part in larger]
+        solutions = [
+            method(island, near, finer, **options)
+            for island, near in zip(problems, begin, strict=True)
+        ]
+        joined = join_islands(problem, [single, *larger], [alone, *solutions], tolerance)
+        joined.work["islands"] = float(len(parts))
+        for name, count in joined.work.items():
+            work[name] = count if name == "islands" else work.get(name, 0.0) + count
+        if joined.solved or not all(solution.solved for solution in solutions):
+            break
+        force = joined.r
+    joined.work.update(work)
+    return joined
+
+
+def solve_singles(
+    problem: FrictionProblem, contacts: Integers, tolerance: float
+) -> FrictionSolution:
+    """Exact forces of contacts that feel no other, put together as a problem of their own."""
+    dim = problem.dim
+    apart = cut_out_island(problem, contacts)
+    offset = apart.offset.reshape(-1, dim)
+    whole = apart.delassus
+    local = np.zeros((len(contacts), dim, dim))
+    for i in range(dim):
+        for j in range(dim):
+            local[:, i, j] = np.asarray(whole[i::dim][:, j::dim].diagonal())
+    force, status = solve_contacts_apart(local, offset, apart.friction)
+    lost = contacts[status == NONE]
+    if len(lost) == 0:
+        return judge_forces(apart, force.ravel(), tolerance, "local contact")
+    return judge_forces(
+        apart, force.ravel(), tolerance, "local contact", status="no solution",
+        message=f"contact {lost[0]} has no force that obeys Coulomb's law, nor {len(lost) - 1} "
+        "others\n  -> it is jammed (Painleve) or bears on no mass: solve at velocity level",
+    )  # fmt: skip

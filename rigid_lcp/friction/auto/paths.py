@@ -1,0 +1,300 @@
+"""Attempts by factorisations: what sticks, Newton's method, and paths of the interior point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.friction.attempts import heaviness, seem_loose, smoothed_path
+from rigid_lcp.friction.auto.sweeps import TURNS, take_turns
+from rigid_lcp.friction.auto.trial import LIMITS, Trial
+from rigid_lcp.friction.linear import SingularSystem
+from rigid_lcp.friction.methods import ITERATIONS, Path, PathStep, interior_point
+from rigid_lcp.friction.problem import FrictionSolution, length
+
+Floats = NDArray[np.float64]
+
+NEWTON_PATIENCE = 3
+"""Steps of Newton that may fail to halve the residual: from the end of a path it begins to converge
+in the first two or not at all."""
+
+
+CONVEX_PATH = Path(convex=True, compliance=1e-4)
+BENT_PATH = Path(compliance=1e-4, rounding=0.3)
+"""The convex path with the term |u_T|."""
+SHARP_ROUNDING = Path(rounding=1e-4, compliance=1e-3)
+
+
+@dataclass(frozen=True)
+class ConvexPath:
+    """The convex path, all of it where nothing moves, and from a part of it on Coulomb's."""
+
+    path: Path = CONVEX_PATH
+    steps: int = 7
+    until: float = 1e-4
+    """Residual [-] at which it is left."""
+    useful: float = 1e-3
+    """Residual [-] from which Newton is begun (where little slides)."""
+    newton: int = 5
+    """Steps of Newton."""
+    rest: float = 1e-3
+    """Where nothing moves the convex law is Coulomb's: velocities so small beside those of q [-]
+    are taken for rest, and the path is followed to its end.  Other paths may end at a motion that
+    solves the problem as well (an arch that only just stands)."""
+    rest_until: float = 1e-8
+    """Residual [-] at that end."""
+    rest_steps: int = 15
+    bent: Path = BENT_PATH
+    """Followed from where the convex one was left: coming from there it folds back seldom."""
+    bent_steps: int = 25
+    bent_useful: float = 3e-6
+    """Residual [-] at which Newton is tried, and again at `Limits.hand_over`."""
+    bent_newton: int = 8
+    """Steps of Newton."""
+    wider: float = 10.0
+    """sigma with which the smoothed path goes on from there, over that of the point [-]: where the
+    interior point has jammed, some contacts are far from its own."""
+
+
+@dataclass(frozen=True)
+class HeavyPath:
+    """Where light bodies bear heavy ones."""
+
+    newton: int = 12
+    """Steps of Newton from the forces of sticking."""
+    patience: int = 5
+    """Of them, that may fail to halve the residual."""
+    steps: int = 20
+    """Along the convex path, which has to go further."""
+    end_newton: int = 10
+    """Steps of Newton from its end."""
+
+
+@dataclass(frozen=True)
+class SharpPath:
+    """Coulomb's path of the interior point with hardly any rounding: it can jam, and where it does
+    not its end is near."""
+
+    path: Path = SHARP_ROUNDING
+    steps: int = 40
+    until: float = 3e-8
+    """Residual [-] at its end."""
+    useful: float = 1e-5
+    """Residual [-] from which Newton is begun."""
+    near: float = 1e-7
+    """Residual [-] from which turns are begun."""
+    turns: int = 3
+    """Turns that may fail."""
+
+
+@dataclass(frozen=True)
+class SmoothedFurther:
+    """The smoothed path that goes on from the convex one, and extrapolated points from its end."""
+
+    factorisations: int = 150
+    useful: float = 1e-6
+    """Residual [-] from which points are begun."""
+    points: int = 80
+    """Factorisations of them."""
+    points_flops: float = 5e9
+    """Their effort."""
+
+
+CONVEX, HEAVY, SHARP = ConvexPath(), HeavyPath(), SharpPath()
+FURTHER = SmoothedFurther()
+TURN_PATHS = (
+    Path(rounding=0.3, compliance=1e-4),
+    Path(rounding=1e-3, compliance=1e-4, lagged=True),
+    Path(convex=True, compliance=1e-4),
+)
+TURN_PATH_STEPS = 45
+"""Paths from whose ends turns begin again, and steps along each: how many turns are needed differs
+by ten between starts that look alike, so a few of many starts cost less than many of one."""
+PATHS = (
+    (Path(rounding=0.3, compliance=0.01), 100),
+    (Path(rounding=0.03, compliance=1.0), 100),
+    (Path(rounding=1.0, compliance=0.1), 100),
+    (Path(rounding=1e-3, compliance=1e-3), 300),
+    (Path(rounding=0.3, compliance=0.1), 300),
+    (Path(convex=True, compliance=1e-4), 300),
+)
+"""Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
+
+
+# --- what sticks ------------------------------------------------------------------------------
+
+
+def stick_all(trial: Trial) -> bool:
+    """One factorisation, exact for towers and much of what stands.  With a start, and where
+    factorisations are dear, only if the best point looks like it."""
+    if not trial.cold or trial.dear:
+        return trial.stick_if_likely()
+    trial.stuck = trial.stick()
+    if not trial.best.solved:
+        trial.loose = seem_loose(trial.problem, trial.stuck.r)
+        trial.heaviness = heaviness(trial.problem, trial.stuck.r)
+    return trial.best.solved
+
+
+def step_from_best(trial: Trial) -> bool:
+    """Newton from the best point."""
+    trial.newton(trial.best.r, LIMITS.newton, trial.best.method)
+    return trial.best.solved
+
+
+def step_from_stuck(trial: Trial) -> bool:
+    """Newton from the forces of sticking, where light bodies bear heavy ones."""
+    assert trial.stuck is not None
+    trial.newton(trial.stuck.r, HEAVY.newton, trial.stuck.method, HEAVY.patience)
+    return trial.best.solved
+
+
+# --- along paths ------------------------------------------------------------------------------
+
+
+def follow_convex_path(trial: Trial) -> bool:
+    """A part of the convex path and Newton; all of it where it seems to end at rest; then from its
+    part on Coulomb's, and Newton."""
+    if not trial.affordable:
+        return False
+    try:
+        path = PathStep(trial.problem, CONVEX.path, trial.factors)
+    except SingularSystem:
+        return False
+    found = follow(trial, path, CONVEX.until, CONVEX.steps)
+    if found.residual < CONVEX.useful:
+        trial.newton(found.r, CONVEX.newton, found.method, NEWTON_PATIENCE)
+    if not trial.best.solved and seems_at_rest(trial):
+        part = path.x, path.s
+        rest = follow(trial, path, CONVEX.rest_until, CONVEX.rest_steps)
+        trial.newton(rest.r, CONVEX.newton, rest.method, NEWTON_PATIENCE)
+        path.x, path.s = part
+    path.path = CONVEX.bent
+    steps = CONVEX.bent_steps
+    for until in (CONVEX.bent_useful, LIMITS.hand_over):
+        if trial.best.solved or steps == 0:
+            break
+        found = follow(trial, path, until, steps)
+        if found.residual > CONVEX.bent_useful:
+            break
+        steps -= int(found.work["iterations"])
+        trial.newton(found.r, CONVEX.bent_newton, found.method, NEWTON_PATIENCE)
+    return end_path(trial, path, found)
+
+
+def follow_heavy_path(trial: Trial) -> bool:
+    """The convex path, so much finer as the bodies borne are heavier, from forces of the size of
+    those of sticking, and Coulomb's."""
+    if not trial.affordable:
+        return False
+    assert trial.stuck is not None
+    size = float(np.sqrt(np.mean(trial.stuck.r**2)))
+    path = PathStep(trial.problem, CONVEX.path, trial.factors, size)
+    for path.path, until, steps in (
+        (CONVEX.path, CONVEX.until, HEAVY.steps),
+        (CONVEX.bent, CONVEX.bent_useful, CONVEX.bent_steps),
+        (CONVEX.bent, LIMITS.hand_over, CONVEX.bent_steps),
+    ):
+        found = follow(trial, path, until / trial.heaviness, steps)
+        if found.residual > CONVEX.useful or not trial.affordable:
+            break
+        trial.newton(found.r, HEAVY.end_newton, found.method)
+        if trial.best.solved:
+            break
+    return end_path(trial, path, found)
+
+
+def seems_at_rest(trial: Trial) -> bool:
+    """Whether the best point is near an answer, by its residual, with velocities of almost none."""
+    best, offset = trial.best, trial.problem.offset
+    return best.residual <= CONVEX.until and length(best.u) <= CONVEX.rest * length(offset)
+
+
+def follow(trial: Trial, path: PathStep, until: float, steps: int) -> FrictionSolution:
+    """So many steps on a path at most."""
+    return trial.keep(
+        interior_point(trial.problem, None, until, path.path, iterations=steps, begun=path)
+    )
+
+
+def end_path(trial: Trial, path: PathStep, found: FrictionSolution) -> bool:
+    """Note where a path has ended, for what goes on from there."""
+    trial.path_end, trial.path_point = found.r, (path.force(), CONVEX.wider * path.sigma())
+    return trial.best.solved
+
+
+def follow_sharp_path(trial: Trial) -> bool:
+    """`SHARP` and Newton from its end, and turns from where that is near."""
+    trial.sharp = True
+    found = trial.keep(
+        interior_point(
+            trial.problem, None, max(SHARP.until, trial.tolerance), SHARP.path,
+            linear=trial.factors, iterations=min(SHARP.steps, trial.affordable),
+        )
+    )  # fmt: skip
+    if found.residual <= SHARP.useful:
+        found = trial.newton(found.r, LIMITS.newton, found.method)
+    if not trial.best.solved and found.residual <= SHARP.near:
+        take_turns(trial, found.r, SHARP.turns)
+    return trial.best.solved
+
+
+def smooth_further(trial: Trial) -> bool:
+    """The smoothed path from the forces and sigma where the convex one ended, and from its end
+    extrapolated points."""
+    assert trial.path_point is not None
+    trial.smoothed = True
+    found = smoothed_path(
+        trial.problem, trial.tolerance, trial.path_point, linear=trial.linear,
+        factorisations=min(FURTHER.factorisations, trial.affordable),
+    )  # fmt: skip
+    trial.keep(found)
+    trial.sharpen()
+    if trial.best.solved or found.residual > FURTHER.useful:
+        return trial.best.solved
+    trial.drift(FURTHER.points, FURTHER.points_flops, found)
+    return trial.best.solved
+
+
+def turn_from_paths(trial: Trial) -> bool:
+    """Turns from where the convex path ended and from the ends of a few more; none of these is
+    followed once that has cost the effort of turns.
+
+    Forces there are inside their cones, far from every change of status, and so a self-stress has
+    less way to go than from swept ones, which lie on the cones' boundaries.
+    """
+    problem, most = trial.problem, trial.effort + TURNS.flops
+    if trial.path_end is not None and take_turns(trial, trial.path_end):
+        return True
+    for path in TURN_PATHS:
+        if trial.effort > most or not trial.affordable:
+            break
+        found = interior_point(
+            problem, None, max(LIMITS.hand_over, trial.tolerance), path, linear=trial.linear,
+            iterations=min(TURN_PATH_STEPS, trial.affordable),
+        )  # fmt: skip
+        if trial.polish(trial.keep(found), factorisations=0) or take_turns(trial, found.r):
+            return True
+    return False
+
+
+def follow_paths(trial: Trial) -> bool:
+    """The interior point along `PATHS`; each end goes to Newton, and if that is not enough to
+    Gauss-Seidel and Newton again, within `Trial.bound_effort`."""
+    problem = trial.problem
+    for path, sweeps in PATHS:
+        if trial.effort > trial.bound or not trial.affordable:
+            break
+        found = trial.keep(
+            interior_point(
+                problem, None, max(LIMITS.hand_over, trial.tolerance), path, linear=trial.linear,
+                iterations=min(ITERATIONS, trial.affordable),
+            )
+        )  # fmt: skip
+        if trial.polish(found) or trial.sweep(found.r, sweeps, "interior-point"):
+            return True
+        if trial.accepts() and not trial.small:
+            return True
+    return False

@@ -1,0 +1,205 @@
+"""`solve_friction`: one call for friction problems, and the default that chooses and falls back.
+
+``auto`` tries one method after another, what is cheap before what is dear
+(`rigid_lcp.friction.auto.plan`), and takes the first point that is exact enough, and otherwise the
+best.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.errors import UsageError
+from rigid_lcp.friction.attempts import frictionless
+from rigid_lcp.friction.auto.islands import islands, solve_islands
+from rigid_lcp.friction.auto.plan import FIRST, attempts, is_proved_insoluble
+from rigid_lcp.friction.auto.trial import LIMITS, Trial
+from rigid_lcp.friction.methods import newton
+from rigid_lcp.friction.problem import (
+    FORCE_ROUND_OFF,
+    SHARE_LEFT,
+    BodySpace,
+    FrictionProblem,
+    FrictionSolution,
+    friction_problem,
+    in_range,
+    judge_forces,
+    length,
+    require_number,
+    require_start,
+)
+
+Floats = NDArray[np.float64]
+
+TINY = 1e-60
+"""Problems with a smaller q are solved in other units."""
+FEW_ISLANDS = 20
+"""Up to so many islands, single contacts not counted, of a large problem are solved apart at once:
+a few grains that lie loose can keep a whole bed from converging.  More cost more than they gain."""
+
+ENERGY_GIVEN = (
+    "W gives energy to forces within the cones of friction (r . W r < 0), so a solution need not"
+    " exist; the best residual is {:.2g}\n  -> give W by its bodies (BodySpace), or to more digits"
+)
+
+
+def solve_friction(
+    W: ArrayLike | sp.sparray | sp.spmatrix | BodySpace,
+    q: ArrayLike,
+    mu: ArrayLike,
+    dim: int,
+    start: ArrayLike | None = None,
+    tolerance: float = 1e-12,
+    method: str = "auto",
+    accept: float = 0.0,
+) -> FrictionSolution:
+    """Forces r and velocities u with ``u = W r + q`` under unilateral contact and Coulomb friction.
+
+    ``W`` (nc * dim, nc * dim): dense, sparse, or its factors as a `BodySpace`; may be singular
+    and slightly non-symmetric.  ``q`` (nc * dim,), contact after contact: (n, t) or (n, t1, t2);
+    r in N and u in m/s^2, or in N s and m/s, with W to match.  ``mu`` (nc,) or one number [-].
+    ``start`` r (nc * dim,): forces of the step before.  ``tolerance``: on the scale-free residual
+    (`rigid_lcp.friction.problem.cones`); round-off ends near 1e-15 times the condition of W.
+
+    ``accept``: where sweeps and Newton leave more than ``tolerance``, but not more than this,
+    ``auto`` tries no more on problems of more than `Limits.few_contacts` contacts.
+
+    ``method``: ``auto`` (module docstring); ``interior-point`` and ``newton`` are polished by
+    Newton; ``pivoting`` and ``dantzig`` (2D) are in the modules of their names.
+
+    Never fails silently: see ``status`` and ``message`` of the `FrictionSolution`, which holds
+    the best point found.  Raises `ProblemError` for input that poses no problem, `UsageError` for
+    an unknown method or a tolerance that is not positive.  Forces, and sometimes velocities, are
+    not unique: compare residuals.
+    """
+    problem: FrictionProblem = friction_problem(W, q, mu, dim)
+    if method != "auto" and method not in find_methods():
+        raise UsageError(
+            f"there is no method {method!r}", where="method",
+            remedy="one of " + ", ".join(["auto", *find_methods()]),
+        )  # fmt: skip
+    tolerance, accept = (
+        require_number(tolerance, "tolerance"),
+        require_number(accept, "accept", zero=True),
+    )
+    begin = None
+    if start is not None:
+        begin = require_start(start, len(problem.offset), problem.dim)
+        in_range(begin, "start", least=0.0)
+    if problem.contacts == 0:
+        return judge_forces(problem, problem.offset.copy(), tolerance, method)
+    largest = float(np.abs(problem.offset).max())
+    if 0.0 < largest < TINY:  # squares of such numbers are zero
+        unit = 2.0 ** np.frexp(largest)[1]
+        large = replace(problem, offset=problem.offset / unit)
+        found = solve_friction(
+            large.bodies or large.delassus, large.offset, large.friction, dim,
+            None if begin is None else begin / unit, tolerance, method, accept,
+        )  # fmt: skip
+        return replace(found, r=found.r * unit, u=found.u * unit)
+    if method == "auto":
+        return solve_auto(problem, begin, tolerance, accept)
+    return solve_alone(problem, begin, tolerance, method)
+
+
+def solve_auto(
+    problem: FrictionProblem, start: Floats | None = None, tolerance: float = 1e-12,
+    accept: float = 0.0,
+) -> FrictionSolution:  # fmt: skip
+    """The default of `solve_friction` on a problem that is made already."""
+    if not problem.friction.any():
+        exact = frictionless(problem, start, tolerance)
+        if exact.solved:
+            return exact
+    parts = islands(problem) if problem.contacts > LIMITS.few_contacts else []
+    larger = sum(len(part) > 1 for part in parts)
+    split = len(parts) > 1 and larger <= FEW_ISLANDS
+    if split:
+        trial = Trial(problem, start, tolerance)
+        trial.keep(solve_islands(problem, _solve_island, start, tolerance, accept=accept))
+    else:
+        trial = attempts(problem, start, tolerance, accept)
+    finer = tolerance
+    while trial.best.residual <= finer and not trial.best.solved and finer > FORCE_ROUND_OFF:
+        finer = refine_tolerance(problem, trial.best.r, finer)
+        trial.keep(attempts(problem, trial.best.r, finer, accept, FIRST).solution())
+    if trial.best.solved or (
+        trial.best.residual <= accept and problem.contacts > LIMITS.few_contacts
+    ):  # fmt: skip
+        return trial.solution()
+    parts = parts or islands(problem)
+    if len(parts) > 1 and not split:
+        apart = trial.keep(solve_islands(problem, _solve_island, trial.best.r, tolerance))
+        if _error(apart) < _error(trial.best):  # endless forces on one hide the errors of others
+            trial.best = apart
+    if not trial.best.solved and (
+        trial.best.status == "no solution" or is_proved_insoluble(problem)
+    ):
+        if len(parts) <= 1:
+            trial.forget_endless()
+        return trial.solution(
+            "no solution",
+            "no forces within the cones of friction keep all contacts from approaching (proved by"
+            " a linear programme)\n  -> look for bodies held between others that can not give way"
+            " (a press), or contacts that bear on no mass; where r are forces, use impulses: a"
+            " velocity-level time step",
+        )
+    if not trial.best.solved and trial.gives_energy:
+        return trial.solution(message=ENERGY_GIVEN.format(trial.best.residual))
+    return trial.solution()
+
+
+def refine_tolerance(problem: FrictionProblem, force: Floats, tolerance: float) -> float:
+    """Half of the residual at which forces of this size leave little of the error without forces,
+    as light bodies that still fall may leave much beside the forces of heavy ones; half of the
+    tolerance so far at most."""
+    enough = SHARE_LEFT * problem.error_without_forces / (length(force) or 1.0)
+    return 0.5 * min(enough, tolerance)
+
+
+def _error(found: FrictionSolution) -> float:
+    """Size of the natural map in units of force, not over that of the forces."""
+    return found.residual * float(np.linalg.norm(found.r))
+
+
+def _solve_island(
+    problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
+) -> FrictionSolution:
+    return attempts(problem, start, tolerance, accept).solution()
+
+
+def solve_alone(
+    problem: FrictionProblem, start: Floats | None, tolerance: float, method: str
+) -> FrictionSolution:
+    """One of `find_methods`, by itself or, where its file says ``POLISHED``, with Newton at its
+    end."""
+    module = import_module(find_methods()[method])
+    solve = getattr(module, module.__name__.rpartition(".")[2])
+    if not getattr(module, "POLISHED", False):
+        alone: FrictionSolution = solve(problem, start, tolerance)
+        return alone
+    trial = Trial(problem, None, tolerance)
+    rough = max(LIMITS.hand_over, tolerance)
+    trial.polish(trial.keep(solve(problem, None, rough, linear=trial.factors)))
+    return trial.solution()
+
+
+@cache
+def find_methods() -> dict[str, str]:
+    """The methods by name, and the module of each: the files beside that of Newton's method with a
+    line ``METHOD = "..."``, each with a function of its file's name.  They are compiled when they
+    are asked for."""
+    package, found = newton.__module__.rpartition(".")[0], {}
+    for path in sorted(Path(newton.__code__.co_filename).parent.glob("*.py")):
+        named = re.search(r'^METHOD = "(.+)"$', path.read_text(encoding="utf-8"), re.MULTILINE)
+        if named:
+            found[named[1]] = f"{package}.{path.stem}"
+    return found

@@ -1,0 +1,184 @@
+"""Attempts by sweeps of Gauss-Seidel, alone and by turns with extrapolated proximal points.
+
+A self-stress may have to grow a long way before the next contact lets go.  Sweeps of Gauss-Seidel
+are cheap and hardly ever fail, but creep; extrapolated proximal points run far ahead, and get stuck
+among changes of status, out of which sweeps lead.  So each goes on from where the other ended, and
+not from its best point: the residual does not show the way made, and sweeps that begin again from
+the best point stop at 1e-4 to 1e-6 where in one run they end below 1e-9.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.friction.attempts import proximal_newton
+from rigid_lcp.friction.auto.trial import LIMITS, Trial
+from rigid_lcp.friction.methods import gauss_seidel
+from rigid_lcp.friction.problem import FrictionSolution
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BriefSweeps:
+    """A few sweeps, for what they solve at once."""
+
+    sweeps: int = 30
+    creep: tuple[int, float] = (15, 4e-3)
+    """They end where so many of them leave more than this residual [-] (towers)."""
+    fast: float = 3e-4
+    """A residual [-] that few sweeps leave where more may end it (loose grains, crystals)."""
+    fast_sweeps: int = 200
+    """So many more."""
+
+
+@dataclass(frozen=True)
+class LongSweeps:
+    """Sweeps of a large bed with a start, in one run."""
+
+    sweeps: int = 1600
+    until: float = 1e-9
+    """Residual [-] at which Newton's method takes over."""
+    yielding_sweeps: int = 2000
+    """Where the bed yields and a rough answer is asked for."""
+    near: float = 1.4
+    """They end at so many times the tolerance [-], from where proximal points with a great shift,
+    which hardly ever fail, take off what is stiff of the error: a third and more."""
+    few: int = 1000
+    """After fewer sweeps some more cost less than such points."""
+    shift: float = 1e-3
+    """First shift of the points, over the mean of W's diagonal [-]."""
+    factorisations: int = 8
+    """Of the points."""
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Sweeps and extrapolated points by turns."""
+
+    sweeps: int = 1000
+    """A turn."""
+    points: int = 1500
+    """Factorisations a turn at most."""
+    points_patience: int = 30
+    """Factorisations after which points that did not halve their residual are left."""
+    patience: int = 8
+    """Turns that may fail to halve the least residual so far."""
+    flops: float = 6e10
+    """Effort after which there is no next turn."""
+
+
+BRIEF, LONG, TURNS = BriefSweeps(), LongSweeps(), Turns()
+
+
+def sweep_briefly(trial: Trial) -> bool:
+    """A few sweeps, and more where they converge fast (`BriefSweeps`)."""
+    for sweeps, slow in ((BRIEF.sweeps, BRIEF.creep), (BRIEF.fast_sweeps, (0, np.inf))):
+        found = gauss_seidel(
+            trial.problem, trial.best.r, trial.tolerance, sweeps, sweeper=trial.sweeper, slow=slow
+        )
+        trial.keep(found)
+        if trial.best.solved or found.residual > BRIEF.fast:
+            break
+    if trial.small:
+        trial.sharpen()
+    else:
+        trial.sharpen_by_sweeps()
+    return trial.best.solved
+
+
+def sweep_on(trial: Trial, sweeps: int, points: int) -> bool:
+    """Sweeps from the best point, and so many factorisations of points from their end."""
+    until = max(trial.coarse, LIMITS.hand_over)
+    return trial.sweep(trial.best.r, sweeps, until=until, factorisations=points)
+
+
+def sweep_yielding(trial: Trial) -> bool:
+    """Sweeps that drift, as the error falls like one over their number, and a proximal point
+    at their end.  In one run: begun again from their best point sweeps may go round in circles."""
+    near = LONG.near * trial.tolerance
+    if trial.sweep(trial.start, LONG.yielding_sweeps, until=near, factorisations=0):
+        return True
+    done = int(trial.work["sweeps"])
+    if done < LONG.few and trial.sweep(
+        trial.best.r, BRIEF.fast_sweeps + done // 2, factorisations=0
+    ):  # fmt: skip
+        return True
+    if not trial.dear:
+        trial.keep(
+            proximal_newton(
+                trial.problem, trial.best.r, trial.tolerance, linear=trial.linear,
+                factorisations=LONG.factorisations, first_shift=LONG.shift,
+            ),
+            trial.best.method,
+        )  # fmt: skip
+    return trial.best.solved
+
+
+def sweep_deep(trial: Trial) -> bool:
+    """Sweeps far down from the start, and Newton."""
+    return trial.sweep(trial.start, LONG.sweeps, until=LONG.until, factorisations=0)
+
+
+def sweep_deep_from_path(trial: Trial) -> bool:
+    """The same from the end of the convex path."""
+    return trial.sweep(
+        trial.path_end, LONG.sweeps, "interior-point", until=LONG.until, factorisations=0
+    )
+
+
+def sweep_from_path(trial: Trial) -> bool:
+    """Sweeps of one turn from the end of the convex path."""
+    assert trial.path_end is not None
+    sweep_turn(trial, trial.path_end)
+    return trial.best.solved
+
+
+def turn_from_best(trial: Trial) -> bool:
+    """Turns from the best point."""
+    return take_turns(trial, trial.best.r)
+
+
+def turn_once(trial: Trial) -> bool:
+    """Where W gives energy no solution need exist: what is near is found in one turn, the last."""
+    take_turns(trial, trial.best.r if trial.path_end is None else trial.path_end, patience=1)
+    return True
+
+
+def run_points(trial: Trial, most: int, flops: float) -> bool:
+    """Extrapolated points from the best one (`Trial.drift`)."""
+    trial.drift(most, flops)
+    return trial.best.solved
+
+
+def take_turns(trial: Trial, force: Floats, patience: int | None = None) -> bool:
+    """Sweeps and extrapolated points by turns, from forces r (nc * dim,) [N or N s], until
+    ``patience`` of them failed to halve the least residual; whether the tolerance is reached."""
+    patience = TURNS.patience if patience is None else patience
+    most, mark, waited = trial.effort + TURNS.flops, np.inf, 0
+    while waited < patience and trial.effort < most and trial.affordable:
+        found = sweep_turn(trial, force)
+        if trial.endless(found.r):  # sweeps diverge where friction makes W no descent
+            break
+        if not trial.best.solved:
+            found = trial.drift(TURNS.points, np.inf, found, TURNS.points_patience)
+        if trial.best.solved:
+            break
+        force, waited = found.r, waited + 1
+        if found.residual < 0.5 * mark:
+            mark, waited = found.residual, 0
+    return trial.best.solved
+
+
+def sweep_turn(trial: Trial, start: Floats) -> FrictionSolution:
+    """Sweeps of one turn from ``start``, and where they end."""
+    found = trial.keep(
+        gauss_seidel(
+            trial.problem, start, trial.tolerance, TURNS.sweeps, sweeper=trial.sweeper, last=True
+        )
+    )
+    trial.sharpen()
+    return found

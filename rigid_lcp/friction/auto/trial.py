@@ -1,0 +1,393 @@
+"""One attempt at a friction problem: the best point so far, and the methods that better it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.friction.attempts import (
+    POINTS,
+    PROXIMAL,
+    extrapolated_points,
+    proximal_newton,
+    refined,
+    seem_to_stick,
+    sticking,
+)
+from rigid_lcp.friction.linear import Factorisation, factorisation
+from rigid_lcp.friction.methods import PATIENCE, Sweeper, gauss_seidel, make_sweeper, newton
+from rigid_lcp.friction.problem import (
+    FORCE_ROUND_OFF,
+    FrictionProblem,
+    FrictionSolution,
+    Status,
+    gives_energy,
+    judge_forces,
+    length,
+)
+from rigid_lcp.friction.sweeps import MANY_CONTACTS
+
+Floats = NDArray[np.float64]
+
+ENDLESS = 1e6
+"""Forces over ``rho |q|`` [-] that look endless."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What holds for every attempt."""
+
+    hand_over: float = 1e-7
+    """Residual [-] at which Newton takes over."""
+    few_contacts: int = 300
+    """Up to so many a problem is small: it costs less to factor than to sweep."""
+    convex_contacts: int = 10_000
+    """Up to so many the convex path is followed."""
+    newton: int = 20
+    """Steps of Newton from `hand_over`, where it mostly needs fewer factorisations than proximal
+    points."""
+    update_flops: float = 160.0
+    """Flops of a factorisation that cost as much as a contact's update in a sweep, over dim^2."""
+    dear: float = 100.0
+    """A factorisation that costs as much as so many sweeps is dear: sweeps go first, and on."""
+    last_word: float = 1e-11
+    """At such a tolerance and below a step of Newton ends what the others found: the residual is
+    measured on the scale of all forces, and only what is exact to round-off is so for a pebble
+    under a boulder."""
+    rest: float = 100.0
+    """Velocity times rho over the error of the forces [-], up to which it is taken for that of a
+    contact at rest: corrections of a solution are of the size of its error."""
+    refinements: int = 8
+    """Most such steps, where factorisations cost next to nothing; one beyond `few_contacts`."""
+    more_sweeps: float = 0.5
+    """Sweeps to that end over those that found the solution [-], at most."""
+    few_points: int = 50
+    """Fewer factorisations than that extrapolated points are not begun with."""
+    most_flops: float = 4e11
+    """An effort (some 20 s) beyond which no factorisation is begun.  Only large problems come
+    there: one of 10,400 contacts between spheres takes 1.5e10 flops, most of a second, and one of
+    10,000 between discs 20 ms."""
+    most_factored: float = 2e7
+    """Factorisations times contacts, of the same use."""
+    misled: float = 2.0
+    """Error of forces to start from over that of none [-] above which they are left aside: those
+    of a step before that know but some of the contacts may be a little above 1, and lead on."""
+    great_forces: float = 1e4
+    """Forces over ``rho |q|`` [-], above which such a residual hides velocities."""
+    last_share: float = 1.0
+    """What the paths of the interior point may cost in all before no further one is begun: so
+    many times what was spent before them [-],"""
+    last_flops: float = 2e10
+    """or so many flops (some seconds), if that is more."""
+
+
+LIMITS = Limits()
+
+
+class Trial:
+    """The best point so far, who found it, and the work of all."""
+
+    def __init__(
+        self, problem: FrictionProblem, start: Floats | None, tolerance: float, accept: float = 0.0
+    ) -> None:
+        zero = np.zeros(len(problem.offset))
+        self.problem, self.tolerance, self.accept = problem, tolerance, accept
+        self.work = dict[str, float]()
+        self.best = judge_forces(
+            problem, zero, tolerance, "no forces", velocity=problem.offset.copy()
+        )
+        self.linear: Factorisation | None = None
+        self.path_end: Floats | None = None
+        self.path_point: tuple[Floats, float] | None = None
+        self.sharp = self.smoothed = False
+        """Whether the sharp path was followed, and the smoothed one."""
+        self.stuck: FrictionSolution | None = None
+        """Forces at which all contacts stick, where there is no start."""
+        self.loose, self.heaviness = False, 1.0
+        """Of these forces: whether much seems loose, and what heavy bodies ask for (`sticking`)."""
+        self.bound = np.inf
+        """Effort beyond which the last attempts end."""
+        self.start: Floats | None = None
+        """The forces given to start from; None where they mislead."""
+        if start is not None:
+            begun = judge_forces(problem, start, tolerance, "start")
+            if begun.residual * length(start) < LIMITS.misled * problem.error_without_forces:
+                self.start = start
+                self.keep(begun)
+
+    @property
+    def small(self) -> bool:
+        """Whether it costs less to factor than to sweep."""
+        return self.problem.contacts <= LIMITS.few_contacts
+
+    @property
+    def new(self) -> bool:
+        """Whether a large problem has no start."""
+        return not self.small and self.start is None
+
+    @property
+    def moving(self) -> bool:
+        """Whether a large problem has a start: a step of a bed in motion."""
+        return not self.small and self.start is not None
+
+    @property
+    def rough(self) -> bool:
+        """Whether a rough answer is asked for of a large problem, which needs few factorisations or
+        none."""
+        return not self.small and self.tolerance >= LIMITS.hand_over
+
+    @property
+    def coarse(self) -> float:
+        """Residual that sweeps go down to first."""
+        return self.tolerance if self.tolerance > LIMITS.last_word else LIMITS.hand_over
+
+    @property
+    def convex_useful(self) -> bool:
+        """Whether the convex path is worth its factorisations."""
+        few = self.problem.contacts <= LIMITS.convex_contacts
+        return few and self.tolerance < LIMITS.hand_over
+
+    @property
+    def cold(self) -> bool:
+        """Whether there is no start, and the convex path is worth it."""
+        return self.start is None and self.convex_useful
+
+    @property
+    def heavy(self) -> bool:
+        """Whether light bodies bear heavy ones."""
+        return self.heaviness > 1.0
+
+    @property
+    def nearly_stuck(self) -> bool:
+        """Whether Newton may take over from the forces of sticking."""
+        return self.stuck is not None and self.best.residual <= LIMITS.hand_over / self.heaviness
+
+    def accepts(self) -> bool:
+        """Whether the best point is good enough for who asked."""
+        return self.best.residual <= self.accept
+
+    def accepts_large(self) -> bool:
+        """The same for a bed in motion, where the next step is due unless it is a small one."""
+        return self.accepts() and self.problem.contacts >= MANY_CONTACTS
+
+    def bound_effort(self) -> bool:
+        """Set the effort beyond which the last attempts end, by what was spent so far."""
+        self.bound = max(LIMITS.last_flops, (1.0 + LIMITS.last_share) * self.effort)
+        return False
+
+    @cached_property
+    def sweeper(self) -> Sweeper:
+        """The sweeps of this problem."""
+        return make_sweeper(self.problem)
+
+    @property
+    def factors(self) -> Factorisation:
+        """The factorisations of this problem, made when they are first needed."""
+        self.linear = self.linear or factorisation(self.problem)
+        return self.linear
+
+    @cached_property
+    def gives_energy(self) -> bool:
+        """Whether W is proved to give energy, so that nothing promises a solution."""
+        return gives_energy(self.problem)
+
+    def keep(self, found: FrictionSolution, after: str = "") -> FrictionSolution:
+        """Count the work of a solution and keep it if it is the best; gives it back."""
+        named = found.method == "gauss-seidel" or "islands" in found.work  # islands name their own
+        for name, count in found.work.items():
+            key = name if named or name == "factorisations" else f"{found.method} {name}"
+            self.work[key] = self.work.get(key, 0.0) + count
+        if found.residual < self.best.residual or not np.isfinite(self.best.residual):
+            name = f"{after} + {found.method}" if after else found.method
+            status: Status = "not converged" if found.status == "solved" else found.status
+            self.best = replace(found, method=name, status=status)
+            if found.residual <= self.tolerance:  # whether it solves is for the tolerance here
+                if self.problem.mended(found.r, found.residual):
+                    self.best = replace(self.best, status="solved", message="")
+                else:
+                    self.best = judge_forces(
+                        self.problem, found.r, self.tolerance, name, status=status,
+                        message=found.message,
+                    )  # fmt: skip
+        return found
+
+    def polish(
+        self,
+        found: FrictionSolution,
+        after: str = "",
+        factorisations: int = PROXIMAL.factorisations,
+    ) -> bool:
+        """Proximal points from a point of another method; whether the tolerance is reached."""
+        if self.best.solved or not np.isfinite(found.residual):
+            return self.best.solved
+        if found.residual <= LIMITS.hand_over:
+            found = self.newton(found.r, LIMITS.newton, after or found.method)
+        if self.best.solved or factorisations == 0:
+            return self.best.solved
+        self.keep(
+            proximal_newton(
+                self.problem, found.r, self.tolerance, linear=self.factors,
+                factorisations=min(factorisations, self.affordable),
+            ),
+            after or found.method,
+        )  # fmt: skip
+        self.sharpen()
+        return self.best.solved
+
+    def sweep(
+        self, start: Floats | None, sweeps: int, after: str = "", until: float = 0.0,
+        factorisations: int = PROXIMAL.factorisations,
+    ) -> bool:  # fmt: skip
+        """Gauss-Seidel to a residual of ``until``, and Newton; whether the tolerance is reached."""
+        until = max(until, self.tolerance)
+        found = self.keep(
+            gauss_seidel(self.problem, start, until, sweeps, sweeper=self.sweeper), after
+        )
+        name = f"{after} + gauss-seidel" if after else "gauss-seidel"
+        return self.best.solved or self.polish(found, name, factorisations)
+
+    def drift(
+        self, most: int, flops: float, start: FrictionSolution | None = None,
+        patience: int = POINTS.factorisations,
+    ) -> FrictionSolution:  # fmt: skip
+        """Extrapolated proximal points from ``start`` (the best if None), with so many
+        factorisations at most and at about such a cost."""
+        count = int(min(most, flops / self.factors.flops, self.affordable))
+        start = start or self.best
+        if count < LIMITS.few_points:
+            return start
+        found = self.keep(
+            extrapolated_points(
+                self.problem, start.r, self.tolerance, linear=self.factors, factorisations=count,
+                patience=patience,
+            ),
+            start.method,
+        )  # fmt: skip
+        self.sharpen()
+        return found
+
+    def stick_if_likely(self) -> bool:
+        """Where the best point looks like it: all contacts stick; whether that is the answer."""
+        if seem_to_stick(self.problem, self.best.r):
+            self.stick()
+        return self.best.solved
+
+    def stick(self) -> FrictionSolution:
+        """Forces at which all contacts stick."""
+        exact = FORCE_ROUND_OFF if self.tolerance <= LIMITS.last_word else self.tolerance
+        found = self.keep(sticking(self.problem, exact, linear=self.factors))
+        self.sharpen()
+        return found
+
+    @property
+    def dear(self) -> bool:
+        """Whether a factorisation costs as much as many sweeps."""
+        return self.sweeps_a_factorisation > LIMITS.dear
+
+    @property
+    def sweeps_a_factorisation(self) -> float:
+        """How many sweeps cost as much as a factorisation."""
+        update = LIMITS.update_flops * self.problem.dim**2
+        return self.factors.flops / (update * self.problem.contacts)
+
+    @property
+    def effort(self) -> float:
+        """What was spent so far, about, in flops."""
+        factorisations = self.work.get("factorisations", 0.0)
+        updates = self.work.get("contact updates", 0.0)
+        each = self.linear.flops if self.linear else 0.0
+        return factorisations * each + updates * LIMITS.update_flops * self.problem.dim**2
+
+    @property
+    def affordable(self) -> int:
+        """Factorisations up to `Limits.most_flops` and `Limits.most_factored`."""
+        flops = (LIMITS.most_flops - self.effort) / max(1.0, self.factors.flops)
+        count = LIMITS.most_factored / self.problem.contacts - self.work.get("factorisations", 0.0)
+        return max(0, int(min(flops, count)))
+
+    @property
+    def forces(self) -> float:
+        """Size of the best forces over that of what makes the contacts approach, ``rho |q|``."""
+        offered = self.problem.rho * length(self.problem.offset)
+        return length(self.best.r) / offered if offered > 0.0 else 0.0
+
+    def endless(self, force: Floats) -> bool:
+        """Whether the greatest of forces r is so far above ``rho |q|`` that they look endless."""
+        offered = self.problem.rho * length(self.problem.offset)
+        return not float(np.abs(force).max(initial=0.0)) <= ENDLESS * offered
+
+    def forget_endless(self) -> None:
+        """No forces in place of endless ones, behind whose size any velocity hides."""
+        if self.forces > ENDLESS:
+            self.best = Trial(self.problem, None, self.tolerance).best
+
+    def newton(
+        self, start: Floats, steps: int, after: str, patience: int = PATIENCE
+    ) -> FrictionSolution:
+        """So many steps of Newton, and one more where the answer is to be exact."""
+        found = self.keep(
+            newton(
+                self.problem, start, self.tolerance, linear=self.factors,
+                iterations=min(steps, self.affordable), patience=patience,
+            ),
+            after,
+        )  # fmt: skip
+        self.sharpen()
+        return found
+
+    def sharpen(self) -> None:
+        """Newton without its shift, from a solution, where the tolerance asks for an exact one."""
+        if not self.best.solved or self.tolerance > LIMITS.last_word:
+            return
+        exact = FORCE_ROUND_OFF / max(1.0, self.forces / LIMITS.great_forces)
+        if self.best.residual > exact:
+            steps = LIMITS.refinements if self.problem.contacts <= LIMITS.few_contacts else 1
+            found = refined(self.problem, self.best.r, exact, linear=self.linear, steps=steps)
+            if not self.leaves_rest(found):
+                self.keep(found, self.best.method)
+
+    def leaves_rest(self, found: FrictionSolution) -> bool:
+        """Whether contacts that rest in the best point, a solution, move in ``found``.
+
+        Without its shift Newton's method may step along a self-stress to where forces meet their
+        cones' boundaries and, above the least friction that holds, into a motion that solves the
+        problem as well.  Both are exact; bodies at rest stay so.
+        """
+        error = max(self.best.residual, FORCE_ROUND_OFF) * length(self.best.r)
+        before, after = (
+            self.problem.rho * np.linalg.norm(each.u.reshape(-1, self.problem.dim), axis=1)
+            <= LIMITS.rest * error
+            for each in (self.best, found)
+        )
+        return bool((before & ~after).any())
+
+    def sharpen_by_sweeps(self) -> None:
+        """A part more sweeps, from a solution that sweeps found, where the tolerance asks for an
+        exact one: they converge fast there, and need no factors."""
+        if (
+            not self.best.solved
+            or self.tolerance > LIMITS.last_word
+            or self.best.residual <= FORCE_ROUND_OFF
+        ):
+            return
+        more = int(np.ceil(LIMITS.more_sweeps * self.work.get("sweeps", 0.0)))
+        self.keep(
+            gauss_seidel(self.problem, self.best.r, FORCE_ROUND_OFF, more, sweeper=self.sweeper)
+        )
+
+    def solution(self, status: Status | None = None, message: str = "") -> FrictionSolution:
+        """The best point, with the work of all attempts."""
+        best = self.best
+        if not best.solved and not message and best.residual > self.tolerance:
+            message = (
+                f"no method reached {self.tolerance:.2g}; the best residual is {best.residual:.2g}"
+                f" by {best.method}\n  -> look at W (a mass of zero? an entry of the wrong sign?),"
+                " ask for less, or give forces near the solution as start"
+            )
+        return FrictionSolution(
+            best.r, best.u, best.residual, status or best.status, best.method, self.work,
+            "" if best.solved else message or best.message,
+        )  # fmt: skip

@@ -1,0 +1,132 @@
+"""The shift of the diagonal that makes reduced equations (28) regular, and how it is taken out.
+
+Redundant contacts make the reduced equations singular, and nearly redundant ones make the way to a
+solution long.  So ``A + shift`` is solved, and the shift taken out by proximal steps
+
+    a = (A + shift) f - shift f_before + b,
+
+each of which drives the change of b that it makes, all contacts kept consistent.  A fixed point
+knows no shift (Rockafellar, SIAM J. Control Optim. 14 (1976) 877, for monotone problems; with
+friction it is judged by its residual).  The shift falls as long as that takes few pivots.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.friction.pivots.drive import DONE, settle_values
+from rigid_lcp.friction.pivots.state import (
+    Pivots,
+    drive_offset,
+    measure_pivots_residual,
+    read_pivots_force,
+)
+from rigid_lcp.friction.pivots.updates import BREAKING, STATIC, multiply_geometry, refresh_reduced
+from rigid_lcp.friction.problem import FrictionProblem
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SHIFT_LEAST = 1e-6
+"""Relative shift below which round-off in the inverse would make events up."""
+PROXIMAL_STEPS = 60
+"""Most proximal steps that take the shift out,"""
+HARDLY = 10
+"""Pivots of a proximal step after which the shift can fall faster."""
+PROXIMAL_PATIENCE = 12
+"""and most without a better residual: self-stress moves on for a while before it settles."""
+
+
+def change_shift(state: Pivots, shift: float) -> bool:
+    """Another shift [that of A]; b takes the difference up, f and a and the lists stay."""
+    geometry, by = state.geometry, shift - state.shift[0]
+    geometry.row_value[state.diagonal[0]] += by
+    geometry.column_value[state.diagonal[1]] += by
+    state.shift[0] = shift
+    product = np.zeros_like(state.b)
+    multiply_geometry(geometry, state.f, product)
+    state.b[:] = state.a - product
+    return bool(refresh_reduced(geometry, state.reduced))
+
+
+def remove_shift(problem: FrictionProblem, state: Pivots, tolerance: float, few: int) -> Floats:
+    """Proximal steps; the shift falls tenfold each, a hundredfold after a step of hardly a pivot.
+
+    A step of more than ``few`` pivots is done again with the shift of before, which then falls
+    more slowly.
+    """
+    exact, best = problem.offset[state.rows], read_pivots_force(problem, state)
+    least, idle, pace = measure_pivots_residual(problem, state, best), 0, 1.0
+    taken, floor = 0, SHIFT_LEAST * state.unit
+    for _ in range(PROXIMAL_STEPS if state.shift[0] > 0.0 else 0):
+        if idle == PROXIMAL_PATIENCE:
+            break
+        before, shift, spent = copy_pivots(state), float(state.shift[0]), int(state.events[0])
+        smaller = min(shift, max((0.1 if taken > HARDLY else 0.01) ** pace * shift, floor))
+        if least <= tolerance:
+            smaller = shift  # what comes now is cheap, and free where no list changes
+        if smaller < shift:
+            change_shift(state, smaller)
+        change = exact - smaller * state.f - state.b
+        ended = drive_offset(state, change, 1.0, True, spent + few)
+        taken = int(state.events[0]) - spent
+        if ended != DONE:
+            restore_pivots(state, before, shift)
+            if smaller == shift or pace < 0.1:
+                break
+            pace *= 0.5
+            continue
+        force = read_pivots_force(problem, state)
+        residual = measure_pivots_residual(problem, state, force)
+        idle = 0 if residual < least else idle + 1
+        if least <= tolerance and (taken or not residual < 0.5 * least):
+            break
+        if residual < least:
+            best, least = force, residual
+    return find_lists_force(problem, state, best, least)
+
+
+def find_lists_force(
+    problem: FrictionProblem, state: Pivots, force: Floats, residual: float
+) -> Floats:
+    """Forces of the lists reached with no shift at all, where they are better than ``force``.
+
+    A shift larger than a pivot of eq. 28 comes out slowly, and hides the sign of that pivot.
+    """
+    if not change_shift(state, 0.0):
+        return force
+    nothing = np.zeros_like(state.b)
+    state.b[:] = problem.offset[state.rows]
+    state.f[:] = 0.0
+    for _ in range(2):
+        settle_values(state.geometry, state.reduced, state.b, nothing, state.f, state.a)
+    found = read_pivots_force(problem, state)
+    with np.errstate(over="ignore", invalid="ignore"):  # where eq. 28 is singular but to round-off
+        return found if measure_pivots_residual(problem, state, found) < residual else force
+
+
+def copy_pivots(state: Pivots) -> tuple[Ints, Floats, Floats]:
+    """The lists, f and a, to come back to."""
+    return state.reduced.kind.copy(), state.f.copy(), state.a.copy()
+
+
+def restore_pivots(state: Pivots, kept: tuple[Ints, Floats, Floats], shift: float) -> None:
+    """Come back to lists, f and a, with the shift they belong to."""
+    set_lists(state, kept[0])
+    state.f[:], state.a[:] = kept[1], kept[2]
+    change_shift(state, shift)
+
+
+def set_lists(state: Pivots, kinds: Ints) -> None:
+    """Put every contact on a list; the inverse has then to be computed afresh."""
+    geometry, reduced = state.geometry, state.reduced
+    reduced.kind[:] = kinds
+    reduced.place[:] = -1
+    inside = np.zeros(len(state.rows), dtype=bool)
+    inside[geometry.normal[kinds != BREAKING]] = True
+    inside[geometry.tangent[kinds == STATIC]] = True
+    members = np.flatnonzero(inside)
+    reduced.members[: len(members)] = members
+    reduced.place[members] = np.arange(len(members))
+    reduced.size[0] = len(members)

@@ -1,0 +1,211 @@
+"""What a friction problem may be made of: numbers, matrices and operators as a caller has them."""
+
+from __future__ import annotations
+
+from numbers import Integral
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.errors import ProblemError, UsageError
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+LEAST, MOST = 1e-100, 1e100
+"""Range of the largest number of W, and of q: squares beyond it are no numbers any more."""
+COLUMNS = 256
+"""Columns of an operator that are written out at a time."""
+
+
+OPERATOR = "let it return a number for every row"
+"""What to do about an operator whose products are none."""
+FROM_A_DIVISION = "look for a mass of zero or a division by zero where it was made"
+"""What to do about numbers that are not finite."""
+
+
+def require_finite(values: ArrayLike, name: str, remedy: str = FROM_A_DIVISION) -> Floats:
+    """A copy of ``values`` as an array of floats; `ProblemError`, with ``name``, for all else.
+
+    Refused are text, complex numbers, masked ones, numbers that are not finite, for which
+    ``remedy`` says what to do.
+    """
+    if np.ma.is_masked(values):
+        raise ProblemError(
+            "some of its numbers are masked", where=name,
+            remedy="fill them, or leave out their contacts",
+        )  # fmt: skip
+    try:
+        given = np.asarray(values)
+        array = given.astype(float) if given.dtype.kind in "biufO" else None
+    except (TypeError, ValueError) as error:
+        raise ProblemError(
+            f"{name} is not made of numbers ({error})", where=name, remedy="give real numbers"
+        ) from error
+    if array is None:
+        raise ProblemError(
+            f"{name} is not made of numbers (but of {given.dtype})", where=name,
+            remedy="give real numbers",
+        )  # fmt: skip
+    bad = np.flatnonzero(~np.isfinite(array))
+    if len(bad):
+        raise ProblemError(
+            f"{len(bad)} of its numbers are not finite, first number {bad[0]}", where=name,
+            remedy=remedy,
+        )  # fmt: skip
+    return array
+
+
+def require_by_contact(values: ArrayLike, name: str, dim: int) -> Floats:
+    """``values`` (nc * dim,), (nc * dim, 1), (1, nc * dim) or (nc, dim) as (nc * dim,).
+
+    `ProblemError` for other shapes: (dim, nc) would be read in the wrong order.
+    """
+    array = require_finite(values, name)
+    if array.ndim > 1 and len(array) != 1 and array.shape[1:] not in ((dim,), (1,)):
+        raise ProblemError(
+            f"{name} has shape {array.shape} in {dim} dimensions", where=name,
+            remedy=f"give one number a row of W, or (nc, {dim}): a row a contact",
+        )  # fmt: skip
+    return array.ravel()
+
+
+def require_number(value: Any, name: str, *, zero: bool = False) -> float:
+    """A number above zero, or also zero, as a float; `UsageError`, with ``name``, for all else."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not (0.0 < number < np.inf or (zero and number == 0.0)):
+        raise UsageError(
+            f"the {name} is {value!r}", where=name,
+            remedy="give a number " + ("of zero or more" if zero else "above zero"),
+        )  # fmt: skip
+    return number
+
+
+def require_whole(value: Any, name: str) -> int:
+    """A count of zero or more; `UsageError`, with ``name``, for all else."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 0:
+        raise UsageError(f"{name} is {value!r}", where=name, remedy="give a count of 0 or more")
+    return int(value)
+
+
+def require_start(start: ArrayLike, numbers: int, dim: int) -> Floats:
+    """Forces to begin from as a copy (``numbers``,) = (nc * dim,); `ProblemError` for all else."""
+    force = require_by_contact(start, "start", dim)
+    if len(force) != numbers:
+        raise ProblemError(
+            f"it has {len(force)} numbers and q has {numbers}", where="start",
+            remedy="give the forces of all contacts, in the order of q",
+        )  # fmt: skip
+    return force
+
+
+def read_order(order: ArrayLike, count: int) -> Integers | None:
+    """An order as the numbers 0 ... ``count`` - 1, or None where it has not each of them once."""
+    given = np.asarray(order)
+    if given.shape != (count,) or (count and given.dtype.kind not in "iu"):
+        return None
+    numbers = given.astype(np.int64)
+    return numbers if np.array_equal(np.sort(numbers), np.arange(count)) else None
+
+
+def in_range(values: Floats, name: str, least: float = LEAST) -> None:
+    """Raise `ProblemError` where the largest of the numbers can not be squared in floats."""
+    largest = float(np.abs(values).max(initial=0.0))
+    if largest and not least <= largest <= MOST:
+        raise ProblemError(
+            f"its largest number is {largest:.1g}", where=name,
+            remedy=f"choose other units: {LEAST:g} to {MOST:g} can be computed with",
+        )  # fmt: skip
+
+
+def require_matrix(matrix: Any, name: str = "W") -> sp.csr_array:
+    """W from a dense or sparse matrix, or a scipy `LinearOperator` (n products with columns).
+
+    ``name``: what messages call it.
+    """
+    if hasattr(matrix, "matmat") and not sp.issparse(matrix):
+        matrix = write_out_operator(matrix, name)
+    given = matrix if sp.issparse(matrix) else require_finite(matrix, name)
+    if given.ndim != 2:
+        raise ProblemError(
+            f"it has {given.ndim} dimensions, not 2", where=name,
+            remedy="give a square matrix; for no contacts numpy.zeros((0, 0))",
+        )  # fmt: skip
+    if not sp.issparse(matrix):
+        return sp.csr_array(given)
+    rows = sp.csr_array(matrix)
+    w = sp.csr_array((require_finite(rows.data, name), rows.indices, rows.indptr), rows.shape)
+    if not w.has_canonical_format:
+        w = w.copy()  # the caller's indices are not ours to sort
+        w.sum_duplicates()
+    return w
+
+
+def write_out_operator(operator: Any, name: str) -> sp.csr_array:
+    """The matrix of an operator, from its products with the columns of the identity.
+
+    Raises `ProblemError` where it has no shape, or its products are not of that shape.
+    """
+    shape = getattr(operator, "shape", None)
+    if not isinstance(shape, tuple) or [isinstance(n, Integral) for n in shape] != [True, True]:
+        raise ProblemError(
+            f"the operator's shape is {shape!r}", where=name,
+            remedy="give it a shape, (rows, columns), or use scipy's LinearOperator",
+        )  # fmt: skip
+    rows, columns = shape
+    parts = []
+    for first in range(0, columns, COLUMNS):
+        width = min(COLUMNS, columns - first)
+        unit = np.zeros((columns, width))
+        unit[first + np.arange(width), np.arange(width)] = 1.0
+        try:
+            product = operator.matmat(unit)
+        except ValueError as error:  # scipy's, of a product that it can not put into shape
+            raise ProblemError(
+                f"the operator's product failed ({error})", where=name, remedy=OPERATOR
+            ) from error
+        if np.shape(product) != (rows, width):
+            raise ProblemError(
+                f"the operator's product of {columns} x {width} numbers has shape "
+                f"{np.shape(product)}, not {(rows, width)}", where=name, remedy=OPERATOR,
+            )  # fmt: skip
+        parts.append(sp.csc_array(require_finite(product, name)))
+    return sp.csr_array(sp.hstack(parts)) if parts else sp.csr_array((rows, columns))
+
+
+def check_factors(jacobian: sp.csr_array, inverse: sp.csr_array, size: int) -> None:
+    """Raise `ProblemError` where the factors of W (`BodySpace`) do not fit together."""
+    where = "BodySpace"
+    for name, part in (("jacobian", jacobian), ("inverse_mass", inverse)):
+        if not sp.issparse(part) or part.format != "csr":
+            raise ProblemError(
+                f"{name} is no sparse matrix by rows", where=where,
+                remedy="give scipy.sparse.csr_array",
+            )  # fmt: skip
+        if part.dtype.kind not in "biuf":
+            raise ProblemError(
+                f"{name} is not made of numbers (but of {part.dtype})", where=where,
+                remedy="give real numbers",
+            )  # fmt: skip
+        if not np.isfinite(part.data).all():
+            raise ProblemError(
+                f"{name} holds numbers that are not finite", where=where, remedy=FROM_A_DIVISION,
+            )  # fmt: skip
+        in_range(part.data, f"{where}, {name}")
+    freedoms = jacobian.shape[1]
+    if inverse.shape != (freedoms, freedoms) or size not in (3, 6) or freedoms % size:
+        raise ProblemError(
+            f"jacobian has {freedoms} columns, inverse_mass the shape {inverse.shape}, and a body "
+            f"{size} freedoms", where=where,
+            remedy="give 3 freedoms a body in 2D and 6 in 3D, all bodies' in both",
+        )  # fmt: skip
+    if not (inverse.diagonal() > 0).all():
+        raise ProblemError(
+            "a mass is negative or infinite", where=f"{where}, inverse_mass",
+            remedy="leave out the columns of bodies that can not move",
+        )  # fmt: skip

@@ -1,0 +1,193 @@
+"""A friction problem laid out contact after contact for kernels that visit one at a time.
+
+`BodyBlocks`: each contact knows its two bodies and two small Jacobians, so that a visit costs the
+same however many neighbours there are.  `MatrixBlocks`: the rows of W in dim x dim blocks, where
+only W is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigid_lcp.friction.problem import BodySpace, FrictionProblem
+from rigid_lcp.sparse import diagonal_blocks
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class BodyBlocks:
+    """``W = B B^T`` with ``B = J L`` and ``M^-1 = L L^T``, two blocks of B a contact.
+
+    Scaled so, a body's velocities ``w = L^-1 v`` take up an impulse r as ``w += B^T r``: no mass
+    is left to multiply with.  The two bodies of contact c are ``body[c]`` (nc, 2),
+    the number ``bodies`` for none; ``block`` (nc, 2, dim, body_size); ``local`` (nc, dim, dim)
+    has the blocks on W's diagonal.
+    """
+
+    body: Integers
+    block: Floats
+    local: Floats
+    bodies: int
+
+    def body_velocity(self, force: Floats) -> Floats:
+        """``w = B^T r``, (bodies + 1, body_size); the last row stands for no body. r: (nc, dim)."""
+        velocity = np.zeros((self.bodies + 1, self.block.shape[3]))
+        add_impulses(self.body, self.block, force, velocity)
+        return velocity
+
+
+@njit(cache=True)
+def add_impulses(body: Integers, block: Floats, force: Floats, velocity: Floats) -> None:
+    """``w += B^T r``: changes ``velocity`` (bodies + 1, size) by the forces (nc, dim)."""
+    for c in range(len(body)):
+        bears = False  # few contacts of a bed in motion do
+        for i in range(force.shape[1]):
+            bears = bears or force[c, i] != 0.0
+        if not bears:
+            continue
+        for side in range(2):
+            moved = body[c, side]
+            for i in range(force.shape[1]):
+                for k in range(velocity.shape[1]):
+                    velocity[moved, k] += block[c, side, i, k] * force[c, i]
+
+
+@njit(cache=True)
+def find_relative_velocities(body: Integers, block: Floats, velocity: Floats) -> Floats:
+    """``B w`` of every contact, (nc, dim)."""
+    relative = np.zeros((len(body), block.shape[2]))
+    for c in range(len(body)):
+        for side in range(2):
+            moved = body[c, side]
+            for i in range(relative.shape[1]):
+                for k in range(velocity.shape[1]):
+                    relative[c, i] += block[c, side, i, k] * velocity[moved, k]
+    return relative
+
+
+@dataclass(frozen=True)
+class MatrixBlocks:
+    """Rows of W in blocks: ``block[start[c]:start[c + 1]]`` at the contacts ``column``."""
+
+    start: Integers
+    column: Integers
+    block: Floats
+    local: Floats
+
+
+def lay_out_bodies(problem: FrictionProblem) -> BodyBlocks | None:
+    """Blocks in body space; None if the factors of W are unknown or not those of pairs of bodies.
+
+    None too if M^-1 is not positive semi-definite.
+    """
+    space = problem.bodies
+    size, contacts = 3 * problem.dim - 3, problem.contacts
+    if space is None or space.body_size != size or space.jacobian.shape[1] % size or not contacts:
+        return None
+    root = root_inverse_mass(space)
+    if root is None:
+        return None
+    laid_out = pair_blocks(*problem.body_jacobians, root)
+    if laid_out is None:
+        return None
+    return BodyBlocks(*laid_out, len(root))
+
+
+@njit(cache=True)
+def pair_blocks(
+    first: Integers, moved: Integers, part: Floats, root: Floats
+) -> tuple[Integers, Floats, Floats] | None:
+    """``body``, ``block`` and ``local`` of `BodyBlocks`; None if a contact moves three bodies.
+
+    A block of zeros moves none.
+    """
+    contacts, (dim, size) = len(first) - 1, part.shape[1:]
+    body = np.full((contacts, 2), len(root))
+    block, local = np.zeros((contacts, 2, dim, size)), np.zeros((contacts, dim, dim))
+    diagonal = True
+    for b in range(len(root)):
+        for m in range(size):
+            for n in range(size):
+                diagonal = diagonal and (m == n or root[b, m, n] == 0.0)
+    for c in range(contacts):
+        side = 0
+        for k in range(first[c], first[c + 1]):
+            if not moves(part[k]):
+                continue
+            if side == 2:
+                return None
+            body[c, side] = moved[k]
+            for i in range(dim):
+                for m in range(size):
+                    value = part[k, i, m]
+                    if diagonal:
+                        block[c, side, i, m] = value * root[moved[k], m, m]
+                    elif value != 0.0:
+                        for n in range(size):
+                            block[c, side, i, n] += value * root[moved[k], m, n]
+            for i in range(dim):
+                for j in range(i + 1):
+                    total = 0.0
+                    for m in range(size):
+                        total += block[c, side, i, m] * block[c, side, j, m]
+                    local[c, i, j] += total
+                    if j < i:
+                        local[c, j, i] += total
+            side += 1
+    return body, block, local
+
+
+@njit(cache=True)
+def moves(part: Floats) -> bool:
+    """Whether a block of J has an entry that is not zero."""
+    for i in range(part.shape[0]):
+        for m in range(part.shape[1]):
+            if part[i, m] != 0.0:
+                return True
+    return False
+
+
+def root_inverse_mass(space: BodySpace) -> Floats | None:
+    """L of every body with ``M^-1 = L L^T``, (bodies, size, size); None if M^-1 is no such thing.
+
+    By eigenvectors, as a body that is held has zeros there.
+    """
+    rows = space.inverse_mass
+    mass = diagonal_blocks(rows.indptr, rows.indices, rows.data, space.body_size)
+    if np.count_nonzero(mass) != np.count_nonzero(rows.data):
+        return None
+    diagonal = np.einsum("bii->bi", mass)
+    if np.count_nonzero(mass) == np.count_nonzero(diagonal):
+        if (diagonal < 0).any():
+            return None
+        root = np.zeros_like(mass)
+        np.einsum("bii->bi", root)[:] = np.sqrt(diagonal)
+        return root
+    scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    values, vectors = np.linalg.eigh(mass / (scale[:, :, None] * scale[:, None, :]))
+    if values.min() < -1e-12:
+        return None
+    return scale[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+
+
+def lay_out_matrix(problem: FrictionProblem) -> MatrixBlocks:
+    """W in blocks, with one on the diagonal of every row, of zeros if need be."""
+    dim, contacts = problem.dim, problem.contacts
+    blocks = problem.delassus_blocks if contacts else None
+    if blocks is None:
+        empty = np.zeros((0, dim, dim))
+        return MatrixBlocks(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), empty, empty)
+    row = np.repeat(np.arange(contacts), np.diff(blocks.indptr))
+    own = row == blocks.indices
+    local = np.zeros((contacts, dim, dim))
+    local[row[own]] = blocks.data[own]
+    return MatrixBlocks(
+        blocks.indptr.astype(np.int64), blocks.indices.astype(np.int64),
+        np.ascontiguousarray(blocks.data), local,
+    )  # fmt: skip

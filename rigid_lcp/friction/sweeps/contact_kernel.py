@@ -1,0 +1,287 @@
+"""Sweeps over the contacts, each solved exactly while the others are held, with momentum.
+
+A sweep goes by the velocities of the bodies (`rigid_lcp.friction.sweeps.body_kernel`) or by the
+rows of W.  A
+contact that has no solution keeps its force.  `sweep_until_small` repeats them with momentum
+(`rigid_lcp.friction.methods.gauss_seidel` says why) without a return to Python: a sweep over a
+hundred contacts
+costs a few microseconds.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigid_lcp.friction.problem import natural_map
+from rigid_lcp.friction.sweeps.blocks import add_impulses, find_relative_velocities
+from rigid_lcp.friction.sweeps.body_kernel import sweep_bodies_2d, sweep_bodies_3d
+from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contact_2d, solve_contact_3d
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+GROWTH = 1.5
+"""Momentum starts again when a sweep changes the forces by so many times the least change since
+it last did: without this large beds (10,000 contacts) swing on at 1e-4, as nothing turns back."""
+CHECK_EVERY, CHECK_AFTER = 0.1, 5.0
+"""The residual costs about a sweep: it is taken when the sweeps have grown by this part, and by so
+many at least, and when the change a sweep makes has fallen as far as the residual should."""
+
+
+MANY_CONTACTS, ALL_EVERY = 2000, 10
+"""From so many contacts on only one sweep of so many goes over all of them, and the others over
+those that bear: beds in motion have two open contacts for one that does."""
+STALLED, STALLS = 100.0, 0.7
+"""Where the sweeps since the last look, so many at least and as many as all before, leave more than
+this part of the residual, the order is turned round: in one order sweeps may go round in circles,
+at a few contacts that slide, which in the other they leave at once."""
+
+
+class SweepBlocks(NamedTuple):
+    """A problem as the kernels read it: `BodyBlocks`, or `MatrixBlocks` where ``body`` is empty."""
+
+    offset: Floats
+    friction: Floats
+    local: Floats
+    packed: Floats
+    """`rigid_lcp.friction.sweeps.pack_contacts` where ``body`` is not empty."""
+    body: Integers
+    block: Floats
+    start: Integers
+    column: Integers
+    entry: Floats
+    bodies: int
+    rho: float
+
+
+class Momentum(NamedTuple):
+    """What goes from sweep to sweep, changed in place."""
+
+    last: Floats
+    """Forces before the last sweep, (nc, dim)."""
+    velocity: Floats
+    """``w = B^T r`` of the bodies (`BodyBlocks`)."""
+    last_velocity: Floats
+    tally: Floats
+    """Sweeps done (a sweep over some counts as their share of all contacts), Nesterov's time t_k,
+    least change since the restart, last change."""
+
+
+@njit(cache=True)
+def visit_all(
+    blocks: SweepBlocks, force: Floats, last: Floats, velocity: Floats, part: float,
+    visit: Integers,
+) -> tuple[int, float, float]:  # fmt: skip
+    """One sweep from ``y = force + part (force - last)``, ``velocity`` being that of y.
+
+    Returns as `rigid_lcp.friction.sweeps.sweep_bodies_2d`, and leaves what it leaves.
+    """
+    if len(blocks.body) == 0:
+        before = force.copy()
+        extrapolate(force, last, part)
+        origin = force.copy()
+        stuck = sweep_matrix(
+            blocks.start, blocks.column, blocks.entry, blocks.local, blocks.offset,
+            blocks.friction, force, visit,
+        )  # fmt: skip
+        product, square = measure_step(origin, force, before, blocks.local)
+        return stuck, product, square
+    if force.shape[1] == 2:
+        return sweep_bodies_2d(
+            blocks.body, blocks.packed, blocks.local, force, last, velocity, part, visit
+        )
+    return sweep_bodies_3d(
+        blocks.body, blocks.packed, blocks.local, force, last, velocity, part, visit
+    )
+
+
+@njit(cache=True)
+def sweep_once(
+    blocks: SweepBlocks, state: Momentum, force: Floats, visit: Integers, backward: Integers,
+    symmetric: bool, momentum: bool,
+) -> int:  # fmt: skip
+    """One sweep from ``y = r + beta (r - r before)``; changes ``force`` and ``state``.
+
+    Called with the forces it left; returns as `visit_all`.
+    """
+    tally, part = state.tally, 0.0
+    back = symmetric and int(tally[0]) % 2 == 1
+    if momentum and not back:
+        later = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * tally[1] ** 2))
+        part = (tally[1] - 1.0) / later
+        extrapolate(state.velocity, state.last_velocity, part)
+        tally[1] = later
+    last = state.last.copy() if back else state.last  # the way made is that of there and back
+    stuck, product, square = visit_all(
+        blocks, force, last, state.velocity, part, backward if back else visit
+    )
+    tally[0] += len(visit) / len(force)
+    if momentum and (not symmetric or back):
+        tally[3] = np.sqrt(square)
+        tally[2] = min(tally[2], tally[3])
+        if product > 0.0 or tally[3] > GROWTH * tally[2]:
+            # Begin again, and rid the velocities of rounding, which momentum would throw forward.
+            tally[1], tally[2] = 1.0, np.inf
+            state.velocity[:] = 0.0
+            add_impulses(blocks.body, blocks.block, force, state.velocity)
+    return stuck
+
+
+@njit(cache=True)
+def sweep_until_small(
+    blocks: SweepBlocks, state: Momentum, force: Floats, visit: Integers, backward: Integers,
+    symmetric: bool, momentum: bool, tolerance: float, sweeps: int, trial: int, useful: float,
+) -> tuple[Floats, float, int]:  # fmt: skip
+    """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done in all, or
+    ``trial`` of them left more than ``useful``.
+
+    Returns the best forces of those looked at, their residual, and the contacts without an answer
+    in the last sweep over all.
+    """
+    best, stuck, enough = force.copy(), 0, 0.0
+    best_residual = residual_of(blocks, force)
+    mark, marked = best_residual, 0.0
+    some = momentum and not symmetric and len(visit) >= MANY_CONTACTS
+    count, carry = 0, visit
+    while best_residual > tolerance and state.tally[0] < sweeps:
+        done = state.tally[0]
+        check = min(float(sweeps), done + max(CHECK_AFTER, np.ceil(CHECK_EVERY * done)))
+        while state.tally[0] < check:
+            if some and count % ALL_EVERY > 0:
+                sweep_once(blocks, state, force, carry, carry, symmetric, momentum)
+            else:
+                stuck = sweep_once(blocks, state, force, visit, backward, symmetric, momentum)
+                if some:
+                    carry = carrying(force, state.last, visit)
+            count += 1
+            if state.tally[3] <= enough:
+                break
+        if momentum and state.tally[0] >= max(STALLED, 2.0 * marked):
+            if best_residual > STALLS * mark:
+                visit, backward, count = backward, visit, 0
+                state.tally[1], state.tally[2] = 1.0, np.inf
+            mark, marked = best_residual, state.tally[0]
+        residual = residual_of(blocks, force)
+        if not np.isfinite(residual):
+            break
+        if residual < best_residual:
+            best[:] = force
+            best_residual = residual
+        if state.tally[0] >= trial and best_residual > useful:
+            break
+        if momentum and residual > 0.0:
+            enough = state.tally[3] * min(0.9, tolerance / residual)
+    return best, best_residual, stuck
+
+
+@njit(cache=True)
+def carrying(force: Floats, last: Floats, visit: Integers) -> Integers:
+    """Those of the contacts ``visit`` that bear, or did before the last sweep, in their order."""
+    found, count = np.empty_like(visit), 0
+    for c in visit:
+        bears = False
+        for k in range(force.shape[1]):
+            bears = bears or force[c, k] != 0.0 or last[c, k] != 0.0
+        if bears:
+            found[count] = c
+            count += 1
+    return found[:count]
+
+
+@njit(cache=True)
+def residual_of(blocks: SweepBlocks, force: Floats) -> float:
+    """`rigid_lcp.friction.problem.natural_residual` of forces (nc, dim), by the blocks."""
+    if len(blocks.body) > 0:
+        motion = np.zeros((blocks.bodies + 1, blocks.block.shape[3]))
+        add_impulses(blocks.body, blocks.block, force, motion)
+        velocity = find_relative_velocities(blocks.body, blocks.block, motion) + blocks.offset
+    else:
+        velocity = blocks.offset.copy()
+        for c in range(len(force)):
+            for entry in range(blocks.start[c], blocks.start[c + 1]):
+                other = force[blocks.column[entry]]
+                for i in range(force.shape[1]):
+                    for j in range(force.shape[1]):
+                        velocity[c, i] += blocks.entry[entry, i, j] * other[j]
+    error = size(natural_map(force, velocity, blocks.friction, blocks.rho))
+    if error == 0.0:
+        return 0.0
+    scale = size(force)
+    if scale == 0.0:
+        scale = blocks.rho * size(velocity)
+    return error / scale if scale > 0.0 else np.inf
+
+
+@njit(cache=True)
+def size(values: Floats) -> float:
+    """Euclidean norm of (n, k) numbers."""
+    total = 0.0
+    for i in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            total += values[i, k] ** 2
+    return np.sqrt(total)
+
+
+@njit(cache=True)
+def extrapolate(values: Floats, last: Floats, part: float) -> None:
+    """``y = x + part (x - last)``: changes ``values`` from x to y, and ``last`` to x; both 2D."""
+    for i in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            value = values[i, k]
+            values[i, k] = value + part * (value - last[i, k])
+            last[i, k] = value
+
+
+@njit(cache=True)
+def measure_step(
+    origin: Floats, values: Floats, last: Floats, local: Floats
+) -> tuple[float, float]:
+    """``(y - x) . (x - last)`` and ``|y - x|^2`` of a sweep from y to x, weighted with |diag W|.
+
+    The first is positive if the sweep went against the way made since ``last``.
+    """
+    product = square = 0.0
+    for i in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            back = origin[i, k] - values[i, k]
+            weight = abs(local[i, k, k])
+            product += weight * back * (values[i, k] - last[i, k])
+            square += weight * back * back
+    return product, square
+
+
+@njit(cache=True)
+def sweep_matrix(
+    start: Integers, column: Integers, block: Floats, local: Floats, offset: Floats,
+    friction: Floats, force: Floats, visit: Integers,
+) -> int:  # fmt: skip
+    """A sweep with the rows of W, in blocks; changes ``force``; returns as `sweep_bodies_2d`."""
+    stuck, dim = 0, force.shape[1]
+    q = np.zeros(3)
+    for c in visit:
+        for i in range(dim):
+            q[i] = offset[c, i]
+        for entry in range(start[c], start[c + 1]):
+            other = column[entry]
+            if other != c:
+                for i in range(dim):
+                    for j in range(dim):
+                        q[i] += block[entry, i, j] * force[other, j]
+        if dim == 2:
+            r_n, r_1, status = solve_contact_2d(local[c], q[0], q[1], friction[c])
+            r_2 = 0.0
+        else:
+            r_n, r_1, r_2, status = solve_contact_3d(
+                local[c], q[0], q[1], q[2], friction[c], -force[c, 1], -force[c, 2]
+            )
+        if status == NONE:
+            stuck += 1
+            continue
+        force[c, 0], force[c, 1] = r_n, r_1
+        if dim == 3:
+            force[c, 2] = r_2
+    return stuck

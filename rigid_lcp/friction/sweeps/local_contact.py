@@ -1,0 +1,212 @@
+"""One contact, solved exactly: ``u = W r + q`` under Coulomb's law with the full block W.
+
+A contact is open, it sticks, or it slides (section 6).  Open: ``q_N >= 0`` and ``r = 0``.  Stick:
+``W r = -q`` with r in the cone.  Slide along the unit vector d: ``r = r_N (1, -mu d)`` and
+``u = (0, kappa d)`` with ``kappa >= 0``, that is
+
+    r_N = -q_N / D,   D = W_NN - mu W_NT . d,   lambda d = g + G d,   lambda = kappa D,
+    g = W_NN q_T - q_N W_TN,   G = mu (q_N W_TT - q_T W_NT)
+
+In 2D d is one of two signs.  In 3D the component of ``g + G d`` across d has to vanish, see
+`rigid_lcp.friction.sweeps.sliding_direction`.  Updating the two tangents one after the other
+instead is wrong:
+where W_TT is not diagonal such a sweep has another fixed point.
+
+W need be neither symmetric nor regular.  Where several answers exist (a strong coupling W_NT)
+the order is open, stick, slide; where none exists (Painleve) the status says so.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from rigid_lcp.friction.sweeps.sliding_direction import (
+    ROUNDING,
+    find_all_directions,
+    find_direction_near,
+)
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+OPEN, STICK, SLIDE, NONE = 0, 1, 2, 3
+
+SINGULAR = 1e-13
+"""A block whose pivot is smaller than this part of its greatest entry is singular."""
+
+
+@njit(cache=True)
+def solve_contacts_apart(
+    local: Floats, offset: Floats, friction: Floats
+) -> tuple[Floats, Integers]:
+    """Contacts that feel no other: forces (nc, dim) and statuses (nc,) of W's blocks ``local``."""
+    force, status = np.zeros_like(offset), np.zeros(len(offset), dtype=np.int64)
+    for c in range(len(offset)):
+        w, q, mu = local[c], offset[c], friction[c]
+        if len(q) == 2:
+            force[c, 0], force[c, 1], status[c] = solve_contact_2d(w, q[0], q[1], mu)
+        else:
+            r_n, r_1, r_2, status[c] = solve_contact_3d(w, q[0], q[1], q[2], mu, 0.0, 0.0)
+            force[c, 0], force[c, 1], force[c, 2] = r_n, r_1, r_2
+    return force, status
+
+
+@njit(cache=True)
+def solve_contact_2d(w: Floats, q_n: float, q_t: float, mu: float) -> tuple[float, float, int]:
+    """Exact force of one contact in 2D; ``w`` (2, 2).  Returns (r_N, r_T, status)."""
+    if q_n >= 0.0:
+        return 0.0, 0.0, OPEN
+    if mu == 0.0:
+        return (-q_n / w[0, 0], 0.0, SLIDE) if w[0, 0] > 0.0 else (0.0, 0.0, NONE)
+    straight, crossed = w[0, 0] * w[1, 1], w[0, 1] * w[1, 0]
+    determinant = straight - crossed
+    if abs(determinant) > SINGULAR * (abs(straight) + abs(crossed)):
+        r_n = (w[0, 1] * q_t - w[1, 1] * q_n) / determinant
+        r_t = (w[1, 0] * q_n - w[0, 0] * q_t) / determinant
+        if r_n >= 0.0 and abs(r_t) <= mu * r_n:
+            return r_n, r_t, STICK
+    elif w[0, 0] > 0.0:
+        r_n = -q_n / w[0, 0]
+        if abs(w[1, 0] * r_n + q_t) <= ROUNDING * (abs(w[1, 0] * r_n) + abs(q_t)):
+            return r_n, 0.0, STICK
+    g = w[0, 0] * q_t - q_n * w[1, 0]
+    bend = mu * (q_n * w[1, 1] - q_t * w[0, 1])
+    first = 1.0 if g >= 0.0 else -1.0
+    size = abs(w[0, 0] * q_t) + mu * abs(q_t * w[0, 1]) - q_n * (abs(w[1, 0]) + mu * abs(w[1, 1]))
+    for d in (first, -first):
+        denominator = w[0, 0] - mu * w[0, 1] * d
+        if denominator > 0.0 and d * g + bend >= -ROUNDING * size:
+            r_n = -q_n / denominator
+            return r_n, -mu * r_n * d, SLIDE
+    return 0.0, 0.0, NONE
+
+
+@njit(cache=True)
+def solve_contact_3d(
+    w: Floats, q_n: float, q_1: float, q_2: float, mu: float, d_1: float, d_2: float
+) -> tuple[float, float, float, int]:
+    """Exact force of one contact in 3D; ``w`` (3, 3).  Returns (r_N, r_1, r_2, status).
+
+    ``(d_1, d_2)``: a sliding direction to start from, of any length; zeros if none is known.
+    """
+    if q_n >= 0.0:
+        return 0.0, 0.0, 0.0, OPEN
+    if mu == 0.0:
+        return (-q_n / w[0, 0], 0.0, 0.0, SLIDE) if w[0, 0] > 0.0 else (0.0, 0.0, 0.0, NONE)
+    r_n, r_1, r_2, found = force_sticking(w, q_n, q_1, q_2)
+    if found and r_n >= 0.0 and r_1 * r_1 + r_2 * r_2 <= (mu * r_n) ** 2:
+        return r_n, r_1, r_2, STICK
+    g_1 = w[0, 0] * q_1 - q_n * w[1, 0]
+    g_2 = w[0, 0] * q_2 - q_n * w[2, 0]
+    b_11 = mu * (q_n * w[1, 1] - q_1 * w[0, 1])
+    b_12 = mu * (q_n * w[1, 2] - q_1 * w[0, 2])
+    b_21 = mu * (q_n * w[2, 1] - q_2 * w[0, 1])
+    b_22 = mu * (q_n * w[2, 2] - q_2 * w[0, 2])
+    size = (w[0, 0] + mu * (abs(w[0, 1]) + abs(w[0, 2]))) * (abs(q_1) + abs(q_2)) - q_n * (
+        abs(w[1, 0]) + abs(w[2, 0])
+        + mu * (abs(w[1, 1]) + abs(w[1, 2]) + abs(w[2, 1]) + abs(w[2, 2]))
+    )  # fmt: skip
+    for start in range(2):  # from the last direction; then from that of uncoupled tangents
+        if start == 1 or (d_1 == 0.0 and d_2 == 0.0):
+            d_1, d_2 = g_1, g_2
+        d_1, d_2, found = find_direction_near(g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2)
+        if found:
+            r_n = force_sliding(w, q_n, mu, g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2, size)
+            if r_n > 0.0:
+                return r_n, -mu * r_n * d_1, -mu * r_n * d_2, SLIDE
+    directions, count = find_all_directions(g_1, g_2, b_11, b_12, b_21, b_22, size)
+    for k in range(count):
+        d_1, d_2 = directions[k, 0], directions[k, 1]
+        r_n = force_sliding(w, q_n, mu, g_1, g_2, b_11, b_12, b_21, b_22, d_1, d_2, size)
+        if r_n > 0.0:
+            return r_n, -mu * r_n * d_1, -mu * r_n * d_2, SLIDE
+    return 0.0, 0.0, 0.0, NONE
+
+
+@njit(cache=True)
+def force_sticking(
+    w: Floats, q_n: float, q_1: float, q_2: float
+) -> tuple[float, float, float, bool]:
+    """Solve ``W r = -q`` by elimination with the greatest pivots; False if there is no solution.
+
+    Of a singular block's solutions this is the one with zeros in the eliminated directions; the
+    sliding directions hold those on the edge of the cone.
+    """
+    c_00 = w[1, 1] * w[2, 2] - w[1, 2] * w[2, 1]
+    c_01 = w[1, 2] * w[2, 0] - w[1, 0] * w[2, 2]
+    c_02 = w[1, 0] * w[2, 1] - w[1, 1] * w[2, 0]
+    determinant = w[0, 0] * c_00 + w[0, 1] * c_01 + w[0, 2] * c_02
+    trace = abs(w[0, 0]) + abs(w[1, 1]) + abs(w[2, 2])
+    if abs(determinant) <= 1e-8 * trace * trace * trace:
+        return force_sticking_pivoted(w, q_n, q_1, q_2)
+    c_10 = w[0, 2] * w[2, 1] - w[0, 1] * w[2, 2]
+    c_11 = w[0, 0] * w[2, 2] - w[0, 2] * w[2, 0]
+    c_12 = w[0, 1] * w[2, 0] - w[0, 0] * w[2, 1]
+    c_20 = w[0, 1] * w[1, 2] - w[0, 2] * w[1, 1]
+    c_21 = w[0, 2] * w[1, 0] - w[0, 0] * w[1, 2]
+    c_22 = w[0, 0] * w[1, 1] - w[0, 1] * w[1, 0]
+    inverse = -1.0 / determinant
+    r_n = (c_00 * q_n + c_10 * q_1 + c_20 * q_2) * inverse
+    r_1 = (c_01 * q_n + c_11 * q_1 + c_21 * q_2) * inverse
+    r_2 = (c_02 * q_n + c_12 * q_1 + c_22 * q_2) * inverse
+    return r_n, r_1, r_2, True
+
+
+@njit(cache=True)
+def force_sticking_pivoted(
+    w: Floats, q_n: float, q_1: float, q_2: float
+) -> tuple[float, float, float, bool]:
+    """`force_sticking` for blocks that are nearly or quite singular."""
+    a = w.copy()
+    b = np.array([-q_n, -q_1, -q_2])
+    columns = np.array([0, 1, 2])
+    greatest = np.abs(a).max()
+    size = np.abs(b).max()
+    rank = 0
+    for k in range(3):
+        pivot, row, column = 0.0, k, k
+        for i in range(k, 3):
+            for j in range(k, 3):
+                if abs(a[i, j]) > pivot:
+                    pivot, row, column = abs(a[i, j]), i, j
+        if pivot <= SINGULAR * greatest:
+            break
+        rank += 1
+        for j in range(3):
+            a[k, j], a[row, j] = a[row, j], a[k, j]
+        b[k], b[row] = b[row], b[k]
+        for i in range(3):
+            a[i, k], a[i, column] = a[i, column], a[i, k]
+        columns[k], columns[column] = columns[column], columns[k]
+        for i in range(k + 1, 3):
+            factor = a[i, k] / a[k, k]
+            for j in range(k, 3):
+                a[i, j] -= factor * a[k, j]
+            b[i] -= factor * b[k]
+    for k in range(rank, 3):
+        if abs(b[k]) > SINGULAR * size:
+            return 0.0, 0.0, 0.0, False
+    r = np.zeros(3)
+    for i in range(rank - 1, -1, -1):
+        value = b[i]
+        for j in range(i + 1, rank):
+            value -= a[i, j] * r[columns[j]]
+        r[columns[i]] = value / a[i, i]
+    return r[0], r[1], r[2], True
+
+
+@njit(cache=True)
+def force_sliding(
+    w: Floats, q_n: float, mu: float, g_1: float, g_2: float,
+    b_11: float, b_12: float, b_21: float, b_22: float, d_1: float, d_2: float, size: float,
+) -> float:  # fmt: skip
+    """r_N of a contact that slides along ``(d_1, d_2)``; -1 if D or kappa has the wrong sign.
+
+    ``size``: sum of the magnitudes that g and G are made of, the measure of their rounding.
+    """
+    denominator = w[0, 0] - mu * (w[0, 1] * d_1 + w[0, 2] * d_2)
+    kappa = d_1 * (g_1 + b_11 * d_1 + b_12 * d_2) + d_2 * (g_2 + b_21 * d_1 + b_22 * d_2)
+    if denominator <= 0.0 or kappa < -ROUNDING * size:
+        return -1.0
+    return -q_n / denominator

@@ -1,0 +1,216 @@
+"""The geometry equations of section 5: relative velocities and accelerations at the contacts.
+
+With the rows of J along n, t (n, t1, t2) of every contact, ``u = J v`` are the relative velocities
+(positive when parting), ``A = J M^-1 J^T`` the matrices of eqs 17 and 25 in one, and b their
+offset (eqs 17, 24).  Bodies that can not move have no columns.
+
+How normals across edges turn, and what it adds to the gap's acceleration (eq. 17, in space).
+
+The normal of two crossing edges is across both, that of a sphere on an edge across the edge: both
+turn with both bodies, and not as a face would.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from rigid_lcp.contact import Contacts, contact_frames
+from rigid_lcp.friction.problem import BodySpace
+from rigid_lcp.motion.state import Motion
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def body_space(
+    contacts: Contacts, position: Floats, columns: Ints, inverse_mass: sp.csr_array
+) -> BodySpace:
+    """J and M^-1 of the contacts, ``A = J M^-1 J^T`` (eqs 17, 25).
+
+    ``position`` (n, dim) [m] of all bodies; ``columns`` (n,): the place of each among the movable
+    ones, -1 for a fixed one; ``inverse_mass`` of the movable ones.
+    """
+    size = 3 if contacts.dim == 2 else 6
+    movable = inverse_mass.shape[0] // size
+    return BodySpace(jacobian(contacts, position, columns, movable), inverse_mass, size)
+
+
+def jacobian(contacts: Contacts, position: Floats, columns: Ints, movable: int) -> sp.csr_array:
+    """J (nc * dim, movable * 3) in 2D, (nc * dim, movable * 6) in 3D: ``dg/dq`` (eqs 13, 20).
+
+    Row of a direction d: (d, x_a x d) for body a and its negative, with x_b, for body b.
+    """
+    dim, nc = contacts.dim, len(contacts)
+    frames = contact_frames(contacts.normal)
+    size = 3 if dim == 2 else 6
+    values = np.empty((nc, dim, 2, size))
+    place = np.empty((nc, 2), dtype=np.int64)
+    for side, (bodies, sign) in enumerate(((contacts.body_a, 1.0), (contacts.body_b, -1.0))):
+        lever = contacts.point - position[bodies]
+        values[:, :, side, :dim] = sign * frames
+        values[:, :, side, dim:] = sign * _moment(lever[:, None, :], frames)
+        place[:, side] = np.where(bodies >= 0, columns[bodies], -1)
+    swap = place[:, 0] > place[:, 1]  # columns in ascending order
+    values[swap], place[swap] = values[swap][:, :, ::-1], place[swap][:, ::-1]
+    there = np.broadcast_to((place >= 0)[:, None, :, None], values.shape)
+    column = np.broadcast_to(place[:, None, :, None] * size + np.arange(size), values.shape)
+    counts = there.sum(axis=(2, 3)).ravel()
+    pointer = np.concatenate([[0], np.cumsum(counts)])
+    shape = (nc * dim, movable * size)
+    return sp.csr_array((values[there], column[there], pointer), shape=shape)
+
+
+def _moment(lever: Floats, force: Floats) -> Floats:
+    """``x x f``: one number (in a last axis of its own) in 2D, a vector in 3D."""
+    if lever.shape[-1] == 3:
+        return np.cross(lever, force)
+    return (lever[..., 0] * force[..., 1] - lever[..., 1] * force[..., 0])[..., None]
+
+
+def _turned(spin: Floats, arm: Floats) -> Floats:
+    """``w x r``."""
+    if arm.shape[-1] == 3:
+        return np.cross(spin, arm)
+    return np.stack([-spin * arm[..., 1], spin * arm[..., 0]], axis=-1)
+
+
+def _point_velocities(contacts: Contacts, motion: Motion, bodies: Ints, point: Floats) -> Floats:
+    there = (bodies >= 0)[:, None]
+    arm = point - motion.position[bodies]
+    return np.where(there, motion.velocity[bodies] + _turned(motion.spin[bodies], arm), 0.0)
+
+
+def relative_velocity(contacts: Contacts, motion: Motion) -> Floats:
+    """``u = J v`` with all bodies, moving or driven: (nc, dim) along n, t (n, t1, t2) [m/s]."""
+    a = _point_velocities(contacts, motion, contacts.body_a, contacts.point)
+    b = _point_velocities(contacts, motion, contacts.body_b, contacts.point)
+    return np.einsum("cij,cj->ci", contact_frames(contacts.normal), a - b)
+
+
+def inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
+    """The terms ``d2g/dq_k dq_l q'_k q'_l`` of eqs 14, 17 and 24, (nc, dim) [m/s^2].
+
+    Relative acceleration at the contacts while no force or torque acts.  With c the carrier of a
+    surface (a vertex, or a centre of curvature at the distance R behind the contact point), and
+    ``c' = v + w x x``, ``c'' = w x (w x x)``:
+
+        curved b:  n . (c_a'' - c_b'') + |tangential part of c_a' - c_b'|^2 / |c_a - c_b|
+        flat b:    n . (c_a'' - c_b'') + 2 (w_b x n) . (c_a' - c_b')
+
+    where in the second c_b is the point of body b at c_a.  Tangential, as the contact point c goes
+    on with ``c' = c_a' - R_a n'`` over both surfaces (a ball rolls) and not with either of them:
+
+        t . (w_a x (c' - v_a) - w_b x (c' - v_b))
+
+    In 3D, at edges, see `rigid_lcp.motion.equations`; crossing edges that slide along each other
+    are
+    taken to slide along b's, which matters to no force: friction then has the velocity's direction.
+    """
+    frames = contact_frames(contacts.normal)
+    n = contacts.normal
+    flat = np.isinf(contacts.radius_b)
+    carrier_a = contacts.point + contacts.radius_a[:, None] * n
+    behind = np.where(flat, 0.0, contacts.radius_b)
+    face = contacts.point - contacts.gap[:, None] * n
+    carrier_b = np.where(flat[:, None], carrier_a, face - behind[:, None] * n)
+    pull_a = _centripetal(contacts.body_a, motion, carrier_a)
+    moving = _point_velocities(contacts, motion, contacts.body_a, carrier_a) - _point_velocities(
+        contacts, motion, contacts.body_b, carrier_b
+    )
+    along = moving - (moving * n).sum(axis=1)[:, None] * n
+    apart = contacts.radius_a + behind + contacts.gap
+    curved = (along * along).sum(axis=1) / np.where(flat | (apart <= 0), 1.0, apart)
+    turning = _turned(_spin_of(contacts.body_b, motion), n)
+    normal = (n * (pull_a - _centripetal(contacts.body_b, motion, carrier_b))).sum(axis=1)
+    normal += np.where(flat, 2 * (turning * moving).sum(axis=1), curved)
+    normal_rate = np.where(
+        flat[:, None], turning, along / np.where(flat | (apart <= 0), 1.0, apart)[:, None]
+    )
+    edges = np.flatnonzero(np.any(contacts.edge_b != 0, axis=1))
+    if len(edges):
+        normal[edges], normal_rate[edges] = _across_edges(contacts[edges], motion)
+    point_rate = _point_velocities(contacts, motion, contacts.body_a, carrier_a)
+    point_rate -= contacts.radius_a[:, None] * normal_rate
+    pull = _turned(
+        _spin_of(contacts.body_a, motion), point_rate - motion.velocity[contacts.body_a]
+    ) - _turned(_spin_of(contacts.body_b, motion), point_rate - motion.velocity[contacts.body_b])
+    result = np.einsum("cij,cj->ci", frames, pull)
+    result[:, 0] = normal
+    return result
+
+
+def _across_edges(contacts: Contacts, motion: Motion) -> tuple[Floats, Floats]:
+    """Normal part (nc,) and ``n'`` (nc, 3) for contacts at an edge of b."""
+    a, b = contacts.body_a, contacts.body_b
+    carrier = contacts.point + contacts.radius_a[:, None] * contacts.normal
+    foot = contacts.point - contacts.gap[:, None] * contacts.normal
+    velocity = _point_velocities(contacts, motion, a, carrier)
+    velocity -= _point_velocities(contacts, motion, b, foot)
+    pull = _centripetal(a, motion, carrier) - _centripetal(b, motion, foot)
+    turns = _spin_of(a, motion), _spin_of(b, motion), velocity
+    return edge_acceleration(contacts, *turns, pull), edge_normal_rate(contacts, *turns)
+
+
+def _spin_of(bodies: Ints, motion: Motion) -> Floats:
+    there = bodies >= 0 if motion.dim == 2 else (bodies >= 0)[:, None]
+    return np.where(there, motion.spin[bodies], 0.0)
+
+
+def _centripetal(bodies: Ints, motion: Motion, point: Floats) -> Floats:
+    spin = _spin_of(bodies, motion)
+    arm = point - motion.position[bodies]
+    return _turned(spin, _turned(spin, arm))
+
+
+def find_contact_offset(contacts: Contacts, motion: Motion, free: Motion) -> Floats:
+    """b of eqs 17 and 24, (nc * dim,): relative accelerations without contact forces [m/s^2].
+
+    ``free`` has the accelerations that the loads alone would give as its velocities and spins.
+    """
+    loads = relative_velocity(contacts, free)
+    return (loads + inertial_acceleration(contacts, motion)).ravel()
+
+
+def edge_normal_rate(
+    contacts: Contacts, spin_a: Floats, spin_b: Floats, velocity: Floats
+) -> Floats:
+    """``dn/dt`` (nc, 3) [1/s] of contacts whose body b has an edge there.
+
+    ``spin_a``, ``spin_b`` (nc, 3) [rad/s]; ``velocity`` (nc, 3) [m/s]: that of a's carrier (point
+    of the edge, centre of the sphere) relative to the point of b's edge nearest to it.
+
+        edge a across edge b:  n || c = e_a x e_b,  dn/dt = (1 - n n^T) dc/dt / (n . c)
+        sphere on edge b:      e_b . dn/dt = -n . de_b/dt,  t . dn/dt = t . velocity / distance
+    """
+    n, e = contacts.normal, contacts.edge_b
+    turned_b = np.cross(spin_b, e)
+    across = np.cross(contacts.edge_a, e)
+    change = np.cross(np.cross(spin_a, contacts.edge_a), e) + np.cross(contacts.edge_a, turned_b)
+    signed = _dot(n, across)
+    crossing = (change - _dot(n, change)[:, None] * n) / np.where(signed == 0, 1.0, signed)[:, None]
+    side = np.cross(e, n)
+    distance = contacts.radius_a + contacts.gap
+    rolling = _dot(side, velocity) / np.where(distance == 0, 1.0, distance)
+    round_edge = -_dot(n, turned_b)[:, None] * e + rolling[:, None] * side
+    sharp = np.any(contacts.edge_a != 0, axis=1, keepdims=True)
+    return np.where(sharp, crossing, round_edge)
+
+
+def edge_acceleration(
+    contacts: Contacts, spin_a: Floats, spin_b: Floats, velocity: Floats, pull: Floats
+) -> Floats:
+    """``d2g/dt2`` (nc,) [m/s^2] of contacts with an edge, while no force acts.
+
+    With ``g + R = n . D``, D from a point of b's edge to a's carrier, and D along n now:
+    ``n . D'' + 2 n' . D' - |D| |n'|^2``.  ``velocity`` D' and ``pull`` D'' (nc, 3): those of the
+    carrier relative to the nearest point of b's edge.
+    """
+    rate = edge_normal_rate(contacts, spin_a, spin_b, velocity)
+    length = contacts.radius_a + contacts.gap
+    return _dot(contacts.normal, pull) + 2 * _dot(rate, velocity) - length * _dot(rate, rate)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("ci,ci->c", a, b), dtype=float)

@@ -1,0 +1,192 @@
+"""Overlaps at the end of a time step, taken out by moving bodies apart (split impulse).
+
+Each round moves by the smallest displacement weighted with mass, ``M^-1 J_N^T lambda`` with
+``lambda >= 0``, exact to the first order in it.  Velocities stay, so that nothing bounces off what
+was an error of the step.  What that changes:
+
+* Momentum and the centre of mass of bodies in flight: nothing.
+* Their angular momentum: by ``sum m dx x v``, dx the moves, v about the common centre of mass: at
+  most overlap times momentum; in space also by the turn of what spins.  (It could be put back by a
+  turn of all, but that would change their energy.)
+* Energy: bodies that lie on what is fixed are lifted, by at most their weight times the overlap.  A
+  body that comes to rest lost more in the same step.  Where a step would end with more energy than
+  it began with, `pay_lift` takes the lift from what restitution gave, or else from the kinetic
+  energy of the bodies moved.
+
+Who pays: a disc that lands on a floor is by ``v h / 2`` too deep at the midpoint, comes out again
+by the end if it bounces, and does not if it hands its velocity on to a disc above it.  It is then
+lifted, at rest, and what the lift costs is in the disc above.  Both got their velocities from
+impulses with restitution; so much less of it acts among the bodies that push each other as makes
+the energy that of the start.  That changes impulses alone, so it keeps momentum, and lets no pair
+approach that would not without restitution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from rigid_lcp.contact import Contacts
+from rigid_lcp.friction.auto import solve_friction
+from rigid_lcp.motion.equations import body_space
+from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
+from rigid_lcp.motion.world import World
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+OVERLAP = 1e-12
+"""Overlap that is left alone, as a share of the smallest body's size."""
+PROJECTION_TOLERANCE = 1e-9
+"""Residual of the displacements that take overlaps out; what is left is seen in the next step."""
+PROJECTIONS, OVERLAP_LEFT = 20, 1e-9
+"""Most times that overlaps are taken out after a step, and the share of the smallest body's size
+below which what a first time left (of second order) is left to the next step."""
+GREATEST_TURN = 0.1
+"""Turn of a body in one of these [rad]: beyond it the first order of a move means little."""
+TURNING, STIFF = 6, 1e-6
+"""After so many, turning costs ``1 / STIFF`` times as much: small grains between large ones may
+turn to and fro for ever, where the large ones must give way."""
+LEAST_COST = 1e-15
+"""Lifts that cost no more than this part of the energy are none [-]."""
+
+
+@dataclass(frozen=True)
+class Restitution:
+    """What restitution did in a step."""
+
+    body_a: Ints
+    body_b: Ints
+    """Bodies that pushed each other in the step, (nc,)."""
+    taken_out: Callable[[], Floats]
+    """What velocities would be without it, less what they are, (n, 3) or (n, 6) [m/s, 1/s]."""
+
+
+def remove_overlap(world: World, motion: Motion, touching: Contacts | None = None) -> Motion:
+    """Bodies moved apart until no two overlap: what turning, and impacts of more speed than the
+    contacts were looked for with, leave at the end of a step.  No velocity changes, but that spins
+    in space turn along with their bodies.  ``touching``: contacts without margin, where known."""
+    for done in range(PROJECTIONS):
+        if touching is None or done:
+            touching = world.contacts(motion, 0.0)
+        deepest = -float(touching.gap.min(initial=0.0))
+        if deepest <= (OVERLAP_LEFT if done else OVERLAP) * world.length:
+            break
+        found = world.contacts(motion, deepest)  # neighbours that the move may reach stay clear
+        inverse_mass = world.inverse_mass(motion)
+        if done >= TURNING:
+            weight = np.where(np.arange(world.size) < motion.dim, 1.0, STIFF**0.5)
+            scale = sp.diags_array(np.tile(weight, inverse_mass.shape[0] // world.size))
+            inverse_mass = sp.csr_array(scale @ inverse_mass @ scale)
+        bodies = body_space(found, motion.position, world.columns, inverse_mass)
+        offset = np.zeros((len(found), motion.dim))
+        offset[:, 0] = found.gap
+        apart = solve_friction(
+            bodies, offset.ravel(), 0.0, dim=motion.dim, tolerance=PROJECTION_TOLERANCE
+        )
+        move = np.zeros_like(motion.rates)
+        change = bodies.inverse_mass @ (bodies.jacobian.T @ apart.r)
+        move[world.movable] = np.asarray(change).reshape(-1, world.size)
+        turn = float(np.abs(move[:, motion.dim :]).max())
+        motion = shifted(motion, move * min(1.0, GREATEST_TURN / max(turn, 1e-300)))
+    return motion
+
+
+def shifted(motion: Motion, move: Floats) -> Motion:
+    """Bodies moved by ``move`` (n, 3) or (n, 6), in space with their spins turned along.
+
+    So spins are the same in the bodies' own frames, and kinetic energies stay.
+    """
+    after = displace_motion(motion, move)
+    if motion.dim == 2:
+        return after
+    from rigid_lcp.shapes import quaternion_of_rotation, rotate
+
+    return replace(after, spin=rotate(quaternion_of_rotation(move[:, 3:]), motion.spin))
+
+
+def part_bodies(
+    world: World, start: Motion, end: Motion, loads: Floats | None, h: float,
+    touching: Contacts | None = None, restitution: Restitution | None = None,
+) -> Motion:  # fmt: skip
+    """The end of a step of length ``h`` [s] from ``start``, without overlaps and without the
+    energy that taking them out would add; ``loads`` (n, 3) or (n, 6) [N, N m] at its midpoint.
+
+    ``touching``: contacts of ``end`` without margin, where known; ``restitution``: None where
+    nothing bounced.
+    """
+    parted = remove_overlap(world, end, touching)
+    if parted is end:
+        return end
+    work = 0.0
+    if loads is not None:
+        way = 0.5 * h * (start.rates + end.rates)[world.movable]
+        work = float((np.asarray(loads)[world.movable] * way).sum())
+    return pay_lift(world, end, parted, world.energy(start) + work, restitution)
+
+
+def pay_lift(
+    world: World, end: Motion, parted: Motion, budget: float,
+    restitution: Restitution | None = None,
+) -> Motion:  # fmt: skip
+    """Bodies slower by as much energy as the step has above ``budget`` [J], not more than the lift
+    from ``end`` to ``parted``.
+
+    First ``restitution`` pays among the bodies moved and those that touch them; then the bodies
+    moved, all slower by one factor; then those that touch them.  Where a fixed body moves it may
+    bring energy in, and nothing is taken.
+    """
+    if parted.rates[~world.movable].any():
+        return parted
+    energy = world.energy(parted)
+    owed = min(energy - world.energy(end), energy - budget)
+    none = LEAST_COST * abs(energy)
+    if owed <= none:
+        return parted
+    moved = world.movable & (parted.position != end.position).any(axis=1)
+    payers = [moved]
+    if restitution is not None:
+        near = join_bodies(world, moved, restitution)
+        parted = measure_energy_taken(world, parted, near, restitution.taken_out(), owed)
+        payers.append(near)
+    for bodies in payers:
+        owed -= energy - world.energy(parted)
+        energy = world.energy(parted)
+        if owed > none:
+            parted = measure_energy_taken(world, parted, bodies, -parted.rates, owed)
+    return parted
+
+
+def join_bodies(world: World, moved: Bools, restitution: Restitution) -> Bools:
+    """``moved`` bodies, and those that movable ones join to them by pushing each other, (n,)."""
+    a, b = restitution.body_a, restitution.body_b
+    both = world.movable[a] & world.movable[b]
+    count = len(moved)
+    pairs = sp.coo_array((np.ones(both.sum()), (a[both], b[both])), shape=(count, count))
+    _, label = connected_components(pairs, directed=False)
+    joined: Bools = world.movable & np.isin(label, label[moved])
+    return joined
+
+
+def measure_energy_taken(
+    world: World, motion: Motion, bodies: Bools, change: Floats, owed: float
+) -> Motion:
+    """``motion`` with as small a part of ``change`` (n, 3) or (n, 6) [m/s, 1/s] in the velocities
+    of ``bodies`` (n,) as takes ``owed`` [J] of energy, or the part that takes most, at most all."""
+    rates, change = motion.rates, np.where(bodies[:, None], change, 0.0)
+    moving = replace(motion, position=np.zeros_like(motion.position))  # kinetic energies alone
+    here = world.energy(moving)
+    half = world.energy(replace_rates(moving, rates + 0.5 * change)) - here
+    whole = world.energy(replace_rates(moving, rates + change)) - here
+    square, slope = 2.0 * whole - 4.0 * half, 4.0 * half - whole  # of the parabola in the part
+    if slope >= 0.0:
+        return motion
+    root = slope**2 - 4.0 * square * owed
+    part = 2.0 * owed / (root**0.5 - slope) if root > 0.0 else -slope / (2.0 * square)
+    return replace_rates(motion, rates + min(part, 1.0) * change)

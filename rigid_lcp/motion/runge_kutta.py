@@ -1,0 +1,295 @@
+"""Acceleration level: contact forces at every stage of a fourth-order Runge-Kutta step (section 9).
+
+A step, as in section 4 of the paper: contacts; collisions, where touching bodies approach (section
+7); the geometry equations (26) with Coulomb's law (27); integration.  A step that ends in an
+overlap is taken back and halved; after three clean steps the step is doubled, up to the longest
+one.  Four things are added to the paper:
+
+* Halving alone takes some twenty halvings to come down to a gap of 5e-10 of a body, and as many
+  doublings to get away from it.  So the step that is tried for the one taken back ends where the
+  gap closes, by the cubic through gap and approach at its two ends; the half is tried where these
+  are not known (`find_share_until_touch`; ``Pace.locating`` turns it off).  A dozen grains that
+  bounce
+  in a box, 230 collisions: 5 steps each, by halving alone 72, and an eighth of the time.
+* Bounces that get shorter without end (Zeno) are cut off: an approach slower than 1e-4 of
+  the free-fall speed over a body's size (``REST_SPEED``) is a collision without restitution.
+  Collisions are those of `rigid_lcp.collision.collide`.
+* A sliding contact keeps the direction of its friction during a step.  A step in which it comes
+  to rest is taken back and shortened to end there; from then on it may stick.
+* Gaps and velocities of lasting contacts are put back to zero after each step, as the second
+  derivative of a gap alone would let them drift (by the fifth power of the step).
+
+Use it for few bodies and where order counts; where forces do not exist (Painleve) it raises
+`NoSolution`, and velocity-level time stepping goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.contact import ContactForces, Contacts
+from rigid_lcp.errors import NoSolution, NotConverged, Overlapping, ProblemError, RigidError
+from rigid_lcp.motion.acceleration_forces import find_forces
+from rigid_lcp.motion.checks import Loads
+from rigid_lcp.motion.equations import body_space, find_contact_offset
+from rigid_lcp.motion.finite_states import is_finite, too_much
+from rigid_lcp.motion.lasting_contacts import (
+    OVERLAP,
+    Lasting,
+    collided,
+    find_share_until_rest,
+    find_share_until_touch,
+    lasting_contacts,
+    overlap_beyond,
+    redetect_contacts,
+    remove_drift,
+)
+from rigid_lcp.motion.state import Motion, replace_rates
+from rigid_lcp.motion.time_stepping import contact_forces
+from rigid_lcp.motion.world import World
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+CLEAN_STEPS = 3
+"""Steps without an overlap before the step is doubled (section 9)."""
+SHORTEST = 1e-12
+"""Shortest step as a share of the longest one."""
+MOST_STEPS = 10_000_000
+"""Steps that one call may take: what moves too fast for its size would never end."""
+LOCATED = 8
+"""Times that the end of one step is located; then it is halved as in section 9."""
+NO_FORCES = 1e-6
+"""Step, as a share of the longest one, at which a state without finite forces is taken for one."""
+TRAVEL = 0.25
+"""Way a body may go in one step, in sizes of the smallest body: nothing jumps over another."""
+
+
+@dataclass
+class Pace:
+    """The step control's memory, and what it has counted."""
+
+    longest: float
+    """Longest step [s]."""
+    step: float
+    """Step that is tried next [s]."""
+    locating: bool = True
+    """Whether a step that is taken back is tried to where the gap closes; else its half is."""
+    clean: int = 0
+    """Steps since the last overlap."""
+    accepted: int = 0
+    halved: int = 0
+    """Steps taken back because bodies overlapped."""
+    shortened: int = 0
+    """Steps taken back because a sliding contact came to rest within them, bodies went too far, or
+    a stage had no forces."""
+    collisions: int = 0
+    scaled: int = 0
+    """Collisions whose restitution was scaled down (`rigid_lcp.collision.restitution_scale`)."""
+    cut_off: int = 0
+    """Collisions that ran out of rounds (`rigid_lcp.collision.impulses`)."""
+    worst_residual: float = 0.0
+    steps_above: int = 0
+    """Steps with a stage whose forces were found no better than the tolerance."""
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Time derivative of a state, and the contact forces behind it."""
+
+    position: Floats
+    angle: Floats
+    rates: Floats
+    contacts: Contacts
+    force: Floats
+    """(nc, dim) [N]."""
+    acceleration: Floats
+    """Relative, (nc, dim) [m/s^2]."""
+    residual: float = 0.0
+    """Error of the forces (`forces_error`) [-]."""
+
+
+def advance_runge_kutta(
+    world: World, motion: Motion, time: float, seconds: float, pace: Pace, loads: Loads | None,
+    tolerance: float,
+) -> tuple[Motion, ContactForces]:  # fmt: skip
+    """The state ``seconds`` [s] later, and the forces at the start of the last step.
+
+    Raises `NoSolution` (Painleve), `NotConverged` or `Overlapping` where no step is short enough,
+    `SceneError` where a state would not be finite.
+    """
+    end, forces = time + seconds, None
+    fastest = _travel_limit(world, motion)
+    if seconds > MOST_STEPS * fastest:
+        raise NotConverged(
+            f"{seconds:g} s take more than {MOST_STEPS:.0e} steps, so fast do bodies go or turn",
+            where=f"time {time:.9g} s", remedy="use method='time-stepping'",
+        )  # fmt: skip
+    while end - time > SHORTEST * pace.longest or forces is None:
+        motion, collision = collided(world, motion, tolerance)
+        pace.collisions += collision is not None
+        pace.scaled += collision is not None and collision.restitution_scale < 1.0
+        pace.cut_off += collision is not None and collision.cut_off
+        lasting = lasting_contacts(world, motion)
+        tried, located = pace.step, 0
+        while True:
+            h = min(tried, end - time, _travel_limit(world, motion))
+            try:
+                rates, after = step_runge_kutta(world, motion, time, h, lasting, loads, tolerance)
+            except NoSolution:  # of a stage, perhaps, that the motion does not come to
+                if h < NO_FORCES * pace.longest:
+                    raise
+                tried = h / 2
+                pace.shortened += 1
+                continue
+            except ProblemError as error:
+                pull = _pull(loads, time, motion)
+                raise too_much(world, motion, pull, h, time, error) from error
+            if not is_finite(world, after):  # speeds so great leave no step that is long enough
+                raise too_much(world, motion, _pull(loads, time, motion), h, time)
+            first, last = rates[0], rates[-1]
+            pressed, stuck = lasting_keys(first, last)
+            overlap = overlap_beyond(world, after, pressed)
+            stop = find_share_until_rest(world, motion, after, h, lasting)
+            far = _travel_limit(world, after)
+            if overlap > OVERLAP * world.length:
+                share = None
+                if pace.locating and located < LOCATED:
+                    share = find_share_until_touch(world, motion, after, h, pressed)
+                if share is None or located == 0:
+                    pace.step, pace.clean = h / 2, 0
+                tried, located = h * (0.5 if share is None else share), located + 1
+                pace.halved += 1
+            elif stop < 1.0:
+                tried = h * stop
+                pace.shortened += 1
+            elif far < 0.5 * h:  # by even acceleration the way is half of what the end's speed has
+                tried = min(0.5, np.sqrt(2 * far / h)) * h
+                pace.shortened += 1
+            else:
+                break
+            if tried < SHORTEST * pace.longest:
+                raise _no_step(world, after, overlap, time)
+        time += h
+        pace.accepted += 1
+        pace.clean += 1
+        residual = max(rate.residual for rate in rates)
+        pace.worst_residual = max(pace.worst_residual, residual)
+        pace.steps_above += residual > tolerance
+        if pace.clean >= CLEAN_STEPS:
+            pace.step, pace.clean = min(2 * pace.step, pace.longest), 0
+        forces = contact_forces(first.contacts, first.force, first.acceleration, 1.0)
+        motion = remove_drift(world, after, pressed, stuck)
+    assert forces is not None
+    return motion, forces
+
+
+def step_runge_kutta(
+    world: World, motion: Motion, time: float, h: float, lasting: Lasting, loads: Loads | None,
+    tolerance: float,
+) -> tuple[list[Rate], Motion]:  # fmt: skip
+    """One classical fourth-order step: the rates of its four stages, and its end."""
+
+    def rate_at(part: float, previous: Rate | None) -> Rate:
+        stage = motion if previous is None else moved(motion, part * h, [(1.0, previous)])
+        pull = _pull(loads, time + part * h, stage)
+        return find_state_rate(world, stage, h, lasting, pull, tolerance)
+
+    first = rate_at(0.0, None)
+    second = rate_at(0.5, first)
+    third = rate_at(0.5, second)
+    fourth = rate_at(1.0, third)
+    weights = [(1 / 6, first), (1 / 3, second), (1 / 3, third), (1 / 6, fourth)]
+    return [first, second, third, fourth], moved(motion, h, weights)
+
+
+def moved(motion: Motion, h: float, weights: list[tuple[float, Rate]]) -> Motion:
+    """The state moved for ``h`` [s] with a weighted mean of rates."""
+    position = motion.position + h * sum(w * rate.position for w, rate in weights)
+    angle = motion.angle + h * sum(w * rate.angle for w, rate in weights)
+    if motion.dim == 3:
+        angle = angle / np.linalg.norm(angle, axis=1)[:, None]
+    rates = motion.rates + h * sum(w * rate.rates for w, rate in weights)
+    return replace_rates(replace(motion, position=position, angle=angle), rates)
+
+
+def find_state_rate(
+    world: World, motion: Motion, h: float, lasting: Lasting, loads: ArrayLike | None,
+    tolerance: float,
+) -> Rate:  # fmt: skip
+    """Velocities and accelerations of a state, its lasting contacts taken as closed (eq. 26)."""
+    if motion.dim == 3:
+        from rigid_lcp.shapes import quaternion_rate
+
+        turning = quaternion_rate(motion.angle, motion.spin)
+    else:
+        turning = motion.spin
+    free = world.accelerations(motion, loads)
+    contacts, slip = redetect_contacts(world, motion, h, lasting)
+    if len(contacts) == 0:
+        none = np.zeros((0, motion.dim))
+        return Rate(motion.velocity, turning, free, contacts, none, none)
+    bodies = body_space(contacts, motion.position, world.columns, world.inverse_mass(motion))
+    offset = find_contact_offset(contacts, motion, replace_rates(motion, free))
+    gravity = float(np.linalg.norm(world.scene.gravity))
+    solution, error = find_forces(bodies, offset, contacts.friction, slip, tolerance, gravity)
+    change = bodies.inverse_mass @ (bodies.jacobian.T @ solution.r)
+    free[world.movable] += np.asarray(change).reshape(-1, world.size)
+    shape = (-1, motion.dim)
+    return Rate(
+        motion.velocity, turning, free, contacts, solution.r.reshape(shape),
+        solution.u.reshape(shape), error,
+    )  # fmt: skip
+
+
+def _pull(loads: Loads | None, time: float, motion: Motion) -> ArrayLike | None:
+    return None if loads is None else loads(time, motion)
+
+
+def _no_step(world: World, motion: Motion, overlap: float, time: float) -> RigidError:
+    """What is wrong with the end ``motion`` of the shortest step, which may have an ``overlap``."""
+    where, remedy = f"time {time:.9g} s", "use method='time-stepping'"
+    if overlap > OVERLAP * world.length:
+        return Overlapping(
+            f"bodies overlap by {overlap:.2g} m after the shortest step", where=where,
+            remedy=f"{remedy}, which removes overlaps",
+        )  # fmt: skip
+    speed = _speeds(world, motion)
+    body = int(np.argmax(speed))
+    return NotConverged(
+        f"the shortest step is too long for it; its points go at {speed[body]:.3g} m/s",
+        where=f"{world.scene.called(body)}, {where}",
+        remedy=f"look at its loads and at gravity, or {remedy}",
+    )
+
+
+def _speeds(world: World, motion: Motion) -> Floats:
+    """Bound of the velocity of each body's points [m/s], (n,)."""
+    turning = np.linalg.norm(motion.rates[:, motion.dim :], axis=1) * world.reach
+    return np.asarray(np.linalg.norm(motion.velocity, axis=1) + turning)
+
+
+def _travel_limit(world: World, motion: Motion) -> float:
+    fastest = float(_speeds(world, motion).max())
+    return TRAVEL * world.length / fastest if fastest > 0 else np.inf
+
+
+def lasting_keys(first: Rate, last: Rate) -> tuple[Ints, Ints]:
+    """Keys of contacts that press at the first and last stage; of those that stick at both.
+
+    Contacts that took the place of others on the way (`successors`) have no first stage.
+    """
+    pressed, stuck = [], []
+    for rate in (first, last):
+        normal, tangential = rate.force[:, 0], np.linalg.norm(rate.force[:, 1:], axis=1)
+        below = tangential < rate.contacts.friction * normal * (1 - 1e-9)
+        pressed.append(rate.contacts.key[normal > 0])
+        stuck.append(rate.contacts.key[(normal > 0) & below])
+    new = np.setdiff1d(last.contacts.key, first.contacts.key)
+    return (
+        np.intersect1d(np.union1d(pressed[0], new), pressed[1]),
+        np.intersect1d(np.union1d(stuck[0], new), stuck[1]),
+    )

@@ -1,0 +1,57 @@
+"""State of the bodies: where they are and how fast; plain arrays, advanced by functions.
+
+Generalised velocities are one vector, body after body: (x, y, phi) in 2D, (x, y, z, and the spin
+in the world frame) in 3D.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Positions and velocities of n bodies, fixed ones included."""
+
+    position: Floats
+    """Centres of mass [m], (n, dim)."""
+    angle: Floats
+    """2D: angles [rad], (n,), anticlockwise; 3D: unit quaternions (w, x, y, z), (n, 4)."""
+    velocity: Floats
+    """Velocities of the centres of mass [m/s], (n, dim)."""
+    spin: Floats
+    """Spins [rad/s]: (n,) in 2D, (n, 3) in the world frame in 3D."""
+
+    @property
+    def dim(self) -> int:
+        """2 or 3."""
+        return self.position.shape[1]
+
+    @property
+    def rates(self) -> Floats:
+        """Generalised velocities (n, 3) in 2D, (n, 6) in 3D [m/s, rad/s]."""
+        return np.column_stack([self.velocity, self.spin])
+
+
+def replace_rates(motion: Motion, rates: Floats) -> Motion:
+    """The same places with generalised velocities ``rates`` (n, 3) or (n, 6)."""
+    dim = motion.dim
+    spin = rates[:, 2] if dim == 2 else rates[:, 3:]
+    return Motion(motion.position, motion.angle, rates[:, :dim].copy(), spin.copy())
+
+
+def displace_motion(motion: Motion, move: Floats) -> Motion:
+    """Bodies moved by ``move`` (n, 3) [m, rad] or (n, 6) [m, rotation vector]; same velocities."""
+    dim = motion.dim
+    if dim == 2:
+        angle = motion.angle + move[:, 2]
+    else:
+        from rigid_lcp.shapes import turn_quaternion
+
+        angle = turn_quaternion(motion.angle, move[:, 3:])
+    return Motion(motion.position + move[:, :dim], angle, motion.velocity, motion.spin)

@@ -1,0 +1,350 @@
+"""Velocity-level time stepping (Moreau and Jean): impulses instead of forces.
+
+One step of length h, with the geometry of the midpoint ``q_m = q + h/2 v``:
+
+    M (v+ - v) = h f + J^T p        K* contains u + mu |u_T| n, orthogonal to p in K   (eq. 27)
+    q+ = q_m + h/2 v+
+
+where u is J v+ at the end of the step, ``J(q_m) v+ + h/2 J' v`` (the inertial terms of eq. 24),
+with the normal part shifted by the contact's own law: Newton's restitution ``u_N+ + e u_N-`` where
+two bodies are about to collide, else ``u_N+ + 2 g / h`` for a contact that is open at the midpoint,
+by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur. J. Mech. 13 (1994)
+93; Jean, CMAME 177 (1999) 235).  Without friction no step adds energy: the mean of ``J v`` and
+``J v+`` is never positive where p_N is not zero (to the second order in h where J turns), and what
+spins freely keeps its energy (`rigid_lcp.motion.free_rotation`); with restitution 1 a bounce
+keeps it to round-off, of bodies that turn as well, and so do chains of collisions within the step
+(`rigid_lcp.collision.passing`, `rigid_lcp.motion.struck_bodies`) unless they run out of rounds,
+which is
+reported.  An approach no faster than what gravity gives in a step, ``g h``, does not bounce.  With
+friction a body that comes to rest within a step may gain up to ``m (h |f/m|)^2 / 8``, and
+restitution is scaled down where it would make more, or where wedged bodies have no impulses that
+let them bounce (`rigid_lcp.collision.restitution_scale`).
+
+What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart
+(`rigid_lcp.motion.overlap_removal`).  That keeps momentum; the angular momentum of bodies that
+slide upon
+each other it changes, by a part of first order in h.
+
+Use it where forces do not exist (Painleve) or where events are too many to be met one by one; it
+is of first order in h where contacts open and close, of second order in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.collision import (
+    Closing,
+    Impulses,
+    Share,
+    StepVelocities,
+    find_bouncing,
+    find_contact_shift,
+    find_hit_by_others,
+    find_impulses_in_turn,
+    gains_energy,
+)
+from rigid_lcp.contact import ContactForces, Contacts, contact_frames, contact_rows
+from rigid_lcp.errors import NotConverged
+from rigid_lcp.friction.auto import solve_friction
+from rigid_lcp.friction.problem import BodySpace, FrictionSolution
+from rigid_lcp.motion.equations import body_space, inertial_acceleration, relative_velocity
+from rigid_lcp.motion.overlap_removal import OVERLAP, Restitution, part_bodies
+from rigid_lcp.motion.state import Motion, replace_rates
+from rigid_lcp.motion.struck_bodies import (
+    find_contacts_of_struck,
+    find_missed_collisions,
+    moreau_margin,
+)
+from rigid_lcp.motion.world import World
+
+Floats = NDArray[np.float64]
+SolveFrom = Callable[..., tuple[FrictionSolution, float]]
+"""Impulses and their error [-] from the contacts' `BodySpace`, q (nc, dim), friction (nc,) and, if
+known, a start (nc * dim,)."""
+
+SHARE_LEFT = 0.1
+"""Part of the offending velocities that a solution may leave before its forces are called wrong."""
+START_AGAIN = 1e-4
+"""Error of the forces above which they are looked for once more, from nothing, and without the
+inertial terms that ask bodies to part: those are of the velocities before the step."""
+WIDENINGS = 10
+"""Most times that a step is made again as bodies were struck that then struck others; what is left
+are overlaps, taken out, and collisions of the next step."""
+GREATEST_TURN = np.pi
+"""Angle [rad] that a body may turn within a step: beyond it midpoint geometry means nothing."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step that was made: the state after it, the forces in it, how well they were found."""
+
+    motion: Motion
+    contacts: ContactForces
+    residual: float
+    """Error of the impulses (scale-free natural residual), see `forces_error` [-]."""
+    message: str = ""
+    """What the solver has to say of impulses that it did not find."""
+    scaled: bool = False
+    """Whether restitution was scaled down (`rigid_lcp.collision.restitution_scale`)."""
+    cut_off: bool = False
+    """Whether collisions were closed without restitution (`rigid_lcp.collision.passing`)."""
+
+
+def step_moreau(
+    world: World, motion: Motion, loads: ArrayLike | None, h: float,
+    known: ContactForces | None, tolerance: float, accept: float = 0.0,
+) -> Step:  # fmt: skip
+    """One step of length ``h`` [s].
+
+    ``loads`` (n, 3) or (n, 6) [N, N m] at the midpoint, or None; ``known``: contacts of the last
+    step, whose forces the solver starts from; ``tolerance``: scale-free residual, and
+    ``accept``, as `solve_friction` has them.  Raises `NotConverged` for a body that turns by more
+    than half a turn within the step.
+    """
+    _refuse_fast_spin(world, motion, h)
+    middle = world.drifted(motion, 0.5 * h)
+    pull = None if loads is None else np.asarray(loads, dtype=float)
+    accelerations = world.accelerations(middle, pull, gyroscopic=False)
+    free = replace_rates(middle, middle.rates + h * accelerations)
+    margin = moreau_margin(world, motion, accelerations, h)
+    contacts = world.contacts(middle, margin)
+    if len(contacts) == 0:
+        end = part_bodies(world, motion, world.drifted(free, 0.5 * h), pull, h)
+        return Step(end, contact_forces(contacts, np.zeros((0, motion.dim)), None, h), 0.0)
+    slow = float(np.linalg.norm(world.scene.gravity)) * h
+    solve = partial(judge_impulses, slow=slow, tolerance=tolerance, accept=accept)
+    for turn in range(WIDENINGS + 1):
+        made = detect_step_contacts(world, contacts, middle, free, h, solve, known)
+        end = world.drifted(made.after, 0.5 * h)
+        touching = world.contacts(end, 0.0)
+        struck = find_missed_collisions(world, contacts, end, touching, slow)
+        if turn == WIDENINGS or not struck.any():
+            break
+        wider, margin = find_contacts_of_struck(world, middle, margin, struck, end, h)
+        if len(wider) == len(contacts):
+            break
+        contacts = wider
+    end = part_bodies(world, motion, end, pull, h, touching, made.restitution)
+    found = made.impulses
+    forces = contact_forces(contacts, found.impulse, found.velocity, h)
+    return Step(end, forces, found.error, found.message, made.scaled, found.cut_off)
+
+
+@dataclass(frozen=True)
+class Made:
+    """What contacts did in a step."""
+
+    impulses: Impulses
+    after: Motion
+    """The bodies at the midpoint, with their rates at the end."""
+    scaled: bool
+    """Whether restitution was scaled down."""
+    restitution: Restitution | None
+    """What restitution did; None where nothing bounced."""
+
+
+def detect_step_contacts(
+    world: World, contacts: Contacts, middle: Motion, free: Motion, h: float, solve: SolveFrom,
+    known: ContactForces | None,
+) -> Made:  # fmt: skip
+    """Impulses of the contacts of a step, with as much restitution as makes no energy, and the
+    rates they leave; ``middle`` and ``free`` as `find_closing_contacts` has them."""
+    bodies = body_space(contacts, middle.position, world.columns, world.inverse_mass(middle))
+    closing = find_closing_contacts(world, contacts, middle, free, h)
+    found = find_step_impulses(bodies, closing, solve, keep_known_impulses(contacts, known, h))
+    velocities = StepVelocities(
+        relative_velocity(contacts, middle), relative_velocity(contacts, free),
+        (free.rates - middle.rates)[world.movable],
+    )  # fmt: skip
+    share, full = Share(len(contacts)), closing.restitution
+    while (bounce := find_bouncing(closing)).any():
+        if found.error > START_AGAIN:  # wedged bodies may have no impulses to bounce with
+            share.leave_out()
+        elif not share.next(gains_energy(bodies, closing, velocities, found, bounce)):
+            break
+        closing = replace(closing, restitution=share.now * full)
+        found = find_step_impulses(bodies, closing, solve, None)
+    restitution = None
+    if bounce.any():
+        restitution = Restitution(
+            contacts.body_a, contacts.body_b,
+            partial(_take_out_restitution, world, bodies, closing, found, solve),
+        )  # fmt: skip
+    rates = free.rates
+    rates[world.movable] += _velocities(bodies, found.impulse, world.size)
+    after = replace_rates(middle, rates)
+    return Made(found, after, bool((share.now < 1.0).any()), restitution)
+
+
+def _take_out_restitution(
+    world: World, bodies: BodySpace, closing: Closing, found: Impulses, solve: SolveFrom
+) -> Floats:
+    """What the rates (n, 3) or (n, 6) would be without restitution, less what they are."""
+    inelastic = replace(closing, restitution=np.zeros_like(closing.restitution))
+    calm = find_impulses_at_once(bodies, inelastic, solve, None)
+    change = np.zeros((len(world.mass), world.size))
+    change[world.movable] = _velocities(bodies, calm.impulse - found.impulse, world.size)
+    return change
+
+
+def find_closing_contacts(
+    world: World, contacts: Contacts, middle: Motion, free: Motion, h: float
+) -> Closing:
+    """Gaps and relative velocities that the law of a step asks for (eq. 24).
+
+    ``middle``: the bodies at the midpoint with the rates of the start, ``free`` with those that
+    they would have at the end without impulses.
+    """
+    turning = 0.5 * h * inertial_acceleration(find_planes_at_corners(contacts), middle)
+    if middle.dim == 3:  # spins change also while no force acts
+        coasting = replace_rates(middle, world.coasting(middle))
+        turning += 0.5 * h * relative_velocity(contacts, coasting)
+    return Closing(
+        restitution=contacts.restitution,
+        friction=contacts.friction,
+        gap=contacts.gap - 0.25 * h * turning[:, 0],
+        before=relative_velocity(contacts, middle)[:, 0] - turning[:, 0],
+        offset=relative_velocity(contacts, free) + turning,
+        turning=turning[:, 0],
+        slow=float(np.linalg.norm(world.scene.gravity)) * h,
+        h=h,
+        touching=OVERLAP * world.length,
+    )
+
+
+def find_step_impulses(
+    bodies: BodySpace, closing: Closing, solve: SolveFrom,
+    start: Floats | None,
+) -> Impulses:  # fmt: skip
+    """Impulses of all contacts together, or in turn where collisions are passed on."""
+    found = find_impulses_at_once(bodies, closing, solve, start)
+    diagonal = bodies.diagonal[:: closing.offset.shape[1]]
+    if find_hit_by_others(closing, find_bouncing(closing), found, diagonal).any():
+        found = find_impulses_in_turn(bodies, closing, solve)
+    return found
+
+
+def find_impulses_at_once(
+    bodies: BodySpace, closing: Closing, solve: SolveFrom,
+    start: Floats | None,
+) -> Impulses:  # fmt: skip
+    """Impulses that answer to all contacts together (eq. 27), looked for from ``start``."""
+    bounce = find_bouncing(closing)
+    shift = find_contact_shift(closing, bounce)
+    solution, error = solve(bodies, closing.offset + shift, closing.friction, start)
+    if error > START_AGAIN:  # jammed bodies may have no forces that part them as they turned
+        shift = find_contact_shift(closing, bounce, closing.turning)
+        solution, error = solve(bodies, closing.offset + shift, closing.friction)
+    velocity = solution.u.reshape(shift.shape) - shift
+    return Impulses(solution.r.reshape(shift.shape), velocity, error, solution.message)
+
+
+def find_planes_at_corners(contacts: Contacts) -> Contacts:
+    """Contacts whose corners on corners and edges are corners on the plane across the normal.
+
+    The distance of two points has a curvature of 1 over itself: it tells how the gap grows only
+    for times far below a step.  The plane parts the two bodies, so it is safe, and at most the
+    way of a step too careful with bodies that would just pass.
+    """
+    corners = (contacts.radius_a == 0) & (contacts.radius_b == 0)
+    if not corners.any():
+        return contacts
+    flat = np.where(corners, np.inf, contacts.radius_b)
+    return replace(contacts, radius_b=flat, edge_b=np.where(corners[:, None], 0.0, contacts.edge_b))
+
+
+def find_impulses(
+    bodies: BodySpace, offset: Floats, friction: Floats, start: Floats | None, tolerance: float,
+    accept: float = 0.0,
+) -> FrictionSolution:  # fmt: skip
+    """Impulses (or forces, displacements) of contacts with ``offset`` q (nc, dim)."""
+    return solve_friction(
+        bodies, offset.ravel(), friction, dim=offset.shape[1], start=start, tolerance=tolerance,
+        accept=accept,
+    )  # fmt: skip
+
+
+def judge_impulses(
+    bodies: BodySpace, offset: Floats, friction: Floats, start: Floats | None = None, *,
+    slow: float, tolerance: float, accept: float,
+) -> tuple[FrictionSolution, float]:  # fmt: skip
+    """Impulses and their `forces_error`, ``slow`` the velocity that gravity gives in a step."""
+    found = find_impulses(bodies, offset, friction, start, tolerance, accept)
+    return found, forces_error(bodies, found, slow, offset)
+
+
+def forces_error(
+    bodies: BodySpace, solution: FrictionSolution, free: float, offset: Floats | None = None
+) -> float:
+    """The residual of a solution over the forces that matter [-].
+
+    The natural map over ``|r|``, or over what the velocities (accelerations) ``free`` of gravity
+    would need at every contact where r is smaller: contacts that carry next to nothing have no
+    scale of their own.  Self-stress without bound would hide any error behind ``|r|``: where the
+    map leaves more than `SHARE_LEFT` of the velocities in ``offset`` q (if given), that share is
+    the error.
+    """
+    if len(solution.r) == 0 or solution.residual == 0.0:
+        return 0.0
+    rho = 1.0 / float(bodies.diagonal.mean())
+    size = float(np.linalg.norm(solution.r))
+    own = size or rho * float(np.linalg.norm(solution.u))
+    least = rho * free * len(solution.r) ** 0.5
+    left = solution.residual * own
+    error = left / max(size, least, 1e-300)
+    if offset is None:
+        return error
+    share = left / max(rho * float(np.linalg.norm(offset)), least, 1e-300)
+    return share if share > SHARE_LEFT else error
+
+
+def keep_known_impulses(contacts: Contacts, known: ContactForces | None, h: float) -> Floats | None:
+    """Impulses (nc * dim,) that the contacts of the last step had, zero for new ones [N s]."""
+    if known is None or len(known) == 0:
+        return None
+    rows, there = contact_rows(known.key, contacts.key)
+    force = np.where(there[:, None], known.force[rows], 0.0)
+    return np.einsum("cij,cj->ci", contact_frames(contacts.normal), h * force).ravel()
+
+
+def contact_forces(
+    contacts: Contacts, impulse: Floats, velocity: Floats | None, h: float
+) -> ContactForces:
+    """Contacts with the mean forces of a step of length ``h``: impulse (nc, dim) [N s] over h."""
+    force = impulse / h
+    normal, tangential = force[:, 0], force[:, 1:]
+    amount = np.linalg.norm(tangential, axis=1)
+    sliding = amount >= contacts.friction * normal * (1 - 1e-9)
+    if velocity is not None:
+        slip = np.linalg.norm(velocity[:, 1:], axis=1)
+        sliding &= slip > 1e-9 * np.abs(velocity).max(initial=0.0)
+    status = np.where(normal <= 0, "open", np.where(sliding, "slide", "stick"))
+    if contacts.dim == 3:
+        frames = contact_frames(contacts.normal)
+        tangential = np.einsum("ci,cij->cj", tangential, frames[:, 1:])
+    else:
+        tangential = tangential[:, 0]
+    given = {name: getattr(contacts, name) for name in Contacts.__dataclass_fields__}
+    return ContactForces(**given, normal_force=normal, tangential_force=tangential, status=status)
+
+
+def _refuse_fast_spin(world: World, motion: Motion, h: float) -> None:
+    spin = np.abs(motion.spin) if motion.dim == 2 else np.linalg.norm(motion.spin, axis=1)
+    if (h * spin > GREATEST_TURN).any():
+        worst = int(np.argmax(spin))
+        raise NotConverged(
+            f"it turns by {h * spin[worst]:.3g} rad within a step", where=world.scene.called(worst),
+            remedy=f"take a step shorter than {GREATEST_TURN / spin[worst]:.3g} s",
+        )  # fmt: skip
+
+
+def _velocities(bodies: BodySpace, impulse: Floats, size: int) -> Floats:
+    """``M^-1 J^T p`` of the movable bodies, (nb, size)."""
+    change = bodies.inverse_mass @ (bodies.jacobian.T @ impulse.ravel())
+    return np.asarray(change).reshape(-1, size)

@@ -1,0 +1,316 @@
+"""A scene: bodies with shape, mass and surface, gravity; and what the equations need of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.contact import Contacts, detect_2d, shapes_2d
+from rigid_lcp.errors import SceneError
+from rigid_lcp.friction.problem import MOST_FRICTION
+from rigid_lcp.motion.checks import (
+    MOST_OF_A_STATE,
+    check_half_space,
+    require_density,
+    require_number_in,
+)
+from rigid_lcp.motion.state import Motion, displace_motion
+from rigid_lcp.shapes import HalfSpace, require_vector
+
+if TYPE_CHECKING:
+    from rigid_lcp.motion.gyroscopic import PrincipalInertia
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Body:
+    """One body of a scene, as it starts."""
+
+    shape: Any
+    mass: float
+    """Mass [kg], inf for a fixed body."""
+    inertia: Any
+    """Moment of inertia [kg m^2]: a number in 2D, a tensor (3, 3) in the body's frame in 3D."""
+    position: Floats
+    angle: Any
+    velocity: Floats
+    spin: Any
+    friction: float | None
+    restitution: float | None
+    name: str
+
+    @property
+    def movable(self) -> bool:
+        """It follows from forces where the body goes."""
+        return isfinite(self.mass)
+
+
+class Scene:
+    """Bodies and gravity.  ``gravity`` (dim,) [m/s^2]; the default pulls along the last axis."""
+
+    def __init__(self, dim: int = 2, gravity: ArrayLike | None = None) -> None:
+        if not isinstance(dim, int | np.integer) or dim not in (2, 3):
+            raise SceneError(f"dim is {dim!r}", where="scene", remedy="give 2 or 3")
+        self.dim = int(dim)
+        default = np.zeros(dim)
+        default[-1] = -9.81
+        self.gravity = (
+            default
+            if gravity is None
+            else require_vector(gravity, dim, "gravity", "scene", MOST_OF_A_STATE)
+        )
+        self.bodies: list[Body] = []
+
+    def called(self, body: int) -> str:
+        """Name of a body for messages; its number where it has none."""
+        return self.bodies[body].name or f"body {body}"
+
+    def add(
+        self, shape: Any, *, density: float | None = None, position: ArrayLike | None = None,
+        angle: Any = None, velocity: ArrayLike | None = None, spin: Any = None,
+        friction: float | None = None, restitution: float | None = None, fixed: bool = False,
+        name: str = "",
+    ) -> int:  # fmt: skip
+        """Add a body; returns its number.
+
+        ``density`` [kg/m^3], in 2D [kg/m^2]: of a body that moves; ``fixed`` ones need none, keep
+        the ``velocity`` they are given, and half-spaces always are.  ``position`` of the centre of
+        mass [m]; without it, the body stays where its vertices were given.  ``angle`` [rad], in 3D
+        a quaternion (w, x, y, z).  ``velocity`` [m/s], ``spin`` [rad/s].  ``friction`` and
+        ``restitution`` of a contact are the smaller of its two bodies'; a body without a value
+        leaves it to the other; without any both are zero.  Raises `SceneError`.
+        """
+        where = name or f"body {len(self.bodies)}"
+        if isinstance(shape, type) or getattr(shape, "dim", None) != self.dim:
+            raise SceneError(
+                f"{type(shape).__name__} is no shape of {self.dim} dimensions", where=where,
+                remedy=f"use a shape with dim {self.dim}",
+            )  # fmt: skip
+        if not isinstance(fixed, bool | np.bool_):
+            raise SceneError(f"fixed is {fixed!r}", where=where, remedy="give True or False")
+        if isinstance(shape, HalfSpace):
+            check_half_space(shape, position, angle, velocity, spin, where)
+            fixed = True
+        mass, inertia = np.inf, np.inf
+        if not fixed:
+            otherwise = ", or fixed=True for a body that does not move"
+            density = require_density(density, where, otherwise)
+            mass, inertia = shape.mass_properties(density)
+        if friction is not None:
+            remedy = f"give 0 to {MOST_FRICTION:g}"
+            friction = require_number_in(friction, 0.0, MOST_FRICTION, "friction", where, remedy)
+        if restitution is not None:
+            restitution = require_number_in(
+                restitution, 0.0, 1.0, "restitution", where, "give 0 to 1"
+            )
+
+        def state(values: ArrayLike | None, default: ArrayLike, size: int, what: str) -> Floats:
+            given = default if values is None else values
+            return require_vector(given, size, what, where, MOST_OF_A_STATE)
+
+        origin = getattr(shape, "centroid", np.zeros(self.dim))
+        turn = 3 if self.dim == 3 else 1
+        upright = [1.0, 0.0, 0.0, 0.0] if self.dim == 3 else [0.0]
+        angle = state(angle, upright, len(upright), "angle")
+        length = float(np.linalg.norm(angle))
+        if self.dim == 3 and length == 0:
+            raise SceneError("the quaternion is zero", where=where, remedy="give (1, 0, 0, 0)")
+        self.bodies.append(Body(
+            shape, mass, inertia,
+            state(position, origin, self.dim, "position"),
+            angle / length if self.dim == 3 else angle,
+            state(velocity, np.zeros(self.dim), self.dim, "velocity"),
+            state(spin, np.zeros(turn), turn, "spin"),
+            friction, restitution, name,
+        ))  # fmt: skip
+        return len(self.bodies) - 1
+
+
+@dataclass(frozen=True)
+class World:
+    """The unchanging part of a simulation: what does not depend on the state."""
+
+    scene: Scene
+    columns: Ints
+    """Number of each body among the movable ones, -1 for a fixed one, (n,)."""
+    mass: Floats
+    """Masses [kg], (n,), inf for a fixed body."""
+    inertia: Floats
+    """Moments of inertia [kg m^2], (n,) in 2D, tensors in the bodies' frames (n, 3, 3) in 3D."""
+    reach: Floats
+    """Greatest distance of a body's points from its centre of mass [m], (n,); 0 if infinite."""
+    length: float
+    """Size of the smallest movable body [m]: the unit of all tolerances."""
+    detect: Callable[[Motion, Any], Contacts]
+    """Contacts of a state within a margin [m], one number or (n,)."""
+
+    @property
+    def movable(self) -> NDArray[np.bool_]:
+        """Bodies whose motion follows from forces, (n,)."""
+        return self.columns >= 0
+
+    @property
+    def size(self) -> int:
+        """Freedoms of a body: 3 in 2D, 6 in 3D."""
+        return 3 if self.scene.dim == 2 else 6
+
+    @cached_property
+    def heaviest(self) -> float:
+        """Greatest mass [kg] or, in numbers, moment of inertia [kg m^2] of the movable bodies."""
+        inertia = self.inertia[self.movable]
+        if self.scene.dim == 3:
+            inertia = np.trace(inertia, axis1=1, axis2=2)
+        return float(max(self.mass[self.movable].max(), inertia.max()))
+
+    def inverse_mass(self, motion: Motion) -> sp.csr_array:
+        """M^-1 of the movable bodies (eq. 12), in the world frame."""
+        moving = self.movable
+        if self.scene.dim == 2:
+            mass = self.mass[moving]
+            diagonal = np.column_stack([mass, mass, self.inertia[moving]])
+            return sp.diags_array(1.0 / diagonal.ravel(), format="csr")
+        blocks = np.zeros((moving.sum(), 6, 6))
+        blocks[:, range(3), range(3)] = 1.0 / self.mass[moving][:, None]
+        blocks[:, 3:, 3:] = np.linalg.inv(self._inertia_placed(motion)[moving])
+        return sp.csr_array(sp.block_diag(blocks, format="csr"))
+
+    @cached_property
+    def principal(self) -> PrincipalInertia:
+        """Principal moments and axes of inertia of all bodies; 3D only."""
+        from rigid_lcp.motion.gyroscopic import principal_inertia
+
+        return principal_inertia(self.inertia)
+
+    def drifted(self, motion: Motion, seconds: float) -> Motion:
+        """The state after ``seconds`` [s] without any force; in 3D spins change as bodies turn."""
+        if self.scene.dim == 2:
+            return displace_motion(motion, seconds * motion.rates)
+        from rigid_lcp.motion.gyroscopic import free_rotation
+
+        angle, spin = free_rotation(self.principal, motion.angle, motion.spin, seconds)
+        return Motion(motion.position + seconds * motion.velocity, angle, motion.velocity, spin)
+
+    def coasting(self, motion: Motion) -> Floats:
+        """Generalised accelerations (n, size) while no force acts: in 3D spins change all the
+        same [rad/s^2]."""
+        result = np.zeros((len(self.mass), self.size))
+        if self.scene.dim == 3:
+            from rigid_lcp.motion.gyroscopic import gyroscopic_acceleration
+
+            result[:, 3:] = gyroscopic_acceleration(self.inertia, motion.angle, motion.spin)
+        return result
+
+    def accelerations(
+        self, motion: Motion, loads: ArrayLike | None, gyroscopic: bool = True
+    ) -> Floats:
+        """Generalised accelerations of gravity and loads, (n, size), in 3D with those of the
+        gyroscopic torque, unless `drifted` accounts for it (``gyroscopic`` False)."""
+        dim = self.scene.dim
+        result = np.zeros((len(self.mass), self.size))
+        moving = self.movable
+        result[moving, :dim] = self.scene.gravity
+        if loads is not None:
+            force = np.asarray(loads, dtype=float)
+            result[moving, :dim] += force[moving, :dim] / self.mass[moving][:, None]
+        if dim == 2:
+            if loads is not None:
+                result[moving, 2] += force[moving, 2] / self.inertia[moving]
+            return result
+        inertia, spin = self._inertia_placed(motion)[moving], motion.spin[moving]
+        torque = np.zeros_like(spin)
+        if gyroscopic:
+            torque -= np.cross(spin, np.einsum("nij,nj->ni", inertia, spin))
+        if loads is not None:
+            torque += force[moving, 3:]
+        result[moving, 3:] = np.linalg.solve(inertia, torque[..., None])[..., 0]
+        return result
+
+    def contacts(self, motion: Motion, margin: Any) -> Contacts:
+        """Contacts of a state with friction and restitution of their surfaces."""
+        found = self.detect(motion, margin)
+        surface = {  # the smaller; a body without a value leaves it to the other
+            name: np.nan_to_num(np.fmin(value[found.body_a], value[found.body_b]))
+            for name, value in self.surfaces.items()
+        }
+        return replace(found, **surface)
+
+    @cached_property
+    def surfaces(self) -> dict[str, Floats]:
+        """Friction and restitution of every body and of nothing, NaN where unknown, (n + 1,)."""
+        return {
+            name: np.array(
+                [np.nan if (v := getattr(body, name, None)) is None else v
+                 for body in [*self.scene.bodies, None]], dtype=float,
+            )
+            for name in ("friction", "restitution")
+        }  # fmt: skip
+
+    def energy(self, motion: Motion) -> float:
+        """Kinetic and potential energy of the movable bodies [J]."""
+        moving = self.movable
+        mass, velocity = self.mass[moving], motion.velocity[moving]
+        linear = 0.5 * float((mass * (velocity**2).sum(axis=1)).sum())
+        height = float((mass * (motion.position[moving] @ self.scene.gravity)).sum())
+        if self.scene.dim == 2:
+            angular = 0.5 * float((self.inertia[moving] * motion.spin[moving] ** 2).sum())
+        else:
+            inertia, spin = self._inertia_placed(motion)[moving], motion.spin[moving]
+            angular = 0.5 * float(np.einsum("ni,nij,nj->", spin, inertia, spin))
+        return linear + angular - height
+
+    def _inertia_placed(self, motion: Motion) -> Floats:
+        from rigid_lcp.shapes import rotation_matrix
+
+        frame = rotation_matrix(motion.angle)
+        return np.einsum("nij,njk,nlk->nil", frame, self.inertia, frame)
+
+
+def _detected(
+    detect: Callable[..., Contacts], shapes: Any, motion: Motion, margin: Any
+) -> Contacts:
+    return detect(shapes, motion.position, motion.angle, margin)
+
+
+def make_world(scene: Scene) -> tuple[World, Motion]:
+    """Arrays of a scene and its state at the start.  Raises `SceneError` for an empty scene.
+
+    What is done to ``scene`` later changes neither.
+    """
+    given, scene = scene, Scene(scene.dim, scene.gravity)
+    scene.bodies = bodies = list(given.bodies)
+    movable = np.array([body.movable for body in bodies], dtype=bool)
+    if not movable.any():
+        raise SceneError("no body can move", where="scene", remedy="add a body with a density")
+    columns = np.where(movable, np.cumsum(movable) - 1, -1)
+    shapes = [body.shape for body in bodies]
+    reach = np.array([shape.reach if isfinite(shape.reach) else 0.0 for shape in shapes])
+    mass = np.array([body.mass for body in bodies])
+    if scene.dim == 2:
+        arrays = shapes_2d(shapes, movable, scene.called)
+        inertia = np.array([body.inertia for body in bodies])
+
+        detect = partial(_detected, detect_2d, arrays)
+    else:
+        from rigid_lcp.contact import detect_3d, shapes_3d
+
+        solids = shapes_3d(shapes, movable, scene.called)
+        inertia = np.array([body.inertia if body.movable else np.eye(3) for body in bodies])
+        detect = partial(_detected, detect_3d, solids)
+
+    angle = np.array([body.angle for body in bodies])
+    spin = np.array([body.spin for body in bodies])
+    start = Motion(
+        np.array([body.position for body in bodies]), angle[:, 0] if scene.dim == 2 else angle,
+        np.array([body.velocity for body in bodies]), spin[:, 0] if scene.dim == 2 else spin,
+    )  # fmt: skip
+    length = float(reach[movable].min())
+    return World(scene, columns, mass, inertia, reach, length, detect), start

@@ -1,0 +1,236 @@
+"""Tables of a rigid scene file, as pydantic checks them; SI units throughout."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from rigid_lcp.motion import MOST_STEPS, too_many_steps
+from trackbed.scene_files import Name, NonNegative, Positive, Problem, Real, Table, suggest_word
+
+Vector = Annotated[list[Real], Field(min_length=2, max_length=3)]
+VECTORS = (
+    "normal", "position", "velocity", "box", "region_low", "region_high", "force", "least",
+)  # fmt: skip
+"""Keys whose values have one number a dimension."""
+Restitution = Annotated[Real, Field(ge=0, le=1)]
+LEAST_OF_A_STEP = 1e-6
+"""Shortest time between two frames in steps."""
+
+
+class Surface(Table):
+    """What bodies without values of their own get."""
+
+    friction: NonNegative = 0.0
+    restitution: Restitution = 0.0
+
+
+class Run(Table):
+    """How long, and how."""
+
+    duration: Positive
+    """[s]"""
+    step: Positive = 1e-3
+    """Length of a step, the longest one at acceleration level [s]."""
+    method: Literal["time-stepping", "acceleration"] = "time-stepping"
+    tolerance: Annotated[Real, Field(ge=1e-14, le=1e-3)] = 1e-10
+    """Scale-free residual of the contact forces [-]."""
+    frames: Annotated[int, Field(ge=1, le=100_000)] = 20
+    """States that are kept, at equal times."""
+
+    @model_validator(mode="after")
+    def _comes_to_an_end(self) -> Run:
+        steps = self.duration / self.step
+        if not LEAST_OF_A_STEP * self.frames <= steps <= MOST_STEPS:
+            raise ValueError(
+                f"{too_many_steps('duration', steps)}, and the time between two frames must be"
+                f" at least {LEAST_OF_A_STEP:g} of one"
+            )
+        return self
+
+
+class Ground(Table):
+    """A half-space: everything with ``normal . x <= offset``."""
+
+    normal: Vector
+    offset: Real = 0.0
+    friction: NonNegative | None = None
+    restitution: Restitution | None = None
+
+
+class BodyTable(Table):
+    """One body; exactly one of the shapes."""
+
+    name: Name
+    box: Vector | None = None
+    """Edge lengths [m]."""
+    radius: Positive | None = None
+    """Of a disc or a sphere [m]."""
+    vertices: list[Vector] | None = None
+    """Of a convex polygon (anticlockwise) or polyhedron [m]."""
+    density: Positive | None = None
+    """[kg/m^3]; in 2D [kg/m^2], or per metre of depth."""
+    inertia: Positive | None = None
+    """Moment of inertia in place of the shape's own, in 2D [kg m^2]; a huge one holds the body
+    upright."""
+    fixed: bool = False
+    position: Vector | None = None
+    angle: Real | Annotated[list[Real], Field(min_length=4, max_length=4)] | None = None
+    """[rad]; in 3D a quaternion w, x, y, z."""
+    velocity: Vector | None = None
+    spin: Real | Vector | None = None
+    friction: NonNegative | None = None
+    restitution: Restitution | None = None
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> BodyTable:
+        given = [k for k in ("box", "radius", "vertices") if getattr(self, k) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of box, radius and vertices, not {len(given)} of them")
+        if not self.fixed and self.density is None:
+            raise ValueError("give a density, or fixed = true")
+        return self
+
+
+class Grains(Table):
+    """Many irregular stones on a loose grid inside a region, to be poured."""
+
+    count: Annotated[int, Field(ge=1, le=100_000)]
+    size: Annotated[list[Positive], Field(min_length=2, max_length=2)]
+    """Smallest and largest diameter [m], uniform in between."""
+    region_low: Vector
+    region_high: Vector
+    """Corners of the region that the grid fills from below [m]; higher if it does not suffice."""
+    density: Positive
+    corners: Annotated[list[int], Field(min_length=2, max_length=2)] = Field([5, 9])
+    """Fewest and most corners of a stone."""
+    seed: Annotated[int, Field(ge=0)] = 1
+    friction: NonNegative | None = None
+    restitution: Restitution | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Grains:
+        if self.size[0] > self.size[1]:
+            raise ValueError("size is [smallest, largest]")
+        if not 3 <= self.corners[0] <= self.corners[1]:
+            raise ValueError("corners is [fewest, most], at least 3")
+        if len(self.region_low) != len(self.region_high) or any(
+            low >= high for low, high in zip(self.region_low, self.region_high, strict=True)
+        ):
+            raise ValueError("region_high must lie beyond region_low in every direction")
+        return self
+
+
+class Load(Table):
+    """A force on a named body, constant or cyclic between two values."""
+
+    body: Name
+    force: Vector
+    """[N]; the greatest one of a cyclic load."""
+    least: Vector | None = None
+    """The smallest force of a cyclic load [N]; zero if not given."""
+    frequency: Positive | None = None
+    """[Hz]; without it the load is constant."""
+    phase: Real = 0.0
+    """Of a cyclic load at its begin [rad]; at zero it starts from the smallest force."""
+    begin: NonNegative = 0.0
+    end: Positive | None = None
+
+    @model_validator(mode="after")
+    def _is_a_whole(self) -> Load:
+        if self.end is not None and self.end <= self.begin:
+            raise ValueError(f"end ({self.end:g} s) is not after begin ({self.begin:g} s)")
+        if self.frequency is None and (self.least is not None or self.phase != 0.0):
+            raise ValueError("least and phase are of a cyclic load: give its frequency too")
+        return self
+
+
+class WearTable(Table):
+    """Corners of polygons, corners and edges of polyhedra worn by the work of friction."""
+
+    coefficient: Positive
+    """Volume per work of friction [m^3/J]."""
+    every: Annotated[int, Field(ge=1)] = 20
+    """Steps between cuts."""
+    volume_scale: Positive | None = None
+    """Wear that changes the stiffness of a corner [m^3], in 2D [m^2]; without it none does."""
+
+
+class StrengthTable(Table):
+    """Grains that break under their contact forces."""
+
+    tension: Positive
+    """[Pa]"""
+    every: Annotated[int, Field(ge=1)] = 20
+    """Steps between judgements."""
+    smallest: NonNegative = 0.0
+    """Volume below which grains do not break [m^3], in 2D area [m^2]."""
+    modulus: Positive | None = None
+    """Weibull's modulus; with ``reference_volume``."""
+    reference_volume: Positive | None = None
+    """Volume (2D: area) of a grain that bears ``tension``."""
+    unique: bool = False
+    """Judge by the forces of elastic contacts; for piles at rest."""
+
+
+class SceneTables(Table):
+    """A whole scene file."""
+
+    title: str = ""
+    dimensions: Literal[2, 3]
+    gravity: Vector | None = None
+    run: Run
+    surface: Surface = Surface()
+    ground: list[Ground] = Field([])
+    body: list[BodyTable] = Field([])
+    grains: list[Grains] = Field([])
+    load: list[Load] = Field([])
+    wear: WearTable | None = None
+    strength: StrengthTable | None = None
+
+
+def find_faults(tables: SceneTables) -> Iterator[Problem]:
+    """What the tables of a scene demand of one another."""
+    yield from _find_wrong_sizes(tables)
+    names = [body.name for body in tables.body]
+    held = {body.name for body in tables.body if body.fixed}
+    for i, body in enumerate(tables.body):
+        if body.name in names[:i]:
+            yield Problem(f"body.{i}.name", f"two bodies have the name {body.name}")
+        if body.inertia is not None and (tables.dimensions == 3 or body.fixed):
+            yield Problem(f"body.{i}.inertia", "for bodies that move, in 2 dimensions")
+    for i, load in enumerate(tables.load):
+        if load.body not in names:
+            near = suggest_word(load.body, names)
+            yield Problem(f"load.{i}.body", f"there is no body {load.body}{near}")
+        elif load.body in held:
+            yield Problem(f"load.{i}.body", f"{load.body} is fixed, no load moves it")
+    for i, grains in enumerate(tables.grains):
+        if tables.dimensions == 3 and grains.corners[0] < 4:
+            yield Problem(f"grains.{i}.corners", "a polyhedron has at least 4")
+    if tables.run.method == "acceleration" and (tables.wear or tables.strength):
+        yield Problem("run.method", "nothing wears or breaks at acceleration level")
+    if tables.strength and (tables.strength.modulus is None) != (
+        tables.strength.reference_volume is None
+    ):
+        yield Problem("strength", "give both modulus and reference_volume, or neither")
+    if not tables.grains and all(body.fixed for body in tables.body):
+        yield Problem("", "no body can move: add a [[body]] with a density, or [[grains]]")
+
+
+def _find_wrong_sizes(tables: SceneTables) -> Iterator[Problem]:
+    """Vectors that are not of the scene's dimensions."""
+    vectors: list[tuple[str, Any]] = [("gravity", tables.gravity)]
+    for kind, entries in (
+        ("ground", tables.ground), ("body", tables.body), ("grains", tables.grains),
+        ("load", tables.load),
+    ):  # fmt: skip
+        for i, table in enumerate(entries):
+            vectors += [(f"{kind}.{i}.{name}", getattr(table, name, None)) for name in VECTORS]
+            for k, vertex in enumerate(getattr(table, "vertices", None) or ()):
+                vectors.append((f"{kind}.{i}.vertices.{k}", vertex))
+    for key, value in vectors:
+        if value is not None and len(value) != tables.dimensions:
+            yield Problem(key, f"has {len(value)} numbers in {tables.dimensions} dimensions")

@@ -1,0 +1,151 @@
+"""Convex polygons: grains with corners in the plane.
+
+A shape knows its own frame only: its centroid is the origin.  Where it is, and how fast, is a
+matter of the scene and of `rigid_lcp.motion.state`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+from numbers import Integral
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rigid_lcp.errors import ShapeError
+from rigid_lcp.shapes.numbers import LEAST, MOST, require_finite_shape, require_length
+
+Floats = NDArray[np.float64]
+
+FLAT = 1e-12
+"""Sine of the turn at a vertex below which three vertices count as one line [-]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon:
+    """Convex polygon, given by its vertices (n, 2) in metres, anticlockwise.
+
+    ``vertices`` are kept relative to the centroid, which is at ``centroid`` (2,) in the frame they
+    were given in.  Raises `ShapeError` for fewer than three vertices, numbers that are not finite,
+    clockwise or crossing outlines, corners that point inwards, repeated or collinear vertices.
+    A grain that is not convex is a matter of several bodies.
+    """
+
+    vertices: Floats
+    centroid: Floats
+
+    dim = 2
+
+    def __init__(self, vertices: ArrayLike) -> None:
+        outline = check_outline(vertices)
+        start = outline.mean(axis=0)
+        area, first, _ = _moments(outline - start)
+        centroid = start + first / area
+        object.__setattr__(self, "vertices", outline - centroid)
+        object.__setattr__(self, "centroid", centroid)
+
+    @classmethod
+    def rectangle(cls, width: float, height: float) -> Polygon:
+        """Rectangle of ``width`` along x and ``height`` along y [m].  Raises `ShapeError`."""
+        width = require_length(width, "width", "rectangle")
+        height = require_length(height, "height", "rectangle")
+        x, y = width / 2, height / 2
+        return cls([(-x, -y), (x, -y), (x, y), (-x, y)])
+
+    @classmethod
+    def regular(cls, corners: int, radius: float) -> Polygon:
+        """Regular polygon with ``corners`` vertices on a circle of ``radius`` [m].
+
+        Raises `ShapeError`.
+        """
+        radius = require_length(radius, "radius", "polygon")
+        if not isinstance(corners, Integral) or corners < 3:
+            raise ShapeError(
+                f"it has {corners!r} corners",
+                where="polygon",
+                remedy="give a whole number, 3 or more",
+            )
+        angle = 2 * pi * np.arange(corners) / corners
+        return cls(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+    @cached_property
+    def area(self) -> float:
+        """Area [m^2]."""
+        return _moments(self.vertices)[0]
+
+    @cached_property
+    def face_normals(self) -> Floats:
+        """Outward unit normals (n, 2); face k runs from vertex k to vertex k + 1."""
+        along = np.roll(self.vertices, -1, axis=0) - self.vertices
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        return np.column_stack([along[:, 1], -along[:, 0]])
+
+    @cached_property
+    def reach(self) -> float:
+        """Distance of the farthest vertex from the centroid [m]."""
+        return float(np.linalg.norm(self.vertices, axis=1).max())
+
+    def mass_properties(self, density: float) -> tuple[float, float]:
+        """Mass [kg] and moment of inertia about the centroid [kg m^2] at ``density`` [kg/m^2]."""
+        area, _, second = _moments(self.vertices)
+        return density * area, density * second
+
+
+def check_outline(vertices: ArrayLike) -> Floats:
+    """The vertices (n, 2) if they are a convex polygon, anticlockwise; else a `ShapeError`."""
+    where = "polygon"
+    outline = require_finite_shape(vertices, "outline", where)
+    if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
+        raise ShapeError(
+            f"vertices have shape {outline.shape}", where=where,
+            remedy="give at least three vertices of two coordinates",
+        )  # fmt: skip
+    size = float(np.ptp(outline, axis=0).max())
+    if size != 0 and not LEAST <= size <= MOST:
+        raise ShapeError(
+            f"it is {size:.1g} m in size", where=where,
+            remedy=f"choose other units: {LEAST:g} to {MOST:g} can be computed with",
+        )  # fmt: skip
+    side = np.roll(outline, -1, axis=0) - outline
+    length = np.hypot(side[:, 0], side[:, 1])
+    if (length <= FLAT * length.max()).any():
+        twice = int(np.argmin(length))
+        raise ShapeError(
+            "it is there twice", where=f"{where}, vertex {twice}", remedy="leave one of them out"
+        )
+    before, after = np.roll(side, 1, axis=0), side
+    scale = np.roll(length, 1) * length
+    turn_sine = (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / scale
+    turn = np.arctan2(turn_sine, (before * after).sum(axis=1) / scale)
+    if np.isclose(turn.sum(), -2 * pi):
+        raise ShapeError(
+            "the vertices run clockwise", where=where, remedy="give them in reverse order"
+        )
+    if (np.abs(turn_sine) <= FLAT).any():
+        flat = int(np.argmin(np.abs(turn_sine)))
+        raise ShapeError(
+            "it lies on a line with its neighbours", where=f"{where}, vertex {flat}",
+            remedy="leave it out; a polygon needs an area",
+        )  # fmt: skip
+    if (turn < 0).any() or not np.isclose(turn.sum(), 2 * pi):
+        inward = int(np.argmin(turn))
+        raise ShapeError(
+            "the polygon is not convex or crosses itself", where=f"{where}, vertex {inward}",
+            remedy="divide it into convex polygons, or take its convex hull",
+        )  # fmt: skip
+    return outline
+
+
+def _moments(outline: Floats) -> tuple[float, Floats, float]:
+    """Area [m^2], first moment (2,) [m^3] and polar second moment [m^4] about the origin.
+
+    Green's theorem over the sides (exact).
+    """
+    x, y = outline.T
+    x1, y1 = np.roll(outline, -1, axis=0).T
+    cross = x * y1 - x1 * y
+    first = np.array([((x + x1) * cross).sum(), ((y + y1) * cross).sum()]) / 6
+    second = ((x * x + x * x1 + x1 * x1 + y * y + y * y1 + y1 * y1) * cross).sum() / 12
+    return float(cross.sum() / 2), first, float(second)

@@ -1,0 +1,225 @@
+"""One implicit step of the relaxation of section 8: bodies of unit mass on springs and sliders.
+
+Unknown is the move d of the mass-free coordinates, which balances inertia, load and springs,
+
+    d / h = Q + J^T f(xi - J d),    f: `coulomb_spring`
+
+Newton's method on this equation is quick near a solution, but where contacts slide its slope is
+not symmetric, and from afar it stalls.  Without friction the equation is the minimum of a convex
+energy, which Newton's method with a line search always finds.  With friction it is a friction
+problem with a softer W (`ElasticNetwork.friction_step`), for which there are solvers that go on
+where Newton's method stops; its end is left to Newton's method, for the last digits.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from rigid_lcp.friction.methods import gauss_seidel, newton
+from rigid_lcp.friction.problem import friction_problem
+
+Floats = NDArray[np.float64]
+SWEEPS = 300
+"""Of Gauss-Seidel in a step."""
+
+
+def slider_forces(trial: Floats, allowed: Floats) -> Floats:
+    """Forces (nc, dim) [N] of springs with ``trial`` forces (nc, dim) and friction limits (nc,)."""
+    force = trial.copy()
+    force[:, 0] = np.maximum(trial[:, 0], 0.0)
+    size = np.linalg.norm(trial[:, 1:], axis=1)
+    force[:, 1:] *= np.divide(allowed, size, out=np.ones_like(size), where=size > allowed)[:, None]
+    return force
+
+
+def slider_energy(trial: Floats, stiffness: Floats, allowed: Floats) -> float:
+    """Energy [J] whose derivative by deformation is `slider_forces`, friction limits held fixed."""
+    normal = np.maximum(trial[:, 0], 0.0)
+    size = np.linalg.norm(trial[:, 1:], axis=1)
+    elastic = np.minimum(size, allowed)
+    sliding = np.divide(elastic, size, out=np.ones_like(size), where=size > 0)
+    # 1/2 f^2 / k of the springs, then work at the constant force of the sliders
+    tangential = (trial[:, 1:] ** 2 / stiffness[:, 1:]).sum(axis=1) * sliding * (1 - sliding / 2)
+    return float(np.sum(normal**2 / (2 * stiffness[:, 0]) + tangential))
+
+
+def slider_slope(
+    trial: Floats, stiffness: Floats, allowed: Floats, friction: Floats | None = None
+) -> Floats:
+    """Derivative of `slider_forces` by deformation, (nc, dim, dim) [N/m].
+
+    With ``friction`` (nc,) the limits follow the normal forces (Coulomb), else they are fixed
+    (Tresca).  At a kink: the closed, sticking side.  Tangential stiffness is the same both ways.
+    """
+    count, dim = trial.shape
+    closed = trial[:, 0] >= 0
+    size = np.linalg.norm(trial[:, 1:], axis=1)
+    slides = size > allowed
+    diagonal = stiffness.copy()
+    diagonal[~closed, 0] = 0.0
+    # a limit of zero can not stick, at zero deformation neither
+    diagonal[(allowed <= 0) & ~(closed & (friction > 0 if friction is not None else False)), 1:] = 0
+    blocks = np.zeros((count, dim, dim))
+    blocks[:, range(dim), range(dim)] = diagonal
+    along = trial[slides, 1:] / size[slides, None]
+    share = allowed[slides] / size[slides]
+    across = np.eye(dim - 1) - along[:, :, None] * along[:, None, :]
+    blocks[slides, 1:, 1:] = share[:, None, None] * across * stiffness[slides, None, 1:]
+    if friction is not None:
+        push = np.where(closed, friction * stiffness[:, 0], 0.0)[slides]
+        blocks[slides, 1:, 0] = push[:, None] * along
+    return blocks
+
+
+class ElasticNetwork:
+    """Bodies of unit mass on springs and sliders.
+
+    ``jacobian`` mass free (nc * dim, ndof); ``free`` (ndof,) accelerations without contact forces;
+    ``stiffness`` (nc, dim); ``friction`` (nc,).
+    """
+
+    def __init__(
+        self, jacobian: sp.csr_array, free: Floats, stiffness: Floats, friction: Floats
+    ) -> None:
+        self.jacobian, self.free = jacobian, free
+        self.stiffness, self.friction = stiffness, friction
+        self.identity = sp.eye_array(jacobian.shape[1], format="csc")
+        self.load = float(np.linalg.norm(free)) or 1.0
+        self.newton_steps = 0
+        self.force = np.zeros(jacobian.shape[0])
+        """Forces of the last `friction_step`, where the next begins."""
+
+    @cached_property
+    def delassus(self) -> sp.csr_array:
+        """W of bodies of unit mass."""
+        return sp.csr_array(self.jacobian @ self.jacobian.T)
+
+    @cached_property
+    def own_order(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The contacts in an order that is theirs, not that of the numbers, and its rows of W.
+
+        Gauss-Seidel's way depends on the order; where there are several states so does its end.
+        """
+        count, dim = self.stiffness.shape
+        key = self.delassus @ (self.delassus @ (self.jacobian @ self.free))
+        order = np.argsort(key.reshape(count, dim)[:, 0], kind="stable")
+        return order, (order[:, None] * dim + np.arange(dim)).ravel()
+
+    def trial(self, deformation: Floats, move: Floats) -> Floats:
+        """Spring forces (nc, dim) after the move, before contacts open or slide."""
+        moved = deformation - (self.jacobian @ move).reshape(deformation.shape)
+        return np.asarray(self.stiffness * moved)
+
+    def allowed(self, trial: Floats) -> Floats:
+        """Coulomb's friction limits (nc,) of trial forces."""
+        return self.friction * np.maximum(trial[:, 0], 0.0)
+
+    def imbalance(self, force: Floats, move: Floats, h: float) -> Floats:
+        """``d / h - Q - J^T f``, (ndof,): zero for the move d of an implicit step."""
+        return np.asarray(move / h - self.free - self.jacobian.T @ force.ravel())
+
+    def newton_direction(self, blocks: Floats, imbalance: Floats, h: float) -> Floats:
+        """``-(1 / h + J^T f' J)^-1`` times the imbalance; ``blocks`` f' (nc, dim, dim)."""
+        self.newton_steps += 1
+        count, dim, _ = blocks.shape
+        pointer = np.arange(count + 1)
+        law = sp.bsr_array((blocks, pointer[:-1], pointer), shape=(count * dim, count * dim))
+        slope = self.identity / h + self.jacobian.T @ (law @ self.jacobian)
+        return np.asarray(splu(sp.csc_array(slope)).solve(-imbalance))
+
+    def coulomb_step(
+        self, deformation: Floats, move: Floats, h: float, steps: int
+    ) -> tuple[Floats, bool]:
+        """Newton's method under Coulomb's law from a first ``move``; move, whether found."""
+
+        def state(move: Floats) -> tuple[Floats, Floats, Floats, float]:
+            trial = self.trial(deformation, move)
+            allowed = self.allowed(trial)
+            imbalance = self.imbalance(slider_forces(trial, allowed), move, h)
+            return trial, allowed, imbalance, float(np.linalg.norm(imbalance))
+
+        trial, allowed, imbalance, error = state(move)
+        for _ in range(steps):
+            if error <= 1e-15 * self.load:
+                return move, True
+            blocks = slider_slope(trial, self.stiffness, allowed, self.friction)
+            direction = self.newton_direction(blocks, imbalance, h)
+            for halvings in range(12):
+                tried = move + direction / 2**halvings
+                found = state(tried)
+                if found[3] < (1 - 1e-4 / 2**halvings) * error:
+                    break
+            else:
+                break
+            move, (trial, allowed, imbalance, error) = tried, found
+        # no more descent: round-off, if the balance is as good as it can be
+        return move, error <= 1e-11 * self.load
+
+    def friction_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
+        """The implicit step as a friction problem; move, whether found.
+
+        With forces f for unknowns, ``u = (W + 1 / (k h)) f + J Q - xi / h``: a closed contact has
+        no ``u_N``, a sticking one no ``u_T``, and a sliding one slides against f_T.  Springs make W
+        regular, and Gauss-Seidel with Newton at its end finds what Newton alone does not.
+        """
+        soft = self.delassus + sp.diags_array(1.0 / (h * self.stiffness.ravel()))
+        offset = self.jacobian @ self.free - deformation.ravel() / h
+        order, rows = self.own_order
+        problem = friction_problem(
+            sp.csr_array(sp.csr_array(soft)[rows][:, rows]), offset[rows], self.friction[order],
+            deformation.shape[1],
+        )  # fmt: skip
+        found = gauss_seidel(problem, self.force[rows], 1e-7, SWEEPS)
+        self.newton_steps += SWEEPS // 100  # the cost of as many sweeps
+        if found.residual > 1e-13:
+            polished = newton(problem, found.r, 1e-14)
+            self.newton_steps += int(polished.work.get("factorisations", 0.0))
+            found = min(polished, found, key=lambda each: each.residual)
+        if found.residual > 1e-9:
+            return np.zeros(self.jacobian.shape[1]), False
+        self.force[rows] = found.r
+        move = h * (self.free + self.jacobian.T @ self.force)
+        return self.coulomb_step(deformation, move, h, 10)
+
+    def tresca_step(
+        self, deformation: Floats, move: Floats, h: float, allowed: Floats
+    ) -> tuple[Floats, Floats]:
+        """Least energy with friction limits ``allowed`` (nc,); move (ndof,), trial (nc, dim)."""
+
+        def energy(move: Floats) -> tuple[float, Floats]:
+            trial = self.trial(deformation, move)
+            springs = slider_energy(trial, self.stiffness, allowed)
+            return float(move @ move / (2 * h) - self.free @ move + springs), trial
+
+        value, trial = energy(move)
+        for _ in range(60):
+            imbalance = self.imbalance(slider_forces(trial, allowed), move, h)
+            error = float(np.linalg.norm(imbalance))
+            if error <= 1e-9 * self.load:
+                break
+            blocks = slider_slope(trial, self.stiffness, allowed)
+            direction = self.newton_direction(blocks, imbalance, h)
+            descent = float(imbalance @ direction)
+            for halvings in range(20):
+                tried = move + direction / 2**halvings
+                value_tried, trial_tried = energy(tried)
+                if value_tried <= value + 1e-4 * descent / 2**halvings + 1e-15 * abs(value):
+                    break
+            else:
+                break
+            move, value, trial = tried, value_tried, trial_tried
+        return move, trial
+
+    def implicit_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
+        """Move d (ndof,) of one implicit step from deformations xi (nc, dim), whether found."""
+        move = np.zeros(self.jacobian.shape[1])
+        if not self.friction.any():
+            move, _ = self.tresca_step(deformation, move, h, self.friction)
+            return self.coulomb_step(deformation, move, h, 5)
+        found, converged = self.coulomb_step(deformation, move, h, 15)
+        return (found, True) if converged else self.friction_step(deformation, h)

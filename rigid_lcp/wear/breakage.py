@@ -1,0 +1,180 @@
+"""Breakage in a run: grains whose contact forces pull them apart are split, and the run goes on.
+
+Every so many steps each polygon (polyhedron) that moves is judged by the criteria of
+`rigid_lcp.wear.strength`; what is above its strength is split (`rigid_lcp.wear.fragmentation`)
+along the
+line, or in 3D by a plane through the line, that joins its greatest pair of opposite forces.
+
+Forces are the means over the last step.  In an impact they grow as 1 / h: with breakage, h is the
+duration of impacts.  Where forces are not unique they are those that the solver found, and boxes
+on each other may carry friction that squeezes them sideways; ``unique`` takes those of elastic
+contacts (section 8) instead, for piles at rest or in slow motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from sys import float_info
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.contact import ContactForces
+from rigid_lcp.errors import SceneError, ShapeError
+from rigid_lcp.motion import Motion, require_number_in, require_whole_in
+from rigid_lcp.wear.fragmentation import split_body
+from rigid_lcp.wear.strength import Break, find_splitting_line, weibull_strength
+
+if TYPE_CHECKING:
+    from rigid_lcp.motion import Body, Scene
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+DUST = 100
+"""Parts of a grain of the start, on average, beyond which grains break without end: without a size
+effect parts under the stress that broke the whole break as well, and their number doubles."""
+
+
+@dataclass(frozen=True)
+class Breakage:
+    """When grains break in a run."""
+
+    strength: float
+    """Tension that breaks a grain [Pa] (2D: per metre of depth), Brazilian in 2D, point load in
+    3D; with ``modulus`` that of a grain of ``reference_volume``."""
+    every: int = 20
+    """Steps between judgements."""
+    smallest: float = 0.0
+    """Volume (2D: area) below which grains do not break [m^3, m^2]; with zero a run ends with a
+    `SceneError` where grains turn to `DUST`."""
+    modulus: float | None = None
+    """Weibull's modulus of the size effect, `rigid_lcp.wear.weibull_strength`; None: none."""
+    reference_volume: float | None = None
+    """[m^3, m^2]"""
+    unique: bool = False
+    """Judge by the forces of elastic contacts (`rigid_lcp.unique.forces`), impacts left out."""
+
+    def __post_init__(self) -> None:
+        positive, steps = "give a tension above zero", "give 1 or more steps between judgements"
+        require_number_in(
+            self.strength, 0.0, float_info.max, "strength", "breakage", positive, above=True
+        )
+        require_whole_in(self.every, 1, "every", "breakage", steps)
+        require_number_in(
+            self.smallest, 0.0, np.inf, "smallest", "breakage", "give a volume, or zero"
+        )
+        if (self.modulus is None) != (self.reference_volume is None):
+            raise ShapeError(
+                "a size effect needs both modulus and reference_volume", where="breakage",
+                remedy="give both or neither",
+            )  # fmt: skip
+        self.draw_strength(1.0)
+
+    def draw_strength(self, volume: float) -> float:
+        """Tension that a grain of ``volume`` [m^3, m^2] bears [Pa]."""
+        if self.modulus is None or self.reference_volume is None:
+            return self.strength
+        return weibull_strength(self.strength, volume, self.reference_volume, self.modulus)
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A grain that broke in a run."""
+
+    time: float
+    """[s]"""
+    body: int
+    """Number of the whole, and of its first part."""
+    part: int
+    """Number of the second part."""
+    tension: float
+    """[Pa]"""
+    strength: float
+    """[Pa]"""
+
+
+def gather_forces(contacts: ContactForces, body: int) -> tuple[Floats, Floats]:
+    """Points (k, dim) [m] and forces (k, dim) [N] of the contacts of a body that carry."""
+    carries = contacts.normal_force > 0
+    as_a, as_b = carries & (contacts.body_a == body), carries & (contacts.body_b == body)
+    force = contacts.force
+    return (
+        np.vstack([contacts.point[as_a], contacts.point[as_b]]),
+        np.vstack([force[as_a], -force[as_b]]),
+    )
+
+
+def grain_volume(body: Body) -> float:
+    """Volume [m^3], in 2D area [m^2], of a polygon or polyhedron."""
+    return float(body.shape.area if body.shape.dim == 2 else body.shape.volume)
+
+
+def breaks(
+    scene: Scene, motion: Motion, contacts: ContactForces, breakage: Breakage
+) -> list[tuple[int, Break]]:
+    """The grains that break under their contact forces, and where, by their number."""
+    found = []
+    kind = "brazilian" if scene.dim == 2 else "point-load"
+    carries = contacts.normal_force > 0
+    touched = np.bincount(
+        np.concatenate([contacts.body_a[carries], contacts.body_b[carries]]),
+        minlength=len(scene.bodies),
+    )
+    for k in np.flatnonzero(touched >= 2):
+        body = scene.bodies[k]
+        if not body.movable or not hasattr(body.shape, "vertices"):
+            continue
+        volume = grain_volume(body)
+        if volume < breakage.smallest:
+            continue
+        points, forces = gather_forces(contacts, int(k))
+        line = find_splitting_line(
+            points, forces, motion.position[k], volume, breakage.draw_strength(volume),
+            "brazilian" if kind == "brazilian" else "point-load",
+        )  # fmt: skip
+        if line is not None:
+            found.append((int(k), line))
+    return found
+
+
+def refuse_dust(breakage: Breakage, movable: int, broken: int, time: float) -> None:
+    """Raise `SceneError` where ``broken`` breaks have made ``movable`` grains, `DUST` of each, at a
+    ``time`` [s], and no smallest volume will end it."""
+    whole = movable - broken
+    if breakage.smallest == 0.0 and movable > DUST * whole:
+        raise SceneError(
+            f"{whole} grains have broken into {movable} parts, which go on to break",
+            where=f"breakage at {time:.6g} s",
+            remedy="give a smallest volume that breaks, or a greater strength",
+        )
+
+
+def break_scene(scene: Scene, motion: Motion, body: int, line: Break) -> Scene | None:
+    """The scene at ``motion`` with one grain broken; None where no cut leaves two sound parts.
+
+    A cut that would leave a sliver goes, parallel to itself, through the centre of mass.
+    """
+    direction = line.direction
+    if scene.dim == 3:  # the plane holds the line and, as far as it can, the least inertia's axis
+        direction = _plane_normal(scene.bodies[body], motion, body, direction)
+    for point in (line.point, motion.position[body]):
+        try:
+            return split_body(scene, motion, body, point, direction)
+        except ShapeError:
+            continue
+    return None
+
+
+def _plane_normal(body: Body, motion: Motion, number: int, along: Floats) -> Floats:
+    """Normal of the plane through the line: across it, along the longest axis left (3D)."""
+    from rigid_lcp.shapes import rotation_matrix
+
+    frame = rotation_matrix(motion.angle[number : number + 1])[0]
+    arms = body.shape.vertices @ frame.T
+    across = arms - np.outer(arms @ along, along)
+    _, vectors = np.linalg.eigh(across.T @ across)
+    normal = vectors[:, -1] - (vectors[:, -1] @ along) * along
+    return np.asarray(normal / np.linalg.norm(normal))

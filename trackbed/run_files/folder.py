@@ -1,0 +1,233 @@
+"""The folder of one run: its only writer's lock, its manifest, what may be written over.
+
+A run folder may come from anyone, so nothing in it is followed out of it: a symbolic link is
+refused.  Files that are no run's are left alone.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import re
+import socket
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any, ClassVar
+
+from trackbed.errors import UsageError
+from trackbed.run_files.whole import open_unlinked, read_object, refuse_writing, write_whole
+
+MANIFEST, RESULT = "manifest.json", "result.json"
+FORMAT = 1
+"""Of run folders; a manifest without one has the first."""
+
+
+def refuse_links(path: Path) -> None:
+    """Raise `UsageError` if the folder holds a symbolic link: what writes there would follow it."""
+    with suppress(FileNotFoundError), os.scandir(path) as entries:
+        links = sorted(entry.name for entry in entries if entry.is_symlink())
+        if links:
+            raise UsageError(
+                f"this run folder holds a symbolic link ({', '.join(links[:3])}), which may lead "
+                "anywhere; nothing was read or changed there",
+                where=str(path),
+                remedy="remove the link, or put the files themselves in its place",
+            )
+
+
+def refuse_format(path: Path, manifest: Mapping[str, Any]) -> None:
+    """Raise `UsageError` for the run of a later trackbed, and say which one can go on with it."""
+    found = manifest.get("format", FORMAT)
+    if found != FORMAT:
+        versions = manifest.get("versions") or manifest.get("provenance", {}).get("versions", {})
+        maker = versions.get("trackbed", "that made it")
+        raise UsageError(
+            f"this run folder is of format {found!r:.20}, and this trackbed knows format {FORMAT}",
+            where=str(path),
+            remedy=f"go on with the trackbed {maker}, or start anew in another folder",
+        )
+
+
+@contextmanager
+def lock_folder(path: Path, name: str = ".lock") -> Iterator[os.stat_result]:
+    """Make the folder if need be, and hold its only writer's lock, the file ``name`` in it.
+
+    Gives the identity of the lock.  The system drops it with the process, however that ends.
+    Raises `UsageError` when another process has it, when there is a symbolic link, or when the
+    folder can not be written, and `DiskFull` when there is no room.
+    """
+    with refuse_writing(path):
+        path.mkdir(parents=True, exist_ok=True)
+    refuse_links(path)
+    with refuse_writing(path):
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+        stream = os.open(path / name, flags, 0o666)
+    try:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            owner = os.read(stream, 200).decode(errors="replace").strip()
+            raise UsageError(
+                f"another process writes to this run ({owner})", where=str(path),
+                remedy="wait for it, or stop it; nothing was changed",
+            ) from error  # fmt: skip
+        except OSError as error:
+            raise UsageError(
+                f"the disk of this folder has no locks ({error.strerror})", where=str(path),
+                remedy="give a folder on another disk: without a lock two runs could mix",
+            ) from error  # fmt: skip
+        with refuse_writing(path):
+            os.truncate(stream, 0)
+            os.write(stream, f"pid {os.getpid()} on {socket.gethostname()}".encode())
+            for leftover in path.glob(".*.partial"):  # of a killed writer
+                if leftover.is_file():
+                    leftover.unlink()
+        yield os.fstat(stream)
+    finally:
+        os.close(stream)
+
+
+def is_written(path: Path, name: str = ".lock") -> bool:
+    """Whether a process holds the folder's lock, the file ``name`` in it.
+
+    The lock is tried only when the process that last took it may still live: a try can refuse,
+    for its instant, a writer that starts.
+    """
+    try:
+        with open_unlinked(path / name, "r") as stream:
+            holder = re.fullmatch(r"pid (\d+) on (.+)", stream.read().strip())
+            here = holder is not None and holder[2] == socket.gethostname()
+            if holder is not None and here and not Path(f"/proc/{holder[1]}").exists():
+                return False
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
+class RunFolder:
+    """The folder ``path``; made when it is locked first.  A story says what is in its own."""
+
+    own: ClassVar[tuple[str, ...]] = ()
+    """Patterns of the run's files; what starts anew removes these and no other."""
+    states: ClassVar[str] = ""
+    """Pattern of the saved states: where there is one, there was a manifest before it."""
+    compared: ClassVar[tuple[str, ...]] = ("scene",)
+    """Parts of the manifest that must be the same for a run to go on."""
+    free: ClassVar[tuple[str, ...]] = ()
+    """Dotted keys of the manifest that may change: no number of the run depends on them."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock: os.stat_result | None = None
+        """Identity of the lock while we hold it."""
+
+    @property
+    def summary(self) -> dict[str, Any] | None:
+        """What the run came to; None where it has not come to its end, report and all."""
+        return read_object(self.path / RESULT) or None
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Hold the lock of the folder's only writer; see `lock_folder`."""
+        with lock_folder(self.path) as self._lock:
+            try:
+                yield
+            finally:
+                self._lock = None
+
+    def refuse_if_replaced(self) -> None:
+        """Raise `UsageError` if the folder whose lock we hold is not the one that is there now."""
+        if self._lock is None:
+            return
+        try:
+            same = os.path.samestat(self._lock, os.stat(self.path / ".lock"))
+        except OSError:
+            same = False
+        if not same:
+            raise UsageError(
+                "this folder was removed or replaced while the run went on", where=str(self.path),
+                remedy="leave the folder of a run alone; start it again",
+            )  # fmt: skip
+
+    def settle(self, manifest: Mapping[str, Any], scene: str, *, resume: bool, force: bool) -> bool:
+        """Make the folder ready for a run of ``manifest``; whether a run that is there goes on.
+
+        An empty folder is taken.  One with another scene's run, a finished run, or an unfinished
+        run without ``resume``, raises `UsageError` and is left as it is, unless ``force``: then
+        the run's own files are removed.  So does a folder with files of other people and no run,
+        always.
+        """
+        there = read_object(self.path / MANIFEST)
+        if there is None:
+            self._refuse_strangers()
+            if any(self.path.glob(self.states) if self.states else ()):
+                there = {}
+        if there is not None and not force:
+            self._refuse_other(there, manifest)
+            if resume:
+                return True
+            state = "is not finished" if self.summary is None else "is finished"
+            raise UsageError(
+                f"this run is there already and {state}", where=str(self.path),
+                remedy="--resume to go on with it, or --force to compute it again",
+            )  # fmt: skip
+        with refuse_writing(self.path):
+            for pattern in self.own:
+                for path in self.path.glob(pattern):
+                    path.unlink()
+        write_whole(self.path / "scene.toml", scene)
+        content = {"format": FORMAT, **manifest}
+        write_whole(self.path / MANIFEST, json.dumps(content, indent=1) + "\n")
+        return False
+
+    def _refuse_strangers(self) -> None:
+        """Refuse a folder with files that are no run's: there may be anything behind a typo."""
+        names = sorted(path.name for path in self.path.iterdir())
+        own = (*self.own, ".lock")
+        strange = [name for name in names if not any(fnmatch(name, pattern) for pattern in own)]
+        if strange:
+            raise UsageError(
+                f"this folder holds other files ({', '.join(strange[:3])})",
+                where=str(self.path), remedy="give a new or empty folder: --run-folder",
+            )  # fmt: skip
+
+    def _refuse_other(self, there: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+        """Refuse a run that can not go on here: damaged, of another version, of another scene."""
+        remedy = "give another --run-folder, or --force to lose that run"
+        if not there:
+            raise UsageError(
+                f"the {MANIFEST} of this run is missing or can not be read",
+                where=str(self.path), remedy=remedy,
+            )  # fmt: skip
+        refuse_format(self.path, there)
+        before, after = ({part: one.get(part) for part in self.compared} for one in (there, now))
+        if changes := list(list_differences("", before, after, self.free)):
+            raise UsageError(
+                "this folder holds the run of another scene:\n  " + "\n  ".join(changes),
+                where=str(self.path), remedy=remedy,
+            )  # fmt: skip
+
+
+def list_differences(key: str, before: Any, after: Any, free: tuple[str, ...]) -> Iterator[str]:
+    """What differs between two values of JSON, one line for each dotted key below ``key``."""
+    if before == after or key in free:
+        return
+    if isinstance(before, list) and isinstance(after, list) and len(before) == len(after):
+        before, after = (dict(enumerate(one)) for one in (before, after))
+    if isinstance(before, dict) and isinstance(after, dict):
+        for name in dict.fromkeys([*before, *after]):
+            inner = f"{key}.{name}" if key else str(name)
+            yield from list_differences(inner, before.get(name), after.get(name), free)
+    else:
+        yield f"{key}: {_shorten(before)} there, {_shorten(after)} now"
+
+
+def _shorten(value: Any) -> str:
+    text = "nothing" if value is None else json.dumps(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,329 @@
+"""Scene files: TOML to tables, with every problem at once, each with its line and key.
+
+A story gives the model of its scene (a pydantic model whose tables are `scene_types.Table`) and a
+`Guide` to its example; `read_scene` reads the text and `SceneText.check` the tables.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from trackbed.errors import SceneError, TrackbedError, UsageError
+from trackbed.scene_files.lines import find_key_lines
+from trackbed.scene_files.types import NAME_PATTERN
+
+BOUNDS = {
+    "greater_than": ("gt", "above"),
+    "greater_than_equal": ("ge", "at least"),
+    "less_than": ("lt", "below"),
+    "less_than_equal": ("le", "at most"),
+}
+"""Types of pydantic's errors: name of the bound in their context, and its words."""
+
+HARDLY = 1e-12
+"""A least value up to this stands for "above zero"."""
+
+
+LONGEST = 1 << 24
+"""Most bytes of a scene file."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is wrong with a key."""
+
+    key: str
+    """Dotted key; entries of a list by their number from 0, as in ``load.0.force``."""
+    what: str
+    """One sentence."""
+    where: str = ""
+    """File and line where that is not the scene file."""
+
+
+@dataclass(frozen=True)
+class Guide:
+    """Where a user finds what a scene of this kind may hold."""
+
+    example: str
+    """Name of the example scene that explains every key."""
+    override: str
+    """An override that makes sense, such as ``procedure.k=10``."""
+
+    @property
+    def copy(self) -> str:
+        """How to get the example."""
+        return f"trackbed new {self.example} FOLDER writes one that explains every key"
+
+
+@dataclass
+class SceneText:
+    """A scene file as read: its tables, and what is wrong with single keys."""
+
+    path: Path
+    text: str
+    data: dict[str, Any]
+    guide: Guide
+    overrides: dict[str, str] = field(default_factory=dict)
+    """Dotted key -> the override that set it."""
+    tables: dict[str, Any] = field(default_factory=dict)
+    """Dotted key -> each valid table of the model, such as ``body.0`` and ``simulation``."""
+    problems: list[Problem] = field(default_factory=list)
+
+    @cached_property
+    def places(self) -> dict[str, str]:
+        """Dotted key -> where it stands."""
+        places = {key: f"{self.path}:{line}" for key, line in find_key_lines(self.text).items()}
+        for key, override in self.overrides.items():
+            places = {k: place for k, place in places.items() if not f"{k}.".startswith(f"{key}.")}
+            for end in (found.start() for found in re.finditer(r"\.", key)):
+                places.setdefault(key[:end], f"--set {override}")
+            places[key] = f"--set {override}"
+        return places
+
+    def check(self, model: type[BaseModel]) -> None:
+        """Check every table by itself: fills ``tables`` and ``problems``; nothing is raised."""
+        for name, definition in model.model_fields.items():
+            value, inner = self.data.get(name), find_model(definition.annotation)
+            entries = {name: value}
+            if isinstance(value, list):
+                entries = {f"{name}.{index}": entry for index, entry in enumerate(value)}
+            if inner is None:
+                continue
+            for key, entry in entries.items():
+                with suppress(ValidationError):
+                    self.tables[key] = inner.model_validate(entry)
+        try:
+            model.model_validate(self.data)
+        except ValidationError as error:
+            found = [one for one in error.errors(include_url=False) if not _is_echo(one)]
+            self.problems += [_explain(model, one) for one in found]
+
+    def refuse(self, problems: Iterable[Problem]) -> None:
+        """Raise `SceneError` with all problems, in the order of the file, if there are any."""
+        unique = list(dict.fromkeys(problems))
+        if not unique:
+            return
+        order = {place: index for index, place in enumerate(self.places.values())}
+        entries = []
+        for problem in unique:
+            place = self._find_place(problem.key)
+            line = f"  {problem.where or place}: {problem.key or 'scene'}: {problem.what}"
+            entries.append((order.get(place, -1), line))
+        head = "1 problem" if len(entries) == 1 else f"{len(entries)} problems"
+        raise SceneError(
+            "\n".join([head, *(line for _, line in sorted(entries))]),
+            where=str(self.path),
+            remedy=f"correct these keys; {self.guide.copy}",
+        )
+
+    def _find_place(self, key: str) -> str:
+        """File and line of a key, or of the nearest table around it."""
+        while key:
+            if key in self.places:
+                return self.places[key]
+            key = key.rpartition(".")[0]
+        return str(self.path)
+
+
+def read_scene(
+    path: Path | str,
+    overrides: Sequence[str] = (),
+    *,
+    guide: Guide,
+    after_override: Callable[[dict[str, Any], str], None] | None = None,
+) -> SceneText:
+    """Read a scene file; its tables are not checked yet.
+
+    ``overrides`` such as ``simulation.duration=0.1``, ``load.0.force=[0, 0, -1]`` or
+    ``body.beam.material.young=1e9`` replace or add keys; values in TOML, a bare word is a string.
+    ``after_override`` is called with the tables and the dotted key that was set.
+
+    Raises `UsageError` when the file or an override can not be read, `SceneError` for no TOML.
+    """
+    path = Path(path)
+    text = _read_text(path, guide)
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise _refuse_syntax(path, text, error) from error
+    scene = SceneText(path, text, data, guide)
+    for override in overrides:
+        key = _set_key(data, override, guide)
+        scene.overrides[key] = override
+        if after_override is not None:
+            after_override(data, key)
+    return scene
+
+
+def describe_error(error: TrackbedError) -> str:
+    """An error as the problem of a key says it: what, and what to do."""
+    return error.what + (f" ({error.remedy})" if error.remedy else "")
+
+
+def suggest_word(word: str, known: Iterable[str]) -> str:
+    """``; did you mean X?`` for the nearest of the known words, or what they are."""
+    known = sorted(known)
+    near = get_close_matches(word.lower(), known, n=1, cutoff=0.6)
+    if near:
+        return f"; did you mean {near[0]}?"
+    return f"; known: {', '.join(known[:20])}" if known else ""
+
+
+def find_model(annotation: Any) -> type[BaseModel] | None:
+    """The model inside a field's type, however deep; None when there is none."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = (find_model(argument) for argument in get_args(annotation))
+    return next((model for model in found if model), None)
+
+
+def _explain(model: type[BaseModel], error: ErrorDetails) -> Problem:
+    """What pydantic found, as one sentence about a key of ``model``."""
+    names = [str(name) for name in error["loc"] if not str(name).startswith("#")]
+    key = ".".join(names)
+    kind, context = error["type"], error.get("ctx", {})
+    value = f", not {_show(error['input'])}"
+    if kind == "extra_forbidden":
+        what = "unknown key" + suggest_word(names[-1], _list_keys(model, names[:-1]))
+    elif kind == "missing":
+        what = "missing"
+    elif kind == "literal_error":
+        known = re.findall(r"'([^']*)'", str(context["expected"]))
+        near = suggest_word(error["input"], known) if isinstance(error["input"], str) else ""
+        what = f"must be {context['expected']}{value}{near}"
+    elif kind in ("model_type", "model_attributes_type"):
+        what = f"must be a table{value}"
+    elif kind == "greater_than_equal" and 0 < context["ge"] <= HARDLY:
+        what = f"must be above 0 (and at least {context['ge']:g}){value}"
+    elif kind in ("tuple_type", "list_type", "too_short"):
+        tables = len(names) == 1 and find_model(model.model_fields[names[0]].annotation)
+        what = f"write [[{key}]] tables{value}" if tables else f"must be a list in [...]{value}"
+        if kind == "too_short" and not tables:
+            what = f"must have at least {context['min_length']} entries{value}"
+    elif kind == "too_long":
+        most = "" if context["field_type"] == "Tuple" else "at most "
+        what = f"must have {most}{context['max_length']} entries{value}"
+    elif kind == "string_too_short":
+        what = "must not be empty"
+    elif kind == "string_type":
+        what = f"must be a text{value}"
+    elif kind == "string_pattern_mismatch" and context["pattern"] == NAME_PATTERN:
+        key = key.removesuffix(".[key]")
+        what = f"a name has 1 to 60 letters, digits and _ . + -{value}"
+    elif kind in BOUNDS:
+        name, words = BOUNDS[kind]
+        what = f"must be {words} {context[name]:.6g}{value}"
+    elif kind == "value_error":
+        what = error["msg"].removeprefix("Value error, ")
+    else:
+        what = error["msg"].replace("Input should", "must") + value
+    return Problem(key, what)
+
+
+def _is_echo(error: ErrorDetails) -> bool:
+    """Whether a list only counts as too short because its entries have faults of their own."""
+    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
+
+
+def _show(value: object) -> str:
+    try:
+        return f"{value!r:.60}"
+    except ValueError:  # an integer of too many digits
+        return "this number"
+
+
+def _list_keys(model: type[BaseModel], names: Sequence[str]) -> list[str]:
+    """Keys that the table at ``names`` inside ``model`` knows."""
+    inner: type[BaseModel] | None = model
+    for name in names:
+        if inner is None:
+            break
+        if name in inner.model_fields:
+            inner = find_model(inner.model_fields[name].annotation)
+    return list(inner.model_fields) if inner else []
+
+
+def _read_text(path: Path, guide: Guide) -> str:
+    remedy = f"give a scene file; {guide.copy}"
+    try:
+        with path.open("rb") as stream:  # which may be a pipe, or a device without an end
+            data = stream.read(LONGEST + 1)
+        if len(data) > LONGEST:
+            raise UsageError(
+                f"can not read the scene (it is longer than {LONGEST >> 20} MiB)",
+                where=str(path), remedy=remedy,
+            )  # fmt: skip
+        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        raise SceneError(
+            f"this is not a text file (byte {error.start})", where=str(path), remedy=remedy
+        ) from error
+    except (OSError, ValueError) as error:  # ValueError: a null byte in the path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise UsageError(
+            f"can not read the scene ({reason})", where=str(path), remedy=remedy
+        ) from error
+
+
+def _refuse_syntax(path: Path, text: str, error: Exception) -> SceneError:
+    found = re.search(r"line (\d+)", str(error))
+    line = int(found[1]) if found else text.count("\n") + 1
+    source = text.split("\n")[line - 1].strip()
+    reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+    return SceneError(
+        f"this is not TOML: {reason}\n  {source:.200}",
+        where=f"{path}:{line}",
+        remedy='one key = value a line, strings in "quotes"; toml.io explains the format',
+    )
+
+
+def _set_key(data: dict[str, Any], override: str, guide: Guide) -> str:
+    """Set ``key=value`` in ``data``; the dotted key, entries of lists by number."""
+    key, equals, text = (part.strip() for part in override.partition("="))
+    if not equals or not all(re.fullmatch(r"[\w+-]+", name) for name in key.split(".")):
+        raise UsageError(
+            f"can not read the override {override!r}",
+            where="--set",
+            remedy=f"write table.key=value, such as --set {guide.override}",
+        )
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        value = text
+    table: Any = data
+    *steps, last = key.split(".")
+    path = []
+    for step in steps:
+        place = _find_entry(table, step, override, guide)
+        path.append(str(place))
+        table = table.setdefault(step, {}) if isinstance(table, dict) else table[place]
+    place = _find_entry(table, last, override, guide)
+    table[place] = value
+    return ".".join([*path, str(place)])
+
+
+def _find_entry(table: Any, step: str, override: str, guide: Guide) -> str | int:
+    """Key of a table; in a list, the number of the entry that has this number or name."""
+    if isinstance(table, dict):
+        return step
+    if isinstance(table, list):
+        names = [entry.get("name") if isinstance(entry, dict) else None for entry in table]
+        if step in names:
+            return names.index(step)
+        if step.isdecimal() and int(step) < len(table):
+            return int(step)
+        what = f"there is no entry {step}; there are {len(table)}, counted from 0"
+    else:
+        what = f"{step} lies inside a value, not a table"
+    raise UsageError(what, where=f"--set {override}", remedy=guide.copy)
