@@ -1,9 +1,10 @@
 # Every target does its own set-up (setup.sh says what it installs) and is quick when all is there.
-.PHONY: demo demo-rigid test test-all test-lowest test-rest lint bench validate setup
+.PHONY: setup-peers demo demo-rigid test test-all test-lowest test-rest lint bench validate setup
 
 bin := .venv/bin
 lowest := .venv-lowest
 two := -n 2 --dist worksteal
+until := inf # seconds after which `make test-rest` begins no test
 
 setup:
 	@./setup.sh
@@ -36,9 +37,11 @@ $(lowest)/made: tests/lowest.txt pyproject.toml
 		-c tests/lowest.txt -e ".[test]"
 	touch $@
 
-test-rest: # what `make test` left out or skipped, with the newest versions that pip finds
+setup-peers:
 	@./setup.sh test,peers
-	$(bin)/python -m pytest $(two) --nothing-missing \
+
+test-rest: setup-peers # what `make test` left out or skipped, with the newest versions that pip finds
+	$(bin)/python -m pytest $(two) --nothing-missing --begin-until $(until) \
 		-m "(long or studies or engine or peer) and not validate"
 
 lint:

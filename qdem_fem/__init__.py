@@ -41,22 +41,10 @@ _HOMES = {
     "ramp": "files",
 }
 __all__ = [
-    "Body",
-    "ContactPlane",
-    "CriticalStep",
-    "Energy",
-    "History",
-    "Material",
-    "PeriodicWidth",
-    "QdemError",
-    "Series",
-    "Simulation",
-    "SphereContact",
-    "StaticAnswer",
-    "StepWarning",
-    "SurfaceContact",
-    "ramp",
-]
+    "Body", "ContactPlane", "CriticalStep", "Energy", "History", "Material", "PeriodicWidth",
+    "QdemError", "Series", "Simulation", "SphereContact", "StaticAnswer", "StepWarning",
+    "SurfaceContact", "ramp",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

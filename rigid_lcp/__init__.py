@@ -43,24 +43,10 @@ _HOMES = {
     "solve_friction": "friction.auto",
 }
 __all__ = [
-    "BodySpace",
-    "Breakage",
-    "Disc",
-    "FrictionProblem",
-    "FrictionSolution",
-    "HalfSpace",
-    "Polygon",
-    "Polyhedron",
-    "RigidError",
-    "Scene",
-    "Simulation",
-    "Sphere",
-    "Wear",
-    "box",
-    "collide",
-    "lcp",
+    "BodySpace", "Breakage", "Disc", "FrictionProblem", "FrictionSolution", "HalfSpace", "Polygon",
+    "Polyhedron", "RigidError", "Scene", "Simulation", "Sphere", "Wear", "box", "collide", "lcp",
     "solve_friction",
-]
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

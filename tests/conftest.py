@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from functools import cache
 from importlib import import_module
 
@@ -18,12 +19,18 @@ settings.register_profile(  # beside other processes time says nothing
 )
 settings.load_profile("no clock")
 
+BEGAN = time.monotonic()  # each process reads this file at its start
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """``--nothing-missing``: for CI and ``make test-all``, where everything is installed."""
     parser.addoption(
         "--nothing-missing", action="store_true",
         help="a test whose engine, program or library is missing fails instead of being skipped",
+    )  # fmt: skip
+    parser.addoption(
+        "--begin-until", type=float, default=float("inf"), metavar="SECONDS",
+        help="skip tests that have not begun when these seconds are over, and say so",
     )  # fmt: skip
 
 
@@ -74,8 +81,12 @@ def peer_missing(name: str) -> str:
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip what needs an engine or a library that is missing; with ``--nothing-missing`` it fails.
 
-    ``@pytest.mark.engine`` (default: liggghts) and ``@pytest.mark.peer("coal")``.
+    ``@pytest.mark.engine`` (default: liggghts) and ``@pytest.mark.peer("coal")``.  A machine several
+    times slower than usual leaves out what has not begun in time (``--begin-until``).
     """
+    seconds = item.config.getoption("--begin-until")
+    if time.monotonic() - BEGAN > seconds:
+        pytest.skip(f"not begun within {seconds:g} s on this slow machine")
     engines = [mark.args[0] if mark.args else "liggghts" for mark in item.iter_markers("engine")]
     peers = [mark.args[0] for mark in item.iter_markers("peer")]
     missing = [*filter(None, map(engine_missing, engines)), *filter(None, map(peer_missing, peers))]

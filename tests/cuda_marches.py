@@ -119,7 +119,7 @@ def simulator_begin() -> None:
     """Small blocks: in numba's simulator every thread of a block costs, at work or not."""
     from qdem_fem.kernel.cuda import step as cuda_step
 
-    cuda_step.BLOCK = 8
+    cuda_step.THREADS_A_BLOCK = 8
 
 
 def steps_launched(look: int) -> list[tuple[int, int]]:

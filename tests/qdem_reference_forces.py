@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from qdem_fem.element.finger import strain_of as strain_finger
+from qdem_fem.element.finger import stress_nominal as stress_finger
 from qdem_fem.element.kinematics import (
     IDENTITY,
     FloatArray,
@@ -23,9 +25,7 @@ from qdem_fem.element.kinematics import (
     volume_change,
     von_mises,
 )
-from qdem_fem.element.measure_finger import strain_of as strain_finger
-from qdem_fem.element.measure_finger import stress_nominal as stress_finger
-from qdem_fem.element.measure_small import stress_nominal as stress_small
+from qdem_fem.element.small import stress_nominal as stress_small
 from qdem_fem.element.strain_measures import MEASURES, Strain, elastic_energy, stress_cauchy
 from tests.qdem_construction import particle_forces, strain_rate
 

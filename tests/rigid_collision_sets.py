@@ -54,9 +54,7 @@ def kinetic_energy(bodies: BodySpace, velocity: Floats) -> float:
     return 0.5 * float(v @ np.linalg.solve(inverse[np.ix_(moves, moves)], v))
 
 
-def random_collision(
-    generator: np.random.Generator,
-) -> tuple[BodySpace, Floats, Floats, Floats]:
+def random_collision(generator: np.random.Generator) -> tuple[BodySpace, Floats, Floats, Floats]:
     """Some free bodies and a wall with contacts anywhere on them: J and M^-1, v, eps, mu.
 
     Nothing but Newton's third law holds for the contacts: arms, normals, masses of a factor of

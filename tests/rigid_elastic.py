@@ -31,8 +31,7 @@ def slide_with_memory(
     deformation: Floats, slip: Floats, stiffness: Floats, friction: Floats
 ) -> tuple[Floats, Floats]:
     """A law of one's own (`rigid_lcp.unique.micro_displacements.ForceLaw`): what slides stays slid,
-    as in
-    MD (Cundall and Strack), so that the forces depend on the order in which contacts slid."""
+    as in MD (Cundall and Strack), so that the forces depend on the order in which contacts slid."""
     force, _ = coulomb_spring(deformation, slip, stiffness, friction)
     slipped = slip.copy()
     slipped[:, 1:] = deformation[:, 1:] - force[:, 1:] / stiffness[:, 1:]

@@ -1,3 +1,3 @@
 """trackbed: the command, and the floor that the three stories stand on."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -1,7 +1,9 @@
-"""Choices that are one file each of a folder: a law, a move, an engine, found by being there.
+"""Choices that are one file each, found by being there: docs/extend.md shows one of each kind.
 
-A file is a choice when it sets the folder's word (``LAW``, ``MOVE``, ``ENGINE``) at its top level;
-users write its name with hyphens.  Names are read without importing the files.
+A file is a choice when it sets the word of its room at its top level: ``LAW``, ``MOVE``,
+``ENGINE``, ``METHOD``, ``MEASURE`` or ``SHAPE``.  Its name is that of the file, with hyphens for
+underscores.
+Names are read without importing the files.
 """
 
 from __future__ import annotations
@@ -22,29 +24,27 @@ RETIRED_AFTER = "0.1"
 
 
 @cache
-def find_choices(neighbour: str, word: str) -> Mapping[str, str]:
-    """Name -> module of every choice in the folder of the module ``neighbour``, sorted by name."""
-    spec = find_spec(neighbour)
+def find_choices(room: str, word: str) -> Mapping[str, str]:
+    """Name -> module of every file of the package ``room`` that sets ``word``, sorted by name."""
+    spec = find_spec(room)
     assert spec is not None
-    assert spec.origin is not None
-    package = neighbour if spec.submodule_search_locations else neighbour.rpartition(".")[0]
-    found = {}
-    for path in Path(spec.origin).parent.glob("*.py"):
-        if re.search(rf"^{word} = ", path.read_text(encoding="utf-8"), re.MULTILINE):
-            name = path.stem.removeprefix(f"{word.lower()}_").replace("_", "-")
-            found[name] = f"{package}.{path.stem}"
-    return dict(sorted(found.items()))
+    return {
+        path.stem.replace("_", "-"): f"{room}.{path.stem}"
+        for folder in spec.submodule_search_locations or ()
+        for path in sorted(Path(folder).glob("*.py"))
+        if re.search(rf"^{word} = ", path.read_text(encoding="utf-8"), re.MULTILINE)
+    }
 
 
 def find_choice(
-    neighbour: str, word: str, name: str, missing: str, retired: Mapping[str, str] | None = None
+    room: str, word: str, name: str, missing: str, retired: Mapping[str, str] | None = None
 ) -> Any:
     """The object ``word`` of the choice ``name``; raises `UsageError` with the nearest name.
 
     ``missing``: what an error says before the name, "there is no law"; ``retired``: choices that
     left trackbed, and what to use instead.
     """
-    known = find_choices(neighbour, word)
+    known = find_choices(room, word)
     if name not in known:
         why = tell_retired(name, retired or {})
         near = get_close_matches(name.lower().replace("_", "-"), known, n=1)

@@ -13,34 +13,28 @@ from trackbed import __version__
 from trackbed.errors import NO_ROOM, Interrupted, TrackbedError, describe_exit_codes
 from trackbed.run_verbs import choose_command
 
-ADAPTERS = "adapters.cli"
+START, RUN = "adapters.cli.start", "adapters.cli.run"
 VERBS = {
-    "doctor": (ADAPTERS, "engines and libraries: versions, what is missing, how to get it"),
-    "new": (ADAPTERS, "write a commented example scene into a folder"),
-    "run": (ADAPTERS, "the whole procedure of a scene: prepare, compute, jump, relax, repeat"),
-    "resume": (ADAPTERS, "go on with an interrupted run"),
-    "sweep": (
-        "adapters.procedure.sweep.cli",
-        "several seeds and values of a scene's keys, side by side",
+    "doctor": (START, "engines and libraries: versions, what is missing, how to get it"),
+    "new": (START, "write a commented example scene into a folder"),
+    "run": (RUN, "the whole procedure of a scene: prepare, compute, jump, relax, repeat"),
+    "resume": (RUN, "go on with an interrupted run"),
+    "sweep": ("adapters.cli.sweep", "several seeds and values of a scene's keys, side by side"),
+    "status": (RUN, "how far a run is, its settlement and speed-up"),
+    "report": (RUN, "write report.html and the figures of a run"),
+    "export": ("adapters.cli.export", "a run as files of ParaView, OVITO, STL or CSV"),
+    "fit": (
+        "adapters.cli.fit",
+        "fit a residual law to a run, dumps or a CSV series and extrapolate it",
     ),
-    "status": (ADAPTERS, "how far a run is, its settlement and speed-up"),
-    "report": (ADAPTERS, "write report.html and the figures of a run"),
-    "export": ("adapters.export.cli", "a run as files of ParaView, OVITO, STL or CSV"),
-    "fit": (ADAPTERS, "fit a residual law to a run, dumps or a CSV series and extrapolate it"),
-    "relax": (ADAPTERS, "bring the overlaps of a state back to equilibrium"),
-    "qdem": ("qdem_fem.cli", "vibration and statics of deformable bodies, from a scene file"),
-    "advise": (
-        "qdem_fem.scene.advise_cli",
-        "which bodies of a QDEM scene may be rigid, at what error",
-    ),
-    "grains": ("qdem_fem.track.commands", "random ballast grains of a standard grading, as a file"),
-    "train": (
-        "qdem_fem.track.commands",
-        "load of a passing train on a sleeper's rail seats, as CSV",
-    ),
+    "relax": ("adapters.cli.relax", "bring the overlaps of a state back to equilibrium"),
+    "qdem": ("qdem_fem.cli.run", "vibration and statics of deformable bodies, from a scene file"),
+    "advise": ("qdem_fem.cli.advise", "which bodies of a QDEM scene may be rigid, at what error"),
+    "grains": ("qdem_fem.cli.track", "random ballast grains of a standard grading, as a file"),
+    "train": ("qdem_fem.cli.track", "load of a passing train on a sleeper's rail seats, as CSV"),
     "rigid": ("rigid_lcp.cli", "rigid, sharp-edged grains with friction, from a scene file"),
     "validate": ("validation.cli", "measure trackbed against a case with a known answer"),
-    "cite": (ADAPTERS, "print what to cite, as BibTeX"),
+    "cite": (START, "print what to cite, as BibTeX"),
 }
 """Verb -> module whose ``register(verb, parser)`` adds the verb's arguments, and a summary."""
 

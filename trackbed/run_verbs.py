@@ -71,39 +71,39 @@ def describe_run(path: Path, kind: Kind) -> dict[str, Any]:
     summary = read_object(path / RESULT) or {}
     states = len(list(path.glob(kind.states)))
     state = "running" if is_written(path) else "finished" if summary else "stopped"
-    told = {
+    said = {
         "run_folder": str(path),
         "kind": kind.verb,
         "title": manifest["scene"].get("title", ""),
         "state": state,
         "saved_states": states,
     }
-    told |= {key: summary[key] for key in ("time", "steps") if key in summary}
+    said |= {key: summary[key] for key in ("time", "steps") if key in summary}
     next_step = {
         "running": f"trackbed status {shlex.quote(str(path))}",
         "finished": str(path / "report.html"),
         "stopped": _go_on(manifest),
     }
-    return told | {"next": next_step[state]}
+    return said | {"next": next_step[state]}
 
 
 def _show_status(arguments: argparse.Namespace, kind: Kind) -> int:
-    told = describe_run(arguments.run_folder, kind)
+    said = describe_run(arguments.run_folder, kind)
     if arguments.json:
-        print(json.dumps(told, indent=2))
+        print(json.dumps(said, indent=2))
     else:
-        for key, value in told.items():
+        for key, value in said.items():
             print(f"{key.replace('_', ' '):28}{value}")
     return 0
 
 
 def _show_report(arguments: argparse.Namespace, kind: Kind) -> int:
-    told = describe_run(arguments.run_folder, kind)
+    said = describe_run(arguments.run_folder, kind)
     path: Path = arguments.run_folder / "report.html"
-    if told["state"] != "finished" or not path.is_file():
+    if said["state"] != "finished" or not path.is_file():
         raise UsageError(
-            f"this {kind.verb} run is {told['state']}, and its report is written at its end",
-            where=str(arguments.run_folder), remedy=f"first: {told['next']}",
+            f"this {kind.verb} run is {said['state']}, and its report is written at its end",
+            where=str(arguments.run_folder), remedy=f"first: {said['next']}",
         )  # fmt: skip
     print(path)
     if arguments.open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
@@ -121,11 +121,11 @@ def _refuse_export(arguments: argparse.Namespace, kind: Kind) -> int:
 
 
 def _refuse_resume(arguments: argparse.Namespace, kind: Kind) -> int:
-    told = describe_run(arguments.run_folder, kind)
+    said = describe_run(arguments.run_folder, kind)
     what = f"a {kind.verb} run goes on with the command that started it"
     raise UsageError(
-        f"this run is {told['state']}; {what}" if told["state"] != "stopped" else what,
-        where=str(arguments.run_folder), remedy=told["next"],
+        f"this run is {said['state']}; {what}" if said["state"] != "stopped" else what,
+        where=str(arguments.run_folder), remedy=said["next"],
     )  # fmt: skip
 
 

@@ -18,8 +18,8 @@ from trackbed.scene_files.reader import suggest_word
 from validation import cases
 from validation.study import import_part, list_studies, read_record, record_path
 
-TOLD = ("reported", "measured", "finite")
-"""In place of a bar: the value is only told."""
+UNBARRED = ("reported", "measured", "finite")
+"""In place of a bar: the value is only reported."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,12 @@ class Check:
 
     @property
     def barred(self) -> bool:
-        """False for a value that is only told."""
-        return self.bar not in TOLD
+        """False for a value that is only reported."""
+        return self.bar not in UNBARRED
 
     @property
     def verdict(self) -> str:
-        """``met``, ``missed`` where that is known, or ``FAILS``; empty for a value only told."""
+        """``met``, ``missed`` where that is known, or ``FAILS``; empty where reported."""
         if not self.holds:
             return "missed" if self.known else "FAILS"
         return "met" if self.barred else ""
@@ -60,7 +60,7 @@ class Check:
 
     @property
     def known(self) -> bool:
-        """True when a finite value misses the bar and `why` tells of it: told, but no failure."""
+        """True when a finite value misses the bar and `why` explains it: no failure."""
         return bool(self.why) and not self.holds and isfinite(self.value)
 
     @property

@@ -27,7 +27,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 def validate_command(arguments: argparse.Namespace) -> int:
     """Run a case, record and print its checks; 0 when all hold but bars that are known to be
-    missed, which are told as such."""
+    missed, which are reported as such."""
     from trackbed.run_files.provenance import record_provenance as provenance
     from validation.case import (
         Check,

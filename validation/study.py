@@ -115,6 +115,19 @@ def format_checks(checks: Iterable[Check]) -> str:
     return format_table(["bar", "value", "asked", ""], lines)
 
 
+def summarise_bars(checks: Iterable[Check]) -> str:
+    """How many bars of a study are met, and a line for each that is missed."""
+    barred = [check for check in checks if check.barred]
+    missed = [check for check in barred if not check.holds]
+    if not missed:
+        return f"All {len(barred)} bars are met."
+    lines = [
+        f"- {check.name}: {check.value:.3g}, bar {check.asked}; {check.why}" for check in missed
+    ]
+    head = f"Of {len(barred)} bars {len(barred) - len(missed)} are met.  Missed:"
+    return "\n".join([head, "", *lines])
+
+
 def mean_interval(values: npt.ArrayLike, level: float = 0.95) -> tuple[float, float]:
     """Mean of values (k,) and half the width of Student's interval of it; nan for a single one."""
     found = np.asarray(values, dtype=float)
@@ -126,14 +139,15 @@ def mean_interval(values: npt.ArrayLike, level: float = 0.95) -> tuple[float, fl
 
 
 def describe_commits(commits: Iterable[str]) -> str:
-    """Commits by which rows were made, with their numbers of rows, the most frequent first."""
+    """The three commits that made most rows, with their numbers of rows, and how many others."""
 
     def short(commit: str) -> str:
         digits, _, modified = commit.partition("-")
         return f"`{digits[:10]}`" + (" with changed files" if modified else "")
 
     counted = Counter(map(short, commits))
-    return ", ".join(f"{name} ({count:,})" for name, count in counted.most_common())
+    words = ", ".join(f"{name} ({count:,})" for name, count in counted.most_common(3))
+    return words + (f" and {len(counted) - 3} more" if len(counted) > 3 else "")
 
 
 def write_page(name: str) -> None:

@@ -9,6 +9,8 @@ import numpy as np
 
 from adapters.bed.state import FloatArray
 
+GOLDEN_ANGLE = 2.399963229728653
+"""Golden angle [rad]: its multiples are spread evenly over a circle."""
 SIDES_GAP = 0.01
 """Greatest gap between a cylinder and the polygon around it, over the mean grain radius."""
 

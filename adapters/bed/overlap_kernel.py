@@ -11,10 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from adapters.bed.container import GOLDEN_ANGLE
 from adapters.bed.state import BoolArray, FloatArray, IntArray
 
-GOLDEN_ANGLE = 2.399963229728653
-"""Golden angle [rad]: made-up directions of consecutive rows are spread evenly."""
 _COINCIDENT = 1e-9
 """Centres nearer than this share of the radii have no direction: one is made up."""
 

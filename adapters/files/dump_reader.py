@@ -12,7 +12,6 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 
 from adapters.bed import FloatArray, IntArray
-from adapters.files import dump_kernel as kernel
 from adapters.files.dump_frame import Frame, Kind
 from adapters.files.dump_text import WRITE_TEXT, DumpText, list_grains
 
@@ -214,6 +213,8 @@ class Reader(DumpText):
 
     def read_frame_rows(self, header: Header) -> FloatArray:
         """All rows of a frame, shape (n, c), in the order of the file."""
+        from adapters.files import dump_kernel as kernel  # loads the compiler
+
         columns = len(header.columns)
         values = np.empty((min(header.rows, _VALUES_AT_FIRST // columns + 1), columns))
         first, row, column = self.line, 0, 0

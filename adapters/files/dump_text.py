@@ -13,7 +13,7 @@ import numpy as np
 from adapters.bed import IntArray
 from adapters.errors import DumpError
 
-BLOCK = 1 << 20
+TEXT_BLOCK = 1 << 20
 """Bytes read at once; also the longest line that is taken for text."""
 WRITE_TEXT = "write text with 'dump ID all custom N FILE id x y z ...' or 'dump ID all local ...'"
 
@@ -23,7 +23,7 @@ class DumpText:
 
     def __init__(self, path: Path, stream: FileIO | GzipFile) -> None:
         self.path, self.stream = path, stream
-        self.block = bytearray(BLOCK)
+        self.block = bytearray(TEXT_BLOCK)
         self.text = np.frombuffer(self.block, np.uint8)
         self.begin = self.end = 0  # block[begin:end] is read from the file, but not yet used
         self.line = 0  # lines used so far
@@ -35,9 +35,9 @@ class DumpText:
     def more(self) -> bool:
         """Read on behind what is not yet used; False at the end of the file."""
         unused = self.end - self.begin
-        if unused == BLOCK:
+        if unused == TEXT_BLOCK:
             self.fault(
-                f"a line is longer than {BLOCK} bytes: this is no text dump",
+                f"a line is longer than {TEXT_BLOCK} bytes: this is no text dump",
                 WRITE_TEXT,
                 line=self.line + 1,
             )

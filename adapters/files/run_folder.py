@@ -202,7 +202,7 @@ class RunFolder:
             return "the record of its failure is damaged"
 
     def failure_details(self, name: str) -> dict[str, Any]:
-        """What `give_up` was told of a failed jump besides the reason; empty when that is all."""
+        """What `give_up` noted of a failed jump besides the reason; empty when that is all."""
         try:
             text = (self.path / name / "failed.json").read_text(encoding="utf-8")
             return {key: value for key, value in json.loads(text).items() if key != "why"}

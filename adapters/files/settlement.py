@@ -40,7 +40,7 @@ class Series:
         return self._kept(self.cycle + self.counted_from >= cycle)
 
     def after(self, cycle: float) -> Series:
-        """The rows behind ``cycle``, counted from there: a load that changed starts a law anew."""
+        """The rows behind ``cycle``, counted from there: a changed load starts the law again."""
         rows = self.cycle > cycle
         begun = float(self.settlement[~rows][-1]) if not rows.all() else self.begun
         kept, counted_from = self._kept(rows), self.counted_from + cycle

@@ -25,7 +25,7 @@ REMEDY = (
     "the first line names the columns, such as cycle,settlement or cycle,settlement_mm (units are "
     "m, cm, mm, um, %); for other names: --columns CYCLE SETTLEMENT"
 )
-STRAIN = "strain is told by 1 or %"
+STRAIN = "strain is marked by 1 or %"
 
 
 def read_table_series(path: Path, names: Sequence[str] = (), unit: str | None = None) -> Series:
@@ -73,7 +73,7 @@ def read_table_series(path: Path, names: Sequence[str] = (), unit: str | None = 
         raise UsageError(
             f"cycle {cycle[again[0]]:g} was given in line {table.lines[first]} already",
             where=table.where(second, "cycle"),
-            remedy="keep one reading of a cycle; stages whose count starts anew: a file each",
+            remedy="keep one reading of a cycle; a file for each stage whose count starts again",
         )
     return Series(cycle, settlement, unit or UNKNOWN)
 

@@ -1,65 +1,17 @@
 """How far to jump: slopes, forecasts, bands, control; pure functions of what was computed."""
 
-from adapters.jumps.band import (
-    PROBABILITY,
-    Band,
-    estimate_band,
-)
-from adapters.jumps.check import (
-    accept,
-    judge,
-    reject,
-)
-from adapters.jumps.control import (
-    Control,
-    Decision,
-    Settings,
-    begin,
-    decide,
-    joined,
-    observe,
-)
-from adapters.jumps.forecast import (
-    fit_forecast,
-)
-from adapters.jumps.history import (
-    Jumped,
-    find_asked_gain,
-)
-from adapters.jumps.rates import (
-    Stretch,
-    measure_rates,
-)
-from adapters.jumps.schedule import (
-    schedule_jumps,
-)
-from adapters.jumps.slopes import (
-    Landing,
-    estimate_slopes,
-    unmoved,
-)
+from adapters.jumps.band import BAND_PROBABILITY, Band, estimate_band
+from adapters.jumps.check import accept, judge, reject
+from adapters.jumps.control import Control, Decision, Settings, begin, decide, joined, observe
+from adapters.jumps.forecast import fit_forecast
+from adapters.jumps.history import Jumped, find_asked_gain
+from adapters.jumps.rates import Stretch, measure_rates
+from adapters.jumps.schedule import schedule_jumps
+from adapters.jumps.slopes import Landing, estimate_slopes, unmoved
 
 __all__ = [
-    "PROBABILITY",
-    "Band",
-    "Control",
-    "Decision",
-    "Jumped",
-    "Landing",
-    "Settings",
-    "Stretch",
-    "accept",
-    "begin",
-    "decide",
-    "estimate_band",
-    "estimate_slopes",
-    "find_asked_gain",
-    "fit_forecast",
-    "joined",
-    "judge",
-    "measure_rates",
-    "observe",
-    "reject",
-    "schedule_jumps",
+    "BAND_PROBABILITY", "Band", "Control", "Decision", "Jumped", "Landing", "Settings", "Stretch",
+    "accept", "begin", "decide", "estimate_band", "estimate_slopes", "find_asked_gain",
+    "fit_forecast", "joined", "judge", "measure_rates", "observe", "reject", "schedule_jumps",
     "unmoved",
-]
+]  # fmt: skip

@@ -25,7 +25,7 @@ from typing import Any
 
 from scipy.special import ndtri
 
-PROBABILITY = 0.9
+BAND_PROBABILITY = 0.9
 """Chance with which the band is to hold."""
 
 
@@ -40,7 +40,7 @@ class Band:
     """The same with the errors observed behind the jumps taken out: the middle of both bands."""
     low: float
     high: float
-    """Between them a full run from the same state ends with `PROBABILITY`."""
+    """Between them a full run from the same state ends with `BAND_PROBABILITY`."""
     mean_low: float
     mean_high: float
     """The same for the mean of many full runs."""
@@ -70,7 +70,7 @@ def estimate_band(cycle: int, settlement: float, checks: Sequence[Mapping[str, A
         own += here[2] * (check["window"] - here[1])  # healing cycles
         other += here[2] * (check["window"] + check["jump"])
     jumps = sqrt(own + sum(derivative[first] ** 2 * variance[first] for first in variance))
-    half = float(ndtri((1 + PROBABILITY) / 2))
+    half = float(ndtri((1 + BAND_PROBABILITY) / 2))
     mean, single = half * hypot(jumps, laws), half * hypot(jumps, laws, sqrt(other))
     middle = settlement - off
     ends = (middle - single, middle + single, middle - mean, middle + mean)

@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 from adapters.bed import FloatArray
 from adapters.jumps.control import (
     GROWTH,
-    PROBABILITY,
+    JUMP_PROBABILITY,
     SAFETY,
     STATES,
     Control,
@@ -147,8 +147,8 @@ def compare_rate(before: Forecast, past: Sequence[Stretch], window: Stretch) -> 
     errors: of the window's own noise and of the forecast ``before`` it, made from ``past``."""
     start, end, k = float(window.first_cycle), float(window.last_cycle), len(window.gain)
     expected = float(before.gain(start, end)) / k
-    known = np.array(before.half_widths(start, end, PROBABILITY)) / k
-    student = float(stdtrit(before.freedom, (1 + PROBABILITY) / 2))
+    known = np.array(before.half_widths(start, end, JUMP_PROBABILITY)) / k
+    student = float(stdtrit(before.freedom, (1 + JUMP_PROBABILITY) / 2))
     noise = float(estimate_noise(past).variance[-1]) / k
     error = sqrt(noise + float((known / student) @ (known / student)))
     difference = window.rate - expected
@@ -169,8 +169,8 @@ def sum_drift(drift: tuple[float, float], deviation: float) -> tuple[float, floa
 
 def expect_by_all(both: Forecast, start: float, end: float) -> Expected:
     """By the forecast of all windows on both sides."""
-    student = float(stdtrit(both.freedom, (1 + PROBABILITY) / 2))
-    noise, form = (float(one) / student for one in both.half_widths(start, end, PROBABILITY))
+    student = float(stdtrit(both.freedom, (1 + JUMP_PROBABILITY) / 2))
+    noise, form = (float(one) / student for one in both.half_widths(start, end, JUMP_PROBABILITY))
     return Expected(float(both.gain(start, end)), noise, form, both.shares(start, end))
 
 

@@ -39,7 +39,7 @@ from adapters.jumps.rates import (
 from adapters.jumps.slopes import Landing, estimate_slopes, reseating, unmoved
 from adapters.laws.fit import FIRST_WINDOW, WHY_NOT, WHY_NOT_PISTON, BoolArray, Regime
 
-PROBABILITY = 0.9
+JUMP_PROBABILITY = 0.9
 """Chance with which a jump is to hold its tolerance."""
 SHORTEST_WINDOW, LONGEST_WINDOW = 10, 100
 """Fewest and most cycles k of a window: grains are fitted on the one, a kill loses the other."""
@@ -146,7 +146,7 @@ class Decision:
     correction: float = 0.0
     """What is to be gained beyond ``gain``, for the errors of earlier jumps [m]."""
     half_width: float = 0.0
-    """How far that can be off with `PROBABILITY`, before it is tried [m]."""
+    """How far that can be off with `JUMP_PROBABILITY`, before it is tried [m]."""
     limits: tuple[tuple[str, float], ...] = ()
     """Longest jump by each rule [cycles]."""
     binding: str = ""
@@ -266,7 +266,7 @@ def decide(control: Control, settings: Settings, piston: Regime | None = None) -
         limits=tuple((name, float(value)) for name, value in limits.items()),
         binding=binding,
         bound=bound_cycles(
-            control.stretches[-1], settings.tolerance * total / max(jump, 1), PROBABILITY
+            control.stretches[-1], settings.tolerance * total / max(jump, 1), JUMP_PROBABILITY
         ),
     )
     if control.attempts >= ATTEMPTS:
@@ -360,9 +360,9 @@ def estimate_widths(
     curve, lie from the forecast.
     """
     here = float(control.cycle)
-    noise, form = forecast.half_widths(here, here + lengths, PROBABILITY)
+    noise, form = forecast.half_widths(here, here + lengths, JUMP_PROBABILITY)
     curve = np.array(control.curve_cycle), np.array(control.curve_settlement)
-    low, high = bound_gain_by_laws(*curve, here + lengths, PROBABILITY)
+    low, high = bound_gain_by_laws(*curve, here + lengths, JUMP_PROBABILITY)
     gain = forecast.gain(here, here + lengths)
     apart = np.maximum(high - gain, gain - low)
     return noise, np.maximum(form, np.where(np.isfinite(apart), apart, 0.0))
@@ -383,7 +383,7 @@ def window_of(
     variance = float(estimate_noise(control.stretches).variance[-1])
     known = float(1 / (forecast.weight @ forecast.error**2)) if forecast.error.any() else inf
     others = min(value for name, value in limits.items() if name not in ("noise", "laws"))
-    student = float(stdtrit(forecast.freedom, (1 + PROBABILITY) / 2))
+    student = float(stdtrit(forecast.freedom, (1 + JUMP_PROBABILITY) / 2))
     if variance > 0:
         error = 1 / np.sqrt(known + sizes / variance)
         allowed = SAFETY * settings.tolerance * abs(control.settlement)

@@ -34,6 +34,7 @@ class Karrech2007:
     parameter_units = ("m", "m per unit of time")
     minimum_cycles = 2
     first_state = 1
+    as_printed = True
 
     def fit(self, cycle: FloatArray, displacement: FloatArray) -> FloatArray:
         """Parameters a [m] and b [m per unit of time], shape (2, ...); see `Law.fit`."""

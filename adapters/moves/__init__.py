@@ -9,7 +9,9 @@ from trackbed.choices import find_choice, find_choices
 if TYPE_CHECKING:  # a scene asks for names only; the ways themselves load scipy
     from adapters.moves.contract import Move
 
-__all__ = ["DEFAULT", "RETIRED", "get_move", "list_moves"]
+__all__ = [
+    "DEFAULT", "RETIRED", "get_move", "list_moves",
+]  # fmt: skip
 
 DEFAULT = "smoothed"
 """The way of a scene that names none."""

@@ -25,7 +25,7 @@ RETRIES = 3
 """How often a failed jump is tried again, by its law each time half as long."""
 SHARES = (1.0, 0.5, 0.25, 0.0)
 """Of the move, by history, in each of the tries: the bed has no room for more."""
-GROWTH = 2.0
+ROOM_GROWTH = 2.0
 """Of what a bed had room for, the most that the next jump by history tries to move it by."""
 
 
@@ -168,8 +168,8 @@ def find_known_room(outcomes: Sequence[Outcome], end: int) -> float:
     """What the next jump by history may try to move the mean grain by [m]; inf: all that is asked.
 
     Debts grow behind a jump without room, and shares of them with them: a bed that settles by 30 um
-    a jump would be asked for a quarter of 500.  So a jump tries no more than `GROWTH` times what
-    the one before found room for, half of its smallest try where it found none.
+    a jump would be asked for a quarter of 500.  So a jump tries no more than `ROOM_GROWTH` times
+    what the one before found room for, half of its smallest try where it found none.
     """
     room = np.inf
     for one in outcomes:
@@ -177,9 +177,9 @@ def find_known_room(outcomes: Sequence[Outcome], end: int) -> float:
             continue
         tried, got = min(room, one.notes["asked"]), one.notes["gain"]
         if one.notes["attempt"] == 1:
-            room = max(room, GROWTH * got)
+            room = max(room, ROOM_GROWTH * got)
         else:
-            room = GROWTH * got if got else tried * min(filter(None, SHARES)) / 2
+            room = ROOM_GROWTH * got if got else tried * min(filter(None, SHARES)) / 2
     return float(room)
 
 

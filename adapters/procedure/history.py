@@ -119,6 +119,12 @@ def cycles_computed(cycle: int, spans: Sequence[tuple[int, int]]) -> int:
     return cycle - sum(last - first for first, last in spans if last <= cycle)
 
 
+def find_last_common_cycle(own: History, full: History) -> int:
+    """Greatest cycle that both tables have; 0 for none."""
+    common = np.intersect1d(own.cycle, full.cycle)
+    return int(common[-1]) if len(common) else 0
+
+
 @dataclass(frozen=True)
 class FailedJump:
     """A jump that was given up."""

@@ -12,7 +12,14 @@ from adapters.bed import FloatArray, State, load_state
 from adapters.errors import UsageError
 from adapters.files import Outcome, RunFolder, Window, load_window
 from adapters.jumps import Band, estimate_band
-from adapters.procedure.history import FailedJump, History, failed_jumps, history_of
+from adapters.procedure.history import (
+    FailedJump,
+    History,
+    failed_jumps,
+    find_last_common_cycle,
+    history_of,
+    list_jumped_spans,
+)
 from adapters.scene import Scene, load_scene
 
 CONTROL = "control"
@@ -138,6 +145,18 @@ def read_track(name: str, folder: RunFolder) -> Track:
         discarded=tuple(discarded),
         events=tuple(folder.events()),
     )
+
+
+def find_comparable_cycle(record: Record) -> int:
+    """The last cycle that run and control both have; 0 when the control is not past the first jump.
+
+    Before the first jump they share their stages, so there is nothing to compare.
+    """
+    if record.control is None:
+        return 0
+    cycle = find_last_common_cycle(record.run.history, record.control.history)
+    spans = list_jumped_spans(record.run.outcomes)
+    return 0 if spans and cycle <= spans[0][0] else cycle
 
 
 Event = dict[str, Any]

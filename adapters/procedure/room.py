@@ -8,7 +8,6 @@ import numpy as np
 
 from adapters.bed import GRAVITY, FloatArray, State
 from adapters.errors import NotConverged
-from adapters.relaxation import rearrange, relax
 from adapters.scene import Scene
 
 
@@ -47,6 +46,8 @@ def relaxed(
 
     Raises `RelaxationNotConverged`.
     """
+    from adapters.relaxation import relax  # loads the compiler
+
     procedure = scene.procedure
     assert procedure is not None
     if procedure.relaxation == "none":
@@ -83,6 +84,8 @@ def relax_by_rearranging(
     generator: np.random.Generator,
 ) -> tuple[FloatArray, dict[str, Any], float]:
     """Of grains that change places under the lowered piston; then its height on top of them [m]."""
+    from adapters.relaxation import rearrange  # loads the compiler
+
     reach = scene.piston_reach
     relaxation, hops = rearrange(
         target,

@@ -8,8 +8,15 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from adapters.procedure.history import sum_cost
-from adapters.procedure.record import Record, Track, estimate_band_of_run, read_run_record
+from adapters.jumps import BAND_PROBABILITY
+from adapters.procedure.history import History, sum_cost
+from adapters.procedure.record import (
+    Record,
+    Track,
+    estimate_band_of_run,
+    find_comparable_cycle,
+    read_run_record,
+)
 from trackbed.run_files import is_written
 
 
@@ -49,8 +56,12 @@ class Status:
 
 def status(run_folder: Path) -> Status:
     """How far the run in ``run_folder`` is; raises `UsageError` when it is no run folder."""
-    record = read_run_record(run_folder)
-    history = record.run.history
+    return judge_progress(read_run_record(run_folder))
+
+
+def judge_progress(record: Record) -> Status:
+    """How far a run is."""
+    run_folder, history = record.path, record.run.history
     cycle = int(history.cycle[-1]) if len(history.cycle) else 0
     computed = history.computed(cycle)
     state = "running" if is_written(run_folder, "lock") else "stopped"
@@ -78,6 +89,47 @@ def status(run_folder: Path) -> Status:
         control_cycle=_cycle(record.control) if record.control is not None else None,
         next=f"trackbed {verb} {shlex.quote(str(run_folder))}",
     )
+
+
+def describe_result(record: Record) -> list[str]:
+    """What came out so far, in sentences with millimetres and per cent; none before a cycle."""
+    history = record.run.history
+    if not len(history.cycle):
+        return []
+    cycle, settled = int(history.cycle[-1]), float(history.settlement[-1])
+    computed = history.computed(cycle)
+    how = "all of them" if computed == cycle else f"{computed} of them"
+    said = [f"The bed settled {_millimetres(settled)} in {cycle} cycles, {how} computed."]
+    band = estimate_band_of_run(record.run)
+    if band is not None:
+        ends = f"{_millimetres(band.low)} to {_millimetres(band.high)}"
+        said.append(f"With probability {BAND_PROBABILITY:g} a full run settles {ends}.")
+    at = find_comparable_cycle(record)
+    if record.control is not None and at and record.run.jumps:
+        said.append(compare_with_full(history, record.control.history, at))
+    return said
+
+
+def compare_with_full(own: History, full: History, cycle: int) -> str:
+    """The sentence on the full run beside a run with jumps, at the last cycle that both have."""
+    mine, truth = own.row(cycle), full.row(cycle)
+    settled, of_full = float(own.settlement[mine]), float(full.settlement[truth])
+    error = 100 * (settled - of_full) / abs(of_full) if of_full else nan
+    said = f"The full run beside it settled {_millimetres(of_full)}"
+    if cycle != own.cycle[-1]:
+        said += f" in {cycle} cycles, this one {_millimetres(settled)}"
+    if isfinite(error):
+        off = f"{abs(error):.0f} % {'short' if error < 0 else 'over'}"
+        said += f": the jumps are {off if abs(error) >= 0.5 else 'within 0.5 %'}"
+    spent, of_full_s = float(own.cpu_s[mine]), float(full.cpu_s[truth])
+    if min(spent, of_full_s) > 0:
+        ratio = max(of_full_s / spent, spent / of_full_s)
+        said += f", at {ratio:.1f} times {'less' if spent <= of_full_s else 'more'} computing"
+    return said + "."
+
+
+def _millimetres(length: float) -> str:
+    return f"{1e3 * length:#.3g} mm"
 
 
 def _why(event: dict[str, Any]) -> str:

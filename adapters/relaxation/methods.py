@@ -23,6 +23,7 @@ from typing import Literal
 import numpy as np
 
 from adapters.bed import (
+    CHAIN_FACTOR,
     BoolArray,
     FloatArray,
     HertzStiffness,
@@ -55,9 +56,6 @@ RETIRED = {"proximal": "smallest-move"}
 
 GAP_FACTOR = 5.0
 """Pairs nearer than so many mean overlaps belong to the network: they close under any load."""
-CHAIN_FACTOR = 10.0
-"""Greatest contact force over the mean one: force chains have an exponential tail, and the
-largest of a hundred thousand contacts stays below it."""
 
 
 def relax(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from math import inf
 
-from adapters.jumps import PROBABILITY
+from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure import Record, estimate_band_of_run, list_checks, list_decisions
 from trackbed.report import micrometres, paragraph, per_cent, plain, section, table
 
@@ -63,8 +63,8 @@ def control(record: Record) -> str:
         paragraph(
             f"At cycle {band.cycle} the bed has settled by {micrometres(band.settlement)} µm; with "
             f"the errors observed behind its jumps taken out, {micrometres(band.corrected)} µm. "
-            f"With probability {PROBABILITY:g} a full run from the same state ends within {ends}, "
-            f"the mean of many within {mean}. Standard deviations: "
+            f"With probability {BAND_PROBABILITY:g} a full run from the same state ends within "
+            f"{ends}, the mean of many within {mean}. Standard deviations: "
             f"{micrometres(band.jumps)} µm from the noise of the computed rates, "
             f"{micrometres(band.laws)} µm from the form of the law, {micrometres(band.scatter)} µm "
             "from the bursts of the other run."

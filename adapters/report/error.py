@@ -269,9 +269,3 @@ def _settled(history: History | None, first: int, last: int) -> float:
         for cycle in (first, last)
     )
     return end - start
-
-
-def find_last_common_cycle(own: History, full: History) -> int:
-    """Greatest cycle that both tables have; 0 for none."""
-    common = np.intersect1d(own.cycle, full.cycle)
-    return int(common[-1]) if len(common) else 0

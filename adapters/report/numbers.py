@@ -18,6 +18,8 @@ from adapters.procedure import (
     Track,
     cycles_computed,
     estimate_band_of_run,
+    find_comparable_cycle,
+    find_last_common_cycle,
     list_jumped_spans,
     sum_cost,
 )
@@ -28,7 +30,6 @@ from adapters.report.error import (
     JumpFigures,
     comparison,
     curve_fitted,
-    find_last_common_cycle,
     measure_jump,
     stopped_early,
 )
@@ -175,18 +176,6 @@ def numbers_of(record: Record) -> Numbers:
         decks={k: v for o in run.outcomes for k, v in o.notes.get("decks", {}).items()},
         reproduce=_reproduce(record),
     )
-
-
-def find_comparable_cycle(record: Record) -> int:
-    """The last cycle that run and control both have; 0 when the control is not past the first jump.
-
-    Before the first jump they share their stages, so there is nothing to compare.
-    """
-    if record.control is None:
-        return 0
-    cycle = find_last_common_cycle(record.run.history, record.control.history)
-    spans = list_jumped_spans(record.run.outcomes)
-    return 0 if spans and cycle <= spans[0][0] else cycle
 
 
 def error_rows(record: Record, cycle: int) -> tuple[Comparison, ...]:

@@ -1,23 +1,9 @@
 """A settlement scene: its tables, its file, and what is checked before anything runs."""
 
-from adapters.scene.file import (
-    load_scene,
-)
-from adapters.scene.model import (
-    left_out,
-)
-from adapters.scene.tables import (
-    GrainRadius,
-    Procedure,
-    Scene,
-    flatten_keys,
-)
+from adapters.scene.file import load_scene
+from adapters.scene.model import left_out
+from adapters.scene.tables import GrainRadius, Procedure, Scene, flatten_keys
 
 __all__ = [
-    "GrainRadius",
-    "Procedure",
-    "Scene",
-    "flatten_keys",
-    "left_out",
-    "load_scene",
-]
+    "GrainRadius", "Procedure", "Scene", "flatten_keys", "left_out", "load_scene",
+]  # fmt: skip

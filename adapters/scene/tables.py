@@ -31,7 +31,8 @@ from adapters.bed import (
 from adapters.files import LoadSeries, read_load_series
 from adapters.laws.fit import FIRST_WINDOW
 from adapters.moves import DEFAULT as MOVE_DEFAULT
-from adapters.scene.checks import COUNT_GREATEST, find_problems, find_warnings
+from adapters.scene.checks import find_problems, find_warnings
+from adapters.scene.mechanics import COUNT_GREATEST
 from trackbed.scene_files import NonNegative, Positive, Table
 
 TRACK_SAMPLES = 100

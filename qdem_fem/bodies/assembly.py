@@ -12,7 +12,7 @@ from numpy.typing import DTypeLike, NDArray
 from qdem_fem.bodies.conditions import Conditions
 from qdem_fem.bodies.deformable import Body
 from qdem_fem.bodies.frames import BodyFrames
-from qdem_fem.element import Strain
+from qdem_fem.element import MEASURES, Strain
 from qdem_fem.kernel.cpu import Constraints, Fields, Loads, Probes, aligned_zeros, build_layout
 from qdem_fem.kernel.cpu import step as kernel
 
@@ -103,7 +103,7 @@ class Assembly:
         """Of free bodies in single precision."""
         self._nodes = np.concatenate([body.nodes for body in bodies])
         self._sizes = np.array([EDGE * np.median(body.gradients[1]) ** (1 / 3) for body in bodies])
-        self._turning = strain != "small"
+        self._turning = MEASURES[strain].OBJECTIVE
         self._joined = master != np.arange(self.n_nodes)
         self._joined[master[self._joined]] = True
 

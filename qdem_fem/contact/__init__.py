@@ -1,37 +1,13 @@
 """Contact between bodies: its state, its step, and the time step that it allows."""
 
-from qdem_fem.contact.critical_step import (
-    CriticalStep,
-    find_critical_step,
-)
-from qdem_fem.contact.sphere_state import (
-    PARTED,
-    SphereContacts,
-)
-from qdem_fem.contact.state import (
-    Contacts,
-    Floats,
-)
-from qdem_fem.contact.surface_state import (
-    SurfaceContacts,
-)
-from qdem_fem.contact.system import (
-    System,
-    choose_assembly,
-)
-from qdem_fem.contact.window import (
-    window_run,
-)
+from qdem_fem.contact.critical_step import CriticalStep, find_critical_step
+from qdem_fem.contact.sphere_state import PARTED, SphereContacts
+from qdem_fem.contact.state import Contacts, Floats
+from qdem_fem.contact.surface_state import SurfaceContacts
+from qdem_fem.contact.system import System, choose_assembly
+from qdem_fem.contact.window import window_run
 
 __all__ = [
-    "PARTED",
-    "Contacts",
-    "CriticalStep",
-    "Floats",
-    "SphereContacts",
-    "SurfaceContacts",
-    "System",
-    "choose_assembly",
-    "find_critical_step",
-    "window_run",
-]
+    "PARTED", "Contacts", "CriticalStep", "Floats", "SphereContacts", "SurfaceContacts", "System",
+    "choose_assembly", "find_critical_step", "window_run",
+]  # fmt: skip

@@ -21,7 +21,7 @@ from qdem_fem.contact.search import (
 )
 from qdem_fem.contact.spheres import (
     NEAR,
-    SKIN,
+    SKIN_OF_SPHERES,
     Contact,
     Planes,
     SphereContact,
@@ -60,7 +60,7 @@ class SphereContacts(Contacts):
         radius = by_body([asked.of_body(b.name, "radius") for b in run.bodies])
         poisson = by_body([float(np.mean(b.material.poisson)) for b in run.bodies])
         self.one = pair_stiffness(normal, normal.max(initial=0.0))
-        self.skin = float(SKIN * radius.min() if asked.skin is None else asked.skin)
+        self.skin = float(SKIN_OF_SPHERES * radius.min() if asked.skin is None else asked.skin)
         free = asked.skin is None and asked.contacts != NEAR
         self.skins = (self.skin, float(radius.min()) if free else self.skin)
         """Least and greatest skin [m]."""

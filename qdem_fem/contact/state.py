@@ -122,7 +122,7 @@ class Contacts(ABC):
         """Ends (p, 2), k_n (p,) and k_n to walls (c,) [N/m] of all contacts there can be before
         pairs are looked for again: no vertex then is half a skin from where it was."""
         raise ConditionError(
-            "what is near is told of spheres", where="contact, contacts", remedy="give a number"
+            "only spheres know what is near", where="contact, contacts", remedy="give a number"
         )
 
     @abstractmethod
@@ -203,7 +203,7 @@ class Contacts(ABC):
         """Look for pairs again; those that touch keep their springs."""
         position = self.positions()
         if position is None:
-            return  # what made it so is told by the march
+            return  # the march says what made it so
         self.check_images(position)
         self.renew_lists(position)
         self._near = None

@@ -95,11 +95,6 @@ class Material:
         """Whether any element has a viscosity."""
         return bool(np.any(self.shear_viscosity) or np.any(self.bulk_viscosity))
 
-    @property
-    def is_uniform(self) -> bool:
-        """Whether all elements have the same values."""
-        return all(np.all(value == np.ravel(value)[0]) for value in self._values())
-
     def per_element(self, elements: int) -> Material:
         """The same material with an array (elements,) for each property.
 

@@ -1,25 +1,24 @@
-"""The strain measures: each is a file of its own, ``measure_NAME.py``, found by being there.
+"""The strain measures: each is a file here that sets ``MEASURE``, found by being there.
 
-A measure has ``LAW``, the type by which compiled code chooses it; ``stress_numbers``, its nominal
-stress written once for numbers, arrays, lanes and GPU; ``viscous_numbers``, what viscosity adds to
-it, and where there is one ``pulls_viscous``, both at once; and, on arrays, ``strain_of``,
-``stress_nominal`` and ``energy_stored``.
+``MEASURE`` is the type by which compiled code chooses a measure, and ``OBJECTIVE`` says whether a
+body may turn under it.  ``stress_numbers`` is its nominal stress, written once for numbers,
+arrays, lanes and GPU; ``viscous_numbers`` what viscosity adds to it, and where there is one
+``pulls_viscous`` both at once; ``stress_nominal`` and ``energy_stored`` are on arrays.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import ArrayLike
 
 from qdem_fem.element.kinematics import IDENTITY, FloatArray, transposed, volume_change
+from trackbed.choices import find_choices
 
-PREFIX = "measure_"
 MEASURES: dict[str, Any] = {
-    path.stem.removeprefix(PREFIX): import_module(f"{__package__}.{path.stem}")
-    for path in sorted(Path(__file__).parent.glob(f"{PREFIX}*.py"))
+    name: import_module(module)
+    for name, module in find_choices("qdem_fem.element", "MEASURE").items()
 }
 """Name -> module."""
 
@@ -30,8 +29,8 @@ else:
 
 
 def stress_cauchy(H: FloatArray, nominal: FloatArray, strain: Strain) -> FloatArray:
-    """Cauchy stress T = P F^T/J [Pa], (m, 3, 3); ``small`` does not tell T from P."""
-    if strain == "small":
+    """Cauchy stress T = P F^T/J [Pa], (m, 3, 3); T is P where the measure is not objective."""
+    if not MEASURES[strain].OBJECTIVE:
         return nominal
     return nominal @ transposed(IDENTITY + H) / (1 + volume_change(H))[..., None, None]
 

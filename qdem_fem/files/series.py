@@ -105,7 +105,7 @@ class Driver:
         self.constant = np.zeros(components)
         if isinstance(value, Series) or callable(value):
             self.varying = value
-            self.sample(np.zeros(1))  # a fault is told now, not in the run
+            self.sample(np.zeros(1))  # a fault is found now, not in the run
         else:
             self.constant = self._columns(value, 1, None)[0]
 
@@ -119,7 +119,7 @@ class Driver:
         return np.concatenate(rows)
 
     def _called(self, time: float) -> Any:
-        """Value of a function at one time [s]; what goes wrong in it is told with the time."""
+        """Value of a function at one time [s]; an error names the time."""
         assert callable(self.varying)
         try:
             return self.varying(time)

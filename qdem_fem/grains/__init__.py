@@ -1,23 +1,9 @@
 """Ballast grains: random hulls, gradings, sieves, scans, their meshes."""
 
-from qdem_fem.grains.grading import (
-    BALLAST,
-    Grading,
-)
-from qdem_fem.grains.hulls import (
-    GrainRecipe,
-)
-from qdem_fem.grains.sets import (
-    GrainSet,
-    make_grains,
-    save_grains,
-)
+from qdem_fem.grains.grading import BALLAST, Grading
+from qdem_fem.grains.hulls import GrainRecipe
+from qdem_fem.grains.sets import GrainSet, make_grains, save_grains
 
 __all__ = [
-    "BALLAST",
-    "Grading",
-    "GrainRecipe",
-    "GrainSet",
-    "make_grains",
-    "save_grains",
-]
+    "BALLAST", "Grading", "GrainRecipe", "GrainSet", "make_grains", "save_grains",
+]  # fmt: skip

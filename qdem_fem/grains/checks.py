@@ -1,4 +1,4 @@
-"""What the surface of a scanned stone must obey; all that is wrong is told at once."""
+"""What the surface of a scanned stone must obey; all that is wrong is said at once."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from qdem_fem.mesh import (
     raise_problems,
 )
 
-CHUNK = 2_000_000
+PAIRS_AT_ONCE = 2_000_000
 """Pairs of triangles that are looked at together."""
-FLAT = 1e-12
+FLAT_TRIANGLE = 1e-12
 """Area of a triangle over its longest edge squared, at and below which it has none."""
 FOLDED = 1e-6
 """Angle short of pi between the normals of two neighbours that lie upon each other [rad]."""
@@ -35,7 +35,7 @@ def check_surface(nodes: FloatArray, faces: IntArray, where: str) -> None:
     """
     area = np.linalg.norm(face_area_vectors(nodes, faces), axis=1)
     longest = ((nodes[faces] - nodes[np.roll(faces, 1, axis=1)]) ** 2).sum(axis=2).max(axis=1)
-    flat = np.flatnonzero(~(area > FLAT * longest))
+    flat = np.flatnonzero(~(area > FLAT_TRIANGLE * longest))
     problems: list[Problem] = []
     if len(flat):
         problems.append(
@@ -154,7 +154,7 @@ def triangles_cutting(nodes: FloatArray, faces: IntArray) -> IntArray:
     found = [np.zeros((0, 2), np.int64)]
     start = 0
     while start < len(order):
-        stop = start + max(1, int(np.searchsorted(np.cumsum(reach[start:]), CHUNK)))
+        stop = start + max(1, int(np.searchsorted(np.cumsum(reach[start:]), PAIRS_AT_ONCE)))
         rows = np.arange(start, min(stop, len(order)))
         first = np.repeat(rows, reach[rows])
         step = np.arange(len(first)) - np.repeat(np.cumsum(reach[rows]) - reach[rows], reach[rows])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from qdem_fem.files import MeshError
 from qdem_fem.mesh import FloatArray
@@ -36,10 +35,6 @@ class Grading:
                 remedy="give growing sieves in metres and as many shares, growing from 0 to 1",
             )
 
-    def passing_at(self, size: ArrayLike) -> FloatArray:
-        """Share of the mass of grains that pass a hole of ``size`` [m]."""
-        return np.interp(np.log(size), np.log(self.sieves), self.passing)
-
 
 @dataclass(frozen=True, eq=False)
 class GradingLimits:
@@ -50,10 +45,6 @@ class GradingLimits:
     """[m], (k,)."""
     least: FloatArray
     most: FloatArray
-
-    def kept_by(self, passing: FloatArray) -> bool:
-        """Whether shares (k,) lie within the limits."""
-        return bool(((self.least <= passing) & (passing <= self.most)).all())
 
 
 EN_13450_A = GradingLimits(
@@ -67,9 +58,6 @@ EN_13450_A = GradingLimits(
 Not compared with a printed copy of the standard."""
 BALLAST = Grading(EN_13450_A.sieves, np.array([0.0, 0.13, 0.475, 0.845, 1.0]))
 """Midway between the limits of `EN_13450_A`, with nothing below 22.4 mm: 71.5 % from 31.5 to 50."""
-
-PAPER_SIZE = Grading(np.array([0.045, 0.055]), np.array([0.0, 1.0]))
-"""The paper's grains, "around 5 cm" (section 4), which is coarser than `BALLAST` by number."""
 
 
 def draw_sizes(grading: Grading, count: int, generator: np.random.Generator) -> FloatArray:
@@ -89,10 +77,3 @@ def draw_sizes(grading: Grading, count: int, generator: np.random.Generator) -> 
     inverse = low[at] ** -3.0 - 3 * rest / np.where(mass[at] > 0, mass[at], 1.0)
     sizes = np.clip(inverse ** (-1 / 3), low[at], high[at])
     return np.asarray(generator.permutation(sizes))
-
-
-def passing_of(sizes: FloatArray, masses: FloatArray, sieves: FloatArray) -> FloatArray:
-    """Share of the mass of grains, (k,), that passes each sieve: ``sizes`` (n,) [m] at most it."""
-    order = np.argsort(sizes)
-    total = np.concatenate([[0.0], np.cumsum(masses[order])])
-    return np.asarray(total[np.searchsorted(sizes[order], sieves, side="right")] / total[-1])

@@ -150,6 +150,33 @@ def draw_grain(generator: np.random.Generator, recipe: GrainRecipe) -> GrainForm
     )
 
 
+def make_flat_form(points: FloatArray) -> GrainForm:
+    """The grain of flat faces that is the hull of ``points`` (M, 3), the origin inside it.
+
+    Raises `MeshError` where a point is no corner of the hull, or the mesh would have a sliver.
+    """
+    corner_faces, count = find_hull_faces(points), len(points)
+    if len(corner_faces) != 2 * count - 4 or len(np.unique(corner_faces)) != count:
+        raise MeshError(
+            f"not each of the {count} points is a corner of their hull", where="grain shape",
+            remedy="leave out those inside it, on its edges and on its faces",
+        )  # fmt: skip
+    edges = find_surface_edges(corner_faces)
+    surface = np.vstack([points, points[edges.nodes].mean(axis=1)])
+    faces = quarter_faces(corner_faces, edges)
+    inner = place_apex_and_spokes(surface, faces, count)
+    nodes = np.vstack([surface, inner]) - inner[0]
+    worst = signed_radius_ratios(nodes, make_grain_elements(nodes, corner_faces)).min()
+    if worst < RATIO_LEAST:
+        raise MeshError(
+            f"its flattest tetrahedron has a radius ratio of {worst:.2g}", where="grain shape",
+            remedy=f"keep the corners farther apart: {RATIO_LEAST:g} is the least",
+        )  # fmt: skip
+    volume = polyhedron_integrals(nodes, faces).volume
+    psi = sphericity_true(volume, surface_area(nodes, faces))
+    return GrainForm(corner_faces, nodes, psi, roundness_wadell(surface, faces))
+
+
 class _Drawn:
     """Random corners, dents, direction and kind of stretch of one grain; lift and stretch open."""
 
@@ -252,3 +279,6 @@ class _Drawn:
         nodes = np.vstack([turned, inner]) - inner[0]
         worst = signed_radius_ratios(nodes, make_grain_elements(nodes, self.corner_faces)).min()
         return GrainForm(self.corner_faces, nodes, psi, roundness) if worst >= RATIO_LEAST else None
+
+
+SHAPE = draw_grain

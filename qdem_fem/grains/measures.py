@@ -13,7 +13,7 @@ import numpy as np
 
 from qdem_fem.mesh import FloatArray, IntArray, face_area_vectors
 
-FAR = 1e3
+FIRST_PLANES = 1e3
 """Distance of the planes that the search for an inscribed sphere starts from, over the extent."""
 PIVOTS_MOST = 500
 OUTSIDE = 1e-12
@@ -181,7 +181,7 @@ def inscribed_sphere(nodes: FloatArray, faces: IntArray) -> tuple[FloatArray, fl
     a negative radius where the planes have no point in common.
 
     A linear programme in four unknowns, max r with n.x + r <= d, by the dual simplex: of four
-    planes that hold a sphere between them the one that leaves is told by the multipliers, and the
+    planes that hold a sphere between them the multipliers say which leaves, and the
     plane that cuts deepest into the sphere enters.
     """
     normal = face_area_vectors(nodes, faces)
@@ -191,7 +191,7 @@ def inscribed_sphere(nodes: FloatArray, faces: IntArray) -> tuple[FloatArray, fl
     reach = ((nodes[faces[:, 0]] - origin) * normal).sum(axis=1)
     start = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / np.sqrt(3)
     rows = np.column_stack([np.vstack([start, normal]), np.ones(len(normal) + 4)])
-    bound = np.concatenate([np.full(4, FAR * extent), reach])
+    bound = np.concatenate([np.full(4, FIRST_PLANES * extent), reach])
     basis = np.arange(4)
     for _ in range(PIVOTS_MOST):
         inverse = np.linalg.inv(rows[basis])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import zipfile
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -17,13 +18,14 @@ import numpy as np
 
 from qdem_fem.files import MeshError
 from qdem_fem.grains.grading import BALLAST, Grading, draw_sizes
-from qdem_fem.grains.hulls import GrainRecipe, draw_grain
+from qdem_fem.grains.hulls import GrainForm, GrainRecipe
 from qdem_fem.grains.measures import Solid, polyhedron_integrals
 from qdem_fem.grains.meshing import make_grain_faces, make_grain_tetrahedra
 from qdem_fem.grains.sieve import find_sieve_size
 from qdem_fem.mesh import FloatArray, IntArray, TetMesh
+from trackbed.choices import find_choice
 
-FORMAT = 1
+GRAINS_FORMAT = 1
 BATCH = 50
 """Grains a process makes at a time."""
 
@@ -71,16 +73,25 @@ class GrainSet:
         return np.asarray(8 * (2 * self.corners - 4))
 
 
+def get_shape(name: str) -> Callable[[np.random.Generator, GrainRecipe], GrainForm]:
+    """What draws a grain of a shape: the ``SHAPE`` of a file of this room."""
+    draw: Callable[[np.random.Generator, GrainRecipe], GrainForm]
+    draw = find_choice("qdem_fem.grains", "SHAPE", name, "there is no grain shape")
+    return draw
+
+
 def make_grains(
     count: int, seed: int, recipe: GrainRecipe | None = None, grading: Grading = BALLAST,
-    workers: int = 1,
+    workers: int = 1, shape: str = "hulls",
 ) -> GrainSet:  # fmt: skip
-    """``count`` random grains whose sieve sizes follow ``grading``.
+    """``count`` random grains of a ``shape`` whose sieve sizes follow ``grading``.
 
-    Grain i depends on ``seed``, i and the recipe only; sizes on ``seed``, ``count`` and the
+    Grain i depends on ``seed``, i, shape and recipe only; sizes on ``seed``, ``count`` and the
     grading: the same set for any number of ``workers`` (processes).  Raises `MeshError` for a
-    recipe that random grains do not meet, a count below one, or a seed below zero.
+    recipe that random grains do not meet, a count below one, or a seed below zero, `UsageError`
+    for a shape that there is not.
     """
+    get_shape(shape)
     if count < 1 or workers < 1 or seed < 0:
         raise MeshError(
             f"{count} grains of seed {seed} on {workers} processors",
@@ -88,7 +99,7 @@ def make_grains(
             remedy="use a seed of 0 or more, and 1 or more of the others",
         )
     sizes = draw_sizes(grading, count, np.random.default_rng([seed, count]))
-    make = partial(_make_batch, recipe=recipe or GrainRecipe(), seed=seed)
+    make = partial(_make_batch, recipe=recipe or GrainRecipe(), seed=seed, shape=shape)
     batches = [range(at, min(at + BATCH, count)) for at in range(0, count, BATCH)]
     if workers == 1:
         made = [make(batch) for batch in batches]
@@ -108,12 +119,12 @@ def make_grains(
 
 
 def _make_batch(
-    grains: range, recipe: GrainRecipe, seed: int
+    grains: range, recipe: GrainRecipe, seed: int, shape: str
 ) -> list[tuple[FloatArray, IntArray, float, float, float]]:
     """Nodes, corner faces, sieve size, sphericity and roundness of grains of no set size."""
-    made = []
+    made, draw = [], get_shape(shape)
     for grain in grains:
-        form = draw_grain(np.random.default_rng([seed, grain, FORMAT]), recipe)
+        form = draw(np.random.default_rng([seed, grain, GRAINS_FORMAT]), recipe)
         size = find_sieve_size(form.nodes)
         made.append((form.nodes, form.corner_faces, size, form.sphericity, form.roundness))
     return made
@@ -126,7 +137,7 @@ def save_grains(path: str | os.PathLike[str], grains: GrainSet) -> None:
     with temporary.open("wb") as stream:
         np.savez(
             stream,
-            format=np.array(FORMAT),
+            format=np.array(GRAINS_FORMAT),
             corners=grains.corners.astype(np.uint8),
             nodes=grains.nodes,
             corner_faces=grains.corner_faces.astype(np.uint8),
@@ -147,7 +158,11 @@ def load_grains(path: str | os.PathLike[str]) -> GrainSet:
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise MeshError(f"not a set of grains ({error})", where=where, remedy=remedy) from error
     wanted = ((5 * corners.sum() - 5 * len(corners), 3), (2 * corners.sum() - 4 * len(corners), 3))
-    if number != FORMAT or (nodes.shape, faces.shape) != wanted or shape.shape != (3, len(corners)):
+    if (
+        number != GRAINS_FORMAT
+        or (nodes.shape, faces.shape) != wanted
+        or shape.shape != (3, len(corners))
+    ):
         raise MeshError(
             f"format {number}, nodes {nodes.shape}, faces {faces.shape} for {len(corners)} grains",
             where=where,

@@ -26,7 +26,7 @@ from trackbed.run_files import write_whole
 
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT = 3
+CHECKPOINT_FORMAT = 3
 DIGEST = 64
 """Letters of a SHA-256 in hexadecimal."""
 BESIDE = "beside "
@@ -44,7 +44,7 @@ def write_checkpoint(
     assembly, (_, held) = simulation.assembly, simulation.pack_lists()
     critical = simulation.elements_critical_step
     head = {
-        "format": FORMAT,
+        "format": CHECKPOINT_FORMAT,
         "fingerprint": fingerprint_run(simulation),
         "motion": asdict(simulation.motion) | {"work": None},
         "critical_step": {
@@ -185,10 +185,10 @@ def _compare(saved: Mapping[str, str], here: Mapping[str, str], where: str) -> N
     if not different:
         return
     name = different[0]
-    told = [marks.get(name, "absent") for marks in (saved, here)]
+    both = [marks.get(name, "absent") for marks in (saved, here)]
     what = f"another simulation was saved: {', '.join(different)} differ"
-    if all(len(text) < DIGEST for text in told):
-        what += f" ({name}: {told[0]!r} in the file, {told[1]!r} here)"
+    if all(len(text) < DIGEST for text in both):
+        what += f" ({name}: {both[0]!r} in the file, {both[1]!r} here)"
     raise CheckpointError(
         what, where=where, remedy="make the simulation as it was when it was saved, or start again"
     )
@@ -216,9 +216,9 @@ def _opened(content: bytes, where: str) -> tuple[dict[str, Any], Arrays]:
         known = head["format"]
     except (KeyError, ValueError, OSError, EOFError) as error:
         raise CheckpointError(f"this is no checkpoint ({error})", where=where) from error
-    if known != FORMAT:
+    if known != CHECKPOINT_FORMAT:
         raise CheckpointError(
-            f"it is of format {known}, this version reads {FORMAT}",
+            f"it is of format {known}, this version reads {CHECKPOINT_FORMAT}",
             where=where,
             remedy="go on with the version that wrote it",
         )

@@ -38,13 +38,13 @@ Floats = NDArray[np.float64]
 
 UNCHECKED_MOST = 32
 """Most steps between two evaluations of the true residual, while forces are nearly linear."""
-DRIFT = 0.05
+RESIDUAL_DRIFT = 0.05
 """Relative difference of predicted and true residual that asks for more of them."""
 SLOPE_LEFT = 0.3
 """A step is long enough when the slope along it has dropped to this share."""
 TRIALS = 12
 """Lengths tried along one direction."""
-ROUNDING = 2.2e-16
+UNIT_ROUNDING = 2.2e-16
 """Residual over ``|M u|`` at which the last bits of the displacement are felt."""
 STALLS = 200
 """Steps that may be spent there."""
@@ -170,7 +170,7 @@ def _conjugate(
     while True:
         size = problem.force_scale(total, r)
         small = np.linalg.norm(r)
-        if small <= ROUNDING * np.linalg.norm(u[stiff] / weight[stiff]):
+        if small <= UNIT_ROUNDING * np.linalg.norm(u[stiff] / weight[stiff]):
             stalls += 1
         if small <= tolerance * size or problem.steps >= max_steps or stalls >= STALLS:
             total, _ = forces(u)
@@ -202,7 +202,7 @@ def _conjugate(
         unchecked = 0 if checked else unchecked + 1
         if checked:
             sure = u
-            loose = step.drift > DRIFT
+            loose = step.drift > RESIDUAL_DRIFT
             interval = max(1, interval // 4) if loose else min(2 * interval, UNCHECKED_MOST)
         before, r = r, project(total)
         z = weight * r

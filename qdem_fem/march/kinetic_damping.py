@@ -34,7 +34,7 @@ from qdem_fem.march.steps import march
 
 Floats = NDArray[np.float64]
 
-LOOK = 40
+STEPS_A_LOOK = 40
 """Steps between two looks at the kinetic energy."""
 WAIT = 4
 """Looks without a greater kinetic energy after which a body is past its peak: a grain that
@@ -125,7 +125,7 @@ def find_kinetic_each(run: State) -> Floats:
 
 
 def stop(run: State, bodies: NDArray[np.bool_]) -> None:
-    """Set the velocities of some bodies (b,) to zero; the account of energies is not told."""
+    """Set the velocities of some bodies (b,) to zero; the account of energies does not see it."""
     still = np.repeat(bodies, np.diff(run.first_node))
     at = run.assembly.place[still]
     run.assembly.state.velocity.reshape(-1, 4)[at] = 0.0
@@ -204,7 +204,7 @@ class Damping:
 
 def find_rest(
     run: State, unbalanced: float, kinetic: float, loose: float, most: float,
-    progress: Callable[[Rest], None] | None = None, look: int = LOOK, each: bool = True,
+    progress: Callable[[Rest], None] | None = None, look: int = STEPS_A_LOOK, each: bool = True,
     damping: Damping | None = None, keep: Callable[[Damping], None] | None = None,
     fall: bool = False,
 ) -> Rest:  # fmt: skip

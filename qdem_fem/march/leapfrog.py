@@ -95,7 +95,7 @@ def find_half_work(run: State, behind: Floats, level: Floats) -> Floats:
     mean = _by_place(run, 0.5 * (behind + level))
     force = loads.weight * table[loads.series]
     work = np.array([0.5 * run.step * float(force @ mean[loads.node_at]), 0.0])
-    if held.weight.any():  # the impulse that moved the nodes as they were told
+    if held.weight.any():  # the impulse that moved the nodes as prescribed
         free = find_free_accelerations(run, run.assembly.field("displacement"), behind)
         missing = _by_place(run, level - behind - 0.5 * run.step * free)
         inverse = np.asarray(run.assembly.state.inverse_mass, dtype=float)

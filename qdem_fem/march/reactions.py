@@ -22,7 +22,7 @@ def reaction(run: State, condition: Held | Roller) -> Floats:
     """Total force of a support on the body now [N], (3,): ``sum m a - f`` over what it holds.
 
     ``f``: what elements, loads and gravity do to its nodes; ``a``: of the motion it prescribes.
-    Of two conditions on one component both are told all of it.  Raises `ConditionError` for what
+    Of two conditions on one component both get all of it.  Raises `ConditionError` for what
     holds nothing in this simulation.
     """
     if not any(condition is known for known in (*run.conditions.held, *run.conditions.rollers)):

@@ -30,7 +30,7 @@ from qdem_fem.march.options import (
     words_check,
 )
 from qdem_fem.march.reactions import reaction
-from qdem_fem.march.state import SAFETY
+from qdem_fem.march.state import STEP_SAFETY
 from qdem_fem.march.steps import march
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ class History:
 class Simulation(ConditionedBodies):
     """Explicit dynamics of one or several bodies.
 
-    ``strain``: ``"finger"`` (the paper), ``"small"``, ``"svk"`` or ``"corotational"``;
+    ``strain``: ``"finger"`` (the paper), or another of `qdem_fem.element.MEASURES`;
     ``precision``: ``"float64"`` or ``"float32"``; ``step`` [s], or ``safety`` times the critical
     step; ``gravity`` [m/s^2], three components, constant or a series; ``threads``: all by
     default, the result does not depend on it; ``mass_scaling`` [s]: raise the density of
@@ -82,7 +82,7 @@ class Simulation(ConditionedBodies):
         strain: Strain = "finger",
         precision: Literal["float64", "float32"] = "float64",
         step: float | None = None,
-        safety: float = SAFETY,
+        safety: float = STEP_SAFETY,
         gravity: Value | None = None,
         threads: int | None = None,
         mass_scaling: float | None = None,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from qdem_fem.contact import Contacts
     from qdem_fem.rigid import Acting
 
-SAFETY = 0.9
+STEP_SAFETY = 0.9
 
 
 @dataclass(eq=False)
@@ -26,7 +26,7 @@ class State(System):
     contact: Contact | None = None
     given_step: float | None = None
     """Time step that the user gave [s]."""
-    safety: float = SAFETY
+    safety: float = STEP_SAFETY
     warned: float = nan
     """The critical step of which a warning was given [s]."""
 

@@ -25,7 +25,7 @@ Integers = NDArray[np.int64]
 WINDOW_STEPS = 4096
 GRAVITY_STEPS = 16
 """Steps over which the momentum is interpolated for the work of a gravity that changes."""
-GROWTH = 10.0
+UNSTABLE_GROWTH = 10.0
 """Kinetic energy over all energy ever put in, above which a motion is called unstable."""
 
 
@@ -194,7 +194,7 @@ def motion_check(run: State, bad: float) -> None:
     kinetic = run.assembly.kinetic() + (0.0 if run.rigid is None else run.rigid.kinetic())
     put_in = sum_energy_put_in(run)
     ratio = run.step / run.critical_step.value
-    if not kinetic <= GROWTH * put_in and (ratio > 1 or not np.isfinite(kinetic)):
+    if not kinetic <= UNSTABLE_GROWTH * put_in and (ratio > 1 or not np.isfinite(kinetic)):
         critical = run.critical_step
         raise Unstable(
             f"the motion grew without bound: {kinetic:.3g} J of kinetic energy from "

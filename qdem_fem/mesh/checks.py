@@ -22,7 +22,7 @@ FLAT = 1e-12
 regular tetrahedron has 0.118.  Round-off of the volume itself is about 1e-16."""
 EXTENT_MOST = 1e100
 """Largest extent of a mesh [m], and one over the smallest: volumes stay within float64."""
-_BLOCK = 1 << 16
+_ELEMENTS_AT_ONCE = 1 << 16
 _SHOWN = 5
 
 
@@ -214,8 +214,8 @@ def _volumes(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Signed volume [m^3], the same over longest edge cubed, and that ratio's rounding, (m,)."""
     volume, shape, noise = np.full((3, len(elements)), np.nan)
-    for start in range(0, len(elements), _BLOCK):
-        part = start + np.flatnonzero(usable[start : start + _BLOCK])
+    for start in range(0, len(elements), _ELEMENTS_AT_ONCE):
+        part = start + np.flatnonzero(usable[start : start + _ELEMENTS_AT_ONCE])
         x = np.ascontiguousarray(nodes[elements[part]].transpose(1, 2, 0))
         with np.errstate(all="ignore"):  # beyond the range of a float: the caller finds it
             e = x[1:] - x[0]

@@ -1,4 +1,4 @@
-"""Meshes to test and to compare with: boxes, rings, boxes with holes."""
+"""Meshes to test and to compare with, boxes and rings; and gmsh with a model of its own."""
 
 from __future__ import annotations
 
@@ -18,10 +18,6 @@ from qdem_fem.mesh.tetrahedra import TetMesh, altitudes, element_gradients, read
 
 Pattern = Literal["kuhn", "five"]
 Triple = tuple[float, float, float]
-Hole = tuple[Literal["x", "y", "z"], tuple[float, float], float]
-
-_NEAR = 1e-9
-"""Distance to a side, over the size of the box, within which a node lies on it."""
 
 
 def make_box_mesh(
@@ -133,23 +129,6 @@ def jitter(mesh: TetMesh, fraction: float, seed: int) -> TetMesh:
     )
 
 
-def make_gmsh_box(size: Triple, h: float, holes: Sequence[Hole] = ()) -> TetMesh:
-    """A Delaunay mesh of a box from the origin to ``size`` [m], by gmsh, element size ``h`` [m].
-
-    ``holes`` are cylinders through the whole box: (axis, (u, v), radius) with the letter of the
-    axis, the place of the cylinder in the two other coordinates in the order x, y, z, and its
-    radius [m].  Node sets: ``x-min`` ... ``z-max``, and ``hole-1``, ``hole-2``, ...
-
-    Raises `LibraryMissing` without gmsh, `MeshError` for measures that make no box, or if gmsh
-    fails.  The mesh depends on the version of gmsh; use `make_box_mesh` where figures have to be
-    reproduced exactly.
-    """
-    _positive("size and h", (*size, h))
-    _positive("radius of the holes", [radius for _, _, radius in holes])
-    with gmsh_model("gmsh_box", h, "change h or the holes") as gmsh:
-        return _gmsh_mesh(gmsh, size, holes)
-
-
 @contextmanager
 def gmsh_model(where: str, h: float, remedy: str) -> Iterator[Any]:
     """gmsh with a model of its own and element size ``h`` [m]; what was open stays as it was.
@@ -204,35 +183,6 @@ def make_gmsh_tetrahedra(gmsh: Any, where: str) -> TetMesh:
     name = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
     name[tags] = np.arange(len(tags))
     return read_mesh((coordinates.reshape(-1, 3), name[corners].reshape(-1, 4)), where=where)
-
-
-def _gmsh_mesh(gmsh: Any, size: Triple, holes: Sequence[Hole]) -> TetMesh:
-    solids = gmsh.model.occ
-    box = solids.addBox(0, 0, 0, *size)
-    drills = []
-    for hole_axis, place, radius in holes:
-        along = "xyz".index(hole_axis)
-        start = np.insert(np.asarray(place, float), along, -0.1 * size[along])
-        way = np.zeros(3)
-        way[along] = 1.2 * size[along]
-        drills.append((3, solids.addCylinder(*start, *way, radius)))
-    if drills:
-        solids.cut([(3, box)], drills)
-    solids.synchronize()
-    gmsh.model.mesh.generate(3)
-    mesh = make_gmsh_tetrahedra(gmsh, "gmsh_box")
-
-    near = _NEAR * max(size)
-    surface = np.unique(find_surface_faces(mesh.elements))
-    x = mesh.nodes[surface]
-    sets: dict[str, IntArray] = {}
-    for axis, letter in enumerate("xyz"):
-        sets[f"{letter}-min"] = surface[np.abs(x[:, axis]) < near]
-        sets[f"{letter}-max"] = surface[np.abs(x[:, axis] - size[axis]) < near]
-    for number, (hole_axis, place, radius) in enumerate(holes, 1):
-        across = np.delete(x, "xyz".index(hole_axis), axis=1) - place
-        sets[f"hole-{number}"] = surface[np.abs(np.hypot(*across.T) - radius) < near]
-    return TetMesh(mesh.nodes, mesh.elements, mesh.flipped, mesh.unused, sets)
 
 
 def _cells_cut(

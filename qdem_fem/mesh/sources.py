@@ -1,6 +1,6 @@
 """What a mesh can be given as: arrays, scikit-fem, meshio, a file.  Nothing is checked here yet.
 
-Neither scikit-fem nor meshio is imported: their meshes are told by what they hold, and meshio
+Neither scikit-fem nor meshio is imported: their meshes are known by what they hold, and meshio
 is loaded only to read a file.
 """
 

@@ -12,8 +12,8 @@ from qdem_fem.mesh.checks import BoolArray, FloatArray, IntArray
 
 _BITS = 21
 """Bits of a node number in a packed face: three of them and one for its sense fill 64."""
-_BLOCK = 1 << 16
-_SHOWN = 4
+_FACED_AT_ONCE = 1 << 16
+_OWNERS_SHOWN = 4
 
 _UIntArray = npt.NDArray[np.uint64]
 
@@ -77,8 +77,8 @@ def _faces_packed(elements: IntArray) -> tuple[tuple[_UIntArray, ...], BoolArray
     along, and sorting plain numbers is the fastest there is.
     """
     keys = np.empty((4, len(elements)), np.uint64)
-    for start in range(0, len(elements), _BLOCK):
-        part = slice(start, start + _BLOCK)
+    for start in range(0, len(elements), _FACED_AT_ONCE):
+        part = slice(start, start + _FACED_AT_ONCE)
         node, odd = _faces_of(elements[part])
         node = [n.astype(np.uint64) for n in node]
         for face, (a, b, c) in enumerate(_OPPOSITE):
@@ -111,7 +111,9 @@ def _faces_corners(faces: tuple[npt.NDArray[Any], ...], chosen: IntArray) -> Int
 
 def _raise_overlap(face: IntArray, elements: IntArray, where: str) -> None:
     owners = np.flatnonzero(np.isin(elements, face).sum(axis=1) == 3)
-    shown = ", ".join(map(str, owners[:_SHOWN])) + (", ..." if len(owners) > _SHOWN else "")
+    shown = ", ".join(map(str, owners[:_OWNERS_SHOWN])) + (
+        ", ..." if len(owners) > _OWNERS_SHOWN else ""
+    )
     many = len(owners) > 2
     raise MeshError(
         f"{len(owners)} elements ({shown}) share the face of nodes {face.tolist()}"

@@ -25,7 +25,7 @@ from qdem_fem.mesh.checks import (
 )
 from qdem_fem.mesh.sources import MeshParts, read_mesh_parts
 
-_BLOCK = 1 << 14
+_GRADIENTS_AT_ONCE = 1 << 14
 """Elements worked on at once: what they need stays in the cache of a core."""
 _SLIVER = 1e-2
 """Six volumes over the product of three edges below which gradients are made in extended
@@ -135,8 +135,8 @@ def element_gradients(nodes: FloatArray, elements: IntArray) -> tuple[FloatArray
     """
     gradients = np.empty((len(elements), 3, 3))
     volumes = np.empty(len(elements))
-    for start in range(0, len(elements), _BLOCK):
-        part = slice(start, start + _BLOCK)
+    for start in range(0, len(elements), _GRADIENTS_AT_ONCE):
+        part = slice(start, start + _GRADIENTS_AT_ONCE)
         x = nodes[elements[part]].transpose(1, 2, 0)
         gradient, sixfold, lengths = _cofactors(x)
         gradients[part], volumes[part] = gradient.transpose(2, 0, 1), sixfold / 6
@@ -178,10 +178,10 @@ def altitudes(gradients: FloatArray) -> FloatArray:
     The altitude over the face opposite node a is 1 / |grad N_a|.
     """
     smallest = np.empty(len(gradients))
-    for start in range(0, len(gradients), _BLOCK):
-        g = np.ascontiguousarray(gradients[start : start + _BLOCK].transpose(1, 2, 0))
+    for start in range(0, len(gradients), _GRADIENTS_AT_ONCE):
+        g = np.ascontiguousarray(gradients[start : start + _GRADIENTS_AT_ONCE].transpose(1, 2, 0))
         squares = [(row * row).sum(axis=0) for row in (*g, g.sum(axis=0))]
-        smallest[start : start + _BLOCK] = 1 / np.sqrt(np.max(squares, axis=0))
+        smallest[start : start + _GRADIENTS_AT_ONCE] = 1 / np.sqrt(np.max(squares, axis=0))
     return smallest
 
 

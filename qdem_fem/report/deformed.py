@@ -34,7 +34,7 @@ OUTLINED = 20
 """Most bodies whose undeformed edges are drawn: of a heap they would hide it."""
 SERIES_ROOM = 0.05
 """Around all that moves in a series, over its size: for spheres, too."""
-DISC_CORNERS = 20
+CORNERS_OF_A_DISC = 20
 """Of the polygon that a sphere is drawn as."""
 DISC_FACE, DISC_EDGE = (0.80, 0.77, 0.72, 0.55), (0.45, 0.42, 0.38, 0.7)
 """Colours of it, red, green, blue and how opaque."""
@@ -95,7 +95,7 @@ def draw_deformed(
     ``bodies`` are `qdem_fem.Body`.  By default displacements are magnified by a round factor that
     makes the greatest `SHOWN` of the bodies' size.  The undeformed edges of up to `OUTLINED` bodies
     are drawn thin.  The viewer stands at ``azimuth`` and ``elevation`` [degrees] as in matplotlib's
-    3-D axes.  ``time`` [s] is told where given.  ``bearing``: spheres of contact, drawn around
+    3-D axes.  ``time`` [s] is written where given.  ``bearing``: spheres of contact, drawn around
     their vertices as those are now.  Colours reach from zero to the greatest stress; the colour bar
     says whether that is this picture's or, where ``series`` is given, that of all pictures, which
     then have one frame, too.  Faces are sorted from back to front (painter's algorithm): those that
@@ -122,10 +122,10 @@ def draw_deformed(
         if len(bodies) <= OUTLINED:
             _outline(panel, bodies, frame)
         _draw_frame(panel, frame)
-        told = f"Displacement \N{MULTIPLICATION SIGN} {magnification:g}"
-        told += "" if time is None else f" at t = {time:.6g} s"
-        told += "\ngrey: spheres that bear" * (bearing is not None and len(bearing.nodes) > 0)
-        panel.set(aspect="equal", title=told)
+        title = f"Displacement \N{MULTIPLICATION SIGN} {magnification:g}"
+        title += "" if time is None else f" at t = {time:.6g} s"
+        title += "\ngrey: spheres that bear" * (bearing is not None and len(bearing.nodes) > 0)
+        panel.set(aspect="equal", title=title)
         panel.set_axis_off()
         panel.margins(0.03)
         panel.autoscale_view()
@@ -291,9 +291,9 @@ def discs(centre: FloatArray, radius: FloatArray) -> tuple[FloatArray, FloatArra
     """Outlines of spheres as the viewer sees them, and where in the row of faces they belong.
 
     ``centre`` (s, 3) [m] in the frame right, away from the viewer, up; ``radius`` (s,) [m].
-    Polygons (s, `DISC_CORNERS`, 2) [m], and the distance of the spheres' far sides (s,) [m]: drawn
-    by that, a sphere lies behind the faces at its own vertex and before bodies behind it.
+    Polygons (s, `CORNERS_OF_A_DISC`, 2) [m], and the distance of the spheres' far sides (s,) [m]:
+    drawn by that, a sphere lies behind the faces at its own vertex and before bodies behind it.
     """
-    turn = 2 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
+    turn = 2 * np.pi * np.arange(CORNERS_OF_A_DISC) / CORNERS_OF_A_DISC
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
     return centre[:, None, [0, 2]] + radius[:, None, None] * circle, centre[:, 1] + radius

@@ -20,7 +20,7 @@ from qdem_fem.files import UsageError
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
-SPACING = 1e-6
+UNEVEN_INTERVAL = 1e-6
 """Greatest departure of a time interval from the mean one, relative."""
 PADDING = 8
 """Samples a spectrum is padded to, over those of the record, when peaks are sought."""
@@ -227,6 +227,6 @@ def _record(time: FloatArray, values: FloatArray) -> tuple[float, FloatArray]:
     if not (np.isfinite(time).all() and np.isfinite(values).all()):
         raise UsageError("a spectrum needs finite numbers")
     step = float(time[-1] - time[0]) / (len(time) - 1)
-    if not (step > 0 and np.abs(np.diff(time) - step).max() <= SPACING * step):
+    if not (step > 0 and np.abs(np.diff(time) - step).max() <= UNEVEN_INTERVAL * step):
         raise UsageError("the samples are not evenly spaced in time")
     return step, values

@@ -29,7 +29,7 @@ BANDWIDTH = 20.0
 FREQUENCY = "frequency (Hz)"
 HIGHEST = 1000.0
 """Frequency up to which the paper reads its spectra [Hz]."""
-LEAST = 5
+FEWEST_SAMPLES = 5
 """Samples of a record that has spectra: with rest before them, second differences leave four."""
 
 
@@ -95,8 +95,8 @@ def peaks_of(frequency: FloatArray, size: FloatArray, count: int = 5) -> list[fl
 
 def list_track_facts(path: Path, load: TimeSeries) -> dict[str, Any]:
     """Figures of the run in a folder: greatest and final displacement of each point [m] since the
-    prepared state, along y and down; peaks of spectra and mobility [Hz], of a record of `LEAST`
-    samples or more."""
+    prepared state, along y and down; peaks of spectra and mobility [Hz], of a record
+    of `FEWEST_SAMPLES` samples or more."""
     rows = table_read(path / "probes.csv")
     time = rows["time"]
     facts: dict[str, Any] = {}
@@ -108,7 +108,7 @@ def list_track_facts(path: Path, load: TimeSeries) -> dict[str, Any]:
             "lateral": float(across[-1]),
             "lateral_greatest": float(np.abs(across).max()),
         }
-        if len(time) < LEAST:
+        if len(time) < FEWEST_SAMPLES:
             continue
         if name != "sleeper":
             _, acceleration = accelerations(time, up)
@@ -136,7 +136,7 @@ def draw_track_pictures(path: Path, load: TimeSeries) -> Iterator[tuple[Path, st
             target,
             f"{word} displacement of grains and sleeper since the prepared state (Fig. 8).",
         )
-    if len(time) < LEAST:
+    if len(time) < FEWEST_SAMPLES:
         return
     target = path / "picture-track-acceleration.png"
     curves = {s: accelerations(time, moved[f"{s} z"]) for s in SENSORS}

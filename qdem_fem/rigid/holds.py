@@ -66,15 +66,15 @@ def find_hold(
     given, share = np.full(3, -1), np.zeros(3)
     for k in range(3):
         mine = component == k
-        told = {(s if w else 0, w) for s, w in zip(series[mine], weight[mine], strict=True)}
-        if len(told) > 1:
+        asked = {(s if w else 0, w) for s, w in zip(series[mine], weight[mine], strict=True)}
+        if len(asked) > 1:
             raise ConditionError(
                 f"its nodes are to move apart along {'xyz'[k]}, and the body is rigid",
                 where=where,
                 remedy="prescribe one motion for all of them",
             )
         if not mask[k]:
-            given[k], share[k] = told.pop() if told else (0, 0.0)
+            given[k], share[k] = asked.pop() if asked else (0, 0.0)
     turning = {0: STILL, 1: int(np.argmax(mask[3:])), 3: FREE}[int(turns)]
     return RigidHold(given, share, turning)
 

@@ -258,9 +258,9 @@ def rigid_advance(
                 after += step * gravity[k]
             if c.given[b, k] >= 0:
                 target = c.given_weight[b, k] * table[1, c.given[b, k]]
-                told = (target - c.shift[b, k]) / step
-                work[1] += 0.5 * (told - after) / c.inverse_mass[b] * (told + before)
-                after = told
+                given = (target - c.shift[b, k]) / step
+                work[1] += 0.5 * (given - after) / c.inverse_mass[b] * (given + before)
+                after = given
                 c.shift[b, k] = target
             else:
                 c.shift[b, k] += step * after

@@ -1,24 +1,10 @@
 """A scene run from its file: build, march, report, advice."""
 
-from qdem_fem.scene.build import (
-    simulation_of,
-)
-from qdem_fem.scene.checks import (
-    load_scene,
-)
-from qdem_fem.scene.page import (
-    write_report,
-)
-from qdem_fem.scene.run import (
-    make_plan,
-    run_dynamic,
-    run_static,
-)
-from qdem_fem.scene.run_folder import (
-    RESULT,
-    RunFolder,
-    make_manifest,
-)
+from qdem_fem.scene.build import simulation_of
+from qdem_fem.scene.checks import load_scene
+from qdem_fem.scene.page import write_report
+from qdem_fem.scene.run import make_plan, run_dynamic, run_static
+from qdem_fem.scene.run_folder import RESULT, RunFolder, make_manifest
 from qdem_fem.scene.summary import (
     list_body_facts,
     list_mass_scaling_facts,
@@ -27,17 +13,7 @@ from qdem_fem.scene.summary import (
 )
 
 __all__ = [
-    "RESULT",
-    "RunFolder",
-    "list_body_facts",
-    "list_mass_scaling_facts",
-    "load_scene",
-    "make_manifest",
-    "make_plan",
-    "run_dynamic",
-    "run_static",
-    "simulation_of",
-    "summary_of",
-    "tell_critical_step",
-    "write_report",
-]
+    "RESULT", "RunFolder", "list_body_facts", "list_mass_scaling_facts", "load_scene",
+    "make_manifest", "make_plan", "run_dynamic", "run_static", "simulation_of", "summary_of",
+    "tell_critical_step", "write_report",
+]  # fmt: skip

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-SAMPLE = 12
+VERTICES_TRIED = 12
 """Surface vertices at which a compliance is computed: those farthest from the centre, which are the
 softest, and as many evenly between."""
 FAST = 0.5
@@ -153,8 +153,8 @@ def _held_components(arm: Floats) -> Integers:
 def _vertices_sampled(arm: Floats, vertices: Integers) -> Integers:
     """Some vertices of a surface, the farthest among them."""
     order = vertices[np.argsort(-(arm[vertices] ** 2).sum(axis=1))]
-    evenly = order[np.linspace(0, len(order) - 1, SAMPLE).astype(int)]
-    return np.unique(np.concatenate([order[:SAMPLE], evenly]))
+    evenly = order[np.linspace(0, len(order) - 1, VERTICES_TRIED).astype(int)]
+    return np.unique(np.concatenate([order[:VERTICES_TRIED], evenly]))
 
 
 def contact_stiffness(run: Simulation) -> list[float]:

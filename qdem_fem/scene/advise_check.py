@@ -17,7 +17,7 @@ from qdem_fem.scene.checks import load_scene
 from qdem_fem.tables import Prepared
 from qdem_fem.track import SLEEPER
 
-SAMPLES = 200
+SAMPLES_COMPARED = 200
 """Samples of a history that two runs are compared at."""
 
 
@@ -93,7 +93,7 @@ def _histories(
     assert duration is not None
     run.advance(run.step)
     started = time.process_time()
-    history = run.advance(duration - run.step, probes, duration / SAMPLES)
+    history = run.advance(duration - run.step, probes, duration / SAMPLES_COMPARED)
     cost = time.process_time() - started
     moved = {name: history[name] - history[name][0] for name in probes}
     return moved, cost, run.steps_done

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
+from qdem_fem.element import MEASURES
 from qdem_fem.files import MeshError
 from qdem_fem.tables import (
     Absorb,
@@ -229,12 +230,14 @@ def find_motion_faults(text: SceneText) -> Iterator[Problem]:
     if not isinstance(simulation, SimulationTable):
         return
     joined = {table.body for _, table in list_tables(text, Periodic)}
+    turns = MEASURES[simulation.strain].OBJECTIVE
     for key, body in list_tables(text, BodyTable):
         if simulation.method == "static" and body.moves:
             name = "velocity" if body.velocity is not None else "spin"
             yield Problem(f"{key}.{name}", 'a static answer has no motion: method = "dynamic"')
-        elif simulation.strain == "small" and body.spin is not None and not body.rigid:
-            what = 'a body that turns is strained by it under strain = "small": take "finger"'
+        elif not turns and body.spin is not None and not body.rigid:
+            what = "a body that turns is strained by it under strain = "
+            what += f'"{simulation.strain}": take "finger"'
             yield Problem(f"{key}.spin", what)
         elif body.spin is not None and body.name in joined:
             yield Problem(

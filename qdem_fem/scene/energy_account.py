@@ -16,7 +16,7 @@ STORED = ("kinetic", "elastic", "contact", "friction", "viscous", "absorbed", "f
 class EnergyAccount:
     """Energies of a run, taken row by row or many at a time: what is missing, and over what.
 
-    Missing is external work less what all others gained.  It is told over the greatest energy that
+    Missing is external work less what all others gained.  It is divided by the greatest energy that
     was put in, or went from one form to another, or was in motion.  What a scene begins with,
     overlap or motion, is no work of its loads.
     """

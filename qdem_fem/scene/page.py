@@ -184,8 +184,8 @@ NAMED = (*STORED, "external")
 
 def _bed(summary: dict[str, Any]) -> Iterator[str]:
     """How the prepared bed of a track stands."""
-    if "bed" in summary:
-        yield f"<h2>The prepared bed</h2><p>{escape(summary['bed']['told'].capitalize())}.</p>"
+    if words := summary.get("bed", {}).get("words"):
+        yield f"<h2>The prepared bed</h2><p>{escape(words.capitalize())}.</p>"
 
 
 def _left_out(summary: dict[str, Any]) -> Iterator[str]:

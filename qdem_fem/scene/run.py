@@ -106,7 +106,7 @@ def run_dynamic(
 ) -> Done:
     """Advance a scene to its duration, from its start or from the last checkpoint.
 
-    ``run`` and ``bodies`` are those of `simulation_of`, ``progress`` is a `qdem_fem.cli.Progress`.
+    ``run`` and ``bodies`` are those of `simulation_of`, ``progress`` a `qdem_fem.cli.run.Progress`.
     Every row and field is the same, bit by bit, however often the run was interrupted.  SIGINT
     and SIGTERM save the state and raise `Interrupted`.
     """

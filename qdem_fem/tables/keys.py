@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from qdem_fem.bodies import Rigid
-from qdem_fem.element import Strain
+from qdem_fem.element import MEASURES, Strain
 from qdem_fem.tables.contact import ContactTable
 from qdem_fem.tables.types import (
     Cells,
@@ -311,8 +311,8 @@ class Scene(Table):
             ),
             (self.simulation.mass_scaling is None, "mass scaling: every mass is the material's"),
             (
-                self.simulation.strain == "small",
-                "finite rotations: the strain is the small one",
+                not MEASURES[self.simulation.strain].OBJECTIVE,
+                f"finite rotations: the strain is {self.simulation.strain}",
             ),
             (self.simulation.method == "static", "inertia: the answer is static"),
             (self.contact is None, "contact and friction between bodies"),

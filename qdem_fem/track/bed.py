@@ -103,7 +103,7 @@ def bed_prepare(
     """
     bed = bed_read(path, recipe) if path.exists() else None
     grains = grains_of(recipe)
-    if bed is None:  # told before grains fall for hours
+    if bed is None:  # refused before grains fall for hours
         recipe.layout.grains_beside(place_grain_nodes(grains)[recipe.below :], 0.0, recipe.seed + 1)
     for number, stage in enumerate(STAGES):
         if bed is not None and STAGES.index(bed.stage) >= number:
@@ -156,13 +156,13 @@ def run_stage(
     shares = FIRMER if stage in FIRM else ROUGH
     if stage in ("hard", "rest"):
         shares = (recipe.unbalanced, recipe.kinetic, recipe.loose)
-    told = None if progress is None else (lambda rest: progress(stage, rest))
+    report = None if progress is None else (lambda rest: progress(stage, rest))
     together = recipe.periodic and stage in ("hard", "rest")  # as said above: a heap slides
     sitting = Sitting(run, part, started)
     damping = sitting.go_on()
     try:
         rest = find_rest(
-            run, *shares, recipe.patience, told, each=not together, damping=damping,
+            run, *shares, recipe.patience, report, each=not together, damping=damping,
             keep=sitting.keep, fall=stage in FALLS,
         )  # fmt: skip
     except NotConverged as error:
@@ -273,7 +273,12 @@ def enter_bed(run: Simulation, bed: Bed) -> None:
 def write_bed(path: Path, recipe: BedRecipe, bed: Bed) -> None:
     """Write a bed, atomically."""
     stream = BytesIO()
-    head = {"recipe": recipe.told(), "stage": bed.stage, "rests": bed.rests, "stands": bed.stands}
+    head = {
+        "recipe": recipe.format_json(),
+        "stage": bed.stage,
+        "rests": bed.rests,
+        "stands": bed.stands,
+    }
     np.savez_compressed(
         stream, head=json.dumps(head), nodes=np.concatenate(bed.nodes),
         counts=[len(nodes) for nodes in bed.nodes], displacement=bed.displacement,
@@ -289,7 +294,7 @@ def bed_read(path: Path, recipe: BedRecipe) -> Bed:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         head = json.loads(str(arrays.pop("head")))
-        there, here = json.loads(head["recipe"]), json.loads(recipe.told())
+        there, here = json.loads(head["recipe"]), json.loads(recipe.format_json())
         counts, nodes = arrays.pop("counts"), arrays.pop("nodes")
         displacement = arrays.pop("displacement")
         stage, rests = head["stage"], head["rests"]

@@ -11,7 +11,7 @@ from qdem_fem.files import ConditionError
 from qdem_fem.mesh import FloatArray
 from qdem_fem.tables import TimeSeries
 from qdem_fem.track.loads import (
-    LONGEST,
+    MOST_SAMPLES,
     RATE,
     Roughness,
     Track,
@@ -48,11 +48,11 @@ def make_bogie_series(
             f"{RISE:g} s", where="bogie",
             remedy=f"give a lead of {RISE * train.speed:.3g} m or more, or less speed",
         )  # fmt: skip
-    if not (end + rest) * rate < LONGEST:
+    if not (end + rest) * rate < MOST_SAMPLES:
         raise ConditionError(
             f"it passes and rests for {end + rest:.3g} s, {(end + rest) * rate:.3g} samples",
             where="bogie",
-            remedy=f"give more speed, less lead or less rest: at most {LONGEST} samples",
+            remedy=f"give more speed, less lead or less rest: at most {MOST_SAMPLES} samples",
         )
     time = np.arange(int(np.ceil((end + rest) * rate)) + 1) / rate
     front = train.speed * time - lead

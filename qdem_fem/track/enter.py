@@ -56,7 +56,7 @@ class TrackScene(Scene):
         """Physics that is not in this run."""
         track = self.track
         viscous = any(m.shear_viscosity or m.bulk_viscosity for m in (track.ballast, track.sleeper))
-        told = ["viscosity: the materials are elastic"] * (not viscous)
+        elastic = ["viscosity: the materials are elastic"] * (not viscous)
         missing = [text for text in super().left_out() if not text.startswith(("viscosity", "any"))]
         missing += ["deformation of grains, said to be rigid"] * bool(track.rigid)
         missing += ["rail, pads and all other sleepers: a force acts on the rail seat"]
@@ -64,7 +64,7 @@ class TrackScene(Scene):
         if track.bogie is not None and track.bogie.passing > duration:
             passing = f"it takes {track.bogie.passing:.4g} s, this run {duration:.4g} s"
             missing.append(f"the end of the bogie's passing: {passing}")
-        return told + missing
+        return elastic + missing
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class TrackPrepared(Prepared):
     loads: tuple[TimeSeries, ...]
     """On each rail seat [N], (k, 3)."""
     stand: dict[str, Any] = field(default_factory=dict)
-    """`qdem_fem.track.stand.Stand` of the bed, and what it is told as; filled by `enter_track`."""
+    """`qdem_fem.track.stand.Stand` of the bed, and its ``words``; filled by `enter_track`."""
 
     @property
     def load(self) -> TimeSeries:
@@ -194,12 +194,12 @@ def foresee_bed(prepared: TrackPrepared) -> dict[str, Any]:
     ahead, recipe = list_stages_ahead(prepared.recipe, prepared.bed_file), prepared.recipe
     if not ahead:
         return {}
-    told = (
+    words = (
         f"{recipe.below + recipe.beside} grains, to be prepared first (stages {ahead[0]} to "
         f"{ahead[-1]}), half a second to two of processor time a grain; kept in "
         f"{prepared.bed_file}"
     )
-    return {"grains": recipe.below + recipe.beside, "stages_ahead": list(ahead), "told": told}
+    return {"grains": recipe.below + recipe.beside, "stages_ahead": list(ahead), "words": words}
 
 
 def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
@@ -214,7 +214,7 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     scene, recipe = prepared.scene, prepared.recipe
     assert isinstance(scene, TrackScene)
     table, track = scene.simulation, scene.track
-    bed = bed_prepare(recipe, prepared.bed_file, table.threads, _Told())
+    bed = bed_prepare(recipe, prepared.bed_file, table.threads, _Report())
     contact = contact_of(prepared)
     stand = judge_bed(
         recipe, bed, prepared.bed_file, contact, track.stand, track.creep, table.threads,
@@ -230,7 +230,7 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     seats = [sets[name] for name in sorted(sets) if name.startswith("seat")]
     for seat, load in zip(seats, prepared.loads, strict=True):
         run.load(sleeper, seat, Series(load.times, load.values))
-    prepared.stand.update(asdict(stand), creep=stand.creep, told=stand.told())
+    prepared.stand.update(asdict(stand), creep=stand.creep, words=stand.describe())
     prepared.meshes.update({name: body.mesh for name, body in bodies.items()})
     prepared.probes.update(points_of(recipe, bed, bodies))
     return run, bodies
@@ -266,7 +266,7 @@ def points_of(
     return found
 
 
-class _Told:
+class _Report:
     """How far a preparation is, on standard error, every 10 s."""
 
     def __init__(self) -> None:

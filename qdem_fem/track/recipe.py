@@ -98,16 +98,16 @@ class BedRecipe:
         width = PeriodicWidth("y", self.box.width) if self.periodic else None
         return SphereContact(self.radius, each, self.friction, self.planes(), periodic=width)
 
-    def told(self) -> str:
+    def format_json(self) -> str:
         """The recipe as a text, equal for equal beds; that of a slice names no part.
 
         ``patience`` is not in it: it is no part of what has come to rest.
         """
-        told = asdict(self)
-        del told["patience"]
+        written = asdict(self)
+        del written["patience"]
         if self.part == "slice":
-            del told["part"], told["shoulder"]
-        return json.dumps(told, sort_keys=True, default=np.ndarray.tolist)
+            del written["part"], written["shoulder"]
+        return json.dumps(written, sort_keys=True, default=np.ndarray.tolist)
 
 
 def grains_of(recipe: BedRecipe) -> GrainSet:

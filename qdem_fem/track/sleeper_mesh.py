@@ -10,7 +10,7 @@ import numpy as np
 from qdem_fem.files import MeshError
 from qdem_fem.mesh import FloatArray, IntArray, TetMesh, make_box_mesh
 
-NEAR = 1e-9
+ON_THE_PLANE = 1e-9
 """Over the length: distance within which a node lies on a plane."""
 
 
@@ -121,7 +121,7 @@ def sleeper_mesh(shape: SleeperShape, along: int = 80, across: int = 8, up: int 
         for new, old in (("bottom", "z-min"), ("top", "z-max"), ("end-1", "x-min"),
                          ("end-2", "x-max"))
     }  # fmt: skip
-    top, near = sets["top"], NEAR * shape.length
+    top, near = sets["top"], ON_THE_PLANE * shape.length
     seats = shape.length / 2 + shape.seat_distance / 2 * np.array([-1, 1])
     for number, seat in enumerate(seats, 1):
         inside = np.abs(nodes[top, 0] - seat) <= shape.seat_length / 2 + near
@@ -147,7 +147,7 @@ def make_half_sleeper(shape: SleeperShape, along: int, across: int, up: int) -> 
     number[nodes] = np.arange(len(nodes))
     sets = {name: number[old][number[old] >= 0] for name, old in whole.node_sets.items()}
     sets = {name: mine for name, mine in sets.items() if len(mine)}
-    sets["ends"] = np.flatnonzero(whole.nodes[nodes, 0] > middle - NEAR * shape.length)
+    sets["ends"] = np.flatnonzero(whole.nodes[nodes, 0] > middle - ON_THE_PLANE * shape.length)
     return TetMesh(whole.nodes[nodes], number[whole.elements[kept]], node_sets=sets)
 
 

@@ -54,7 +54,7 @@ class Stand:
             return 0.0
         return self.slid / self.elastic if self.elastic > 0 else np.inf
 
-    def told(self) -> str:
+    def describe(self) -> str:
         """In a sentence's words."""
         return (
             f"let go for {1e3 * self.time:g} ms with friction {self.friction:g}, its sliders take "
@@ -129,7 +129,7 @@ def judge_bed(
     stand = Stand(**bed.stands[key])
     if not stand.creep <= creep:
         raise NotConverged(
-            f"the bed creeps: {stand.told()} ({creep:g} asked)", where=str(path),
+            f"the bed creeps: {stand.describe()} ({creep:g} asked)", where=str(path),
             remedy="prepare it with less friction than the run has (track.prepared_friction), or "
             "allow more (track.creep)",
         )  # fmt: skip

@@ -1,9 +1,6 @@
 """Collisions: impulses, their passing on within a step, restitution."""
 
-from rigid_lcp.collision.impulses import (
-    Collision,
-    collide,
-)
+from rigid_lcp.collision.impulses import Collision, collide
 from rigid_lcp.collision.passing import (
     Closing,
     Impulses,
@@ -12,22 +9,9 @@ from rigid_lcp.collision.passing import (
     find_hit_by_others,
     find_impulses_in_turn,
 )
-from rigid_lcp.collision.restitution_scale import (
-    Share,
-    StepVelocities,
-    gains_energy,
-)
+from rigid_lcp.collision.restitution_scale import Share, StepVelocities, gains_energy
 
 __all__ = [
-    "Closing",
-    "Collision",
-    "Impulses",
-    "Share",
-    "StepVelocities",
-    "collide",
-    "find_bouncing",
-    "find_contact_shift",
-    "find_hit_by_others",
-    "find_impulses_in_turn",
-    "gains_energy",
-]
+    "Closing", "Collision", "Impulses", "Share", "StepVelocities", "collide", "find_bouncing",
+    "find_contact_shift", "find_hit_by_others", "find_impulses_in_turn", "gains_energy",
+]  # fmt: skip

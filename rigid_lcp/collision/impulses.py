@@ -54,7 +54,7 @@ from rigid_lcp.friction.problem import (
 
 Floats = NDArray[np.float64]
 
-ROUNDS, ROUNDS_ROUGH = 500, 50
+COLLISION_ROUNDS, COLLISION_ROUNDS_ROUGH = 500, 50
 """Rounds of a collision until the rest ends without restitution: without friction, where masses of
 a factor of 1e3 that touch anywhere take some hundred; with it, where one in five of those has no
 end, and energy is lost anyway."""
@@ -126,7 +126,7 @@ def collide(
     eps = check_one_a_contact("restitution", restitution, 1.0, nc)
     mu = check_one_a_contact("friction", friction, MOST_FRICTION, nc)
     if max_rounds is None:
-        max_rounds = ROUNDS_ROUGH if mu.any() else ROUNDS
+        max_rounds = COLLISION_ROUNDS_ROUGH if mu.any() else COLLISION_ROUNDS
     check_choices(law, energy, tolerance, max_rounds, still, rest_speed)
     moved = np.zeros(nc * dim)
     if drive is not None:

@@ -1,13 +1,11 @@
 """Collisions that are passed on within a step: a ball hits the next one, and that the one after it.
 
 Time stepping (`rigid_lcp.motion.time_stepping`) lets a contact bounce that approaches at the start
-of a
-step and closes within it.  One that is open, does not close by itself, and is closed by the impulse
-of another would end the step without restitution: of five balls in a row a tenth of a step's way
-apart 5 % of the energy went so at restitution 1.  Here such contacts wait, and rounds follow as in
-section 7 of the paper (`rigid_lcp.collision.impulses`): what closes and approaches bounces, with
-the
-contacts that have closed before, until nothing does,
+of a step and closes within it.  One that is open, does not close by itself, and is closed by the
+impulse of another would end the step without restitution: of five balls in a row a tenth of a
+step's way apart 5 % of the energy went so at restitution 1.  Here such contacts wait, and rounds
+follow as in section 7 of the paper (`rigid_lcp.collision.impulses`): what closes and approaches
+bounces, with the contacts that have closed before, until nothing does,
 
     u' = u + W p,    u_N' + e u_N >= 0 where it bounces (eq. 35),    u_N' + 2 g / h >= 0 elsewhere,
 
@@ -18,9 +16,9 @@ the order in time; no time passes between them.
 
 How many there are depends on the masses: a light disc between a wall and a heavy one takes
 ``pi sqrt(M / m)``.  At restitution 1 without friction they come to an end, and are awaited
-(`ROUNDS`).  With losses they need not (inelastic collapse, Zeno), and what a collapse has left goes
-in its end: there `LOSSY_ROUNDS` and `LOSSY_WORK` bound the work, and what still approaches is
-closed without restitution.  `Impulses.cut_off` tells where either bound was met.
+(`PASSING_ROUNDS`).  With losses they need not (inelastic collapse, Zeno), and what a collapse has
+left goes in its end: there `LOSSY_ROUNDS` and `LOSSY_WORK` bound the work, and what still
+approaches is closed without restitution.  `Impulses.cut_off` tells where either bound was met.
 """
 
 from __future__ import annotations
@@ -39,7 +37,7 @@ Solve = Callable[[BodySpace, Floats, Floats], tuple[FrictionSolution, float]]
 """Impulses of the contacts of J with relative velocities q (nc, dim) and friction (nc,), and their
 error [-]."""
 
-ROUNDS = 20_000
+PASSING_ROUNDS = 20_000
 """Most rounds of a step, about 1 ms each where few bodies collide: a light disc between a wall and
 a heavy one takes as many at a mass ratio of 4e7."""
 LOSSY_ROUNDS, LOSSY_WORK = 50, 1_000
@@ -142,7 +140,7 @@ def find_impulses_in_turn(bodies: BodySpace, closing: Closing, solve: Solve) -> 
     lossy = (closing.restitution < 1.0) | (closing.friction > 0.0)
     impulse = np.zeros_like(now.offset)
     worst, message, cut_off, work = 0.0, "", False, 0
-    for turn in range(ROUNDS + 1):
+    for turn in range(PASSING_ROUNDS + 1):
         bounce = find_bouncing(now)
         if turn > 0:
             bounce &= needs_impulse(now, least)
@@ -150,8 +148,8 @@ def find_impulses_in_turn(bodies: BodySpace, closing: Closing, solve: Solve) -> 
                 now = replace(now, restitution=np.where(lossy, 0.0, now.restitution))
                 bounce &= ~lossy
                 cut_off = True
-        cut_off |= turn == ROUNDS and bool(bounce.any())
-        last = turn > 0 and (turn == ROUNDS or not bounce.any())
+        cut_off |= turn == PASSING_ROUNDS and bool(bounce.any())
+        last = turn > 0 and (turn == PASSING_ROUNDS or not bounce.any())
         bounce &= not last
         resting = ((now.gap <= now.touching) | (now.restitution == 0.0)) & (now.offset[:, 0] <= 0.0)
         taking = np.flatnonzero(bounce | resting | last)

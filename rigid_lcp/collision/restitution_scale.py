@@ -48,8 +48,7 @@ def gains_energy(
     bodies: BodySpace, closing: Closing, velocities: StepVelocities, found: Impulses, bounce: Flags
 ) -> Flags:
     """Contacts (nc,) of the islands (`rigid_lcp.friction.auto.islands`) in which some ``bounce``
-    and whose
-    impulses make energy."""
+    and whose impulses make energy."""
     gains = np.zeros(len(bounce), dtype=bool)
     if not closing.friction.any():
         return gains
@@ -72,7 +71,7 @@ def gains_energy(
     return gains
 
 
-RESOLUTION = 1 / 64
+SHARE_RESOLUTION = 1 / 64
 """To which a share is found [-]; a smaller one is none."""
 
 
@@ -96,7 +95,7 @@ class Share:
         wrong = gains & (before <= self._least)
         self._least[wrong] = self._most[wrong] = 0.0
         middle = 0.5 * (self._least + self._most)
-        self.now = np.where(self._most - self._least > RESOLUTION, middle, self._least)
+        self.now = np.where(self._most - self._least > SHARE_RESOLUTION, middle, self._least)
         return bool((self.now != before).any())
 
     def leave_out(self) -> None:

@@ -4,10 +4,9 @@ Where the nearest features of two polyhedra are a corner and an edge, or two cor
 no pair of crossing edges names the normal: it lies along the line of nearest points, as between
 two spheres of radius zero.  The plane across it through either point parts the two bodies, so
 bodies that do not approach along it can not meet by translation.  At touch (within
-`rigid_lcp.contact.manifold.TIE`) the normal is that of the face that keeps the bodies farthest
-apart,
-which it also is once they overlap: the gap is continuous there; a normal, as that of the distance
-to a point, can not be.
+`rigid_lcp.contact.manifold.TIE_IN_SPACE`) the normal is that of the face that keeps the bodies
+farthest apart, which it also is once they overlap: the gap is continuous there; a normal, as that
+of the distance to a point, can not be.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigid_lcp.contact.manifold import SAME, TIE, add_candidate
-from rigid_lcp.contact.separation import NEARLY, Solids, dot
+from rigid_lcp.contact.manifold import SAME_CONTACT, TIE_IN_SPACE, add_candidate
+from rigid_lcp.contact.separation import NEARLY_OPPOSITE, Solids, dot
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -76,7 +75,7 @@ def pair_belongs(solids: Solids, pair: Floats, normal: Floats, tie: float) -> bo
     So do the two ends of what parallel edges have in common.
     """
     away = pair[5:8]
-    if pair[0] > tie and dot(away, normal) < np.cos(NEARLY) * pair[0]:
+    if pair[0] > tie and dot(away, normal) < np.cos(NEARLY_OPPOSITE) * pair[0]:
         return False
     edge = int(pair[2])
     return pair[4] * dot(solids.bisector[edge], normal) >= solids.seen_about[edge]
@@ -90,10 +89,10 @@ def find_corner_candidates(
     """Add the nearest corner-edge pair no farther than ``within`` [m], and those beside it.
 
     ``near_a``, ``near_b``: edges of each body near the other; ``touching`` (3,): normal where the
-    points are less than `TIE` of ``size`` [m] apart.  Rows of ``found`` as
-    `rigid_lcp.contact.manifold.COLUMNS` says; returns how many there are.
+    points are less than `TIE_IN_SPACE` of ``size`` [m] apart.  Rows of ``found`` as
+    `rigid_lcp.contact.manifold.CANDIDATE_COLUMNS` says; returns how many there are.
     """
-    tie = TIE * size
+    tie = TIE_IN_SPACE * size
     pairs = np.empty((PAIRS, PAIR_COLUMNS))
     many = list_corner_edge_pairs(solids, a, b, near_b, 1.0, within, tie, pairs, 0)
     many = list_corner_edge_pairs(solids, b, a, near_a, -1.0, within, tie, pairs, many)
@@ -119,6 +118,6 @@ def find_corner_candidates(
         if not of_a:
             first, second = second, first
         count = add_candidate(
-            found, count, kind, first, second, pair[0], normal, 1.0, point, SAME * size
+            found, count, kind, first, second, pair[0], normal, 1.0, point, SAME_CONTACT * size
         )
     return count

@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-TIE = 1e-9
+TIE_IN_PLANE = 1e-9
 """Separations that differ by less than this share of a grain's reach are equal: then the face of
 the body with the smaller number is taken, so that round-off does not change a contact's name."""
 FACE_BITS, BODY_BITS = 10, 21
@@ -247,7 +247,7 @@ def pair_contacts(
             face_j, gap_j = widest_face(vj, nj, vi)
             if gap_j > margin:
                 continue
-            tie = TIE * min(radius[i], radius[j])
+            tie = TIE_IN_PLANE * min(radius[i], radius[j])
             if gap_i >= gap_j - tie:
                 upper, lower = j, i
                 count = find_face_contacts(vi, ni, face_i, vj, nj, margin, tie, found)

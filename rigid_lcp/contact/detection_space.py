@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from rigid_lcp.contact.arrays import Contacts
 from rigid_lcp.contact.corners import CORNER_EDGE, CORNERS, EDGE_CORNER
 from rigid_lcp.contact.manifold import (
-    COLUMNS,
+    CANDIDATE_COLUMNS,
     CORNER_FACE,
     EDGES,
     FACE_CORNER,
     MOST,
     ROOM,
-    TIE,
+    TIE_IN_SPACE,
     add_candidate,
     keep_outer,
 )
@@ -119,7 +119,7 @@ def pair_contacts(
         np.empty((room, 9)),
         np.empty(room, np.int64),
     )
-    found = np.empty((ROOM, COLUMNS))
+    found = np.empty((ROOM, CANDIDATE_COLUMNS))
     c = 0
     for i, j in pairs:
         margin = margins[i] + margins[j]
@@ -177,6 +177,6 @@ def find_corners_on_plane(
         gap = dot(n, x) - level
         if gap <= margin:
             count = add_candidate(
-                found, count, CORNER_FACE, v - first, 0, gap, n, 1.0, x, TIE * size
+                found, count, CORNER_FACE, v - first, 0, gap, n, 1.0, x, TIE_IN_SPACE * size
             )
     return keep_outer(found, count, size)

@@ -11,27 +11,27 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigid_lcp.contact.separation import NEARLY, Solids, cross, cross_edges, dot
+from rigid_lcp.contact.separation import NEARLY_OPPOSITE, Solids, cross, cross_edges, dot
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-TIE = 1e-9
+TIE_IN_SPACE = 1e-9
 """Share of a body's reach below which lengths are equal: round-off never renames a contact."""
-SAME = 1e-6
+SAME_CONTACT = 1e-6
 """Contacts of a pair nearer than this share of the reach are one."""
 CORNER_FACE, FACE_CORNER, EDGES = 0, 1, 2
 """Corner of a on a face of b; corner of b on a face of a; an edge of a across one of b."""
 STEEP = 10.0
 """How much farther out [m] a contact must be for each metre of gap; faces that share contacts are
-tilted by less than its inverse, see `rigid_lcp.contact.separation.NEARLY`."""
-OUTSIDE = 1e-2
+tilted by less than its inverse, see `rigid_lcp.contact.separation.NEARLY_OPPOSITE`."""
+OUTSIDE_HULL = 1e-2
 """Share of the reach by which a contact must lie outside of those kept to be kept as well."""
 MOST = 12
 """Contacts kept of a pair."""
 ROOM = 256
 """Candidates looked at for one pair; there are a few dozen for grains of a hundred corners."""
-COLUMNS = 10
+CANDIDATE_COLUMNS = 10
 """Row of a candidate: kind, feature of a, feature of b, gap, normal from b to a (3), point (3)."""
 
 
@@ -96,17 +96,17 @@ def find_face_candidates(
     for v in range(first_other, solids.first_vertex[other + 1]):
         x = solids.vertex[v]
         gap = dot(n, x) - level
-        if gap <= margin and within_face(solids, own, face, x, TIE * size):
+        if gap <= margin and within_face(solids, own, face, x, TIE_IN_SPACE * size):
             here, there = v - first_other, face - solids.first_face[own]
             if own_is_b:
                 count = add_candidate(
-                    found, count, CORNER_FACE, here, there, gap, n, sign, x, SAME * size
+                    found, count, CORNER_FACE, here, there, gap, n, sign, x, SAME_CONTACT * size
                 )
             else:
                 count = add_candidate(
-                    found, count, FACE_CORNER, there, here, gap, n, sign, x, SAME * size
+                    found, count, FACE_CORNER, there, here, gap, n, sign, x, SAME_CONTACT * size
                 )
-    opposite = np.cos(NEARLY)
+    opposite = np.cos(NEARLY_OPPOSITE)
     start, stop = solids.first_corner[face], solids.first_corner[face + 1]
     for g in range(solids.first_face[other], solids.first_face[other + 1]):
         m = solids.normal[g]
@@ -115,15 +115,33 @@ def find_face_candidates(
         for k in range(start, stop):
             x = solids.vertex[first_own + solids.loop[k]]
             gap = dot(m, x) - solids.offset[g]
-            if gap <= margin and within_face(solids, other, g, x, TIE * size):
+            if gap <= margin and within_face(solids, other, g, x, TIE_IN_SPACE * size):
                 here, there = g - solids.first_face[other], solids.loop[k]
                 if own_is_b:
                     count = add_candidate(
-                        found, count, FACE_CORNER, here, there, gap, m, -sign, x, SAME * size
+                        found,
+                        count,
+                        FACE_CORNER,
+                        here,
+                        there,
+                        gap,
+                        m,
+                        -sign,
+                        x,
+                        SAME_CONTACT * size,
                     )
                 else:
                     count = add_candidate(
-                        found, count, CORNER_FACE, there, here, gap, m, -sign, x, SAME * size
+                        found,
+                        count,
+                        CORNER_FACE,
+                        there,
+                        here,
+                        gap,
+                        m,
+                        -sign,
+                        x,
+                        SAME_CONTACT * size,
                     )
     a, b = (other, own) if own_is_b else (own, other)
     crossing = np.empty(9)
@@ -144,7 +162,7 @@ def find_face_candidates(
                 continue
             count = add_candidate(
                 found, count, EDGES, edge_a - solids.first_edge[a], edge_b - solids.first_edge[b],
-                crossing[2], normal, 1.0, crossing[6:9], SAME * size,
+                crossing[2], normal, 1.0, crossing[6:9], SAME_CONTACT * size,
             )  # fmt: skip
     return count
 
@@ -207,8 +225,8 @@ def find_farthest_along(
 def keep_outer_rows(found: Floats, count: int, size: float, kept: Ints, number: int) -> int:
     """Add to the ``kept`` rows p, q, left, right (-1: none) those that their hull leaves out.
 
-    Edge by edge of the hull, the candidate farthest beyond it by more than `OUTSIDE`: as a stone
-    on a face of five corners may stand on any three of them.  Returns how many rows there are.
+    Edge by edge of the hull, the candidate farthest beyond it by more than `OUTSIDE_HULL`: as a
+    stone on a face of five corners may stand on any three of them.  Returns the number of rows.
     """
     ring = np.empty(MOST, np.int64)
     corners = 0
@@ -217,7 +235,7 @@ def keep_outer_rows(found: Floats, count: int, size: float, kept: Ints, number: 
             ring[corners] = row
             corners += 1
     normal = found[kept[0], 4:7]
-    least = OUTSIDE * size
+    least = OUTSIDE_HULL * size
     added = True
     while added and 2 < corners < MOST:  # every edge once a round: what is too much goes evenly
         added, place = False, 0
@@ -236,7 +254,7 @@ def keep_outer_rows(found: Floats, count: int, size: float, kept: Ints, number: 
                     - STEEP * length * max(found[k, 3] - higher, 0.0)
                 )
                 if worth > most:
-                    best, most = k, worth + TIE * size * length
+                    best, most = k, worth + TIE_IN_SPACE * size * length
             place += 1
             if best < 0:
                 continue
@@ -253,15 +271,14 @@ def keep_outer(found: Floats, count: int, size: float) -> int:
 
     The farthest from the middle, the farthest from that, and on either side of the line through
     both the farthest; then what lies outside of these (`keep_outer_rows`), at most `MOST` in all;
-    the
-    deepest of all takes the place of the nearest of them if it is deeper.
-    One that is higher by g must be `STEEP` g farther out to be taken: of a worn corner the ends
-    that touch, not the one beside them.
-    Lengths within `TIE` of each other count as equal: the first is taken.
+    the deepest of all takes the place of the nearest of them if it is deeper.  One that is higher
+    by g must be `STEEP` g farther out to be taken: of a worn corner the ends that touch, not the
+    one beside them.  Lengths within `TIE_IN_SPACE` of each other count as equal: the first is
+    taken.
     """
     if count <= 4:
         return count
-    tie = TIE * size
+    tie = TIE_IN_SPACE * size
     middle = np.zeros(3)
     deepest = 0
     for k in range(count):
@@ -278,13 +295,13 @@ def keep_outer(found: Floats, count: int, size: float) -> int:
     rows[2] = find_farthest_along(found, count, p, d0, d1, d2, tie)
     rows[3] = find_farthest_along(found, count, p, -d0, -d1, -d2, tie)
     all_rows = keep_outer_rows(found, count, size, rows, 4)
-    kept = np.empty((all_rows, COLUMNS))
+    kept = np.empty((all_rows, CANDIDATE_COLUMNS))
     number, nearest, least, lowest = 0, 0, np.inf, np.inf
     for row in rows[:all_rows]:
         if row < 0:
             continue
         squares = 0.0
-        for column in range(COLUMNS):
+        for column in range(CANDIDATE_COLUMNS):
             kept[number, column] = found[row, column]
             if column >= 7:
                 squares += (found[row, column] - found[deepest, column]) ** 2
@@ -293,9 +310,9 @@ def keep_outer(found: Floats, count: int, size: float) -> int:
         lowest = min(lowest, found[row, 3])
         number += 1
     if found[deepest, 3] < lowest - tie:
-        for column in range(COLUMNS):
+        for column in range(CANDIDATE_COLUMNS):
             kept[nearest, column] = found[deepest, column]
     for row in range(number):
-        for column in range(COLUMNS):
+        for column in range(CANDIDATE_COLUMNS):
             found[row, column] = kept[row, column]
     return number

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.contact.near_pairs import HALF_SPACE
-from rigid_lcp.contact.separation import NEARLY, TILT, Solids
+from rigid_lcp.contact.separation import NEARLY_OPPOSITE, TILT, Solids
 from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.shapes import HalfSpace, Polyhedron, Sphere, rotation_matrix
 
@@ -103,7 +103,7 @@ def _solid(shape: Polyhedron) -> Solids:
         np.array([0, len(shape.faces)]), shape.normals, shape.distances,
         np.cumsum([len(loop) for loop in shape.faces]), np.concatenate(shape.faces),
         np.array([0, len(edges)]), np.ascontiguousarray(edges[:, :2]), bisector,
-        np.cos(opening + TILT), np.cos(opening + NEARLY),
+        np.cos(opening + TILT), np.cos(opening + NEARLY_OPPOSITE),
     )  # fmt: skip
 
 

@@ -21,10 +21,10 @@ Ints = NDArray[np.int64]
 
 TILT = 1e-9
 """Round-off allowed where a normal lies just between two face normals [rad]."""
-NEARLY = 0.1
+NEARLY_OPPOSITE = 0.1
 """Faces whose normals are opposite within this angle [rad] may lie upon each other: they share
 every point contact that lies within both of them."""
-PARALLEL = 1e-6
+PARALLEL_EDGES = 1e-6
 """Edges with a smaller sine of the angle between them have no common normal of their own [-]."""
 
 
@@ -52,7 +52,7 @@ class Solids(NamedTuple):
     """Cosine of half the angle between these normals, (e,): a normal whose cosine with the
     bisector is smaller lies outside the edge's cone of normals."""
     seen_about: Floats
-    """The same with `NEARLY` added to the half angle."""
+    """The same with `NEARLY_OPPOSITE` added to the half angle."""
 
 
 @njit(cache=True)
@@ -134,7 +134,7 @@ def separate_edges(
             w0, w1, w2 = s[0] - r[0], s[1] - r[1], s[2] - r[2]
             c0, c1, c2 = cross(u0, u1, u2, w0, w1, w2)
             squares = c0 * c0 + c1 * c1 + c2 * c2
-            if squares <= PARALLEL**2 * length_a * (w0 * w0 + w1 * w1 + w2 * w2):
+            if squares <= PARALLEL_EDGES**2 * length_a * (w0 * w0 + w1 * w1 + w2 * w2):
                 continue
             k = solids.bisector[f]
             towards_b = c0 * k[0] + c1 * k[1] + c2 * k[2]
@@ -173,7 +173,7 @@ def cross_edges(
     c0, c1, c2 = cross(u0, u1, u2, w0, w1, w2)
     squares = c0 * c0 + c1 * c1 + c2 * c2
     lengths = (u0 * u0 + u1 * u1 + u2 * u2) * (w0 * w0 + w1 * w1 + w2 * w2)
-    if squares <= PARALLEL**2 * lengths:
+    if squares <= PARALLEL_EDGES**2 * lengths:
         return False
     y0, y1, y2 = cross(x0, x1, x2, w0, w1, w2)
     crossing[0] = (y0 * c0 + y1 * c1 + y2 * c2) / squares

@@ -1,8 +1,7 @@
 """All point contacts of two polyhedra: the features that keep them apart say which.
 
-The greatest separation along the normal of a face, or across two edges, is the distance, and
-these features make the contacts (`rigid_lcp.contact.manifold`), unless corners are nearest: then it
-is
+The greatest separation along the normal of a face, or across two edges, is the distance, and these
+features make the contacts (`rigid_lcp.contact.manifold`), unless corners are nearest: then it is
 less than the distance, no candidate is as near as it says, and the nearest corner makes one too
 (`rigid_lcp.contact.corners`).
 """
@@ -16,15 +15,15 @@ from numpy.typing import NDArray
 from rigid_lcp.contact.corners import find_corner_candidates
 from rigid_lcp.contact.manifold import (
     EDGES,
-    SAME,
-    TIE,
+    SAME_CONTACT,
+    TIE_IN_SPACE,
     add_candidate,
     find_face_candidates,
     keep_outer,
     least_gap,
 )
 from rigid_lcp.contact.separation import (
-    NEARLY,
+    NEARLY_OPPOSITE,
     Solids,
     cross_edges,
     dot,
@@ -44,7 +43,7 @@ def find_solid_contacts(
     """Point contacts of two polyhedra with a gap up to ``margin`` [m]; returns how many.
 
     ``box_a``, ``box_b``: bounding boxes, swollen or not; ``size``: the smaller reach of the
-    two [m].  Rows of ``found`` as `COLUMNS` says.
+    two [m].  Rows of ``found`` as `CANDIDATE_COLUMNS` says.
     """
     face_a, gap_a = separate_faces(solids, a, b, margin)
     if gap_a > margin:
@@ -59,7 +58,7 @@ def find_solid_contacts(
     edge_a, edge_b, gap_edges = separate_edges(solids, a, b, near_a, near_b, margin)
     if gap_edges > margin:
         return 0
-    own_is_b = gap_b >= gap_a - TIE * size
+    own_is_b = gap_b >= gap_a - TIE_IN_SPACE * size
     face, own, other = (face_b, b, a) if own_is_b else (face_a, a, b)
     crossing = np.empty(9)
     towards = solids.normal[face] * (1.0 if own_is_b else -1.0)
@@ -68,28 +67,30 @@ def find_solid_contacts(
     crosses = (
         edge_a >= 0
         and cross_edges(solids, a, edge_a, b, edge_b, solids.bisector[edge_b], crossing)
-        and -TIE <= crossing[0] <= 1.0 + TIE
-        and -TIE <= crossing[1] <= 1.0 + TIE
+        and -TIE_IN_SPACE <= crossing[0] <= 1.0 + TIE_IN_SPACE
+        and -TIE_IN_SPACE <= crossing[1] <= 1.0 + TIE_IN_SPACE
     )
     faces = max(gap_a, gap_b)
     alone = (
-        crosses and gap_edges > faces + TIE * size and dot(crossing[3:6], towards) < np.cos(NEARLY)
+        crosses
+        and gap_edges > faces + TIE_IN_SPACE * size
+        and dot(crossing[3:6], towards) < np.cos(NEARLY_OPPOSITE)
     )
     count = 0
     if not alone:
         near = near_a if own_is_b else near_b
         count = find_face_candidates(solids, face, own, other, own_is_b, near, margin, size, found)
     least = least_gap(found, count)
-    apart, missing = max(faces, gap_edges), least > gap_edges + TIE * size
-    deep = count == 0 and apart < -TIE * size
+    apart, missing = max(faces, gap_edges), least > gap_edges + TIE_IN_SPACE * size
+    deep = count == 0 and apart < -TIE_IN_SPACE * size
     if alone or (crosses and missing and (gap_edges == apart or deep)):
         count = add_candidate(
             found, count, EDGES, edge_a - solids.first_edge[a], edge_b - solids.first_edge[b],
-            crossing[2], crossing[3:6], 1.0, crossing[6:9], SAME * size,
+            crossing[2], crossing[3:6], 1.0, crossing[6:9], SAME_CONTACT * size,
         )  # fmt: skip
         least = least_gap(found, count)
-    if apart > -TIE * size and least > apart + TIE * size:
-        within = min(margin, least - TIE * size)
+    if apart > -TIE_IN_SPACE * size and least > apart + TIE_IN_SPACE * size:
+        within = min(margin, least - TIE_IN_SPACE * size)
         count = find_corner_candidates(
             solids, a, b, near_a, near_b, within, size, towards, found, count
         )

@@ -27,9 +27,9 @@ TOUCH = 1e-9
 """Gap below which two bodies touch, as a share of the smallest body's size."""
 AIM = 0.25
 """Gap at which a step that would end in an overlap is to end, in touches."""
-OVERLAP = 1e-11
+LASTING_OVERLAP = 1e-11
 """Overlap that makes a step too long, likewise."""
-DRIFT = 1e-3
+PRESSED_OVERLAP = 1e-3
 """Overlap that contacts which press all the time may have before it is removed, likewise."""
 REST_SPEED = 1e-4
 """Approach that ends without a bounce, as a share of ``sqrt(g size)``."""
@@ -80,7 +80,7 @@ def redetect_contacts(
     rows, there = contact_rows(found.key, lasting.contacts.key)
     now, before = rows[there], np.flatnonzero(there)
     if not there.all():
-        taken, lost = successors(found, lasting.contacts, there, DRIFT * world.length)
+        taken, lost = successors(found, lasting.contacts, there, PRESSED_OVERLAP * world.length)
         now, before = np.concatenate([now, taken]), np.concatenate([before, lost])
     contacts = found[now]
     slip = carry_slip(lasting, before, contacts)
@@ -169,7 +169,7 @@ def find_share_until_rest(
     """
     if not lasting.sliding.any():
         return 1.0
-    reach = travel(world, motion, h) + travel(world, after, h) + DRIFT * world.length
+    reach = travel(world, motion, h) + travel(world, after, h) + PRESSED_OVERLAP * world.length
     found = world.contacts(after, reach)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     there &= lasting.sliding & (lasting.contacts.friction > 0)
@@ -187,12 +187,12 @@ def overlap_beyond(world: World, motion: Motion, pressed: Ints) -> float:
     """Overlap that makes the step too long [m]: of contacts not ``pressed`` all the time (keys).
 
     That of lasting contacts is an error of the integration, which `remove_drift` takes out; it
-    counts above ``DRIFT`` only.
+    counts above ``PRESSED_OVERLAP`` only.
     """
     found = world.contacts(motion, 0.0)
     lasting = np.isin(found.key, pressed)
     overlap = -found.gap
-    overlap[lasting & (overlap < DRIFT * world.length)] = 0.0
+    overlap[lasting & (overlap < PRESSED_OVERLAP * world.length)] = 0.0
     return float(overlap.max(initial=0.0))
 
 
@@ -206,7 +206,7 @@ def find_share_until_touch(
     collision needs.  None where none of these contacts was in sight at the start.
     """
     found = world.contacts(after, 0.0)
-    found = found[(found.gap < -OVERLAP * world.length) & ~np.isin(found.key, pressed)]
+    found = found[(found.gap < -LASTING_OVERLAP * world.length) & ~np.isin(found.key, pressed)]
     start = world.contacts(motion, travel(world, motion, h) + travel(world, after, h))
     rows, there = contact_rows(start.key, found.key)
     found, start = found[there], start[rows[there]]
@@ -239,7 +239,7 @@ def remove_drift(world: World, motion: Motion, pressed: Ints, stuck: Ints) -> Mo
     """
     if len(pressed) == 0:
         return motion
-    found = world.contacts(motion, DRIFT * world.length)
+    found = world.contacts(motion, PRESSED_OVERLAP * world.length)
     contacts = found[np.isin(found.key, pressed)]
     if len(contacts) == 0:
         return motion

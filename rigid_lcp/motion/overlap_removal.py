@@ -41,7 +41,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-OVERLAP = 1e-12
+OVERLAP_ALLOWED = 1e-12
 """Overlap that is left alone, as a share of the smallest body's size."""
 PROJECTION_TOLERANCE = 1e-9
 """Residual of the displacements that take overlaps out; what is left is seen in the next step."""
@@ -76,7 +76,7 @@ def remove_overlap(world: World, motion: Motion, touching: Contacts | None = Non
         if touching is None or done:
             touching = world.contacts(motion, 0.0)
         deepest = -float(touching.gap.min(initial=0.0))
-        if deepest <= (OVERLAP_LEFT if done else OVERLAP) * world.length:
+        if deepest <= (OVERLAP_LEFT if done else OVERLAP_ALLOWED) * world.length:
             break
         found = world.contacts(motion, deepest)  # neighbours that the move may reach stay clear
         inverse_mass = world.inverse_mass(motion)

@@ -37,7 +37,7 @@ from rigid_lcp.motion.checks import Loads
 from rigid_lcp.motion.equations import body_space, find_contact_offset
 from rigid_lcp.motion.finite_states import is_finite, too_much
 from rigid_lcp.motion.lasting_contacts import (
-    OVERLAP,
+    LASTING_OVERLAP,
     Lasting,
     collided,
     find_share_until_rest,
@@ -58,7 +58,7 @@ CLEAN_STEPS = 3
 """Steps without an overlap before the step is doubled (section 9)."""
 SHORTEST = 1e-12
 """Shortest step as a share of the longest one."""
-MOST_STEPS = 10_000_000
+MOST_STEPS_OF_A_CALL = 10_000_000
 """Steps that one call may take: what moves too fast for its size would never end."""
 LOCATED = 8
 """Times that the end of one step is located; then it is halved as in section 9."""
@@ -123,9 +123,10 @@ def advance_runge_kutta(
     """
     end, forces = time + seconds, None
     fastest = _travel_limit(world, motion)
-    if seconds > MOST_STEPS * fastest:
+    if seconds > MOST_STEPS_OF_A_CALL * fastest:
         raise NotConverged(
-            f"{seconds:g} s take more than {MOST_STEPS:.0e} steps, so fast do bodies go or turn",
+            f"{seconds:g} s take more than {MOST_STEPS_OF_A_CALL:.0e} steps,"
+            " so fast do bodies go or turn",
             where=f"time {time:.9g} s", remedy="use method='time-stepping'",
         )  # fmt: skip
     while end - time > SHORTEST * pace.longest or forces is None:
@@ -155,7 +156,7 @@ def advance_runge_kutta(
             overlap = overlap_beyond(world, after, pressed)
             stop = find_share_until_rest(world, motion, after, h, lasting)
             far = _travel_limit(world, after)
-            if overlap > OVERLAP * world.length:
+            if overlap > LASTING_OVERLAP * world.length:
                 share = None
                 if pace.locating and located < LOCATED:
                     share = find_share_until_touch(world, motion, after, h, pressed)
@@ -252,7 +253,7 @@ def _pull(loads: Loads | None, time: float, motion: Motion) -> ArrayLike | None:
 def _no_step(world: World, motion: Motion, overlap: float, time: float) -> RigidError:
     """What is wrong with the end ``motion`` of the shortest step, which may have an ``overlap``."""
     where, remedy = f"time {time:.9g} s", "use method='time-stepping'"
-    if overlap > OVERLAP * world.length:
+    if overlap > LASTING_OVERLAP * world.length:
         return Overlapping(
             f"bodies overlap by {overlap:.2g} m after the shortest step", where=where,
             remedy=f"{remedy}, which removes overlaps",

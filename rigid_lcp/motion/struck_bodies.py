@@ -3,8 +3,7 @@
 Contacts of a step are looked for as far as bodies get within it by the velocities that they begin
 it with (`moreau_margin`).  A body at rest that is struck gets further.  What it then meets shows as
 an overlap at the end of the step, at a pair that had no contact in it (`find_missed_collisions`).
-A
-pair without restitution is moved apart and comes to rest in the next step, as it would have done
+A pair without restitution is moved apart and comes to rest in the next step, as it would have done
 in this one.  With restitution the step is made again, with more contacts
 (`find_contacts_of_struck`).
 
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from rigid_lcp.contact import Contacts
 from rigid_lcp.motion.equations import relative_velocity
-from rigid_lcp.motion.overlap_removal import OVERLAP
+from rigid_lcp.motion.overlap_removal import OVERLAP_ALLOWED
 from rigid_lcp.motion.state import Motion
 from rigid_lcp.motion.world import World
 
@@ -42,7 +41,7 @@ def speeds(world: World, rates: Floats) -> Floats:
 def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float) -> Floats:
     """How far each body's points can get within a step that nothing strikes them in [m], (n,)."""
     rates = np.abs(motion.rates) + h * np.abs(accelerations)
-    return h * speeds(world, rates) + OVERLAP * world.length
+    return h * speeds(world, rates) + OVERLAP_ALLOWED * world.length
 
 
 def find_missed_collisions(
@@ -54,7 +53,9 @@ def find_missed_collisions(
     ``touching``: contacts of ``end`` without margin.
     """
     missed = np.zeros(len(world.mass), dtype=bool)
-    found = touching[(touching.gap < -OVERLAP * world.length) & (touching.restitution > 0.0)]
+    found = touching[
+        (touching.gap < -OVERLAP_ALLOWED * world.length) & (touching.restitution > 0.0)
+    ]
     if len(found) == 0:
         return missed
     known = np.isin(_pairs(world, found), _pairs(world, contacts))

@@ -11,19 +11,17 @@ two bodies are about to collide, else ``u_N+ + 2 g / h`` for a contact that is o
 by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur. J. Mech. 13 (1994)
 93; Jean, CMAME 177 (1999) 235).  Without friction no step adds energy: the mean of ``J v`` and
 ``J v+`` is never positive where p_N is not zero (to the second order in h where J turns), and what
-spins freely keeps its energy (`rigid_lcp.motion.free_rotation`); with restitution 1 a bounce
-keeps it to round-off, of bodies that turn as well, and so do chains of collisions within the step
+spins freely keeps its energy (`gyroscopic.free_rotation`); with restitution 1 a bounce keeps
+it to round-off, of bodies that turn as well, and so do chains of collisions within the step
 (`rigid_lcp.collision.passing`, `rigid_lcp.motion.struck_bodies`) unless they run out of rounds,
-which is
-reported.  An approach no faster than what gravity gives in a step, ``g h``, does not bounce.  With
-friction a body that comes to rest within a step may gain up to ``m (h |f/m|)^2 / 8``, and
-restitution is scaled down where it would make more, or where wedged bodies have no impulses that
-let them bounce (`rigid_lcp.collision.restitution_scale`).
+which is reported.  An approach no faster than what gravity gives in a step, ``g h``, does not
+bounce.  With friction a body that comes to rest within a step may gain up to ``m (h |f/m|)^2 / 8``,
+and restitution is scaled down where it would make more, or where wedged bodies have no impulses
+that let them bounce (`rigid_lcp.collision.restitution_scale`).
 
 What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart
 (`rigid_lcp.motion.overlap_removal`).  That keeps momentum; the angular momentum of bodies that
-slide upon
-each other it changes, by a part of first order in h.
+slide upon each other it changes, by a part of first order in h.
 
 Use it where forces do not exist (Painleve) or where events are too many to be met one by one; it
 is of first order in h where contacts open and close, of second order in between.
@@ -52,9 +50,9 @@ from rigid_lcp.collision import (
 from rigid_lcp.contact import ContactForces, Contacts, contact_frames, contact_rows
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction.auto import solve_friction
-from rigid_lcp.friction.problem import BodySpace, FrictionSolution
+from rigid_lcp.friction.problem import SHARE_LEFT, BodySpace, FrictionSolution
 from rigid_lcp.motion.equations import body_space, inertial_acceleration, relative_velocity
-from rigid_lcp.motion.overlap_removal import OVERLAP, Restitution, part_bodies
+from rigid_lcp.motion.overlap_removal import OVERLAP_ALLOWED, Restitution, part_bodies
 from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.struck_bodies import (
     find_contacts_of_struck,
@@ -68,8 +66,6 @@ SolveFrom = Callable[..., tuple[FrictionSolution, float]]
 """Impulses and their error [-] from the contacts' `BodySpace`, q (nc, dim), friction (nc,) and, if
 known, a start (nc * dim,)."""
 
-SHARE_LEFT = 0.1
-"""Part of the offending velocities that a solution may leave before its forces are called wrong."""
 START_AGAIN = 1e-4
 """Error of the forces above which they are looked for once more, from nothing, and without the
 inertial terms that ask bodies to part: those are of the velocities before the step."""
@@ -214,7 +210,7 @@ def find_closing_contacts(
         turning=turning[:, 0],
         slow=float(np.linalg.norm(world.scene.gravity)) * h,
         h=h,
-        touching=OVERLAP * world.length,
+        touching=OVERLAP_ALLOWED * world.length,
     )
 
 

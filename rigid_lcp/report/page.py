@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rigid_lcp.motion import Scene
 from rigid_lcp.report import pictures
 from rigid_lcp.scene import RunFolder, history_of, read_frame, rebuild_frame_scene, write_history
-from trackbed.report import bullets, page, paragraph, picture, section, table
+from trackbed.report import bullets, encode_figure, page, paragraph, picture, section, table
 from trackbed.run_files import write_whole
 
 Floats = NDArray[np.float64]
@@ -125,5 +125,5 @@ def draw_frame_figure(
 def write_picture(folder: RunFolder, name: str, figure: Any) -> Path:
     """Write a figure as ``picture-NAME.png``; its path.  Raises as `write_whole`."""
     path = folder.path / f"picture-{name}.png"
-    write_whole(path, pictures.figure_png(figure))
+    write_whole(path, encode_figure(figure, path.suffix))
     return path

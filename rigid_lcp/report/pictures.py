@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 STONE, EDGE, FIXED = "#e9e4da", "#8a8174", "#c9ced6"
 STICK, SLIDE = "#0b5fa5", "#d1495b"
-WIDEST = 7.0
+FORCE_LINE_WIDTH = 7.0
 """Line width of the largest normal force [points]."""
 
 
@@ -61,7 +61,7 @@ def draw_chains(
         for body in (contacts.body_a[c], contacts.body_b[c]):
             if body >= 0 and not isinstance(scene.bodies[body].shape, HalfSpace):
                 lines.append([place[body], point])
-                widths.append(WIDEST * min(contacts.normal_force[c] / scale, 1.0))
+                widths.append(FORCE_LINE_WIDTH * min(contacts.normal_force[c] / scale, 1.0))
                 colours.append(SLIDE if contacts.status[c] == "slide" else STICK)
     axes.add_collection(
         LineCollection(lines, linewidths=widths, colors=colours, capstyle="round", alpha=0.85)
@@ -74,10 +74,10 @@ def draw_chain_legend(axes: Any, scale: float, unit: str) -> None:
 
     most, less = (f"{f:,.0f}" if f >= 100 else f"{f:.3g}" for f in (scale, scale / 4))
     signs = [
-        (STICK, WIDEST / 2, "sticks"),
-        (SLIDE, WIDEST / 2, "slides"),
-        ("#666666", WIDEST, f"{most} {unit} or more"),
-        ("#666666", WIDEST / 4, f"{less} {unit}"),
+        (STICK, FORCE_LINE_WIDTH / 2, "sticks"),
+        (SLIDE, FORCE_LINE_WIDTH / 2, "slides"),
+        ("#666666", FORCE_LINE_WIDTH, f"{most} {unit} or more"),
+        ("#666666", FORCE_LINE_WIDTH / 4, f"{less} {unit}"),
     ]
     axes.legend(
         [Line2D([], [], color=colour, linewidth=width) for colour, width, _ in signs],
@@ -158,13 +158,6 @@ def force_scale(forces: list[Floats]) -> float:
     return float(np.quantile(largest, 0.75)) if largest else 1.0
 
 
-def figure_png(figure: Any) -> bytes:
-    """A figure as PNG."""
-    image = BytesIO()
-    figure.savefig(image, format="png")
-    return image.getvalue()
-
-
 def picture_history(history: dict[str, Floats]) -> Any:
     """A figure of energy, greatest overlap and number of contacts against time."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -173,15 +166,8 @@ def picture_history(history: dict[str, Floats]) -> Any:
     figure = Figure(figsize=(7, 4.6), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
     rows = figure.subplots(3, 1, sharex=True)
-    for axes, (name, label) in zip(
-        rows,
-        [
-            ("energy", "energy [J]"),
-            ("contacts", "contacts that carry"),
-            ("overlap", "overlap [m]"),
-        ],
-        strict=True,
-    ):
+    labels = {"energy": "energy [J]", "contacts": "contacts that carry", "overlap": "overlap [m]"}
+    for axes, (name, label) in zip(rows, labels.items(), strict=True):
         axes.plot(history["time"], history[name], color=STICK, marker=".", markersize=4)
         axes.set_ylabel(label, fontsize=8)
         axes.grid(alpha=0.3)

@@ -163,11 +163,10 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
             where=str(folder.path / FRAME.format(len(history["time"]))),
             remedy="the same command with --resume computes it again",
         )
-    moves = int(run.world.movable.sum())
-    return {
+    summary = {
         "title": file.tables.title,
         "method": run.method,
-        "bodies": moves,
+        "bodies": int(run.world.movable.sum()),
         "time": run.time,
         "steps": run.steps,
         "step": run.time / max(run.steps, 1),
@@ -180,11 +179,6 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
         "tolerance": run.tolerance,
         "residual_worst": run.worst_residual,
         "steps_above": run.steps_above,
-        **(
-            {"steps_scaled": run.steps_scaled, "steps_cut_off": run.steps_cut_off}
-            if _any_has(file, "restitution")
-            else {}
-        ),
         "speed_largest": float(np.abs(run.velocities).max(initial=0.0)),
         "positions": {
             body.name: run.positions[n].tolist()
@@ -193,18 +187,16 @@ def summary_of(file: SceneFile, scene: Scene, run: Simulation, folder: RunFolder
         },
         "cpu_s": float(history["cpu"][-1]),
         "cpu_a_step": float(history["cpu"][-1]) / max(run.steps, 1),
-        **(
-            {}
-            if run.worn is None
-            else {
-                "worn": run.worn.volume,
-                "friction_work": run.worn.work,
-                "worn_mass": run.worn.mass,
-                "worn_energy": run.worn.energy,
-            }
-        ),
-        **({} if run.breakage is None else {"broken": len(run.broken)}),
-        "frames": frames,
-        "last_frame": FRAME.format(frames),
-        "left_out": left_out(file),
     }
+    if _any_has(file, "restitution"):
+        summary |= {"steps_scaled": run.steps_scaled, "steps_cut_off": run.steps_cut_off}
+    if run.worn is not None:
+        summary |= {
+            "worn": run.worn.volume, "friction_work": run.worn.work, "worn_mass": run.worn.mass,
+            "worn_energy": run.worn.energy,
+        }  # fmt: skip
+    if run.breakage is not None:
+        summary["broken"] = len(run.broken)
+    return summary | {
+        "frames": frames, "last_frame": FRAME.format(frames), "left_out": left_out(file),
+    }  # fmt: skip

@@ -92,7 +92,7 @@ def restore_frame(path: Path, run: Simulation) -> float:
     if len(frame["motion"].position) != bodies or frame["motion"].dim != run.motion.dim:
         raise SceneError(
             f"the frame has {len(frame['motion'].position)} bodies, the scene {bodies}",
-            where=str(path), remedy="--force to compute it anew",
+            where=str(path), remedy="--force to compute it again",
         )  # fmt: skip
     for name in ("motion", "contacts", "pace", *COUNTERS):
         setattr(run, name, frame[name])

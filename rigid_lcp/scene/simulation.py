@@ -1,8 +1,7 @@
 """A scene set in motion: time, states, forces, energies; the physics is in the two integrators.
 
 `rigid_lcp.motion.time_stepping` (velocity level) for most scenes, `rigid_lcp.motion.runge_kutta`
-(acceleration
-level, section 9) for few bodies and high order.
+(acceleration level, section 9) for few bodies and high order.
 """
 
 from __future__ import annotations

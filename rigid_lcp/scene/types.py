@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from rigid_lcp.motion import MOST_STEPS, too_many_steps
+from trackbed.choices import find_choices
 from trackbed.scene_files import Name, NonNegative, Positive, Problem, Real, Table, suggest_word
 
 Vector = Annotated[list[Real], Field(min_length=2, max_length=3)]
@@ -18,6 +19,13 @@ VECTORS = (
 Restitution = Annotated[Real, Field(ge=0, le=1)]
 LEAST_OF_A_STEP = 1e-6
 """Shortest time between two frames in steps."""
+
+
+def check_shape(name: str) -> str:
+    """The name of a grain shape, if there is one of it."""
+    if name not in (known := find_choices("rigid_lcp.shapes", "SHAPE")):
+        raise ValueError(f"there is no grain shape {name!r}{suggest_word(name, known)}")
+    return name
 
 
 class Surface(Table):
@@ -106,6 +114,8 @@ class Grains(Table):
     density: Positive
     corners: Annotated[list[int], Field(min_length=2, max_length=2)] = Field([5, 9])
     """Fewest and most corners of a stone."""
+    shape: Annotated[str, AfterValidator(check_shape)] = "irregular"
+    """A file of `rigid_lcp.shapes` that draws stones."""
     seed: Annotated[int, Field(ge=0)] = 1
     friction: NonNegative | None = None
     restitution: Restitution | None = None

@@ -1,25 +1,19 @@
-"""Grain shapes, one file each."""
+"""Grain shapes, one file each; a file that sets ``SHAPE`` draws the stones of a scene.
 
-from rigid_lcp.shapes.disc import (
-    Disc,
-)
-from rigid_lcp.shapes.half_space import (
-    HalfSpace,
-)
-from rigid_lcp.shapes.numbers import (
-    require_vector,
-)
-from rigid_lcp.shapes.plain_numbers import (
-    real_numbers,
-)
-from rigid_lcp.shapes.polygon import (
-    Polygon,
-    check_outline,
-)
-from rigid_lcp.shapes.polyhedron import (
-    Polyhedron,
-    box,
-)
+``SHAPE(random, diameter, corners, dim)`` returns a `Polygon` (``dim`` 2) or a `Polyhedron` (3)
+whose points, as they are given, are within ``diameter / 2`` [m] of the origin.
+"""
+
+from collections.abc import Callable
+
+from numpy.random import Generator
+
+from rigid_lcp.shapes.disc import Disc
+from rigid_lcp.shapes.half_space import HalfSpace
+from rigid_lcp.shapes.numbers import require_vector
+from rigid_lcp.shapes.plain_numbers import real_numbers
+from rigid_lcp.shapes.polygon import Polygon, check_outline
+from rigid_lcp.shapes.polyhedron import Polyhedron, box
 from rigid_lcp.shapes.rotations import (
     quaternion_of_matrix,
     quaternion_of_rotation,
@@ -31,33 +25,20 @@ from rigid_lcp.shapes.rotations import (
     turn_quaternion,
     unit_quaternion,
 )
-from rigid_lcp.shapes.sphere import (
-    Sphere,
-)
-from rigid_lcp.shapes.stones import (
-    cut_points,
-    fragments,
-)
+from rigid_lcp.shapes.sphere import Sphere
+from rigid_lcp.shapes.stones import cut_points, fragments
+from trackbed.choices import find_choice
 
 __all__ = [
-    "Disc",
-    "HalfSpace",
-    "Polygon",
-    "Polyhedron",
-    "Sphere",
-    "box",
-    "check_outline",
-    "cut_points",
-    "fragments",
-    "quaternion_of_matrix",
-    "quaternion_of_rotation",
-    "quaternion_product",
-    "quaternion_rate",
-    "real_numbers",
-    "require_vector",
-    "rotate",
-    "rotate_back",
-    "rotation_matrix",
-    "turn_quaternion",
-    "unit_quaternion",
-]
+    "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "box", "check_outline", "cut_points",
+    "fragments", "get_shape", "quaternion_of_matrix", "quaternion_of_rotation",
+    "quaternion_product", "quaternion_rate", "real_numbers", "require_vector", "rotate",
+    "rotate_back", "rotation_matrix", "turn_quaternion", "unit_quaternion",
+]  # fmt: skip
+
+
+def get_shape(name: str) -> Callable[[Generator, float, int, int], Polygon | Polyhedron]:
+    """What draws stones of a shape; raises `UsageError` with the nearest name where none does."""
+    draw: Callable[[Generator, float, int, int], Polygon | Polyhedron]
+    draw = find_choice(__name__, "SHAPE", name, "there is no grain shape")
+    return draw

@@ -19,7 +19,7 @@ from rigid_lcp.shapes.numbers import LEAST, MOST, require_finite_shape, require_
 
 Floats = NDArray[np.float64]
 
-FLAT = 1e-12
+STRAIGHT = 1e-12
 """Sine of the turn at a vertex below which three vertices count as one line [-]."""
 
 
@@ -110,7 +110,7 @@ def check_outline(vertices: ArrayLike) -> Floats:
         )  # fmt: skip
     side = np.roll(outline, -1, axis=0) - outline
     length = np.hypot(side[:, 0], side[:, 1])
-    if (length <= FLAT * length.max()).any():
+    if (length <= STRAIGHT * length.max()).any():
         twice = int(np.argmin(length))
         raise ShapeError(
             "it is there twice", where=f"{where}, vertex {twice}", remedy="leave one of them out"
@@ -123,7 +123,7 @@ def check_outline(vertices: ArrayLike) -> Floats:
         raise ShapeError(
             "the vertices run clockwise", where=where, remedy="give them in reverse order"
         )
-    if (np.abs(turn_sine) <= FLAT).any():
+    if (np.abs(turn_sine) <= STRAIGHT).any():
         flat = int(np.argmin(np.abs(turn_sine)))
         raise ShapeError(
             "it lies on a line with its neighbours", where=f"{where}, vertex {flat}",

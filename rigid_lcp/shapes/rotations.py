@@ -91,7 +91,7 @@ def turn_quaternion(quaternion: Floats, rotation_vector: ArrayLike) -> Floats:
 
     ``q' = exp(phi) q``, kept at length one against round-off.  With ``phi = w t`` this is the
     exact motion under a constant spin, for any time; a spin that changes within the step needs an
-    integrator on top, such as `rigid_lcp.motion.free_rotation`.
+    integrator on top, such as `rigid_lcp.motion.gyroscopic.free_rotation`.
     """
     turned = quaternion_product(quaternion_of_rotation(rotation_vector), quaternion)
     return turned / np.linalg.norm(turned, axis=-1, keepdims=True)

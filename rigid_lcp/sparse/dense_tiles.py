@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 TILE = 4
 """Rows of a tile, and numbers in a vector: rows and columns are padded to multiples of it."""
-DEPTH = 64
+TERMS_AT_ONCE = 64
 """Terms that are summed at a time: what they read stays in the processor's nearest memory."""
 _VECTOR, _WORD = ir.VectorType(ir.DoubleType(), TILE), ir.IntType(64)
 _FUSED = ("contract",)
@@ -131,8 +131,8 @@ def subtract_product(
 ) -> None:  # fmt: skip
     """``X = S - A B``: X and S (rows, columns) in ``out`` and ``source``, A^T (depth, rows) in
     ``left``, B (depth, columns) in ``right``.  ``rows``, ``columns``: multiples of `TILE`."""
-    for k in range(0, max(depth, 1), DEPTH):
-        deep = min(DEPTH, depth - k)
+    for k in range(0, max(depth, 1), TERMS_AT_ONCE):
+        deep = min(TERMS_AT_ONCE, depth - k)
         for j in range(0, columns, 12):
             wide, b_at = columns - j, right_at + k * right_stride + j
             for i in range(0, rows, 4):

@@ -7,8 +7,7 @@ what they leave on these rows goes to the front's parent (`rigid_lcp.sparse.elim
 
 Both sides are kept by the pivot: ``upper`` = [U, L^-1 E] and ``lower`` = [L^T, (G U^-1)^T], so that
 the same few kernels (`rigid_lcp.sparse.dense_tiles`) make both, four pivots at a time.  Pivots and
-rows
-are padded to multiples of four, with ones on the diagonal.
+rows are padded to multiples of four, with ones on the diagonal.
 
 Nothing is exchanged.  That is safe where the symmetric part of the matrix is positive definite, and
 good enough where a shift or a barrier keeps it regular: a zero pivot ends the factorisation, and

@@ -21,12 +21,12 @@ from rigid_lcp.unique.elastic_network import slider_forces
 
 Floats = NDArray[np.float64]
 
-STEP = 1e10
+HELD_STEP = 1e10
 """Length of the proximal steps in units of the stiffest mode's time."""
-STEPS = 8
+HELD_STEPS = 8
 """Proximal steps, all with one factorisation: each leaves 1e-10 over the softest mode of the
 error."""
-OUTSIDE = 1e-3
+OUTSIDE_CONE = 1e-3
 """Part of the greatest force by which a contact may be outside its cone after the first step."""
 
 
@@ -43,13 +43,13 @@ def find_held_displacement(
     springs = keep_held_stiffness(stiffness, problem.friction)
     weighted = sp.csr_array(sp.diags_array(springs.ravel()) @ jacobian)
     identity = sp.eye_array(jacobian.shape[1], format="csc")
-    solve = splu(sp.csc_array(identity / STEP + jacobian.T @ weighted)).solve
+    solve = splu(sp.csc_array(identity / HELD_STEP + jacobian.T @ weighted)).solve
     displacement, trial = np.zeros(jacobian.shape[1]), np.zeros(springs.shape)
-    for _ in range(STEPS):
+    for _ in range(HELD_STEPS):
         displacement = displacement + solve(free + jacobian.T @ trial.ravel())
         before, trial = trial, -(weighted @ displacement).reshape(springs.shape)
         force = slider_forces(trial, problem.friction * np.maximum(trial[:, 0], 0.0))
-        if not np.abs(trial - force).max() <= OUTSIDE * np.abs(trial).max():
+        if not np.abs(trial - force).max() <= OUTSIDE_CONE * np.abs(trial).max():
             return None
         change = float(np.linalg.norm(trial - before))
         if (

@@ -214,9 +214,8 @@ def micro_displacements(
 
     With `coulomb_spring` a start changes the cost and not the answer: without friction, and where
     all contacts hold (`rigid_lcp.unique.held_contacts`; springs are then linear on the way as
-    well), there
-    is one limit; elsewhere with friction the start is left aside.  A law with memory, or of your
-    own, begins at the start as it is.  When not to use it: for many grains, where
+    well), there is one limit; elsewhere with friction the start is left aside.  A law with memory,
+    or of your own, begins at the start as it is.  When not to use it: for many grains, where
     `rigid_lcp.unique.elastic_limit` has the same answer at a fraction of the cost.
     """
     bodies = bodies_of(problem)

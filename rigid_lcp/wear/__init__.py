@@ -1,12 +1,6 @@
 """Wear and breakage of grains."""
 
-from rigid_lcp.wear.breakage import (
-    Breakage,
-    Broken,
-    break_scene,
-    breaks,
-    refuse_dust,
-)
+from rigid_lcp.wear.breakage import Breakage, Broken, break_scene, breaks, refuse_dust
 from rigid_lcp.wear.corners import (
     Wear,
     WearState,
@@ -16,34 +10,13 @@ from rigid_lcp.wear.corners import (
     step_wear,
     wear_on_after_break,
 )
-from rigid_lcp.wear.fragmentation import (
-    split_body,
-)
-from rigid_lcp.wear.polygons import (
-    WornPolygon,
-)
-from rigid_lcp.wear.polyhedra import (
-    WornPolyhedron,
-)
-from rigid_lcp.wear.solids import (
-    SolidWear,
-)
+from rigid_lcp.wear.fragmentation import split_body
+from rigid_lcp.wear.polygons import WornPolygon
+from rigid_lcp.wear.polyhedra import WornPolyhedron
+from rigid_lcp.wear.solids import SolidWear
 
 __all__ = [
-    "Breakage",
-    "Broken",
-    "SolidWear",
-    "Wear",
-    "WearState",
-    "WornPolygon",
-    "WornPolyhedron",
-    "break_scene",
-    "breaks",
-    "contact_stiffness_worn",
-    "refuse_dust",
-    "replace_worn",
-    "split_body",
-    "start_wear",
-    "step_wear",
-    "wear_on_after_break",
-]
+    "Breakage", "Broken", "SolidWear", "Wear", "WearState", "WornPolygon", "WornPolyhedron",
+    "break_scene", "breaks", "contact_stiffness_worn", "refuse_dust", "replace_worn", "split_body",
+    "start_wear", "step_wear", "wear_on_after_break",
+]  # fmt: skip

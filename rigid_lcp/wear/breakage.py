@@ -51,7 +51,7 @@ class Breakage:
     """Volume (2D: area) below which grains do not break [m^3, m^2]; with zero a run ends with a
     `SceneError` where grains turn to `DUST`."""
     modulus: float | None = None
-    """Weibull's modulus of the size effect, `rigid_lcp.wear.weibull_strength`; None: none."""
+    """Weibull's modulus of the size effect, `strength.weibull_strength`; None: none."""
     reference_volume: float | None = None
     """[m^3, m^2]"""
     unique: bool = False

@@ -55,7 +55,7 @@ class Wear:
     every: int = 20
     """Steps between cuts."""
     volume_scale: float | None = None
-    """V_0 of `rigid_lcp.wear.worn_stiffness` [m^3, m^2 in 2D]; None: stiffness does not change.
+    """V_0 of `abrasion.worn_stiffness` [m^3, m^2 in 2D]; None: stiffness does not change.
     """
     stiffness_left: float = 0.1
     """Share of the stiffness that stays at a worn corner [-]."""

@@ -13,7 +13,7 @@ from rigid_lcp.wear.fragmentation import polygon_moments
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LEAST_CUT = 1e-6
+LEAST_CHAMFER = 1e-6
 """Chamfers shorter than this share of a grain's size wait: detection has ties of 1e-9 of it."""
 
 
@@ -40,7 +40,7 @@ def wear_polygon(grain: WornPolygon, pending: Floats) -> tuple[WornPolygon, Floa
     None where all of it is.  Raises `ShapeError` where it is more than half of the grain.
     """
     size = float(np.linalg.norm(np.ptp(grain.sharp, axis=0)))
-    least = (LEAST_CUT * size) ** 2
+    least = (LEAST_CHAMFER * size) ** 2
     if pending.max() < least:
         return None
     as_now = grain.vertices, np.arange(len(pending)), np.zeros(len(pending))
@@ -109,7 +109,7 @@ def take_corners(vertices: Floats, areas: Floats) -> tuple[Floats, Ints]:
             left, height + cut_depth(height, left @ [-across[1], across[0]], areas[k])
         )
     edge = np.linalg.norm(np.roll(left, -1, axis=0) - left, axis=1)
-    left = left[edge > LEAST_CUT * edge.max()]
+    left = left[edge > LEAST_CHAMFER * edge.max()]
     return left, _nearest(vertices, left)
 
 

@@ -21,9 +21,9 @@ from rigid_lcp.shapes import Polyhedron, cut_points
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LEAST_CUT = 1e-5
+LEAST_CORNER_CUT = 1e-5
 """Cuts less deep than this share of a grain's reach wait: corners within 1e-6 of it are one."""
-NEAR = 2e-6
+NEAR_PLANE = 2e-6
 """Corners within this share of the reach of a plane lie in it."""
 MOST_AT_ONCE = 0.5
 """Share of a grain's volume that one cut may take."""
@@ -53,7 +53,7 @@ def place_plane(grain: WornPolyhedron, corners: Ints) -> int | None:
     A chamfer wears on at all its edges and corners; a plane that has not cut yet only where it is.
     """
     height = grain.shape.vertices @ grain.normal.T
-    on = height >= height.max(axis=0, initial=-np.inf) - NEAR * grain.shape.reach
+    on = height >= height.max(axis=0, initial=-np.inf) - NEAR_PLANE * grain.shape.reach
     mine = on[corners].all(axis=0) & ((grain.lost > 0) | (on.sum(axis=0) == len(corners)))
     return int(np.argmax(mine)) if mine.any() else None
 
@@ -108,7 +108,7 @@ def cut_shape(shape: Polyhedron, normal: Floats, volume: float) -> Polyhedron | 
             where="wear", remedy="cut more often (every), or take a smaller coefficient",
         )  # fmt: skip
     depth = cut_depth(shape, normal, volume)
-    if depth < LEAST_CUT * shape.reach:
+    if depth < LEAST_CORNER_CUT * shape.reach:
         return None
     height = shape.vertices @ normal
     try:

@@ -2,8 +2,7 @@
 
 The volume worn at a contact is shared alike by the edges and corners that make it: all of it goes
 to the corner on a face, half to each of two crossing edges.  `rigid_lcp.wear.corners` says how
-much, and
-`rigid_lcp.wear.polyhedra` how it is cut off.
+much, and `rigid_lcp.wear.polyhedra` how it is cut off.
 """
 
 from __future__ import annotations

@@ -22,16 +22,7 @@ from adapters.files.dump import Frame, read_frames, write_dump
 from adapters.files.run_folder import RunFolder
 from adapters.procedure.run import run_scene
 from adapters.scene.tables import Scene
-from tests.engine_sample import (
-    AFTER,
-    FIRST,
-    JUMP,
-    QUIET,
-    SECOND,
-    Damage,
-    Sample,
-    fake_damaged,
-)
+from tests.engine_sample import AFTER, FIRST, JUMP, QUIET, SECOND, Damage, Sample, fake_damaged
 from trackbed import command
 
 PREPARATION = "preparation"

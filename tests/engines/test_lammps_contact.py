@@ -9,13 +9,7 @@ import pytest
 
 from adapters.bed import contact_law as law
 from adapters.engines.lammps_decks import TANGENTIAL_RULES
-from tests.tangential_rules import (
-    LOOPS,
-    force_incremental,
-    force_rescaled,
-    force_secant,
-    work,
-)
+from tests.tangential_rules import LOOPS, force_incremental, force_rescaled, force_secant, work
 from validation.bench.few_grains import (
     PLACE,
     RADIUS,

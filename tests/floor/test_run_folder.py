@@ -18,7 +18,7 @@ from trackbed.run_files.folder import RunFolder, lock_folder
 from trackbed.run_files.whole import append_line, seal_file, write_whole
 
 ROOT = Path(__file__).parents[2]
-STORIES = ("adapters", "qdem_fem", "rigid_lcp")
+FOLDERS = ("adapters.files", "qdem_fem.scene", "rigid_lcp.scene")
 
 
 class Folder(RunFolder):
@@ -41,15 +41,15 @@ def tree(folder: Path) -> dict[str, bytes]:
 # --- the lock -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("story", STORIES)
-def test_second_writer_is_refused(story: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("room", FOLDERS)
+def test_second_writer_is_refused(room: str, tmp_path: Path) -> None:
     """Another process gets the pid of the first; when the first is gone the folder is free."""
     code = (
-        f"import sys; from pathlib import Path; from {story}.run_folder import RunFolder\n"
+        f"import sys; from pathlib import Path; from {room}.run_folder import RunFolder\n"
         "with RunFolder(Path(sys.argv[1])).locked():\n"
         "    print('in', flush=True); sys.stdin.read()"
     )
-    name = "lock" if story == "adapters" else ".lock"
+    name = "lock" if room == "adapters.files" else ".lock"
     first = subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path)],
         cwd=ROOT, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE,

@@ -267,15 +267,15 @@ def check_studies(house: House) -> Iterator[Breach]:
 
 
 def check_constants(house: House) -> Iterator[Breach]:
-    """Rule 6: a constant has one home: no name stands for a number in two files."""
-    homes: dict[str, list[tuple[str, int]]] = defaultdict(list)
+    """Rule 6: a constant has one home: no name stands for a number in two files of a package."""
+    homes: dict[tuple[str, str], list[tuple[str, int]]] = defaultdict(list)
     for file, tree in house.trees.items():
         for node in tree.body:
             if isinstance(node, ast.Assign) and is_number(node.value):
                 for target in node.targets:
                     if isinstance(target, ast.Name) and target.id.isupper():
-                        homes[target.id].append((file, node.lineno))
-    for name, places in homes.items():
+                        homes[file.partition("/")[0], target.id].append((file, node.lineno))
+    for (_, name), places in homes.items():
         for file, line in places[1:]:
             yield Breach(file, line, "rule 6", f"{name} has a home in {places[0][0]} already")
 
@@ -285,7 +285,7 @@ def is_number(node: ast.expr) -> bool:
     inside = [one for one in ast.walk(node) if isinstance(one, ast.Constant)]
     return (
         bool(inside)
-        and all(isinstance(one.value, int | float) for one in inside)
+        and all(type(one.value) in (int, float) for one in inside)
         and not any(isinstance(one, ast.Name | ast.Call) for one in ast.walk(node))
     )
 

@@ -12,14 +12,7 @@ from validation.studies.laws.run import (
     predict_by_polyfit,
     summarise_auto,
 )
-from validation.studies.laws.series import (
-    CUTS,
-    REACH,
-    LawCase,
-    cut_cases,
-    family_cases,
-    fast_cases,
-)
+from validation.studies.laws.series import CUTS, REACH, LawCase, cut_cases, family_cases, fast_cases
 
 pytestmark = pytest.mark.studies
 READ = np.geomspace(1, 1e5, 61)

@@ -154,7 +154,7 @@ def test_exit_codes(
     def fails(_arguments: object) -> int:
         raise error
 
-    monkeypatch.setattr("adapters.cli.cite_command", fails)
+    monkeypatch.setattr("adapters.cli.start.run_cite", fails)
     assert main(["cite"]) == code
     text = capsys.readouterr().err
     assert text.startswith("trackbed: ")

@@ -287,7 +287,7 @@ def test_blocks_of_text_do_not_matter(tmp_path: Path, frames: list[Frame], block
     write_dump(path, frames)
     whole = list(read_frames(path))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(dump_text, "BLOCK", block)
+        patch.setattr(dump_text, "TEXT_BLOCK", block)
         patch.setattr(dump_reader, "_VALUES_AT_FIRST", 1)
         assert_frames_equal(list(read_frames(path)), whole)
 
@@ -406,7 +406,7 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
     assert sum(len(frame.values) for frame in read_frames(path)) == 250_000
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 5 * values.nbytes + 2 * dump_text.BLOCK
+    assert peak < 5 * values.nbytes + 2 * dump_text.TEXT_BLOCK
 
 
 # --- faults -------------------------------------------------------------------------------------

@@ -97,7 +97,8 @@ def test_markers_of_what_may_be_missing(tmp_path: Path, option: list[str], outco
     )
     run = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", *option, str(tmp_path)],
-        capture_output=True, text=True, cwd=tmp_path, env={"PATH": "/usr/bin:/bin"},
+        capture_output=True, text=True, cwd=tmp_path,
+        env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT)},  # this checkout's engines
     )  # fmt: skip
     assert f"2 {outcome}" in run.stdout
     assert "the engine no-such-engine is not installed" in run.stdout

@@ -219,7 +219,7 @@ def test_missing_file_foreign_npz_and_later_format(
     np.savez(tmp_path / "foreign.npz", displacement=np.zeros(3))
     with pytest.raises(CheckpointError, match="no whole checkpoint"):
         victim.restore(tmp_path / "foreign.npz")
-    monkeypatch.setattr("qdem_fem.march.checkpoint.FORMAT", 99)
+    monkeypatch.setattr("qdem_fem.march.checkpoint.CHECKPOINT_FORMAT", 99)
     victim.save(tmp_path / "later.npz")
     monkeypatch.undo()
     with pytest.raises(CheckpointError, match="format 99"):

@@ -19,10 +19,10 @@ import meshio
 import numpy as np
 import pytest
 
-from qdem_fem import cli
+import qdem_fem.scene as scene_room
+from qdem_fem.cli import run as cli
 from qdem_fem.files.errors import Interrupted, SceneError, StepWarning, UsageError
 from qdem_fem.files.output import table_read
-from qdem_fem.scene import build as scene_build
 
 ROOT = Path(__file__).parents[2]
 SCENE = """\
@@ -46,7 +46,7 @@ vtu_interval = 0.004
 probes = { tip = { nearest = [0.4, 0.05, 0.05] }, middle = { nearest = [0.2, 0, 0] } }
 """
 START = (
-    "import sys, argparse; from qdem_fem import cli; p = argparse.ArgumentParser();"
+    "import sys, argparse; from qdem_fem.cli import run as cli; p = argparse.ArgumentParser();"
     "cli.register('qdem', p); a = p.parse_args(sys.argv[1:]); sys.exit(a.command(a))"
 )
 """The verb in a process of its own, whatever ``trackbed`` lists."""
@@ -342,7 +342,7 @@ def test_wrong_scene_makes_no_folder(scene: Path) -> None:
 
 def test_folder_that_can_not_be_made_is_a_sentence(scene: Path) -> None:
     """A file where the folder should be: refused with its name and what to do."""
-    with pytest.raises(UsageError, match=r"scene\.toml: can not be written \(.+\)\n  -> make room"):
+    with pytest.raises(UsageError, match=r"scene\.toml: can not be written \(.+\)\n  -> a file is"):
         command(scene, "--run-folder", scene)
 
 
@@ -368,13 +368,13 @@ def test_warnings_of_what_comes_before_the_run_are_sentences(
     scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The bed of a track is prepared there: no file, line and code of ours on the way."""
-    make = scene_build.simulation_of
+    make = scene_room.simulation_of
 
     def made(prepared: Any) -> Any:
         warnings.warn("the step is short", StepWarning, stacklevel=1)
         return make(prepared)
 
-    monkeypatch.setattr(scene_build, "simulation_of", made)
+    monkeypatch.setattr(scene_room, "simulation_of", made)
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         assert command(scene, "--no-pictures", "--set", "simulation.duration=0.004") == 0

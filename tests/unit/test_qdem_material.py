@@ -35,10 +35,8 @@ def test_constants_obey_the_relations_of_elasticity(
     assert m.viscous_second == shear
     assert m.viscous_first + 2 / 3 * shear == pytest.approx(bulk, rel=1e-15, abs=1e-15 * shear)
     assert m.is_viscous == (shear > 0 or bulk > 0)
-    assert m.is_uniform
     assert isinstance(m.wave_speed, float)
     wide = m.per_element(3)
-    assert wide.is_uniform
     for name in ("lame_first", "lame_second", "viscous_first", "viscous_second", "wave_speed"):
         np.testing.assert_array_equal(getattr(wide, name), [getattr(m, name)] * 3)
 
@@ -150,7 +148,6 @@ def test_kinds_of_numbers_that_are_taken() -> None:
     assert (m.poisson, m.density, m.shear_viscosity) == (0.25, 3.0, 1.0)
     assert all(type(value) is float for value in (m.young, m.poisson, m.density))
     np.testing.assert_array_equal(m.bulk_viscosity, [1.0, 2.0])
-    assert not m.is_uniform
 
 
 def test_arrays_are_kept_safe() -> None:

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from qdem_fem.files.errors import LibraryMissing, MeshError
 from qdem_fem.mesh.checks import FLAT
-from qdem_fem.mesh.generation import jitter, make_box_mesh, make_gmsh_box, make_ring_mesh
+from qdem_fem.mesh.generation import gmsh_model, jitter, make_box_mesh, make_ring_mesh
 from qdem_fem.mesh.tetrahedra import TetMesh, element_gradients, read_mesh
 
 pytestmark = pytest.mark.lowest
@@ -368,7 +368,7 @@ def test_files_cut_short_are_refused(suffix: str, tmp_path: Path) -> None:
 def test_no_mesh_library_is_loaded_for_arrays() -> None:
     program = (
         "import sys, qdem_fem.mesh.tetrahedra, qdem_fem.mesh.generation as g;"
-        "qdem_fem.mesh.tetrahedra.mesh_read(g.box_mesh((1, 1, 1), (1, 1, 1)));"
+        "qdem_fem.mesh.tetrahedra.read_mesh(g.make_box_mesh((1, 1, 1), (1, 1, 1)));"
         "sys.exit(any(m in sys.modules for m in ('skfem', 'meshio', 'gmsh', 'matplotlib')))"
     )
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
@@ -379,8 +379,8 @@ def test_libraries_missing_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     meshio.Mesh(NODES, {"tetra": ELEMENTS}).write(path)
     monkeypatch.setitem(sys.modules, "gmsh", None)
     monkeypatch.setitem(sys.modules, "meshio", None)
-    with pytest.raises(LibraryMissing, match="pip install gmsh"):
-        make_gmsh_box((1, 1, 1), 0.5)
+    with pytest.raises(LibraryMissing, match="pip install gmsh"), gmsh_model("box", 0.5, ""):
+        pass
     with pytest.raises(LibraryMissing, match="pip install meshio"):
         read_mesh(path)
 
@@ -404,7 +404,6 @@ def test_generation_refuses_what_makes_no_mesh() -> None:
         lambda: make_ring_mesh(1, 2, 1, (1, 2, 1)),
         lambda: jitter(BOX, -0.1, 0),
         lambda: jitter(BOX, 40.0, 0),
-        lambda: make_gmsh_box((1, 1, 1), -1),
     ):
         with pytest.raises(MeshError):
             make()

@@ -37,7 +37,7 @@ def body(shift: float = 0.0) -> Any:
     return SimpleNamespace(
         nodes=x, elements=mesh.elements, surface=find_surface_faces(mesh.elements),
         displacement=1e-4 * x[:, [1, 2, 0]], velocity=x**2, von_mises=lambda: stress,
-        _simulation=None,
+        mover=None,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ import pytest
 from matplotlib import colormaps, image
 
 import qdem_fem as q
-from qdem_fem.cli import Progress
+from qdem_fem.cli.run import Progress
 from qdem_fem.contact.search.periodic import PeriodicWidth
 from qdem_fem.files.output import write_bodies_vtu
 from qdem_fem.mesh.generation import make_box_mesh
@@ -60,7 +60,7 @@ def block(stress: float, moved: float = 0.0) -> Any:
     return SimpleNamespace(
         nodes=mesh.nodes, elements=mesh.elements, surface=find_surface_faces(mesh.elements),
         displacement=np.tile([moved, 0.0, 0.0], (len(mesh.nodes), 1)),
-        velocity=np.zeros_like(mesh.nodes), _simulation=None,
+        velocity=np.zeros_like(mesh.nodes), mover=None,
         von_mises=lambda: np.full(len(mesh.elements), stress),
     )  # fmt: skip
 

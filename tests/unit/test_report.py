@@ -26,6 +26,7 @@ from adapters.report.spheres import draw_spheres, extent_of, view
 from adapters.scene.file import load_scene
 from adapters.scene.model import left_out
 from adapters.scene.tables import Scene
+from trackbed.command import main
 from trackbed.report.page import number, per_cent, plain
 from trackbed.scenes import scene_path
 
@@ -108,6 +109,33 @@ def test_page_shows_the_numbers_of_the_json(finished: Path) -> None:
     hidden = wanted - shown(page)
     assert not hidden
     assert len(wanted) > 50
+
+
+def test_status_ends_with_what_came_out(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """``trackbed status`` says in mm and per cent what report.json says; --json keeps its keys."""
+    numbers = json.loads((finished / "report.json").read_text())
+    run, full = (
+        next(row for row in numbers["error_rows"] if row["name"] == name)
+        for name in ("this run", "full run (control)")
+    )
+    assert main(["status", str(finished)]) == 0
+    settled, beside = capsys.readouterr().out.splitlines()[-2:]
+    assert settled == (
+        f"The bed settled {1e3 * numbers['settlement']:#.3g} mm in 40 cycles, "
+        f"{numbers['cycles_computed']} of them computed."
+    )
+    assert beside.startswith(f"The full run beside it settled {1e3 * full['settlement']:#.3g} mm: ")
+    off = 100 * abs(run["settlement_error"])
+    assert ("within 0.5 %" if off < 0.5 else f"{off:.0f} % ") in beside
+    assert f" {max(run['speed_up'], 1 / run['speed_up']):.1f} times " in beside
+    assert main(["status", str(finished), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(status(finished).to_dict()))
+    empty = tmp_path / "run"
+    shutil.copytree(finished, empty, ignore=shutil.ignore_patterns("window*", "jump*", "control"))
+    assert main(["status", str(empty)]) == 0
+    assert "The bed settled" not in capsys.readouterr().out
 
 
 def test_json_is_strict_and_says_what_was_run(finished: Path) -> None:

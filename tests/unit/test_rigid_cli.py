@@ -69,8 +69,7 @@ def test_a_dry_run_writes_nothing(scene: Path, capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.parametrize(
-    ("change", "code"),
-    [("density = 2000.0", 3), ("position = [0.0, 0.02]", 6), ("step = -1", 3)],
+    ("change", "code"), [("density = 2000.0", 3), ("position = [0.0, 0.02]", 6), ("step = -1", 3)]
 )
 def test_bad_scenes_have_their_exit_codes(scene: Path, change: str, code: int) -> None:
     key = change.partition(" ")[0]

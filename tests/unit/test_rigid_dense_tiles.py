@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.sparse.dense_tiles import DEPTH, divide_rows, subtract_product
+from rigid_lcp.sparse.dense_tiles import TERMS_AT_ONCE, divide_rows, subtract_product
 
 ROUND_OFF = np.finfo(float).eps
 
@@ -15,7 +15,7 @@ ROUND_OFF = np.finfo(float).eps
 @settings(max_examples=60, deadline=None)
 @given(
     st.integers(0, 2**32 - 1), st.integers(1, 9), st.integers(1, 9),
-    st.sampled_from([0, 1, 3, 12, DEPTH, DEPTH + 1, 2 * DEPTH + 5]),
+    st.sampled_from([0, 1, 3, 12, TERMS_AT_ONCE, TERMS_AT_ONCE + 1, 2 * TERMS_AT_ONCE + 5]),
 )  # fmt: skip
 def test_a_product_is_that_of_numpy_and_nothing_else_is_touched(seed, high, wide, depth):
     """Bound: a sum of n products has an error of n round-offs of the sum of their sizes (Higham,

@@ -41,12 +41,12 @@ def test_outlines_that_are_none_are_named(vertices, words):
 )  # fmt: skip
 def test_motions_and_densities_that_are_none_are_named(given, words):
     """NaN became masses and velocities of NaN, without a word; `Scene.add` says the same."""
-    with pytest.raises(SceneError, match=f"^fragment: {words}") as told:
+    with pytest.raises(SceneError, match=f"^fragment: {words}") as raised:
         fragment(SQUARE, MIDDLE, UP, **({"density": 1.0} | given))
     with pytest.raises(SceneError, match=words) as added:
         Scene().add(Polygon(SQUARE), **({"density": 1.0} | given))
-    assert added.value.what == told.value.what
-    assert added.value.remedy.startswith(told.value.remedy)
+    assert added.value.what == raised.value.what
+    assert added.value.remedy.startswith(raised.value.remedy)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_parts_have_the_mass_of_the_whole(length):
 
 
 def test_the_remedy_of_a_density_names_both_bounds():
-    """1e300 was told to be positive."""
+    """The message for 1e300 asked for a positive number."""
     with pytest.raises(SceneError, match=r"is 1e\+300\n  -> .*above zero, 1e\+50 at most.*fixed"):
         Scene().add(Polygon(SQUARE), density=1e300)
 

@@ -54,7 +54,7 @@ def test_tables_that_are_refused(tmp_path, old, new, words):
         scene_file(tmp_path, WORN_AND_BROKEN.replace(old, new, 1))
 
 
-def test_wear_in_space_is_kept_and_told(tmp_path):
+def test_wear_in_space_is_kept_and_named(tmp_path):
     """`test_rigid_resume` goes on from its frames; the summary names what went."""
     file = scene_file(tmp_path, WORN_IN_SPACE)
     scene, run = simulation_of(file)

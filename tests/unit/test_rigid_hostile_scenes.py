@@ -82,7 +82,7 @@ def test_scenes_that_are_none_are_named(given):
         Scene(**given)
 
 
-def test_a_press_that_does_not_give_way_is_told():
+def test_a_press_that_does_not_give_way_is_named():
     """Impulses can not part what two fixed bodies squeeze, and the user has them already."""
     scene = Scene()
     scene.add(HalfSpace([0, 1]))
@@ -175,8 +175,7 @@ def test_a_step_that_is_none_is_named(step):
 
 @METHODS
 @pytest.mark.parametrize(
-    "answer",
-    [np.zeros(3), np.zeros((1, 3)), np.zeros((2, 2)), np.full((2, 3), np.nan), 0.0, "a"],
+    "answer", [np.zeros(3), np.zeros((1, 3)), np.zeros((2, 2)), np.full((2, 3), np.nan), 0.0, "a"]
 )
 def test_loads_that_are_none_are_named(method, answer):
     """NaN made positions of NaN without a word, other shapes an IndexError."""
@@ -244,7 +243,7 @@ def test_a_direction_of_any_length_is_a_line(length):
     run.advance(0.01)
 
 
-def test_bodies_that_overlap_at_the_start_are_told_by_name():
+def test_bodies_that_overlap_at_the_start_are_named():
     scene = Scene()
     scene.add(HalfSpace([0, 1]))
     scene.add(BLOCK, density=2700, position=(0, 0.01), name="sleeper")

@@ -30,7 +30,7 @@ ORDERS = ["a", [np.nan, 1.0], [0.5, 1.5], [0.0, 1.0], [0], [0, 0], [0, 2], [[0, 
     ],
 )
 def test_options_that_are_none_are_named(method, option, values):
-    """A shift of NaN was told as a ray, one of text as an error of the compiler."""
+    """A shift of NaN was reported as a ray, one of text as an error of the compiler."""
     for value in values:
         with pytest.raises(UsageError, match=rf"^{option}: .*{value}.*\n  -> give"):
             method(PROBLEM, **{option: value})

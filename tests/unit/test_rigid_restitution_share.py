@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as some
 
-from rigid_lcp.collision.restitution_scale import RESOLUTION, Share
+from rigid_lcp.collision.restitution_scale import SHARE_RESOLUTION, Share
 
-THRESHOLD = some.one_of(some.floats(0.0, 1.0), some.sampled_from((0.0, 0.5, RESOLUTION, 1.0)))
+THRESHOLD = some.one_of(some.floats(0.0, 1.0), some.sampled_from((0.0, 0.5, SHARE_RESOLUTION, 1.0)))
 
 
 @given(some.lists(THRESHOLD, min_size=1, max_size=8))
@@ -20,7 +20,7 @@ def test_each_contact_keeps_the_greatest_share_below_its_threshold(thresholds: l
     while share.next(share.now > most):
         trials += 1
     assert (share.now <= most).all()
-    assert (share.now >= np.where(most < 1.0, most - RESOLUTION, 1.0)).all()
+    assert (share.now >= np.where(most < 1.0, most - SHARE_RESOLUTION, 1.0)).all()
     assert trials <= 8
     if (most == 1.0).all():
         assert trials == 1
@@ -33,7 +33,7 @@ def test_a_contact_that_gains_at_the_share_found_keeps_nothing() -> None:
     while share.next(np.array([share.now[0] > 0.0 and share.now[1] < 0.5, share.now[1] > 0.4])):
         pass
     assert share.now[0] == 0.0
-    assert 0.4 - RESOLUTION <= share.now[1] <= 0.4
+    assert 0.4 - SHARE_RESOLUTION <= share.now[1] <= 0.4
 
 
 def test_what_is_left_out_is_tried_once_more_and_then_kept() -> None:

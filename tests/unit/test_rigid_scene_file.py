@@ -11,8 +11,8 @@ import pytest
 
 from rigid_lcp.errors import RigidError, SceneError, ShapeError
 from rigid_lcp.scene.file import force_at, loads_of, scene_build, scene_read
-from rigid_lcp.scene.pouring import make_stone_2d
 from rigid_lcp.scene.types import Load
+from rigid_lcp.shapes.irregular import draw_polygon
 
 pytestmark = pytest.mark.lowest
 
@@ -140,7 +140,7 @@ def test_a_load_on_nobody_is_refused(tmp_path: Path) -> None:
 
 
 def test_stones_in_space_have_four_corners(tmp_path: Path) -> None:
-    """Those asked for with three had four, and nobody was told."""
+    """Those asked for with three had four, and no message said so."""
     text = """
     dimensions = 3
     run.duration = 0.1
@@ -203,7 +203,7 @@ def test_a_load_acts_on_the_named_body_alone() -> None:
 
 
 def test_the_same_seed_gives_the_same_stones() -> None:
-    first, again = (make_stone_2d(np.random.default_rng(5), 0.05, 7) for _ in range(2))
+    first, again = (draw_polygon(np.random.default_rng(5), 0.05, 7) for _ in range(2))
     np.testing.assert_array_equal(first.vertices, again.vertices)
     assert len(first.vertices) == 7
     assert first.reach < 0.05

@@ -96,7 +96,7 @@ def test_what_is_no_size_is_refused(make: Callable[[], object]) -> None:
 
 
 @pytest.mark.parametrize("high", [1e-13, 1e-10])
-def test_flatter_than_faces_are_told_apart_is_flat(high: float) -> None:
+def test_flatter_than_faces_can_be_distinguished_is_flat(high: float) -> None:
     with pytest.raises(ShapeError, match="in a plane"):
         Polyhedron([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.3, 0.3, high]])
     with pytest.raises(ShapeError, match="in a plane"):  # and no warning before it

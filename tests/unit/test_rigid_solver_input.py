@@ -34,7 +34,7 @@ def test_malformed_input_is_named(w, q, mu, dim, words):
 
 
 @pytest.mark.parametrize("mu", [np.inf, np.nan])
-def test_friction_without_bound_is_told_what_can_be_given(mu):
+def test_error_for_unbounded_friction_says_what_can_be_given(mu):
     with pytest.raises(ProblemError, match=r"mu.*\n.*give 0 to 1e\+06"):
         solve_friction(np.eye(2), [-1.0, 0.0], mu, 2)
 

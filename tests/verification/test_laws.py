@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +11,8 @@ from hypothesis import strategies as st
 
 from adapters.bed.state import FloatArray
 from adapters.errors import UsageError
-from adapters.laws import Law, get_law, list_laws
+from adapters.laws import Law, get_law
 from adapters.laws.karrech2007 import Karrech2007
-from trackbed.choices import find_choice, find_choices
 
 LAWS = [get_law(name) for name in ("karrech2007", "linear", "log")]
 """Laws without shape parameters and constraints; `test_laws_shaped` has the others."""
@@ -249,48 +247,12 @@ def test_fewest_cycles_are_interpolated(law: Law) -> None:
     np.testing.assert_allclose(value, displacement, atol=1e3 * EPS * np.abs(displacement).max())
 
 
-@every_law
-@pytest.mark.parametrize(
-    ("cycle", "displacement", "message"),
-    [
-        ([1.0], [0.0], "do not determine"),
-        ([3.0, 3.0, 4.0, 5.0], np.zeros(4), "ascend"),
-        ([3.0, 5.0, 4.0, 6.0], np.zeros(4), "ascend"),
-        ([3.0, np.nan, 5.0, 6.0], np.zeros(4), "finite"),
-        ([-1.0, 1.0, 2.0, 3.0], np.zeros(4), "negative|logarithm"),
-        ([3.0, 4.0, 5.0, 6.0], np.zeros(3), "shape"),
-        ([3.0, 4.0, 5.0, 6.0], [[0.0], [0.0], [np.nan], [0.0]], r"at cycle 5, grain and axis \[0"),
-        ([3.0, 4.0, 5.0, 6.0], [0.0, np.inf, -np.inf, 0.0], "2 displacements are not finite"),
-    ],
-)
-def test_data_that_can_not_be_fitted_are_refused(
-    law: Law, cycle: list[float], displacement: FloatArray, message: str
-) -> None:
-    """A fit names what is wrong with its data, and never returns nan."""
-    with pytest.raises(UsageError, match=message):
-        law.fit(np.array(cycle), np.asarray(displacement))
-
-
 def test_laws_break_down_with_a_sentence() -> None:
     """Where ln N and N can not be told apart at all, laws with both say so."""
     cycle = 1e15 + np.arange(4.0)
     for name in ("log-linear", "karrech2007"):
         with pytest.raises(UsageError, match="use the law log"):
             get_law(name).fit(cycle, np.zeros(4))
-
-
-@pytest.mark.parametrize("name", list_laws())
-def test_every_law_keeps_the_contract(name: str) -> None:
-    """Whatever file is a law: it has its name, describes all of its parameters, leaves a bed at
-    rest where it is, and lets one that settles by ln N settle on, by a finite length."""
-    law, cycle = get_law(name), np.arange(1.0, 41.0)
-    assert law.name == name
-    assert len(law.parameter_names) == len(law.parameter_units)
-    still = law.fit(cycle, np.zeros((40, 2)))
-    assert still.shape == (len(law.parameter_names), 2)
-    assert not law.increment(still, 40.0, 80.0).any()
-    settling = law.fit(cycle, -1e-5 * np.log(cycle))
-    assert -1e-3 < float(law.increment(settling, 40.0, 80.0)) < 0
 
 
 @pytest.mark.parametrize(("wrong", "meant"), [("Log", "log"), ("log_linear", "log-linear")])
@@ -302,18 +264,6 @@ def test_unknown_law_names_the_nearest(wrong: str, meant: str) -> None:
     with pytest.raises(UsageError) as raised:
         get_law("quadratic")
     assert raised.value.what == "there is no law 'quadratic'"
-
-
-def test_a_choice_is_added_by_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file that sets the word of its folder is a choice; others are none, and no list is kept."""
-    folder = tmp_path / "more_laws"
-    folder.mkdir()
-    (folder / "__init__.py").touch()
-    (folder / "square_root.py").write_text("LAW = 'the law'\n")
-    (folder / "contract.py").write_text("class Law:\n    LAW = 1\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    assert find_choices("more_laws", "LAW") == {"square-root": "more_laws.square_root"}
-    assert find_choice("more_laws", "LAW", "square-root", "there is no law") == "the law"
 
 
 def test_hundred_thousand_grains_take_less_than_a_second() -> None:

@@ -302,7 +302,7 @@ def test_grains_that_change_places_settle_by_what_they_do(
         return replace(measured, position=position, method="rearranged"), 7
 
     monkeypatch.setattr(jump_room, "relaxed", jammed_at_40(jump_room.relaxed))
-    monkeypatch.setattr(jump_room, "rearrange", rearranged)
+    monkeypatch.setattr("adapters.relaxation.rearrange", rearranged)
     keys = ('procedure.settlement="history"', "procedure.h=[20, 15]", "procedure.total_cycles=125")
     settle(tmp_path / "found", *keys)
     assert not called

@@ -17,14 +17,7 @@ from qdem_fem.march.leapfrog import find_free_accelerations
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.scene.build import simulation_of
 from qdem_fem.scene.checks import load_scene
-from tests.qdem_boundary_waves import (
-    GROUND,
-    PRESSURE,
-    SPEED,
-    bar,
-    bar_share,
-    oblique_share,
-)
+from tests.qdem_boundary_waves import GROUND, PRESSURE, SPEED, bar, bar_share, oblique_share
 from trackbed import command
 
 Floats = NDArray[np.float64]

@@ -18,9 +18,9 @@ from qdem_fem.contact.bounds import (
 )
 from qdem_fem.contact.search.pairs import find_near_pairs, find_near_walls, renew_pairs
 from qdem_fem.contact.spheres.law import (
-    BLOCK,
     GO_ON,
     LOOK_AGAIN,
+    SPHERES_AT_ONCE,
     TOO_DEEP,
     Contact,
     Planes,
@@ -169,7 +169,7 @@ def test_kernel_is_its_twin(walls: bool) -> None:
 
 def test_threads_give_the_same_bits() -> None:
     """Several blocks of spheres, one thread or more: forces, springs and losses are equal."""
-    count = 2 * BLOCK + 17
+    count = 2 * SPHERES_AT_ONCE + 17
     one, more = cloud(3, count, True), cloud(3, count, True)
     random = np.random.default_rng(4)
     at = np.zeros((count, 3))

@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from tests.qdem_slopes import tetrahedron
-from validation.bench.qdem.contact import (
-    CASES,
-    MODELS,
-    account,
-    momenta,
-    near_critical,
-    spinning,
-)
+from validation.bench.qdem.contact import CASES, MODELS, account, momenta, near_critical, spinning
 
 CLOSES = 1e-3
 """Share of the greatest energy that the account may lack."""

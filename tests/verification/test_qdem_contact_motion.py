@@ -19,7 +19,7 @@ import qdem_fem as q
 from qdem_fem.contact import window as contact_window
 from qdem_fem.contact.search.pairs import SEARCH, choose_skin
 from qdem_fem.contact.search.periodic import extents
-from qdem_fem.contact.spheres.options import SKIN
+from qdem_fem.contact.spheres.options import SKIN_OF_SPHERES
 from qdem_fem.files.errors import (
     CheckpointError,
     ConditionError,
@@ -262,7 +262,7 @@ def test_what_meets_or_parts_in_the_step_that_outlives_the_list_is_not_missed() 
 def test_the_skin_follows_the_motion_and_changes_no_bit() -> None:
     """Two collide while both fly at 20 m/s: lists come to last longer, forces are the same."""
     states, runs = [], []
-    for skin in (None, SKIN * RADIUS):
+    for skin in (None, SKIN_OF_SPHERES * RADIUS):
         run = two(gap=1e-6, shift=(0.004, 0.002), step=1.2e-6, contact={"skin": skin})
         for body, own in zip(run.bodies, ((20.0, 0, 0), (20.3, -0.3, -0.2)), strict=True):
             body.velocity = np.tile(np.array(own), (len(body.nodes), 1))

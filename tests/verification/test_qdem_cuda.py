@@ -13,7 +13,6 @@ from qdem_fem.element import stress
 from qdem_fem.files.errors import ConditionError, LibraryMissing
 from qdem_fem.kernel.cpu import step as kernel
 from qdem_fem.kernel.cpu.arrays import Constraints, Loads, Probes
-from qdem_fem.kernel.cuda.assembly import number_samples, sort_node_actions
 from validation.bench.qdem_gpu.contact import MARCHES
 from validation.bench.qdem_gpu.search import CLOUDS
 from validation.cases.qdem_gpu import STRAINS, twins_in_simulator
@@ -110,6 +109,8 @@ def literals(source: str) -> list[float]:
 
 def test_actions_of_a_node_keep_the_order_of_the_step() -> None:
     """Of one node: loads, rollers as given, held components, probes; the others have none."""
+    from qdem_fem.kernel.cuda.assembly import sort_node_actions
+
     loads = Loads(np.array([0]), np.array([13]), np.array([2]), np.array([5.0]))
     held = Constraints(
         node_at=np.array([6, 14]), series=np.array([0, 1]), weight=np.array([0.0, 1.0]),
@@ -129,6 +130,8 @@ def test_actions_of_a_node_keep_the_order_of_the_step() -> None:
 
 @pytest.mark.parametrize(("stride", "first", "rows"), [(1, 1, 9), (3, 2, 9), (4, 9, 1), (2, 1, 2)])
 def test_samples_are_those_of_the_cpu_kernel(stride: int, first: int, rows: int) -> None:
+    from qdem_fem.kernel.cuda.assembly import number_samples
+
     probes = Probes(np.array([4]), np.zeros((rows, 1, 3)), stride, first)
     numbers = number_samples(8, probes)
     for done in range(1, 9):

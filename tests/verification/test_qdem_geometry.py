@@ -14,7 +14,13 @@ from hypothesis import strategies as st
 from qdem_fem.files.errors import MeshError
 from qdem_fem.kernel.cpu.ordering import order_for_locality
 from qdem_fem.mesh import surface
-from qdem_fem.mesh.generation import jitter, make_box_mesh, make_gmsh_box, make_ring_mesh
+from qdem_fem.mesh.generation import (
+    gmsh_model,
+    jitter,
+    make_box_mesh,
+    make_gmsh_tetrahedra,
+    make_ring_mesh,
+)
 from qdem_fem.mesh.surface import (
     face_area_vectors,
     find_faces_within,
@@ -107,7 +113,7 @@ def test_surface_does_not_depend_on_how_faces_are_compared(
     np.testing.assert_array_equal(packed, find_surface_faces(elements[::-1]))
     far = find_surface_faces(elements + (1 << 40))
     np.testing.assert_array_equal(packed, far - (1 << 40))
-    monkeypatch.setattr(surface, "_BLOCK", 7)
+    monkeypatch.setattr(surface, "_FACED_AT_ONCE", 7)
     np.testing.assert_array_equal(packed, find_surface_faces(elements))
 
 
@@ -348,26 +354,6 @@ def test_order_of_bodies_in_pieces_and_of_none() -> None:
 
 
 @pytest.mark.peer("gmsh")
-def test_gmsh_box_with_holes() -> None:
-    """Holes become prisms inside their circles: volume between the two; one handle each."""
-    size, radius = (1.0, 0.5, 0.25), 0.1
-    mesh = make_gmsh_box(size, 0.1, [("y", (0.3, 0.12), radius), ("z", (0.75, 0.25), radius)])
-    _, volumes = element_gradients(mesh.nodes, mesh.elements)
-    circle = np.pi * radius**2 * (0.5 + 0.25)
-    removed = np.prod(size) - volumes.sum()
-    assert 0.6 * circle < removed < circle
-    faces = find_surface_faces(mesh.elements)
-    assert divergence_volume(mesh.nodes, faces) == pytest.approx(volumes.sum(), rel=1e-12)
-    edges = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)), axis=0)
-    assert len(np.unique(faces)) - len(edges) + len(faces) == 2 - 2 * 2
-    for name, axes, place in (("hole-1", [0, 2], (0.3, 0.12)), ("hole-2", [0, 1], (0.75, 0.25))):
-        x = mesh.nodes[mesh.node_sets[name]][:, axes] - place
-        assert len(x) > 12
-        np.testing.assert_allclose(np.hypot(*x.T), radius, rtol=1e-8)
-    assert np.all(mesh.nodes[mesh.node_sets["z-max"], 2] > 0.25 - 1e-9)
-
-
-@pytest.mark.peer("gmsh")
 def test_gmsh_of_the_user_is_left_as_it_was() -> None:
     import gmsh
 
@@ -378,11 +364,15 @@ def test_gmsh_of_the_user_is_left_as_it_was() -> None:
         for name in ("mine", "another"):
             gmsh.model.add(name)
         gmsh.model.setCurrent("mine")
-        assert len(make_gmsh_box((1, 1, 1), 0.5).elements) > 20
+        with gmsh_model("box", 0.5, "remedy") as ours:
+            ours.model.occ.addBox(0, 0, 0, 1, 1, 1)
+            ours.model.occ.synchronize()
+            ours.model.mesh.generate(3)
+            assert len(make_gmsh_tetrahedra(ours, "box").elements) > 20
         assert gmsh.model.getCurrent() == "mine"
         assert gmsh.option.getNumber("Mesh.MeshSizeMax") == 7
-        with pytest.raises(MeshError):
-            make_gmsh_box((1, 1, 1), 0.5, [("x", (0.5, 0.5), 3.0)])  # nothing of the box remains
+        with pytest.raises(MeshError), gmsh_model("box", 0.5, "remedy") as ours:
+            ours.open("no such file")
         assert gmsh.model.getCurrent() == "mine"
     finally:
         gmsh.finalize()

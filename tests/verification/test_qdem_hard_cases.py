@@ -99,7 +99,7 @@ def test_the_bound_on_the_energy_is_broken_above_the_critical_step(
     """At 1.001 of the judge's step energy grows by 1.09 each step: the check fails, not the run."""
     problem = hard.near_critical_problem()
     share = 1.001 / hard.run_share(problem)
-    monkeypatch.setattr("qdem_fem.march.steps.GROWTH", 1e30)
+    monkeypatch.setattr("qdem_fem.march.steps.UNSTABLE_GROWTH", 1e30)
     energy = hard.energies(problem, share, 600, 100)
     assert energy.max() / energy[0] > 1 / (1 - 0.99**2)
 

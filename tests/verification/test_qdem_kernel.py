@@ -17,7 +17,7 @@ from numba.core import types
 
 import qdem_fem as q
 from qdem_fem.bodies.assembly import NO_LOADS
-from qdem_fem.element import measure_finger, measure_small, stress
+from qdem_fem.element import finger, small, stress
 from qdem_fem.element.kinematics import displacement_gradient, volume_change
 from qdem_fem.element.strain_measures import MEASURES, Strain
 from qdem_fem.kernel.cpu import lanes
@@ -194,14 +194,14 @@ def test_viscous_stress_of_arrays(law: Strain) -> None:
     rate, G = generator.uniform(-9, 9, (2, 100, 3, 3))
     h, d, g = (tuple(A.reshape(-1, 9).T) for A in (H, rate, G))
     if law == "small":
-        found = measure_small.viscous_numbers(h, d, -0.4, 0.6, 0.5)
+        found = small.viscous_numbers(h, d, -0.4, 0.6, 0.5)
         expected = reference_forces.stress_viscous_small(rate, -0.4, 0.6)
     else:
         found = stress.viscous_current(h, d, -0.4, 0.6, 0.5)
         expected = reference_forces.stress_viscous(H, rate, -0.4, 0.6)
         # the velocity edges that go with the rate: Hdot = sum w_a (x) g_a
         w = tuple((rate @ np.linalg.inv(G)).transpose(0, 2, 1).reshape(-1, 9).T)
-        both, _, power = measure_finger.pulls_viscous(h, w, g, 0.7, 1.3, -0.4, 0.6, 0.5)
+        both, _, power = finger.pulls_viscous(h, w, g, 0.7, 1.3, -0.4, 0.6, 0.5)
         total = reference_forces.stress_finger(H, 0.7, 1.3) + expected
         pulls = (total @ G.transpose(0, 2, 1)).transpose(0, 2, 1)
         scale = np.linalg.cond(G)[:, None, None] * abs(pulls).max()
@@ -331,7 +331,7 @@ def test_a_scalar_kernel_would_be_seen() -> None:
     """The same element functions in a loop over plain numbers do not pass the test above."""
     gradient, stress_of = (
         numba.njit(**kernel.MATHEMATICS)(function)
-        for function in (stress.element_gradient, measure_finger.stress_numbers)
+        for function in (stress.element_gradient, finger.stress_numbers)
     )
 
     @numba.njit(**kernel.MATHEMATICS)
@@ -356,7 +356,7 @@ def cache_key() -> Any:
     return dispatcher._cache._index_key((types.int64,), dispatcher.targetctx.codegen())
 
 
-@pytest.mark.parametrize("name", ["stress.py", "lanes.py", "measure_finger.py"])
+@pytest.mark.parametrize("name", ["stress.py", "lanes.py", "finger.py"])
 def test_a_changed_source_has_another_cache_key(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The stress lies in another file than the cached function: its text is in the key."""
     assert cache_key() == cache_key()
@@ -369,11 +369,11 @@ STARTING = """
 import time
 begun = time.process_time()
 import qdem_fem as q
-from qdem_fem.march.leapfrog import velocities_behind
+from qdem_fem.march.leapfrog import take_velocities_behind
 imported = time.process_time()
 nodes = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
 run = q.Simulation([q.Body((nodes, [[0, 1, 2, 3]]), q.Material(1e6, 0.2, 1e3))], threads=1, step=1.)
-velocities_behind(run)
+take_velocities_behind(run)
 print(imported - begun, time.process_time() - imported)
 """
 
@@ -407,9 +407,10 @@ ALONE = """
 import time
 import numpy as np
 import qdem_fem as q
-from qdem_fem.mesh.generation import box_mesh
+from qdem_fem.mesh.generation import make_box_mesh
 
-body = q.Body(box_mesh((2.4, 0.25, 0.22), (72, 12, 11), "five"), q.Material(45e9, 0.167, 2350.0))
+mesh = make_box_mesh((2.4, 0.25, 0.22), (72, 12, 11), "five")
+body = q.Body(mesh, q.Material(45e9, 0.167, 2350.0))
 run = q.Simulation([body], threads=1, gravity=lambda t: (0, 0, np.sin(1e3 * t)))
 run.fix(body, body.nodes[:, 0] == 0)
 run.advance(run.step)

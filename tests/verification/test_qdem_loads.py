@@ -1,39 +1,52 @@
-"""Sleeper and loads: modes against beams, a train against its closed-form spectrum, bad records."""
+"""Sleeper and loads: a train against its closed-form spectrum."""
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import pi
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from qdem_fem.track.commands import SEAT_AREA
 from scipy.integrate import trapezoid
-from scipy.linalg import eigh
 
-from qdem_fem import Body, Simulation
+from qdem_fem import Body, Series, Simulation
 from qdem_fem.element.material import Material
-from qdem_fem.files.errors import ConditionError, MeshError, NotConverged
-from qdem_fem.grains.hulls import GrainRecipe, draw_grain
-from qdem_fem.grains.meshing import make_grain_tetrahedra
-from qdem_fem.mesh.tetrahedra import TetMesh, element_gradients, lumped_mass
+from qdem_fem.files.errors import ConditionError, MeshError
+from qdem_fem.files.output import table_read
+from qdem_fem.mesh.tetrahedra import element_gradients, lumped_mass
 from qdem_fem.report.spectra import fourier_spectrum
 from qdem_fem.track.loads.rail import Track, seat_share
-from qdem_fem.track.loads.record import LoadRecord, load_record_read, load_record_write
+from qdem_fem.track.loads.record import SEATS, LoadRecord
 from qdem_fem.track.loads.train import (
     Train,
     WheelFlat,
     find_seat_forces,
     make_train_record,
-    train_spectrum,
 )
 from qdem_fem.track.sleeper_mesh import SleeperShape, sleeper_mesh
-from qdem_fem.track.sleeper_modes import find_free_modes
 from trackbed.command import main
 
 CONCRETE = Material(young=45e9, poisson=0.167, density=2350)
 TRACK = Track()
+
+
+def train_spectrum(frequency: np.ndarray, train: Train, track: Track) -> np.ndarray:
+    """Fourier spectrum of the force on seat 1 without flats [N s], complex (k,).
+
+        X(f) = P a/v sinc(f a/v) 4/(4 + (2 pi f L/v)^4) sum over axles of e^(-2 pi i f x_j/v)
+
+    with sinc(x) = sin(pi x)/(pi x): the sum has its peaks at multiples of speed over car length,
+    weighed by 4 cos(pi f b/v) cos(pi f c/v) of bogie distance b and axle distance c (Milne, Le Pen,
+    Thompson, Powrie, J. Sound Vib. 397, 2017, 123-140).
+    """
+    per_metre = frequency / train.speed
+    axles = np.exp(-2j * pi * np.outer(per_metre, train.axles)).sum(axis=1)
+    load = train.first_share * train.axle_load * track.spacing / train.speed
+    beam = 4 / (4 + (2 * pi * per_metre * track.elastic_length) ** 4)
+    return np.asarray(load * np.sinc(per_metre * track.spacing) * beam * axles)
 
 
 # --- sleeper ------------------------------------------------------------------------------------
@@ -65,85 +78,6 @@ def test_sets_lie_where_they_say() -> None:
     x = [mesh.nodes[mesh.node_sets[name]][0, 0] for name in ("S1", "S2", "S3")]
     np.testing.assert_allclose(x, [0, 0.499, 1.0])
     assert (mesh.nodes[mesh.node_sets["bottom"], 2] == 0).all()
-
-
-def test_box_modes_are_those_of_a_beam() -> None:
-    """A slender free box: Euler-Bernoulli bending (kL)^2 = 22.373, 61.673, less shear and rotary
-    inertia, which take (1 + E/(k G)) (r/L)^2 (kL)^2/2 or so: 0.4 % and 1.1 % at r/L = 1/139, and
-    a wave along it, c/2 L, less the inertia of its sides: (nu pi r/L)^2, nothing here."""
-    shape = SleeperShape(width=0.05, height=0.05, top_width=0.05, centre_height=0.05,
-                         end_height=0.05)  # fmt: skip
-    modes = find_free_modes(sleeper_mesh(shape, 30, 1, 1), CONCRETE, 12, quadratic=True)
-    wave = sqrt(45e9 / 2350)
-    vertical = modes.frequency[[kind == "vertical" for kind in modes.kind]]
-    beam = np.array([22.373, 61.673]) / (2 * pi * 4) * wave * 0.05 / sqrt(12)
-    assert (vertical[:2] < 1.005 * beam).all()  # elements are stiffer by their O(h^4)
-    np.testing.assert_allclose(vertical[:2], beam, rtol=0.012)
-    lateral = modes.frequency[[kind == "lateral" for kind in modes.kind]]
-    np.testing.assert_allclose(lateral[:2], vertical[:2], rtol=5e-3)
-
-
-def test_twist_and_stretch_of_the_paper_s_block() -> None:
-    """2 x 0.24 x 0.174 m: torsion sqrt(G J/(rho I_p))/2 L with Saint-Venant's J of a rectangle,
-    axial c/2 L less (nu pi r/L)^2/2: 0.03 %.  Three cells over the width are 0.6 % too stiff in
-    torsion, and converge."""
-    b, h = 0.24, 0.174
-    modes = find_free_modes(sleeper_mesh(SleeperShape(top_width=b), 24, 3, 3), CONCRETE, 9, True)
-    odd = np.arange(1, 40, 2)
-    torsion = b * h**3 / 3 * (1 - 192 * h / (pi**5 * b) * (np.tanh(odd * pi * b / 2 / h)
-                                                           / odd**5).sum())  # fmt: skip
-    polar = b * h * (b**2 + h**2) / 12
-    shear = 45e9 / 2 / 1.167
-    expected = {
-        "torsion": sqrt(shear * torsion / 2350 / polar) / 4,
-        "axial": sqrt(45e9 / 2350) / 4,
-    }
-    for kind, frequency in expected.items():
-        assert modes.frequency[modes.kind.index(kind)] == pytest.approx(frequency, rel=0.008)
-
-
-def test_modes_of_a_grain_scale_with_its_size() -> None:
-    """A body that is no beam, with slices of a single node: f goes with 1/size, and E with f^2."""
-    form = draw_grain(np.random.default_rng(0), GrainRecipe())
-    mesh = make_grain_tetrahedra(form.nodes, form.corner_faces)
-    small = TetMesh(0.01 * mesh.nodes, mesh.elements)
-    soft = Material(young=45e7, poisson=0.167, density=2350)
-    frequency = find_free_modes(mesh, CONCRETE, 4).frequency
-    np.testing.assert_allclose(
-        find_free_modes(small, CONCRETE, 4).frequency, 100 * frequency, rtol=1e-9
-    )
-    np.testing.assert_allclose(find_free_modes(mesh, soft, 4).frequency, frequency / 10, rtol=1e-9)
-
-
-def test_modes_are_found_again_to_the_bit_and_are_those_of_the_whole_matrix() -> None:
-    """No draw decides them: from one start in forty the six rigid motions were found as five.
-
-    The stiffness matrix is the forces of unit displacements, by QDEM's own elements.
-    """
-    form = draw_grain(np.random.default_rng(0), GrainRecipe())
-    mesh = make_grain_tetrahedra(form.nodes, form.corner_faces)
-    found = [find_free_modes(mesh, CONCRETE, 6) for _ in range(2)]
-    assert np.array_equal(found[0].shape, found[1].shape)
-    gradient, volume = element_gradients(mesh.nodes, mesh.elements)
-    full = np.concatenate([-gradient.sum(axis=1, keepdims=True), gradient], axis=1)
-    stretch = np.einsum("eai,ebj->eaibj", full, full) * volume[:, None, None, None, None]
-    crossed = stretch.transpose(0, 1, 4, 3, 2)
-    along = np.einsum("eakbk->eab", stretch)[:, :, None, :, None] * np.eye(3)[:, None]
-    blocks = CONCRETE.lame_first * stretch + CONCRETE.lame_second * (crossed + along)
-    at = (3 * mesh.elements[:, :, None] + np.arange(3)).reshape(-1, 12)
-    matrix = np.zeros((3 * len(mesh.nodes),) * 2)
-    np.add.at(matrix, (at[:, :, None], at[:, None]), blocks.reshape(-1, 12, 12))
-    mass = lumped_mass(mesh.elements, volume, CONCRETE.density, len(mesh.nodes))
-    value = eigh(matrix, np.diag(np.repeat(mass, 3)), eigvals_only=True)[6:12]
-    np.testing.assert_allclose(found[0].frequency, np.sqrt(value) / 2 / pi, rtol=1e-9)
-
-
-def test_modes_of_two_blocks_are_refused() -> None:
-    one = sleeper_mesh(SleeperShape(), 6, 1, 1)
-    nodes = np.vstack([one.nodes, one.nodes + np.array([0.0, 1.0, 0.0])])
-    elements = np.vstack([one.elements, one.elements + len(one.nodes)])
-    with pytest.raises(NotConverged, match="more than six motions"):
-        find_free_modes(TetMesh(nodes, elements), CONCRETE, 8)
 
 
 @pytest.mark.parametrize(
@@ -269,26 +203,6 @@ def test_a_train_that_can_not_be_is_refused(made: object, word: str) -> None:
 # --- records ------------------------------------------------------------------------------------
 
 
-def test_record_is_linear_between_samples(tmp_path: Path) -> None:
-    """Read back to nine digits; between samples exactly the chord, outside the end values."""
-    made = make_train_record(Train(cars=1), TRACK, 0.0221)
-    path = tmp_path / "train.csv"
-    load_record_write(path, made)
-    record = load_record_read(path)
-    np.testing.assert_allclose(record.pressure, made.pressure, rtol=1e-8, atol=1e-3)
-    series = record.seat(2)
-    for k in (0, 1000, len(record.time) - 2):
-        between = series(0.75 * record.time[k] + 0.25 * record.time[k + 1])
-        chord = 0.75 * record.pressure[k, 1] + 0.25 * record.pressure[k + 1, 1]
-        assert between == pytest.approx(chord, rel=1e-9)
-    assert series(-1.0) == record.pressure[0, 1]
-    force = record.force(1, area=0.0221, down=[0, 0, -1])
-    middle = float(record.time[2000])
-    np.testing.assert_allclose(
-        force(middle), [0, 0, -record.pressure[2000, 0] * 0.0221], rtol=1e-12
-    )
-
-
 def test_a_free_sleeper_takes_up_the_impulse_of_the_record() -> None:
     """Both seats loaded by a record in steps: momentum is the integral of the forces, its moment
     about the centre that of their difference."""
@@ -297,7 +211,8 @@ def test_a_free_sleeper_takes_up_the_impulse_of_the_record() -> None:
     simulation = Simulation([body])
     for seat in (1, 2):
         nodes = body.mesh.node_sets[f"seat-{seat}"]
-        simulation.load(body, nodes, record.force(seat, 0.0221, [0, 0, -1]))
+        push = 0.0221 * record.pressure[:, seat - 1, None] * np.array([0.0, 0.0, -1.0])
+        simulation.load(body, nodes, Series(record.time, push))
     duration = 3e-4
     simulation.advance(duration)
     time = simulation.time
@@ -314,49 +229,16 @@ def test_a_free_sleeper_takes_up_the_impulse_of_the_record() -> None:
     assert turning == pytest.approx(expected, rel=2 * lag)
 
 
-@pytest.mark.parametrize(
-    ("content", "word"),
-    [
-        ("time,rp1\n0,1\n0.0001,2\n", "no column rp2"),
-        ("", "the file is empty"),
-        ("time,rp1,rp2\n", "no rows"),
-        ("time,rp1,rp2\n0,1,2\n", "two or more times"),
-        ("time,rp1,rp2\n0,1,2\n0.0001,x,3\n", "'x' is not a number"),
-        ("time,rp1,rp2\n0,1,2\n0.0001,nan,3\n", "not a finite number"),
-        ("time,rp1,rp2\n0,1,2\n0,1,2\n", "does not increase"),
-        ("time,rp1,rp2\n0,1,2\n0.0001,1,2\n0.0003,1,2\n", "sampled evenly"),
-        ("time,rp1,rp2\n0,1,2\n0.1,1,2\n0.2,1,2\n", "sampled at 10 Hz, not 10000 Hz"),
-    ],
-)
-def test_bad_records_are_refused_with_a_sentence(tmp_path: Path, content: str, word: str) -> None:
-    path = tmp_path / "record.csv"
-    path.write_text(content)
-    with pytest.raises(ConditionError, match=word) as caught:
-        load_record_read(path)
-    assert "record.csv" in str(caught.value)
-    assert "->" in str(caught.value)
-
-
-def test_no_file_other_rates_and_wrong_seats(tmp_path: Path) -> None:
-    with pytest.raises(ConditionError, match="can not read the series"):
-        load_record_read(tmp_path / "none.csv")
-    path = tmp_path / "slow.csv"
-    path.write_text("time,rp1,rp2\n0,1,2\n0.1,1,2\n0.2,1,2\n")
-    record = load_record_read(path, rate=None)
-    assert record.rate == pytest.approx(10)
-    with pytest.raises(ConditionError, match="rail seat 3"):
-        record.seat(3)
-    with pytest.raises(ConditionError, match="area of 0"):
-        record.force(1, 0.0, [0, 0, -1])
-    with pytest.raises(ConditionError, match="shape"):
-        LoadRecord(np.arange(3.0), np.zeros((3, 3)))
-
-
-def test_command_writes_a_record(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_writes_a_record_to_nine_digits(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "train.csv"
     assert main(["train", "--cars", "1", "--out", str(path)]) == 0
     assert "10000 Hz" in capsys.readouterr().out
-    assert load_record_read(path).pressure.max() > 1e5
+    made = make_train_record(Train(cars=1), TRACK, SEAT_AREA)
+    found = table_read(path)
+    for seat in (0, 1):
+        np.testing.assert_allclose(found[SEATS[seat]], made.pressure[:, seat], rtol=1e-8, atol=1e-3)
 
 
 def test_command_gives_wheels_flats(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -366,7 +248,7 @@ def test_command_gives_wheels_flats(tmp_path: Path, capsys: pytest.CaptureFixtur
     flat = ["--flat", "2", "60e3", "2e-3"]
     for path, more in zip(paths, ([], flat), strict=True):
         assert main(["train", "--cars", "1", *more, "--out", str(path)]) == 0
-    even, struck = (load_record_read(path).pressure for path in paths)
+    even, struck = (table_read(path)["rp1"] for path in paths)
     centre = 60e3 * seat_share(np.zeros(1), TRACK)[0] / (0.13 * 0.17)
     assert (struck - even).max() == pytest.approx(centre, rel=0.01)
     for axle in ("4", "0.5", "-1", "nan"):

@@ -13,7 +13,7 @@ import pytest
 from matplotlib import image
 
 import qdem_fem as q
-from qdem_fem.cli import Progress
+from qdem_fem.cli.run import Progress
 from qdem_fem.element.material import Material
 from qdem_fem.files.errors import CheckpointError, EnergyLost, NotConverged, SceneError
 from qdem_fem.grains.grading import Grading

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from qdem_fem.cli.track import SEAT_AREA
 from qdem_fem.files.errors import SceneError
+from qdem_fem.files.output import table_read
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.track import enter as track_scene
 from qdem_fem.track import stand as track_stand
 from qdem_fem.track.bogie import RISE, make_bogie_series
-from qdem_fem.track.commands import SEAT_AREA
 from qdem_fem.track.enter import TrackPrepared
 from qdem_fem.track.loads.rail import QUIET, Track, seat_share
-from qdem_fem.track.loads.record import load_record_read
 from qdem_fem.track.loads.train import Train
 from trackbed.command import main
 from validation.bench.track_trials import SCENE
@@ -47,7 +47,7 @@ def test_flats_of_a_scene_are_those_of_the_command(tmp_path: Path) -> None:
     pressures = []
     for name, more in (("round.csv", []), ("flat.csv", asked)):
         assert main([*words, str(tmp_path / name), *more]) == 0
-        pressures.append(load_record_read(tmp_path / name).pressure[:, 0])
+        pressures.append(table_read(tmp_path / name)["rp1"])
     table = ", ".join(f"{{ axle = {a}, peak = {p}, duration = {d} }}" for a, p, d in flats)
     time, round_load = load_of(tmp_path, f"lead = {LEAD}")
     _, flat_load = load_of(tmp_path, f"lead = {LEAD}, flat = [{table}]")

@@ -13,8 +13,8 @@ from qdem_fem.files.output import Table
 from qdem_fem.report.spectra import fourier_spectrum, frequency_response, parzen_smoothed
 from qdem_fem.report.track import (
     BANDWIDTH,
+    FEWEST_SAMPLES,
     GRAINS,
-    LEAST,
     SENSORS,
     acceleration_spectrum,
     average_between,
@@ -160,7 +160,7 @@ def rows_written(folder: Path, count: int) -> None:
     table.append(np.column_stack([time, *(len(names) * [1e-3 * time**2])]))
 
 
-@pytest.mark.parametrize("count", [2, LEAST - 1, LEAST])
+@pytest.mark.parametrize("count", [2, FEWEST_SAMPLES - 1, FEWEST_SAMPLES])
 def test_a_run_too_short_for_spectra_ends_with_the_rest(tmp_path: Path, count: int) -> None:
     """Settlement is told, spectra from four accelerations on; a window that smooths nothing is
     not claimed."""
@@ -168,9 +168,11 @@ def test_a_run_too_short_for_spectra_ends_with_the_rest(tmp_path: Path, count: i
     load = load_of(np.linspace(0, -1, count))
     facts = list_track_facts(tmp_path, load)
     assert facts["B2"]["settlement"] == pytest.approx(-1e-3 * ((count - 1) * STEP) ** 2)
-    assert ("peaks" in facts["S1"]) == ("peaks" in facts["B2"]) == (count >= LEAST)
-    assert ("peaks" in facts["S1"]) == ("mobility_peaks" in facts["B1"]) == (count >= LEAST)
+    assert ("peaks" in facts["S1"]) == ("peaks" in facts["B2"]) == (count >= FEWEST_SAMPLES)
+    assert (
+        ("peaks" in facts["S1"]) == ("mobility_peaks" in facts["B1"]) == (count >= FEWEST_SAMPLES)
+    )
     told = dict(draw_track_pictures(tmp_path, load))
-    assert len(told) == (6 if count >= LEAST else 2)
-    assert any("not smoothed" in caption for caption in told.values()) == (count >= LEAST)
+    assert len(told) == (6 if count >= FEWEST_SAMPLES else 2)
+    assert any("not smoothed" in caption for caption in told.values()) == (count >= FEWEST_SAMPLES)
     assert smoothing(np.linspace(0.0, 0.05, 9)) == "Parzen window of 20 Hz"

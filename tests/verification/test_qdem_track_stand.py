@@ -135,7 +135,7 @@ def test_skin_and_friction_of_a_scene_are_the_runs(tmp_path: Path) -> None:
     assert run.contacts is not None
     assert run.contacts.skin == 1.5e-3
     assert prepared.stand["creep"] == 0.0
-    assert "let go for 0.5 ms with friction 0.577" in prepared.stand["told"]
+    assert "let go for 0.5 ms with friction 0.577" in prepared.stand["words"]
 
 
 def test_a_bed_of_grains_in_the_air_takes_nothing(tmp_path: Path) -> None:

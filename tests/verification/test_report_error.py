@@ -20,16 +20,17 @@ from adapters.procedure.history import (
     History,
     cycles_computed,
     failed_jumps,
+    find_last_common_cycle,
     history_of,
     list_jumped_spans,
     read_history,
     sum_cost,
 )
+from adapters.procedure.status import compare_with_full
 from adapters.report.error import (
     Beds,
     comparison,
     curve_fitted,
-    find_last_common_cycle,
     gained_time,
     measure_jump,
     relative_error,
@@ -305,6 +306,19 @@ def test_common_cycle() -> None:
     assert find_last_common_cycle(history_of(PROCEDURE[:4]), full_run(75)) == 70
     assert find_last_common_cycle(history_of(PROCEDURE[:4]), full_run(50)) == 50
     assert find_last_common_cycle(own, history_of([])) == 0
+
+
+def test_a_sentence_compares_run_and_control() -> None:
+    """13 % less than the closed form, for 323 s instead of 400, as computed by hand."""
+    full = full_run()
+    short = history_of([*PROCEDURE[:4], window(70, 100, settlement=0.87 * settled(100))])
+    for own, of_full, cycle, said in (
+        (short, full, 100, "0.138 mm: the jumps are 13 % short, at 1.2 times less computing."),
+        (short, full, 50, "0.118 mm in 50 cycles, this one 0.118 mm: the jumps are within 0.5 %, "
+         "at 1.0 times less computing."),
+        (full, short, 100, "0.120 mm: the jumps are 15 % over, at 1.2 times more computing."),
+    ):  # fmt: skip
+        assert compare_with_full(own, of_full, cycle) == f"The full run beside it settled {said}"
 
 
 def folder_of(path: Path, outcomes: tuple[Outcome, ...]) -> RunFolder:

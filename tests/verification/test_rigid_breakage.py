@@ -60,7 +60,7 @@ def test_a_pressed_diamond_breaks_at_its_strength(share):
 
 
 def test_grains_that_turn_to_dust_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Far above the strength every part breaks again: told, unless a smallest volume ends it."""
+    """Far above the strength every part breaks again: an error unless there is a least volume."""
     monkeypatch.setattr("rigid_lcp.wear.breakage.DUST", 4)
     with pytest.raises(
         SceneError, match=r"2 grains have broken into .* parts, which go on to break"
@@ -127,7 +127,7 @@ def test_a_wall_of_boxes_breaks_and_stands():
 
 
 def test_broken_grains_wear_on():
-    """Wear before, through and after a break: the parts begin anew, the sum goes on."""
+    """Wear before, through and after a break: the parts begin with none, the sum goes on."""
     run = press(5e3, tension_of(5e3) / 2, wear=Wear(1e-9, every=1))
     run.advance(3e-3)
     assert run.broken

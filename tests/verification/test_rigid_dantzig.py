@@ -82,7 +82,7 @@ def test_a_singular_border_changes_nothing() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_inverse_follows_the_lists(seed: int) -> None:
-    """After random moves between all lists the inverse is that of eq. 28, built anew in NumPy."""
+    """After random moves between all lists the inverse is that of eq. 28, built in NumPy."""
     problem = network(20, 0.4, seed)
     state = start_pivots(problem, 1e-2, 0.0, None, False)
     g = np.random.default_rng(seed)

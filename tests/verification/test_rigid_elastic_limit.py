@@ -14,12 +14,7 @@ from hypothesis import strategies as st
 from rigid_lcp.friction.problem.definition import BodySpace, friction_problem
 from rigid_lcp.unique.elastic_limit import elastic_limit, relax_from
 from tests.rigid_elastic import find_least_forces
-from tests.rigid_static_problems import (
-    GRAVITY,
-    difference,
-    pyramid,
-    tower,
-)
+from tests.rigid_static_problems import GRAVITY, difference, pyramid, tower
 from validation.bench.rigid.packings import packing
 
 

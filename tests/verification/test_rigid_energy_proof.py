@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rigid_lcp import BodySpace, solve_friction
 from rigid_lcp.friction.problem.definition import friction_problem
-from rigid_lcp.friction.problem.energy_proof import CERTAIN, find_least_energy, gives_energy
+from rigid_lcp.friction.problem.energy_proof import CERTAIN_ENERGY, find_least_energy, gives_energy
 from validation.bench.rigid.packings import packing
 
 
@@ -44,7 +44,7 @@ def test_a_w_of_bodies_never_gives_energy(seed, dim, mu):
     contacts = int(generator.integers(1, 8))
     jacobian = generator.standard_normal((contacts * dim, 3)) * 10.0 ** generator.integers(-6, 6)
     problem = friction_problem(jacobian @ jacobian.T, np.ones(contacts * dim), mu, dim)
-    assert find_least_energy(problem)[0] >= -1e-12 > -CERTAIN
+    assert find_least_energy(problem)[0] >= -1e-12 > -CERTAIN_ENERGY
 
 
 def test_the_proof_is_not_asked_of_bodies():

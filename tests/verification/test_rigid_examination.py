@@ -175,7 +175,7 @@ def test_answers_hold_in_extended_precision(dim: int) -> None:
 
 
 def test_two_grains_beside_a_wall() -> None:
-    """Walls are told by negative numbers, which are no grains: no radius is read past the end."""
+    """Walls have negative numbers, which are no grains: no radius is read past the end."""
     made = Bed(
         np.array([[0.1, 0, 0.05], [0.25, 0, 0.05]]), np.full(2, 0.05), 0.3, 2, 0.5,
         np.array([[0, -1], [1, -1], [1, -3]]), np.zeros((3, 3)), 1.0,

@@ -43,11 +43,11 @@ def test_a_load_beyond_numbers_is_named(dim, method, column, unit, load):
         return pull
 
     run = free_bodies(dim, method, loads=loads)
-    with pytest.raises(SceneError, match=r"^b at 0 s: its load is 1e\+") as told:
+    with pytest.raises(SceneError, match=r"^b at 0 s: its load is 1e\+") as error:
         run.advance(0.01)
-    assert f" {unit} " in told.value.what
-    assert "this leads to" in told.value.what  # no finite state, or no forces of a contact ahead
-    assert told.value.remedy
+    assert f" {unit} " in error.value.what
+    assert "this leads to" in error.value.what  # no finite state, or no forces of a contact ahead
+    assert error.value.remedy
     assert (run.time, run.energy) == (0.0, 0.0)
     np.testing.assert_array_equal(run.positions, [np.zeros(dim), np.eye(dim)[0]])
 
@@ -67,7 +67,7 @@ def test_the_steps_before_are_kept():
 
 
 @METHODS
-def test_a_load_that_no_step_is_short_enough_for_is_told_as_that(method):
+def test_a_load_that_no_step_is_short_enough_for_is_named(method):
     """``h F / m`` with F / m = 3e32 m/s^2: a number, but farther than a body's size at any step of
     Runge-Kutta, whose error spoke of an overlap of 0 m; a step of time stepping has no such bound.
     """
@@ -76,10 +76,10 @@ def test_a_load_that_no_step_is_short_enough_for_is_told_as_that(method):
         run.advance(1e-3)
         assert run.velocities[1, 0] == pytest.approx(1e28 / run.world.mass[1], rel=1e-12)
         return
-    with pytest.raises(NotConverged, match=r"^b, time 0 s: the shortest step is too long") as told:
+    with pytest.raises(NotConverged, match=r"^b, time 0 s: the shortest step is too long") as error:
         run.advance(1e-3)
-    assert "overlap" not in str(told.value)
-    assert "time-stepping" in told.value.remedy
+    assert "overlap" not in str(error.value)
+    assert "time-stepping" in error.value.remedy
 
 
 @OVERFLOWS
@@ -93,9 +93,9 @@ def test_a_load_upon_a_contact_names_its_body(method, load):
     run = Simulation(scene, method, loads=lambda time, motion: [[0, 0, 0], [0, -load, 0]])
     with pytest.raises(
         SceneError, match=r"^sleeper at 0 s: its load is .*40 kg: this leads"
-    ) as told:
+    ) as error:
         run.advance(0.01)
-    assert told.value.exit_code == 3
+    assert error.value.exit_code == 3
     assert run.time == 0.0
 
 

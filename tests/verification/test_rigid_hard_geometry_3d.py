@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.contact.manifold import MOST
-from rigid_lcp.contact.separation import PARALLEL
+from rigid_lcp.contact.separation import PARALLEL_EDGES
 from rigid_lcp.shapes.polyhedron import Polyhedron, box
 from rigid_lcp.shapes.rotations import (
     Floats,
@@ -35,7 +35,7 @@ def separating_axes(shapes: list[Polyhedron], turns: Floats) -> Floats:
         edges.append(along / np.linalg.norm(along, axis=1)[:, None])
     across = np.cross(edges[0][:, None], edges[1]).reshape(-1, 3)
     sine = np.linalg.norm(across, axis=1)
-    axes = np.vstack([*normals, across[sine > PARALLEL] / sine[sine > PARALLEL, None]])
+    axes = np.vstack([*normals, across[sine > PARALLEL_EDGES] / sine[sine > PARALLEL_EDGES, None]])
     return np.vstack([axes, -axes])
 
 
@@ -112,7 +112,7 @@ def test_an_overlap_has_a_contact_with_its_depth(name: str, seed: int, share: fl
     found = contacts(shapes, position, turns, margin=1e-3 * width)
     assert len(found) > 0
     least = np.argmin(np.abs(found.gap - depth))
-    # lengths tell apart what differs by more than 1e-9 of the size (`manifold_3d.TIE`)
+    # lengths tell apart what differs by more than 1e-9 of the size (`TIE_IN_SPACE`)
     tie = 2e-9 * min(shape.reach for shape in shapes)
     assert found.gap[least] == pytest.approx(depth, abs=tie)
     away = 1.0 if found.body_a[least] == 1 else -1.0

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.friction.linear.factorisation import BlockSystem, SingularSystem
-from rigid_lcp.sparse.dense_tiles import DEPTH
+from rigid_lcp.sparse.dense_tiles import TERMS_AT_ONCE
 from rigid_lcp.sparse.elimination_order import FEW_BLOCKS, minimum_degree, symmetric_pattern
 from rigid_lcp.sparse.elimination_tree import EliminationTree, elimination_tree
 from rigid_lcp.sparse.multifrontal import factor_fronts, solve_fronts
@@ -80,7 +80,7 @@ def test_fronts_wider_than_a_panel_and_split_ones():
     tree = elimination_tree(blocks, size, rows, columns)
     widths = np.diff(tree.first) * size
     assert len(widths) > 1
-    assert widths.max() > DEPTH
+    assert widths.max() > TERMS_AT_ONCE
     factors, rest, stack = (
         np.full(numbers, np.nan)
         for numbers in (tree.factor_start[-1], tree.rest_most, tree.stack_most)

@@ -83,7 +83,7 @@ def test_a_light_ball_between_a_wall_and_a_heavy_one(ratio: float, step: float, 
 
 def test_collisions_that_run_out_of_rounds_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """With 100 rounds a step, the 314 collisions lose energy, and the run tells of it."""
-    monkeypatch.setattr(passed_collisions, "ROUNDS", 100)
+    monkeypatch.setattr(passed_collisions, "PASSING_ROUNDS", 100)
     run = billiard(1e4, 1e-2)
     begin = run.energy
     run.advance(0.3)
@@ -93,7 +93,7 @@ def test_collisions_that_run_out_of_rounds_are_counted(monkeypatch: pytest.Monke
 
 def test_an_inelastic_collapse_ends() -> None:
     """e = 0.9 at a mass ratio of 1e6: the light ball collides ever faster with ever less.  It is
-    closed after a bounded number of rounds, energy never grows, and it is told."""
+    closed after a bounded number of rounds, energy never grows, and a message says so."""
     run = billiard(1e6, 1e-2, e=0.9)
     before = run.energy
     for _ in range(30):
@@ -102,12 +102,12 @@ def test_an_inelastic_collapse_ends() -> None:
         before = run.energy
     assert run.steps_cut_off >= 1
     assert run.overlap <= 1e-9 * run.world.length
-    assert LOSSY_ROUNDS < passed_collisions.ROUNDS
+    assert LOSSY_ROUNDS < passed_collisions.PASSING_ROUNDS
 
 
 def test_a_run_tells_what_was_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the summary, in the report, and after a resumed run."""
-    monkeypatch.setattr(passed_collisions, "ROUNDS", 20)
+    monkeypatch.setattr(passed_collisions, "PASSING_ROUNDS", 20)
     path = tmp_path / "billiard.toml"
     path.write_text(
         "dimensions = 2\ngravity = [0.0, 0.0]\n[run]\nduration = 0.3\nstep = 1e-2\nframes = 2\n"

@@ -132,7 +132,7 @@ def test_full_disk_at_a_picture(
 def test_files_that_the_system_cuts_short(
     scene: Path, whole: list[dict[str, Any]], tmp_path: Path
 ) -> None:
-    """A limit on the length of files, set by the system, is told like a full disk."""
+    """A limit on the length of files, set by the system, is reported like a full disk."""
     command = [sys.executable, "-m", "trackbed", *run_words(scene, tmp_path / "run")]
     limited = ["bash", "-c", 'ulimit -f 2; exec "$@"', "bash", *command]  # 2 KiB; a frame has 7
     ended = subprocess.run(

@@ -51,12 +51,7 @@ def scaled(
 
 
 def plain_map(
-    force: Floats,
-    velocity: Floats,
-    mu: Floats,
-    rho: Floats,
-    sigma: float,
-    eps: float,
+    force: Floats, velocity: Floats, mu: Floats, rho: Floats, sigma: float, eps: float
 ) -> Floats:
     """The twin: F contact by contact."""
     found = np.zeros_like(force)

@@ -1,8 +1,7 @@
 """`solve_friction` on closed forms, on hard small cases, and on real problems where they are given.
 
 A solution is judged by its residual (`rigid_lcp.friction.problem.cones`); forces are compared only
-where they are
-unique.
+where they are unique.
 """
 
 from __future__ import annotations
@@ -198,15 +197,15 @@ def test_a_warm_start_costs_less_and_a_wrong_one_does_no_harm():
     push = bodies.jacobian @ np.random.default_rng(5).standard_normal(360)
     changed = q + 1e-3 * push
     warm = solve_friction(bodies, changed, 0.5, 3, start=cold.r)
-    anew = solve_friction(bodies, changed, 0.5, 3)
+    again = solve_friction(bodies, changed, 0.5, 3)
     assert warm.solved
-    assert anew.solved
-    assert warm.work["factorisations"] < anew.work["factorisations"]
+    assert again.solved
+    assert warm.work["factorisations"] < again.work["factorisations"]
     assert "interior-point iterations" not in warm.work
     for factor in (-2.0, 1e6):  # far farther than no forces: as if they had not been given
         wrong = solve_friction(bodies, changed, 0.5, 3, start=factor * cold.r)
-        assert wrong.work == anew.work
-        np.testing.assert_array_equal(wrong.r, anew.r)
+        assert wrong.work == again.work
+        np.testing.assert_array_equal(wrong.r, again.r)
 
 
 def test_low_friction_is_reached_along_the_convex_path_bent_to_coulombs():
@@ -321,15 +320,6 @@ def test_the_search_ends_after_the_effort_that_is_stated(monkeypatch):
     for work in ("factorisations", "interior-point iterations"):
         assert found.work[work] < 0.6 * all_paths[work]
     assert found.work["factorisations"] < 2 * 800
-
-
-@pytest.mark.parametrize("method", ["newton", "interior-point", "gauss-seidel", "pivoting"])
-def test_every_method_says_what_it_reached(method):
-    """On a small tower: solved, or a residual above the tolerance and a message with a remedy."""
-    bodies, q = tower(3, 1.0, 2)
-    found = solve_friction(bodies, q, 0.5, 2, tolerance=1e-10, method=method)
-    assert found.solved == (found.residual <= 1e-10)
-    assert found.solved or "->" in found.message
 
 
 def test_contacts_in_any_order():

@@ -188,7 +188,7 @@ def test_wear_too_small_to_cut_waits_and_too_much_is_refused():
 
 def test_what_stays_keeps_every_points_velocity():
     """A spinning cube loses corners: what is left moves as a part of the whole did; mass, energy
-    of what went are told."""
+    of what went are reported."""
     scene = Scene(3, [0.0, 0.0, -GRAVITY])
     turn = quaternion_of_rotation([0.3, -0.2, 0.4])
     scene.add(

@@ -1,10 +1,6 @@
 """The page and the figures that all reports share."""
 
-from trackbed.report.figure import (
-    STYLE,
-    encode_figure,
-    save_figure,
-)
+from trackbed.report.figure import STYLE, encode_figure, save_figure
 from trackbed.report.page import (
     MINUS,
     TIMES,
@@ -23,21 +19,7 @@ from trackbed.report.page import (
 )
 
 __all__ = [
-    "MINUS",
-    "STYLE",
-    "TIMES",
-    "bullets",
-    "encode_figure",
-    "folded",
-    "micrometres",
-    "number",
-    "page",
-    "paragraph",
-    "per_cent",
-    "picture",
-    "plain",
-    "save_figure",
-    "section",
-    "table",
+    "MINUS", "STYLE", "TIMES", "bullets", "encode_figure", "folded", "micrometres", "number",
+    "page", "paragraph", "per_cent", "picture", "plain", "save_figure", "section", "table",
     "verdict",
-]
+]  # fmt: skip

@@ -1,13 +1,7 @@
 """Run folders: one lock, whole files with digests, provenance, signals."""
 
-from trackbed.run_files import (
-    folder,
-)
-from trackbed.run_files.arguments import (
-    add_run_arguments,
-    place_run,
-    refuse_both,
-)
+from trackbed.run_files import folder
+from trackbed.run_files.arguments import add_run_arguments, place_run, refuse_both
 from trackbed.run_files.folder import (
     MANIFEST,
     RESULT,
@@ -16,13 +10,8 @@ from trackbed.run_files.folder import (
     refuse_format,
     refuse_links,
 )
-from trackbed.run_files.provenance import (
-    record_provenance,
-)
-from trackbed.run_files.signals import (
-    note_signals,
-    raise_on_signals,
-)
+from trackbed.run_files.provenance import record_provenance
+from trackbed.run_files.signals import note_signals, raise_on_signals
 from trackbed.run_files.whole import (
     append_line,
     digest_file,
@@ -35,25 +24,8 @@ from trackbed.run_files.whole import (
 )
 
 __all__ = [
-    "MANIFEST",
-    "RESULT",
-    "add_run_arguments",
-    "append_line",
-    "digest_file",
-    "folder",
-    "is_written",
-    "lock_folder",
-    "note_signals",
-    "open_unlinked",
-    "place_run",
-    "raise_on_signals",
-    "read_object",
-    "record_provenance",
-    "refuse_both",
-    "refuse_format",
-    "refuse_links",
-    "refuse_writing",
-    "seal_file",
-    "sync_folder",
-    "write_whole",
-]
+    "MANIFEST", "RESULT", "add_run_arguments", "append_line", "digest_file", "folder", "is_written",
+    "lock_folder", "note_signals", "open_unlinked", "place_run", "raise_on_signals", "read_object",
+    "record_provenance", "refuse_both", "refuse_format", "refuse_links", "refuse_writing",
+    "seal_file", "sync_folder", "write_whole",
+]  # fmt: skip

@@ -47,7 +47,7 @@ def refuse_format(path: Path, manifest: Mapping[str, Any]) -> None:
         raise UsageError(
             f"this run folder is of format {found!r:.20}, and this trackbed knows format {FORMAT}",
             where=str(path),
-            remedy=f"go on with the trackbed {maker}, or start anew in another folder",
+            remedy=f"go on with the trackbed {maker}, or start again in another folder",
         )
 
 
@@ -114,7 +114,7 @@ class RunFolder:
     """The folder ``path``; made when it is locked first.  A story says what is in its own."""
 
     own: ClassVar[tuple[str, ...]] = ()
-    """Patterns of the run's files; what starts anew removes these and no other."""
+    """Patterns of the run's files; a fresh start removes these and no other."""
     states: ClassVar[str] = ""
     """Pattern of the saved states: where there is one, there was a manifest before it."""
     compared: ClassVar[tuple[str, ...]] = ("scene",)

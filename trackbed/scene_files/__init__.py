@@ -9,27 +9,9 @@ from trackbed.scene_files.reader import (
     read_scene,
     suggest_word,
 )
-from trackbed.scene_files.types import (
-    Name,
-    NonNegative,
-    Positive,
-    Real,
-    Table,
-    Text,
-)
+from trackbed.scene_files.types import Name, NonNegative, Positive, Real, Table, Text
 
 __all__ = [
-    "Guide",
-    "Name",
-    "NonNegative",
-    "Positive",
-    "Problem",
-    "Real",
-    "SceneText",
-    "Table",
-    "Text",
-    "describe_error",
-    "find_model",
-    "read_scene",
-    "suggest_word",
-]
+    "Guide", "Name", "NonNegative", "Positive", "Problem", "Real", "SceneText", "Table", "Text",
+    "describe_error", "find_model", "read_scene", "suggest_word",
+]  # fmt: skip

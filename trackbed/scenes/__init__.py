@@ -6,7 +6,9 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
-__all__ = ["scene_names", "scene_path", "scene_template", "scene_verb"]
+__all__ = [
+    "scene_names", "scene_path", "scene_template", "scene_verb",
+]  # fmt: skip
 
 VERB_OF_TABLE = {"sample": "run", "simulation": "qdem", "run": "rigid"}
 """A table of a scene file, and the verb that reads it."""
@@ -36,6 +38,6 @@ def scene_path(name: str) -> Path:
 
 
 def scene_verb(name: str) -> str:
-    """The verb of ``trackbed`` that runs the scene ``name``, told by a table only it has."""
+    """The verb of ``trackbed`` that runs the scene ``name``, known by a table only it has."""
     tables = tomllib.loads(scene_template(name))
     return next((verb for table, verb in VERB_OF_TABLE.items() if table in tables), "run")

@@ -81,7 +81,7 @@ def _at_most(name: str, value: float, bar: float) -> Check:
 def twins_in_simulator() -> dict[str, float]:
     """`twins_compare` in a new process with numba's simulator of a GPU."""
     code = (
-        "import json; from qdem_fem import cuda_step; cuda_step.BLOCK = 16; "
+        "import json; from qdem_fem.kernel.cuda import step; step.THREADS_A_BLOCK = 16; "
         "from validation.cases.qdem_gpu import twins_compare; print(json.dumps(twins_compare()))"
     )
     variables = os.environ | {"NUMBA_ENABLE_CUDASIM": "1", "NUMBA_NUM_THREADS": "1"}

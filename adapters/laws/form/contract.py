@@ -15,7 +15,9 @@ class Law(Protocol):
 
     A file beside the other laws with an object ``LAW`` of this kind is a law, and is named nowhere
     else.  Displacements may have any shape behind their first axis (grains
-    and axes): each column is fitted by itself, all at once.
+    and axes): each column is fitted by itself, all at once.  ``as_printed = True`` says that a law
+    is kept with the faults of its paper, for comparison: its increments need not vanish with the
+    jump, and may depend on the unit of cycles.
     """
 
     @property

@@ -1,8 +1,6 @@
 """Which pairs may touch."""
 
-from qdem_fem.contact.search import (
-    cells,
-)
+from qdem_fem.contact.search import cells
 from qdem_fem.contact.search.pairs import (
     NO_IMAGE,
     Pairs,
@@ -21,17 +19,6 @@ from qdem_fem.contact.search.periodic import (
 )
 
 __all__ = [
-    "NO_IMAGE",
-    "Pairs",
-    "PeriodicWidth",
-    "cells",
-    "check_extents",
-    "check_joined",
-    "choose_skin",
-    "extents",
-    "find_joined_twins",
-    "find_near_walls",
-    "find_partners",
-    "make_pairs",
-    "renew_pairs",
-]
+    "NO_IMAGE", "Pairs", "PeriodicWidth", "cells", "check_extents", "check_joined", "choose_skin",
+    "extents", "find_joined_twins", "find_near_walls", "find_partners", "make_pairs", "renew_pairs",
+]  # fmt: skip

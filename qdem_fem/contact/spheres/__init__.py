@@ -1,8 +1,6 @@
 """Contact by spheres at surface vertices (section 4 of the paper)."""
 
-from qdem_fem.contact.spheres import (
-    law,
-)
+from qdem_fem.contact.spheres import law
 from qdem_fem.contact.spheres.law import (
     DEEPEST,
     GO_ON,
@@ -22,7 +20,7 @@ from qdem_fem.contact.spheres.law import (
 )
 from qdem_fem.contact.spheres.options import (
     NEAR,
-    SKIN,
+    SKIN_OF_SPHERES,
     ContactPlane,
     SphereContact,
     check_contact_number,
@@ -35,31 +33,9 @@ from qdem_fem.contact.spheres.options import (
 )
 
 __all__ = [
-    "DEEPEST",
-    "GO_ON",
-    "LOOK_AGAIN",
-    "NEAR",
-    "SKIN",
-    "TOO_DEEP",
-    "Contact",
-    "ContactPlane",
-    "Planes",
-    "SphereContact",
-    "Spheres",
-    "advance_one",
-    "advance_threads",
-    "check_contact_number",
-    "check_contact_planes",
-    "check_planes_along",
-    "find_body_value",
-    "image_less",
-    "law",
-    "make_plane_arrays",
-    "minus",
-    "pair_stiffness",
-    "put_row",
-    "row",
-    "series",
-    "slider",
-    "tangential_stiffness",
-]
+    "DEEPEST", "GO_ON", "LOOK_AGAIN", "NEAR", "SKIN_OF_SPHERES", "TOO_DEEP", "Contact",
+    "ContactPlane", "Planes", "SphereContact", "Spheres", "advance_one", "advance_threads",
+    "check_contact_number", "check_contact_planes", "check_planes_along", "find_body_value",
+    "image_less", "law", "make_plane_arrays", "minus", "pair_stiffness", "put_row", "row", "series",
+    "slider", "tangential_stiffness",
+]  # fmt: skip

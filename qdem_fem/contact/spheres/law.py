@@ -18,7 +18,7 @@ from numba.extending import overload
 from qdem_fem.contact.search import Pairs
 from qdem_fem.kernel import exact, inlined
 
-BLOCK = 512
+SPHERES_AT_ONCE = 512
 """Spheres that one thread takes at a time."""
 GO_ON, LOOK_AGAIN, TOO_DEEP = 0, 1, 2
 """What a step says: go on; a vertex has left the skin, so that its forces wait for new pairs; two
@@ -265,7 +265,7 @@ def advance_build(threads: bool) -> Any:
         p0, p1, p2, p3, p4, p5, p6, p7, p8, p9, p10 = pairs
         friction, half_skin, start, position, force, slid = c[3:]
         count, acting = position.shape[0], p7.shape[0]
-        blocks = (count + BLOCK - 1) // BLOCK
+        blocks = (count + SPHERES_AT_ONCE - 1) // SPHERES_AT_ONCE
         far, deep = np.zeros(blocks), np.zeros(blocks)
         for stage in range(3):  # all spheres pass one stage before any begins the next
             for b in prange(blocks):

@@ -33,7 +33,7 @@ from qdem_fem.files import ConditionError, is_real
 
 Floats = NDArray[np.float64]
 
-SKIN = 0.1
+SKIN_OF_SPHERES = 0.1
 """Thickness of the skin of the neighbour list, over the smallest radius."""
 ALONG = 1e-6
 """Sine of the angle to an axis below which a wall is along it."""

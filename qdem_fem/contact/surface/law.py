@@ -39,9 +39,9 @@ from qdem_fem.contact.surface.geometry import (
 from qdem_fem.contact.surface.overlaps import overlaps_forces, wall_faces_forces
 from qdem_fem.kernel import digest_sources, exact, inlined
 
-FLAT = 50
+FLATNESS_POWER = 50
 """Power of a cosine: a vertex or an edge 1 degree from flat bears under 1 %, 10 degrees, half."""
-PARALLEL = 1e-6
+PARALLEL_EDGES = 1e-6
 """Square of the sine of the angle between edges below which they do not cross."""
 SOURCES = contact_kernel, contact_surface_geometry, contact_surface_clip, contact_surface_overlaps
 
@@ -81,7 +81,7 @@ def point_weight(surface: Any, x: Any, q: int, n: Any) -> float:  # pragma: no c
         against = max(0.0, -dot(face_normal(x, surface.face, f), n))
         area += surface.face_area[f] / 3.0 * against
         flat = max(flat, against)
-    return area * (1.0 - flat**FLAT)
+    return area * (1.0 - flat**FLATNESS_POWER)
 
 
 @exact
@@ -159,7 +159,7 @@ def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # p
         uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
         determinant = uu * vv - uv * uv
         g, n, s, t = -1.0, (0.0, 0.0, 0.0), 0.0, 0.0
-        if determinant > PARALLEL * uu * vv:
+        if determinant > PARALLEL_EDGES * uu * vv:
             s, t = (uv * vw - vv * uw) / determinant, (uu * vw - uv * uw) / determinant
             if 0.0 < s < 1.0 and 0.0 < t < 1.0:
                 n = cross(u, v)
@@ -191,7 +191,7 @@ def edges_forces(c: Any, velocity: Any, step: float, moved: float) -> None:  # p
         )
         if near.edge_weight[at] < 0.0:  # the ends of an edge are its vertices': it fades to them
             flat = edge_flatness(surface, x, a, n, -1.0) * edge_flatness(surface, x, b, n, 1.0)
-            fade = 16.0 * s * (1.0 - s) * t * (1.0 - t) * (1.0 - flat**FLAT)
+            fade = 16.0 * s * (1.0 - s) * t * (1.0 - t) * (1.0 - flat**FLATNESS_POWER)
             near.edge_weight[at] = fade * min(surface.edge_area[a], surface.edge_area[b])
             # what slides onto an edge begins without a force
             near.edge_start[at] = 0.0 if step == 0.0 or g + dot(way, n) <= 0.0 else g

@@ -52,8 +52,8 @@ ROWS_ELASTIC, ROWS_VISCOUS = 11, 13
 """Numbers an element brings: nine gradients, lambda V, mu V; with viscosity also those of it."""
 
 
-LAWS: dict[str, type] = {name: measure.LAW for name, measure in MEASURES.items()}
-BY_LAW = {measure.LAW: measure for measure in MEASURES.values()}
+LAWS: dict[str, type] = {name: measure.MEASURE for name, measure in MEASURES.items()}
+BY_LAW = {measure.MEASURE: measure for measure in MEASURES.values()}
 element_gradient = inlined(stress.element_gradient)
 element_pulls = inlined(stress.element_pulls)
 matrix_product = inlined(stress.matrix_product)

@@ -20,6 +20,9 @@ from qdem_fem.element import Strain
 from qdem_fem.files import LibraryMissing
 from qdem_fem.kernel.cpu import Constraints, Fields, Loads, Probes, count_lane
 from qdem_fem.kernel.cpu import step as kernel
+from qdem_fem.kernel.cuda import step as cuda_step
+from qdem_fem.kernel.cuda.step import NO_CUDA, cuda
+from qdem_fem.kernel.cuda.sums import motion_summed
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,8 +30,6 @@ Integers = NDArray[np.int64]
 
 def require_gpu() -> None:
     """Raise `LibraryMissing` unless numba.cuda is installed and finds a GPU and its compiler."""
-    from qdem_fem.kernel.cuda.step import NO_CUDA, cuda
-
     where = 'device="cuda"'
     if cuda.is_available():
         return
@@ -69,8 +70,6 @@ class NodeActions(NamedTuple):
 
 def sort_node_actions(n_nodes: int, loads: Loads, held: Constraints, probes: Probes) -> NodeActions:
     """Sort the kernel's lists by node, so that one thread does all that happens to a node."""
-    from qdem_fem.kernel.cuda import step as cuda_step
-
     kinds = (
         (cuda_step.LOAD, loads.node_at, loads.series, loads.weight),
         (cuda_step.ROLLER, held.roller_at, None, held.roller_normal),
@@ -131,17 +130,14 @@ class CudaAssembly(Assembly):
     ) -> None:
         require_gpu()
         super().__init__(bodies, master, strain, dtype, threads, density_factor)
-        from qdem_fem.kernel.cuda import step as cuda_step
-        from qdem_fem.kernel.cuda.step import cuda
-
         layout = self.packed.layout
         lanes = count_lane(self.dtype)
         width = kernel.ROWS_VISCOUS if self.viscous else kernel.ROWS_ELASTIC
         by_row = layout.rows.reshape(-1, width, lanes).transpose(1, 0, 2).reshape(width, -1)
         by_corner = layout.corners.reshape(-1, 4, lanes).transpose(1, 0, 2).reshape(4, -1)
         self._rows, self._corners = cuda.to_device(by_row), cuda.to_device(by_corner)
-        self._element_blocks = -(-by_row.shape[1] // cuda_step.BLOCK)
-        self._node_blocks = -(-self.n_nodes // cuda_step.BLOCK)
+        self._element_blocks = -(-by_row.shape[1] // cuda_step.THREADS_A_BLOCK)
+        self._node_blocks = -(-self.n_nodes // cuda_step.THREADS_A_BLOCK)
         self._forces_kernel = cuda_step.element_forces_kernel(strain, bool(self.viscous))
 
         by_node = np.bincount(self.place, weights=self.mass, minlength=self.n_nodes)
@@ -159,13 +155,9 @@ class CudaAssembly(Assembly):
         return found[1:4], found[4:]
 
     def _sums(self) -> Floats:
-        from qdem_fem.kernel.cuda.sums import motion_summed
-
         return motion_summed(self.state.displacement, self.state.velocity, self._mass)
 
     def _state(self, inverse_mass: Floats) -> Fields:
-        from qdem_fem.kernel.cuda.step import cuda
-
         def zeros() -> Any:
             return cuda.to_device(np.zeros(4 * self.n_nodes, self.dtype))
 
@@ -199,9 +191,6 @@ class CudaAssembly(Assembly):
         bodies; its ``said`` is set.  Its list may end the window early: then the host waits
         every `LOOK` steps.
         """
-        from qdem_fem.kernel.cuda import step as cuda_step
-        from qdem_fem.kernel.cuda.step import cuda
-
         acted = sort_node_actions(self.n_nodes, loads, held, probes)
         samples = number_samples(steps, probes)
         taken = int(samples.max(initial=-1)) + 1
@@ -229,8 +218,8 @@ class CudaAssembly(Assembly):
             cuda.to_device(accelerations.astype(self.dtype)), status, dt,
         )  # fmt: skip
         motion = cuda_step.node_motion_kernel(gravity is not None)
-        launch_forces = self._forces_kernel[self._element_blocks, cuda_step.BLOCK]
-        launch_motion = motion[self._node_blocks, cuda_step.BLOCK]
+        launch_forces = self._forces_kernel[self._element_blocks, cuda_step.THREADS_A_BLOCK]
+        launch_motion = motion[self._node_blocks, cuda_step.THREADS_A_BLOCK]
         for k, sample in enumerate(samples.tolist()):
             if contact is not None and k % LOOK == 0 and status[cuda_step.LIMIT] <= k:
                 break
@@ -241,9 +230,9 @@ class CudaAssembly(Assembly):
             if contact is not None:
                 contact.launch_step(state.displacement, state.velocity, status, step, k)
 
-        bad, done = (told := status.copy_to_host().tolist())[:2]
+        bad, done = (ended := status.copy_to_host().tolist())[:2]
         if contact is not None:
-            contact.end(told)
+            contact.end(ended)
         remembered = memory.copy_to_host()
         for total, kind in ((0, cuda_step.LOAD), (1, cuda_step.HELD)):
             work[total] += remembered[acted.of_kind(kind)[0], 0].sum()

@@ -13,7 +13,7 @@ import numpy as np
 
 from qdem_fem.kernel.cuda.step import cuda, grid
 
-CHUNK = 64
+NUMBERS_A_THREAD = 64
 """Numbers that one thread adds."""
 
 
@@ -23,7 +23,7 @@ def chunks_sum(values: Any, count: Any, sums: Any) -> None:
     chunk = cuda.grid(1)
     if chunk < sums.size:
         total = 0
-        for i in range(chunk * CHUNK, min((chunk + 1) * CHUNK, count)):
+        for i in range(chunk * NUMBERS_A_THREAD, min((chunk + 1) * NUMBERS_A_THREAD, count)):
             total += values[i]
         sums[chunk] = total
 
@@ -32,9 +32,9 @@ def chunks_sum(values: Any, count: Any, sums: Any) -> None:
 def scan_chunks(values: Any, count: Any, before: Any, first: Any) -> None:
     """``first`` (count + 1,) from the sums ``before`` every chunk."""
     chunk = cuda.grid(1)
-    if chunk * CHUNK < count:
-        total, end = before[chunk], min((chunk + 1) * CHUNK, count)
-        for i in range(chunk * CHUNK, end):
+    if chunk * NUMBERS_A_THREAD < count:
+        total, end = before[chunk], min((chunk + 1) * NUMBERS_A_THREAD, count)
+        for i in range(chunk * NUMBERS_A_THREAD, end):
             first[i] = total
             total += values[i]
         if end == count:
@@ -46,7 +46,7 @@ def sums_before(values: Any, count: int) -> Any:
 
     Both on the GPU, int64; ``count`` is above zero.
     """
-    chunks = -(-count // CHUNK)
+    chunks = -(-count // NUMBERS_A_THREAD)
     if chunks == 1:
         before = cuda.to_device(np.zeros(1, np.int64))
     else:

@@ -41,7 +41,7 @@ except Exception as error:  # without CUDA's runtime numba-cuda raises errors of
         remedy=NO_CUDA,
     ) from error
 
-BLOCK = 128
+THREADS_A_BLOCK = 128
 """Threads of a block."""
 LOAD, ROLLER, HELD, PROBE = range(4)
 """Kinds of actions on a node, in the order in which a step does them."""
@@ -59,7 +59,7 @@ matrix_product = cuda.jit(device=True)(stress.matrix_product)
 
 def grid(count: int) -> tuple[int, int]:
     """Blocks and threads of a launch for so many."""
-    return max(1, -(-count // BLOCK)), BLOCK
+    return max(1, -(-count // THREADS_A_BLOCK)), THREADS_A_BLOCK
 
 
 @cuda.jit(device=True)

@@ -1,23 +1,11 @@
 """Loads of a passing train: rail, wheels, roughness, records."""
 
-from qdem_fem.track.loads.rail import (
-    Track,
-    seat_share,
-)
-from qdem_fem.track.loads.record import (
-    RATE,
-    load_record_write,
-)
-from qdem_fem.track.loads.rolling import (
-    find_rolling_forces,
-)
-from qdem_fem.track.loads.roughness import (
-    RailKind,
-    Roughness,
-    WheelKind,
-)
+from qdem_fem.track.loads.rail import Track, seat_share
+from qdem_fem.track.loads.record import RATE, write_load_record
+from qdem_fem.track.loads.rolling import find_rolling_forces
+from qdem_fem.track.loads.roughness import RailKind, Roughness, WheelKind
 from qdem_fem.track.loads.train import (
-    LONGEST,
+    MOST_SAMPLES,
     Train,
     WheelFlat,
     find_flat_forces,
@@ -25,7 +13,7 @@ from qdem_fem.track.loads.train import (
 )
 
 __all__ = [
-    "LONGEST",
+    "MOST_SAMPLES",
     "RATE",
     "RailKind",
     "Roughness",
@@ -35,7 +23,7 @@ __all__ = [
     "WheelKind",
     "find_flat_forces",
     "find_rolling_forces",
-    "load_record_write",
     "make_train_record",
     "seat_share",
-]
+    "write_load_record",
+]  # fmt: skip

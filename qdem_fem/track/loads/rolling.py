@@ -40,7 +40,7 @@ Response = Callable[[FloatArray], ComplexArray]
 
 STEEL_MODULUS = 206e9 / (2 * (1 - 0.3**2))
 """E* of steel on steel [Pa]."""
-CHUNK = 128
+FREQUENCIES_AT_ONCE = 128
 """Frequencies taken at once, for the memory."""
 MOST_WORK = 2e10
 """Samples times frequencies of one rail: some minutes."""
@@ -151,8 +151,11 @@ def sum_lines(
     """Re sum over m of lines (m, b) e^(2 pi i f t), (2, n, b), at ``time`` (n,) [s]: as it is,
     and with each term times its ``response`` (n, m), a function of frequencies."""
     total = np.zeros((2, len(time), lines.shape[1]))
-    for first in range(0, len(frequency), CHUNK):
-        some, sizes = frequency[first : first + CHUNK], lines[first : first + CHUNK]
+    for first in range(0, len(frequency), FREQUENCIES_AT_ONCE):
+        some, sizes = (
+            frequency[first : first + FREQUENCIES_AT_ONCE],
+            lines[first : first + FREQUENCIES_AT_ONCE],
+        )
         wave = np.exp(2j * pi * np.outer(time, some))
         total[0] += (wave @ sizes).real
         total[1] += ((wave * response(some)) @ sizes).real

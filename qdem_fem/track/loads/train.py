@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, pi
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from qdem_fem.track.loads.record import RATE, LoadRecord
 from qdem_fem.track.loads.rolling import find_rolling_forces
 from qdem_fem.track.loads.roughness import Roughness
 
-LONGEST = 10_000_000
+MOST_SAMPLES = 10_000_000
 """Samples of a record: 17 minutes at 10 kHz."""
 
 
@@ -150,22 +149,6 @@ def find_flat_forces(
     return total
 
 
-def train_spectrum(frequency: FloatArray, train: Train, track: Track) -> np.ndarray[Any, Any]:
-    """Fourier spectrum of the force on seat 1 without flats [N s], complex (k,).
-
-        X(f) = P a/v sinc(f a/v) 4/(4 + (2 pi f L/v)^4) sum over axles of e^(-2 pi i f x_j/v)
-
-    with sinc(x) = sin(pi x)/(pi x): the sum has its peaks at multiples of speed over car length,
-    weighed by 4 cos(pi f b/v) cos(pi f c/v) of bogie distance b and axle distance c (Milne, Le Pen,
-    Thompson, Powrie, J. Sound Vib. 397, 2017, 123-140).
-    """
-    per_metre = frequency / train.speed
-    axles = np.exp(-2j * pi * np.outer(per_metre, train.axles)).sum(axis=1)
-    load = train.first_share * train.axle_load * track.spacing / train.speed
-    beam = 4 / (4 + (2 * pi * per_metre * track.elastic_length) ** 4)
-    return np.asarray(load * np.sinc(per_metre * track.spacing) * beam * axles)
-
-
 def make_train_record(
     train: Train, track: Track, area: float, flats: Sequence[WheelFlat] = (), rate: float = RATE,
     roughness: Roughness | None = None,
@@ -180,10 +163,10 @@ def make_train_record(
                              remedy="give numbers above zero")  # fmt: skip
     lead = (QUIET * track.elastic_length + track.spacing / 2) / train.speed
     last = 2 * lead + train.length / train.speed
-    if not last * rate < LONGEST:
+    if not last * rate < MOST_SAMPLES:
         raise ConditionError(
             f"the train takes {last:.3g} s to pass, {last * rate:.3g} samples", where="train",
-            remedy=f"give more speed or fewer cars: at most {LONGEST} samples",
+            remedy=f"give more speed or fewer cars: at most {MOST_SAMPLES} samples",
         )  # fmt: skip
     time = np.arange(int(np.ceil(last * rate)) + 1) / rate
     force = find_seat_forces(time - lead, train, track, flats)

@@ -21,8 +21,7 @@ convex problems; with Coulomb's law nothing is proved, and the best point is kep
 Measured on what no other method of this package solved: 100 to 1,500 factorisations.  Sweeps
 between them, each going on from where the other ended, save up to nine in ten
 (`rigid_lcp.friction.auto.sweeps`); so may a start inside the cones, where a path of the interior
-point
-ends.
+point ends.
 """
 
 from __future__ import annotations

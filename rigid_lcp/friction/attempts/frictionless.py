@@ -51,7 +51,7 @@ Bools = NDArray[np.bool_]
 Indices = NDArray[np.int32]
 Solve = Callable[[Floats], Floats]
 
-SHIFT = 1e-8
+NORMAL_SHIFT = 1e-8
 """Relative shift of the diagonal: a small one is soon taken out again."""
 SWEEPS, SWEEPS_AT_ONCE, SETTLED = 400, 20, 1
 """Most sweeps before the first exchange; they end when so few contacts changed sides in 20."""
@@ -60,13 +60,13 @@ SWEEPS_BETWEEN = 100
 SMOOTHED, SMOOTHINGS, HASTE = 2, 3, 15
 """as long as more contacts than that are wrong, so many times; with self-stress they mislead, so
 that the exchanges begin again without them where so many do not end."""
-PROXIMAL_STEPS = 20
+NORMAL_SHIFT_STEPS = 20
 BAND_MOST, BAND_OVERHEAD = 1.3e8, 20
 """Banded Cholesky up to about so many multiplications, the band counted so much wider: half of what
 sparse LU takes in the plane, as much as it where 1,700 spheres touch."""
 SIGN_MARGIN = 1e-13
 """Relative size of an acceleration or force that counts as zero."""
-PATIENCE = 5
+EXCHANGE_PATIENCE = 5
 """Exchanges at once that may fail to make violations fewer, before one at a time."""
 
 
@@ -120,10 +120,9 @@ def frictionless(
     """Solve a friction problem without friction (mu = 0), in 2D or 3D.
 
     ``start`` r (nc * dim,): forces near the solution.  ``work``: ``sweeps``; ``exchanges`` of
-    sides, each with one factorisation; ``proximal`` steps.
-    Not for a W that is not symmetric or has a negative diagonal: use
-    `rigid_lcp.friction.methods.pivoting`.
-    Raises `ProblemError` where a coefficient of friction is not zero.
+    sides, each with one factorisation; ``proximal`` steps.  Not for a W that is not symmetric or
+    has a negative diagonal: use `rigid_lcp.friction.methods.pivoting`.  Raises `ProblemError` where
+    a coefficient of friction is not zero.
     """
     if problem.friction.any():
         raise ProblemError(
@@ -142,7 +141,7 @@ def frictionless(
     best, least = np.zeros(nc), np.inf
     for smoothings, limit in ((SMOOTHINGS, HASTE), (0, max_exchanges)):
         f, carries = first.copy(), first > 0.0
-        for step in range(PROXIMAL_STEPS):
+        for step in range(NORMAL_SHIFT_STEPS):
             before = work["exchanges"]
             f, sharper = pivot_principally(
                 a, b, order, f, carries, work, limit, smoothings if step == 0 else 0
@@ -180,9 +179,9 @@ def pivot_principally(
     factor and no change of sides.
     """
     unit = float(a_matrix.diagonal().mean()) or 1.0
-    shift = SHIFT * unit
+    shift = NORMAL_SHIFT * unit
     offset = b - shift * before
-    fewest, patience = len(b) + 1, PATIENCE
+    fewest, patience = len(b) + 1, EXCHANGE_PATIENCE
     smoothed = False
     scale = float(np.abs(b).max()) or 1.0
     f = np.zeros(len(b))
@@ -202,10 +201,10 @@ def pivot_principally(
         if smoothed and count > 0.7 * fewest:
             smoothings = 0
         if count < fewest:
-            fewest, patience = count, PATIENCE
+            fewest, patience = count, EXCHANGE_PATIENCE
         else:
             patience -= 1
-        smoothed = count > SMOOTHED and patience == PATIENCE and smoothings > 0
+        smoothed = count > SMOOTHED and patience == EXCHANGE_PATIENCE and smoothings > 0
         if smoothed:
             smoothings -= 1
             f = np.maximum(f, 0.0)

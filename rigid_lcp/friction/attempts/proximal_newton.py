@@ -1,9 +1,8 @@
 """Proximal points, each found by Newton's method, for contacts that are redundant and slide.
 
 Where W is singular and contacts slide, Newton's method (`rigid_lcp.friction.methods.newton`)
-changes the statuses
-of the same few contacts to and fro.  A proximal point is the answer of a regular problem near the
-last one (Rockafellar, SIAM J. Control Optim. 14 (1976) 877)
+changes the statuses of the same few contacts to and fro.  A proximal point is the answer of a
+regular problem near the last one (Rockafellar, SIAM J. Control Optim. 14 (1976) 877)
 
     u = W r + q + alpha (r - r_k),        r_(k+1) = r        so that no error of alpha is left
 
@@ -79,11 +78,10 @@ def proximal_newton(
     """Proximal points from ``start`` (zero forces if None) until the residual is small enough.
 
     ``linear``: factorisations of this problem's W, made if not given; at most ``factorisations``
-    are spent.  ``first_shift``: alpha over mean(diag W) to begin with; the default is small, to
-    end fast; a great one takes off what is stiff of the error.  Good from a rough point on (a few
-    dozen sweeps, or the forces of the step before); where `rigid_lcp.friction.methods.newton`
-    converges it needs
-    fewer factorisations.
+    are spent.  ``first_shift``: alpha over mean(diag W) to begin with; the default is small, to end
+    fast; a great one takes off what is stiff of the error.  Good from a rough point on (a few dozen
+    sweeps, or the forces of the step before); where `rigid_lcp.friction.methods.newton` converges
+    it needs fewer factorisations.
 
     Raises `ProblemError` for a start that is none, `UsageError` for other options that are none.
     """

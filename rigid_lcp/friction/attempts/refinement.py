@@ -2,10 +2,9 @@
 
 A Newton step solves ``(A + B W) dr = -F`` with A shifted by ``shift / rho``, as W is singular where
 forces are not unique (`rigid_lcp.friction.methods.newton`).  The shift holds back what W answers
-with less than it:
-a boulder on a pebble moves with all contacts below it loaded alike, at an eigenvalue of W smaller
-than the mean of its diagonal by the ratio of their masses.  Plain steps better that part by
-``lambda / (lambda + shift)`` each; at a ratio of 1e8 they never end.
+with less than it: a boulder on a pebble moves with all contacts below it loaded alike, at an
+eigenvalue of W smaller than the mean of its diagonal by the ratio of their masses.  Plain steps
+better that part by ``lambda / (lambda + shift)`` each; at a ratio of 1e8 they never end.
 
 Here the shifted factors precondition GMRES (Saad and Schultz, SIAM J. Sci. Stat. Comput. 7 (1986)
 856) for the matrix as it is.  All its eigenvalues are next to 1 then, or to 0 where forces are not

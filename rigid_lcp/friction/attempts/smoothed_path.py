@@ -101,8 +101,7 @@ def smoothed_path(
     them; else it begins at the forces of springs.  ``linear``: factorisations of this problem's W,
     made if not given; at most ``factorisations`` are spent.  Some 40 to 100 factorisations solve
     most settled beds; for what sticks or hardly slides `rigid_lcp.friction.methods.interior_point`
-    and Newton need a
-    third of that.  ``work``: ``points`` and ``factorisations``.
+    and Newton need a third of that.  ``work``: ``points`` and ``factorisations``.
     """
     linear = linear or factorisation(problem)
     best, least = np.zeros(problem.offset.shape), np.inf
@@ -207,19 +206,13 @@ def find_smoothed_point(
 
 @njit(cache=True)
 def smoothed_map(
-    force: Floats,
-    velocity: Floats,
-    mu: Floats,
-    rho: Floats,
-    sigma: float,
-    eps: float,
+    force: Floats, velocity: Floats, mu: Floats, rho: Floats, sigma: float, eps: float
 ) -> tuple[Floats, Floats, Floats]:
     """F and its derivatives A = dF/dr, B = dF/du.
 
     ``force`` and ``velocity`` (nc, dim); ``mu`` and ``rho`` (nc,), rho force per velocity;
-    ``sigma`` force squared, ``eps`` a velocity.
-    F (nc, dim) a force, A (nc, dim, dim), B (nc, dim, dim) force per velocity.
-    Without friction x and s are the normal parts, and ``F_T = r_T``.
+    ``sigma`` force squared, ``eps`` a velocity.  F (nc, dim) a force, A (nc, dim, dim), B (nc, dim,
+    dim) force per velocity.  Without friction x and s are the normal parts, and ``F_T = r_T``.
     """
     nc, dim = force.shape
     f = np.zeros((nc, dim))

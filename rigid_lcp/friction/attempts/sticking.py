@@ -7,7 +7,7 @@ W may be singular: proximal steps from nothing,
 
 converge to forces of least norm among those that fit, all with one factorisation.  What W answers
 with less than alpha (heavy bodies on light ones) they better little: where a step does not pay, a
-few products by the same factors find it (`rigid_lcp.friction.attempts.gmres`).
+few products by the same factors find it (`rigid_lcp.friction.attempts.refinement.gmres`).
 """
 
 from __future__ import annotations

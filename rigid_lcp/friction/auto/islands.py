@@ -28,7 +28,7 @@ Indices = NDArray[Any]
 Flags = NDArray[np.bool_]
 Method = Callable[..., FrictionSolution]
 
-ROUNDS = 4
+ISLAND_ROUNDS = 4
 """Times the islands are solved again, ten times finer each, until the whole is fine enough."""
 
 
@@ -192,7 +192,7 @@ def solve_islands(
     problems = [cut_out_island(problem, part) for part in larger]
     alone = solve_singles(problem, single, tolerance)
     work: dict[str, float] = {}
-    for round_ in range(ROUNDS):
+    for round_ in range(ISLAND_ROUNDS):
         finer = tolerance * 0.1**round_
         begin: list[Floats | None] = [None] * len(larger)
         if start is not None or round_ > 0:

@@ -11,12 +11,12 @@ from rigid_lcp.friction.attempts import heaviness, seem_loose, smoothed_path
 from rigid_lcp.friction.auto.sweeps import TURNS, take_turns
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
 from rigid_lcp.friction.linear import SingularSystem
-from rigid_lcp.friction.methods import ITERATIONS, Path, PathStep, interior_point
+from rigid_lcp.friction.methods import PATH_ITERATIONS, Path, PathStep, interior_point
 from rigid_lcp.friction.problem import FrictionSolution, length
 
 Floats = NDArray[np.float64]
 
-NEWTON_PATIENCE = 3
+PATH_END_PATIENCE = 3
 """Steps of Newton that may fail to halve the residual: from the end of a path it begins to converge
 in the first two or not at all."""
 
@@ -165,11 +165,11 @@ def follow_convex_path(trial: Trial) -> bool:
         return False
     found = follow(trial, path, CONVEX.until, CONVEX.steps)
     if found.residual < CONVEX.useful:
-        trial.newton(found.r, CONVEX.newton, found.method, NEWTON_PATIENCE)
+        trial.newton(found.r, CONVEX.newton, found.method, PATH_END_PATIENCE)
     if not trial.best.solved and seems_at_rest(trial):
         part = path.x, path.s
         rest = follow(trial, path, CONVEX.rest_until, CONVEX.rest_steps)
-        trial.newton(rest.r, CONVEX.newton, rest.method, NEWTON_PATIENCE)
+        trial.newton(rest.r, CONVEX.newton, rest.method, PATH_END_PATIENCE)
         path.x, path.s = part
     path.path = CONVEX.bent
     steps = CONVEX.bent_steps
@@ -180,7 +180,7 @@ def follow_convex_path(trial: Trial) -> bool:
         if found.residual > CONVEX.bent_useful:
             break
         steps -= int(found.work["iterations"])
-        trial.newton(found.r, CONVEX.bent_newton, found.method, NEWTON_PATIENCE)
+        trial.newton(found.r, CONVEX.bent_newton, found.method, PATH_END_PATIENCE)
     return end_path(trial, path, found)
 
 
@@ -290,7 +290,7 @@ def follow_paths(trial: Trial) -> bool:
         found = trial.keep(
             interior_point(
                 problem, None, max(LIMITS.hand_over, trial.tolerance), path, linear=trial.linear,
-                iterations=min(ITERATIONS, trial.affordable),
+                iterations=min(PATH_ITERATIONS, trial.affordable),
             )
         )  # fmt: skip
         if trial.polish(found) or trial.sweep(found.r, sweeps, "interior-point"):

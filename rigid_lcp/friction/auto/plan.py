@@ -205,8 +205,4 @@ LAST = (
 """What is dear and seldom needed, where nothing proves that there is no solution: some ten seconds
 of it solve large packings of little friction."""
 
-PLAN = (
-    *FIRST,
-    Stage("friction in steps", lambda t: True, step_friction),
-    *LAST,
-)
+PLAN = (*FIRST, Stage("friction in steps", lambda t: True, step_friction), *LAST)

@@ -7,11 +7,9 @@ best.
 
 from __future__ import annotations
 
-import re
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,7 +20,6 @@ from rigid_lcp.friction.attempts import frictionless
 from rigid_lcp.friction.auto.islands import islands, solve_islands
 from rigid_lcp.friction.auto.plan import FIRST, attempts, is_proved_insoluble
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
-from rigid_lcp.friction.methods import newton
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     SHARE_LEFT,
@@ -36,6 +33,7 @@ from rigid_lcp.friction.problem import (
     require_number,
     require_start,
 )
+from trackbed.choices import find_choices
 
 Floats = NDArray[np.float64]
 
@@ -182,7 +180,7 @@ def solve_alone(
     """One of `find_methods`, by itself or, where its file says ``POLISHED``, with Newton at its
     end."""
     module = import_module(find_methods()[method])
-    solve = getattr(module, module.__name__.rpartition(".")[2])
+    solve = module.METHOD
     if not getattr(module, "POLISHED", False):
         alone: FrictionSolution = solve(problem, start, tolerance)
         return alone
@@ -192,14 +190,6 @@ def solve_alone(
     return trial.solution()
 
 
-@cache
-def find_methods() -> dict[str, str]:
-    """The methods by name, and the module of each: the files beside that of Newton's method with a
-    line ``METHOD = "..."``, each with a function of its file's name.  They are compiled when they
-    are asked for."""
-    package, found = newton.__module__.rpartition(".")[0], {}
-    for path in sorted(Path(newton.__code__.co_filename).parent.glob("*.py")):
-        named = re.search(r'^METHOD = "(.+)"$', path.read_text(encoding="utf-8"), re.MULTILINE)
-        if named:
-            found[named[1]] = f"{package}.{path.stem}"
-    return found
+def find_methods() -> Mapping[str, str]:
+    """The methods by name, and the module of each; compiled when they are asked for."""
+    return find_choices("rigid_lcp.friction.methods", "METHOD")

@@ -18,7 +18,7 @@ from rigid_lcp.friction.attempts import (
     sticking,
 )
 from rigid_lcp.friction.linear import Factorisation, factorisation
-from rigid_lcp.friction.methods import PATIENCE, Sweeper, gauss_seidel, make_sweeper, newton
+from rigid_lcp.friction.methods import NEWTON_PATIENCE, Sweeper, gauss_seidel, make_sweeper, newton
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     FrictionProblem,
@@ -325,7 +325,7 @@ class Trial:
             self.best = Trial(self.problem, None, self.tolerance).best
 
     def newton(
-        self, start: Floats, steps: int, after: str, patience: int = PATIENCE
+        self, start: Floats, steps: int, after: str, patience: int = NEWTON_PATIENCE
     ) -> FrictionSolution:
         """So many steps of Newton, and one more where the answer is to be exact."""
         found = self.keep(

@@ -1,4 +1,4 @@
-"""What reading a damaged file raises, and how it is told."""
+"""What reading a damaged file raises, and the error that names the file."""
 
 from __future__ import annotations
 

@@ -6,15 +6,13 @@ are compressed columns, -2 compressed rows, and nz >= 0 that many triplets, i th
 columns, as CSparse has them and the library's own files (its header says the other way round: H,
 which is not square, fits only so).  ``fclib_global`` has M, H, vectors/f, vectors/w instead
 (`rigid_lcp.friction.files.fclib`).  Order of contacts and signs are ours.  Rolling friction
-(spacedim 5)
-and equality constraints (V, R; G) are refused.
+(spacedim 5) and equality constraints (V, R; G) are refused.
 
 Friction problems of FCLIB by masses (``fclib_global``): ``M v = H r + f``, ``u = H^T v + w``.
 
 Acary et al., FCLIB, Inria RT-0444 (2014).  With ``W = H^T M^-1 H`` and ``q = w + H^T M^-1 f`` it is
 the problem of `rigid_lcp.friction.problem.definition`, and where M is made of one block a body, the
-bodies
-are known.  ``J = H^T``.
+bodies are known.  ``J = H^T``.
 """
 
 from __future__ import annotations
@@ -35,10 +33,7 @@ from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, fr
 from rigid_lcp.sparse import diagonal_blocks
 
 Floats = NDArray[np.float64]
-PARTS = {
-    "fclib_local": (("W",), ("q", "mu")),
-    "fclib_global": (("M", "H"), ("f", "w", "mu")),
-}
+PARTS = {"fclib_local": (("W",), ("q", "mu")), "fclib_global": (("M", "H"), ("f", "w", "mu"))}
 """Matrices and vectors of a problem, by its group."""
 
 

@@ -9,8 +9,7 @@ W is an array W in the same file, or ``NAME_W.npz`` of `scipy.sparse.save_npz`; 
 knows its bodies has J (nc * dim, ndof) as ``NAME_H.npz`` and the diagonal of M^-1, Minv (ndof,).
 
 Files that end in ``.hdf5`` or ``.h5`` are read by `rigid_lcp.friction.files.fclib`, those in
-``.dat`` by
-`rigid_lcp.friction.files.siconos`.
+``.dat`` by `rigid_lcp.friction.files.siconos`.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from rigid_lcp.friction.files.siconos import read_siconos_problem
 from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, friction_problem
 
 Floats = NDArray[np.float64]
-SAME = 1e-8
+SAME_MATRIX = 1e-8
 """W and its factors, both stored, differ by less than this share of the largest entry of W."""
 
 
@@ -189,7 +188,7 @@ def _same(problem: FrictionProblem, path: Path, parts: dict[str, NDArray[Any]]) 
     apart = np.inf
     if stored.shape == made.shape:
         apart = float(abs(sp.csr_array(stored - made).data).max(initial=0.0)) / largest
-    if apart > SAME:
+    if apart > SAME_MATRIX:
         raise ProblemError(
             f"W is not J M^-1 J^T (they differ by {apart:.1g} of its largest entry)", where="W",
             remedy=f"remove {path.stem}_W.npz or {path.stem}_H.npz, whichever is the wrong one",

@@ -16,14 +16,6 @@ from rigid_lcp.friction.linear.lorentz_cones import (
 )
 
 __all__ = [
-    "Factorisation",
-    "SingularSystem",
-    "Solve",
-    "cone_divide",
-    "cone_product",
-    "cone_scale",
-    "cone_scaling",
-    "cone_scaling_square",
-    "cone_step",
-    "factorisation",
-]
+    "Factorisation", "SingularSystem", "Solve", "cone_divide", "cone_product", "cone_scale",
+    "cone_scaling", "cone_scaling_square", "cone_step", "factorisation",
+]  # fmt: skip

@@ -1,32 +1,20 @@
 """Friction methods, one file each, found by being here."""
 
-from rigid_lcp.friction.methods.dantzig import (
-    dantzig,
-)
-from rigid_lcp.friction.methods.gauss_seidel import (
-    Sweeper,
-    gauss_seidel,
-    make_sweeper,
-)
+from rigid_lcp.friction.methods.dantzig import dantzig
+from rigid_lcp.friction.methods.gauss_seidel import Sweeper, gauss_seidel, make_sweeper
 from rigid_lcp.friction.methods.interior_point import (
-    ITERATIONS,
+    PATH_ITERATIONS,
     Path,
     PathStep,
     interior_point,
     spring_size,
 )
-from rigid_lcp.friction.methods.newton import (
-    PATIENCE,
-    alart_curnier,
-    newton,
-)
-from rigid_lcp.friction.methods.pivoting import (
-    pivoting,
-)
+from rigid_lcp.friction.methods.newton import NEWTON_PATIENCE, alart_curnier, newton
+from rigid_lcp.friction.methods.pivoting import pivoting
 
 __all__ = [
-    "ITERATIONS",
-    "PATIENCE",
+    "NEWTON_PATIENCE",
+    "PATH_ITERATIONS",
     "Path",
     "PathStep",
     "Sweeper",
@@ -38,4 +26,4 @@ __all__ = [
     "newton",
     "pivoting",
     "spring_size",
-]
+]  # fmt: skip

@@ -81,7 +81,6 @@ from rigid_lcp.friction.problem import (
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-METHOD = "dantzig"
 
 
 @dataclass(frozen=True)
@@ -218,3 +217,6 @@ def trace_events(state: Pivots) -> list[Event]:
         )
         for row in state.trace[:count]
     ]  # fmt: skip
+
+
+METHOD = dantzig

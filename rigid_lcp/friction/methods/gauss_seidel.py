@@ -13,8 +13,7 @@ made, ``(y - r) . (r - r before) > 0`` with the weights diag W, it starts again 
 proves that this converges with friction, as nothing proves it of plain sweeps; so the residual is
 watched and the best point kept.  Where a bed yields slowly the sweeps drift at some 1e-6 for
 thousands: Newton's method (`rigid_lcp.friction.methods.newton`) goes on from there.  Sweeps to a
-residual of 1e-6
-and of 1e-12 (- where 2000 were short):
+residual of 1e-6 and of 1e-12 (- where 2000 were short):
 
 | problem (contacts)       | plain        | momentum   |
 |--------------------------|--------------|------------|
@@ -56,7 +55,6 @@ from rigid_lcp.friction.sweeps import (
 )
 
 Floats = NDArray[np.float64]
-METHOD = "gauss-seidel"
 Integers = NDArray[np.int64]
 Order = Literal["forward", "symmetric"]
 
@@ -199,3 +197,6 @@ def contact_order(order: Order | Integers, contacts: int) -> Integers:
         "the order of the contacts is not one", where="gauss_seidel, order",
         remedy="give 'forward', 'symmetric' or an array with every contact once",
     )  # fmt: skip
+
+
+METHOD = gauss_seidel

@@ -54,11 +54,10 @@ from rigid_lcp.friction.problem import (
 from rigid_lcp.sparse import multiply_blocks
 
 Floats = NDArray[np.float64]
-METHOD = "interior-point"
 POLISHED = True
 """Newton's method is called from its end."""
 
-ITERATIONS = 50
+PATH_ITERATIONS = 50
 BOUNDARY_SHARE = 0.99
 """Part of the way to the nearest cone's boundary that a step may go."""
 LEAST_CENTRING = 1e-6
@@ -92,7 +91,7 @@ def interior_point(
     path: Path = Path(),
     *,
     linear: Factorisation | None = None,
-    iterations: int = ITERATIONS,
+    iterations: int = PATH_ITERATIONS,
     begun: PathStep | None = None,
 ) -> FrictionSolution:
     """Follow the path until the residual is at or below ``tolerance``.
@@ -306,3 +305,6 @@ def coulomb_velocity(s: Floats, mu: Floats, eps: float, convex: bool) -> tuple[F
                 turn = (squares + 2.0 * eps**2) / rounded**2
                 slope[c, 0, k] = -share * mu[c] * turn * s[c, k] / rounded
     return velocity, slope
+
+
+METHOD = interior_point

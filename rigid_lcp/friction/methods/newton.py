@@ -29,10 +29,9 @@ from rigid_lcp.friction.problem import (
 )
 
 Floats = NDArray[np.float64]
-METHOD = "newton"
 Flags = NDArray[np.int8]
 
-ITERATIONS = 50
+NEWTON_ITERATIONS = 50
 FIRST_SHIFTS = (1e-5, 1e-3)
 """Proximal shifts over mean(diag W) to begin with, tried in turn."""
 LEAST_SHIFT, QUIET = 1e-10, 0.01
@@ -42,7 +41,7 @@ that hardly bear would change at every step."""
 BEARABLE = 1e-2
 """Part of what makes the contacts approach, ``rho |q|``, that the first shift may hold back of the
 forces: a great weight on light bodies answers at a small eigenvalue of W."""
-PATIENCE = 8
+NEWTON_PATIENCE = 8
 """Steps that may fail to halve the best residual: contacts change status before it falls."""
 
 
@@ -102,16 +101,16 @@ def newton(
     tolerance: float = 1e-12,
     *,
     linear: Factorisation | None = None,
-    iterations: int = ITERATIONS,
-    patience: int = PATIENCE,
+    iterations: int = NEWTON_ITERATIONS,
+    patience: int = NEWTON_PATIENCE,
 ) -> FrictionSolution:
     """Newton steps from ``start`` (zero forces if None) until the residual is small enough.
 
     Converges fast near a solution, and may go anywhere from a poor start: give it the point of
     another method.  Where it does not halve its residual in ``patience`` steps it goes back to its
     best point and on with a greater shift, which is slower and steadier; asked for less patience
-    than `PATIENCE` it ends there.  ``linear``: factorisations of this problem's W, made if not
-    given.
+    than `NEWTON_PATIENCE` it ends there.  ``linear``: factorisations of this problem's W, made if
+    not given.
 
     Raises `ProblemError` for a start that is none, `UsageError` for other options that are none.
     """
@@ -127,7 +126,7 @@ def newton(
     offered = problem.rho * length(problem.offset)
     first = min(FIRST_SHIFTS[0], BEARABLE * offered / (length(best) or 1.0)) or FIRST_SHIFTS[0]
     least_shift = min(LEAST_SHIFT, QUIET * first)
-    for shift in (first, *FIRST_SHIFTS[1:]) if patience >= PATIENCE else (first,):
+    for shift in (first, *FIRST_SHIFTS[1:]) if patience >= NEWTON_PATIENCE else (first,):
         force, waited, mark = best, 0, best_residual
         status = np.zeros(0, dtype=np.int8)
         while best_residual > tolerance and done < iterations and waited < patience:
@@ -158,3 +157,6 @@ def newton(
         problem, best, tolerance, "newton",
         {"iterations": float(done), "factorisations": float(done)},
     )  # fmt: skip
+
+
+METHOD = newton

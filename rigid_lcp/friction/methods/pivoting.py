@@ -8,9 +8,8 @@ of the paper's section 6 in place of the three or four unknowns a contact of Ste
 
 The solutions r(lambda) form a path of straight pieces; at each corner one contact changes its list
 (events 3a to 3d).  Unlike the driven force of `rigid_lcp.friction.methods.dantzig`, lambda may grow
-again: after a
-corner the path goes on in the sense in which the contact that moved stays consistent.  A path
-never meets itself, so nothing cycles.
+again: after a corner the path goes on in the sense in which the contact that moved stays
+consistent.  A path never meets itself, so nothing cycles.
 
 From no forces, d = n: for large lambda all contacts part.  Along a ray that ends the path,
 ``dr . du = -mu dr_N |du_T| <= 0`` and ``dr . du = dr . W dr + dlambda dr . d``.  With W positive
@@ -67,7 +66,6 @@ from rigid_lcp.friction.problem import (
 )
 
 Floats = NDArray[np.float64]
-METHOD = "pivoting"
 
 
 def pivoting(
@@ -226,3 +224,6 @@ def make_consistent(
             a[t] = 0.0
         elif t >= 0 and sign != 0.0 and geometry.slip[c] == 0:
             a[t] = -sign * max(-sign * a[t], little / rho * noise[c, 1])
+
+
+METHOD = pivoting

@@ -10,11 +10,7 @@ from rigid_lcp.friction.pivots.drive import (
     move_contact,
     settle_values,
 )
-from rigid_lcp.friction.pivots.shift import (
-    SHIFT_LEAST,
-    remove_shift,
-    set_lists,
-)
+from rigid_lcp.friction.pivots.shift import SHIFT_LEAST, remove_shift, set_lists
 from rigid_lcp.friction.pivots.state import (
     Pivots,
     drive_offset,
@@ -40,34 +36,9 @@ from rigid_lcp.friction.pivots.updates import (
 )
 
 __all__ = [
-    "BREAKING",
-    "DONE",
-    "LIST_NAMES",
-    "NORMAL",
-    "SHIFT_LEAST",
-    "SINGULAR",
-    "SLIDING_DOWN",
-    "SLIDING_UP",
-    "STATIC",
-    "TANGENTIAL",
-    "TOO_MANY",
-    "TURNING",
-    "Geometry",
-    "Ints",
-    "Pivots",
-    "Reduced",
-    "drive",
-    "drive_offset",
-    "judge_pivots",
-    "move_contact",
-    "multiply_geometry",
-    "read_pivots_force",
-    "refresh_reduced",
-    "remove_shift",
-    "scatter_column",
-    "set_lists",
-    "settle_values",
-    "slide_sign",
-    "solve_reduced",
-    "start_pivots",
-]
+    "BREAKING", "DONE", "LIST_NAMES", "NORMAL", "SHIFT_LEAST", "SINGULAR", "SLIDING_DOWN",
+    "SLIDING_UP", "STATIC", "TANGENTIAL", "TOO_MANY", "TURNING", "Geometry", "Ints", "Pivots",
+    "Reduced", "drive", "drive_offset", "judge_pivots", "move_contact", "multiply_geometry",
+    "read_pivots_force", "refresh_reduced", "remove_shift", "scatter_column", "set_lists",
+    "settle_values", "slide_sign", "solve_reduced", "start_pivots",
+]  # fmt: skip

@@ -30,11 +30,11 @@ Ints = NDArray[np.int64]
 
 SHIFT_LEAST = 1e-6
 """Relative shift below which round-off in the inverse would make events up."""
-PROXIMAL_STEPS = 60
+SHIFT_STEPS = 60
 """Most proximal steps that take the shift out,"""
-HARDLY = 10
+FEW_PIVOTS = 10
 """Pivots of a proximal step after which the shift can fall faster."""
-PROXIMAL_PATIENCE = 12
+SHIFT_PATIENCE = 12
 """and most without a better residual: self-stress moves on for a while before it settles."""
 
 
@@ -59,11 +59,11 @@ def remove_shift(problem: FrictionProblem, state: Pivots, tolerance: float, few:
     exact, best = problem.offset[state.rows], read_pivots_force(problem, state)
     least, idle, pace = measure_pivots_residual(problem, state, best), 0, 1.0
     taken, floor = 0, SHIFT_LEAST * state.unit
-    for _ in range(PROXIMAL_STEPS if state.shift[0] > 0.0 else 0):
-        if idle == PROXIMAL_PATIENCE:
+    for _ in range(SHIFT_STEPS if state.shift[0] > 0.0 else 0):
+        if idle == SHIFT_PATIENCE:
             break
         before, shift, spent = copy_pivots(state), float(state.shift[0]), int(state.events[0])
-        smaller = min(shift, max((0.1 if taken > HARDLY else 0.01) ** pace * shift, floor))
+        smaller = min(shift, max((0.1 if taken > FEW_PIVOTS else 0.01) ** pace * shift, floor))
         if least <= tolerance:
             smaller = shift  # what comes now is cheap, and free where no list changes
         if smaller < shift:

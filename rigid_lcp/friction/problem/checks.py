@@ -16,7 +16,7 @@ Integers = NDArray[np.int64]
 
 LEAST, MOST = 1e-100, 1e100
 """Range of the largest number of W, and of q: squares beyond it are no numbers any more."""
-COLUMNS = 256
+COLUMNS_AT_ONCE = 256
 """Columns of an operator that are written out at a time."""
 
 
@@ -159,8 +159,8 @@ def write_out_operator(operator: Any, name: str) -> sp.csr_array:
         )  # fmt: skip
     rows, columns = shape
     parts = []
-    for first in range(0, columns, COLUMNS):
-        width = min(COLUMNS, columns - first)
+    for first in range(0, columns, COLUMNS_AT_ONCE):
+        width = min(COLUMNS_AT_ONCE, columns - first)
         unit = np.zeros((columns, width))
         unit[first + np.arange(width), np.arange(width)] = 1.0
         try:

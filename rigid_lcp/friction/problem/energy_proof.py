@@ -19,15 +19,15 @@ from rigid_lcp.friction.problem.definition import FrictionProblem
 
 Floats = NDArray[np.float64]
 
-STEPS = 3000
+DESCENT_STEPS = 3000
 """Of the descent: forces that balance each other are found in some dozens, rarely in a thousand."""
-CERTAIN = 1e-10
+CERTAIN_ENERGY = 1e-10
 """Energy over that of the same forces on the mean diagonal of W that is no round-off [-]."""
 
 
 def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
     """``rho r . W r`` [-] of forces r in K of length one, and these, (nc * dim,): where a descent
-    from equal normal forces ends, or becomes less than -`CERTAIN`.
+    from equal normal forces ends, or becomes less than -`CERTAIN_ENERGY`.
 
     Negative: a proof that W gives energy.  Positive: no proof that it does not, as the least of a
     form that is not convex may be elsewhere.  The steps, ``r -> P_K(r - S r / |S|)`` with S the
@@ -39,10 +39,10 @@ def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
     force = np.zeros(len(problem.offset))
     force[:: problem.dim] = problem.contacts**-0.5
     energy, ahead, momentum = float(force @ (form @ force)), force, 1.0
-    for _ in range(STEPS):
+    for _ in range(DESCENT_STEPS):
         step = _in_cones(ahead - (form @ ahead) / largest, problem)
         size = float(np.linalg.norm(step))
-        if size == 0.0 or energy < -CERTAIN:
+        if size == 0.0 or energy < -CERTAIN_ENERGY:
             break
         step /= size
         reached = float(step @ (form @ step))
@@ -60,7 +60,9 @@ def find_least_energy(problem: FrictionProblem) -> tuple[float, Floats]:
 def gives_energy(problem: FrictionProblem) -> bool:
     """Whether forces are found on which W gives energy; never where it is made of bodies."""
     return (
-        problem.bodies is None and problem.contacts > 0 and find_least_energy(problem)[0] < -CERTAIN
+        problem.bodies is None
+        and problem.contacts > 0
+        and find_least_energy(problem)[0] < -CERTAIN_ENERGY
     )
 
 

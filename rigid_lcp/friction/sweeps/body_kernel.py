@@ -1,11 +1,10 @@
 """Sweeps in body space, plane and solid: momentum, visit and judgement of a contact in one pass.
 
 A visit reads the velocities ``w = B^T y`` of two bodies (`rigid_lcp.friction.sweeps.blocks`),
-solves its
-contact exactly and changes them.  A sweep with momentum begins at ``y = r + part (r - r before)``;
-as w is linear in y, w is carried ahead for all contacts at once, and y itself is made contact by
-contact when it is needed; what a visit reads lies in one row: so a sweep goes through the memory
-once, not four times.
+solves its contact exactly and changes them.  A sweep with momentum begins at
+``y = r + part (r - r before)``; as w is linear in y, w is carried ahead for all contacts at once,
+and y itself is made contact by contact when it is needed; what a visit reads lies in one row: so a
+sweep goes through the memory once, not four times.
 
 Where W_cc can be inverted safely (`inverses`), what sticks is ``r = y - W_cc^-1 u``, and what
 slides in the plane has one sign only: with ``mu |W_NT| < W_NN`` the contact alone has one answer

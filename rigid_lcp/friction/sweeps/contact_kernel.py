@@ -1,11 +1,9 @@
 """Sweeps over the contacts, each solved exactly while the others are held, with momentum.
 
 A sweep goes by the velocities of the bodies (`rigid_lcp.friction.sweeps.body_kernel`) or by the
-rows of W.  A
-contact that has no solution keeps its force.  `sweep_until_small` repeats them with momentum
-(`rigid_lcp.friction.methods.gauss_seidel` says why) without a return to Python: a sweep over a
-hundred contacts
-costs a few microseconds.
+rows of W.  A contact that has no solution keeps its force.  `sweep_until_small` repeats them with
+momentum (`rigid_lcp.friction.methods.gauss_seidel` says why) without a return to Python: a sweep
+over a hundred contacts costs a few microseconds.
 """
 
 from __future__ import annotations
@@ -24,7 +22,7 @@ from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contact_2d, solv
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-GROWTH = 1.5
+CHANGE_GROWTH = 1.5
 """Momentum starts again when a sweep changes the forces by so many times the least change since
 it last did: without this large beds (10,000 contacts) swing on at 1e-4, as nothing turns back."""
 CHECK_EVERY, CHECK_AFTER = 0.1, 5.0
@@ -78,7 +76,7 @@ def visit_all(
 ) -> tuple[int, float, float]:  # fmt: skip
     """One sweep from ``y = force + part (force - last)``, ``velocity`` being that of y.
 
-    Returns as `rigid_lcp.friction.sweeps.sweep_bodies_2d`, and leaves what it leaves.
+    Returns as `rigid_lcp.friction.sweeps.body_kernel.sweep_bodies_2d`, and leaves what it leaves.
     """
     if len(blocks.body) == 0:
         before = force.copy()
@@ -123,7 +121,7 @@ def sweep_once(
     if momentum and (not symmetric or back):
         tally[3] = np.sqrt(square)
         tally[2] = min(tally[2], tally[3])
-        if product > 0.0 or tally[3] > GROWTH * tally[2]:
+        if product > 0.0 or tally[3] > CHANGE_GROWTH * tally[2]:
             # Begin again, and rid the velocities of rounding, which momentum would throw forward.
             tally[1], tally[2] = 1.0, np.inf
             state.velocity[:] = 0.0

@@ -9,8 +9,7 @@ A contact is open, it sticks, or it slides (section 6).  Open: ``q_N >= 0`` and 
 
 In 2D d is one of two signs.  In 3D the component of ``g + G d`` across d has to vanish, see
 `rigid_lcp.friction.sweeps.sliding_direction`.  Updating the two tangents one after the other
-instead is wrong:
-where W_TT is not diagonal such a sweep has another fixed point.
+instead is wrong: where W_TT is not diagonal such a sweep has another fixed point.
 
 W need be neither symmetric nor regular.  Where several answers exist (a strong coupling W_NT)
 the order is open, stick, slide; where none exists (Painleve) the status says so.
@@ -23,7 +22,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.friction.sweeps.sliding_direction import (
-    ROUNDING,
+    TIE_ROUND_OFF,
     find_all_directions,
     find_direction_near,
 )
@@ -68,7 +67,7 @@ def solve_contact_2d(w: Floats, q_n: float, q_t: float, mu: float) -> tuple[floa
             return r_n, r_t, STICK
     elif w[0, 0] > 0.0:
         r_n = -q_n / w[0, 0]
-        if abs(w[1, 0] * r_n + q_t) <= ROUNDING * (abs(w[1, 0] * r_n) + abs(q_t)):
+        if abs(w[1, 0] * r_n + q_t) <= TIE_ROUND_OFF * (abs(w[1, 0] * r_n) + abs(q_t)):
             return r_n, 0.0, STICK
     g = w[0, 0] * q_t - q_n * w[1, 0]
     bend = mu * (q_n * w[1, 1] - q_t * w[0, 1])
@@ -76,7 +75,7 @@ def solve_contact_2d(w: Floats, q_n: float, q_t: float, mu: float) -> tuple[floa
     size = abs(w[0, 0] * q_t) + mu * abs(q_t * w[0, 1]) - q_n * (abs(w[1, 0]) + mu * abs(w[1, 1]))
     for d in (first, -first):
         denominator = w[0, 0] - mu * w[0, 1] * d
-        if denominator > 0.0 and d * g + bend >= -ROUNDING * size:
+        if denominator > 0.0 and d * g + bend >= -TIE_ROUND_OFF * size:
             r_n = -q_n / denominator
             return r_n, -mu * r_n * d, SLIDE
     return 0.0, 0.0, NONE
@@ -207,6 +206,6 @@ def force_sliding(
     """
     denominator = w[0, 0] - mu * (w[0, 1] * d_1 + w[0, 2] * d_2)
     kappa = d_1 * (g_1 + b_11 * d_1 + b_12 * d_2) + d_2 * (g_2 + b_21 * d_1 + b_22 * d_2)
-    if denominator <= 0.0 or kappa < -ROUNDING * size:
+    if denominator <= 0.0 or kappa < -TIE_ROUND_OFF * size:
         return -1.0
     return -q_n / denominator

@@ -151,7 +151,7 @@ def face_rows(
     return face_start, face_index[:end].copy(), face_value[:end].copy()
 
 
-GROWTH = 1.5
+SWEEP_GROWTH = 1.5
 """Momentum starts again when a sweep goes so many times as far as the shortest since it did."""
 
 
@@ -194,7 +194,7 @@ def normal_sweeps(
             product += diagonal[c] * back * (f[c] - last[c])
             square += diagonal[c] * back * back
         least = min(least, square)
-        if product > 0.0 or square > GROWTH**2 * least:
+        if product > 0.0 or square > SWEEP_GROWTH**2 * least:
             time, least = 1.0, math.inf
         if sweep % at_once == 0:
             changed = 0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-ROUNDING = 1e-14
+TIE_ROUND_OFF = 1e-14
 """Relative size below which a difference of the data is rounding: ties on the edge of the cone."""
 NEWTON_STEPS = 8
 
@@ -64,7 +64,7 @@ def find_all_directions(
         across = c * (g_2 + b_21 * c + b_22 * s) - s * (g_1 + b_11 * c + b_12 * s)
         if abs(across) > best:
             best, e_1, e_2 = abs(across), -c, -s
-    if best <= ROUNDING * size:
+    if best <= TIE_ROUND_OFF * size:
         for k in range(4):
             found[k, 0], found[k, 1] = (1.0 - k, 0.0) if k % 2 == 0 else (0.0, 2.0 - k)
         return found, 4

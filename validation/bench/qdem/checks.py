@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from validation.case import TOLD, Check
+from validation.case import UNBARRED, Check
 from validation.study import Row, format_table
 
 RANGE = re.compile(r"(\S+) to (\S+)")
@@ -44,10 +44,10 @@ def orders(sizes: Sequence[float], errors: Sequence[float]) -> float:
 
 
 def meets(value: float, bar: str) -> bool:
-    """Whether a value meets a bar as it is written: ``< x``, ``>= x``, ``a to b``, a told one."""
+    """Whether a value meets a bar as it is written: ``< x``, ``>= x``, ``a to b``; else True."""
     if not isfinite(value):
         return False
-    if bar in TOLD:
+    if bar in UNBARRED:
         return True
     if found := RANGE.fullmatch(bar):
         return float(found[1]) <= value <= float(found[2])
@@ -70,7 +70,7 @@ def figures_row(checks: Sequence[Check], **more: Any) -> Row:
 
 
 def list_checks(rows: Sequence[Row], page: str = "") -> list[Check]:
-    """The figures of all rows, each held against its bar anew."""
+    """The figures of all rows, each against its bar."""
     return [
         Check(name, value, bar, meets(value, bar), unit, page)
         for row in rows

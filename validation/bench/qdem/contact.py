@@ -164,7 +164,7 @@ def momenta(run: q.Simulation) -> Floats:
 
 
 def account(run: q.Simulation, duration: float, parts: int = 20) -> tuple[float, float, float]:
-    """What the account lacks, what contact stored and what friction took, over the greatest."""
+    """Gap in the energy balance, energy of contact, loss by friction, over the greatest energy."""
     e = run.energy()
     start = e.kinetic + e.elastic + e.contact
     worst, greatest, stored = 0.0, start, e.contact
@@ -191,7 +191,7 @@ def near_critical(model: str, share: float) -> tuple[float, bool]:
     ]
     run = q.Simulation(bodies, threads=1, contact=touch, step=step)
     thrown(bodies[1], (0, 0, -0.05))
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", StepWarning)
-        lacks = account(run, 400 * step)[0]
-    return lacks, any("times the critical" in str(w.message) for w in told)
+        gap = account(run, 400 * step)[0]
+    return gap, any("times the critical" in str(w.message) for w in caught)

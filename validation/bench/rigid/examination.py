@@ -31,7 +31,7 @@ class Family:
     belongs: str
     """`SAME` or `BEYOND`."""
     count: int
-    """How many are posed unless told otherwise."""
+    """How many are posed by default."""
     make: Callable[[Generator, int], Posed]
     soluble: bool = True
     """Every problem is known to have a solution."""

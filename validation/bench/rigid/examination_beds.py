@@ -1,9 +1,8 @@
 """Beds and crystals of the examination under many loads: at rest, kicked, tilted.
 
 Loads are velocities of the bodies before the step, so that q stays in the image of J and a solution
-exists.  They are told in units of g h, what a step of h adds to a free fall.  A generator of random
-numbers alone decides, and the number of the problem in its family, which goes through kinds by
-turns.
+exists.  Their unit is g h, what a step of h adds to a free fall.  Only a generator of random
+numbers decides, and the number of the problem in its family, which takes the kinds by turns.
 """
 
 from __future__ import annotations

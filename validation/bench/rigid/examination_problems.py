@@ -92,7 +92,7 @@ def named(each: NamedProblem) -> Posed:
 
 
 def stored_changed(generator: Generator, index: int) -> Posed:
-    """The stored problems by turns, `rigid_problems.changed`."""
+    """The stored problems by turns, `altered`."""
     return altered(named(stored()[index % len(stored())]), generator)
 
 

@@ -1,8 +1,7 @@
 """A second judge of forces, apart from the solver's own: plain NumPy in extended precision.
 
 The natural residual of `rigid_lcp.friction.problem.cones`, from W or its factors alone: nothing of
-the solver's
-kernels is used, and round-off of the sums is 1e-19 where long double has 80 bits.
+the solver's kernels is used, and round-off of the sums is 1e-19 where long double has 80 bits.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Symbols as in Chung and Ooi (2011): V_n, V_t speeds of approach of the contact point along normal
 and tangent, omega spin, mu friction, e restitution; primes mark what is after the impact.  Hertz'
-collision itself is `adapters.bed.hertz_collision`.  Between rebound without sliding and
-rebound that slides all the time there is no closed form for a spring that stiffens: there an
+collision itself is `adapters.bed.contact_law.hertz_collision`.  Between rebound without sliding
+and rebound that slides all the time there is no closed form for a spring that stiffens: there an
 engine's own law is integrated, in units of m*, V_n and the stiffness of eq. 5.
 """
 

@@ -56,7 +56,7 @@ ACCURACY: tuple[Line, ...] = (
     ("5", "order in the step, friction", "0.9", r"test 5, .*order .*friction$", tell_least),
     ("6", "order in the step, a scene's law", "0.9", r"test 6, .*order .*friction$", tell_least),
 )  # fmt: skip
-"""Test, quantity, bar, pattern of the checks' names, how their values are told."""
+"""Test, quantity, bar, pattern of the checks' names, how their values are written."""
 UNDER = "sliding limit, impulse, under the"
 GAP: tuple[Line, ...] = (
     ("6 to 8", "as a scene has it", "", rf"test [678], .*{UNDER} scene law$", tell_span),

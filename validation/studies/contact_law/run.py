@@ -319,11 +319,11 @@ def measure_engine(engine: str) -> Row:
     checks += tangential_order_checks(engine)
     checks += [c for s in TANGENTIAL for c in tangential_checks(s, engine, impulses)]
     checks += [*closing_checks(engine), lever_check(TANGENTIAL[3], engine)]
-    told = [
+    rows = [
         {"name": check.name, "value": check.value, "bar": check.bar, "ok": bool(check.ok)}
         for check in checks
     ]
-    return {"checks": told, "impulses": impulses, "engine": get_engine(engine).version()}
+    return {"checks": rows, "impulses": impulses, "engine": get_engine(engine).version()}
 
 
 PARTS: dict[str, Callable[[], Row]] = {

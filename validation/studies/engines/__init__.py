@@ -1,4 +1,4 @@
-"""Do three engines settle one packing alike, and how fast is each?
+"""Do three engines settle one packing by the same amount, and how fast is each?
 
 **Question.** How far do settlement, coordination number and density depend on the engine, and on
 what in it?  What does a step cost on LIGGGHTS, LAMMPS and YADE?
@@ -12,9 +12,9 @@ what in it?  What does a step cost on LIGGGHTS, LAMMPS and YADE?
   them rest under gravity, seats the piston as in any run of a scene, and computes 50 load cycles;
 * figures come from positions and the piston's record alone, by the same code for every way;
 * differences of two ways are taken bed by bed, mean and Student's interval over the beds.  One is
-  called real when the interval at 0.05/9 leaves out zero: three pairs of engines times three
+  called real when the interval at 0.05/9 excludes zero: three pairs of engines times three
   figures (settlement, coordination number, relative density);
-* noise: LIGGGHTS against itself with one grain 1e-9 m aside: no two engines can be told apart by
+* noise: LIGGGHTS against itself with one grain 1e-9 m aside: no two engines can be distinguished by
   less than what this twin strays;
 * what a gap comes from: one setting is changed at a time.  Nothing is added, dropped or run again
   because of what it gave.

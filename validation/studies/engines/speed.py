@@ -188,7 +188,7 @@ def run_bed(
 
 
 def check_end(end: FloatArray, grains: int) -> None:
-    """No time is told of a bed that is not whole, finite and at rest; raises `NotCredible`.
+    """No time is reported of a bed that is not whole, finite and at rest; raises `NotCredible`.
 
     At rest: less kinetic energy than lifts every grain by a thousandth of its radius.
     """

@@ -1,8 +1,7 @@
 """Known up to N_c cycles, what is the settlement at 10 N_c, and how far is that wrong?
 
 **Question.** Which law of settlement, alone or by the votes of `adapters.laws.fit.outlook`, errs
-least ten
-times ahead, does its band hold the truth, and does it refuse what no slow law can tell?
+least ten times ahead, does its band hold the truth, and does it refuse what no slow law predicts?
 
 **Answer.** docs/laws.md.
 

@@ -20,7 +20,6 @@ from adapters.laws.fit.refusal import UNCERTAIN, failure, refusals
 from adapters.laws.fit.regime import REGIMES
 from validation.studies.laws.series import (
     OTHER_CUTS,
-    REACH,
     LawCase,
     ballast_cases,
     ballast_series,
@@ -36,8 +35,6 @@ LAWS = (
     "linear", "log", "log-linear", "power", "shenton", "hyperbolic", "stretched-exponential",
     "inverse-log", "sato", "hca", "karrech2007",
 )  # fmt: skip
-REGIME_CUTS = (100.0, 300.0, 1e3, 3e3, 1e4, 1e5, np.inf)
-"""Last known cycle; inf: the whole test."""
 WHOLE_TO, FAIL_AT = 1e6, 0.3
 """Whole tests are predicted up to here; the strain at which they were stopped, 0.297 to 0.305."""
 
@@ -186,26 +183,6 @@ def measure_fast() -> Row:
     return {"cases": len(rows), "refused": sum(not row["allowed"] for row in rows)}
 
 
-def tell_regime(cycle: FloatArray, settlement: FloatArray) -> str:
-    """The regime `REACH` times ahead, or that of the refusal."""
-    said = outlook(cycle, settlement[:, None], REACH * float(cycle[-1]))
-    (refusal,) = refusals(said)
-    return refusal.regime if refusal else said.regime[0].name
-
-
-def tell_regimes() -> Row:
-    """What is said of every ballast test from its readings up to `REGIME_CUTS`; None: too few."""
-    regimes: dict[str, list[str | None]] = {}
-    for name, cycle, strain in ballast_series(data_folder()):
-        told: list[str | None] = []
-        for cut in REGIME_CUTS:
-            known = cycle <= cut * (1 + 1e-9)
-            enough = known.sum() >= 5 and (cycle[known][-1] >= cut / 2 or not np.isfinite(cut))
-            told.append(tell_regime(cycle[known], strain[known]) if enough else None)
-        regimes[name] = told
-    return {"regimes": regimes}
-
-
 def predict_whole_tests() -> Row:
     """Whole ballast tests to a million cycles, and what is said of them with ``--fail-at``."""
     found = []
@@ -213,7 +190,7 @@ def predict_whole_tests() -> Row:
         said = outlook(cycle, strain[:, None], WHOLE_TO)
         (refusal,) = refusals(said)
         failed = refusal or failure(float(said.prediction[0]), FAIL_AT, WHOLE_TO)
-        told = said.regime[0].name
+        regime = said.regime[0].name
         found.append(
             {
                 "name": name,
@@ -222,27 +199,11 @@ def predict_whole_tests() -> Row:
                 "exponent": [said.regime[0].exponent, said.regime[0].deviation],
                 "prediction": float(said.prediction[0]),
                 "band": [float(said.low[0]), float(said.high[0])],
-                "said": refusal.regime if refusal else told,
-                "said_fail_at": failed.regime if failed else told,
+                "said": refusal.regime if refusal else regime,
+                "said_fail_at": failed.regime if failed else regime,
             }
         )
     return {"tests": found}
-
-
-def time_many_grains(grains: int = 1000, cycles: int = 50) -> Row:
-    """CPU time of one fit to noisy logarithms of all axes of all grains, least of three [s]."""
-    cycle = np.arange(1.0, cycles + 1)
-    noise = 0.05 * np.random.default_rng(0).standard_normal((cycles, grains, 3))
-    displacement = np.log(cycle)[:, None, None] + noise
-    cost: dict[str, float] = {}
-    for name in ("log", "hyperbolic", "stretched-exponential"):
-        law, seconds = get_law(name), []
-        for _ in range(3):
-            start = time.process_time()
-            law.fit(cycle, displacement)
-            seconds.append(time.process_time() - start)
-        cost[name] = min(seconds)
-    return {"grains": grains, "cycles": cycles, "cost_s": cost}
 
 
 PARTS: dict[str, Callable[[], Row]] = {
@@ -251,7 +212,5 @@ PARTS: dict[str, Callable[[], Row]] = {
     "families": partial(measure_source, lambda: family_cases(MEMBERS)),
     "engine": partial(measure_source, lambda: run_cases(data_folder())),
     "fast": measure_fast,
-    "regimes": tell_regimes,
     "whole": predict_whole_tests,
-    "grains": time_many_grains,
 }

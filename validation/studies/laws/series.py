@@ -93,7 +93,7 @@ def run_cases(folder: Path) -> list[LawCase]:
 
 
 def slow_families(random: np.random.Generator) -> dict[str, Curve]:
-    """One member of each family whose rate falls for good, its parameters drawn anew.
+    """One member of each family whose rate falls for good, its parameters drawn at random.
 
     Of the bank's own laws and of others: sums of two and three logarithms, of two stretched
     exponentials, Thom and Oakley's squared logarithm, Varandas' sum of n^-b, creep with bursts,

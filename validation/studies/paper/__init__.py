@@ -7,7 +7,7 @@ moving nothing does?  Does the relaxation bring a cell of nine grains to equilib
 **Answer.** docs/paper.md.
 
 **Design.** The stored full run of the paper's bed (1,085 grains, 46.9 GPa, 50 Hz, 300 cycles), all
-windows with k_i of 10 to 200, k and h of 5 to 80 that it has.  Eq. 22 is said to hold coordinates
+windows with k_i of 10 to 200, k and h of 5 to 80 that it has.  Eq. 22 has coordinates
 in its text and displacements in its symbols, so there are three denominators.  Two rivals: nothing
 moved, and what a run that began 1e-10 m apart moved.  The cell: the paper gives no measures; eight
 equal grains at the corners of a cube around one that the estimate moves 1.8 mm into a corner.  The

@@ -56,8 +56,8 @@ def judge_jump(position: FloatArray, twin: FloatArray, k_i: int, k: int, h: int)
         )
         for name, estimate in estimates.items()
     }
-    told = {name: [float(f"{one:.4g}") for one in three] for name, three in errors.items()}
-    return {"k_i": k_i, "k": k, "h": h, "errors": told}
+    rounded = {name: [float(f"{one:.4g}") for one in three] for name, three in errors.items()}
+    return {"k_i": k_i, "k": k, "h": h, "errors": rounded}
 
 
 def judge_jumps() -> Row:

@@ -1,4 +1,4 @@
-"""Every figure of the record, held anew against the bar that stands beside it."""
+"""Every figure of the record against its bar."""
 
 from functools import partial
 

@@ -7,14 +7,7 @@ import numpy as np
 import qdem_fem as q
 from validation.bench.qdem.checks import figures_row, reported
 from validation.bench.qdem.contact import CASES, MODELS, account, momenta, near_critical
-from validation.bench.qdem.grains import (
-    FRICTION,
-    GRAIN,
-    RADIUS,
-    STIFFNESS,
-    lattice,
-    seconds_a_step,
-)
+from validation.bench.qdem.grains import FRICTION, GRAIN, RADIUS, STIFFNESS, lattice, seconds_a_step
 from validation.case import Check
 from validation.studies.qdem_contact.faces import faces_checks
 from validation.studies.qdem_contact.hertz import hertz_checks
@@ -43,10 +36,10 @@ def hard() -> Row:
         for model in MODELS:
             run, duration = case(model)
             before = momenta(run)
-            lacks, stored, lost = account(run, duration)
+            gap, stored, lost = account(run, duration)
             name = f"hard case, {words}, {model}"
             checks += [
-                at_most(f"{name}: energies do not close", lacks, 1e-3),
+                at_most(f"{name}: energies do not close", gap, 1e-3),
                 reported(f"{name}: contact stored at most", stored),
                 reported(f"{name}: friction took", lost),
             ]
@@ -55,9 +48,9 @@ def hard() -> Row:
                 checks.append(at_most(f"{name}: change of angular momentum", change, 1e-9))
     for model in MODELS:
         name = f"hard case, critical step with contact, {model}"
-        (lacks, early), (_, warned) = (near_critical(model, share) for share in (0.999, 1.001))
+        (gap, early), (_, warned) = (near_critical(model, share) for share in (0.999, 1.001))
         checks += [
-            reported(f"{name}: energies do not close at 0.999", lacks),
+            reported(f"{name}: energies do not close at 0.999", gap),
             at_most(f"{name}: warned at 0.999", early, 0),
             Check(f"{name}: warned at 1.001", float(warned), ">= 1", warned),
         ]

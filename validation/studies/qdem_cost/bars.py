@@ -1,4 +1,4 @@
-"""What must hold on any machine; costs at equal error are told."""
+"""What must hold on any machine; costs at equal error are reported."""
 
 from __future__ import annotations
 

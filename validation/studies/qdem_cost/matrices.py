@@ -3,7 +3,7 @@
 v += dt M^-1 (f - K u), u += dt v, by scipy's compressed rows and by the Intel MKL.  Each is given
 its best: A = -dt M^-1 K is formed beforehand, so that the product is added to v without another
 pass; fixed rows and columns and exact zeros are left out; nodes are numbered by reverse
-Cuthill-McKee; indices have 32 bits; MKL's handle is made once, told that many products follow, and
+Cuthill-McKee; indices have 32 bits; MKL's handle is made once, announces many products, and
 gets compressed rows and blocks of 3 x 3 both.  They solve less than QDEM does: small strain only.
 
 MKL takes its threads from the load of the machine unless its environment has `ENVIRONMENT`.
@@ -31,7 +31,7 @@ ENVIRONMENT = {"MKL_DYNAMIC": "FALSE", "OMP_DYNAMIC": "FALSE", "MKL_THREADING_LA
 SAFETY = 0.9
 """Of the time step against its bound."""
 CALLS = 1_000_000
-"""How many products MKL is told to expect."""
+"""Number of products that MKL expects."""
 PLAIN, ROWS = 10, 101
 """MKL's codes: matrix not transposed; blocks stored row by row."""
 

@@ -8,13 +8,7 @@ from typing import Any
 
 from validation.bench.qdem.checks import describe_checks, describe_origin, draw_figure
 from validation.studies.qdem_cost.bars import check_bars
-from validation.studies.qdem_cost.reading import (
-    FAMILIES,
-    LEVELS,
-    describe_costs,
-    family,
-    frontier,
-)
+from validation.studies.qdem_cost.reading import FAMILIES, LEVELS, describe_costs, family, frontier
 from validation.study import Row, format_table
 
 STYLE = {

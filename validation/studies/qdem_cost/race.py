@@ -132,11 +132,11 @@ def race(cells: tuple[int, int, int], rounds: int) -> dict[str, dict[str, float]
     for _ in range(rounds):
         for one in contestants:
             words = [json.dumps(asdict(one)), *map(str, cells)]
-            told = subprocess.run(
+            printed = subprocess.run(
                 [sys.executable, "-m", "validation.studies.qdem_cost.race", *words], check=True,
                 stdout=subprocess.PIPE, cwd=Path(__file__).parents[3], env=kept | ENVIRONMENT,
             )  # fmt: skip
-            found[one.name].append(json.loads(told.stdout))
+            found[one.name].append(json.loads(printed.stdout))
     return {
         name: {"speed": float(np.median([turn["speed"] for turn in turns])), "tip": turns[0]["tip"]}
         for name, turns in found.items()

@@ -32,7 +32,7 @@ Run = tuple[str, str, dict[str, Any]]
 
 
 def plan_runs(question: str) -> list[Run]:
-    """All runs, cheap ones first; the dearest are left out, as no sentence needs them."""
+    """All runs, cheap ones first; the most expensive are left out, as no sentence needs them."""
     bends = question == "bending"
     runs: list[Run] = []
     for level, cells in enumerate(LEVELS[:6] if bends else LEVELS):

@@ -16,7 +16,7 @@ STALE = "made before grains were scattered as they begin to fall; not what the c
 
 
 def check_bars(rows: Sequence[Row]) -> list[Check]:
-    """Every figure of the record, judged anew."""
+    """Every figure of the record against its bar."""
     checks = list_checks(rows, PAGE)
     for row in rows:
         for friction in FRICTIONS if "runs" in row else ():

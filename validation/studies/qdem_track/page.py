@@ -29,8 +29,8 @@ LEVERS = {
     "springs of 0.1 of Table 1's": "springs times 0.1",
     "springs of 0.01": "springs times 0.01",
 }
-MEASURES = {"greatest": "settlement, greatest", "end": "settlement behind both axles",
-            "lateral": "lateral motion, greatest"}  # fmt: skip
+MEASURES = {"greatest": "greatest settlement", "end": "behind both axles",
+            "lateral": "greatest lateral motion"}  # fmt: skip
 PAPER_SCALE = {
     name: name
     for name in (
@@ -59,28 +59,20 @@ def describe(rows: Sequence[Row]) -> dict[str, str]:
 
 
 def describe_packings(row: Row) -> str:
-    """Means over packings and their intervals of 95 %, a column a friction [um]."""
+    """Means over packings and their intervals of 95 %, a line a point and friction [um]."""
     lines = []
     for point in POINTS:
-        for key, words in MEASURES.items():
-            cells = []
-            for friction in FRICTIONS:
-                runs = [run for run in row["runs"] if run["friction"] == friction]
-                mean, half = mean_interval([1e6 * run["points"][point][key] for run in runs])
-                cells.append(f"{mean:.3g} ± {half:.2g}")
-            lines.append([f"{words} of {point}", *cells])
-    for point in POINTS:
-        cells = []
         for friction in FRICTIONS:
-            ratio = [
-                run["points"][point]["lateral_over_vertical"]
-                for run in row["runs"]
-                if run["friction"] == friction
-            ]
-            cells.append(f"{np.mean(ratio):.2g}")
-        lines.append([f"lateral over vertical motion of {point}", *cells])
-    heads = [f"friction {friction:g}" for friction in FRICTIONS]
-    return format_table(["300 grains [µm]", *heads], lines)
+            found = [run["points"][point] for run in row["runs"] if run["friction"] == friction]
+            cells = [point, f"{friction:g}"]
+            for key in MEASURES:
+                mean, half = mean_interval([1e6 * one[key] for one in found])
+                cells.append(f"{mean:.3g} ± {half:.2g}")
+            ratio = np.mean([one["lateral_over_vertical"] for one in found])
+            lines.append([*cells, f"{ratio:.2g}"])
+    return format_table(
+        ["300 grains [µm]", "friction", *MEASURES.values(), "lateral over vertical"], lines
+    )
 
 
 def draw(rows: Sequence[Row], picture: Path) -> None:

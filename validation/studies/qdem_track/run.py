@@ -15,11 +15,7 @@ from qdem_fem.track.enter import TrackPrepared, contact_of
 from qdem_fem.track.stand import begin_bed
 from validation.bench.qdem.checks import figures_row, reported
 from validation.studies.qdem_track.bogie import FRICTIONS, SCENE, SEEDS, measure_packing
-from validation.studies.qdem_track.trials import (
-    blow_checks,
-    lever_checks,
-    resume_check,
-)
+from validation.studies.qdem_track.trials import blow_checks, lever_checks, resume_check
 from validation.study import Row
 
 STEPS = 500

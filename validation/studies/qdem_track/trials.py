@@ -30,7 +30,7 @@ DURATION = 0.015
 
 
 class Quiet:
-    """No progress is told."""
+    """No progress is printed."""
 
     def at(self, steps: int, total: int, when: float) -> None:
         """Nothing."""

@@ -4,7 +4,7 @@ Question: Schwager and Poeschel (2002, section 10) expect that rigid grains may 
 where Molecular Dynamics needs 1e-7 s, and that both cost the same in the end for ballast.  Do they,
 at equal error of the residual settlement after five load cycles?  Does the step matter in space?
 Answer: rigid steps of 1 ms cost what soft grains of 1e9 N/m do, with 500 times fewer steps; but the
-two limits differ by half of their mean, so that smaller errors can not be told from noise.
+two limits differ by half of their mean, so that smaller errors cannot be distinguished from noise.
 
 Design, fixed before the runs: the 30 beds of ``ballast-2d.toml`` of seeds 1 to 30, none left
 out, poured and tamped once by rigid grains; every method starts from that state at rest, has 50 ms

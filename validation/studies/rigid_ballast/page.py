@@ -29,7 +29,7 @@ def _limits(rows: Sequence[Row]) -> str:
     rigid, soft = (list_ends(rows, method) for method in ("rigid", "soft"))
     apart, wide = mean_interval(rigid - soft)
     mean = float(np.mean((rigid + soft) / 2))
-    verdict = "differ" if abs(apart) > wide else "can not be told apart"
+    verdict = "differ" if abs(apart) > wide else "cannot be distinguished"
     return (
         f"**The two limits {verdict}.** The finest rigid level less the finest soft one is "
         f"{1e3 * apart:+.2f} ± {1e3 * wide:.2f} mm in the mean of {len(rigid)} beds, that is "

@@ -9,7 +9,7 @@ contact point with overlap ``d = -gap`` and velocity u of body a over body b
 
 (Cundall and Strack, Geotechnique 29 (1979) 47), advanced by the explicit symplectic Euler method.
 The step is a stated share of ``2 sqrt(m / k)`` of the lightest stone.  Neighbours are kept in a
-list that is made anew when a body has moved by its skin.
+list that is rebuilt when a body has moved by its skin.
 """
 
 from __future__ import annotations

@@ -2,10 +2,9 @@
 
 Question: rigid grains with more contact forces than equations of balance have many forces that
 fit; are those of the direct limit (`rigid_lcp.unique.elastic_limit`) the ones molecular dynamics
-tends to,
-do order and start matter, and what do they cost?
+tends to, do order and start matter, and what do they cost?
 Answer: without friction, and where contacts stick, springs differ by 1/k until round-off; where
-contacts slide, springs keep what slid on the way, and may rest in another state.
+contacts slide, the forces depend on the history, and springs may rest in another state.
 
 Design: every scene by the direct limit, by the relaxation of section 8, by springs integrated in
 time by a program of its own (`springs`) and by LIGGGHTS where the grains are discs.  Error: the

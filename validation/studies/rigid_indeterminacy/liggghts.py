@@ -89,7 +89,7 @@ def liggghts_rest(
         )  # fmt: skip
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         if f"DONE {steps}" not in done.stdout:
-            raise RuntimeError(f"LIGGGHTS did not come to its end: {done.stdout[-400:]}")
+            raise RuntimeError(f"LIGGGHTS did not finish: {done.stdout[-400:]}")
         force = _forces(grains, home, planes)
     cpu = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
     total = np.zeros((len(grains.mass) + 1, 2))

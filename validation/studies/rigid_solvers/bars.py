@@ -49,7 +49,7 @@ def _check_family(family: str, rows: Sequence[Row]) -> list[Check]:
 
 def _check_beside(rows: Sequence[Row], rival: str) -> list[Check]:
     """Ours is not slower than a rival where that reaches the bar; an infinite ratio, where ours
-    does not reach it at all, is told as `ENDLESS`."""
+    does not reach it at all, is reported as `ENDLESS`."""
     checks = []
     for row in rows:
         found = reading.cost_ratios([row], rival)

@@ -92,10 +92,10 @@ class Method:
 JUMPING = Variant()
 
 
-def jumping(jumps: int, *settings: str, told: str = "", runs: int = 1) -> Method:
+def jumping(jumps: int, *settings: str, suffix: str = "", runs: int = 1) -> Method:
     """So many equal jumps by the law of the last window."""
-    name = f"{jumps} jumps{told}"
-    family = "nothing moved" if "nothing" in told else "jumps by the law"
+    name = f"{jumps} jumps{suffix}"
+    family = "nothing moved" if "nothing" in suffix else "jumps by the law"
     return Method(name, family, settings, JUMPING, jumps, runs=runs)
 
 
@@ -119,7 +119,7 @@ STILL = ('procedure.move="still"',)
 
 def still(jumps: int, runs: int = 1) -> Method:
     """Jumps that move nothing."""
-    return jumping(jumps, *STILL, told=", nothing moved", runs=runs)
+    return jumping(jumps, *STILL, suffix=", nothing moved", runs=runs)
 
 
 def soften(factor: int, kind: Kind) -> Method:

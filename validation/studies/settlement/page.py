@@ -11,24 +11,28 @@ import numpy as np
 from adapters.bed.state import FloatArray
 from adapters.procedure.history import sum_cost
 from validation.studies.settlement.bars import check_bars
-from validation.studies.settlement.beds import EVERY, KINDS, LAWS, Kind, list_methods
+from validation.studies.settlement.beds import COARSE, EVERY, KINDS, LAWS, Kind, list_methods
 from validation.studies.settlement.reading import (
-    FIGURES,
     by_packing,
     cheaper_at_equal_step,
     cheaper_by,
     errors_of,
     mean_cost,
     nest,
-    profile_error,
     select_rows,
     summarise_reference,
 )
-from validation.study import describe_commits, format_checks, format_table, mean_interval
+from validation.study import describe_commits, format_table, mean_interval, summarise_bars
 
 Row = dict[str, Any]
-MARKS = {"confined": (60, 100, 200, 500), "coarse": (200, 500, 2000, 10_000)}
-"""Cycles told of the full runs."""
+SHOWN = (
+    "2 jumps", "5 jumps", "2 jumps, nothing moved", "5 jumps, nothing moved",
+    "2 jumps, by history", "5 jumps, by history", "2 jumps, by history, profile",
+    "5 jumps, by history, profile", "5 growing jumps, by history, profile",
+    "5 growing jumps, by history, profile, step x 2", "tolerance 0.02", "tolerance 0.1",
+    "step x 2", "step x 4", "E/10", "100 Hz", "density x 10", "h = 0", "law auto, 100 cycles",
+)  # fmt: skip
+"""Ways of the table; the figure has all."""
 COLOURS = {
     "jumps by the law": "#0072B2", "nothing moved": "#E69F00", "law": "#56B4E9",
     "tolerance": "#0072B2", "softer": "#D55E00", "longer step": "#009E73", "frequency": "#CC79A7",
@@ -44,108 +48,87 @@ def list_ways(kind: Kind) -> list[tuple[str, str]]:
     return [*ways, *((f"law {law}, {cycles} cycles", "law") for law, cycles in LAWS)]
 
 
-def tell_error(errors: FloatArray) -> str:
-    """Mean and half of Student's interval over packings [%], bold where it leaves out zero."""
+def format_error(errors: FloatArray) -> str:
+    """Mean and half of Student's interval over packings [%], bold where it excludes zero."""
     mean, half = mean_interval(errors)
     text = f"{100 * mean:+.0f} ± {100 * half:.0f} %" if half == half else f"{100 * mean:+.0f} %"
     return f"**{text}**" if abs(mean) > half else text
 
 
-def read_table(row: Row, name: str, cycle: float) -> float:
-    """A column of a full run's thinned table, between its rows along ln N."""
-    table = row["table"]
-    return float(np.interp(np.log(cycle), np.log(table["cycle"]), table[name]))
-
-
-def tabulate_reference(rows: Sequence[Row], kind: Kind) -> str:
-    """What the full runs of a bed settle, grains and piston."""
-    runs, lines = select_rows(rows, kind, EVERY), []
-    for words, name, sign in (
-        ("settlement of the mean grain since kᵢ, µm", "settlement", 1.0),
-        ("way of the piston since kᵢ, µm", "piston_height", -1.0),
-    ):
-        cells = []
-        for mark in MARKS[kind.name]:
-
-            def gain(row: Row, mark: int = mark, name: str = name, sign: float = sign) -> float:
-                change = read_table(row, name, mark) - read_table(row, name, kind.k_i)
-                return 1e6 * sign * change
-
-            found = nest(list(by_packing(runs, gain).values()))
-            cells.append(
-                f"{found.mean:.0f} ± {found.half:.0f} ({found.half_given:.0f}; "
-                f"{found.between:.0f}, {found.within:.0f})"
-            )
-        lines.append([words, *cells])
-    head = [f"{kind.title}, after cycle", *(f"{mark:,}" for mark in MARKS[kind.name])]
-    return format_table(head, lines)
-
-
-def tabulate_ways(rows: Sequence[Row], kind: Kind) -> str:
-    """A line a way: cost and errors."""
-    truth = {figure: summarise_reference(rows, kind, figure) for figure in FIGURES}
-    full = select_rows(rows, kind, EVERY)
-    chaos = [f"± {100 * found.alone / found.mean:.0f} %" for found in truth.values()]
-    head = [
-        "way to the last cycle", "runs", "cycles computed", "cheaper by", "at equal cost a step",
-        *FIGURES, "density profile",
-    ]  # fmt: skip
-    lines = [
-        [f"{EVERY}: chaos alone", str(len(full)), str(full[0]["computed"]), "1", "1", *chaos, ""]
-    ]
-    for name, _ in list_ways(kind):
-        mine = select_rows(rows, kind, name)
-        if not mine:
-            continue
-        whole = "state" in mine[0]
-        lines.append([
-            name, str(len(mine)), f"{np.mean([row['computed'] for row in mine]):.0f}",
-            f"{cheaper_by(rows, kind, name):.1f}",
-            f"{cheaper_at_equal_step(rows, kind, name):.1f}",
-            *(tell_error(errors_of(rows, kind, name, figure))
-              if whole or figure == "settlement" else "-" for figure in FIGURES),
-            f"{100 * profile_error(rows, kind, name):.1f} %" if whole else "-",
-        ])  # fmt: skip
-    return format_table(head, lines)
-
-
-def tell_refused(rows: Sequence[Row], kind: Kind) -> str:
-    """Which ways did not come to the end, and why."""
+def tabulate_reference(rows: Sequence[Row]) -> str:
+    """What the full runs of the beds settle, what a run of them strays by, and their cost."""
     lines = []
-    for method in list_methods(kind):
-        mine = [row for row in rows if row["bed"] == kind.name and row["method"] == method.name]
-        ended = [row for row in mine if "settlement" not in row]
-        if ended:
-            why = shorten(ended[0]["refused"])
-            lines.append(f"- *{method.name}*: {len(ended)} of {len(mine)} did not end ({why}).")
-    return "\n".join(lines)
+    for kind in KINDS.values():
+        runs, found = select_rows(rows, kind, EVERY), summarise_reference(rows, kind, "settlement")
+        lines.append([
+            kind.title, str(kind.k_i), str(kind.packings), str(len(runs)),
+            f"{1e6 * found.mean:.0f} ± {1e6 * found.half:.0f} µm",
+            f"{1e6 * found.between:.0f} µm", f"{1e6 * found.within:.0f} µm",
+            f"{mean_cost(runs) / 3600:.2f} h",
+        ])  # fmt: skip
+    head = [
+        "bed", "kᵢ", "packings", "full runs", "settlement", "deviation between packings",
+        "within one", "CPU time a run",
+    ]  # fmt: skip
+    return format_table(head, lines)
 
 
-def shorten(why: str) -> str:
-    """A refusal without its place and its remedy."""
-    return why.rpartition("sentinel line: ")[2].removeprefix("ERROR: ").partition(". Please")[0]
+def tabulate_ways(rows: Sequence[Row]) -> str:
+    """A line a way: cost and errors on both beds."""
+    figures = ("settlement", "elastic deflection")
+    alone = [summarise_reference(rows, kind, figure) for kind in KINDS.values()
+             for figure in figures]  # fmt: skip
+    chaos = [f"± {100 * found.alone / found.mean:.0f} %" for found in alone]
+    lines = [[f"{EVERY}: chaos alone", "1", *chaos[:2], "1", *chaos[2:]]]
+    for name in SHOWN:
+        cells = []
+        for kind in KINDS.values():
+            mine = select_rows(rows, kind, name)
+            if not mine:
+                cells += ["", "", ""]
+                continue
+            equal = cheaper_at_equal_step(rows, kind, name)
+            cells += [
+                f"{cheaper_by(rows, kind, name):.1f} ({equal:.1f})",
+                *(format_error(errors_of(rows, kind, name, figure))
+                  if "state" in mine[0] or figure == "settlement" else "" for figure in figures),
+            ]  # fmt: skip
+        lines.append([name, *cells])
+    head = ["way to cycle 500"]
+    for kind in KINDS.values():
+        head += [f"{kind.name}: cheaper by", *figures]
+    return format_table(head, lines)
+
+
+def list_refused(rows: Sequence[Row]) -> str:
+    """Which ways did not reach the end in how many of their runs."""
+    words = []
+    for kind in KINDS.values():
+        for method in list_methods(kind):
+            mine = [r for r in rows if r["bed"] == kind.name and r["method"] == method.name]
+            ended = sum("settlement" not in row for row in mine)
+            if ended:
+                words.append(f"{method.name} ({kind.name}) {ended} of {len(mine)}")
+    return ", ".join(words)
 
 
 def describe(rows: Sequence[Row]) -> dict[str, str]:
     """The text for each mark of the page."""
-    parts: dict[str, str] = {}
+    ratios = {}
     for name, kind in KINDS.items():
-        truth = summarise_reference(rows, kind, "settlement")
         full = select_rows(rows, kind, EVERY)
         piston = nest(list(by_packing(full, lambda row: float(row["piston"])).values()))
-        parts |= {
-            f"{name.upper()}_REFERENCE": tabulate_reference(rows, kind),
-            f"{name.upper()}_WAYS": tabulate_ways(rows, kind),
-            f"{name.upper()}_REFUSED": tell_refused(rows, kind),
-            f"{name.upper()}_MEAN": f"{1e6 * truth.mean:.0f}",
-            f"{name.upper()}_RATIO": f"{piston.mean / truth.mean:.1f}",
-            f"{name.upper()}_HOURS": f"{mean_cost(full) / 3600:.2f}",
-        }
+        mean = summarise_reference(rows, kind, "settlement").mean
+        ratios[f"{name.upper()}_RATIO"] = f"{piston.mean / mean:.1f}"
     engines = ", ".join(dict.fromkeys(row["engine"] for row in rows if row.get("engine")))
     machines = "; ".join(dict.fromkeys(row["origin"]["machine"] for row in rows))
     spent = sum(sum_cost(row["cost"]) for row in rows if not row["method"].startswith("law"))
-    return parts | {
-        "BARS": format_checks(check_bars(rows)),
+    return ratios | {
+        "REFERENCE": tabulate_reference(rows),
+        "WAYS": tabulate_ways(rows),
+        "REFUSED": list_refused(rows),
+        "STIFFNESS": format_error(errors_of(rows, COARSE, "tolerance 0.1", "piston stiffness")),
+        "BARS": summarise_bars(check_bars(rows)),
         "SPENT": f"{spent / 3600:.0f}",
         "ORIGIN": f"{engines}; {machines}; commits "
         f"{describe_commits(row['origin']['commit'] for row in rows)}.",

@@ -68,7 +68,7 @@ def nest(values: Sequence[FloatArray]) -> Nested:
 
 
 def select_rows(rows: Sequence[Row], kind: Kind, method: str) -> list[Row]:
-    """Runs of a way that came to the last cycle."""
+    """Runs of a way that reached the last cycle."""
     return [
         row
         for row in rows

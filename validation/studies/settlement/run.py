@@ -149,16 +149,16 @@ def measure_run(run: Run, kind: Kind, whole: bool) -> Row:
         if kind.k_i <= outcome.first_cycle < kind.last:
             for purpose, seconds in outcome.cost.items():
                 cost[purpose] = cost.get(purpose, 0.0) + seconds
-    told = {cycle: row for cycle, row in found.items() if cycle <= kind.last}
+    known = {cycle: row for cycle, row in found.items() if cycle <= kind.last}
     row: Row = {
-        "computed": len(told) - kind.k_i,
+        "computed": len(known) - kind.k_i,
         "cost": {purpose: round(seconds, 3) for purpose, seconds in cost.items()},
         "lost": sum(bool(run.folder.failure(name)) for name in run.folder.stage_names()),
     }
-    if kind.last not in told:
+    if kind.last not in known:
         return row
     begun, ended = (
-        {name: mean_block(told, end, name) for name in (*STATE, "settlement", "piston_height")}
+        {name: mean_block(known, end, name) for name in (*STATE, "settlement", "piston_height")}
         for end in (kind.k_i, kind.last)
     )
     row |= {

@@ -19,7 +19,8 @@ class Small(NamedTuple):
     half: Any
 
 
-LAW = Small
+MEASURE = Small
+OBJECTIVE = False
 
 
 def strain_of(H: FloatArray) -> FloatArray:

@@ -203,8 +203,8 @@ def _print(content: dict[str, Any], as_json: bool) -> None:
     for name, modes in content.get("modes", {}).items():
         found = [f"{mode['frequency']:.6g} Hz" for mode in modes]
         print(f"{name}: {', '.join(found)}")
-    if bed := content.get("bed"):
-        print(f"the bed: {bed['told']}")
+    if words := content.get("bed", {}).get("words"):
+        print(f"the bed: {words}")
     print(f"not in this run: {'; '.join(content['left_out'])}")
     if "cost" in content:
         cost = content["cost"]
@@ -220,7 +220,7 @@ class Progress:
     def __init__(self) -> None:
         self._bar: Any = None
         self._task: Any = None
-        self._told = time.monotonic()
+        self._printed = time.monotonic()
         self._first: tuple[float, int] | None = None
 
     def __enter__(self) -> Progress:
@@ -252,8 +252,8 @@ class Progress:
             )
             return
         first = self._first = self._first or (now, steps)
-        if now - self._told >= 10 and steps > first[1]:
-            self._told = now
+        if now - self._printed >= 10 and steps > first[1]:
+            self._printed = now
             left = (now - first[0]) / (steps - first[1]) * (total - steps)
             print(
                 f"t = {when:.4g} s, step {steps} of {total}, {left:.0f} s left",

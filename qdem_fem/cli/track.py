@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from trackbed.choices import find_choices
+
 SEAT_AREA = 0.13 * 0.17
 """Of a rail seat [m^2]: a foot of 130 mm on a pad of 170 mm."""
 
@@ -19,8 +21,12 @@ def _register_grains(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="the .npz file to write")
     parser.add_argument("--count", type=int, default=5700, help="grains (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="default: %(default)s")
-    for shape in ("sphericity", "roundness", "concavity"):
-        parser.add_argument(f"--{shape}", type=float, help="of every grain, 0 to 1")
+    parser.add_argument(
+        "--shape", default="hulls", choices=find_choices("qdem_fem.grains", "SHAPE"),
+        help="default: %(default)s",
+    )  # fmt: skip
+    for wish in ("sphericity", "roundness", "concavity"):
+        parser.add_argument(f"--{wish}", type=float, help="of every grain, 0 to 1; of hulls only")
     parser.add_argument(
         "--sizes", type=float, nargs=2, metavar=("LEAST", "GREATEST"),
         help="sieves, m, in place of EN 13450 31.5/50 A; 0.045 0.055: the paper's grains",
@@ -64,7 +70,7 @@ def grains_command(arguments: argparse.Namespace) -> int:
     if arguments.sizes is not None:
         grading = Grading(np.array(arguments.sizes), np.array([0.0, 1.0]))
     grains = make_grains(
-        arguments.count, arguments.seed, recipe, grading, workers=arguments.workers
+        arguments.count, arguments.seed, recipe, grading, arguments.workers, arguments.shape
     )
     save_grains(arguments.out, grains)
     print(f"{arguments.out}: {len(grains)} grains, {grains.tetrahedra.sum()} tetrahedra")
@@ -79,8 +85,8 @@ def train_command(arguments: argparse.Namespace) -> int:
         Track,
         Train,
         WheelFlat,
-        load_record_write,
         make_train_record,
+        write_load_record,
     )
 
     _refuse_no_folder(arguments.out)
@@ -92,7 +98,7 @@ def train_command(arguments: argparse.Namespace) -> int:
         raise UsageError("--seed is that of a roughness", remedy="give --roughness, too")
     flats = [WheelFlat(axle, peak, duration) for axle, peak, duration in arguments.flat]
     record = make_train_record(train, track, arguments.area, flats, roughness=rough)
-    load_record_write(arguments.out, record)
+    write_load_record(arguments.out, record)
     print(f"{arguments.out}: {record.time[-1]:.3f} s at {record.rate:g} Hz")
     return 0
 

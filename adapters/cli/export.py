@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from adapters.cli import add_json_flag, add_run_argument, print_json
+from adapters.cli.arguments import add_json_flag, add_run_argument, print_json
 
 OPENED_BY = {
     "vtu": "ParaView; colour grains by displacement, glyph: sphere, scale: radius, factor 2",
@@ -37,8 +37,7 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 
 def run_export(arguments: argparse.Namespace) -> int:
     """Write a run, finished or not, in the format of another tool; print what to open."""
-    from adapters.export.formats import export_run
-    from adapters.export.instants import read_exported_run
+    from adapters.export import export_run, read_exported_run
 
     into = arguments.into or arguments.run_folder / arguments.variant / "export"
     run = read_exported_run(arguments.run_folder, arguments.variant)

@@ -31,7 +31,8 @@ class Finger(NamedTuple):
     half: Any
 
 
-LAW = Finger
+MEASURE = Finger
+OBJECTIVE = True
 
 
 def strain_of(H: FloatArray) -> FloatArray:

@@ -27,7 +27,8 @@ class Svk(NamedTuple):
     half: Any
 
 
-LAW = Svk
+MEASURE = Svk
+OBJECTIVE = True
 strain_of = strain_green
 
 

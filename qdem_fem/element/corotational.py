@@ -29,7 +29,8 @@ class Corotational(NamedTuple):
     half: Any
 
 
-LAW = Corotational
+MEASURE = Corotational
+OBJECTIVE = True
 
 
 def strain_of(H: FloatArray) -> FloatArray:

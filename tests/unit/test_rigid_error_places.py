@@ -24,9 +24,9 @@ def test_a_plane_that_misses_says_how_far_to_move_it(offset):
     By the way that the remedy names it goes through the centre of mass, and cuts.
     """
     cube, normal = box(1.0, 1.0, 1.0), np.array([2.0, 0.0, 0.0])
-    with pytest.raises(ShapeError, match=r"do.* not cut .* corners lie \S+ to \S+ m") as told:
+    with pytest.raises(ShapeError, match=r"do.* not cut .* corners lie \S+ to \S+ m") as raised:
         cut(cube, normal, offset)
-    moved = float(told.value.remedy.split("by ")[1].split(" m")[0])
+    moved = float(raised.value.remedy.split("by ")[1].split(" m")[0])
     assert moved == pytest.approx(-offset / 2, rel=1e-3)
     parts = cut(cube, normal, offset + 2 * moved)
     assert [part.volume for part in parts] == pytest.approx([0.5, 0.5], rel=1e-3)
@@ -59,9 +59,9 @@ def test_shapes_with_too_much_or_too_near_name_their_body(dim, shape, words):
     scene = Scene(dim=dim)
     scene.add(Disc(0.1) if dim == 2 else Sphere(0.1), fixed=True)
     scene.add(shape, density=1.0, name="a")
-    with pytest.raises(RigidError, match=f"^a: {words}") as told:
+    with pytest.raises(RigidError, match=f"^a: {words}") as raised:
         Simulation(scene)
-    assert told.value.exit_code == 3
+    assert raised.value.exit_code == 3
 
 
 @pytest.mark.parametrize("dim", [2, 3])

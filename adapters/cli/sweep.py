@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from adapters.cli import add_json_flag, add_scene_arguments, list_overrides, print_json
+from adapters.cli.arguments import add_json_flag, add_scene_arguments, list_overrides, print_json
 from adapters.errors import SweepIncomplete, UsageError
 
 
@@ -48,10 +48,16 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 def run_sweep_command(arguments: argparse.Namespace) -> int:
     """Run a sweep; `SweepIncomplete` when a member failed, after all others are finished."""
     from adapters.procedure import Progress
-    from adapters.procedure.sweep.cluster import check_libraries
-    from adapters.procedure.sweep.plan import check_folder, plan_sweep
-    from adapters.procedure.sweep.results import write_results
-    from adapters.procedure.sweep.run import Cluster, list_dry_run, make_sweep_record, run_sweep
+    from adapters.procedure.sweep import (
+        Cluster,
+        check_folder,
+        check_libraries,
+        list_dry_run,
+        make_sweep_record,
+        plan_sweep,
+        run_sweep,
+        write_results,
+    )
 
     if arguments.workers is not None and arguments.workers < 1:
         raise UsageError("there must be a worker at least", where="--workers")

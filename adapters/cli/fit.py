@@ -1,0 +1,142 @@
+"""The verb ``fit``: a law to a series, and what it predicts."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from adapters.cli.arguments import add_json_flag, print_json
+from adapters.errors import UsageError
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``fit``."""
+    parser.add_argument(
+        "paths", nargs="+", metavar="RUN|DUMP...|CSV", type=Path,
+        help="a run folder, dumps with a frame each cycle, or a table (.csv, .tsv, .txt, .dat) of "
+        "cycle,settlement (m), also settlement [mm], strain [%%]; decimal commas beside ; or tabs; "
+        "two columns of numbers need no header, and their unit is then unknown (see --unit)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--columns", nargs=2, metavar=("CYCLE", "SETTLEMENT"), default=(),
+        help="a table's columns, where they are called otherwise",
+    )  # fmt: skip
+    parser.add_argument(
+        "--unit", metavar="U",
+        help="of a table's settlement where no header gives it: m, cm, mm, um, %%, or 1 (strain)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--law", default="log", metavar="NAME",
+        help="default: log; auto: the slow laws together, refused (exit code 6) where the series "
+        "ratchets or collapses, or half the 90 %% band is wider than all settlement so far",
+    )  # fmt: skip
+    parser.add_argument(
+        "--fail-at", type=float, metavar="S",
+        help="settlement or strain of failure, in the series' unit, of either sign: a series or a "
+        "prediction that reaches it is refused as collapse (exit code 6); failure_excluded in the "
+        "JSON: the band (of --probability) does not reach it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--to-cycle", type=float, metavar="N", help="cycle to predict; default: the last one given"
+    )
+    parser.add_argument(
+        "--from-cycle", type=float, default=0.0, metavar="N", help="leave earlier cycles out"
+    )
+    parser.add_argument(
+        "--load-change", type=float, metavar="N",
+        help="the load changed at cycle N: leave the cycles up to it out, and count from there, as "
+        "the law starts afresh; --to-cycle counts on from the first one",
+    )  # fmt: skip
+    parser.add_argument(
+        "--steps-per-cycle", type=float, metavar="N",
+        help="dumps only: time steps of a cycle; default: each frame is the end of one",
+    )  # fmt: skip
+    parser.add_argument(
+        "--probability", type=float, default=0.9, metavar="P",
+        help="that the band should hold the truth; default: 0.9; refusals do not depend on it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--confidence", type=float, metavar="C",
+        help="also the cycles k that keep the mean error term below --error so surely (eq. 15)",
+    )  # fmt: skip
+    parser.add_argument("--error", type=float, metavar="E", help="in the unit of the series")
+    add_json_flag(parser)
+    parser.set_defaults(command=run_fit)
+
+
+def run_fit(arguments: argparse.Namespace) -> int:
+    """Fit a law to a series; print its parameters, a prediction and its band."""
+    from adapters.errors import JumpRefused
+    from adapters.laws import get_law
+    from adapters.laws.fit import AGREE, count_cycles_needed, fit_auto, fit_series, read_series
+
+    if (arguments.confidence is None) != (arguments.error is None):
+        raise UsageError("--confidence and --error belong together", remedy="give both or none")
+    auto = arguments.law == "auto"
+    if auto and arguments.error is not None:
+        raise UsageError(
+            "--law auto is no single law, so it has no error term of eq. 15",
+            remedy="name a law for --error, such as --law log",
+        )
+    law = get_law("log" if auto else arguments.law)
+    series = read_series(
+        arguments.paths, arguments.steps_per_cycle, arguments.columns, arguments.unit
+    )
+    to_cycle = arguments.to_cycle
+    if to_cycle is None:
+        to_cycle = series.cycle.max(initial=0.0)
+    ahead = to_cycle
+    if arguments.load_change is not None:
+        series, ahead = series.after(arguments.load_change), to_cycle - arguments.load_change
+    series = series.since(arguments.from_cycle)
+    needed = {}
+    if arguments.error is not None:
+        cycles = count_cycles_needed(series, law, arguments.error, arguments.confidence)
+        needed = {"cycles_needed": cycles}
+    try:
+        if auto:
+            found = fit_auto(series, ahead, arguments.probability, arguments.fail_at)
+        else:
+            found = fit_series(series, law, ahead, arguments.probability, arguments.fail_at)
+    except JumpRefused as refusal:
+        if arguments.json:
+            unexcluded = {} if arguments.fail_at is None else {"failure_excluded": False}
+            print_json(refusal.to_json(series.unit) | unexcluded | needed)
+        else:
+            print_cycles_needed(needed, arguments, series.unit)
+        raise
+    fitted = found.to_json() | needed
+    if arguments.json:
+        print_json(fitted)
+        return 0
+    unit = name_unit(series.unit)
+    print(f"law {fitted['law']}, fitted to {len(series.cycle)} cycles")
+    for name, value in fitted["parameters"].items():
+        print(f"  {name} = {value:.6g}")
+    print(f"regime: {fitted['regime'] or 'unknown: too few cycles'}")
+    if found.laws:
+        agreeing = [name for name, said in found.laws.items() if said.agrees]
+        print(f"laws that agree to {AGREE:.0%} of the increment: {', '.join(agreeing) or 'none'}")
+    low, high = fitted["band"]
+    print(f"settlement at cycle {to_cycle:.10g}: {fitted['prediction']:.6g} {unit}")
+    print(f"  with probability {arguments.probability:g} in {low:.6g} ... {high:.6g} {unit}")
+    if found.failure_excluded is False:
+        print(f"  so that failure at {arguments.fail_at:g} is not excluded")
+    print_cycles_needed(needed, arguments, series.unit)
+    return 0
+
+
+def name_unit(unit: str) -> str:
+    """The unit of a series, for a text."""
+    from adapters.files import UNKNOWN
+
+    return "(unit as given)" if unit == UNKNOWN else unit
+
+
+def print_cycles_needed(needed: dict[str, int], arguments: argparse.Namespace, unit: str) -> None:
+    """Print the bound of eq. 15 where it was asked for; a refused prediction has it too."""
+    if needed:
+        print(
+            f"cycles that keep the mean error term below {arguments.error:g} {name_unit(unit)} "
+            f"with confidence {arguments.confidence:g}: {needed['cycles_needed']}"
+        )

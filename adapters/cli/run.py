@@ -1,0 +1,154 @@
+"""The verbs ``run``, ``resume``, ``status`` and ``report``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from pathlib import Path
+
+from adapters.cli.arguments import (
+    add_json_flag,
+    add_run_argument,
+    add_scene_arguments,
+    list_overrides,
+    print_json,
+)
+from adapters.errors import UsageError
+
+JUMP_KEYS = ("procedure.k", "procedure.h")
+"""Keys that ``--tolerance`` stands for."""
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``verb`` to its parser."""
+    {
+        "run": register_run,
+        "resume": register_resume,
+        "status": register_status,
+        "report": register_report,
+    }[verb](parser)
+
+
+def register_run(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``run``."""
+    add_scene_arguments(parser)
+    parser.add_argument(
+        "--run-folder", type=Path, metavar="FOLDER", help="default: run/ beside the scene"
+    )
+    parser.add_argument(
+        "--control", action="store_true", help="also run every cycle, to know the error"
+    )
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change a key of the scene, such as procedure.h=10; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--tolerance", type=float, metavar="T",
+        help="jumps choose themselves: error of the settlement gained in a jump over the total "
+        "settlement, such as 0.02; short for --set procedure.tolerance=T, instead of k and h",
+    )  # fmt: skip
+    parser.add_argument(
+        "--cycles", type=int, metavar="N", help="short for --set procedure.total_cycles=N"
+    )
+    add_cycle_by_cycle_flag(parser)
+    parser.add_argument(
+        "--dry-run", action="store_true", help="write the decks and print the engine's command"
+    )
+    parser.set_defaults(command=run_command)
+
+
+def add_cycle_by_cycle_flag(parser: argparse.ArgumentParser) -> None:
+    """Add ``--cycle-by-cycle``."""
+    parser.add_argument(
+        "--cycle-by-cycle", action="store_true",
+        help="where the bed ratchets or collapses, so that no jump is allowed, or a jump and its "
+        "shorter tries failed, compute cycles instead of stopping with exit code 6",
+    )  # fmt: skip
+
+
+def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
+    """KEY=VALUE of ``--tolerance`` and ``--cycles``; `UsageError` beside a k or h by hand."""
+    overrides = []
+    if arguments.tolerance is not None:
+        by_hand = [one for one in arguments.overrides if one.split("=")[0].strip() in JUMP_KEYS]
+        if by_hand:
+            raise UsageError(
+                f"--tolerance chooses k and h, and --set {by_hand[0]} gives one by hand",
+                remedy="leave one of the two out",
+            )
+        overrides.append(f"procedure.tolerance={arguments.tolerance!r}")
+    if arguments.cycles is not None:
+        overrides.append(f"procedure.total_cycles={arguments.cycles}")
+    return overrides
+
+
+def run_command(arguments: argparse.Namespace) -> int:
+    """Run a scene from its start."""
+    from adapters.procedure import run as procedure
+
+    procedure.run_scene(
+        arguments.scene,
+        arguments.run_folder or arguments.scene.parent / "run",
+        control=arguments.control,
+        overrides=list_overrides(arguments) + list_jump_overrides(arguments),
+        dry_run=arguments.dry_run,
+        cycle_by_cycle=arguments.cycle_by_cycle,
+    )
+    return 0
+
+
+def register_resume(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``resume``."""
+    add_run_argument(parser)
+    add_cycle_by_cycle_flag(parser)
+    parser.set_defaults(command=run_resume)
+
+
+def run_resume(arguments: argparse.Namespace) -> int:
+    """Go on with a run from its last window that passes the checks."""
+    from adapters.procedure import run as procedure
+
+    procedure.resume(arguments.run_folder, cycle_by_cycle=arguments.cycle_by_cycle)
+    return 0
+
+
+def register_status(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``status``."""
+    add_run_argument(parser)
+    add_json_flag(parser)
+    parser.set_defaults(command=run_status)
+
+
+def run_status(arguments: argparse.Namespace) -> int:
+    """Print how far a run is, and in sentences what came out."""
+    from adapters.procedure import describe_result, judge_progress, read_run_record
+
+    record = read_run_record(arguments.run_folder)
+    content = judge_progress(record).to_dict()
+    if arguments.json:
+        print_json(content)
+    else:
+        for key, value in content.items():
+            print(f"{key.replace('_', ' '):28}{value}")
+        print("", *describe_result(record), sep="\n")
+    return 0
+
+
+def register_report(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``report``."""
+    add_run_argument(parser)
+    parser.add_argument("--open", action="store_true", help="show it, when there is a display")
+    parser.set_defaults(command=run_report)
+
+
+def run_report(arguments: argparse.Namespace) -> int:
+    """Write report.html and the figures; print the path."""
+    from adapters.report import write_report
+
+    path = write_report(arguments.run_folder)
+    print(path)
+    if arguments.open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        import webbrowser
+
+        webbrowser.open(path.resolve().as_uri())
+    return 0

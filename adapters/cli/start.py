@@ -1,0 +1,93 @@
+"""The verbs ``doctor``, ``new`` and ``cite``."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from pathlib import Path
+
+from adapters.cli.arguments import add_json_flag, print_json
+from adapters.errors import EngineMissing, UsageError
+
+
+def register(verb: str, parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``verb`` to its parser."""
+    {
+        "doctor": register_doctor,
+        "new": register_new,
+        "cite": register_cite,
+    }[verb](parser)
+
+
+def register_doctor(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``doctor``."""
+    add_json_flag(parser)
+    parser.set_defaults(command=run_doctor)
+
+
+def run_doctor(arguments: argparse.Namespace) -> int:
+    """Print what is here and what is missing; `EngineMissing` when no engine is here."""
+    from dataclasses import asdict
+
+    from adapters.engines import ENGINE_REMEDY, findings, has_usable_engine
+
+    found = findings()
+    if arguments.json:
+        print_json({"ok": has_usable_engine(found), "findings": [asdict(one) for one in found]})
+    else:
+        for one in found:
+            version = one.version or ("missing" if one.remedy else "yes")
+            print(f"{one.kind:9}{one.name:16}{version:28}  {one.where}".rstrip())
+            if one.remedy:
+                print(f"{'':9}-> {one.remedy}")
+    if not has_usable_engine(found):
+        raise EngineMissing("no engine is installed, so nothing can be run", remedy=ENGINE_REMEDY)
+    return 0
+
+
+def register_new(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``new``."""
+    from trackbed.scenes import scene_names
+
+    parser.add_argument("name", metavar="NAME", help="; ".join(scene_names()))
+    parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
+    parser.set_defaults(command=run_new)
+
+
+def run_new(arguments: argparse.Namespace) -> int:
+    """Copy a shipped scene to FOLDER/scene.toml; a scene that is there already is kept."""
+    from trackbed.scene_files import suggest_word
+    from trackbed.scenes import scene_names, scene_template, scene_verb
+
+    names = scene_names()
+    if arguments.name not in names:
+        raise UsageError(f"there is no scene {arguments.name}{suggest_word(arguments.name, names)}")
+    path: Path = arguments.folder / "scene.toml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with path.open("x", encoding="utf-8") as stream:
+            stream.write(scene_template(arguments.name))
+    except FileExistsError:
+        raise UsageError(
+            "this scene is there already and is kept", where=str(path),
+            remedy="remove it first, or name another folder",
+        ) from None  # fmt: skip
+    verb = scene_verb(arguments.name)
+    control = " --control" if verb == "run" else ""
+    print(f"{path}\nnext: trackbed {verb} {shlex.quote(str(path))}{control}")
+    return 0
+
+
+def register_cite(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``cite``."""
+    parser.set_defaults(command=run_cite)
+
+
+def run_cite(arguments: argparse.Namespace) -> int:
+    """Print BibTeX entries."""
+    from importlib.metadata import version
+
+    from adapters.citations import format_citations
+
+    print(format_citations(version("trackbed")))
+    return 0

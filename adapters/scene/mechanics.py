@@ -1,0 +1,188 @@
+"""Whether the numbers of a scene make mechanical sense; each check is a few lines of mechanics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from adapters.bed import (
+    CHAIN_FACTOR,
+    OVERLAP_BOUND,
+    equivalent_modulus,
+    expect_grain_count,
+    find_radius_that_fits,
+    overlap_under_force,
+    rayleigh_time,
+)
+from adapters.errors import SceneError
+from adapters.files import read_load_series
+from adapters.scene.values import Check, NotValid, Values, find_geometry, find_radii
+from trackbed.scene_files import Problem
+
+COUNT_GREATEST = 10**8
+"""Most grains a scene may have."""
+
+RAYLEIGH_SHARE_DOUBTFUL = 0.4
+"""Share of the Rayleigh time above which a time step is doubtful."""
+WIDTH_DOUBTFUL = 8
+"""Least width of a container, in mean grain diameters, that is free of doubt."""
+STEPS_DOUBTFUL = 100
+"""Least number of time steps a cycle that is free of doubt."""
+JUMP_DOUBTFUL = 10
+"""Cycles of a jump for each cycle fitted, above which noise is extrapolated and not a law."""
+
+
+def _room(scene: Values) -> Iterator[Problem]:
+    largest_grain = find_radii(scene).greatest
+    room = find_radius_that_fits(find_geometry(scene))
+    if largest_grain > room:
+        yield Problem(
+            "sample.grain_radius.mean",
+            f"radii up to {largest_grain:g} m do not fit: "
+            f"the container takes radii up to {room:g} m",
+        )
+
+
+def _no_tension(scene: Values) -> Iterator[Problem]:
+    trough = scene.need("loading.mean") - scene.need("loading.amplitude") / 2
+    if trough < 0:
+        yield Problem(
+            "loading.mean",
+            f"the stress would fall to mean - amplitude/2 = {trough:g} Pa: a piston can not pull",
+        )
+
+
+def _rayleigh_time(scene: Values) -> float:
+    grain = "material.grain."
+    radii = find_radii(scene)
+    if radii.smallest <= 0:
+        raise NotValid
+    return rayleigh_time(
+        radii.smallest,
+        scene.need(grain + "density"),
+        scene.need(grain + "young"),
+        scene.need(grain + "poisson"),
+    )
+
+
+def _rayleigh_share(scene: Values) -> float:
+    if scene.get("engine.time_step") is None:
+        return float(scene.need("engine.rayleigh_share"))
+    return float(scene.need("engine.time_step")) / _rayleigh_time(scene)
+
+
+def _time_step(scene: Values) -> Iterator[Problem]:
+    share = _rayleigh_share(scene)
+    if share > 1:
+        yield Problem(
+            "engine.time_step",
+            f"{share:.3g} Rayleigh times of the smallest grain "
+            f"({_rayleigh_time(scene):.3g} s): the grains would explode",
+        )
+
+
+def _fill_height(scene: Values) -> Iterator[Problem]:
+    height = scene.need("sample.fill_height")
+    count = expect_grain_count(find_radii(scene), find_geometry(scene), height)
+    if not 1 <= count <= COUNT_GREATEST:
+        yield Problem("sample.fill_height", f"{height:g} m would take {count:.3g} grains")
+
+
+def _overlap_share(scene: Values) -> tuple[str, float, float]:
+    """Key of the load, its greatest stress [Pa], mean overlap under it over the smallest radius.
+
+    A grain of a layer carries the stress on the square that it fills, (2 r)^2.
+    """
+    if scene.need("loading.waveform") == "sine":
+        key = "loading.amplitude"
+        stress = scene.need("loading.mean") + scene.need(key) / 2
+    else:
+        key = "loading.series"
+        try:
+            series = read_load_series(Path(scene.need(key)))
+        except SceneError as error:
+            raise NotValid from error
+        stress = float(series.stress.max())
+    radii, grain = find_radii(scene), "material.grain."
+    if radii.smallest <= 0:
+        raise NotValid
+    young, poisson = scene.need(grain + "young"), scene.need(grain + "poisson")
+    modulus = equivalent_modulus(young, poisson, young, poisson)
+    overlap = overlap_under_force(stress * (2 * radii.mean) ** 2, modulus, radii.mean / 2)
+    return key, stress, float(overlap) / radii.smallest
+
+
+def _great_load(scene: Values) -> Iterator[Problem]:
+    key, stress, share = _overlap_share(scene)
+    if share > OVERLAP_BOUND:
+        yield Problem(
+            key,
+            f"a stress of {stress:.3g} Pa presses grains {share:.2g} of the smallest radius into "
+            f"one another; Hertz contact is a law up to {OVERLAP_BOUND:g}: "
+            "a smaller load, or stiffer grains",
+        )
+
+
+CHECKS: tuple[Check, ...] = (_room, _fill_height, _no_tension, _time_step, _great_load)
+"""What is wrong."""
+
+
+def _long_time_step(scene: Values) -> Iterator[Problem]:
+    share = _rayleigh_share(scene)
+    if RAYLEIGH_SHARE_DOUBTFUL < share <= 1:
+        key = "rayleigh_share" if scene.get("engine.time_step") is None else "time_step"
+        yield Problem(
+            f"engine.{key}",
+            f"{share:.2g} of the Rayleigh time; above {RAYLEIGH_SHARE_DOUBTFUL} collisions "
+            "gain energy and settlement is doubtful",
+        )
+
+
+def _narrow(scene: Values) -> Iterator[Problem]:
+    container = find_geometry(scene)
+    is_box = container.shape == "box"
+    width = min(container.size_x, container.size_y) if is_box else 2 * container.radius
+    ratio = width / (2 * scene.need("sample.grain_radius.mean"))
+    if ratio < WIDTH_DOUBTFUL:
+        yield Problem(
+            "sample.grain_radius.mean",
+            f"the container is {ratio:.2g} mean grain diameters wide: walls rule the result",
+        )
+
+
+def _few_steps(scene: Values) -> Iterator[Problem]:
+    if scene.get("engine.time_step") is None:
+        longest = scene.need("engine.rayleigh_share") * _rayleigh_time(scene)
+    else:
+        longest = scene.need("engine.time_step")
+    frequency = scene.need("loading.frequency")
+    steps = 1 / (frequency * longest)
+    if steps < STEPS_DOUBTFUL:
+        yield Problem("loading.frequency", f"a cycle is only {steps:.3g} time steps long")
+
+
+def _deep_chains(scene: Values) -> Iterator[Problem]:
+    key, stress, share = _overlap_share(scene)
+    deepest = CHAIN_FACTOR ** (2 / 3) * share
+    if deepest > OVERLAP_BOUND:
+        yield Problem(
+            key,
+            f"under {stress:.3g} Pa overlaps reach about {deepest:.2g} of the smallest radius in "
+            f"force chains; above {OVERLAP_BOUND:g} a run is refused",
+        )
+
+
+def _far_jump(scene: Values) -> Iterator[Problem]:
+    if scene.get("procedure.settlement") == "history":  # by all cycles computed so far
+        return
+    h, k = max(scene.need("procedure.h")), scene.need("procedure.k")
+    if h > JUMP_DOUBTFUL * k:
+        yield Problem(
+            "procedure.h",
+            f"a jump of {h} cycles is fitted to {k}: above {JUMP_DOUBTFUL} times as many it "
+            "extrapolates their noise, and the bed may even rise",
+        )
+
+
+DOUBTS: tuple[Check, ...] = (_long_time_step, _narrow, _few_steps, _deep_chains, _far_jump)
+"""What is doubtful."""

@@ -1,0 +1,72 @@
+"""The keys of a scene by name, as its checks read them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+from adapters.bed import Container, RadiusDistribution
+from trackbed.scene_files import Problem
+
+
+class NotValid(Exception):
+    """A check asked for a key that is not valid in itself."""
+
+
+class Values:
+    """Keys of a scene by dotted name; to ask for one that is not valid raises `NotValid`."""
+
+    def __init__(self, values: Mapping[str, Any], invalid: Iterable[str]) -> None:
+        self._values, self._invalid = values, tuple(invalid)
+
+    def get(self, key: str) -> Any:
+        """A value, None where it is not given."""
+        if any(key == bad or key.startswith(bad + ".") for bad in self._invalid):
+            raise NotValid
+        return self._values.get(key)
+
+    def need(self, key: str) -> Any:
+        """A value that must be there: without it the check is skipped."""
+        value = self.get(key)
+        if value is None:
+            raise NotValid
+        return value
+
+    def has(self, key: str) -> bool:
+        """Whether a key is given, valid or not; a table that is not valid is another problem."""
+        try:
+            return self.get(key) is not None
+        except NotValid:
+            self.get(key.rpartition(".")[0])
+            return True
+
+    def has_table(self, name: str) -> bool:
+        """Whether a table has any key."""
+        self.get(name)
+        return any(key.startswith(name + ".") for key in self._values)
+
+
+Check = Callable[[Values], Iterator[Problem]]
+"""What a check yields of a scene: nothing where all is well."""
+
+
+def find_radii(scene: Values) -> RadiusDistribution:
+    """The distribution of grain radii, whether it makes sense or not."""
+    table = "sample.grain_radius."
+    return RadiusDistribution(
+        scene.need(table + "distribution"),
+        scene.need(table + "mean"),
+        scene.get(table + "standard_deviation") or 0.0,
+        scene.get(table + "truncation") or 2.0,
+    )
+
+
+def find_geometry(scene: Values) -> Container:
+    """The container; of a valid shape, without mirror planes given twice."""
+    shape = scene.need("sample.container")
+    planes = scene.get("sample.symmetry") or ()
+    if shape == "box":
+        sizes = {key: scene.need(f"sample.{key}") for key in ("size_x", "size_y")}
+    else:
+        sizes = {"radius": scene.need("sample.radius")}
+    return Container(shape, tuple(dict.fromkeys(planes)), **sizes)

@@ -1,0 +1,33 @@
+"""Pages of the studies are what their records make of them; no bar fails unless that is known."""
+
+from __future__ import annotations
+
+import pytest
+
+from validation.study import (
+    DOCS,
+    fill_page,
+    import_part,
+    list_studies,
+    read_record,
+    record_path,
+)
+
+pytestmark = pytest.mark.studies
+
+
+@pytest.mark.parametrize("name", list_studies())
+def test_page_and_bars(name: str) -> None:
+    rows = read_record(record_path(name))
+    template = record_path(name).with_name("page.md").read_text(encoding="utf-8")
+    page = fill_page(template, import_part(name, "page").describe(rows))
+    assert DOCS.joinpath(f"{name}.md").read_text(encoding="utf-8") == page
+    checks = import_part(name, "bars").check_bars(rows)
+    assert [check.name for check in checks if not (check.holds or check.known)] == []
+
+
+@pytest.mark.parametrize("name", [name for name in list_studies() if name.startswith("qdem")])
+def test_every_part_is_recorded_and_no_bar_is_missed(name: str) -> None:
+    rows = read_record(record_path(name))
+    assert [row["part"] for row in rows] == list(import_part(name, "run").PARTS)
+    assert all(check.holds for check in import_part(name, "bars").check_bars(rows))
