@@ -79,7 +79,7 @@ class JumpRefused(NotCredible):
     - ``parameters``: of ``auto`` ``exponent`` beta, without unit, and, from ``fit``,
       ``exponent_deviation``; of a law that is named its own: lengths in the unit of the series,
       rates in that per cycle, counted from a load change where there is one.  Only finite ones;
-    - ``laws``: by name, what each slow law says all the same: fields of `fit_agreement.LawSaid`,
+    - ``laws``: by name, what each slow law says all the same: fields of `fit.outlook.LawSaid`,
       ``prediction`` in the unit of the series; empty for a law that is named, and for jumps.
     """
 

@@ -47,8 +47,8 @@ def tell(**answer: object) -> None:
 
 def slow_down(seconds: float) -> None:
     """Have each part of a run tell that it begins, and sleep around its work."""
+    from adapters import relaxation
     from adapters.engines.fake import FakeEngine
-    from adapters.procedure import room as jump_room
     from adapters.procedure import stages
 
     def slowed(work: Callable[..., Any], part: str) -> Callable[..., Any]:
@@ -64,7 +64,7 @@ def slow_down(seconds: float) -> None:
     FakeEngine._prepare = staticmethod(slowed(FakeEngine._prepare, "preparation"))  # type: ignore[method-assign]
     FakeEngine._cycles = staticmethod(slowed(FakeEngine._cycles, "window"))  # type: ignore[method-assign]
     stages.estimate = slowed(stages.estimate, "jump")
-    jump_room.relax = slowed(jump_room.relax, "relaxation")  # type: ignore[assignment]
+    relaxation.relax = slowed(relaxation.relax, "relaxation")
 
 
 def count_operations(root: str, crash: int) -> None:

@@ -104,7 +104,7 @@ class Play:
 
     decisions: list[Decision] = field(default_factory=list)
     checks: list[dict[str, Any]] = field(default_factory=list)
-    """Of jumps that stand, as `jump_band.estimate_band` takes them."""
+    """Of jumps that stand, as `adapters.jumps.estimate_band` takes them."""
     taken_back: list[dict[str, Any]] = field(default_factory=list)
     true_errors: list[float] = field(default_factory=list)
     """Gain of each jump that stands less that of the mean law, over the total."""

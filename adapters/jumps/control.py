@@ -105,7 +105,7 @@ class Control:
     last_error: float = 1.0
     """Realised error of the last jump over its tolerance."""
     drift: tuple[float, float] = (0.0, 0.0)
-    """What rates exceeded their forecasts by, summed upwards and downwards (`jump_check`)."""
+    """What rates exceeded their forecasts by, summed upwards and downwards (`jumps.check`)."""
     attempts: int = 0
     """Jumps from this state that were taken back."""
     window: int = FIRST_WINDOW
@@ -152,7 +152,7 @@ class Decision:
     binding: str = ""
     """The rule that set h."""
     regime: str = ""
-    """One of `fit_regime.REGIMES`, of the bed or, where that is refused, of the piston; empty
+    """One of `fit.regime.REGIMES`, of the bed or, where that is refused, of the piston; empty
     before the first cycles to be fitted."""
     exponent: float = 0.0
     """beta: the rate goes as N^(beta - 1)."""

@@ -1,7 +1,7 @@
 """What the settlement gains over a jump, from rates alone, and how far that can be off.
 
 The rate goes as du/dN = A (N / N_k)^(beta - 1) from the last computed cycle N_k on: beta = 0 is the
-logarithm, 1 a constant rate, below 0 a bed that shakes down.  Every beta of `fit_regime.EXPONENTS`
+logarithm, 1 a constant rate, below 0 a bed that shakes down.  Every beta of `fit.regime.EXPONENTS`
 is fitted to the gains of the computed blocks and weighed; so jumped cycles, which are no data, do
 not enter.
 """
@@ -69,14 +69,14 @@ class Forecast:
 
     @property
     def regime(self) -> Regime:
-        """Regime of the rates; see `fit_regime.find_regime_of_weight`."""
+        """Regime of the rates; see `fit.regime.find_regime_of_weight`."""
         return find_regime_of_weight(self.weight, not self.rate.any())
 
 
 def fit_forecast(rates: Rates, from_cycle: float | None = None) -> Forecast:
     """Fit every exponent to the blocks and weigh it.
 
-    Weights are Student's likelihood times Cauchy's prior of `fit_regime`.  A bed without motion has
+    Weights are Student's likelihood times Cauchy's prior of `fit.regime`.  A bed without motion has
     rate 0 with no error.  ``from_cycle`` is N_k where it is not the end of the last block.
     """
     last = rates.last_cycle if from_cycle is None else from_cycle
@@ -102,7 +102,7 @@ def bound_gain_by_laws(
 ) -> tuple[FloatArray, FloatArray]:
     """Lowest and highest gain that the slow laws give to each of e ``ends``, shape (e,) [m].
 
-    The middle ``probability`` of all laws on all windows (`fit_candidates`), fitted to the run's
+    The middle ``probability`` of all laws on all windows (`fit.candidates`), fitted to the run's
     own curve: ``cycle`` (k,), ``settlement`` [m] (k,).  Infinitely far apart for too few cycles.
     """
     if len(cycle) < 2 * ROWS_FEWEST or not np.ptp(settlement):

@@ -167,13 +167,13 @@ DECISION, CHECK = "decision", "jump checked"
 
 
 def list_decisions(events: Sequence[Event]) -> list[Event]:
-    """Decisions in the order of the run, each once; fields of `jump_control.Decision`."""
+    """Decisions in the order of the run, each once; fields of `adapters.jumps.Decision`."""
     found = {(e["cycle"], e["attempt"], e["action"]): e for e in events if e["event"] == DECISION}
     return list(found.values())
 
 
 def list_checks(events: Sequence[Event]) -> dict[tuple[int, int], Event]:
-    """Checks by the cycle a jump started from and its attempt; fields of `jump_check.Check`."""
+    """Checks by the cycle a jump started from and its attempt; fields of `jumps.check.Check`."""
     return {(e["cycle"], e["attempt"]): e for e in events if e["event"] == CHECK}
 
 

@@ -27,11 +27,6 @@ CONTROL = Variant("control", jumps=False)
 CONTROL_STILL = Variant("control_still", still=True)
 
 
-def make_perturbed_control(member: int) -> Variant:
-    """A control from a state that differs by ``member`` times 1e-10 m in one grain."""
-    return Variant(f"control_perturbed_{member}", jumps=False, perturbation=member * 1e-10)
-
-
 def settle(run: Run) -> Bed:
     """The flow chart, Fig. 10: rain, k_i cycles, then k cycles and a jump of h until the end."""
     p = run.scene.procedure

@@ -45,9 +45,8 @@ class Mover(Protocol):
 class Body:
     """Linear tetrahedra of one viscoelastic body.
 
-    ``mesh``: a `skfem.MeshTet`, a `meshio.Mesh`, a pair ``(nodes (n, 3) [m], elements (m, 4))``,
-    a `qdem_fem.mesh.tetrahedra.TetMesh` or the path of a mesh file.  Left-handed elements are
-    turned
+    ``mesh``: a `skfem.MeshTet`, a `meshio.Mesh`, a pair ``(nodes (n, 3) [m], elements (m, 4))``, a
+    `qdem_fem.mesh.tetrahedra.TetMesh` or the path of a mesh file.  Left-handed elements are turned
     (``mesh.flipped`` lists them).  Numbers of nodes and elements stay the user's own.
     ``rigid``: the body has six freedoms and no strain; of its material only density and Poisson's
     ratio (in contact) count.  ``"lumped"``: with the inertia of quarter masses at its nodes, which

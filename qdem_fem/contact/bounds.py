@@ -59,8 +59,7 @@ def bound_allowed_contacts(
     """Bound on omega^2 [1/s^2] while no vertex has more than so many contacts of its own ``k_n``.
 
     ``normal`` (c,) [N/m], ``inverse_mass`` (c,) [1/kg], ``rigid`` as in `bound_spring_network`; a
-    wall
-    counts as two contacts.  A rigid body may have them at all its vertices at once.
+    wall counts as two contacts.  A rigid body may have them at all its vertices at once.
     """
     return 2 * contacts * float((normal * inverse_mass + rigid(normal)).max(initial=0.0))
 

@@ -1,8 +1,7 @@
 """The critical step for all contacts that may form near where vertices are now.
 
 `qdem_fem.contact.bound_allowed_contacts` holds for any contacts there may ever be, and pays for it:
-it
-gives the lightest vertex of all as many as the scene allows, to another as light, and adds what
+it gives the lightest vertex of all as many as the scene allows, to another as light, and adds what
 elements do to what contact does, though they do it elsewhere.  Bodies that lie together in a bed
 touch where they touch.  Until pairs are looked for again, no contact acts that is not in the list
 of pairs; and a spring of ``k_n`` along n and ``k_t < k_n`` across is at most one of ``k_n`` in all

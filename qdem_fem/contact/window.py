@@ -1,8 +1,7 @@
 """The compiled loop over time steps with rigid bodies or contact beside the elements' own step.
 
 The step itself is `qdem_fem.kernel.cpu.build_window`'s, of one step, as it is without contact: what
-a
-scene without both runs is not touched.  Contact forces of a displacement are found when that
+a scene without both runs is not touched.  Contact forces of a displacement are found when that
 displacement is, and wait for the next step; so the springs and the fields are of one time.
 """
 

@@ -1,10 +1,9 @@
 """What all strain measures share, written once for numbers, arrays, lanes and GPU.
 
-Every function takes the displacement gradient ``H = F - I`` as nine values in rows and gives
-``P``, the nominal stress of which the nodal forces are ``f_a = -V0 P grad N_a`` (`element_pulls`).
-Only ``+ - * /`` are used, so a value may be a number, a NumPy array,
-`qdem_fem.kernel.cpu.lanes.Lanes` or a
-register of a GPU.  ``half`` is 0.5 in the precision of the values: a literal 0.5 would turn
+Every function takes the displacement gradient ``H = F - I`` as nine values in rows and gives ``P``,
+the nominal stress of which the nodal forces are ``f_a = -V0 P grad N_a`` (`element_pulls`).  Only
+``+ - * /`` are used, so a value may be a number, a NumPy array, `qdem_fem.kernel.cpu.lanes.Lanes`
+or a register of a GPU.  ``half`` is 0.5 in the precision of the values: a literal 0.5 would turn
 single precision on a GPU into double.  With ``lame_*`` times the volume, ``P`` comes times it.
 
 All are in displacement form: a strain of 1e-9 keeps its full relative precision, nothing is

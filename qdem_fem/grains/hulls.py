@@ -99,8 +99,7 @@ class GrainForm:
     """Triangles of the hull of the M corners, (2 M - 4, 3), outward."""
     nodes: FloatArray
     """M corners, the middle of every edge of `find_surface_edges` of ``corner_faces``, and the
-    inner
-    nodes of `qdem_fem.grains.place_apex_and_spokes`; centroid at zero, (5 M - 5, 3)."""
+    inner nodes of `qdem_fem.grains.place_apex_and_spokes`; centroid at zero, (5 M - 5, 3)."""
     sphericity: float
     roundness: float
 

@@ -5,12 +5,12 @@ kinetic energy the potential has its least, so what moves is stopped there and b
 (Cundall 1976).  It needs no coefficient and no viscosity, and serves bodies in frictional contact,
 rigid or not, which have no static answer in `qdem_fem.march.dynamic_relaxation`.
 
-The peak is that of all bodies together (``each=False``), or of each body by itself: grains in a
-bed strike at different times, and while one falls the sum of all grows, so that the others go on
+The peak is that of all bodies together (``each=False``), or of each body by itself: grains in a bed
+strike at different times, and while one falls the sum of all grows, so that the others go on
 rattling; stopped one by one, each lands as if it did not bounce.  Where they ``fall``, what is in
 the air is left alone, together with what it meets there (`find_grounded`): stopped at each
-collision on
-its way, a heap of loose grains sinks like snow.  Where springs throw bodies up, that loses time.
+collision on its way, a heap of loose grains sinks like snow.  Where springs throw bodies up, that
+loses time.
 
 What is at rest is said by two numbers (`Rest`), never by a number of steps.  Time goes on while a
 simulation is damped, so its loads should be constant.

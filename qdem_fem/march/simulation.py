@@ -63,8 +63,7 @@ class Simulation(ConditionedBodies):
     default, the result does not depend on it; ``mass_scaling`` [s]: raise the density of
     elements whose own critical step is shorter than this; ``device``: ``"cpu"``, or ``"cuda"``
     for a GPU (`qdem_fem.kernel.cuda.assembly`), whose results repeat to round-off only;
-    ``contact``:
-    how bodies touch, a `qdem_fem.SphereContact` or `SurfaceContact`; not at all by default.
+    ``contact``: how bodies touch, a `qdem_fem.SphereContact` or `SurfaceContact`; by default not.
 
     Bodies of one name are numbered, as messages name them.  In single precision a free body has
     a frame of its own (`qdem_fem.bodies.frames`), renewed when an advance begins: bits then depend

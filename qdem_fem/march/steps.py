@@ -38,8 +38,8 @@ def march(
 ) -> Samples:
     """Compute ``steps``; returns the displacement of ``nodes`` every ``stride`` steps.
 
-    Raises `Unstable` and
-    `ElementInverted`; `StepWarning` when an element makes the step short, or it is too long.
+    Raises `Unstable` and `ElementInverted`; `StepWarning` when an element makes the step short, or
+    it is too long.
     """
     motion, assembly = run.motion, run.assembly
     if steps:

@@ -47,11 +47,10 @@ def amplitude_spectrum(
 ) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and amplitudes [unit of values], (k // 2 + 1,) each, of a record (k,).
 
-    The mean is taken off.  ``window``: ``hann``, or ``none`` for records that die out or hold
-    whole periods.  A cosine of amplitude A peaks at A when its frequency is one of those
-    returned, and up to 15 % below (hann; none: 36 %) between two of them; `find_peak_frequencies`
-    has
-    no such error.  Raises `UsageError` for a record that is no even, finite series.
+    The mean is taken off.  ``window``: ``hann``, or ``none`` for records that die out or hold whole
+    periods.  A cosine of amplitude A peaks at A when its frequency is one of those returned, and up
+    to 15 % below (hann; none: 36 %) between two of them; `find_peak_frequencies` has no such error.
+    Raises `UsageError` for a record that is no even, finite series.
     """
     step, values = _record(time, values)
     if window not in ("hann", "none"):

@@ -37,8 +37,7 @@ def make_bogie_series(
     cosine.  ``share``: of a seat's force, what the slice takes of it; ``roughness``: what rolling
     adds to it, too; ``flats``: on both wheels of one of these two axles.  Raises `ConditionError`
     as `find_flat_forces` and `find_rolling_forces`, for a bogie so near and fast that it is over
-    the sleeper
-    before its load has grown, and for one so slow or far that no record would hold it.
+    the sleeper before its load has grown, and for one so slow or far that no record would hold it.
     """
     axles = train.axles[:2]
     end = passing_time(train, lead)

@@ -37,10 +37,12 @@ def too_many_steps(what: str, steps: float) -> str:
     return f"{what} is {steps:.3g} steps: at most {MOST_STEPS:.0e} can be made"
 
 
-def require_density(value: Any, where: str, otherwise: str = "") -> float:
-    """A density [kg/m^3], in 2D [kg/m^2]; else `SceneError`, whose remedy goes on ``otherwise``."""
-    remedy = f"give a density above zero, {MOST_DENSITY:g} at most{otherwise}"
-    return require_number_in(value, 0.0, MOST_DENSITY, "the density", where, remedy, above=True)
+def require_density(value: Any, where: str) -> float:
+    """A density [kg/m^3], in 2D [kg/m^2]; `SceneError` for all else."""
+    remedy = f"give a density above zero, {MOST_DENSITY:g} at most, or fixed=True for a body that"
+    return require_number_in(
+        value, 0.0, MOST_DENSITY, "the density", where, f"{remedy} does not move", above=True
+    )
 
 
 def require_number_in(

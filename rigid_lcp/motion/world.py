@@ -102,9 +102,7 @@ class Scene:
             fixed = True
         mass, inertia = np.inf, np.inf
         if not fixed:
-            otherwise = ", or fixed=True for a body that does not move"
-            density = require_density(density, where, otherwise)
-            mass, inertia = shape.mass_properties(density)
+            mass, inertia = shape.mass_properties(require_density(density, where))
         if friction is not None:
             remedy = f"give 0 to {MOST_FRICTION:g}"
             friction = require_number_in(friction, 0.0, MOST_FRICTION, "friction", where, remedy)

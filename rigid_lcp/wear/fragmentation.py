@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.motion import MOST_OF_A_STATE, require_density, require_line
-from rigid_lcp.shapes import Polygon, check_outline, real_numbers, require_vector
+from rigid_lcp.shapes import Polygon, real_numbers
 
 if TYPE_CHECKING:
     from rigid_lcp.motion import Body, Motion, Scene
@@ -45,18 +44,6 @@ class Fragment:
     """Velocity of the centre of mass (2,) [m/s]."""
     spin: float
     """[rad/s]"""
-
-
-@dataclass(frozen=True)
-class CutContacts:
-    """The two contacts between new parts, at the ends of the cut."""
-
-    point: Floats
-    """(2, 2) [m]"""
-    normal: Floats
-    """(2, 2), from the second part to the first."""
-    gap: Floats
-    """(2,) [m], zero."""
 
 
 def polygon_moments(vertices: Floats) -> tuple[float, Floats, float]:
@@ -127,52 +114,23 @@ def split_polygon(
     return np.array(left), np.array(right)
 
 
-def fragment(
-    vertices: ArrayLike, point: ArrayLike, direction: ArrayLike, *,
-    density: float, velocity: ArrayLike = (0.0, 0.0), spin: float = 0.0,
-) -> tuple[tuple[Fragment, Fragment], CutContacts]:  # fmt: skip
-    """A moving polygon broken along a line: its parts, with their motion, and their contacts.
-
-    ``vertices`` (n, 2) [m] in the world, anticlockwise; ``point``, ``direction``: see
-    `split_polygon`; ``density`` [kg/m^2]; ``velocity`` (2,) [m/s] of the centre of mass of the
-    whole; ``spin`` [rad/s].  Raises `ShapeError` for what is no polygon, as
-    `rigid_lcp.shapes.polygon.Polygon` does, and as `split_polygon` does; `SceneError` for a line,
-    density, velocity or spin that is none, as `rigid_lcp.motion.world.Scene.add` does.
-    """
-    whole, where = check_outline(vertices), "fragment"
-    origin, along = require_line((point, direction), 2)
-    return _fragments(
-        whole, origin, along, require_density(density, where),
-        require_vector(velocity, 2, "velocity", where, MOST_OF_A_STATE),
-        float(require_vector(spin, 1, "spin", where, MOST_OF_A_STATE)[0]),
-    )  # fmt: skip
-
-
-def _fragments(
+def break_polygon(
     whole: Floats, point: Floats, direction: ArrayLike, density: float, velocity: Floats,
     spin: float,
-) -> tuple[tuple[Fragment, Fragment], CutContacts]:  # fmt: skip
-    """`fragment` of what is known to be sound."""
-    parts = split_polygon(whole, point, direction)
+) -> tuple[Fragment, Fragment]:  # fmt: skip
+    """The parts of a moving polygon that breaks along a line, with their motion.
+
+    ``whole`` (n, 2) [m], anticlockwise; ``point``, ``direction``: see `split_polygon`; ``density``
+    [kg/m^2]; ``velocity`` (2,) [m/s] of the centre of mass of the whole; ``spin`` [rad/s].
+    """
     _, centre, _ = polygon_moments(whole)
     made = []
-    for part in parts:
+    for part in split_polygon(whole, point, direction):
         area, position, second = polygon_moments(part)
         arm = position - centre
         moved = velocity + spin * np.array([-arm[1], arm[0]])
         made.append(Fragment(part, density * area, density * second, position, moved, spin))
-    return (made[0], made[1]), cut_contacts(*parts)
-
-
-def cut_contacts(left: Floats, right: Floats) -> CutContacts:
-    """Contacts between the parts of `split_polygon`: the two corners that they share."""
-    shared = [p for p in left if (p == right).all(axis=1).any()]
-    ends = np.array([shared[0], shared[-1]])
-    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    normal = np.array([-along[1], along[0]])
-    if normal @ (left.mean(axis=0) - right.mean(axis=0)) < 0:
-        normal = -normal
-    return CutContacts(ends, np.array([normal, normal]), np.zeros(2))
+    return made[0], made[1]
 
 
 def scene_at(scene: Scene, motion: Motion) -> Scene:
@@ -220,7 +178,7 @@ def _split_2d(body: Body, point: ArrayLike, direction: ArrayLike) -> tuple[Body,
     angle = float(body.angle[0])
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     # about the body's own place: far from the origin its corners would lose digits, and it mass
-    parts, _ = _fragments(
+    parts = break_polygon(
         body.shape.vertices @ turn.T, _numbers(point, "point") - body.position, direction,
         body.mass / body.shape.area, body.velocity, float(body.spin[0]),
     )  # fmt: skip

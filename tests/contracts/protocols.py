@@ -11,14 +11,11 @@ def list_missing(member: Any, protocol: type) -> list[str]:
     missing = []
     asked = {**protocol.__annotations__, **vars(protocol)}
     for name in sorted(name for name in asked if not name.startswith("_")):
-        method = getattr(protocol, name, None)
-        if not hasattr(member, name):
-            missing.append(name)
-        elif inspect.isfunction(method):
-            arguments = list(inspect.signature(method).parameters)[1:]
-            if (
-                list(inspect.signature(getattr(member, name)).parameters)[: len(arguments)]
-                != arguments
-            ):
-                missing.append(f"{name}({', '.join(arguments)})")
+        method, own = getattr(protocol, name, None), getattr(member, name, None)
+        if not inspect.isfunction(method):
+            missing += [] if hasattr(member, name) else [name]
+            continue
+        arguments = list(inspect.signature(method).parameters)[1:]
+        if own is None or list(inspect.signature(own).parameters)[: len(arguments)] != arguments:
+            missing.append(f"{name}({', '.join(arguments)})")
     return missing

@@ -6,8 +6,6 @@ tests.  Faults of its process are in ``test_faults.py``.
 
 from __future__ import annotations
 
-import inspect
-import re
 import signal
 import time
 from dataclasses import replace
@@ -18,7 +16,6 @@ import pytest
 
 from adapters.bed.sample import GRAVITY
 from adapters.bed.state import Contacts, State, load_state
-from adapters.engines.contract import Engine
 from adapters.files.dump import read_frames
 from adapters.files.run_folder import RunFolder
 from adapters.scene.file import load_scene
@@ -29,18 +26,6 @@ from trackbed import command
 ROOT = Path(__file__).parents[2]
 HISTORY = 7
 """Columns of ``history.txt``."""
-
-
-def test_contributing_shows_the_protocol() -> None:
-    """The block in CONTRIBUTING has every method of an engine with its arguments, and no other."""
-    text = (ROOT / "CONTRIBUTING.md").read_text().partition("class FakeEngine:")[2]
-    shown = dict(re.findall(r"^    def (\w+)\((.*?)\)", text.partition("```")[0], re.MULTILINE))
-    asked = {
-        name: ", ".join(inspect.signature(method).parameters)
-        for name, method in vars(Engine).items()
-        if inspect.isfunction(method) and not name.startswith("_")
-    }
-    assert shown == asked
 
 
 def real(sample: Sample) -> None:

@@ -56,7 +56,7 @@ def test_compliance_knows_no_direction_and_goes_with_the_modulus() -> None:
 
 
 def test_reasons() -> None:
-    """No contact, a load too fast, a hinge, rollers: each body that stays is told why."""
+    """No contact, a load too fast, a hinge, rollers: each body that stays has its reason."""
 
     def said(change: Any, **options: Any) -> tuple[bool, str]:
         contact = q.SphereContact(0.001, options.pop("stiffness", 1e3), 0.1)
@@ -78,6 +78,7 @@ def test_reasons() -> None:
     assert said(lambda run, body: run.load(body, 0, slow))[0]
 
 
+@pytest.mark.long
 def test_two_runs_tell_that_the_prediction_bounds() -> None:
     """Stones on a pad: what was measured is below what was predicted, and not far below."""
     advice = advise_scene(STONES, [], 0.05)

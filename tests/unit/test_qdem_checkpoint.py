@@ -69,7 +69,9 @@ CASES: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=[pytest.mark.long] * (case == "all")) for case in CASES]
+)  # no other test compiles that loop
 @pytest.mark.parametrize("pause", [None, 0.0, 1.37e-4])
 def test_restored_run_is_the_uninterrupted_one(
     case: str, pause: float | None, tmp_path: Path
@@ -213,7 +215,7 @@ def test_file_is_an_npz_that_numpy_reads(saved: Path) -> None:
 def test_missing_file_foreign_npz_and_later_format(
     victim: q.Simulation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Files that are no checkpoint of ours are told as such."""
+    """Files that are no checkpoint of ours are refused as such."""
     with pytest.raises(CheckpointError, match="can not be read"):
         victim.restore(tmp_path / "nothing.npz")
     np.savez(tmp_path / "foreign.npz", displacement=np.zeros(3))

@@ -346,7 +346,7 @@ def test_folder_that_can_not_be_made_is_a_sentence(scene: Path) -> None:
         command(scene, "--run-folder", scene)
 
 
-def test_mass_scaling_is_told(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mass_scaling_is_reported(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What scaling adds to the mass is in the outlook, the result and the report."""
     assert command(scene, "--dry-run", "--json") == 0
     plain = json.loads(capsys.readouterr().out)

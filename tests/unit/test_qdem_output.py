@@ -132,7 +132,7 @@ def test_cut_refuses_another_table(tmp_path: Path) -> None:
 
 
 def test_no_space_is_a_sentence_with_the_file(tmp_path: Path) -> None:
-    """What the system refuses to write is told with the file and a remedy, not by a number."""
+    """What the system refuses to write is named with the file and a remedy, not by a number."""
     with pytest.raises(UsageError, match=r"full.csv: can not be written \(.+\)\n  -> make room"):
         Table(tmp_path / "none" / "full.csv", ["time"]).begin()
     full = Table(Path("/dev/full"), ["time"])

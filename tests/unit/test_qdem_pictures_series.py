@@ -183,7 +183,7 @@ def test_bodies_that_left_a_periodic_width_are_drawn_as_their_images() -> None:
 
 
 @pytest.mark.parametrize("torn", [False, True])
-def test_a_file_that_is_gone_is_told_and_the_others_are_drawn(tmp_path: Path, torn: bool) -> None:
+def test_a_file_that_is_gone_is_named_and_the_others_are_drawn(tmp_path: Path, torn: bool) -> None:
     if torn:
         (tmp_path / "fields_0.vtu").write_text("torn")
     write_bodies_vtu(tmp_path / "fields_1.vtu", [block(1.0)])

@@ -247,7 +247,7 @@ def test_wrong_scenes_are_refused_with_line_and_key(
         assert re.search(r"\d+ problem", message)
 
 
-def test_all_faults_are_told_at_once_in_the_order_of_the_file(tmp_path: Path) -> None:
+def test_all_faults_are_named_at_once_in_the_order_of_the_file(tmp_path: Path) -> None:
     """A fault of every stage of checking (key, mesh, nodes, series, times) in one answer."""
     text = BASE
     for old, new in (
@@ -309,7 +309,7 @@ def test_what_the_simulation_refuses_has_its_key(tmp_path: Path) -> None:
 
 
 def test_conditions_that_contradict_one_another_are_problems_of_the_scene(tmp_path: Path) -> None:
-    """A roller against a prescribed motion; a static scene that can turn: told before any run."""
+    """A roller against a prescribed motion; a static scene that can turn: refused before any run."""
     moved = (
         '[[prescribe]]\nbody = "beam"\nnodes = { set = "x-max" }\ncomponent = "x"\nvalue = 1.0\n'
     )

@@ -1,4 +1,4 @@
-"""`fragment` refuses what `Polygon` and `Scene.add` refuse, and breaks what is sound."""
+"""What `Polygon`, `Scene.add` and breaks refuse is named."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ import pytest
 from rigid_lcp import Polygon, Scene, box
 from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.shapes.stones import cut, fragments
-from rigid_lcp.wear.fragmentation import fragment, split_polygon
+from rigid_lcp.wear.fragmentation import split_polygon
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
-MIDDLE, UP = (0.5, 0.5), (0, 1)
 
 
 @pytest.mark.parametrize(
@@ -26,8 +25,6 @@ MIDDLE, UP = (0.5, 0.5), (0, 1)
 def test_outlines_that_are_none_are_named(vertices, words):
     """Clockwise ones gave parts of negative mass, crossing ones a division by zero."""
     with pytest.raises(ShapeError, match=words):
-        fragment(vertices, MIDDLE, UP, density=1.0)
-    with pytest.raises(ShapeError, match=words):
         Polygon(vertices)
 
 
@@ -40,36 +37,15 @@ def test_outlines_that_are_none_are_named(vertices, words):
     ],
 )  # fmt: skip
 def test_motions_and_densities_that_are_none_are_named(given, words):
-    """NaN became masses and velocities of NaN, without a word; `Scene.add` says the same."""
-    with pytest.raises(SceneError, match=f"^fragment: {words}") as raised:
-        fragment(SQUARE, MIDDLE, UP, **({"density": 1.0} | given))
-    with pytest.raises(SceneError, match=words) as added:
+    """NaN became masses and velocities of NaN, without a word."""
+    with pytest.raises(SceneError, match=words):
         Scene().add(Polygon(SQUARE), **({"density": 1.0} | given))
-    assert added.value.what == raised.value.what
-    assert added.value.remedy.startswith(raised.value.remedy)
-
-
-@pytest.mark.parametrize(
-    ("point", "direction"),
-    [(0.5, UP), ((0.5, 0.5, 0), UP), (MIDDLE, (0, 0, 1)), (MIDDLE, None), ("a", UP)],
-)
-def test_lines_that_are_none_are_named(point, direction):
-    with pytest.raises(SceneError, match=r"fragment: the (point|direction) is"):
-        fragment(SQUARE, point, direction, density=1.0)
 
 
 @pytest.mark.parametrize("point", [(0.5, 0.5, 0), 0.5])
 def test_a_point_of_another_space_splits_nothing(point):
     with pytest.raises(ShapeError, match=r"split: .*point"):
-        split_polygon(SQUARE, point, UP)
-
-
-@pytest.mark.parametrize("length", [1e-200, 1.0, 1e200])
-def test_parts_have_the_mass_of_the_whole(length):
-    """Halves of a unit square; their velocities are ``v + w x r`` at x = -+ 1/4."""
-    (left, right), _ = fragment(SQUARE, MIDDLE, (0, length), density=2.0, velocity=(3, 0), spin=4.0)
-    assert (left.mass, right.mass) == pytest.approx((1.0, 1.0), rel=1e-15)
-    np.testing.assert_allclose([left.velocity, right.velocity], [(3, -1), (3, 1)], rtol=1e-15)
+        split_polygon(SQUARE, point, (0, 1))
 
 
 def test_the_remedy_of_a_density_names_both_bounds():

@@ -472,10 +472,10 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 @pytest.mark.parametrize(
     ("where", "stage"),
     [
-        ("adapters.procedure.stages.state_save", ""),
-        ("adapters.procedure.stages.window_save", "preparation"),
+        ("adapters.procedure.stages.save_state", ""),
+        ("adapters.procedure.stages.save_window", "preparation"),
         ("adapters.files.run_folder.write_whole", ""),
-        ("adapters.engines.fake.dump_write", ""),
+        ("adapters.engines.fake.write_dump", ""),
     ],
 )
 def test_full_disk(

@@ -25,6 +25,13 @@ STONE = q.Material(30e9, 0.2, 2700.0)
 SIDE, RADIUS, WIDTH = 0.03, 0.006, 0.1
 ACROSS = q.PeriodicWidth("y", WIDTH)
 MODELS = "spheres", "surface", "overlaps"
+BY_MODEL = pytest.mark.parametrize(
+    "model",
+    [
+        model if model == "spheres" else pytest.param(model, marks=pytest.mark.long)
+        for model in MODELS
+    ],
+)  # the loop of surfaces compiles for a minute
 
 
 def touch(model: str, periodic: Any = ACROSS, **more: Any) -> Any:
@@ -65,7 +72,7 @@ def clash(model: str, images: int, start: float, drift: float = 0.0) -> Floats:
     return np.stack([body.displacement - (0, drift * run.time, 0) for body in bodies])
 
 
-@pytest.mark.parametrize("model", MODELS)
+@BY_MODEL
 def test_images_meet_as_bodies_do(model: str) -> None:
     """One collision, with the side of the width anywhere and any image of the other body.
 
@@ -81,7 +88,7 @@ def test_images_meet_as_bodies_do(model: str) -> None:
         assert found == pytest.approx(asked, abs=1e-11 if drift else 1e-12)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@BY_MODEL
 def test_a_closed_ring_is_at_rest(model: str) -> None:
     """Two blocks that fill the width, pressed into each other alike on both sides: no net force.
 
@@ -124,7 +131,7 @@ def slide(model: str, start: float, ways: int = 0) -> Floats:
     return np.asarray(stone.displacement)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@BY_MODEL
 def test_a_joined_slab_has_no_seam(model: str) -> None:
     """A block slides 2.4 mm along a joined slab: over its middle, over its seam, an image away.
 
@@ -139,7 +146,7 @@ def test_a_joined_slab_has_no_seam(model: str) -> None:
         assert slide(model, start, ways) == pytest.approx(asked, abs=rounding)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@BY_MODEL
 def test_goes_on_in_the_middle_of_a_crossing(model: str, tmp_path: Path) -> None:
     """Saved while springs are stretched across the side: the same bits."""
 
@@ -193,7 +200,7 @@ def test_list_is_that_of_all_images() -> None:
         assert np.array_equal(one, other)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@BY_MODEL
 def test_what_meets_itself_is_refused(model: str) -> None:
     """A body as long as the width, one that turns into its image, a wall across, a loose slab."""
     long = block("plank", (0, 0, 0), True, (0.01, 0.0995, 0.01))
@@ -238,7 +245,7 @@ normal = [0, 0, 1]
 
 
 def test_a_scene_names_the_width(tmp_path: Path) -> None:
-    """The keys reach the contact; what does not fit them is told with its key."""
+    """The keys reach the contact; what does not fit them is named with its key."""
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
     run, _ = simulation_of(load_scene(path))
@@ -464,7 +471,7 @@ pressure = { ramp = 1e-3, value = 1e3 }
 
 
 def test_a_scene_names_absorbing_faces(tmp_path: Path) -> None:
-    """Its energies are columns of energy.csv, which close; what is wrong is told with its key."""
+    """Its energies are columns of energy.csv, which close; what is wrong is named with its key."""
     path = tmp_path / "scene.toml"
     path.write_text(ABSORBING)
     assert command.main(["qdem", str(path), "--no-pictures"]) == 0

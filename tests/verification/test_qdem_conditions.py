@@ -58,7 +58,7 @@ def test_fixed_nodes_do_not_move_and_the_others_do() -> None:
     [0.01, (np.array([0.0, 1.0]), np.array([0.01, 0.02])), lambda t: 0.01 * (1 + t)],
     ids=["constant", "table", "function"],
 )
-def test_prescribed_nodes_are_where_they_are_told(given: Any) -> None:
+def test_prescribed_nodes_are_where_they_should_be(given: Any) -> None:
     """At the time reached, whatever the form of the value is."""
     body = block()
     run = free(body)

@@ -10,7 +10,13 @@ from validation.bench.qdem.contact import CASES, MODELS, account, momenta, near_
 
 CLOSES = 1e-3
 """Share of the greatest energy that the account may lack."""
-BY_MODEL = pytest.mark.parametrize("model", MODELS)
+BY_MODEL = pytest.mark.parametrize(
+    "model",
+    [
+        model if model == "spheres" else pytest.param(model, marks=pytest.mark.long)
+        for model in MODELS
+    ],
+)  # the loop of surfaces compiles for a minute
 SHORT = [words for words in CASES if words != "spinning grain"]
 
 
@@ -51,6 +57,7 @@ def test_critical_step_with_contact(model: str) -> None:
 
 @BY_MODEL
 @pytest.mark.parametrize("friction", [0.0, 0.5])
+@pytest.mark.long
 def test_tetrahedron_stands_on_its_vertex(model: str, friction: float) -> None:
     """Spring of a vertex ``p/2 A/3 (three faces of c = 1/3)`` against the weight: it stays."""
     worst, aside = tetrahedron(model, friction)

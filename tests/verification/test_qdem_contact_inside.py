@@ -1,4 +1,4 @@
-"""Bodies that begin in each other: told where no contact sees it, accounted for where one does."""
+"""Bodies that begin in each other: named where no contact sees it, accounted for where one does."""
 
 from __future__ import annotations
 
@@ -19,6 +19,13 @@ MODELS = {
     "surface": q.SurfaceContact(1e10, 0.5, depth=0.002),
     "overlaps": q.SurfaceContact(1e10, 0.5, depth=0.002, faces="overlaps"),
 }
+BY_MODEL = pytest.mark.parametrize(
+    "model",
+    [
+        model if model == "spheres" else pytest.param(model, marks=pytest.mark.long)
+        for model in MODELS
+    ],
+)  # the loop of surfaces compiles for a minute
 LOW = make_box_mesh((SIDE,) * 3, (2, 2, 2))
 
 
@@ -29,7 +36,7 @@ def beside(model: str, size: float, corner: tuple[float, float, float]) -> q.Sim
     return q.Simulation(bodies, threads=1, contact=MODELS[model], step=1e-8)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@BY_MODEL
 @pytest.mark.parametrize(
     ("size", "corner"),
     [
@@ -38,7 +45,7 @@ def beside(model: str, size: float, corner: tuple[float, float, float]) -> q.Sim
         (0.05, (-0.01, -0.011, -0.009)),  # swallows: no point of it is in the other
     ],
 )
-def test_bodies_deep_in_each_other_are_told(
+def test_bodies_deep_in_each_other_are_named(
     model: str, size: float, corner: tuple[float, float, float]
 ) -> None:
     run = beside(model, size, corner)
@@ -46,7 +53,7 @@ def test_bodies_deep_in_each_other_are_told(
         run.advance(1e-8)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@BY_MODEL
 @pytest.mark.parametrize(
     ("y", "said"),
     [
@@ -70,7 +77,7 @@ def test_images_across_a_width_are_looked_at(model: str, y: float, said: str | N
         run.advance(1e-8)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@BY_MODEL
 def test_bodies_that_contact_parts_are_not(model: str) -> None:
     """1 mm deep, within a sphere's radius and the greatest depth; and apart."""
     for corner in ((0.002, 0.002, SIDE - 1e-3), (0.002, 0.002, SIDE + 0.01)):
@@ -89,7 +96,7 @@ def test_what_overlap_gives_is_what_the_account_is_measured_by() -> None:
 
 
 def test_motion_that_a_scene_begins_with_is_not_missing() -> None:
-    """`velocity` of a body is no work of loads; what is lost on the way is told over it."""
+    """`velocity` of a body is no work of loads; what is lost on the way is divided by it."""
     rows = {"kinetic": [400.0, 400.0, 396.0], "elastic": [0.0] * 3, "external": [0.0] * 3}
     steady = list_energy_facts({name: np.array(values[:2]) for name, values in rows.items()})
     assert steady["relative_imbalance"] == 0.0

@@ -122,7 +122,7 @@ def test_a_march_is_stable_below_the_step_and_not_above(share: float, steps: int
 
 
 def test_a_march_that_meets_nearer_vertices_than_it_began_with_stops() -> None:
-    """The elements' step, though stiff vertices come near on the way: told before they touch."""
+    """The elements' step, though stiff vertices come near on the way: found before they touch."""
     run = two(2e-3, STONE, stiffness=1e12)
     run.bodies[1].velocity = np.tile([0.0, 0.0, -10.0], (27, 1))
     with pytest.raises(Unstable, match=r"come near each other.*\n.*number of contacts"):

@@ -19,6 +19,7 @@ from qdem_fem.files.errors import ConditionError, ContactTooDeep
 from qdem_fem.mesh.generation import make_box_mesh
 from tests.qdem_slopes import slope_gain
 
+pytestmark = pytest.mark.long  # the loop of surfaces compiles for a minute
 Floats = NDArray[np.float64]
 STONE = q.Material(30e9, 0.2, 2700.0)
 SIDE = 0.03

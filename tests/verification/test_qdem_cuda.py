@@ -61,7 +61,7 @@ def test_twins_agree_in_special_cases(apart: dict[str, float], variant: str) -> 
 @pytest.mark.parametrize("variant", [*MARCHES, "too deep"])
 @pytest.mark.long
 def test_contact_of_spheres_is_that_of_the_processor(apart: dict[str, float], variant: str) -> None:
-    """Places, forces, springs, losses and energies; lists made anew and stops in the same step.
+    """Places, forces, springs, losses and energies; lists made again and stops in the same step.
 
     On the GPU the processor's search and step raise, and no march copies arrays to the host.
     """

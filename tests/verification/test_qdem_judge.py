@@ -139,6 +139,7 @@ def test_linear_elements_converge_at_order_two_to_quadratic_ones() -> None:
     assert order == pytest.approx(2, abs=0.1)
 
 
+@pytest.mark.long
 @pytest.mark.peer("pyamg")
 def test_quadratic_elements_and_beams() -> None:
     """P2 meets Timoshenko to what a clamp's hindered contraction makes, 0.3 %; eq. 12 as printed.
@@ -179,6 +180,7 @@ def test_modes_by_two_methods() -> None:
         np.testing.assert_allclose(gram, np.eye(5), atol=1e-5)
 
 
+@pytest.mark.long
 def test_modes_come_down_to_those_of_beams() -> None:
     """Extrapolated to h = 0 from two meshes: Timoshenko's bending, Saint-Venant's torsion.
 

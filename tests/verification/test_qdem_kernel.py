@@ -31,6 +31,11 @@ LAWS: tuple[Strain, ...] = get_args(Strain)
 LAW = pytest.mark.parametrize("law", LAWS)
 PRECISION = pytest.mark.parametrize("precision", ["float64", "float32"])
 VISCOUS = pytest.mark.parametrize("viscous", [False, True], ids=["elastic", "viscous"])
+KERNELS = [
+    pytest.param(law, precision, viscous, marks=[pytest.mark.long] * (law != "finger"))
+    for law in LAWS for precision in ("float64", "float32") for viscous in (False, True)
+]  # fmt: skip
+"""Sixteen loops, each compiled for seconds: those of the paper's law first."""
 ROOT = Path(__file__).parents[2]
 
 
@@ -119,9 +124,7 @@ def stretched(body: q.Body, scale: float, dtype: str, seed: int = 5) -> np.ndarr
 
 
 @pytest.mark.parametrize("name", MESHES)
-@VISCOUS
-@PRECISION
-@LAW
+@pytest.mark.parametrize(("law", "precision", "viscous"), KERNELS)
 def test_forces_are_those_of_numpy(law: Strain, precision: str, viscous: bool, name: str) -> None:
     """f = sum -V0 P grad N (eq. 11) against `reference_forces.internal_forces`, to round-off.
 

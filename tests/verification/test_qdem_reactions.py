@@ -36,7 +36,7 @@ def test_equilibrium() -> None:
 
 
 def test_newton() -> None:
-    """A body whose nodes are all told ``z = a t^2/2``: m a, gravity apart."""
+    """A body whose nodes all follow ``z = a t^2/2``: m a, gravity apart."""
     body = block()
     run = q.Simulation([body], threads=1, step=1e-4, gravity=[0, 0, -9.81])
     told = run.prescribe(body, np.arange(len(X)), "z", lambda t: 0.5 * 3.0 * t**2)

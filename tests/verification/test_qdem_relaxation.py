@@ -243,7 +243,7 @@ def test_nothing_to_do_and_going_on() -> None:
     ("held", "free"),
     [([], 6), ([(0, "xyz")], 3), ([(0, "xyz"), (4, "yz")], 1), ([(slice(None), "xy")], 1)],
 )
-def test_free_body_is_told(held: list[tuple[Any, str]], free: int) -> None:
+def test_free_body_is_named(held: list[tuple[Any, str]], free: int) -> None:
     """Each rigid motion that is left is counted; node 4 is on the x axis through node 0."""
     body = q.Body(
         make_box_mesh((0.4, 0.1, 0.1), (4, 3, 2)), q.Material(1e6, 0.3, 1000.0), name="grain"
@@ -255,7 +255,7 @@ def test_free_body_is_told(held: list[tuple[Any, str]], free: int) -> None:
         run.relax()
 
 
-def test_loose_part_of_a_mesh_is_told() -> None:
+def test_loose_part_of_a_mesh_is_named() -> None:
     """A body in two parts, one of them held."""
     mesh = make_box_mesh((0.4, 0.1, 0.1), (2, 1, 1))
     count = len(mesh.nodes)
@@ -278,7 +278,7 @@ def test_not_converged_keeps_the_state_and_can_go_on() -> None:
     assert run.relax().residual <= 1e-8
 
 
-def test_rounding_is_told_from_slowness() -> None:
+def test_rounding_is_distinguished_from_slowness() -> None:
     """A tolerance that double precision can not reach ends soon, with the reason."""
     run, _, _ = cantilever((12, 3, 2), strain="small")
     with pytest.raises(NotConverged, match="where rounding keeps it") as caught:
@@ -287,7 +287,7 @@ def test_rounding_is_told_from_slowness() -> None:
     assert steps < 5000
 
 
-def test_jump_that_inverts_elements_is_told() -> None:
+def test_jump_that_inverts_elements_is_named() -> None:
     """The remedy of the message works: in parts it goes."""
     run, body, end = bar("svk")
     held = run.prescribe(body, end, "x", -0.15)

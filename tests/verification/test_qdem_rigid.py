@@ -286,7 +286,7 @@ def test_head_on_collision_of_two_rigid_cubes() -> None:
     assert total(run) == pytest.approx(mass / 2, rel=(2 * np.pi / period * 1e-7) ** 2)
 
 
-@pytest.mark.parametrize("model", ["spheres", "surface"])
+@pytest.mark.parametrize("model", ["spheres", pytest.param("surface", marks=pytest.mark.long)])
 def test_collision_of_a_rigid_and_a_deformable_body(model: str) -> None:
     """Aslant: momentum, angular momentum and energy of both together are what they were."""
     contact = None if model == "spheres" else q.SurfaceContact(1e12, 0.0)

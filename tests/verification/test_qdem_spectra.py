@@ -156,7 +156,7 @@ def test_noisy_cosine_within_a_thousandth() -> None:
         assert mode.frequency == pytest.approx(27, rel=1e-3)
 
 
-def test_modes_of_a_beam_are_told_apart() -> None:
+def test_modes_of_a_beam_are_separated() -> None:
     """Bending modes at 1 : 6.2 : 17 of falling strength, four periods of the first, with noise."""
     generator = np.random.default_rng(4)
     time = np.arange(0, 4 / 27, 1e-4)

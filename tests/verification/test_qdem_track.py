@@ -89,7 +89,7 @@ def test_cubes_come_to_rest_on_springs_that_bear_their_weight(rigid: bool, each:
         assert overlap == pytest.approx(weight.sum() / (8 * STIFFNESS), rel=2e-2)
 
 
-@pytest.mark.parametrize("surface", [False, True])
+@pytest.mark.parametrize("surface", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_grounded_is_what_stands_on_the_ground_over_others(surface: bool) -> None:
     """A cube that touches another is grounded with it: on the ground, or where gravity is held."""
     contact: Any = q.SphereContact(RADIUS, STIFFNESS, 0.5, (GROUND,))
@@ -204,7 +204,7 @@ def test_what_rings_while_the_sum_of_all_grows_is_stopped_by_itself(
     assert rings[3] == pytest.approx(0.0 if stopped else 1.0, abs=0.01 if stopped else 0.07)
 
 
-def test_no_equilibrium_in_time_is_told() -> None:
+def test_no_equilibrium_in_time_is_an_error() -> None:
     with pytest.raises(NotConverged, match=r"asked.*kinetic energy.*bodies loose"):
         kinetic_damping.find_rest(stacked(True), 1e-3, 1e-4, 0.0, 1e-3, look=1)
 

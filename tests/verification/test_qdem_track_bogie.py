@@ -208,7 +208,7 @@ def test_the_device_of_a_scene_is_that_of_its_run(
     assert options["device"] == "cuda"
 
 
-def test_no_room_beside_the_sleeper_is_told_before_grains_fall(
+def test_no_room_beside_the_sleeper_is_refused_before_grains_fall(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Grains of 70 mm between a sleeper of 240 mm and walls 300 mm apart; no file is begun."""

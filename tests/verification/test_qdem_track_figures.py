@@ -129,7 +129,7 @@ def test_density_of_a_spectrum_is_scipys_and_holds_the_variance() -> None:
     )
 
 
-def test_two_sines_are_told_apart_from_the_bandwidth_on() -> None:
+def test_two_sines_are_separate_from_the_bandwidth_on() -> None:
     """Of amplitude A over T each is a line A T/2, so that a peak, smoothed, is
     A T/2 sqrt(W(0)/T), W(0) = 3/4 280/(151 b); half a bandwidth apart they are one peak."""
     time = STEP * np.arange(20000)
@@ -162,7 +162,7 @@ def rows_written(folder: Path, count: int) -> None:
 
 @pytest.mark.parametrize("count", [2, FEWEST_SAMPLES - 1, FEWEST_SAMPLES])
 def test_a_run_too_short_for_spectra_ends_with_the_rest(tmp_path: Path, count: int) -> None:
-    """Settlement is told, spectra from four accelerations on; a window that smooths nothing is
+    """Settlement is there, spectra from four accelerations on; a window that smooths nothing is
     not claimed."""
     rows_written(tmp_path, count)
     load = load_of(np.linspace(0, -1, count))

@@ -60,7 +60,7 @@ def in_process(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
         words: Sequence[str], folder: Path, watch: Callable[[], None]
     ) -> tuple[int, float, float]:
         watch()
-        words = list(words[len(sweep_member.COMMAND) :])
+        words = list(words[words.index("trackbed") + 1 :])
         ran.append(words)
         screen = (folder / "screen.txt").open("w")
         with screen, redirect_stdout(screen), redirect_stderr(screen):
@@ -274,14 +274,14 @@ def test_stopped_it_goes_on(
     into, run = tmp_path / "sweep", sweep_member.run_process
 
     def stopped_in_the_second(
-        words: Sequence[str], folder: Path, watch: Callable[[], None]
+        asked: Sequence[str], folder: Path, watch: Callable[[], None]
     ) -> tuple[int, float, float]:
-        if "sample.seed=2" in command:
+        if "sample.seed=2" in asked:
             os.kill(os.getpid(), signal.SIGTERM)
             while True:  # until the sweep has told its members to stop
                 watch()
                 time.sleep(0.01)
-        return run(command, folder, watch)
+        return run(asked, folder, watch)
 
     words = (scene, "--seeds", 3, "--into", into)
     with monkeypatch.context() as context:

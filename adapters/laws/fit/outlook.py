@@ -35,8 +35,8 @@ from adapters.laws.fit.regime import (
 from adapters.laws.form import check_training_data
 
 JUDGED = 0.9
-"""Probability of the band that a prediction is judged by (`fit_refusal`, `compare_laws`), whatever
-band is asked for: a narrower one is no way round a refusal.  `validation.law_study` measured the
+"""Probability of the band that a prediction is judged by (`fit.refusal`, `compare_laws`), whatever
+band is asked for: a narrower one is no way round a refusal.  The study of laws measured the
 refusals at 90 %, the probability that regimes need too."""
 
 TO_TELL = "to see a regime"
@@ -47,7 +47,7 @@ TO_TELL = "to see a regime"
 class Outlook:
     """What n series are expected to do; each array of shape (n,), in the unit of the series.
 
-    Prediction and ends of bands are not finite where the laws overflow; `fit_refusal.refusals`
+    Prediction and ends of bands are not finite where the laws overflow; `fit.refusal.refusals`
     raises then.
     """
 
@@ -108,7 +108,7 @@ def outlook(
     unbounded = np.array([regime.bounded < 1 - CERTAIN for regime in regimes]) & ~bounded
     exponent = EXPONENTS[weigh_exponents(few, means).argmax(axis=0)]
     known = to_cycle == cycle[-1]
-    with np.errstate(over="ignore", invalid="ignore"):  # judged in `fit_refusal`
+    with np.errstate(over="ignore", invalid="ignore"):  # judged in `fit.refusal`
         candidates = find_candidates(few, means, to_cycle)
         votes = candidates.votes(bounded, unbounded)
         moved = np.zeros_like(last) if known else candidates.median(votes)

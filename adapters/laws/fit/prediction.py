@@ -36,7 +36,7 @@ class Prediction:
     `estimate_prediction_band`."""
     unit: str
     regime: str | None = None
-    """One of `fit_regime.REGIMES`; None where the series is too short to show one."""
+    """One of `fit.regime.REGIMES`; None where the series is too short to show one."""
     laws: dict[str, LawSaid] = field(default_factory=dict)
     """What each slow law says, by name; empty for a law that was named."""
     failure_excluded: bool | None = None
@@ -117,7 +117,7 @@ def fit_auto(
     regime follows from, and under each law's name the settlement that it alone predicts (the
     median of its windows); ``laws`` says which agree.
 
-    Raises `JumpRefused` where `fit_refusal.refusals` says so and ``to_cycle`` lies behind the
+    Raises `JumpRefused` where `fit.refusal.refusals` says so and ``to_cycle`` lies behind the
     series; it has ``laws`` too.  Otherwise as `fit_series`: a regime that is refused comes before
     a result that is not finite.
     """

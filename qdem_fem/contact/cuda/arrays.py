@@ -1,8 +1,7 @@
 """What contact of spheres remembers on a GPU, the launches of a step, and its lists made again.
 
 Arrays are those of `qdem_fem.contact.spheres.law.Contact`, and stay on the GPU: neither a step nor
-a
-look for pairs moves one to the host, which reads counts and greatest values alone.
+a look for pairs moves one to the host, which reads counts and greatest values alone.
 """
 
 from __future__ import annotations

@@ -9,9 +9,8 @@ vertex i and the images ``x_j + n W e`` of a vertex j, i meets the nearest,
 and n is found when pairs are looked for, and kept with them.  So a force depends on ``d`` alone,
 wherever the side is, and a spring does not know that its bodies cross it.
 
-Where a body and its own image would touch, contact of a body with itself would be needed, which
-is not computed: such a body is refused.  A slab as wide as the width, whose faces `find_partners`
-has
+Where a body and its own image would touch, contact of a body with itself would be needed, which is
+not computed: such a body is refused.  A slab as wide as the width, whose faces `find_partners` has
 joined, is one with its images, and allowed.
 """
 

@@ -1,9 +1,8 @@
 """The compiled time step: forces of the elements (eqs. 1-11), then the motion of the nodes.
 
 Elements are worked on in chunks, each with its own window of nodal forces
-(`qdem_fem.kernel.cpu.layout`),
-so that threads never write to the same place; the order of all sums is fixed by the layout,
-not by the threads, and a run gives the same bits on any number of them.
+(`qdem_fem.kernel.cpu.layout`), so that threads never write to the same place; the order of all sums
+is fixed by the layout, not by the threads, and a run gives the same bits on any number of them.
 
 A scene pays for what it names: the strain measure is chosen by the type of ``law``, and an
 argument that is ``None`` (viscosity, gravity) takes its branch out of the compiled code.

@@ -1,10 +1,10 @@
 """The bodies of a simulation on a GPU: state and element data stay there from window to window.
 
 `CudaAssembly` answers the calls of `qdem_fem.bodies.assembly.Assembly`; ``Simulation(...,
-device="cuda")``
-takes it in its place.  A window goes to the GPU as launches without a wait in between (with contact
-there are few); what comes back at its end is how many steps were done, the count of bad elements,
-the samples of the probes and the work of the few nodes with loads and constraints.
+device="cuda")`` takes it in its place.  A window goes to the GPU as launches without a wait in
+between (with contact there are few); what comes back at its end is how many steps were done, the
+count of bad elements, the samples of the probes and the work of the few nodes with loads and
+constraints.
 """
 
 from __future__ import annotations

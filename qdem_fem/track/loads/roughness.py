@@ -2,8 +2,7 @@
 
 Levels: Directive (EU) 2015/996, Annex, Appendix G, table G-1, as replaced by Delegated Directive
 (EU) 2021/1226; its smooth rail is the limit of EN ISO 3095:2013.  `qdem_fem.track.loads.rolling`
-makes a
-force of it.
+makes a force of it.
 """
 
 from __future__ import annotations
