@@ -81,8 +81,8 @@ def peer_missing(name: str) -> str:
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Skip what needs an engine or a library that is missing; with ``--nothing-missing`` it fails.
 
-    ``@pytest.mark.engine`` (default: liggghts) and ``@pytest.mark.peer("coal")``.  A machine several
-    times slower than usual leaves out what has not begun in time (``--begin-until``).
+    ``@pytest.mark.engine`` (default: liggghts) and ``@pytest.mark.peer("coal")``.  A slow
+    machine leaves out what has not begun in time (``--begin-until``).
     """
     seconds = item.config.getoption("--begin-until")
     if time.monotonic() - BEGAN > seconds:

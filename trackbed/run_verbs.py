@@ -87,13 +87,26 @@ def describe_run(path: Path, kind: Kind) -> dict[str, Any]:
     return said | {"next": next_step[state]}
 
 
-def _show_status(arguments: argparse.Namespace, kind: Kind) -> int:
-    said = describe_run(arguments.run_folder, kind)
-    if arguments.json:
-        print(json.dumps(said, indent=2))
+def print_fields(content: dict[str, Any], as_json: bool) -> None:
+    """Print values by name, as JSON or a line each; a number that is not finite is no JSON."""
+    if as_json:
+        print(json.dumps(content, indent=2, allow_nan=False))
     else:
-        for key, value in said.items():
+        for key, value in content.items():
             print(f"{key.replace('_', ' '):28}{value}")
+
+
+def show_page(path: Path, open_it: bool) -> None:
+    """Print the path of a page; with ``open_it`` show it, where there is a display."""
+    print(path)
+    if open_it and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        import webbrowser
+
+        webbrowser.open(path.resolve().as_uri())
+
+
+def _show_status(arguments: argparse.Namespace, kind: Kind) -> int:
+    print_fields(describe_run(arguments.run_folder, kind), arguments.json)
     return 0
 
 
@@ -105,11 +118,7 @@ def _show_report(arguments: argparse.Namespace, kind: Kind) -> int:
             f"this {kind.verb} run is {said['state']}, and its report is written at its end",
             where=str(arguments.run_folder), remedy=f"first: {said['next']}",
         )  # fmt: skip
-    print(path)
-    if arguments.open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        import webbrowser
-
-        webbrowser.open(path.resolve().as_uri())
+    show_page(path, arguments.open)
     return 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
 from adapters.cli.arguments import (
@@ -11,9 +10,9 @@ from adapters.cli.arguments import (
     add_run_argument,
     add_scene_arguments,
     list_overrides,
-    print_json,
 )
 from adapters.errors import UsageError
+from trackbed.run_verbs import print_fields, show_page
 
 JUMP_KEYS = ("procedure.k", "procedure.h")
 """Keys that ``--tolerance`` stands for."""
@@ -124,12 +123,8 @@ def run_status(arguments: argparse.Namespace) -> int:
     from adapters.procedure import describe_result, judge_progress, read_run_record
 
     record = read_run_record(arguments.run_folder)
-    content = judge_progress(record).to_dict()
-    if arguments.json:
-        print_json(content)
-    else:
-        for key, value in content.items():
-            print(f"{key.replace('_', ' '):28}{value}")
+    print_fields(judge_progress(record).to_dict(), arguments.json)
+    if not arguments.json:
         print("", *describe_result(record), sep="\n")
     return 0
 
@@ -145,10 +140,5 @@ def run_report(arguments: argparse.Namespace) -> int:
     """Write report.html and the figures; print the path."""
     from adapters.report import write_report
 
-    path = write_report(arguments.run_folder)
-    print(path)
-    if arguments.open and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        import webbrowser
-
-        webbrowser.open(path.resolve().as_uri())
+    show_page(write_report(arguments.run_folder), arguments.open)
     return 0

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from qdem_fem.scene.advise import Advice
+    from qdem_fem.scene import Advice
 
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
@@ -38,9 +38,13 @@ def register(verb: str, parser: argparse.ArgumentParser) -> None:
 def advise_command(arguments: argparse.Namespace) -> int:
     """Tell what may be rigid; with ``--check``, what two runs say to that."""
     from qdem_fem.files import UsageError
-    from qdem_fem.scene.advise import error_together
-    from qdem_fem.scene.advise_check import advise_scene, check_advice, mark_checked
-    from qdem_fem.scene.checks import load_scene
+    from qdem_fem.scene import (
+        advise_scene,
+        check_advice,
+        error_together,
+        load_scene,
+        mark_checked,
+    )
 
     if not 0 < arguments.tolerance < 1:
         raise UsageError(

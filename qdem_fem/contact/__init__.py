@@ -5,9 +5,9 @@ from qdem_fem.contact.sphere_state import PARTED, SphereContacts
 from qdem_fem.contact.state import Contacts, Floats
 from qdem_fem.contact.surface_state import SurfaceContacts
 from qdem_fem.contact.system import System, choose_assembly
-from qdem_fem.contact.window import window_run
+from qdem_fem.contact.window import run_window
 
 __all__ = [
     "PARTED", "Contacts", "CriticalStep", "Floats", "SphereContacts", "SurfaceContacts", "System",
-    "choose_assembly", "find_critical_step", "window_run",
+    "choose_assembly", "find_critical_step", "run_window",
 ]  # fmt: skip

@@ -24,7 +24,7 @@ from qdem_fem.contact.search import PeriodicWidth, check_extents, check_joined, 
 from qdem_fem.contact.spheres import LOOK_AGAIN, NEAR, TOO_DEEP, SphereContact
 from qdem_fem.contact.surface import SurfaceContact, check_inside
 from qdem_fem.contact.system import System
-from qdem_fem.contact.window import advance_contact, window_run
+from qdem_fem.contact.window import advance_contact, run_window
 from qdem_fem.files import ConditionError, ContactTooDeep, StepWarning
 from qdem_fem.kernel.cpu import Constraints, Loads, Probes
 
@@ -255,8 +255,8 @@ class Contacts(ABC):
         return done, bad
 
     def march(self, steps: int, step: float, *given: Any) -> tuple[int, float, int]:
-        """`qdem_fem.contact.window_run` of these contacts."""
-        return window_run(self.run, self.kernel, steps, step, *given)
+        """`qdem_fem.contact.run_window` of these contacts."""
+        return run_window(self.run, self.kernel, steps, step, *given)
 
     def say_step(self, step: float) -> int:
         """Contact at the displacement as it is, to which a ``step`` [s] led; what it says."""

@@ -242,7 +242,7 @@ def find_vertex_places(contact: Any) -> Any:
     return (contact.spheres if isinstance(contact, Contact) else contact.surface).place
 
 
-def window_run(
+def run_window(
     run: System, contact: Any, steps: int, step: float, loads: Loads,
     held: Constraints, probes: Probes, table: Any, gravity: Any, work: Any,
 ) -> tuple[int, float, int]:  # fmt: skip

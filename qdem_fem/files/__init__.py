@@ -16,12 +16,12 @@ from qdem_fem.files.errors import (
     Unstable,
     UsageError,
 )
-from qdem_fem.files.output import Table, table_read, write_bodies_vtu, write_pvd
+from qdem_fem.files.output import Table, read_table, write_bodies_vtu, write_pvd
 from qdem_fem.files.series import Driver, Series, Value, is_real, ramp
 
 __all__ = [
     "CheckpointError", "ConditionError", "ContactTooDeep", "Driver", "ElementInverted",
     "EnergyLost", "Interrupted", "LibraryMissing", "MaterialError", "MeshError", "NotConverged",
     "QdemError", "Series", "StepWarning", "Table", "Unstable", "UsageError", "Value", "is_real",
-    "ramp", "table_read", "write_bodies_vtu", "write_pvd",
+    "ramp", "read_table", "write_bodies_vtu", "write_pvd",
 ]  # fmt: skip

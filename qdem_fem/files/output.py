@@ -208,7 +208,7 @@ class Table:
             ) from error  # fmt: skip
 
 
-def table_read(path: Path) -> dict[str, FloatArray]:
+def read_table(path: Path) -> dict[str, FloatArray]:
     """Columns of a CSV table of numbers by name; empty arrays when it has no rows.
 
     Raises `UsageError` when it is not such a table.

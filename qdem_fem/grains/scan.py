@@ -52,7 +52,7 @@ class Scan:
         return roundness_wadell(self.nodes, self.faces)
 
 
-def scan_read(path: str | os.PathLike[str], unit: float | str = 1.0) -> Scan:
+def read_scan(path: str | os.PathLike[str], unit: float | str = 1.0) -> Scan:
     """Read the triangles of a file that meshio reads (STL, PLY, OBJ, ...), and check them.
 
     ``unit`` is the length of the file's unit [m], or its name: 1e-3 or "mm".  Corners of the same
@@ -97,7 +97,7 @@ def thin_scan(scan: Scan, faces: int) -> Scan:
     return Scan(centre + back * (left.nodes - centre), left.faces)
 
 
-def scan_mesh(scan: Scan, size: float | None = None) -> TetMesh:
+def mesh_scan(scan: Scan, size: float | None = None) -> TetMesh:
     """Tetrahedra inside the triangles of a scan, which stay as they are, by gmsh.
 
     ``size`` of the inner elements [m], the mean edge of the surface by default.  Node set
@@ -106,8 +106,8 @@ def scan_mesh(scan: Scan, size: float | None = None) -> TetMesh:
     edge = np.linalg.norm(scan.nodes[scan.faces] - scan.nodes[np.roll(scan.faces, 1, 1)], axis=2)
     h = float(edge.mean()) if size is None else size
     if not (np.isfinite(h) and h > 0):
-        raise MeshError(f"elements of {h} m", where="scan_mesh", remedy="give a size in metres")
-    with gmsh_model("scan_mesh", h, "thin the scan out or mend its flattest triangles") as gmsh:
+        raise MeshError(f"elements of {h} m", where="mesh_scan", remedy="give a size in metres")
+    with gmsh_model("mesh_scan", h, "thin the scan out or mend its flattest triangles") as gmsh:
         surface = gmsh.model.addDiscreteEntity(2)
         tags = np.arange(1, len(scan.nodes) + 1)
         gmsh.model.mesh.addNodes(2, surface, tags, scan.nodes.reshape(-1))
@@ -117,6 +117,6 @@ def scan_mesh(scan: Scan, size: float | None = None) -> TetMesh:
         gmsh.model.geo.synchronize()
         gmsh.model.mesh.generate(3)
         gmsh.model.mesh.optimize("Netgen")
-        mesh = make_gmsh_tetrahedra(gmsh, "scan_mesh")
+        mesh = make_gmsh_tetrahedra(gmsh, "mesh_scan")
     outer = np.unique(find_surface_faces(mesh.elements))
     return TetMesh(mesh.nodes, mesh.elements, mesh.flipped, mesh.unused, {"surface": outer})

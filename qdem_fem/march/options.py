@@ -36,7 +36,7 @@ def number_bodies(bodies: Sequence[Body]) -> None:
             body.name = f"{body.name} {number}"
 
 
-def words_check(**given: Any) -> None:
+def check_words(**given: Any) -> None:
     """Raise `ConditionError` for a ``strain``, ``precision`` or ``device`` that there is not."""
     known = {"strain": tuple(MEASURES), "precision": PRECISIONS, "device": DEVICES}
     for name, value in given.items():
@@ -46,7 +46,7 @@ def words_check(**given: Any) -> None:
             )
 
 
-def bounds_check(*, safety: float, threads: int | None) -> None:
+def check_bounds(*, safety: float, threads: int | None) -> None:
     """Raise `ConditionError` for a share of the critical step above 1, or part of a thread."""
     if safety > 1:
         raise ConditionError(

@@ -22,12 +22,12 @@ from qdem_fem.march.dynamic_relaxation import StaticAnswer, relax
 from qdem_fem.march.energies import Energy, find_energy
 from qdem_fem.march.leapfrog import find_velocity, level_velocities
 from qdem_fem.march.options import (
-    bounds_check,
     check_bodies,
+    check_bounds,
     check_numbers,
     check_rigid_options,
+    check_words,
     number_bodies,
-    words_check,
 )
 from qdem_fem.march.reactions import reaction
 from qdem_fem.march.state import STEP_SAFETY
@@ -93,9 +93,9 @@ class Simulation(ConditionedBodies):
         own = list(bodies)
         check_bodies(own)
         number_bodies(own)
-        words_check(strain=strain, precision=precision, device=device)
+        check_words(strain=strain, precision=precision, device=device)
         check_numbers(step=step, safety=safety, threads=threads, mass_scaling=mass_scaling)
-        bounds_check(safety=safety, threads=threads)
+        check_bounds(safety=safety, threads=threads)
         check_contact_options(contact, precision, device)
         choose_assembly(device)
         check_rigid_options(own, precision, device)

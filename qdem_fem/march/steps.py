@@ -97,9 +97,9 @@ def march(
 
 def run_window_alone(run: State, *given: Any) -> tuple[int, float]:
     """`Assembly.window` of a system with rigid bodies or absorbing faces that touch nothing."""
-    from qdem_fem.contact import window_run
+    from qdem_fem.contact import run_window
 
-    done, bad, _ = window_run(run, None, *given)
+    done, bad, _ = run_window(run, None, *given)
     return done, bad
 
 

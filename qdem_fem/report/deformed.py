@@ -102,7 +102,7 @@ def draw_deformed(
     pierce each other may be drawn in the wrong order.
     """
     if magnification is None:
-        magnification = magnification_round(bodies)
+        magnification = round_magnification(bodies)
     frame = view_frame(azimuth, elevation)
     stress = faces_stress(bodies)
     seen = faces_corners(bodies, magnification) @ frame.T
@@ -164,7 +164,7 @@ def view_frame(azimuth: float, elevation: float) -> FloatArray:
     return np.array([right, away, np.cross(right, away)])
 
 
-def magnification_round(bodies: Sequence[Any]) -> float:
+def round_magnification(bodies: Sequence[Any]) -> float:
     """1, 2 or 5 times a power of ten, the greatest that keeps displacements below `SHOWN`."""
     nodes = np.concatenate([body.nodes for body in bodies])
     size = float(np.linalg.norm(nodes.max(axis=0) - nodes.min(axis=0)))

@@ -62,7 +62,7 @@ def draw_fields(
     )  # fmt: skip
 
 
-def series_draw(
+def draw_series(
     run: Any, bodies: Sequence[Any], files: Sequence[tuple[float, Path]], magnification: float
 ) -> list[Path]:
     """Draw the picture of each VTU file (time [s], path), all on one colour scale; their paths.

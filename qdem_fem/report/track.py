@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.files import table_read
+from qdem_fem.files import read_table
 from qdem_fem.mesh import FloatArray
 from qdem_fem.report import figures as pictures
 from qdem_fem.report.spectra import fourier_spectrum, frequency_response, parzen_smoothed
@@ -97,7 +97,7 @@ def list_track_facts(path: Path, load: TimeSeries) -> dict[str, Any]:
     """Figures of the run in a folder: greatest and final displacement of each point [m] since the
     prepared state, along y and down; peaks of spectra and mobility [Hz], of a record
     of `FEWEST_SAMPLES` samples or more."""
-    rows = table_read(path / "probes.csv")
+    rows = read_table(path / "probes.csv")
     time = rows["time"]
     facts: dict[str, Any] = {}
     for name in (*GRAINS, *SENSORS, "sleeper"):
@@ -121,7 +121,7 @@ def list_track_facts(path: Path, load: TimeSeries) -> dict[str, Any]:
 
 def draw_track_pictures(path: Path, load: TimeSeries) -> Iterator[tuple[Path, str]]:
     """Draw what a track run shows; file and caption of each picture."""
-    rows = table_read(path / "probes.csv")
+    rows = read_table(path / "probes.csv")
     time = rows["time"]
     moved = {
         f"{name} {axis}": rows[f"{name}_{axis}"] - rows[f"{name}_{axis}"][0]

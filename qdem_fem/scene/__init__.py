@@ -1,5 +1,7 @@
 """A scene run from its file: build, march, report, advice."""
 
+from qdem_fem.scene.advise import Advice, error_together
+from qdem_fem.scene.advise_check import advise_scene, check_advice, mark_checked
 from qdem_fem.scene.build import simulation_of
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.scene.page import write_report
@@ -13,7 +15,8 @@ from qdem_fem.scene.summary import (
 )
 
 __all__ = [
-    "RESULT", "RunFolder", "list_body_facts", "list_mass_scaling_facts", "load_scene",
-    "make_manifest", "make_plan", "run_dynamic", "run_static", "simulation_of", "summary_of",
+    "RESULT", "Advice", "RunFolder", "advise_scene", "check_advice", "error_together",
+    "list_body_facts", "list_mass_scaling_facts", "load_scene", "make_manifest", "make_plan",
+    "mark_checked", "run_dynamic", "run_static", "simulation_of", "summary_of",
     "tell_critical_step", "write_report",
 ]  # fmt: skip

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from qdem_fem.files import table_read
+from qdem_fem.files import read_table
 from qdem_fem.report import Mode
 from qdem_fem.scene.energy_account import STORED
 from qdem_fem.scene.run import Done
@@ -59,7 +59,7 @@ def _pictures(path: Path, summary: dict[str, Any], done: Done) -> Iterator[tuple
     yield deformed, f"Bodies {when}, displacement magnified {factor:g} times{lines}."
     if done.plan is None:
         return
-    rows, energy = table_read(path / "probes.csv"), table_read(path / "energy.csv")
+    rows, energy = read_table(path / "probes.csv"), read_table(path / "energy.csv")
     time = rows.pop("time")
     moving = {name: (time, rows[name]) for name in find_moving_components(rows)}
     if moving:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.files import EnergyLost, Interrupted, Table, table_read, write_bodies_vtu, write_pvd
+from qdem_fem.files import EnergyLost, Interrupted, Table, read_table, write_bodies_vtu, write_pvd
 from qdem_fem.scene.energy_account import EnergyAccount
 from qdem_fem.scene.run_folder import RunFolder
 from qdem_fem.tables import Prepared
@@ -143,10 +143,10 @@ def run_dynamic(
                     f"{folder.checkpoint}\n  -> the same command with --resume goes on from there"
                 )
     if output.magnification is not None:
-        from qdem_fem.report import series_draw
+        from qdem_fem.report import draw_series
 
         files = [(when, folder.path / name) for _, when, name in plan.field_files(plan.total)]
-        pictures = series_draw(run, list(bodies.values()), files, output.magnification)
+        pictures = draw_series(run, list(bodies.values()), files, output.magnification)
         if output.video is not None and pictures:
             from qdem_fem.report import write_video
 
@@ -214,7 +214,7 @@ class _Record:
         self.rows.cut(now, done // plan.sampling + 1)
         at_end = done == plan.total and done % plan.energy > 0
         self.energies.cut(now, done // plan.energy + 1 + at_end)
-        self.account.take(table_read(self.energies.path))
+        self.account.take(read_table(self.energies.path))
         kept = {name for _, _, name in self.plan.field_files(self.run.steps_done)}
         for path in self.path.glob("fields_*.vtu"):
             if path.name not in kept:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from qdem_fem.files import table_read
+from qdem_fem.files import read_table
 from qdem_fem.report import Mode, find_peak_frequencies
 from qdem_fem.scene.energy_account import list_energy_facts
 from qdem_fem.scene.run import Done
@@ -29,7 +29,7 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
     static = done.plan is None
     elements = sum(len(body.elements) for body in done.bodies.values() if not body.rigid)
     element_steps = 0 if done.plan is None else elements * done.plan.total
-    rows, energy = (table_read(folder.path / name) for name in ("probes.csv", "energy.csv"))
+    rows, energy = (read_table(folder.path / name) for name in ("probes.csv", "energy.csv"))
     return {
         "title": prepared.scene.title,
         "method": prepared.scene.simulation.method,

@@ -90,7 +90,7 @@ class Bed:
         return [nodes + u for nodes, u in zip(self.nodes, moved, strict=True)]
 
 
-def bed_prepare(
+def prepare_bed(
     recipe: BedRecipe, path: Path, threads: int | None = None,
     progress: Callable[[str, Rest], None] | None = None,
 ) -> Bed:  # fmt: skip
@@ -101,7 +101,7 @@ def bed_prepare(
     Raises `CheckpointError` for a file of another recipe, `NotConverged` where a stage finds no
     equilibrium, `MeshError` where grains have no room below or beside the sleeper.
     """
-    bed = bed_read(path, recipe) if path.exists() else None
+    bed = read_bed(path, recipe) if path.exists() else None
     grains = grains_of(recipe)
     if bed is None:  # refused before grains fall for hours
         recipe.layout.grains_beside(place_grain_nodes(grains)[recipe.below :], 0.0, recipe.seed + 1)
@@ -121,8 +121,8 @@ def part_of(path: Path, stage: str) -> Path:
 
 
 def list_stages_ahead(recipe: BedRecipe, path: Path) -> tuple[str, ...]:
-    """Stages of a preparation that the file ``path`` lacks; raises as `bed_prepare`."""
-    done = STAGES.index(bed_read(path, recipe).stage) + 1 if path.exists() else 0
+    """Stages of a preparation that the file ``path`` lacks; raises as `prepare_bed`."""
+    done = STAGES.index(read_bed(path, recipe).stage) + 1 if path.exists() else 0
     return STAGES[done:]
 
 
@@ -287,7 +287,7 @@ def write_bed(path: Path, recipe: BedRecipe, bed: Bed) -> None:
     write_whole(path, stream.getvalue())
 
 
-def bed_read(path: Path, recipe: BedRecipe) -> Bed:
+def read_bed(path: Path, recipe: BedRecipe) -> Bed:
     """Read what `write_bed` wrote for this recipe; raises `CheckpointError` else."""
     remedy = "give another file, or remove it to prepare the bed again"
     try:

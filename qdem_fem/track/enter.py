@@ -34,7 +34,7 @@ from qdem_fem.tables import (
     find_output_faults,
     list_named_files,
 )
-from qdem_fem.track.bed import Bed, bed_prepare, list_stages_ahead
+from qdem_fem.track.bed import Bed, list_stages_ahead, prepare_bed
 from qdem_fem.track.bodies import TrackBox
 from qdem_fem.track.recipe import SLEEPER, BedRecipe, names_of
 from qdem_fem.track.sleeper_mesh import SleeperShape
@@ -214,7 +214,7 @@ def enter_track(prepared: TrackPrepared) -> tuple[Any, dict[str, Any]]:
     scene, recipe = prepared.scene, prepared.recipe
     assert isinstance(scene, TrackScene)
     table, track = scene.simulation, scene.track
-    bed = bed_prepare(recipe, prepared.bed_file, table.threads, _Report())
+    bed = prepare_bed(recipe, prepared.bed_file, table.threads, _Report())
     contact = contact_of(prepared)
     stand = judge_bed(
         recipe, bed, prepared.bed_file, contact, track.stand, track.creep, table.threads,

@@ -22,7 +22,7 @@ import pytest
 import qdem_fem.scene as scene_room
 from qdem_fem.cli import run as cli
 from qdem_fem.files.errors import Interrupted, SceneError, StepWarning, UsageError
-from qdem_fem.files.output import table_read
+from qdem_fem.files.output import read_table
 
 ROOT = Path(__file__).parents[2]
 SCENE = """\
@@ -110,7 +110,7 @@ def test_run_writes_what_it_promises(scene: Path, capsys: pytest.CaptureFixture[
     step, total = printed["step"], printed["steps"]
     assert step == pytest.approx(0.9 * printed["critical_step"]["value"])
     assert total * step == pytest.approx(0.02, rel=2e-3)
-    rows, energy = table_read(folder / "probes.csv"), table_read(folder / "energy.csv")
+    rows, energy = read_table(folder / "probes.csv"), read_table(folder / "energy.csv")
     assert list(rows)[1:] == [f"{name}_{axis}" for name in ("tip", "middle") for axis in "xyz"]
     spacing = np.diff(rows["time"])
     assert spacing == pytest.approx(spacing[0])
@@ -151,7 +151,7 @@ def test_energy_balance_is_that_of_verlet(scene: Path) -> None:
 
     def imbalance(name: str, safety: float) -> float:
         find_result(scene, name, f"simulation.safety={safety}")
-        rows = table_read(scene.with_name(name) / "energy.csv")
+        rows = read_table(scene.with_name(name) / "energy.csv")
         missing = rows["external"] - rows["kinetic"] - rows["elastic"]
         return float(np.abs(missing / rows["external"][-1])[rows["time"] > 0.002].max())
 

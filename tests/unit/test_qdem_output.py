@@ -14,14 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from qdem_fem.files.errors import DiskFull, UsageError
-from qdem_fem.files.output import Table, table_read, write_bodies_vtu, write_pvd, write_vtu
+from qdem_fem.files.output import Table, read_table, write_bodies_vtu, write_pvd, write_vtu
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.mesh.surface import find_surface_faces
 from qdem_fem.report.deformed import (
     draw_deformed,
     feature_edges,
-    magnification_round,
     nodal_average,
+    round_magnification,
     view_frame,
 )
 from qdem_fem.report.figures import draw_energy, draw_spectrum, picture_history, unit_of
@@ -96,7 +96,7 @@ def test_table_keeps_every_bit(
     rows = np.column_stack([np.arange(len(values)), values])
     table.append(rows[:1])
     table.append(rows[1:])
-    found = table_read(table.path)
+    found = read_table(table.path)
     assert (np.column_stack([found["time"], found["a"]]) == rows).all()
 
 
@@ -128,7 +128,7 @@ def test_cut_refuses_another_table(tmp_path: Path) -> None:
     assert (tmp_path / "t.csv").read_text() == "time,a\n0.0,1.0\n1.0,"
     (tmp_path / "t.csv").write_text("time,a\n0,x\n")
     with pytest.raises(UsageError, match="no table"):
-        table_read(tmp_path / "t.csv")
+        read_table(tmp_path / "t.csv")
 
 
 def test_no_space_is_a_sentence_with_the_file(tmp_path: Path) -> None:
@@ -171,7 +171,7 @@ def test_magnification_is_round_and_never_below_one(scale: float) -> None:
     """1, 2, 5 times a power of ten; 1 for bodies that do not move or move far."""
     one = body()
     one.displacement = scale * one.nodes / 2
-    factor = magnification_round([one])
+    factor = round_magnification([one])
     assert f"{factor:.0e}"[0] in "125"
     assert factor == pytest.approx(float(f"{factor:.0e}"))
     assert factor >= 1

@@ -20,7 +20,7 @@ from qdem_fem.files.output import write_bodies_vtu
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.mesh.surface import find_surface_faces
 from qdem_fem.report import series as pictures_series
-from qdem_fem.report.series import Shown, inside, place_picture_beside, series_draw
+from qdem_fem.report.series import Shown, draw_series, inside, place_picture_beside
 from trackbed.command import main
 
 pytestmark = pytest.mark.lowest
@@ -82,7 +82,7 @@ def test_colours_of_a_series_are_shares_of_its_greatest_stress(tmp_path: Path) -
     files = [(0.1 * n, tmp_path / f"fields_{n}.vtu") for n in range(3)]
     for stress, (_, path) in zip(stresses, files, strict=True):
         write_bodies_vtu(path, [block(stress)])
-    pictures = series_draw(STILL, [block(0.0)], files, 1.0)
+    pictures = draw_series(STILL, [block(0.0)], files, 1.0)
     assert pictures == [place_picture_beside(path) for _, path in files]
     for stress, picture in zip(stresses, pictures, strict=True):
         expected = np.array(colormaps["viridis"](stress / 4e6)[:3])
@@ -94,7 +94,7 @@ def test_a_series_has_one_frame(tmp_path: Path) -> None:
     files = [(0.1 * n, tmp_path / f"fields_{n}.vtu") for n in range(2)]
     for moved, (_, path) in zip((0.0, 4.0), files, strict=True):
         write_bodies_vtu(path, [block(4.0, moved), block(1.0)])
-    first, last = (image.imread(p) for p in series_draw(STILL, 2 * [block(0.0)], files, 1.0))
+    first, last = (image.imread(p) for p in draw_series(STILL, 2 * [block(0.0)], files, 1.0))
     assert first.shape == last.shape
     seen = [
         [along(picture, colormaps["viridis"](share)[:3]) for share in (0.25, 1.0)]
@@ -189,9 +189,9 @@ def test_a_file_that_is_gone_is_named_and_the_others_are_drawn(tmp_path: Path, t
     write_bodies_vtu(tmp_path / "fields_1.vtu", [block(1.0)])
     files = [(float(i), tmp_path / f"fields_{i}.vtu") for i in (0, 1)]
     with pytest.warns(UserWarning, match=r"fields_0\.vtu, of which a picture is drawn"):
-        assert series_draw(STILL, [block(0.0)], files, 1.0) == [place_picture_beside(files[1][1])]
+        assert draw_series(STILL, [block(0.0)], files, 1.0) == [place_picture_beside(files[1][1])]
     with pytest.warns(UserWarning, match=r"it gets none"):
-        assert series_draw(STILL, [block(0.0)], files[:1], 1.0) == []
+        assert draw_series(STILL, [block(0.0)], files[:1], 1.0) == []
 
 
 def test_a_series_without_any_stress_is_drawn(tmp_path: Path) -> None:
@@ -199,5 +199,5 @@ def test_a_series_without_any_stress_is_drawn(tmp_path: Path) -> None:
     mesh = make_box_mesh((1.0, 1.0, 1.0), (1, 1, 1))
     body = q.Body(mesh, q.Material(1e6, 0.2, 1000.0), rigid=True)
     write_bodies_vtu(tmp_path / "fields_0.vtu", [body])
-    (picture,) = series_draw(STILL, [body], [(0.0, tmp_path / "fields_0.vtu")], 1.0)
+    (picture,) = draw_series(STILL, [body], [(0.0, tmp_path / "fields_0.vtu")], 1.0)
     assert picture.read_bytes().startswith(b"\x89PNG")

@@ -44,7 +44,7 @@ def test_a_run_that_asks_for_neither_keeps_no_bodies(tmp_path):
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
-    ("coefficient = 1e-7", "coefficient = 0", "greater than 0"),
+    ("coefficient = 1e-7", "coefficient = 0", "must be above 0"),
     ("tension = 1.2e4", "tension = 4e4\nmodulus = 3.0", "both modulus"),
     ("step = 2e-3", 'step = 2e-3\nmethod = "acceleration"', "acceleration level"),
     ("every = 2", "evry = 2", "evry: unknown key; did you mean every"),

@@ -156,6 +156,7 @@ def test_stones_in_space_have_four_corners(tmp_path: Path) -> None:
         scene_read(written(tmp_path, text))
 
 
+@pytest.mark.long
 def test_damaged_scenes_give_sentences_only(tmp_path: Path) -> None:
     """Cut, doubled and changed lines: a scene or one of our own errors, never a traceback."""
     lines = PILE.read_text(encoding="utf-8").splitlines()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import qdem_fem as q
 from qdem_fem.contact.search.pairs import find_near_pairs, find_periodic_pairs
 from qdem_fem.files.errors import CheckpointError, ConditionError, SceneError
-from qdem_fem.files.output import table_read
+from qdem_fem.files.output import read_table
 from qdem_fem.march.leapfrog import find_free_accelerations
 from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.scene.build import simulation_of
@@ -475,7 +475,7 @@ def test_a_scene_names_absorbing_faces(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(ABSORBING)
     assert command.main(["qdem", str(path), "--no-pictures"]) == 0
-    rows = table_read(next(tmp_path.rglob("energy.csv")))
+    rows = read_table(next(tmp_path.rglob("energy.csv")))
     assert rows["absorbed"][-1] > 0.0 < rows["foundation"][-1]
     stored = sum(rows[name] for name in ("kinetic", "elastic", "absorbed", "foundation"))
     assert stored[-1] == pytest.approx(rows["external"][-1], rel=1e-3)

@@ -15,7 +15,7 @@ from qdem_fem.grains.checks import check_surface, triangles_cutting
 from qdem_fem.grains.hulls import corners_apart, find_hull_faces
 from qdem_fem.grains.measures import find_surface_edges, polyhedron_integrals, quarter_faces
 from qdem_fem.grains.meshing import radius_ratios
-from qdem_fem.grains.scan import Scan, scan_mesh, scan_read, thin_scan
+from qdem_fem.grains.scan import Scan, mesh_scan, read_scan, thin_scan
 from qdem_fem.mesh.checks import FloatArray, IntArray
 from qdem_fem.mesh.tetrahedra import element_gradients
 
@@ -45,7 +45,7 @@ def written(path: Path, nodes: FloatArray, faces: IntArray, binary: bool = True)
 def test_a_stone_is_read_from_stl(tmp_path: Path, binary: bool) -> None:
     """Volume to what STL holds: seven digits in binary files; nodes are joined again."""
     nodes, faces = stone()
-    scan = scan_read(written(tmp_path / "stone.stl", 1e3 * nodes, faces, binary), unit=1e-3)
+    scan = read_scan(written(tmp_path / "stone.stl", 1e3 * nodes, faces, binary), unit=1e-3)
     assert (len(scan.nodes), len(scan.faces)) == (len(nodes), len(faces))
     assert scan.volume == pytest.approx(polyhedron_integrals(nodes, faces).volume, rel=1e-6)
     assert 0.85 < scan.sphericity < 1
@@ -122,19 +122,19 @@ def test_what_is_no_stone_is_refused(spoil: object, words: str) -> None:
 def test_files_that_hold_no_stone_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "stone.stl"
     with pytest.raises(MeshError, match="no such file"):
-        scan_read(path)
+        read_scan(path)
     path.write_bytes(b"solid nothing")
     with pytest.raises(MeshError, match=r"can not read|no triangles"):
-        scan_read(path)
+        read_scan(path)
     line = meshio.Mesh(np.eye(3), [("line", np.array([[0, 1]]))])
     meshio.write(tmp_path / "line.vtu", line)
     with pytest.raises(MeshError, match="no triangles"):
-        scan_read(tmp_path / "line.vtu")
+        read_scan(tmp_path / "line.vtu")
     nodes, faces = stone(1)
     with pytest.raises(MeshError, match="open"):
-        scan_read(written(path, nodes, faces[2:]))
+        read_scan(written(path, nodes, faces[2:]))
     with pytest.raises(MeshError, match="unit"):
-        scan_read(path, unit=0.0)
+        read_scan(path, unit=0.0)
 
 
 @settings(max_examples=10)
@@ -163,7 +163,7 @@ def test_a_thinned_stone_keeps_its_volume_and_takes_a_hundred_tetrahedra() -> No
     thin = thin_scan(scan, 50)
     assert thin.volume == pytest.approx(scan.volume, rel=1e-12)
     assert len(thin.faces) == pytest.approx(50, abs=4)
-    mesh = scan_mesh(thin)
+    mesh = mesh_scan(thin)
     _, volumes = element_gradients(mesh.nodes, mesh.elements)
     assert volumes.sum() == pytest.approx(scan.volume, rel=1e-9)
     assert 50 < len(mesh.elements) < 200
@@ -173,4 +173,4 @@ def test_a_thinned_stone_keeps_its_volume_and_takes_a_hundred_tetrahedra() -> No
     with pytest.raises(MeshError, match="5 triangles"):
         thin_scan(scan, 5)
     with pytest.raises(MeshError, match="elements of 0"):
-        scan_mesh(thin, 0.0)
+        mesh_scan(thin, 0.0)

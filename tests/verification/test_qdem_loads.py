@@ -15,7 +15,7 @@ from scipy.integrate import trapezoid
 from qdem_fem import Body, Series, Simulation
 from qdem_fem.element.material import Material
 from qdem_fem.files.errors import ConditionError, MeshError
-from qdem_fem.files.output import table_read
+from qdem_fem.files.output import read_table
 from qdem_fem.mesh.tetrahedra import element_gradients, lumped_mass
 from qdem_fem.report.spectra import fourier_spectrum
 from qdem_fem.track.loads.rail import Track, seat_share
@@ -236,7 +236,7 @@ def test_command_writes_a_record_to_nine_digits(
     assert main(["train", "--cars", "1", "--out", str(path)]) == 0
     assert "10000 Hz" in capsys.readouterr().out
     made = make_train_record(Train(cars=1), TRACK, SEAT_AREA)
-    found = table_read(path)
+    found = read_table(path)
     for seat in (0, 1):
         np.testing.assert_allclose(found[SEATS[seat]], made.pressure[:, seat], rtol=1e-8, atol=1e-3)
 
@@ -248,7 +248,7 @@ def test_command_gives_wheels_flats(tmp_path: Path, capsys: pytest.CaptureFixtur
     flat = ["--flat", "2", "60e3", "2e-3"]
     for path, more in zip(paths, ([], flat), strict=True):
         assert main(["train", "--cars", "1", *more, "--out", str(path)]) == 0
-    even, struck = (table_read(path)["rp1"] for path in paths)
+    even, struck = (read_table(path)["rp1"] for path in paths)
     centre = 60e3 * seat_share(np.zeros(1), TRACK)[0] / (0.13 * 0.17)
     assert (struck - even).max() == pytest.approx(centre, rel=0.01)
     for axle in ("4", "0.5", "-1", "nan"):

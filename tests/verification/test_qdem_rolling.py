@@ -10,7 +10,7 @@ import pytest
 
 from qdem_fem.cli.track import SEAT_AREA
 from qdem_fem.files.errors import ConditionError, SceneError
-from qdem_fem.files.output import table_read
+from qdem_fem.files.output import read_table
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.track.bogie import make_bogie_series
 from qdem_fem.track.enter import TrackPrepared
@@ -229,7 +229,7 @@ def test_a_record_of_rough_rails_is_written_by_the_command(tmp_path: Path) -> No
     train, rough = Train(cars=1, speed=90.0), Roughness("smooth", seed=3)
     made = make_train_record(train, TRACK, SEAT_AREA, roughness=rough)
     even = make_train_record(train, TRACK, SEAT_AREA)
-    found = table_read(tmp_path / "train.csv")
+    found = read_table(tmp_path / "train.csv")
     written = np.stack([found["rp1"], found["rp2"]], axis=1)
     np.testing.assert_allclose(written, made.pressure, atol=1e-2)
     added = np.abs(made.pressure - even.pressure)

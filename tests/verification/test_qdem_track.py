@@ -33,7 +33,7 @@ from qdem_fem.scene.checks import load_scene
 from qdem_fem.scene.energy_account import EnergyAccount, list_energy_facts
 from qdem_fem.scene.run import run_dynamic
 from qdem_fem.scene.run_folder import RunFolder
-from qdem_fem.track.bed import Bed, bed_read, scatter, write_bed
+from qdem_fem.track.bed import Bed, read_bed, scatter, write_bed
 from qdem_fem.track.bodies import (
     TrackBox,
     make_loose_lattice,
@@ -376,14 +376,14 @@ def test_a_bed_is_read_as_written_and_refused_for_another_recipe(tmp_path: Path)
     nodes = [np.arange(6.0).reshape(2, 3), np.ones((1, 3))]
     bed = Bed("rest", nodes, np.full((3, 3), 0.5), {"contact_slid": np.ones(2)}, {"rest": {}})
     write_bed(path, RECIPE, bed)
-    found = bed_read(path, RECIPE)
+    found = read_bed(path, RECIPE)
     assert [x.tolist() for x in found.positions] == [(x + 0.5).tolist() for x in nodes]
     assert found.contact["contact_slid"].tolist() == [1.0, 1.0]
     with pytest.raises(CheckpointError, match="friction differ"):
-        bed_read(path, replace(RECIPE, friction=0.6))
+        read_bed(path, replace(RECIPE, friction=0.6))
     path.write_bytes(b"PK")
     with pytest.raises(CheckpointError, match="no bed"):
-        bed_read(path, RECIPE)
+        read_bed(path, RECIPE)
 
 
 def test_the_load_of_a_bogie_is_that_of_its_axles_and_begins_and_ends_at_rest() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from qdem_fem.cli.track import SEAT_AREA
 from qdem_fem.files.errors import SceneError
-from qdem_fem.files.output import table_read
+from qdem_fem.files.output import read_table
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.track import enter as track_scene
 from qdem_fem.track import stand as track_stand
@@ -47,7 +47,7 @@ def test_flats_of_a_scene_are_those_of_the_command(tmp_path: Path) -> None:
     pressures = []
     for name, more in (("round.csv", []), ("flat.csv", asked)):
         assert main([*words, str(tmp_path / name), *more]) == 0
-        pressures.append(table_read(tmp_path / name)["rp1"])
+        pressures.append(read_table(tmp_path / name)["rp1"])
     table = ", ".join(f"{{ axle = {a}, peak = {p}, duration = {d} }}" for a, p, d in flats)
     time, round_load = load_of(tmp_path, f"lead = {LEAD}")
     _, flat_load = load_of(tmp_path, f"lead = {LEAD}, flat = [{table}]")
@@ -196,7 +196,7 @@ def test_the_device_of_a_scene_is_that_of_its_run(
     def begin(*_: object, **options: object) -> None:
         raise Begun(options)
 
-    monkeypatch.setattr(track_scene, "bed_prepare", lambda *_: None)
+    monkeypatch.setattr(track_scene, "prepare_bed", lambda *_: None)
     monkeypatch.setattr(track_stand, "judge_bed", lambda *_: None)
     monkeypatch.setattr(track_stand, "begin_bed", begin)
     load_of(tmp_path, "lead = 1.0")

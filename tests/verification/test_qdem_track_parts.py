@@ -132,7 +132,7 @@ def test_each_rail_seat_takes_its_own_pressure(
     nodes += layout.grains_beside(grains[recipe.below :], 0.5, 2)
     nodes.append(layout.sleeper(0.5).nodes)
     bed = Bed("rest", nodes, np.zeros((sum(map(len, nodes)), 3)), {}, {})
-    monkeypatch.setattr(track_scene, "bed_prepare", lambda *given: bed)
+    monkeypatch.setattr(track_scene, "prepare_bed", lambda *given: bed)
     run, bodies = enter_track(prepared)
     now = np.array([0.0])
     force = [
@@ -206,7 +206,7 @@ def test_hard_stages_of_a_periodic_bed_are_stopped_together(
 
     monkeypatch.setattr(track_bed, "find_rest", find)
     recipe = scene_at(tmp_path, *(WIDTH,) * periodic).recipe
-    track_bed.bed_prepare(recipe, tmp_path / "bed.npz", 1)
+    track_bed.prepare_bed(recipe, tmp_path / "bed.npz", 1)
     assert asked == [True] * (len(track_bed.STAGES) - 2) + [not periodic] * 2
 
 

@@ -12,7 +12,7 @@ import pytest
 from qdem_fem.files.errors import SceneError, StepWarning
 from qdem_fem.scene.build import simulation_of
 from qdem_fem.scene.checks import load_scene
-from qdem_fem.track.bed import bed_prepare, bed_read
+from qdem_fem.track.bed import prepare_bed, read_bed
 from qdem_fem.track.enter import TrackPrepared, contact_of
 from qdem_fem.track.stand import begin_bed
 from trackbed import command
@@ -28,7 +28,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     prepared = scene_at(made, *FEW)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # of stages whose contacts are few
-        bed_prepare(prepared.recipe, prepared.bed_file, 1)
+        prepare_bed(prepared.recipe, prepared.bed_file, 1)
     return made
 
 
@@ -39,7 +39,7 @@ def prepared_in(folder: Path, *overrides: str) -> TrackPrepared:
 def test_rigid_grains_begin_with_the_forces_of_deformable_ones(folder: Path) -> None:
     """To the bit: they lie where those lay.  The sleeper keeps its strain, grains have none."""
     prepared = prepared_in(folder)
-    bed, contact = bed_read(prepared.bed_file, prepared.recipe), contact_of(prepared)
+    bed, contact = read_bed(prepared.bed_file, prepared.recipe), contact_of(prepared)
     runs = [begin_bed(prepared.recipe, bed, contact, kind, threads=1)[0] for kind in (False, True)]
     for run in runs:
         assert run.contacts is not None
@@ -85,7 +85,7 @@ def test_a_run_of_rigid_grains_says_what_it_leaves_out_and_stands_for_itself(fol
         told = " ".join(prepared.scene.left_out())
         assert ("deformation of grains" in told) == (kind != "false")
         simulation_of(prepared)
-    stands = bed_read(prepared.bed_file, prepared.recipe).stands
+    stands = read_bed(prepared.bed_file, prepared.recipe).stands
     keys = {f"friction 0.577, 1e-05 s{kind}" for kind in kinds.values()}
     assert keys <= set(stands)
     assert np.ptp([stands[key]["pairs"] for key in keys]) == 0

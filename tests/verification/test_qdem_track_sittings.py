@@ -16,7 +16,7 @@ from qdem_fem.march.kinetic_damping import Rest
 from qdem_fem.rigid.holds import find_hold
 from qdem_fem.rigid.step import FREE, STILL
 from qdem_fem.track import bed as track_bed
-from qdem_fem.track.bed import STAGES, Bed, bed_prepare, bed_read, part_of, run_stage, write_bed
+from qdem_fem.track.bed import STAGES, Bed, part_of, prepare_bed, read_bed, run_stage, write_bed
 from qdem_fem.track.recipe import BedRecipe, grains_of
 from validation.bench.track_trials import scene_at
 
@@ -110,7 +110,7 @@ def test_what_a_kill_left_of_a_stage_that_is_done_is_not_read(
     part_of(path, "bed").write_bytes(b"left by a kill")
     nothing = Rest(0.0, 0.0, 0.0, 0, 0, 0, 0.0)
     monkeypatch.setattr(track_bed, "find_rest", lambda *given, **more: nothing)
-    assert bed_prepare(recipe, path, 1).stage == "rest"
+    assert prepare_bed(recipe, path, 1).stage == "rest"
     assert not [part for part in parts - {part_of(path, "bed")} if part.exists()]
 
 
@@ -118,15 +118,15 @@ def test_patience_is_no_part_of_a_bed(whole: Bed, tmp_path: Path) -> None:
     """A bed is read by a recipe of more patience, and files of before, which name it, are too."""
     recipe, path = recipe_at(tmp_path), tmp_path / "bed.npz"
     write_bed(path, recipe, whole)
-    assert bed_read(path, replace(recipe, patience=99.0)).stage == "bed"
+    assert read_bed(path, replace(recipe, patience=99.0)).stage == "bed"
     with np.load(path) as archive:
         arrays = dict(archive)
     head = json.loads(str(arrays["head"]))
     head["recipe"] = json.dumps({**json.loads(head["recipe"]), "patience": 5.0})
     np.savez(path, **{**arrays, "head": json.dumps(head)})
-    assert bed_read(path, recipe).stage == "bed"
+    assert read_bed(path, recipe).stage == "bed"
     with pytest.raises(CheckpointError, match="softness differ"):
-        bed_read(path, replace(recipe, softness=1e-3))
+        read_bed(path, replace(recipe, softness=1e-3))
 
 
 @pytest.mark.parametrize(("components", "turning"), [("xy", FREE), ("xyz", STILL)])

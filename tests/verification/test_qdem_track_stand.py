@@ -24,7 +24,7 @@ from qdem_fem.mesh.generation import make_box_mesh
 from qdem_fem.scene.build import simulation_of
 from qdem_fem.scene.checks import load_scene
 from qdem_fem.track import stand as track_stand
-from qdem_fem.track.bed import Bed, bed_read, write_bed
+from qdem_fem.track.bed import Bed, read_bed, write_bed
 from qdem_fem.track.bodies import place_grain_nodes
 from qdem_fem.track.enter import TrackPrepared, contact_of
 from qdem_fem.track.recipe import grains_of
@@ -85,7 +85,7 @@ def test_a_bed_with_too_little_is_refused_and_remembered(
     path = tmp_path / "bed.npz"
     with pytest.raises(NotConverged, match=r"sliders take .* at Coulomb's limit .0\.01 asked"):
         judge_bed(SLOPING, bed, path, contact(0.15), TIME, 0.01)
-    kept = bed_read(path, SLOPING)
+    kept = read_bed(path, SLOPING)
     monkeypatch.setattr(track_stand, "let_bed_stand", None)  # told from the file
     stand = judge_bed(SLOPING, kept, path, contact(0.15), TIME, 1.0)
     assert asdict(stand) in list(kept.stands.values())
@@ -108,7 +108,7 @@ def test_files_of_before_are_read(bed: Bed, tmp_path: Path) -> None:
     head = json.loads(str(arrays.pop("head")))
     del head["stands"]
     np.savez(path, head=json.dumps(head), **arrays)
-    assert bed_read(path, SLOPING).stands == {}
+    assert read_bed(path, SLOPING).stands == {}
 
 
 def scene_in_the_air(folder: Path, text: Callable[[str], str]) -> TrackPrepared:
@@ -140,6 +140,6 @@ def test_skin_and_friction_of_a_scene_are_the_runs(tmp_path: Path) -> None:
 
 def test_a_bed_of_grains_in_the_air_takes_nothing(tmp_path: Path) -> None:
     prepared = scene_in_the_air(tmp_path, str)
-    bed = bed_read(prepared.bed_file, prepared.recipe)
+    bed = read_bed(prepared.bed_file, prepared.recipe)
     stand = let_bed_stand(prepared.recipe, bed, contact_of(prepared), 1e-5)
     assert (stand.pairs, stand.creep, stand.at_limit) == (0, 0.0, 0.0)

@@ -3,6 +3,7 @@ work in its budget."""
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-import rigid_lcp.friction.attempts.extrapolated_points as module
 from rigid_lcp import solve_friction
 from rigid_lcp.friction.attempts.extrapolated_points import POINTS, extrapolated_points
 from rigid_lcp.friction.attempts.proximal_newton import find_proximal_point, proximal_newton
@@ -53,7 +53,7 @@ def test_a_drift_ends_where_the_ground_gives_way(monkeypatch: pytest.MonkeyPatch
     plain points would take ``3 alpha mu / eps`` of them.  The shift is held: the centre runs ahead.
     """
     first = replace(POINTS, least_shift=POINTS.first_shift)
-    monkeypatch.setattr(module, "POINTS", first)
+    monkeypatch.setattr(sys.modules[extrapolated_points.__module__], "POINTS", first)
     problem = squeezed_row()
     start = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 0.0])
     linear, alpha = factorisation(problem), POINTS.first_shift / problem.rho
@@ -70,6 +70,7 @@ def test_a_drift_ends_where_the_ground_gives_way(monkeypatch: pytest.MonkeyPatch
     assert ended.work["points"] < 50 < plain / 50
 
 
+@pytest.mark.long
 def test_solves_a_packing_of_low_friction_that_nothing_else_does() -> None:
     """100 spheres, friction 0.1: Newton, proximal points and the interior point end above 1e-9."""
     problem = packing(100, 3, seed=101, friction=0.1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from itertools import product
 
 import numpy as np
@@ -198,7 +199,7 @@ def test_normal_part_of_w() -> None:
 @pytest.mark.parametrize("skew", [0.0, 1e-3])
 def test_faces(most: float, skew: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """``A + shift`` of some contacts in any order, by a band and by sparse LU, against numpy."""
-    monkeypatch.setattr("rigid_lcp.friction.attempts.frictionless.BAND_MOST", most)
+    monkeypatch.setattr(sys.modules[frictionless.__module__], "BAND_MOST", most)
     g = np.random.default_rng(5)
     a = network(40, 0.0).delassus[::2][:, ::2].tocsr()
     a.data *= 1 + skew * g.normal(size=a.nnz)

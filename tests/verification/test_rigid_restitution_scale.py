@@ -73,7 +73,9 @@ def wedged_rod(friction: float) -> Scene:
     return scene
 
 
-@pytest.mark.parametrize("method", ["time-stepping", "acceleration"])
+@pytest.mark.parametrize(
+    "method", ["time-stepping", pytest.param("acceleration", marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize(("friction", "spin"), [(0.5, -0.5), (2.0, 0.0)])
 def test_a_wedged_rod_bounces_or_stops(method: Method, friction: float, spin: float) -> None:
     """Friction turns the rod by ``2 mu p`` against the ``2 p`` of the walls: for mu > 1 no impulses

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigid_lcp.friction.attempts import smoothed_path as smoothed
 from rigid_lcp.friction.attempts.smoothed_path import (
+    SMOOTHED,
     begin_path,
+    choose_other_path,
     find_smoothed_point,
     smoothed_map,
     smoothed_path,
@@ -116,13 +118,14 @@ def test_a_point_lies_inside_the_cones_and_has_sigma_for_its_product(
     kicked: FrictionProblem, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """``x o s = sigma e``: the product is sigma, and what is beside the axis nothing."""
-    monkeypatch.setattr(smoothed, "SMOOTHED", replace(smoothed.SMOOTHED, found=1e-9))
+    module = sys.modules[smoothed_path.__module__]
+    monkeypatch.setattr(module, "SMOOTHED", replace(SMOOTHED, found=1e-9))
     linear = factorisation(kicked)
     force, sigma = begin_path(kicked, linear)
     force, found, _ = find_smoothed_point(kicked, force, sigma, linear, 60)
     assert found
     rho = kicked.contact_rho
-    eps = smoothed.SMOOTHED.roundings[0] * np.sqrt(sigma) / rho.mean()
+    eps = SMOOTHED.roundings[0] * np.sqrt(sigma) / rho.mean()
     r, u = force.reshape(-1, 3), kicked.velocity(force).reshape(-1, 3)
     for c in range(kicked.contacts):
         x, s = scaled(r[c], u[c], kicked.friction[c], rho[c], eps)
@@ -179,6 +182,6 @@ def test_what_has_no_solution_ends_and_says_so() -> None:
 
 def test_other_paths_differ() -> None:
     """Every rounding in turn, and with those that come again another sigma."""
-    paths = [smoothed.choose_other_path(hop) for hop in range(1, smoothed.SMOOTHED.hops + 1)]
-    assert len(set(paths)) == smoothed.SMOOTHED.hops
-    assert {rounding for rounding, _ in paths} == set(smoothed.SMOOTHED.roundings)
+    paths = [choose_other_path(hop) for hop in range(1, SMOOTHED.hops + 1)]
+    assert len(set(paths)) == SMOOTHED.hops
+    assert {rounding for rounding, _ in paths} == set(SMOOTHED.roundings)

@@ -296,6 +296,7 @@ def test_a_start_does_not_keep_from_the_smoothed_path(still, struck):
     assert trial.work["smoothed path points"] > 5
 
 
+@pytest.mark.long
 def test_where_a_proof_is_at_hand_no_path_is_tried():
     """20 freedoms for 100 contacts: no force keeps all from approaching, by a linear programme."""
     found = solve_auto(random_problem(100, 20, 0.5, 1))

@@ -1,6 +1,6 @@
 """Scene files: TOML to tables, with every problem at once, each with its line and key.
 
-A story gives the model of its scene (a pydantic model of `trackbed.scene_files.Table`) and a `Guide`
+A story gives its model (pydantic, with tables of `trackbed.scene_files.Table`) and a `Guide`
 to its example; `read_scene` reads the text and `SceneText.check` the tables.
 """
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from qdem_fem.files.errors import UsageError
-from qdem_fem.files.output import table_read
+from qdem_fem.files.output import read_table
 from qdem_fem.mesh.checks import FloatArray
 from qdem_fem.report.spectra import fourier_spectrum, parzen_smoothed
 from qdem_fem.report.track import BANDWIDTH, GRAINS, HIGHEST, acceleration_spectrum, mobility
@@ -62,7 +62,7 @@ def measure_packing(folder: Path, seed: int, friction: float) -> dict[str, Any]:
     assert isinstance(prepared, TrackPrepared)
     assert isinstance(prepared.scene, TrackScene)
     trial = run_scene(prepared, folder / f"run-{seed}-{friction}")
-    bogie, rows = prepared.scene.track.bogie, table_read(trial.folder / "probes.csv")
+    bogie, rows = prepared.scene.track.bogie, read_table(trial.folder / "probes.csv")
     assert bogie is not None
     _, ends = passages(bogie)
     points = {}

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from qdem_fem.files.errors import StepWarning
 from qdem_fem.scene.checks import load_scene
-from qdem_fem.track.bed import STAGES, bed_read
+from qdem_fem.track.bed import STAGES, read_bed
 from qdem_fem.track.enter import TrackPrepared, contact_of
 from qdem_fem.track.stand import begin_bed
 from validation.bench.qdem.checks import figures_row, reported
@@ -43,7 +43,7 @@ def paper_scale() -> Row:
     prepared = load_scene(SCENE.with_name("track.toml"))
     assert isinstance(prepared, TrackPrepared)
     recipe = prepared.recipe
-    bed = bed_read(prepared.bed_file, recipe)
+    bed = read_bed(prepared.bed_file, recipe)
     if bed.stage != STAGES[-1]:
         raise SystemExit(
             f"{prepared.bed_file} is at stage {bed.stage}: trackbed qdem goes on there"

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from qdem_fem.files.output import table_read
+from qdem_fem.files.output import read_table
 from qdem_fem.report.track import list_track_facts
 from qdem_fem.scene.build import simulation_of
 from qdem_fem.scene.energy_account import list_energy_facts
 from qdem_fem.scene.run import run_dynamic
 from qdem_fem.scene.run_folder import RunFolder
-from qdem_fem.track.bed import bed_prepare
+from qdem_fem.track.bed import prepare_bed
 from qdem_fem.track.enter import TrackPrepared
 from validation.bench.qdem.checks import reported
 from validation.bench.track_trials import scene_at
@@ -60,8 +60,8 @@ def run_scene(prepared: TrackPrepared, folder: Path) -> Trial:
         done = run_dynamic(prepared, run, bodies, place, resume=False, progress=Quiet())
     return Trial(
         facts=list_track_facts(place.path, prepared.load),
-        energy=list_energy_facts(table_read(place.path / "energy.csv")),
-        rests=bed_prepare(prepared.recipe, prepared.bed_file).rests,
+        energy=list_energy_facts(read_table(place.path / "energy.csv")),
+        rests=prepare_bed(prepared.recipe, prepared.bed_file).rests,
         step=run.step,
         cpu=done.cost["cpu_s"],
         folder=place.path,
