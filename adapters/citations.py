@@ -22,7 +22,7 @@ CITATIONS = (
 }"""),
     ("trackbed itself", r"""@software{trackbed,
   author  = {{The trackbed authors}},
-  title   = {trackbed: settlement of railway ballast by extrapolation of granular simulations},
+  title   = {trackbed: how railway ballast settles, vibrates and breaks},
   version = {VERSION}
 }"""),
 )  # fmt: skip

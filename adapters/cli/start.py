@@ -85,9 +85,8 @@ def register_cite(parser: argparse.ArgumentParser) -> None:
 
 def run_cite(arguments: argparse.Namespace) -> int:
     """Print BibTeX entries."""
-    from importlib.metadata import version
-
     from adapters.citations import format_citations
+    from trackbed import __version__
 
-    print(format_citations(version("trackbed")))
+    print(format_citations(__version__))
     return 0

@@ -55,8 +55,9 @@ def test_kernels_are_defined_and_pictures_drawn(tmp_path: Path, numba_first: boo
 def test_kernels_are_kept(tmp_path: Path) -> None:
     """A second process finds what the first compiled."""
     code = (
-        "import numpy as np\nfrom adapters.files.dump_kernel import float_bits\n"
-        "float_bits(np.uint64(1), np.int64(0))\nprint(sum(float_bits.stats.cache_hits.values()))"
+        "import numpy as np\nfrom adapters.files.dump_kernel import round_to_bits\n"
+        "round_to_bits(np.uint64(1), np.int64(0))\n"
+        "print(sum(round_to_bits.stats.cache_hits.values()))"
     )
     assert [run_without_home(code, tmp_path) for _ in range(2)] == ["0", "1"]
 

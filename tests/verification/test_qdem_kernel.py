@@ -383,10 +383,10 @@ print(imported - begun, time.process_time() - imported)
 
 @pytest.mark.long
 def test_a_new_process_starts_fast(tmp_path: Path) -> None:
-    """CPU seconds: import below 1, first compilation below 10, from the cache below 1.5.
+    """CPU time: import below twice its libraries', compilation below 10 s, from the cache 1.5 s.
 
-    On this kind of machine 0.6, 3 and 0.2; the best of two where nothing is compiled, since
-    processes beside this one slow it down.
+    Usually 1.2 times, 3 and 0.2 s; the best of two where nothing is compiled, since processes
+    beside this one slow it down.
     """
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "OPENBLAS_NUM_THREADS": "1"}
 
@@ -402,7 +402,12 @@ def test_a_new_process_starts_fast(tmp_path: Path) -> None:
     again, cached = zip(*(start() for _ in range(2)), strict=True)
     assert compiled < 10
     assert min(cached) < 1.5
-    assert min(imports, *again) < 1
+    libraries = "import time, numba, scipy.sparse.linalg, meshio; print(time.process_time())"
+    alone = min(
+        float(subprocess.check_output([sys.executable, "-c", libraries], env=environment))
+        for _ in range(2)
+    )
+    assert min(imports, *again) < 2 * alone
     assert list(tmp_path.rglob("*.nbc"))
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from qdem_fem.track.commands import SEAT_AREA
 from scipy.integrate import trapezoid
 
 from qdem_fem import Body, Series, Simulation
+from qdem_fem.cli.track import SEAT_AREA
 from qdem_fem.element.material import Material
 from qdem_fem.files.errors import ConditionError, MeshError
 from qdem_fem.files.output import read_table

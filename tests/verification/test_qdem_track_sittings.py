@@ -29,7 +29,8 @@ class Killed(Exception):
 
 
 def recipe_at(folder: Path) -> BedRecipe:
-    return scene_at(folder).recipe
+    """A bed of 20 grains that rests within a third of a second, whatever a processor rounds."""
+    return scene_at(folder, "track.seed=2").recipe
 
 
 def fallen(recipe: BedRecipe, part: Path | None, killed_after: int | None = None) -> Bed:

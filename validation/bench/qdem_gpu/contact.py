@@ -91,8 +91,8 @@ def processor_idle(run: q.Simulation) -> Iterator[list[str]]:
 
     refused = AssertionError("the processor was asked")
     with (
-        patch("qdem_fem.contact.sphere_state.pairs_renew", side_effect=refused),
-        patch("qdem_fem.contact.state.advance_of", side_effect=refused),
+        patch("qdem_fem.contact.sphere_state.renew_pairs", side_effect=refused),
+        patch("qdem_fem.contact.state.advance_contact", side_effect=refused),
         patch.object(DeviceContact, "fetch", fetch_noted),
         patch.object(CudaAssembly, "_read", read_noted),
     ):
