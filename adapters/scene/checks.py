@@ -29,7 +29,7 @@ JUMP_KEYS, TOLERANCE_KEY = ("procedure.k", "procedure.h"), "procedure.tolerance"
 """Cycles computed and jumped by hand, and what stands instead."""
 
 ENGINES = "adapters.engines"
-"""A file beside which the engines are; only looked for, as they import the scene."""
+"""The room of the engines; only looked for by name, as they import the scene."""
 
 OWNED = (
     (

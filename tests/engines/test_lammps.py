@@ -379,7 +379,7 @@ def test_frictionless_scene_has_no_tangential_law(tmp_path: Path) -> None:
 def test_launcher(run: Path, scene: Scene, tmp_path: Path) -> None:
     """Two processes compute what one does: the same motion, the same contacts, each once.
 
-    They share the bed as columns: of two layers one would be nearly empty.  The force that is told
+    They share the bed as columns: of two layers one would be nearly empty.  The force that is given
     of a contact across the border holds the damping of the other grain's velocity half a step ago
     (docs/lammps.md), all others to round-off.
     """

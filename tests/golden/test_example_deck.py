@@ -1,6 +1,6 @@
 """``liggghts_inputs/example`` is what the code writes for a bed of forty grains, byte for byte.
 
-Run this file as a script to write the example anew.
+Run this file as a script to write the example again.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.studies
 
 
 def test_rows_are_judged_by_their_bars() -> None:
-    """At most, at least, no number, and an error that is told."""
+    """At most, at least, no number, and an error that is reported."""
     met = run.judge("c", "a", "m", "<= 1e-9", "ours", lambda: (1e-10, 3))
     assert met["ok"]
     assert met["steps"] == 3

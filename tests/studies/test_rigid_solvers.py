@@ -138,7 +138,7 @@ def test_plane_problem_in_space() -> None:
 
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_what_takes_too_long_is_ended() -> None:
-    """By its processor time; a job that ends in time is told."""
+    """By its processor time; a job that ends in time is reported."""
 
     def endless() -> dict[str, float]:
         while True:

@@ -233,7 +233,7 @@ def test_growing_jumps_are_spelled_out(tmp_path: Path) -> None:
         assert procedure.h == tuple(schedule_jumps(3, 500, 40, 10, procedure.healing_cycles))
     text, _ = with_value(KARRECH, "procedure.h", 'h = "2 growing"')
     wrong, _ = with_value(text, "procedure.k", "k = 1")
-    message = refusal(tmp_path, wrong)  # what is wrong with the other keys is told, and only that
+    message = refusal(tmp_path, wrong)  # what is wrong with the other keys is said, and only that
     assert "procedure.k: " in message
     assert "procedure.h: " not in message
 

@@ -155,7 +155,7 @@ def test_apt_fails(machine: Machine) -> None:
 
 
 def test_unreachable_source_does_not_stop(machine: Machine) -> None:
-    """A failing ``apt-get update`` is told, and the installation tried all the same."""
+    """A failing ``apt-get update`` is reported, and the installation tried all the same."""
     machine.lacks("liggghts")
     machine.program("apt-get", '[ "$1" != update ] || { echo "E: no such source"; exit 100; }')
     run = machine.setup()

@@ -214,7 +214,7 @@ def moved(settlement: FloatArray) -> Series:
 
 
 def test_sentences_count_as_the_user_does() -> None:
-    """Behind a load change errors name the cycles of the whole series, and where N starts anew."""
+    """Behind a load change errors name the cycles of the whole series, and where N starts again."""
 
     def said(settlement: FloatArray, to_cycle: float, fail_at: float | None = None) -> list[str]:
         found = []

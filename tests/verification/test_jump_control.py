@@ -405,7 +405,7 @@ def test_a_moved_bed_that_settles_more() -> None:
 
 @pytest.mark.long
 def test_load_step_in_mid_run() -> None:
-    """From cycle 600 on the bed settles anew, ten times as fast: it is seen and computed.  Bursts
+    """From cycle 600 on the bed settles again, ten times as fast: it is seen and computed.  Bursts
     part single runs by several per cent, so the error is that of eight."""
     errors = []
     for seed in range(1, 9):

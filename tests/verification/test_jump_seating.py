@@ -98,8 +98,8 @@ def test_deflection_of_the_mean_field() -> None:
 
 @pytest.mark.parametrize("shift", [0.0, 0.2, 0.25, 0.5])
 def test_a_load_series_may_begin_anywhere(tmp_path: Path, shift: float) -> None:
-    """The deflection counts from the cycle's end: the mean field's is told there as 1, by 2,001
-    samples of a sine; nothing is told where the load is greatest at a cycle's end."""
+    """The deflection counts from the cycle's end: the mean field's is 1 there, by 2,001
+    samples of a sine; nothing is said where the load is greatest at a cycle's end."""
     time = np.linspace(0, 0.02, 2001)
     stress = 7075 - 7075 * np.cos(2 * np.pi * (time / 0.02 + shift))
     stress[-1] = stress[0]

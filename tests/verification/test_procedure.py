@@ -216,7 +216,7 @@ def test_what_a_bed_has_no_room_for_is_made_good_by_the_next_jump(
 ) -> None:
     """u = a ln(1 + N) and jumps by history of 20 and 15 cycles, of which the first may move by no
     more than 6 um: a ln(61 / 41) = 7.9 um is halved.  The next is asked for a ln(101 / 86) and for
-    that half; a is told to 2 % from N in place of 1 + N."""
+    that half; a differs by 2 % from N in place of 1 + N."""
     real = jump_room.relaxed
 
     def tight(

@@ -94,7 +94,7 @@ def test_room_where_a_smallest_move_finds_none() -> None:
 
 
 def test_grains_move_as_far_as_in_a_full_run() -> None:
-    """No bed is made anew: the root mean square of the grains' moves stays below a radius, where
+    """No bed is made afresh: the root mean square of the grains' moves stays below a radius, where
     full runs have 0.3 to 0.4 while the cycles double, and the greatest below three diameters."""
     before, container = bed_of(5, 1)
     found = found_by(before, GAIN, container, 0)
