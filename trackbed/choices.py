@@ -46,7 +46,7 @@ def find_choice(
     """
     known = find_choices(room, word)
     if name not in known:
-        why = tell_retired(name, retired or {})
+        why = explain_retired(name, retired or {})
         near = get_close_matches(name.lower().replace("_", "-"), known, n=1)
         if near and not why:
             why = f"; did you mean '{near[0]}'?"
@@ -56,7 +56,7 @@ def find_choice(
     return getattr(import_module(known[name]), word)
 
 
-def tell_retired(name: str, retired: Mapping[str, str]) -> str:
+def explain_retired(name: str, retired: Mapping[str, str]) -> str:
     """Which version has a choice that left trackbed, and what to use; empty for other names."""
     if name not in retired:
         return ""

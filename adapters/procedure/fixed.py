@@ -81,7 +81,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
                     new = run.folder.outcome(name) is None
                     moved = stages.jump(run, bed, h, attempt, gain, share)
                     if new and gain:
-                        say_settled(run, name, gain, share)
+                        report_settled(run, name, gain, share)
                     cycles = p.healing_cycles + p.window_cycles
                     return stages.compute(run, moved, cycles, p.healing_cycles)
             except (EngineFailed, NotCredible, NotConverged) as error:
@@ -104,7 +104,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
     )
 
 
-def say_settled(run: Run, name: str, asked: float, share: float) -> None:
+def report_settled(run: Run, name: str, asked: float, share: float) -> None:
     """Say where a jump settled the bed by other than ``asked`` [m], a ``share`` of which it tried.
 
     Smallest moves settle by what they try; grains that change places by some more or less.

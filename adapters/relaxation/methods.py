@@ -47,7 +47,7 @@ from adapters.relaxation.measured import (
 )
 from adapters.relaxation.printed import minimise_energy
 from adapters.relaxation.smallest import find_smallest_move
-from trackbed.choices import tell_retired
+from trackbed.choices import explain_retired
 
 METHODS = ("smallest-move", "karrech2007")
 """What a user may name."""
@@ -95,7 +95,7 @@ def relax(
     bed = estimated(position, before, walls, walls_after, stiffness, gravity)
     if method not in METHODS:
         raise UsageError(
-            f"there is no relaxation '{method}'{tell_retired(method, RETIRED)}",
+            f"there is no relaxation '{method}'{explain_retired(method, RETIRED)}",
             remedy=f"name one of {', '.join(METHODS)}",
         )
     if tolerance <= 0:

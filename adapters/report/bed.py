@@ -137,7 +137,7 @@ def penetration(record: Record, numbers: Numbers, figures: Figures) -> str:
         if measures
         else paragraph("The scene asks for no relaxation."),
         owed(record),
-        tell_changed_places(record),
+        describe_changed_places(record),
         hung(record),
     )
 
@@ -195,7 +195,7 @@ def owed(record: Record) -> str:
     )
 
 
-def tell_changed_places(record: Record) -> str:
+def describe_changed_places(record: Record) -> str:
     """In how many jumps grains changed places, and what that leaves of the bed before."""
     jumps = record.run.jumps
     notes = [jump.notes for _, jump in jumps if "hops" in jump.notes.get("relaxation", {})]

@@ -70,7 +70,7 @@ def _claim(record: Record, numbers: Numbers) -> Iterator[str]:
     if row is None or full is None:
         claim = (
             f"{begun}, computing {numbers.cycles_computed} of them. The error is unknown: "
-            f"{tell_why_unknown(record)}. Counted in cycles, the speed-up is at most "
+            f"{explain_unknown(record)}. Counted in cycles, the speed-up is at most "
             f"{plain(numbers.speed_up_of_cycles, '.2f')}."
         )
     else:
@@ -96,7 +96,7 @@ def _claim(record: Record, numbers: Numbers) -> Iterator[str]:
         yield f'<div class="fails"><p>Where it fails:</p>{fails}</div>'
 
 
-def tell_why_unknown(record: Record) -> str:
+def explain_unknown(record: Record) -> str:
     """Why the error is unknown."""
     if record.manifest.get("control"):
         return "the full run beside it is not past the first jump yet"
@@ -131,7 +131,7 @@ def _error(record: Record, numbers: Numbers, figures: Figures) -> str:
             "Error against speed-up",
             definition,
             paragraph(
-                f"The error is unknown: {tell_why_unknown(record)}. The speed-up is estimated from "
+                f"The error is unknown: {explain_unknown(record)}. The speed-up is estimated from "
                 f"cycles, {numbers.cycle} done for {numbers.cycles_computed} "
                 f"computed: at most {plain(numbers.speed_up_of_cycles, '.2f')}."
             ),

@@ -15,7 +15,7 @@ from adapters.errors import SceneError
 from adapters.files import read_load_series
 from adapters.scene import mechanics
 from adapters.scene.values import Check, NotValid, Values, find_radii
-from trackbed.choices import find_choices, tell_retired
+from trackbed.choices import explain_retired, find_choices
 from trackbed.scene_files import Problem, suggest_word
 
 ALTERNATIVES = (
@@ -195,7 +195,7 @@ def _move(scene: Values) -> Iterator[Problem]:
 
     move, known = scene.need("procedure.move"), list_moves()
     if move not in known:
-        hint = tell_retired(move, RETIRED) or suggest_word(move, known)
+        hint = explain_retired(move, RETIRED) or suggest_word(move, known)
         yield Problem("procedure.move", f"unknown way {move!r}{hint}")
 
 
@@ -205,7 +205,7 @@ def _relaxation(scene: Values) -> Iterator[Problem]:
         from adapters.relaxation import METHODS, RETIRED
 
         if method not in METHODS:
-            hint = tell_retired(method, RETIRED) or suggest_word(method, (*METHODS, "none"))
+            hint = explain_retired(method, RETIRED) or suggest_word(method, (*METHODS, "none"))
             yield Problem("procedure.relaxation", f"unknown relaxation {method!r}{hint}")
 
 

@@ -112,11 +112,11 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
     """What a run would be: bodies, steps, and the cost as a short trial tells it."""
     from qdem_fem.files import StepWarning
     from qdem_fem.scene import (
+        describe_critical_step,
         list_body_facts,
         list_mass_scaling_facts,
         make_plan,
         simulation_of,
-        tell_critical_step,
     )
 
     outlook: dict[str, Any] = {
@@ -133,7 +133,7 @@ def _outlook(prepared: Prepared) -> dict[str, Any]:
     run, bodies = simulation_of(prepared)
     outlook |= {
         "bodies": list_body_facts(bodies),
-        "critical_step": tell_critical_step(run),
+        "critical_step": describe_critical_step(run),
         "mass_scaling": list_mass_scaling_facts(run),
     }
     if prepared.scene.simulation.method == "dynamic":

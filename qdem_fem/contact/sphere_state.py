@@ -143,7 +143,7 @@ class SphereContacts(Contacts):
         radius, planes = self.kernel.spheres.radius, self.kernel.planes
         return find_near_walls(position, radius, planes.point, planes.normal, skin)
 
-    def tell_deepest(self) -> tuple[str, str]:
+    def describe_deepest(self) -> tuple[str, str]:
         """The pair that overlaps most, and what to do."""
         touching, radius = self.touching(), self.kernel.spheres.radius
         worst = "a vertex is in a wall by more than its radius"

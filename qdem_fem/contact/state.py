@@ -126,7 +126,7 @@ class Contacts(ABC):
         )
 
     @abstractmethod
-    def tell_deepest(self) -> tuple[str, str]:
+    def describe_deepest(self) -> tuple[str, str]:
         """What is too deep, and what to do, in words."""
 
     @abstractmethod
@@ -192,7 +192,7 @@ class Contacts(ABC):
             return
         self.forget()
         self.find_pairs()
-        said = self.say_step(0.0)
+        said = self.step_contact(0.0)
         self.stale = False
         self.check_deep(said)
         moved = self.run.assembly.field("displacement")
@@ -248,7 +248,7 @@ class Contacts(ABC):
         self.lasted += done
         if said == LOOK_AGAIN:
             self.find_pairs()
-            said = self.say_step(step)
+            said = self.step_contact(step)
         if said == TOO_DEEP and not bad:
             self.run.motion.steps_done += done
             self.check_deep(said)
@@ -258,7 +258,7 @@ class Contacts(ABC):
         """`qdem_fem.contact.run_window` of these contacts."""
         return run_window(self.run, self.kernel, steps, step, *given)
 
-    def say_step(self, step: float) -> int:
+    def step_contact(self, step: float) -> int:
         """Contact at the displacement as it is, to which a ``step`` [s] led; what it says."""
         state = self.run.assembly.state
         moved, velocity = np.asarray(state.displacement), np.asarray(state.velocity)
@@ -272,7 +272,7 @@ class Contacts(ABC):
     def check_deep(self, said: int) -> None:
         """Raise `ContactTooDeep` with the deepest contact where a step said so."""
         if said == TOO_DEEP:
-            what, remedy = self.tell_deepest()
+            what, remedy = self.describe_deepest()
             raise ContactTooDeep(what, where=self.when, remedy=remedy)
 
     def name_node(self, node: int) -> str:

@@ -191,7 +191,7 @@ class SurfaceContacts(Contacts):
         np.add.at(total, self.place, values)
         return np.asarray(total[self.place])
 
-    def tell_deepest(self) -> tuple[str, str]:
+    def describe_deepest(self) -> tuple[str, str]:
         """That a point is too deep, and what to do."""
         return (
             f"a point of a surface is more than {self.depth:.3g} m inside another body",

@@ -8,15 +8,6 @@ from qdem_fem.report.track import draw_track_pictures, list_track_facts
 from qdem_fem.report.video import write_video
 
 __all__ = [
-    "OUTLINED",
-    "Mode",
-    "draw_deformed",
-    "draw_fields",
-    "draw_series",
-    "draw_track_pictures",
-    "figures",
-    "find_bearing_spheres",
-    "find_peak_frequencies",
-    "list_track_facts",
-    "write_video",
+    "OUTLINED", "Mode", "draw_deformed", "draw_fields", "draw_series", "draw_track_pictures",
+    "figures", "find_bearing_spheres", "find_peak_frequencies", "list_track_facts", "write_video",
 ]  # fmt: skip

@@ -8,15 +8,15 @@ from qdem_fem.scene.page import write_report
 from qdem_fem.scene.run import make_plan, run_dynamic, run_static
 from qdem_fem.scene.run_folder import RESULT, RunFolder, make_manifest
 from qdem_fem.scene.summary import (
+    describe_critical_step,
     list_body_facts,
     list_mass_scaling_facts,
     summary_of,
-    tell_critical_step,
 )
 
 __all__ = [
-    "RESULT", "Advice", "RunFolder", "advise_scene", "check_advice", "error_together",
-    "list_body_facts", "list_mass_scaling_facts", "load_scene", "make_manifest", "make_plan",
-    "mark_checked", "run_dynamic", "run_static", "simulation_of", "summary_of",
-    "tell_critical_step", "write_report",
+    "RESULT", "Advice", "RunFolder", "advise_scene", "check_advice", "describe_critical_step",
+    "error_together", "list_body_facts", "list_mass_scaling_facts", "load_scene", "make_manifest",
+    "make_plan", "mark_checked", "run_dynamic", "run_static", "simulation_of", "summary_of",
+    "write_report",
 ]  # fmt: skip

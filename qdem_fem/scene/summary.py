@@ -36,7 +36,7 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
         "time": 0.0 if static else float(run.time),
         "step": None if static else float(run.step),
         "steps": 0 if done.plan is None else done.plan.total,
-        "critical_step": tell_critical_step(run),
+        "critical_step": describe_critical_step(run),
         "mass_scaling": list_mass_scaling_facts(run),
         "bodies": list_body_facts(done.bodies),
         "cost": {**cost, "million_elements_per_s": element_steps / 1e6 / cost["wall_s"]}
@@ -53,7 +53,7 @@ def summary_of(prepared: Prepared, done: Done, folder: RunFolder) -> dict[str, A
     }
 
 
-def tell_critical_step(run: Any) -> dict[str, Any]:
+def describe_critical_step(run: Any) -> dict[str, Any]:
     """The critical step [s], what it hangs on, and its share that is used; None: there is none."""
     critical = run.critical_step
     finite = isfinite(critical.value)

@@ -20,9 +20,9 @@ from rigid_lcp.motion.time_stepping import contact_forces, step_moreau
 from rigid_lcp.motion.world import Body, Scene, World, make_world
 
 __all__ = [
-    "MOST_STEPS", "Body", "CheckedLoads", "Loads", "Motion", "Pace", "Scene",
-    "World", "advance_runge_kutta", "body_space", "contact_forces", "find_contact_offset",
-    "is_finite", "make_world", "relative_velocity", "replace_rates", "require_body",
-    "require_line", "require_number_in", "require_residual", "require_seconds",
-    "require_whole_in", "step_moreau", "too_many_steps", "too_much",
+    "MOST_STEPS", "Body", "CheckedLoads", "Loads", "Motion", "Pace", "Scene", "World",
+    "advance_runge_kutta", "body_space", "contact_forces", "find_contact_offset", "is_finite",
+    "make_world", "relative_velocity", "replace_rates", "require_body", "require_line",
+    "require_number_in", "require_residual", "require_seconds", "require_whole_in", "step_moreau",
+    "too_many_steps", "too_much",
 ]  # fmt: skip

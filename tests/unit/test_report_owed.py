@@ -12,7 +12,7 @@ import pytest
 from adapters.files.run_folder import Outcome
 from adapters.procedure.record import Record
 from adapters.report import bed as report_bed
-from adapters.report.bed import hung, owed, tell_changed_places
+from adapters.report.bed import describe_changed_places, hung, owed
 from adapters.scene.file import load_scene
 from trackbed.scenes import scene_path
 
@@ -42,8 +42,8 @@ def test_grains_that_changed_places_are_told() -> None:
         {"asked": asked, "gain": gain, "relaxation": {"hops": 7}}
         for asked, gain in ((7e-5, 8e-5), (3e-5, 1e-5))
     ]
-    assert tell_changed_places(record()) == tell_changed_places(record(other, other)) == ""
-    found = tell_changed_places(record(other, *changed))
+    assert describe_changed_places(record()) == describe_changed_places(record(other, other)) == ""
+    found = describe_changed_places(record(other, *changed))
     assert "In 2 of 3 jumps" in found
     assert ">90.0</data> µm in all" in found
 

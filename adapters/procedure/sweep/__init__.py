@@ -6,6 +6,6 @@ from adapters.procedure.sweep.results import write_results
 from adapters.procedure.sweep.run import Cluster, list_dry_run, make_sweep_record, run_sweep
 
 __all__ = [
-    "Cluster", "check_folder", "check_libraries", "list_dry_run", "make_sweep_record",
-    "plan_sweep", "run_sweep", "write_results",
+    "Cluster", "check_folder", "check_libraries", "list_dry_run", "make_sweep_record", "plan_sweep",
+    "run_sweep", "write_results",
 ]  # fmt: skip

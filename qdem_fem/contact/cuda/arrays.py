@@ -90,7 +90,7 @@ class DeviceContact:
         """What the last step of a window said, from its status."""
         self.said = TOO_DEEP if status[DEEP] else LOOK_AGAIN if status[AGAIN] else GO_ON
 
-    def say_step(self, displacement: Any, velocity: Any, step: float) -> int:
+    def step_contact(self, displacement: Any, velocity: Any, step: float) -> int:
         """Contact at a displacement to which a ``step`` [s] led; what it says."""
         status = cuda.to_device(np.array([0, 1, 0, 0], dtype=np.int32))
         self.launch_step(displacement, velocity, status, step, 0)

@@ -77,10 +77,10 @@ class CudaSphereContacts(SphereContacts):
         """`SphereContacts.pairs_look` around positions on the GPU."""
         self.changing.renew_lists(position, skin, self.skin / 2)
 
-    def say_step(self, step: float) -> int:
-        """`Contacts.say_step`"""
+    def step_contact(self, step: float) -> int:
+        """`Contacts.step_contact`"""
         state = self.run.assembly.state
-        return self.changing.say_step(state.displacement, state.velocity, step)
+        return self.changing.step_contact(state.displacement, state.velocity, step)
 
     def bound_present_stiffness(self) -> float:
         """`SphereContacts.bound_present_stiffness`"""

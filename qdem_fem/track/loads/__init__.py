@@ -13,17 +13,7 @@ from qdem_fem.track.loads.train import (
 )
 
 __all__ = [
-    "MOST_SAMPLES",
-    "RATE",
-    "RailKind",
-    "Roughness",
-    "Track",
-    "Train",
-    "WheelFlat",
-    "WheelKind",
-    "find_flat_forces",
-    "find_rolling_forces",
-    "make_train_record",
-    "seat_share",
+    "MOST_SAMPLES", "RATE", "RailKind", "Roughness", "Track", "Train", "WheelFlat", "WheelKind",
+    "find_flat_forces", "find_rolling_forces", "make_train_record", "seat_share",
     "write_load_record",
 ]  # fmt: skip

@@ -13,17 +13,6 @@ from rigid_lcp.friction.methods.newton import NEWTON_PATIENCE, alart_curnier, ne
 from rigid_lcp.friction.methods.pivoting import pivoting
 
 __all__ = [
-    "NEWTON_PATIENCE",
-    "PATH_ITERATIONS",
-    "Path",
-    "PathStep",
-    "Sweeper",
-    "alart_curnier",
-    "dantzig",
-    "gauss_seidel",
-    "interior_point",
-    "make_sweeper",
-    "newton",
-    "pivoting",
-    "spring_size",
+    "NEWTON_PATIENCE", "PATH_ITERATIONS", "Path", "PathStep", "Sweeper", "alart_curnier", "dantzig",
+    "gauss_seidel", "interior_point", "make_sweeper", "newton", "pivoting", "spring_size",
 ]  # fmt: skip
