@@ -155,7 +155,7 @@ def draw(rows: Sequence[Row], picture: Path) -> None:
         over.set(xscale="log", xlabel="load cycle", title=kind.title)
         over.set_ylabel("settlement [µm]: mean grain; dotted: piston")
         draw_errors(below, rows, kind)
-    figure.savefig(picture, dpi=75)
+    figure.savefig(picture, dpi=100)
     plt.close(figure)
 
 
@@ -177,5 +177,7 @@ def draw_errors(axis: Any, rows: Sequence[Row], kind: Kind) -> None:
                       textcoords="offset points")  # fmt: skip
     axis.set_yscale("symlog", linthresh=50)
     axis.set(xscale="log", xlabel="CPU time over that of every cycle")
+    axis.set_xticks([0.05, 0.1, 0.2, 0.5, 1], labels=["0.05", "0.1", "0.2", "0.5", "1"])
+    axis.set_xticks([], minor=True)
     axis.set_ylabel("error of the mean grain's settlement since kᵢ [%]")
     axis.legend(fontsize=6, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.14))
