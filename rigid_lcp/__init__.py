@@ -23,25 +23,18 @@ if TYPE_CHECKING:
 
 provide_cache_folders(__path__[0])
 
-_HOMES = {
-    "BodySpace": "friction.problem",
-    "Breakage": "wear",
-    "Disc": "shapes",
-    "FrictionProblem": "friction.problem",
-    "FrictionSolution": "friction.problem",
-    "HalfSpace": "shapes",
-    "Polygon": "shapes",
-    "Polyhedron": "shapes",
-    "RigidError": "errors",
-    "Scene": "motion",
-    "Simulation": "scene",
-    "Sphere": "shapes",
-    "Wear": "wear",
-    "box": "shapes",
-    "collide": "collision",
-    "lcp": "friction.attempts",
-    "solve_friction": "friction.auto",
+_ROOMS = {
+    "collision": ("collide",),
+    "errors": ("RigidError",),
+    "friction.attempts": ("lcp",),
+    "friction.auto": ("solve_friction",),
+    "friction.problem": ("BodySpace", "FrictionProblem", "FrictionSolution"),
+    "motion": ("Scene",),
+    "scene": ("Simulation",),
+    "shapes": ("Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "box"),
+    "wear": ("Breakage", "Wear"),
 }
+_HOMES = {name: room for room, names in _ROOMS.items() for name in names}
 __all__ = [
     "BodySpace", "Breakage", "Disc", "FrictionProblem", "FrictionSolution", "HalfSpace", "Polygon",
     "Polyhedron", "RigidError", "Scene", "Simulation", "Sphere", "Wear", "box", "collide", "lcp",

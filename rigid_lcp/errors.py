@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from trackbed.errors import (
-    DiskFull,
-    Interrupted,
     LibraryMissing,
     NotConverged,
     NotCredible,
@@ -14,18 +12,9 @@ from trackbed.errors import (
 )
 
 __all__ = [
-    "DiskFull",
-    "Interrupted",
-    "LibraryMissing",
-    "NoSolution",
-    "NotConverged",
-    "Overlapping",
-    "ProblemError",
-    "RigidError",
-    "SceneError",
-    "ShapeError",
-    "UsageError",
-]
+    "LibraryMissing", "NoSolution", "NotConverged", "Overlapping", "ProblemError", "RigidError",
+    "SceneError", "ShapeError", "UsageError",
+]  # fmt: skip
 
 RigidError = TrackbedError
 """Base of all errors that `rigid_lcp` raises."""

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from rigid_lcp.friction.problem.definition import BodySpace
+from rigid_lcp import BodySpace
 
 Floats = NDArray[np.float64]
 

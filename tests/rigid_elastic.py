@@ -1,4 +1,4 @@
-"""Twins of the unique forces: least squares, and sliders with memory."""
+"""A twin of the unique forces: least squares."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.friction.problem.definition import FrictionProblem
+from rigid_lcp import FrictionProblem
 from rigid_lcp.unique.micro_displacements import (
     bodies_of,
     contact_stiffness,
-    coulomb_spring,
     free_motion,
     mass_free_jacobian,
 )
@@ -25,14 +24,3 @@ def find_least_forces(problem: FrictionProblem, stiffness: ArrayLike = 1.0) -> F
     scaled = sp.csr_array(sp.diags_array(weight) @ jacobian).toarray()
     least, *_ = np.linalg.lstsq(scaled.T, -free_motion(jacobian, problem.offset), rcond=1e-12)
     return np.asarray(weight * least)
-
-
-def slide_with_memory(
-    deformation: Floats, slip: Floats, stiffness: Floats, friction: Floats
-) -> tuple[Floats, Floats]:
-    """A law of one's own (`rigid_lcp.unique.micro_displacements.ForceLaw`): what slides stays slid,
-    as in MD (Cundall and Strack), so that the forces depend on the order in which contacts slid."""
-    force, _ = coulomb_spring(deformation, slip, stiffness, friction)
-    slipped = slip.copy()
-    slipped[:, 1:] = deformation[:, 1:] - force[:, 1:] / stiffness[:, 1:]
-    return force, slipped

@@ -11,15 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from rigid_lcp import Disc, HalfSpace, Polygon, Polyhedron, Scene, Simulation
 from rigid_lcp.motion.state import Motion
-from rigid_lcp.motion.world import Scene
-from rigid_lcp.scene.simulation import Method, Simulation
-from rigid_lcp.shapes.disc import Disc
-from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.polygon import Polygon
-from rigid_lcp.shapes.polyhedron import Polyhedron
+from rigid_lcp.scene.simulation import Method
 from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_rate, rotate
-from rigid_lcp.shapes.stones import ballast_stone
+from tests.rigid_solids import ballast_stone
 from validation.bench.rigid.scenes import DENSITY, FLOOR, G, gravity_on
 
 Floats = NDArray[np.float64]
@@ -115,40 +111,6 @@ def rod_over_edge_answer(seconds: float) -> Floats:
     assert rates(state, ROD_FRICTION)[2] > 0, "it has left the corner"
     along, up = _rod_axes(state[1])
     return np.array([*(state[0] * along + b * up), -state[1]])
-
-
-# --- a rocking block, at any time ---
-
-
-def rocking_block_state(
-    half_width: float, half_height: float, lean: float, seconds: float
-) -> Floats:
-    """Centre [m] and angle [rad] of `rocking_block` (Housner 1963).
-
-    About either corner ``4/3 R^2 t'' = -g R sin(alpha - |t|) sign t``; upright it goes on with
-    ``1 - 3/2 sin^2 alpha`` of its spin.  The block is let go on its right corner.
-    """
-    alpha, radius = np.arctan2(half_width, half_height), np.hypot(half_width, half_height)
-    side, time, state = 1.0, 0.0, np.array([lean, 0.0])
-
-    def upright(_: float, y: Floats) -> float:
-        return float(y[0])
-
-    upright.terminal, upright.direction = True, -1  # type: ignore[attr-defined]
-    corner = half_width
-    while True:
-        found = solve_ivp(
-            lambda _, y: [y[1], -0.75 * G / radius * sin(alpha - y[0])], (time, seconds), state,
-            events=upright, **EXACT,
-        )  # fmt: skip
-        time, state = found.t[-1], found.y[:, -1]
-        if found.status != 1:
-            break
-        side, state = -side, np.array([0.0, -(1 - 1.5 * sin(alpha) ** 2) * state[1]])
-    tilt = side * state[0]  # to the right
-    turn = np.array([[cos(tilt), sin(tilt)], [-sin(tilt), cos(tilt)]])
-    foot = np.array([0.0 if side > 0 else -2 * corner, 0.0])
-    return np.array([*(foot + turn @ (-side * half_width, half_height)), -tilt])
 
 
 # --- a box that falls on its corner, slides, bounces and turns ---
@@ -252,18 +214,6 @@ def sliding_prism_answer(seconds: float) -> Floats:
 
 
 # --- bodies that collide again and again ---
-
-
-def balls_in_a_row(gap: float, restitution: float = 1.0) -> Scene:
-    """Five equal discs (bodies 0 to 4), ``gap`` [m] apart; the first two come with 1 m/s."""
-    scene = Scene(2, gravity=(0.0, 0.0))
-    for k in range(5):
-        place, speed = (0.1 + gap) * k - 0.01 * (k < 2), 1.0 * (k < 2)
-        scene.add(
-            Disc(0.05), density=1000.0, position=(place, 0.0), velocity=(speed, 0.0),
-            restitution=restitution,
-        )  # fmt: skip
-    return scene
 
 
 def dense_gas() -> Scene:

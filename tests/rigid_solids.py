@@ -7,17 +7,30 @@ from typing import Any
 
 import numpy as np
 
+from rigid_lcp import HalfSpace, Polyhedron, box
 from rigid_lcp.contact.arrays import Contacts
 from rigid_lcp.contact.detection_space import detect_3d, shapes_3d
-from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.polyhedron import Polyhedron, box
 from rigid_lcp.shapes.rotations import Floats, rotation_matrix, unit_quaternion
-from rigid_lcp.shapes.stones import ballast_stone
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)
 CUBE = box(1.0, 1.0, 1.0)
 Placed = tuple[Sequence[object], Floats, Floats]
+
+
+def ballast_stone(generator: np.random.Generator, size: float, corners: int = 16) -> Polyhedron:
+    """A random convex stone that passes a square sieve of about ``size`` [m].
+
+    Points on an ellipsoid, each the farthest of ten random ones from those before it (Mitchell's
+    best candidate), so that edges stay sharp and faces are of like size.
+    """
+    chosen = np.empty((0, 3))
+    while len(chosen) < corners:
+        tries = generator.normal(size=(10, 3))
+        tries /= np.linalg.norm(tries, axis=1)[:, None]
+        nearest = -(tries @ chosen.T).max(axis=1, initial=-1.0)
+        chosen = np.vstack([chosen, tries[np.argmax(nearest)]])
+    return Polyhedron(0.5 * size * np.array([1.3, 1.0, 0.75]) * chosen)
 
 
 def contacts(

@@ -93,25 +93,16 @@ class Collision:
 
 
 def collide(
-    bodies: BodySpace,
-    velocity: ArrayLike,
-    restitution: ArrayLike,
-    friction: ArrayLike = 0.0,
-    *,
-    law: Law = "moreau",
-    energy: Energy = "safe",
-    tolerance: float = 1e-12,
-    max_rounds: int | None = None,
-    still: float = 0.0,
-    rest_speed: float = 0.0,
-    drive: ArrayLike | None = None,
-) -> Collision:
+    bodies: BodySpace, velocity: ArrayLike, restitution: ArrayLike, friction: ArrayLike = 0.0, *,
+    law: Law = "moreau", tolerance: float = 1e-12, max_rounds: int | None = None,
+    still: float = 0.0, rest_speed: float = 0.0, drive: ArrayLike | None = None,
+) -> Collision:  # fmt: skip
     """Velocities after a collision by eqs 33 to 36, and the impulses that change them.
 
     ``velocity`` (ndof,) of the bodies [m/s, 1/s]; ``restitution`` eps and ``friction`` mu, (nc,) or
-    one number, eps in [0, 1].  ``law``: what eps acts on with friction.  ``energy``: ``safe``
-    scales eps down until there are impulses and energy does not grow, ``watched`` says so in the
-    message only.  A round whose impulses are not found changes no velocity.
+    one number, eps in [0, 1].  ``law``: what eps acts on with friction, where it is scaled down
+    until there are impulses and energy does not grow.  A round whose impulses are not found changes
+    no velocity.
     After ``max_rounds`` (None: 500, with friction 50) the rest is taken without restitution, which
     ends, costs energy also at eps = 1, and is said in the message.  ``still`` [m/s]: an approach
     not faster is none; ``rest_speed`` [m/s]: one not faster ends without a bounce, which cuts off
@@ -127,7 +118,13 @@ def collide(
     mu = check_one_a_contact("friction", friction, MOST_FRICTION, nc)
     if max_rounds is None:
         max_rounds = COLLISION_ROUNDS_ROUGH if mu.any() else COLLISION_ROUNDS
-    check_choices(law, energy, tolerance, max_rounds, still, rest_speed)
+    if law not in get_args(Law):
+        remedy = "give one of " + ", ".join(get_args(Law))
+        raise UsageError(f"law is {law!r}", where="law", remedy=remedy)
+    require_number(tolerance, "tolerance")
+    require_number(still, "still", zero=True)
+    require_number(rest_speed, "rest_speed", zero=True)
+    require_whole(max_rounds, "max_rounds")
     moved = np.zeros(nc * dim)
     if drive is not None:
         moved = numbers_of("drive", drive, nc * dim, "one number a row of J")
@@ -146,7 +143,7 @@ def collide(
         taking = np.arange(nc) if last else np.flatnonzero(normal <= none)
         bounce = np.where((normal < -rest_speed) & (not last), eps, 0.0)
         part, solution, error, used = run_collision_round(
-            bodies, now, taking, bounce, mu, dim, law, energy, tolerance
+            bodies, now, taking, bounce, mu, dim, law, tolerance
         )
         worst, rounds, factor = max(worst, error), rounds + 1, min(factor, used)
         if not solution.solved or error > ROUGH:
@@ -171,8 +168,6 @@ def collide(
             0, f"restitution was scaled by {factor:.3g}, as energy would have grown, or no impulses"
             " were found"
         )  # fmt: skip
-    if change > work_round_off(bodies, impulse, first):
-        notes.append(f"energy grew by {change:.3g} J\n  -> use energy='safe', or law='moreau'")
     return Collision(
         after, impulse, change, worst, status, rounds, factor, "; ".join(notes), cut_off
     )  # fmt: skip
@@ -180,7 +175,7 @@ def collide(
 
 def run_collision_round(
     bodies: BodySpace, velocity: Floats, taking: NDArray[np.int64], eps: Floats, mu: Floats,
-    dim: int, law: Law, energy: Energy, tolerance: float,
+    dim: int, law: Law, tolerance: float,
 ) -> tuple[Floats, FrictionSolution, float, float]:  # fmt: skip
     """Impulses of one round on the contacts that take part; the solution, its error; the factor of
     eps.
@@ -200,7 +195,7 @@ def run_collision_round(
         problem = FrictionProblem(None, excess.ravel(), mu[taking], dim, part)
         solution = find_round_impulses(problem, tolerance)
         p, error = solution.r, round_error(problem, solution)
-        if energy != "safe" or not (used.any() and problem.friction.any()):
+        if not (used.any() and problem.friction.any()):
             break  # without friction energy can not grow
         change = 0.5 * float(p @ (2.0 * v + part.product(p)))
         if not share.next(np.array([error > ROUGH or change > work_round_off(part, p, v)])):
@@ -263,7 +258,6 @@ def _find_impulses_at(problem: FrictionProblem, tolerance: float) -> FrictionSol
 
 
 Law = Literal["newton", "moreau"]
-Energy = Literal["safe", "watched"]
 
 
 def check_moving_bodies(bodies: BodySpace, velocity: ArrayLike) -> tuple[int, Floats]:
@@ -312,18 +306,3 @@ def check_one_a_contact(name: str, values: ArrayLike, upper: float, nc: int) -> 
             remedy=f"give 0 to {upper:g}",
         )  # fmt: skip
     return array
-
-
-def check_choices(
-    law: str, energy: str, tolerance: float, max_rounds: int, still: float, rest_speed: float
-) -> None:
-    """Raise `UsageError` for what `rigid_lcp.collision.collide` can not be asked."""
-    for name, given, known in (("law", law, get_args(Law)), ("energy", energy, get_args(Energy))):
-        if given not in known:
-            raise UsageError(
-                f"{name} is {given!r}", where=name, remedy="give one of " + ", ".join(known)
-            )
-    require_number(tolerance, "tolerance")
-    require_number(still, "still", zero=True)
-    require_number(rest_speed, "rest_speed", zero=True)
-    require_whole(max_rounds, "max_rounds")

@@ -3,18 +3,12 @@
 Newton's restitution acts on normal velocities, whatever friction does beside it.  Where a rod comes
 down at a slant its normal impulse turns the slip round, friction then pushes along the first slip,
 and the rod leaves with more than it came with (Kane's paradox).  Wedged bodies may have no impulses
-at all that let them bounce.  Without restitution neither happens
-(`rigid_lcp.motion.time_stepping`), so
-as much of it is kept as makes none (`rigid_lcp.collision.restitution_scale`).
+at all that let them bounce.  Without restitution neither happens, so as much of it is kept as makes
+no energy, found by bisection, contact by contact.
 
 The work of the impulses p is ``p (u- + u+) / 2`` with the relative velocities u before and after
 the step.  Without restitution that is at most ``sum M (h f / M)^2 / 8`` of the bodies that touch
 each other: what loads f give within a step to bodies that come to rest in it.  So much is allowed.
-
-How much of a restitution makes no energy: bisection, contact by contact.
-
-Used by both integrators: `rigid_lcp.collision.restitution_scale` and `rigid_lcp.collision.impulses`
-say why it may.
 """
 
 from __future__ import annotations

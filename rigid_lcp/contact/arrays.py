@@ -17,7 +17,7 @@ Bools = NDArray[np.bool_]
 class Contacts:
     """Point contacts of nc pairs of features (eq. 9): a point of body a above body b.
 
-    Bodies are numbered as in the scene, fixed ones included; -1 stands for nothing.
+    Bodies are numbered as in the scene, fixed ones included.
     """
 
     body_a: Ints

@@ -64,7 +64,7 @@ def shapes_2d(
     for number, shape in enumerate(shapes):
         if isinstance(shape, Polygon):
             kind.append(POLYGON)
-            corners, outward, size = shape.vertices, shape.face_normals, shape.reach
+            corners, outward, size = shape.vertices, shape.normals, shape.reach
         elif isinstance(shape, Disc):
             kind.append(DISC)
             corners, outward, size = np.zeros((0, 2)), np.zeros((0, 2)), shape.radius

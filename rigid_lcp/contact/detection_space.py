@@ -12,7 +12,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rigid_lcp.contact.arrays import Contacts
-from rigid_lcp.contact.corners import CORNER_EDGE, CORNERS, EDGE_CORNER
 from rigid_lcp.contact.manifold import (
     CANDIDATE_COLUMNS,
     CORNER_FACE,
@@ -36,7 +35,7 @@ from rigid_lcp.contact.placed_solids import (
     shapes_3d,
 )
 from rigid_lcp.contact.separation import Solids, dot
-from rigid_lcp.contact.solids import find_solid_contacts
+from rigid_lcp.contact.solids import CORNER_EDGE, CORNERS, EDGE_CORNER, find_solid_contacts
 from rigid_lcp.contact.spheres import touch_sphere_plane, touch_sphere_solid, touch_sphere_sphere
 
 __all__ = ["detect_3d", "shapes_3d"]

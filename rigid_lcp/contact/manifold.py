@@ -64,9 +64,7 @@ def add_candidate(
     """
     place = count
     for k in range(count):
-        d0, d1, d2 = (
-            found[k, 7] - point[0], found[k, 8] - point[1], found[k, 9] - point[2],
-        )  # fmt: skip
+        d0, d1, d2 = found[k, 7] - point[0], found[k, 8] - point[1], found[k, 9] - point[2]
         if d0 * d0 + d1 * d1 + d2 * d2 < same * same:
             if found[k, 0] <= kind:
                 return count
@@ -98,14 +96,12 @@ def find_face_candidates(
         gap = dot(n, x) - level
         if gap <= margin and within_face(solids, own, face, x, TIE_IN_SPACE * size):
             here, there = v - first_other, face - solids.first_face[own]
-            if own_is_b:
-                count = add_candidate(
-                    found, count, CORNER_FACE, here, there, gap, n, sign, x, SAME_CONTACT * size
-                )
-            else:
-                count = add_candidate(
-                    found, count, FACE_CORNER, there, here, gap, n, sign, x, SAME_CONTACT * size
-                )
+            kind, first, second = CORNER_FACE, here, there
+            if not own_is_b:
+                kind, first, second = FACE_CORNER, there, here
+            count = add_candidate(
+                found, count, kind, first, second, gap, n, sign, x, SAME_CONTACT * size
+            )
     opposite = np.cos(NEARLY_OPPOSITE)
     start, stop = solids.first_corner[face], solids.first_corner[face + 1]
     for g in range(solids.first_face[other], solids.first_face[other + 1]):
@@ -117,32 +113,12 @@ def find_face_candidates(
             gap = dot(m, x) - solids.offset[g]
             if gap <= margin and within_face(solids, other, g, x, TIE_IN_SPACE * size):
                 here, there = g - solids.first_face[other], solids.loop[k]
-                if own_is_b:
-                    count = add_candidate(
-                        found,
-                        count,
-                        FACE_CORNER,
-                        here,
-                        there,
-                        gap,
-                        m,
-                        -sign,
-                        x,
-                        SAME_CONTACT * size,
-                    )
-                else:
-                    count = add_candidate(
-                        found,
-                        count,
-                        CORNER_FACE,
-                        there,
-                        here,
-                        gap,
-                        m,
-                        -sign,
-                        x,
-                        SAME_CONTACT * size,
-                    )
+                kind, first, second = FACE_CORNER, here, there
+                if not own_is_b:
+                    kind, first, second = CORNER_FACE, there, here
+                count = add_candidate(
+                    found, count, kind, first, second, gap, m, -sign, x, SAME_CONTACT * size
+                )
     a, b = (other, own) if own_is_b else (own, other)
     crossing = np.empty(9)
     towards = sign * n

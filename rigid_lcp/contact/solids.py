@@ -1,9 +1,14 @@
-"""All point contacts of two polyhedra: the features that keep them apart say which.
+"""All point contacts of two polyhedra: the features that keep them apart say which (eqs 8 and 9).
 
 The greatest separation along the normal of a face, or across two edges, is the distance, and these
 features make the contacts (`rigid_lcp.contact.manifold`), unless corners are nearest: then it is
-less than the distance, no candidate is as near as it says, and the nearest corner makes one too
-(`rigid_lcp.contact.corners`).
+less than the distance, no candidate is as near as it says, and the nearest corner makes one too.
+Where the nearest features are a corner and an edge, or two corners, no face and no pair of crossing
+edges names the normal: it lies along the line of nearest points, as between two spheres of radius
+zero.  The plane across it through either point parts the two bodies, so bodies that do not approach
+along it can not meet by translation.  At touch (within `rigid_lcp.contact.manifold.TIE_IN_SPACE`)
+the normal is that of the face that keeps the bodies farthest apart, which it also is once they
+overlap: the gap is continuous there; a normal, as that of the distance to a point, can not be.
 """
 
 from __future__ import annotations
@@ -12,7 +17,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rigid_lcp.contact.corners import find_corner_candidates
 from rigid_lcp.contact.manifold import (
     EDGES,
     SAME_CONTACT,
@@ -33,6 +37,108 @@ from rigid_lcp.contact.separation import (
 )
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+CORNER_EDGE, EDGE_CORNER, CORNERS = 3, 4, 5
+"""Corner of a on an edge of b; corner of b on an edge of a; corner on corner."""
+PAIRS = 64
+"""Pairs of a corner and an edge kept for two bodies; some contacts of them are."""
+PAIR_COLUMNS = 8
+"""Row of a pair: distance, corner, edge, the end of the edge that is nearest (-1: neither), 1 if
+the corner is a's (-1: b's), vector from b's point to a's (3)."""
+
+
+@njit(cache=True)
+def list_corner_edge_pairs(
+    solids: Solids, own: int, other: int, edges_other: Ints, sign: float, within: float,
+    tie: float, pairs: Floats, count: int,
+) -> int:  # fmt: skip
+    """Corners of ``own`` no farther than ``within`` [m] from edges of ``other``, into ``pairs``.
+
+    The nearest of all is row 0, whatever there is room for; of two within ``tie`` [m] the first.
+    ``sign`` is 1 where own is body a.  Returns how many rows there are.
+    """
+    base, corners = solids.first_vertex[other], solids.first_vertex[own]
+    for e in edges_other:
+        p = solids.vertex[base + solids.edge[e, 0]]
+        q = solids.vertex[base + solids.edge[e, 1]]
+        u0, u1, u2 = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        squares = u0 * u0 + u1 * u1 + u2 * u2
+        for v in range(corners, solids.first_vertex[own + 1]):
+            x = solids.vertex[v]
+            d0, d1, d2 = x[0] - p[0], x[1] - p[1], x[2] - p[2]
+            place = min(max((d0 * u0 + d1 * u1 + d2 * u2) / squares, 0.0), 1.0)
+            d0, d1, d2 = d0 - place * u0, d1 - place * u1, d2 - place * u2
+            distance = d0 * d0 + d1 * d1 + d2 * d2
+            if distance > within * within:
+                continue
+            distance = np.sqrt(distance)
+            row = min(count, PAIRS - 1)
+            if count > 0 and distance < pairs[0, 0] - tie:
+                pairs[row] = pairs[0]
+                row = 0
+            count = min(count + 1, PAIRS)
+            slack = tie / np.sqrt(squares)
+            end = 0 if place <= slack else (1 if place >= 1.0 - slack else -1)
+            pairs[row, 0], pairs[row, 1], pairs[row, 2] = distance, v - corners, e
+            pairs[row, 3], pairs[row, 4] = end, sign
+            pairs[row, 5], pairs[row, 6], pairs[row, 7] = sign * d0, sign * d1, sign * d2
+    return count
+
+
+@njit(cache=True)
+def pair_belongs(solids: Solids, pair: Floats, normal: Floats, tie: float) -> bool:
+    """The pair lies across the same gap as the nearest one, whose ``normal`` it nearly has.
+
+    So do the two ends of what parallel edges have in common.
+    """
+    away = pair[5:8]
+    if pair[0] > tie and dot(away, normal) < np.cos(NEARLY_OPPOSITE) * pair[0]:
+        return False
+    edge = int(pair[2])
+    return pair[4] * dot(solids.bisector[edge], normal) >= solids.seen_about[edge]
+
+
+@njit(cache=True)
+def find_corner_candidates(
+    solids: Solids, a: int, b: int, near_a: Ints, near_b: Ints, within: float, size: float,
+    touching: Floats, found: Floats, count: int,
+) -> int:  # fmt: skip
+    """Add the nearest corner-edge pair no farther than ``within`` [m], and those beside it.
+
+    ``near_a``, ``near_b``: edges of each body near the other; ``touching`` (3,): normal where the
+    points are less than `TIE_IN_SPACE` of ``size`` [m] apart.  Rows of ``found`` as
+    `rigid_lcp.contact.manifold.CANDIDATE_COLUMNS` says; returns how many there are.
+    """
+    tie = TIE_IN_SPACE * size
+    pairs = np.empty((PAIRS, PAIR_COLUMNS))
+    many = list_corner_edge_pairs(solids, a, b, near_b, 1.0, within, tie, pairs, 0)
+    many = list_corner_edge_pairs(solids, b, a, near_a, -1.0, within, tie, pairs, many)
+    nearest, normal, point = touching, np.empty(3), np.empty(3)
+    for row in range(many):
+        pair = pairs[row]
+        of_a = pair[4] > 0.0
+        if not of_a and pair[3] >= 0.0:  # corner on corner: found from a's side already
+            continue
+        own, other = (a, b) if of_a else (b, a)
+        for axis in range(3):
+            normal[axis] = pair[5 + axis] / pair[0] if pair[0] > tie else touching[axis]
+            point[axis] = solids.vertex[solids.first_vertex[own] + int(pair[1]), axis]
+        if row == 0:
+            nearest = normal.copy()
+        elif not pair_belongs(solids, pair, nearest, tie):
+            continue
+        corner, edge = int(pair[1]), int(pair[2])
+        first, second = corner, edge - solids.first_edge[other]
+        kind = CORNER_EDGE if of_a else EDGE_CORNER
+        if pair[3] >= 0.0:
+            kind, second = CORNERS, solids.edge[edge, int(pair[3])]
+        if not of_a:
+            first, second = second, first
+        count = add_candidate(
+            found, count, kind, first, second, pair[0], normal, 1.0, point, SAME_CONTACT * size
+        )
+    return count
 
 
 @njit(cache=True)

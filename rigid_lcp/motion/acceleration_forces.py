@@ -12,7 +12,7 @@ from rigid_lcp.errors import NoSolution, NotConverged
 from rigid_lcp.friction.auto import solve_friction
 from rigid_lcp.friction.methods import dantzig, pivoting
 from rigid_lcp.friction.problem import BodySpace, FrictionSolution, friction_problem
-from rigid_lcp.motion.time_stepping import find_impulses, forces_error
+from rigid_lcp.motion.time_stepping import forces_error
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def find_forces(
     if lasting is not None and lasting.residual <= tolerance:
         return lasting, forces_error(bodies, lasting, gravity)
     if not (slip.any(axis=1) & (friction > 0)).any():
-        solution = find_impulses(bodies, offset.reshape(-1, dim), friction, None, tolerance)
+        solution = solve_friction(bodies, offset, friction, dim=dim, tolerance=tolerance)
     elif dim == 2:
         problem = friction_problem(bodies, offset, friction, dim)
         solution = pivoting(problem, None, tolerance, tangential_velocity=slip[:, 0])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import inf, nan
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Loads = Callable[[float, Motion], ArrayLike | None]
 """Forces and torques (n, 3) in 2D, (n, 6) in 3D [N, N m] at a time [s] and state."""
-
 
 MOST_DENSITY = 1e50
 """Densities above it [kg/m^3] have masses that can not be computed with."""
@@ -55,16 +53,12 @@ def require_number_in(
     return number
 
 
-def require_residual(value: Any, what: str, zero: bool = False) -> float:
-    """A residual [-] of a run, above zero or ``zero`` as well; else `SceneError`."""
-    remedy = "give a positive number, say 1e-9" + (", or 0" if zero else "")
-    return require_number_in(value, 0.0, inf, what, "Simulation", remedy, above=not zero)
-
-
-def require_whole_in(value: Any, least: int, what: str, where: str, remedy: str) -> int:
-    """A whole number of ``least`` or more; else `SceneError`."""
+def require_whole_in(
+    value: Any, least: int, what: str, where: str, remedy: str, most: float = inf
+) -> int:
+    """A whole number from ``least`` to ``most``; else `SceneError`."""
     sound = isinstance(value, Integral) and not isinstance(value, bool)
-    if not sound or value < least:
+    if not sound or not least <= value <= most:
         raise SceneError(f"{what} is {value!r}", where=where, remedy=remedy)
     return int(value)
 
@@ -75,17 +69,6 @@ def require_seconds(value: Any, what: str, least: float = 0.0) -> float:
     if not least <= number < inf:
         raise UsageError(f"{what} is {value!r}", remedy="give a positive number of seconds")
     return number
-
-
-def require_body(number: Any, bodies: int) -> int:
-    """The number of a body of a scene; `SceneError` where it has none of that number."""
-    sound = isinstance(number, Integral) and not isinstance(number, bool)
-    if not sound or not 0 <= number < bodies:
-        raise SceneError(
-            f"there is no body {number!r}", where="fragment",
-            remedy=f"give a whole number, 0 to {bodies - 1}, as Scene.add returned it",
-        )  # fmt: skip
-    return int(number)
 
 
 def require_line(line: Any, dim: int) -> tuple[Floats, Floats]:
@@ -123,32 +106,29 @@ def check_half_space(
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class CheckedLoads:
-    """Loads whose answer is looked at: a row for every body, fragments included, all finite."""
+def check_loads(loads: Loads, time: float, motion: Motion) -> Floats | None:
+    """Loads at a time [s] as they are given: a row for every body, fragments included, all finite.
 
-    loads: Loads
-
-    def __call__(self, time: float, motion: Motion) -> Floats | None:
-        """The forces and torques at a time [s]; `SceneError` where they are none."""
-        given = self.loads(time, motion)
-        if given is None:
-            return None
-        shape = motion.rates.shape
-        wrong = ""
-        try:
-            forces = real_numbers(given)
-        except (TypeError, ValueError) as error:
-            wrong = f"are not real numbers ({error})"
-        else:
-            if forces.shape != shape:
-                wrong = f"have shape {forces.shape}"
-            elif not np.isfinite(forces).all():
-                wrong = "are not finite"
-        if wrong:
-            raise SceneError(
-                f"they {wrong}", where=f"loads at {time:.6g} s",
-                remedy=f"return finite numbers {shape}: a row for every body, the fixed ones and"
-                " fragments too",
-            )  # fmt: skip
-        return forces
+    Raises `SceneError` where they are none.
+    """
+    given = loads(time, motion)
+    if given is None:
+        return None
+    shape = motion.rates.shape
+    wrong = ""
+    try:
+        forces = real_numbers(given)
+    except (TypeError, ValueError) as error:
+        wrong = f"are not real numbers ({error})"
+    else:
+        if forces.shape != shape:
+            wrong = f"have shape {forces.shape}"
+        elif not np.isfinite(forces).all():
+            wrong = "are not finite"
+    if wrong:
+        raise SceneError(
+            f"they {wrong}", where=f"loads at {time:.6g} s",
+            remedy=f"return finite numbers {shape}: a row for every body, the fixed ones and"
+            " fragments too",
+        )  # fmt: skip
+    return forces

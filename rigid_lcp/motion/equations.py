@@ -3,11 +3,6 @@
 With the rows of J along n, t (n, t1, t2) of every contact, ``u = J v`` are the relative velocities
 (positive when parting), ``A = J M^-1 J^T`` the matrices of eqs 17 and 25 in one, and b their
 offset (eqs 17, 24).  Bodies that can not move have no columns.
-
-How normals across edges turn, and what it adds to the gap's acceleration (eq. 17, in space).
-
-The normal of two crossing edges is across both, that of a sphere on an edge across the edge: both
-turn with both bodies, and not as a face would.
 """
 
 from __future__ import annotations
@@ -37,6 +32,12 @@ def body_space(
     return BodySpace(jacobian(contacts, position, columns, movable), inverse_mass, size)
 
 
+def find_response(bodies: BodySpace, impulse: Floats) -> Floats:
+    """``M^-1 J^T p``, (nb, 3) or (nb, 6), of contact impulses p: what they do to the velocities."""
+    change = bodies.inverse_mass @ (bodies.jacobian.T @ impulse.ravel())
+    return np.asarray(change).reshape(-1, bodies.body_size)
+
+
 def jacobian(contacts: Contacts, position: Floats, columns: Ints, movable: int) -> sp.csr_array:
     """J (nc * dim, movable * 3) in 2D, (nc * dim, movable * 6) in 3D: ``dg/dq`` (eqs 13, 20).
 
@@ -51,7 +52,7 @@ def jacobian(contacts: Contacts, position: Floats, columns: Ints, movable: int) 
         lever = contacts.point - position[bodies]
         values[:, :, side, :dim] = sign * frames
         values[:, :, side, dim:] = sign * _moment(lever[:, None, :], frames)
-        place[:, side] = np.where(bodies >= 0, columns[bodies], -1)
+        place[:, side] = columns[bodies]
     swap = place[:, 0] > place[:, 1]  # columns in ascending order
     values[swap], place[swap] = values[swap][:, :, ::-1], place[swap][:, ::-1]
     there = np.broadcast_to((place >= 0)[:, None, :, None], values.shape)
@@ -69,23 +70,22 @@ def _moment(lever: Floats, force: Floats) -> Floats:
     return (lever[..., 0] * force[..., 1] - lever[..., 1] * force[..., 0])[..., None]
 
 
-def _turned(spin: Floats, arm: Floats) -> Floats:
-    """``w x r``."""
+def turn_arm(spin: Floats, arm: Floats) -> Floats:
+    """``w x r``: (n, 2) of spins (n,) and arms (n, 2), (n, 3) of both (n, 3)."""
     if arm.shape[-1] == 3:
         return np.cross(spin, arm)
     return np.stack([-spin * arm[..., 1], spin * arm[..., 0]], axis=-1)
 
 
-def _point_velocities(contacts: Contacts, motion: Motion, bodies: Ints, point: Floats) -> Floats:
-    there = (bodies >= 0)[:, None]
+def _point_velocities(motion: Motion, bodies: Ints, point: Floats) -> Floats:
     arm = point - motion.position[bodies]
-    return np.where(there, motion.velocity[bodies] + _turned(motion.spin[bodies], arm), 0.0)
+    return motion.velocity[bodies] + turn_arm(motion.spin[bodies], arm)
 
 
 def relative_velocity(contacts: Contacts, motion: Motion) -> Floats:
     """``u = J v`` with all bodies, moving or driven: (nc, dim) along n, t (n, t1, t2) [m/s]."""
-    a = _point_velocities(contacts, motion, contacts.body_a, contacts.point)
-    b = _point_velocities(contacts, motion, contacts.body_b, contacts.point)
+    a = _point_velocities(motion, contacts.body_a, contacts.point)
+    b = _point_velocities(motion, contacts.body_b, contacts.point)
     return np.einsum("cij,cj->ci", contact_frames(contacts.normal), a - b)
 
 
@@ -104,64 +104,71 @@ def inertial_acceleration(contacts: Contacts, motion: Motion) -> Floats:
 
         t . (w_a x (c' - v_a) - w_b x (c' - v_b))
 
-    In 3D, at edges, see `rigid_lcp.motion.equations`; crossing edges that slide along each other
-    are
-    taken to slide along b's, which matters to no force: friction then has the velocity's direction.
+    In 3D, at edges, see `_across_edges`; crossing edges that slide along each other are taken to
+    slide along b's, which matters to no force: friction then has the velocity's direction.
     """
-    frames = contact_frames(contacts.normal)
-    n = contacts.normal
+    a, b, n = contacts.body_a, contacts.body_b, contacts.normal
     flat = np.isinf(contacts.radius_b)
     carrier_a = contacts.point + contacts.radius_a[:, None] * n
     behind = np.where(flat, 0.0, contacts.radius_b)
     face = contacts.point - contacts.gap[:, None] * n
     carrier_b = np.where(flat[:, None], carrier_a, face - behind[:, None] * n)
-    pull_a = _centripetal(contacts.body_a, motion, carrier_a)
-    moving = _point_velocities(contacts, motion, contacts.body_a, carrier_a) - _point_velocities(
-        contacts, motion, contacts.body_b, carrier_b
-    )
+    carried = _point_velocities(motion, a, carrier_a)
+    moving = carried - _point_velocities(motion, b, carrier_b)
     along = moving - (moving * n).sum(axis=1)[:, None] * n
     apart = contacts.radius_a + behind + contacts.gap
-    curved = (along * along).sum(axis=1) / np.where(flat | (apart <= 0), 1.0, apart)
-    turning = _turned(_spin_of(contacts.body_b, motion), n)
-    normal = (n * (pull_a - _centripetal(contacts.body_b, motion, carrier_b))).sum(axis=1)
+    apart = np.where(flat | (apart <= 0), 1.0, apart)
+    turning = turn_arm(motion.spin[b], n)
+    pull = _centripetal(motion, a, carrier_a) - _centripetal(motion, b, carrier_b)
+    normal = (n * pull).sum(axis=1)
+    curved = (along * along).sum(axis=1) / apart
     normal += np.where(flat, 2 * (turning * moving).sum(axis=1), curved)
-    normal_rate = np.where(
-        flat[:, None], turning, along / np.where(flat | (apart <= 0), 1.0, apart)[:, None]
-    )
+    normal_rate = np.where(flat[:, None], turning, along / apart[:, None])
     edges = np.flatnonzero(np.any(contacts.edge_b != 0, axis=1))
     if len(edges):
         normal[edges], normal_rate[edges] = _across_edges(contacts[edges], motion)
-    point_rate = _point_velocities(contacts, motion, contacts.body_a, carrier_a)
-    point_rate -= contacts.radius_a[:, None] * normal_rate
-    pull = _turned(
-        _spin_of(contacts.body_a, motion), point_rate - motion.velocity[contacts.body_a]
-    ) - _turned(_spin_of(contacts.body_b, motion), point_rate - motion.velocity[contacts.body_b])
-    result = np.einsum("cij,cj->ci", frames, pull)
+    rate = carried - contacts.radius_a[:, None] * normal_rate
+    pull = turn_arm(motion.spin[a], rate - motion.velocity[a])
+    pull -= turn_arm(motion.spin[b], rate - motion.velocity[b])
+    result = np.einsum("cij,cj->ci", contact_frames(n), pull)
     result[:, 0] = normal
     return result
 
 
 def _across_edges(contacts: Contacts, motion: Motion) -> tuple[Floats, Floats]:
-    """Normal part (nc,) and ``n'`` (nc, 3) for contacts at an edge of b."""
-    a, b = contacts.body_a, contacts.body_b
-    carrier = contacts.point + contacts.radius_a[:, None] * contacts.normal
-    foot = contacts.point - contacts.gap[:, None] * contacts.normal
-    velocity = _point_velocities(contacts, motion, a, carrier)
-    velocity -= _point_velocities(contacts, motion, b, foot)
-    pull = _centripetal(a, motion, carrier) - _centripetal(b, motion, foot)
-    turns = _spin_of(a, motion), _spin_of(b, motion), velocity
-    return edge_acceleration(contacts, *turns, pull), edge_normal_rate(contacts, *turns)
+    """Normal part (nc,) [m/s^2] and ``n' = dn/dt`` (nc, 3) [1/s] for contacts at an edge of b.
+
+    The normal of two crossing edges is across both, that of a sphere on an edge across the edge:
+    both turn with both bodies, and not as a face would.  With ``g + R = n . D``, D from a point of
+    b's edge to a's carrier, and D along n now:
+
+        d2g/dt2 = n . D'' + 2 n' . D' - |D| |n'|^2
+        edge a across edge b:  n || c = e_a x e_b,  n' = (1 - n n^T) c' / (n . c)
+        sphere on edge b:      e_b . n' = -n . e_b',  t . n' = t . D' / distance
+    """
+    a, b, n = contacts.body_a, contacts.body_b, contacts.normal
+    carrier = contacts.point + contacts.radius_a[:, None] * n
+    foot = contacts.point - contacts.gap[:, None] * n
+    velocity = _point_velocities(motion, a, carrier) - _point_velocities(motion, b, foot)
+    pull = _centripetal(motion, a, carrier) - _centripetal(motion, b, foot)
+    e_a, e_b = contacts.edge_a, contacts.edge_b
+    turned_b = np.cross(motion.spin[b], e_b)
+    across = np.cross(e_a, e_b)
+    change = np.cross(np.cross(motion.spin[a], e_a), e_b) + np.cross(e_a, turned_b)
+    signed = _dot(n, across)
+    crossing = (change - _dot(n, change)[:, None] * n) / np.where(signed == 0, 1.0, signed)[:, None]
+    side = np.cross(e_b, n)
+    distance = contacts.radius_a + contacts.gap
+    rolling = _dot(side, velocity) / np.where(distance == 0, 1.0, distance)
+    round_edge = -_dot(n, turned_b)[:, None] * e_b + rolling[:, None] * side
+    sharp = np.any(e_a != 0, axis=1, keepdims=True)
+    rate = np.where(sharp, crossing, round_edge)
+    return _dot(n, pull) + 2 * _dot(rate, velocity) - distance * _dot(rate, rate), rate
 
 
-def _spin_of(bodies: Ints, motion: Motion) -> Floats:
-    there = bodies >= 0 if motion.dim == 2 else (bodies >= 0)[:, None]
-    return np.where(there, motion.spin[bodies], 0.0)
-
-
-def _centripetal(bodies: Ints, motion: Motion, point: Floats) -> Floats:
-    spin = _spin_of(bodies, motion)
-    arm = point - motion.position[bodies]
-    return _turned(spin, _turned(spin, arm))
+def _centripetal(motion: Motion, bodies: Ints, point: Floats) -> Floats:
+    spin = motion.spin[bodies]
+    return turn_arm(spin, turn_arm(spin, point - motion.position[bodies]))
 
 
 def find_contact_offset(contacts: Contacts, motion: Motion, free: Motion) -> Floats:
@@ -171,45 +178,6 @@ def find_contact_offset(contacts: Contacts, motion: Motion, free: Motion) -> Flo
     """
     loads = relative_velocity(contacts, free)
     return (loads + inertial_acceleration(contacts, motion)).ravel()
-
-
-def edge_normal_rate(
-    contacts: Contacts, spin_a: Floats, spin_b: Floats, velocity: Floats
-) -> Floats:
-    """``dn/dt`` (nc, 3) [1/s] of contacts whose body b has an edge there.
-
-    ``spin_a``, ``spin_b`` (nc, 3) [rad/s]; ``velocity`` (nc, 3) [m/s]: that of a's carrier (point
-    of the edge, centre of the sphere) relative to the point of b's edge nearest to it.
-
-        edge a across edge b:  n || c = e_a x e_b,  dn/dt = (1 - n n^T) dc/dt / (n . c)
-        sphere on edge b:      e_b . dn/dt = -n . de_b/dt,  t . dn/dt = t . velocity / distance
-    """
-    n, e = contacts.normal, contacts.edge_b
-    turned_b = np.cross(spin_b, e)
-    across = np.cross(contacts.edge_a, e)
-    change = np.cross(np.cross(spin_a, contacts.edge_a), e) + np.cross(contacts.edge_a, turned_b)
-    signed = _dot(n, across)
-    crossing = (change - _dot(n, change)[:, None] * n) / np.where(signed == 0, 1.0, signed)[:, None]
-    side = np.cross(e, n)
-    distance = contacts.radius_a + contacts.gap
-    rolling = _dot(side, velocity) / np.where(distance == 0, 1.0, distance)
-    round_edge = -_dot(n, turned_b)[:, None] * e + rolling[:, None] * side
-    sharp = np.any(contacts.edge_a != 0, axis=1, keepdims=True)
-    return np.where(sharp, crossing, round_edge)
-
-
-def edge_acceleration(
-    contacts: Contacts, spin_a: Floats, spin_b: Floats, velocity: Floats, pull: Floats
-) -> Floats:
-    """``d2g/dt2`` (nc,) [m/s^2] of contacts with an edge, while no force acts.
-
-    With ``g + R = n . D``, D from a point of b's edge to a's carrier, and D along n now:
-    ``n . D'' + 2 n' . D' - |D| |n'|^2``.  ``velocity`` D' and ``pull`` D'' (nc, 3): those of the
-    carrier relative to the nearest point of b's edge.
-    """
-    rate = edge_normal_rate(contacts, spin_a, spin_b, velocity)
-    length = contacts.radius_a + contacts.gap
-    return _dot(contacts.normal, pull) + 2 * _dot(rate, velocity) - length * _dot(rate, rate)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -46,30 +46,20 @@ def too_much(
     if error is not None:
         leads = f"contact forces that can not be computed ({error.where}: {error.what})"
     with np.errstate(all="ignore"):
-        light = error is not None and error.where.endswith("inverse_mass")
-        body, cause = _lightest(world) if light else _fastest(world, motion, loads, h)
+        body, cause = _blame(world, motion, loads, h)
+        if error is not None and error.where.endswith("inverse_mass"):
+            mass, inertia = world.mass, world.least_inertia
+            body = int(np.argmin(np.where(world.movable, np.minimum(mass, inertia), np.inf)))
+            cause = f"its mass is {mass[body]:.3g} kg, its inertia {inertia[body]:.3g} kg m^2"
     return SceneError(
         f"{cause}: this leads to {leads}", where=f"{world.scene.called(body)} at {time:.6g} s",
         remedy="look at loads, gravity, masses and velocities; take a shorter step, or other units",
     )  # fmt: skip
 
 
-def _inertia(world: World) -> Floats:
-    """A moment of inertia of each body, in 3D the least on its tensor's diagonal, (n,) [kg m^2]."""
-    if world.scene.dim == 2:
-        return world.inertia
-    return np.asarray(np.diagonal(world.inertia, axis1=1, axis2=2).min(axis=1))
-
-
-def _lightest(world: World) -> tuple[int, str]:
-    mass, inertia = world.mass, _inertia(world)
-    body = int(np.argmin(np.where(world.movable, np.minimum(mass, inertia), np.inf)))
-    return body, f"its mass is {mass[body]:.3g} kg, its inertia {inertia[body]:.3g} kg m^2"
-
-
-def _fastest(world: World, motion: Motion, loads: ArrayLike | None, h: float) -> tuple[int, str]:
+def _blame(world: World, motion: Motion, loads: ArrayLike | None, h: float) -> tuple[int, str]:
     """The body that goes fastest, or is pushed most within ``h`` [s], and what makes it do so."""
-    dim, mass, inertia = motion.dim, world.mass, _inertia(world)
+    dim, mass, inertia = motion.dim, world.mass, world.least_inertia
     pull = np.zeros(motion.rates.shape) if loads is None else np.asarray(loads, dtype=float)
     weight = np.where(world.movable, np.abs(world.scene.gravity).max(), 0.0)
     speed = np.abs(motion.velocity).max(axis=1)

@@ -6,12 +6,9 @@ spin w in the world frame.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.errors import ShapeError
 from rigid_lcp.shapes import (
     quaternion_of_matrix,
     quaternion_of_rotation,
@@ -26,31 +23,11 @@ from rigid_lcp.shapes import (
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class PrincipalInertia:
-    """Inertia of bodies by principal moments and axes."""
-
-    moments: Floats
-    """Principal moments of inertia in ascending order [kg m^2], (..., 3)."""
-    axes: Floats
-    """Quaternions (..., 4) that turn principal to body coordinates."""
-
-
-def principal_inertia(inertia: ArrayLike) -> PrincipalInertia:
-    """Principal moments and axes of tensors (..., 3, 3) in the body frame [kg m^2].
-
-    Raises `ShapeError` for a tensor that is no body's: a moment is not positive, or exceeds the
-    sum of the two others.
-    """
+def principal_inertia(inertia: ArrayLike) -> tuple[Floats, Floats]:
+    """Principal moments (..., 3) in ascending order [kg m^2], and quaternions (..., 4) that turn
+    their axes to body coordinates, of tensors (..., 3, 3) in the body frame [kg m^2]."""
     moments, axes = np.linalg.eigh(np.asarray(inertia, dtype=float))
-    excess = moments[..., 2] - moments[..., 0] - moments[..., 1]
-    if not ((moments > 0).all() and (excess <= 1e-9 * moments[..., 2]).all()):
-        raise ShapeError(
-            "the inertia tensor is not that of a body with mass", where="inertia",
-            remedy="its eigenvalues must be positive, none more than the other two together",
-        )  # fmt: skip
-    axes = axes * np.sign(np.linalg.det(axes))[..., None, None]
-    return PrincipalInertia(moments, quaternion_of_matrix(axes))
+    return moments, quaternion_of_matrix(axes * np.sign(np.linalg.det(axes))[..., None, None])
 
 
 def world_inertia(inertia: Floats, quaternion: Floats) -> Floats:
@@ -72,9 +49,10 @@ def gyroscopic_acceleration(inertia: Floats, quaternion: Floats, spin: Floats) -
 
 
 def free_rotation(
-    inertia: PrincipalInertia, quaternion: Floats, spin: Floats, seconds: float
+    principal: tuple[Floats, Floats], quaternion: Floats, spin: Floats, seconds: float
 ) -> tuple[Floats, Floats]:
-    """Orientation (..., 4) and spin (..., 3) of free bodies after ``seconds`` [s], in one step.
+    """Orientation (..., 4) and spin (..., 3) of free bodies after ``seconds`` [s], in one step;
+    ``principal``: their `principal_inertia`.
 
     The kinetic energy ``sum L_i^2 / 2 I_i`` is split into that of a sphere with the middle moment
     and one rest for the first and for the third axis; each part turns the body about one axis,
@@ -83,8 +61,8 @@ def free_rotation(
     `turned_to_energy`.  So both are kept to round-off, the error is of second order, and spheres,
     cubes and all bodies with two equal moments move exactly.
     """
-    frame = unit_quaternion(quaternion_product(quaternion, inertia.axes))
-    moments = inertia.moments
+    moments, axes = principal
+    frame = unit_quaternion(quaternion_product(quaternion, axes))
     momentum = moments * rotate_back(frame, spin)
     twice_energy = (momentum**2 / moments).sum(axis=-1)
     world_momentum = rotate(frame, momentum)
@@ -99,7 +77,7 @@ def free_rotation(
     frame = quaternion_product(frame, quaternion_of_rotation(back))
     frame = turn_quaternion(frame, seconds / moments[..., 1:2] * world_momentum)
     spin = rotate(frame, rotate_back(frame, world_momentum) / moments)
-    body = quaternion_product(frame, inertia.axes * [1.0, -1.0, -1.0, -1.0])
+    body = quaternion_product(frame, axes * [1.0, -1.0, -1.0, -1.0])
     return unit_quaternion(body), spin
 
 

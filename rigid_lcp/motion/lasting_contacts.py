@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from rigid_lcp.collision import Collision, collide
 from rigid_lcp.contact import Contacts, choose_tangents, contact_rows
 from rigid_lcp.errors import NotConverged
-from rigid_lcp.friction.problem import BodySpace
 from rigid_lcp.motion.acceleration_forces import ACCEPTED
-from rigid_lcp.motion.equations import body_space, relative_velocity
+from rigid_lcp.motion.equations import body_space, find_response, relative_velocity
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World
 
@@ -76,7 +75,7 @@ def redetect_contacts(
     """The lasting contacts at a stage of the step, and the slip that directs their friction."""
     if len(lasting.contacts) == 0:
         return lasting.contacts, lasting.slip
-    found = world.contacts(motion, travel(world, motion, h) + 10 * TOUCH * world.length)
+    found = world.contacts(motion, h * world.speeds(motion.rates) + 10 * TOUCH * world.length)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     now, before = rows[there], np.flatnonzero(there)
     if not there.all():
@@ -107,14 +106,6 @@ def successors(
     same = (pairs[0][:, None] == pairs[1][None]).all(axis=2)
     takes = same.any(axis=1)
     return new[takes], lost[np.argmax(same[takes], axis=1)]
-
-
-def travel(world: World, motion: Motion, h: float) -> Floats:
-    """How far each body's points get in ``h`` [s] at their speeds now [m], (n,)."""
-    return h * (
-        np.linalg.norm(motion.velocity, axis=1)
-        + np.linalg.norm(motion.rates[:, motion.dim :], axis=1) * world.reach
-    )
 
 
 def carry_slip(lasting: Lasting, rows: Bools | Ints, contacts: Contacts) -> Floats:
@@ -169,8 +160,8 @@ def find_share_until_rest(
     """
     if not lasting.sliding.any():
         return 1.0
-    reach = travel(world, motion, h) + travel(world, after, h) + PRESSED_OVERLAP * world.length
-    found = world.contacts(after, reach)
+    way = h * world.speeds(motion.rates) + h * world.speeds(after.rates)
+    found = world.contacts(after, way + PRESSED_OVERLAP * world.length)
     rows, there = contact_rows(found.key, lasting.contacts.key)
     there &= lasting.sliding & (lasting.contacts.friction > 0)
     if not there.any():
@@ -207,7 +198,7 @@ def find_share_until_touch(
     """
     found = world.contacts(after, 0.0)
     found = found[(found.gap < -LASTING_OVERLAP * world.length) & ~np.isin(found.key, pressed)]
-    start = world.contacts(motion, travel(world, motion, h) + travel(world, after, h))
+    start = world.contacts(motion, h * world.speeds(motion.rates) + h * world.speeds(after.rates))
     rows, there = contact_rows(start.key, found.key)
     found, start = found[there], start[rows[there]]
     aim = AIM * TOUCH * world.length
@@ -265,19 +256,8 @@ def _constrained(
     matrix = bodies.matrix[kept][:, kept].toarray()
     push = np.zeros(value.size)
     push[kept] = np.linalg.lstsq(matrix, -value.ravel()[kept], rcond=1e-12)[0]
+    change = np.zeros_like(motion.rates)
+    change[world.movable] = find_response(bodies, push)
     if velocities:
-        return _pushed(world, motion, bodies, push)
-    move = np.zeros_like(motion.rates)
-    move[world.movable] = _response(bodies, push, world.size)
-    return displace_motion(motion, move)
-
-
-def _pushed(world: World, motion: Motion, bodies: BodySpace, impulse: Floats) -> Motion:
-    rates = motion.rates
-    rates[world.movable] += _response(bodies, impulse, world.size)
-    return replace_rates(motion, rates)
-
-
-def _response(bodies: BodySpace, impulse: Floats, size: int) -> Floats:
-    change = bodies.inverse_mass @ (bodies.jacobian.T @ impulse)
-    return np.asarray(change).reshape(-1, size)
+        return replace_rates(motion, motion.rates + change)
+    return displace_motion(motion, change)

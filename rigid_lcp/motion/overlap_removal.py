@@ -13,12 +13,11 @@ was an error of the step.  What that changes:
   it began with, `pay_lift` takes the lift from what restitution gave, or else from the kinetic
   energy of the bodies moved.
 
-Who pays: a disc that lands on a floor is by ``v h / 2`` too deep at the midpoint, comes out again
-by the end if it bounces, and does not if it hands its velocity on to a disc above it.  It is then
-lifted, at rest, and what the lift costs is in the disc above.  Both got their velocities from
-impulses with restitution; so much less of it acts among the bodies that push each other as makes
-the energy that of the start.  That changes impulses alone, so it keeps momentum, and lets no pair
-approach that would not without restitution.
+Who pays: a disc that lands on a floor is by ``v h / 2`` too deep at the midpoint, and does not come
+out again if it hands its velocity on to a disc above it.  It is then lifted, at rest, and what the
+lift costs is in the disc above.  Both got their velocities from impulses with restitution; so much
+less of it acts among the bodies that push each other as makes the energy that of the start.  That
+keeps momentum, and lets no pair approach that would not without restitution.
 """
 
 from __future__ import annotations
@@ -33,9 +32,10 @@ from scipy.sparse.csgraph import connected_components
 
 from rigid_lcp.contact import Contacts
 from rigid_lcp.friction.auto import solve_friction
-from rigid_lcp.motion.equations import body_space
+from rigid_lcp.motion.equations import body_space, find_response
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
 from rigid_lcp.motion.world import World
+from rigid_lcp.shapes import quaternion_of_rotation, rotate
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,24 +91,14 @@ def remove_overlap(world: World, motion: Motion, touching: Contacts | None = Non
             bodies, offset.ravel(), 0.0, dim=motion.dim, tolerance=PROJECTION_TOLERANCE
         )
         move = np.zeros_like(motion.rates)
-        change = bodies.inverse_mass @ (bodies.jacobian.T @ apart.r)
-        move[world.movable] = np.asarray(change).reshape(-1, world.size)
+        move[world.movable] = find_response(bodies, apart.r)
         turn = float(np.abs(move[:, motion.dim :]).max())
-        motion = shifted(motion, move * min(1.0, GREATEST_TURN / max(turn, 1e-300)))
+        move *= min(1.0, GREATEST_TURN / max(turn, 1e-300))
+        motion = displace_motion(motion, move)
+        if motion.dim == 3:  # spins turn along: so they, and kinetic energies, stay in the bodies
+            turned = rotate(quaternion_of_rotation(move[:, 3:]), motion.spin)
+            motion = replace(motion, spin=turned)
     return motion
-
-
-def shifted(motion: Motion, move: Floats) -> Motion:
-    """Bodies moved by ``move`` (n, 3) or (n, 6), in space with their spins turned along.
-
-    So spins are the same in the bodies' own frames, and kinetic energies stay.
-    """
-    after = displace_motion(motion, move)
-    if motion.dim == 2:
-        return after
-    from rigid_lcp.shapes import quaternion_of_rotation, rotate
-
-    return replace(after, spin=rotate(quaternion_of_rotation(move[:, 3:]), motion.spin))
 
 
 def part_bodies(

@@ -8,9 +8,8 @@ one.  Four things are added to the paper:
 * Halving alone takes some twenty halvings to come down to a gap of 5e-10 of a body, and as many
   doublings to get away from it.  So the step that is tried for the one taken back ends where the
   gap closes, by the cubic through gap and approach at its two ends; the half is tried where these
-  are not known (`find_share_until_touch`; ``Pace.locating`` turns it off).  A dozen grains that
-  bounce
-  in a box, 230 collisions: 5 steps each, by halving alone 72, and an eighth of the time.
+  are not known (`find_share_until_touch`).  A dozen grains that bounce in a box, 230 collisions: 5
+  steps each, by halving alone 72, and an eighth of the time.
 * Bounces that get shorter without end (Zeno) are cut off: an approach slower than 1e-4 of
   the free-fall speed over a body's size (``REST_SPEED``) is a collision without restitution.
   Collisions are those of `rigid_lcp.collision.collide`.
@@ -34,7 +33,7 @@ from rigid_lcp.contact import ContactForces, Contacts
 from rigid_lcp.errors import NoSolution, NotConverged, Overlapping, ProblemError, RigidError
 from rigid_lcp.motion.acceleration_forces import find_forces
 from rigid_lcp.motion.checks import Loads
-from rigid_lcp.motion.equations import body_space, find_contact_offset
+from rigid_lcp.motion.equations import body_space, find_contact_offset, find_response
 from rigid_lcp.motion.finite_states import is_finite, too_much
 from rigid_lcp.motion.lasting_contacts import (
     LASTING_OVERLAP,
@@ -50,6 +49,7 @@ from rigid_lcp.motion.lasting_contacts import (
 from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.time_stepping import contact_forces
 from rigid_lcp.motion.world import World
+from rigid_lcp.shapes import quaternion_rate
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -76,8 +76,6 @@ class Pace:
     """Longest step [s]."""
     step: float
     """Step that is tried next [s]."""
-    locating: bool = True
-    """Whether a step that is taken back is tried to where the gap closes; else its half is."""
     clean: int = 0
     """Steps since the last overlap."""
     accepted: int = 0
@@ -122,6 +120,7 @@ def advance_runge_kutta(
     `SceneError` where a state would not be finite.
     """
     end, forces = time + seconds, None
+    loads = loads or (lambda *_: None)
     fastest = _travel_limit(world, motion)
     if seconds > MOST_STEPS_OF_A_CALL * fastest:
         raise NotConverged(
@@ -147,10 +146,9 @@ def advance_runge_kutta(
                 pace.shortened += 1
                 continue
             except ProblemError as error:
-                pull = _pull(loads, time, motion)
-                raise too_much(world, motion, pull, h, time, error) from error
+                raise too_much(world, motion, loads(time, motion), h, time, error) from error
             if not is_finite(world, after):  # speeds so great leave no step that is long enough
-                raise too_much(world, motion, _pull(loads, time, motion), h, time)
+                raise too_much(world, motion, loads(time, motion), h, time)
             first, last = rates[0], rates[-1]
             pressed, stuck = lasting_keys(first, last)
             overlap = overlap_beyond(world, after, pressed)
@@ -158,7 +156,7 @@ def advance_runge_kutta(
             far = _travel_limit(world, after)
             if overlap > LASTING_OVERLAP * world.length:
                 share = None
-                if pace.locating and located < LOCATED:
+                if located < LOCATED:
                     share = find_share_until_touch(world, motion, after, h, pressed)
                 if share is None or located == 0:
                     pace.step, pace.clean = h / 2, 0
@@ -189,14 +187,14 @@ def advance_runge_kutta(
 
 
 def step_runge_kutta(
-    world: World, motion: Motion, time: float, h: float, lasting: Lasting, loads: Loads | None,
+    world: World, motion: Motion, time: float, h: float, lasting: Lasting, loads: Loads,
     tolerance: float,
 ) -> tuple[list[Rate], Motion]:  # fmt: skip
     """One classical fourth-order step: the rates of its four stages, and its end."""
 
     def rate_at(part: float, previous: Rate | None) -> Rate:
         stage = motion if previous is None else moved(motion, part * h, [(1.0, previous)])
-        pull = _pull(loads, time + part * h, stage)
+        pull = loads(time + part * h, stage)
         return find_state_rate(world, stage, h, lasting, pull, tolerance)
 
     first = rate_at(0.0, None)
@@ -222,12 +220,7 @@ def find_state_rate(
     tolerance: float,
 ) -> Rate:  # fmt: skip
     """Velocities and accelerations of a state, its lasting contacts taken as closed (eq. 26)."""
-    if motion.dim == 3:
-        from rigid_lcp.shapes import quaternion_rate
-
-        turning = quaternion_rate(motion.angle, motion.spin)
-    else:
-        turning = motion.spin
+    turning = motion.spin if motion.dim == 2 else quaternion_rate(motion.angle, motion.spin)
     free = world.accelerations(motion, loads)
     contacts, slip = redetect_contacts(world, motion, h, lasting)
     if len(contacts) == 0:
@@ -237,17 +230,12 @@ def find_state_rate(
     offset = find_contact_offset(contacts, motion, replace_rates(motion, free))
     gravity = float(np.linalg.norm(world.scene.gravity))
     solution, error = find_forces(bodies, offset, contacts.friction, slip, tolerance, gravity)
-    change = bodies.inverse_mass @ (bodies.jacobian.T @ solution.r)
-    free[world.movable] += np.asarray(change).reshape(-1, world.size)
+    free[world.movable] += find_response(bodies, solution.r)
     shape = (-1, motion.dim)
     return Rate(
         motion.velocity, turning, free, contacts, solution.r.reshape(shape),
         solution.u.reshape(shape), error,
     )  # fmt: skip
-
-
-def _pull(loads: Loads | None, time: float, motion: Motion) -> ArrayLike | None:
-    return None if loads is None else loads(time, motion)
 
 
 def _no_step(world: World, motion: Motion, overlap: float, time: float) -> RigidError:
@@ -258,7 +246,7 @@ def _no_step(world: World, motion: Motion, overlap: float, time: float) -> Rigid
             f"bodies overlap by {overlap:.2g} m after the shortest step", where=where,
             remedy=f"{remedy}, which removes overlaps",
         )  # fmt: skip
-    speed = _speeds(world, motion)
+    speed = world.speeds(motion.rates)
     body = int(np.argmax(speed))
     return NotConverged(
         f"the shortest step is too long for it; its points go at {speed[body]:.3g} m/s",
@@ -267,14 +255,8 @@ def _no_step(world: World, motion: Motion, overlap: float, time: float) -> Rigid
     )
 
 
-def _speeds(world: World, motion: Motion) -> Floats:
-    """Bound of the velocity of each body's points [m/s], (n,)."""
-    turning = np.linalg.norm(motion.rates[:, motion.dim :], axis=1) * world.reach
-    return np.asarray(np.linalg.norm(motion.velocity, axis=1) + turning)
-
-
 def _travel_limit(world: World, motion: Motion) -> float:
-    fastest = float(_speeds(world, motion).max())
+    fastest = float(world.speeds(motion.rates).max())
     return TRAVEL * world.length / fastest if fastest > 0 else np.inf
 
 

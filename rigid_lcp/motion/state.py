@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rigid_lcp.shapes import turn_quaternion
+
 Floats = NDArray[np.float64]
 
 
@@ -48,10 +50,5 @@ def replace_rates(motion: Motion, rates: Floats) -> Motion:
 def displace_motion(motion: Motion, move: Floats) -> Motion:
     """Bodies moved by ``move`` (n, 3) [m, rad] or (n, 6) [m, rotation vector]; same velocities."""
     dim = motion.dim
-    if dim == 2:
-        angle = motion.angle + move[:, 2]
-    else:
-        from rigid_lcp.shapes import turn_quaternion
-
-        angle = turn_quaternion(motion.angle, move[:, 3:])
-    return Motion(motion.position + move[:, :dim], angle, motion.velocity, motion.spin)
+    turned = motion.angle + move[:, 2] if dim == 2 else turn_quaternion(motion.angle, move[:, 3:])
+    return Motion(motion.position + move[:, :dim], turned, motion.velocity, motion.spin)

@@ -31,17 +31,10 @@ FASTER = 1e-6
 """Part by which a speed has to be greater than one that was taken into account [-]."""
 
 
-def speeds(world: World, rates: Floats) -> Floats:
-    """Greatest speed of any point of each body [m/s], (n,); ``rates`` (n, 3) or (n, 6)."""
-    dim = world.scene.dim
-    turning = np.linalg.norm(rates[:, dim:], axis=1) * world.reach
-    return np.asarray(np.linalg.norm(rates[:, :dim], axis=1) + turning)
-
-
 def moreau_margin(world: World, motion: Motion, accelerations: Floats, h: float) -> Floats:
     """How far each body's points can get within a step that nothing strikes them in [m], (n,)."""
     rates = np.abs(motion.rates) + h * np.abs(accelerations)
-    return h * speeds(world, rates) + OVERLAP_ALLOWED * world.length
+    return h * world.speeds(rates) + OVERLAP_ALLOWED * world.length
 
 
 def find_missed_collisions(
@@ -71,7 +64,7 @@ def find_contacts_of_struck(
 ) -> tuple[Contacts, Floats]:
     """Contacts at the midpoint of a step, and their margins (n,) [m], with those that ``struck``
     bodies (n,) may get to by their velocities at its ``end``, and so on to what they strike."""
-    reaching = np.where(struck, np.maximum(margin, h * speeds(world, end.rates)), margin)
+    reaching = np.where(struck, np.maximum(margin, h * world.speeds(end.rates)), margin)
     while True:
         contacts = world.contacts(middle, reaching)
         further = _pass_on(world, contacts, reaching, struck)
@@ -95,6 +88,5 @@ def _pass_on(world: World, contacts: Contacts, margin: Floats, struck: Bools) ->
 
 def _pairs(world: World, contacts: Contacts) -> Ints:
     """One number for the two bodies of each contact, (nc,)."""
-    low = np.minimum(contacts.body_a, contacts.body_b).astype(np.int64)
-    high = np.maximum(contacts.body_a, contacts.body_b).astype(np.int64)
-    return low * len(world.mass) + high
+    a, b = contacts.body_a, contacts.body_b
+    return np.minimum(a, b) * len(world.mass) + np.maximum(a, b)

@@ -10,18 +10,13 @@ with the normal part shifted by the contact's own law: Newton's restitution ``u_
 two bodies are about to collide, else ``u_N+ + 2 g / h`` for a contact that is open at the midpoint,
 by ``g = g_m - h^2/8 J' v``: it may close within the step, not more (Moreau, Eur. J. Mech. 13 (1994)
 93; Jean, CMAME 177 (1999) 235).  Without friction no step adds energy: the mean of ``J v`` and
-``J v+`` is never positive where p_N is not zero (to the second order in h where J turns), and what
-spins freely keeps its energy (`gyroscopic.free_rotation`); with restitution 1 a bounce keeps
-it to round-off, of bodies that turn as well, and so do chains of collisions within the step
-(`rigid_lcp.collision.passing`, `rigid_lcp.motion.struck_bodies`) unless they run out of rounds,
-which is reported.  An approach no faster than what gravity gives in a step, ``g h``, does not
-bounce.  With friction a body that comes to rest within a step may gain up to ``m (h |f/m|)^2 / 8``,
-and restitution is scaled down where it would make more, or where wedged bodies have no impulses
-that let them bounce (`rigid_lcp.collision.restitution_scale`).
-
-What curvature, rotation and impacts leave of overlap is taken out by moving the bodies apart
-(`rigid_lcp.motion.overlap_removal`).  That keeps momentum; the angular momentum of bodies that
-slide upon each other it changes, by a part of first order in h.
+``J v+`` is never positive where p_N is not zero (to the second order in h where J turns).  With
+restitution 1 a bounce keeps it to round-off, and so do chains of collisions within the step
+(`rigid_lcp.collision.passing`, `rigid_lcp.motion.struck_bodies`).  An approach no faster than what
+gravity gives in a step, ``g h``, does not bounce.  With friction a body that comes to rest within a
+step may gain up to ``m (h |f/m|)^2 / 8``, and restitution is scaled down where it would make more
+(`rigid_lcp.collision.restitution_scale`).  Overlaps that are left are taken out by moving the
+bodies apart (`rigid_lcp.motion.overlap_removal`).
 
 Use it where forces do not exist (Painleve) or where events are too many to be met one by one; it
 is of first order in h where contacts open and close, of second order in between.
@@ -51,7 +46,12 @@ from rigid_lcp.contact import ContactForces, Contacts, contact_frames, contact_r
 from rigid_lcp.errors import NotConverged
 from rigid_lcp.friction.auto import solve_friction
 from rigid_lcp.friction.problem import SHARE_LEFT, BodySpace, FrictionSolution
-from rigid_lcp.motion.equations import body_space, inertial_acceleration, relative_velocity
+from rigid_lcp.motion.equations import (
+    body_space,
+    find_response,
+    inertial_acceleration,
+    relative_velocity,
+)
 from rigid_lcp.motion.overlap_removal import OVERLAP_ALLOWED, Restitution, part_bodies
 from rigid_lcp.motion.state import Motion, replace_rates
 from rigid_lcp.motion.struck_bodies import (
@@ -173,7 +173,7 @@ def detect_step_contacts(
             partial(_take_out_restitution, world, bodies, closing, found, solve),
         )  # fmt: skip
     rates = free.rates
-    rates[world.movable] += _velocities(bodies, found.impulse, world.size)
+    rates[world.movable] += find_response(bodies, found.impulse)
     after = replace_rates(middle, rates)
     return Made(found, after, bool((share.now < 1.0).any()), restitution)
 
@@ -185,7 +185,7 @@ def _take_out_restitution(
     inelastic = replace(closing, restitution=np.zeros_like(closing.restitution))
     calm = find_impulses_at_once(bodies, inelastic, solve, None)
     change = np.zeros((len(world.mass), world.size))
-    change[world.movable] = _velocities(bodies, calm.impulse - found.impulse, world.size)
+    change[world.movable] = find_response(bodies, calm.impulse - found.impulse)
     return change
 
 
@@ -255,23 +255,15 @@ def find_planes_at_corners(contacts: Contacts) -> Contacts:
     return replace(contacts, radius_b=flat, edge_b=np.where(corners[:, None], 0.0, contacts.edge_b))
 
 
-def find_impulses(
-    bodies: BodySpace, offset: Floats, friction: Floats, start: Floats | None, tolerance: float,
-    accept: float = 0.0,
-) -> FrictionSolution:  # fmt: skip
-    """Impulses (or forces, displacements) of contacts with ``offset`` q (nc, dim)."""
-    return solve_friction(
-        bodies, offset.ravel(), friction, dim=offset.shape[1], start=start, tolerance=tolerance,
-        accept=accept,
-    )  # fmt: skip
-
-
 def judge_impulses(
     bodies: BodySpace, offset: Floats, friction: Floats, start: Floats | None = None, *,
     slow: float, tolerance: float, accept: float,
 ) -> tuple[FrictionSolution, float]:  # fmt: skip
     """Impulses and their `forces_error`, ``slow`` the velocity that gravity gives in a step."""
-    found = find_impulses(bodies, offset, friction, start, tolerance, accept)
+    found = solve_friction(
+        bodies, offset.ravel(), friction, dim=offset.shape[1], start=start, tolerance=tolerance,
+        accept=accept,
+    )  # fmt: skip
     return found, forces_error(bodies, found, slow, offset)
 
 
@@ -326,8 +318,9 @@ def contact_forces(
         tangential = np.einsum("ci,cij->cj", tangential, frames[:, 1:])
     else:
         tangential = tangential[:, 0]
-    given = {name: getattr(contacts, name) for name in Contacts.__dataclass_fields__}
-    return ContactForces(**given, normal_force=normal, tangential_force=tangential, status=status)
+    return ContactForces(
+        **vars(contacts), normal_force=normal, tangential_force=tangential, status=status
+    )
 
 
 def _refuse_fast_spin(world: World, motion: Motion, h: float) -> None:
@@ -338,9 +331,3 @@ def _refuse_fast_spin(world: World, motion: Motion, h: float) -> None:
             f"it turns by {h * spin[worst]:.3g} rad within a step", where=world.scene.called(worst),
             remedy=f"take a step shorter than {GREATEST_TURN / spin[worst]:.3g} s",
         )  # fmt: skip
-
-
-def _velocities(bodies: BodySpace, impulse: Floats, size: int) -> Floats:
-    """``M^-1 J^T p`` of the movable bodies, (nb, size)."""
-    change = bodies.inverse_mass @ (bodies.jacobian.T @ impulse.ravel())
-    return np.asarray(change).reshape(-1, size)

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
-from rigid_lcp.contact import Contacts, detect_2d, shapes_2d
+from rigid_lcp.contact import Contacts, detect_2d, detect_3d, shapes_2d, shapes_3d
 from rigid_lcp.errors import SceneError
 from rigid_lcp.friction.problem import MOST_FRICTION
 from rigid_lcp.motion.checks import (
@@ -21,11 +21,14 @@ from rigid_lcp.motion.checks import (
     require_density,
     require_number_in,
 )
+from rigid_lcp.motion.gyroscopic import (
+    free_rotation,
+    gyroscopic_acceleration,
+    principal_inertia,
+    world_inertia,
+)
 from rigid_lcp.motion.state import Motion, displace_motion
 from rigid_lcp.shapes import HalfSpace, require_vector
-
-if TYPE_CHECKING:
-    from rigid_lcp.motion.gyroscopic import PrincipalInertia
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -63,11 +66,8 @@ class Scene:
         self.dim = int(dim)
         default = np.zeros(dim)
         default[-1] = -9.81
-        self.gravity = (
-            default
-            if gravity is None
-            else require_vector(gravity, dim, "gravity", "scene", MOST_OF_A_STATE)
-        )
+        given = default if gravity is None else gravity
+        self.gravity = require_vector(given, dim, "gravity", "scene", MOST_OF_A_STATE)
         self.bodies: list[Body] = []
 
     def called(self, body: int) -> str:
@@ -111,23 +111,19 @@ class Scene:
                 restitution, 0.0, 1.0, "restitution", where, "give 0 to 1"
             )
 
-        def state(values: ArrayLike | None, default: ArrayLike, size: int, what: str) -> Floats:
+        def state(values: ArrayLike | None, default: Floats | list[float], what: str) -> Floats:
             given = default if values is None else values
-            return require_vector(given, size, what, where, MOST_OF_A_STATE)
+            return require_vector(given, len(default), what, where, MOST_OF_A_STATE)
 
         origin = getattr(shape, "centroid", np.zeros(self.dim))
-        turn = 3 if self.dim == 3 else 1
-        upright = [1.0, 0.0, 0.0, 0.0] if self.dim == 3 else [0.0]
-        angle = state(angle, upright, len(upright), "angle")
-        length = float(np.linalg.norm(angle))
-        if self.dim == 3 and length == 0:
+        turn, upright = (3, [1.0, 0.0, 0.0, 0.0]) if self.dim == 3 else (1, [0.0])
+        angle = state(angle, upright, "angle")
+        length = float(np.linalg.norm(angle)) if self.dim == 3 else 1.0
+        if length == 0:
             raise SceneError("the quaternion is zero", where=where, remedy="give (1, 0, 0, 0)")
         self.bodies.append(Body(
-            shape, mass, inertia,
-            state(position, origin, self.dim, "position"),
-            angle / length if self.dim == 3 else angle,
-            state(velocity, np.zeros(self.dim), self.dim, "velocity"),
-            state(spin, np.zeros(turn), turn, "spin"),
+            shape, mass, inertia, state(position, origin, "position"), angle / length,
+            state(velocity, np.zeros(self.dim), "velocity"), state(spin, np.zeros(turn), "spin"),
             friction, restitution, name,
         ))  # fmt: skip
         return len(self.bodies) - 1
@@ -148,8 +144,8 @@ class World:
     """Greatest distance of a body's points from its centre of mass [m], (n,); 0 if infinite."""
     length: float
     """Size of the smallest movable body [m]: the unit of all tolerances."""
-    detect: Callable[[Motion, Any], Contacts]
-    """Contacts of a state within a margin [m], one number or (n,)."""
+    detect: Callable[[Floats, Floats, Any], Contacts]
+    """Contacts of places and angles within a margin [m], one number or (n,)."""
 
     @property
     def movable(self) -> NDArray[np.bool_]:
@@ -162,12 +158,25 @@ class World:
         return 3 if self.scene.dim == 2 else 6
 
     @cached_property
+    def least_inertia(self) -> Floats:
+        """A moment of inertia of each body, in 3D the least on its tensor's diagonal, (n,)."""
+        if self.scene.dim == 2:
+            return self.inertia
+        return np.asarray(np.diagonal(self.inertia, axis1=1, axis2=2).min(axis=1))
+
+    @cached_property
     def heaviest(self) -> float:
         """Greatest mass [kg] or, in numbers, moment of inertia [kg m^2] of the movable bodies."""
         inertia = self.inertia[self.movable]
         if self.scene.dim == 3:
             inertia = np.trace(inertia, axis1=1, axis2=2)
         return float(max(self.mass[self.movable].max(), inertia.max()))
+
+    def speeds(self, rates: Floats) -> Floats:
+        """Bound of the speed of any point of each body [m/s], (n,); ``rates`` (n, size)."""
+        dim = self.scene.dim
+        turning = np.linalg.norm(rates[:, dim:], axis=1) * self.reach
+        return np.asarray(np.linalg.norm(rates[:, :dim], axis=1) + turning)
 
     def inverse_mass(self, motion: Motion) -> sp.csr_array:
         """M^-1 of the movable bodies (eq. 12), in the world frame."""
@@ -178,22 +187,18 @@ class World:
             return sp.diags_array(1.0 / diagonal.ravel(), format="csr")
         blocks = np.zeros((moving.sum(), 6, 6))
         blocks[:, range(3), range(3)] = 1.0 / self.mass[moving][:, None]
-        blocks[:, 3:, 3:] = np.linalg.inv(self._inertia_placed(motion)[moving])
+        blocks[:, 3:, 3:] = np.linalg.inv(world_inertia(self.inertia, motion.angle)[moving])
         return sp.csr_array(sp.block_diag(blocks, format="csr"))
 
     @cached_property
-    def principal(self) -> PrincipalInertia:
+    def principal(self) -> tuple[Floats, Floats]:
         """Principal moments and axes of inertia of all bodies; 3D only."""
-        from rigid_lcp.motion.gyroscopic import principal_inertia
-
         return principal_inertia(self.inertia)
 
     def drifted(self, motion: Motion, seconds: float) -> Motion:
         """The state after ``seconds`` [s] without any force; in 3D spins change as bodies turn."""
         if self.scene.dim == 2:
             return displace_motion(motion, seconds * motion.rates)
-        from rigid_lcp.motion.gyroscopic import free_rotation
-
         angle, spin = free_rotation(self.principal, motion.angle, motion.spin, seconds)
         return Motion(motion.position + seconds * motion.velocity, angle, motion.velocity, spin)
 
@@ -202,8 +207,6 @@ class World:
         same [rad/s^2]."""
         result = np.zeros((len(self.mass), self.size))
         if self.scene.dim == 3:
-            from rigid_lcp.motion.gyroscopic import gyroscopic_acceleration
-
             result[:, 3:] = gyroscopic_acceleration(self.inertia, motion.angle, motion.spin)
         return result
 
@@ -223,7 +226,7 @@ class World:
             if loads is not None:
                 result[moving, 2] += force[moving, 2] / self.inertia[moving]
             return result
-        inertia, spin = self._inertia_placed(motion)[moving], motion.spin[moving]
+        inertia, spin = world_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
         torque = np.zeros_like(spin)
         if gyroscopic:
             torque -= np.cross(spin, np.einsum("nij,nj->ni", inertia, spin))
@@ -234,7 +237,7 @@ class World:
 
     def contacts(self, motion: Motion, margin: Any) -> Contacts:
         """Contacts of a state with friction and restitution of their surfaces."""
-        found = self.detect(motion, margin)
+        found = self.detect(motion.position, motion.angle, margin)
         surface = {  # the smaller; a body without a value leaves it to the other
             name: np.nan_to_num(np.fmin(value[found.body_a], value[found.body_b]))
             for name, value in self.surfaces.items()
@@ -243,14 +246,11 @@ class World:
 
     @cached_property
     def surfaces(self) -> dict[str, Floats]:
-        """Friction and restitution of every body and of nothing, NaN where unknown, (n + 1,)."""
+        """Friction and restitution of every body, NaN where unknown, (n,)."""
         return {
-            name: np.array(
-                [np.nan if (v := getattr(body, name, None)) is None else v
-                 for body in [*self.scene.bodies, None]], dtype=float,
-            )
+            name: np.array([getattr(body, name) for body in self.scene.bodies], dtype=float)
             for name in ("friction", "restitution")
-        }  # fmt: skip
+        }
 
     def energy(self, motion: Motion) -> float:
         """Kinetic and potential energy of the movable bodies [J]."""
@@ -261,21 +261,9 @@ class World:
         if self.scene.dim == 2:
             angular = 0.5 * float((self.inertia[moving] * motion.spin[moving] ** 2).sum())
         else:
-            inertia, spin = self._inertia_placed(motion)[moving], motion.spin[moving]
+            inertia, spin = world_inertia(self.inertia, motion.angle)[moving], motion.spin[moving]
             angular = 0.5 * float(np.einsum("ni,nij,nj->", spin, inertia, spin))
         return linear + angular - height
-
-    def _inertia_placed(self, motion: Motion) -> Floats:
-        from rigid_lcp.shapes import rotation_matrix
-
-        frame = rotation_matrix(motion.angle)
-        return np.einsum("nij,njk,nlk->nil", frame, self.inertia, frame)
-
-
-def _detected(
-    detect: Callable[..., Contacts], shapes: Any, motion: Motion, margin: Any
-) -> Contacts:
-    return detect(shapes, motion.position, motion.angle, margin)
 
 
 def make_world(scene: Scene) -> tuple[World, Motion]:
@@ -293,17 +281,11 @@ def make_world(scene: Scene) -> tuple[World, Motion]:
     reach = np.array([shape.reach if isfinite(shape.reach) else 0.0 for shape in shapes])
     mass = np.array([body.mass for body in bodies])
     if scene.dim == 2:
-        arrays = shapes_2d(shapes, movable, scene.called)
+        detect = partial(detect_2d, shapes_2d(shapes, movable, scene.called))
         inertia = np.array([body.inertia for body in bodies])
-
-        detect = partial(_detected, detect_2d, arrays)
     else:
-        from rigid_lcp.contact import detect_3d, shapes_3d
-
-        solids = shapes_3d(shapes, movable, scene.called)
+        detect = partial(detect_3d, shapes_3d(shapes, movable, scene.called))
         inertia = np.array([body.inertia if body.movable else np.eye(3) for body in bodies])
-        detect = partial(_detected, detect_3d, solids)
-
     angle = np.array([body.angle for body in bodies])
     spin = np.array([body.spin for body in bodies])
     start = Motion(

@@ -7,16 +7,11 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rigid_lcp.motion import Scene
 from rigid_lcp.report import pictures
 from rigid_lcp.scene import RunFolder, history_of, read_frame, rebuild_frame_scene, write_history
 from trackbed.report import bullets, encode_figure, page, paragraph, picture, section, table
 from trackbed.run_files import write_whole
-
-Floats = NDArray[np.float64]
 
 ROWS = (
     ("bodies that move", "bodies", "{:,}"),
@@ -48,9 +43,12 @@ def write_report(
     write_history(folder.path / "history.csv", history)
     figures = []
     if draw:
-        draw_frames(folder, scene, summary["title"])
+        title = summary["title"]
+        draw_movie(folder, scene, title)
+        last = read_frame(folder.frames()[-1])
+        (end,) = draw_frames(folder, rebuild_frame_scene(last, scene), title, {"end": last})
         figures = [
-            (draw_end(folder, scene, summary["title"]),
+            (end,
              "Force chains at the end: lines from the bodies' centres to their contacts, as wide "
              "as the normal force; blue contacts stick, red ones slide."),
             (write_picture(folder, "history", pictures.picture_history(history)),
@@ -85,41 +83,31 @@ def write_report(
     return path
 
 
-def draw_frames(folder: RunFolder, scene: Scene, title: str) -> list[Path]:
-    """Draw every frame as ``picture-NUMBER.png`` with one window and one scale, and all as
-    ``movie.gif``; the paths of the pictures.  Raises `UsageError` when one can not be written."""
-    frames = [read_frame(path) for path in folder.frames()]
-    positions = [frame["motion"].position[: len(scene.bodies)] for frame in frames]
-    window = pictures.window_of(scene, positions)
-    scale = pictures.force_scale([frame["contacts"].normal_force for frame in frames])
-    drawn = [
-        write_picture(
-            folder, f"{number:06d}", draw_frame_figure(frame, scene, window, scale, title)
-        )
-        for number, frame in enumerate(frames)
-    ]
+def draw_movie(folder: RunFolder, scene: Scene, title: str) -> list[Path]:
+    """Draw every frame as ``picture-NUMBER.png``, and all as ``movie.gif``; the pictures' paths."""
+    frames = {f"{n:06d}": read_frame(path) for n, path in enumerate(folder.frames())}
+    drawn = draw_frames(folder, scene, title, frames)
     movie = pictures.encode_movie([path.read_bytes() for path in drawn])
     write_whole(folder.path / "movie.gif", movie)
     return drawn
 
 
-def draw_end(folder: RunFolder, scene: Scene, title: str) -> Path:
-    """Draw the last frame in a window and with a scale of its own; the picture's path."""
-    frame = read_frame(folder.frames()[-1])
-    bodies = rebuild_frame_scene(frame, scene)
-    window = pictures.window_of(bodies, [frame["motion"].position])
-    scale = pictures.force_scale([frame["contacts"].normal_force])
-    return write_picture(folder, "end", draw_frame_figure(frame, scene, window, scale, title))
-
-
-def draw_frame_figure(
-    frame: dict[str, Any], scene: Scene, window: tuple[Floats, Floats], scale: float, title: str
-) -> Any:
-    """Bodies and force chains of a frame, its time above them."""
-    head = f"{title}   t = {frame['time']:.3f} s"
-    return pictures.draw_state(
-        rebuild_frame_scene(frame, scene), frame["motion"], frame["contacts"], window, scale, head
-    )
+def draw_frames(
+    folder: RunFolder, scene: Scene, title: str, frames: dict[str, dict[str, Any]]
+) -> list[Path]:
+    """Draw frames as ``picture-NAME.png`` with one window, in which the bodies of ``scene`` are,
+    and one scale; their paths.  Raises `UsageError` when one can not be written."""
+    places = [frame["motion"].position[: len(scene.bodies)] for frame in frames.values()]
+    window = pictures.window_of(scene, places)
+    scale = pictures.force_scale([frame["contacts"].normal_force for frame in frames.values()])
+    drawn = []
+    for name, frame in frames.items():
+        bodies, head = rebuild_frame_scene(frame, scene), f"{title}   t = {frame['time']:.3f} s"
+        figure = pictures.draw_state(
+            bodies, frame["motion"], frame["contacts"], window, scale, head
+        )
+        drawn.append(write_picture(folder, name, figure))
+    return drawn
 
 
 def write_picture(folder: RunFolder, name: str, figure: Any) -> Path:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.motion import Motion, Scene
-from rigid_lcp.shapes import Disc, HalfSpace, Polygon
+from rigid_lcp.shapes import HalfSpace, rotation_matrix
 
 Floats = NDArray[np.float64]
 
@@ -19,16 +19,6 @@ STONE, EDGE, FIXED = "#e9e4da", "#8a8174", "#c9ced6"
 STICK, SLIDE = "#0b5fa5", "#d1495b"
 FORCE_LINE_WIDTH = 7.0
 """Line width of the largest normal force [points]."""
-
-
-def place_outline(shape: Any, position: Floats, angle: Any) -> Floats:
-    """Outline of a plane shape where it is [m], (k, 2); of a disc 48 points."""
-    if isinstance(shape, Disc):
-        turn = np.linspace(0, 2 * np.pi, 48, endpoint=False) + float(angle)
-        own = shape.radius * np.column_stack([np.cos(turn), np.sin(turn)])
-        return np.asarray(position + own)
-    c, s = np.cos(float(angle)), np.sin(float(angle))
-    return np.asarray(position + shape.vertices @ np.array([[c, s], [-s, c]]))
 
 
 def window_of(scene: Scene, positions: list[Floats]) -> tuple[Floats, Floats]:
@@ -59,7 +49,7 @@ def draw_chains(
     for c in np.flatnonzero(shown):
         point = contacts.point[c, plane]
         for body in (contacts.body_a[c], contacts.body_b[c]):
-            if body >= 0 and not isinstance(scene.bodies[body].shape, HalfSpace):
+            if not isinstance(scene.bodies[body].shape, HalfSpace):
                 lines.append([place[body], point])
                 widths.append(FORCE_LINE_WIDTH * min(contacts.normal_force[c] / scale, 1.0))
                 colours.append(SLIDE if contacts.status[c] == "slide" else STICK)
@@ -86,41 +76,27 @@ def draw_chain_legend(axes: Any, scale: float, unit: str) -> None:
     )  # fmt: skip
 
 
-def draw_bodies_2d(axes: Any, scene: Scene, motion: Motion) -> None:
-    """All bodies of a plane scene where they are; half-spaces as their faces."""
-    from matplotlib.patches import Polygon as Patch
-
-    for body, position, angle in zip(scene.bodies, motion.position, motion.angle, strict=True):
-        if isinstance(body.shape, HalfSpace):
-            face = body.shape.normal * body.shape.offset
-            along = np.array([-body.shape.normal[1], body.shape.normal[0]])
-            axes.axline(tuple(face), tuple(face + along), color=EDGE, linewidth=1.5)
-        elif isinstance(body.shape, Polygon | Disc):
-            outline = place_outline(body.shape, position, angle)
-            colour = STONE if body.movable else FIXED
-            axes.add_patch(Patch(outline, closed=True, fc=colour, ec=EDGE, linewidth=0.7))
-
-
-def draw_bodies_3d(axes: Any, scene: Scene, motion: Motion) -> None:
-    """Bodies of a scene in space from the side (x and z), the nearest drawn last."""
+def draw_bodies(axes: Any, scene: Scene, motion: Motion, plane: tuple[int, int]) -> None:
+    """All bodies where they are, in space from the side, the nearest drawn last; half-spaces of the
+    plane as their faces."""
     from matplotlib.patches import Circle
     from matplotlib.patches import Polygon as Patch
     from scipy.spatial import ConvexHull
 
-    from rigid_lcp.shapes import rotation_matrix
-
-    frames = rotation_matrix(motion.angle)
-    for n in np.argsort(-motion.position[:, 1]):
+    order = range(len(scene.bodies)) if scene.dim == 2 else np.argsort(-motion.position[:, 1])
+    for n in order:
         shape, position = scene.bodies[n].shape, motion.position[n]
+        look: Any = {"fc": STONE if scene.bodies[n].movable else FIXED, "ec": EDGE, "lw": 0.7}
         if isinstance(shape, HalfSpace):
-            continue
-        points = getattr(shape, "vertices", None)
-        if points is None:
-            axes.add_patch(Circle(tuple(position[[0, 2]]), shape.reach, fc=STONE, ec=EDGE, lw=0.7))
-            continue
-        seen = (position + points @ frames[n].T)[:, [0, 2]]
-        outline = seen[ConvexHull(seen).vertices]
-        axes.add_patch(Patch(outline, closed=True, fc=STONE, ec=EDGE, linewidth=0.7))
+            if scene.dim == 2:
+                face, (x, y) = shape.normal * shape.offset, shape.normal
+                axes.axline(tuple(face), (face[0] - y, face[1] + x), color=EDGE, linewidth=1.5)
+        elif not hasattr(shape, "vertices"):
+            axes.add_patch(Circle(tuple(position[list(plane)]), shape.reach, **look))
+        else:
+            placed = position + shape.vertices @ rotation_matrix(np.atleast_1d(motion.angle[n])).T
+            seen = placed[:, plane]
+            axes.add_patch(Patch(seen[ConvexHull(seen).vertices], closed=True, **look))
 
 
 def draw_state(
@@ -128,7 +104,6 @@ def draw_state(
     scale: float, title: str,
 ) -> Any:  # fmt: skip
     """A matplotlib figure of one state with its force chains; the caller saves it."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     plane = (0, 1) if scene.dim == 2 else (0, 2)
@@ -138,9 +113,8 @@ def draw_state(
     width = 7.0
     height = float(np.clip(width * (high - low)[1] / (high - low)[0], 2.5, 9.0))
     figure = Figure(figsize=(width, height + 0.4), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    (draw_bodies_2d if scene.dim == 2 else draw_bodies_3d)(axes, scene, motion)
+    draw_bodies(axes, scene, motion, plane)
     draw_chains(axes, scene, motion, contacts, scale, plane)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axes.set_title(title, fontsize=10, loc="left")
@@ -160,11 +134,9 @@ def force_scale(forces: list[Floats]) -> float:
 
 def picture_history(history: dict[str, Floats]) -> Any:
     """A figure of energy, greatest overlap and number of contacts against time."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7, 4.6), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
     rows = figure.subplots(3, 1, sharex=True)
     labels = {"energy": "energy [J]", "contacts": "contacts that carry", "overlap": "overlap [m]"}
     for axes, (name, label) in zip(rows, labels.items(), strict=True):

@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 
 from rigid_lcp.errors import ShapeError
 from rigid_lcp.motion import Loads, Motion, Scene
-from rigid_lcp.scene.types import BodyTable, Load, SceneTables, find_faults
+from rigid_lcp.scene.types import BodyTable, Grains, Load, SceneTables, find_faults
 from trackbed.scene_files import Guide, read_scene
 
+Floats = NDArray[np.float64]
 GUIDE = Guide("pile", "run.duration=0.1")
+GRID_SPACING = 1.05
+"""Distance of the grid points of grains over their largest diameter."""
 
 
 @dataclass(frozen=True)
@@ -44,46 +47,61 @@ def scene_read(path: Path | str, overrides: Sequence[str] = ()) -> SceneFile:
     return SceneFile(text.path, text.text, tables, tuple(overrides))
 
 
-# --- to a scene ---------------------------------------------------------------------------------
-
-
 def scene_build(file: SceneFile) -> Scene:
     """Bodies of the file: ground first, then named bodies, then grains.
 
     Raises `ShapeError` and `SceneError` with the name of the body.
     """
-    from rigid_lcp.scene.pouring import place_grains
     from rigid_lcp.shapes import HalfSpace
 
     tables = file.tables
     scene = Scene(tables.dimensions, tables.gravity)
 
     def own(table: Any) -> dict[str, Any]:
-        return {
-            name: value
-            if (value := getattr(table, name)) is not None
-            else getattr(tables.surface, name)
-            for name in ("friction", "restitution")
-        }
+        given = table.model_dump(include={"friction", "restitution"}, exclude_none=True)
+        return tables.surface.model_dump() | given
 
     for i, ground in enumerate(tables.ground):
         with name_shape(f"ground {i}"):
             plane = HalfSpace(ground.normal, ground.offset)
         scene.add(plane, name=f"ground {i}", **own(ground))
     for body in tables.body:
-        given: dict[str, Any] = {
-            key: value
-            for key in ("density", "position", "angle", "velocity", "spin")
-            if (value := getattr(body, key)) is not None
-        }
-        shape = shape_of(body, tables.dimensions)
-        number = scene.add(shape, fixed=body.fixed, name=body.name, **given, **own(body))
+        keys = {"density", "position", "angle", "velocity", "spin", "fixed", "name"}
+        shape, given = shape_of(body, tables.dimensions), body.model_dump(include=keys)
+        number = scene.add(shape, **given, **own(body))
         if body.inertia is not None:
             scene.bodies[number] = replace(scene.bodies[number], inertia=body.inertia)
     for grains in tables.grains:
         for shape, position, angle in place_grains(grains, tables.dimensions):
             scene.add(shape, density=grains.density, position=position, angle=angle, **own(grains))
     return scene
+
+
+def place_grains(grains: Grains, dim: int) -> Iterator[tuple[Any, Floats, Any]]:
+    """Shape, position (dim,) [m] and angle [rad] (3D: quaternion (4,)) of every grain.
+
+    The grid fills ``region`` row by row from below, and goes on above it.  The same seed gives the
+    same grains.
+    """
+    from rigid_lcp.shapes import get_shape, rotation_matrix
+
+    random, draw = np.random.default_rng(grains.seed), get_shape(grains.shape)
+    low, high = np.array(grains.region_low), np.array(grains.region_high)
+    cell = GRID_SPACING * grains.size[1]
+    across = np.maximum(1, np.floor((high - low)[:-1] / cell).astype(int))
+    for number in range(grains.count):
+        place = np.array(np.unravel_index(number % across.prod(), across), dtype=float)
+        level = number // across.prod()
+        position = low + cell * np.append(place + 0.5, level + 0.5)
+        diameter = random.uniform(grains.size[0], grains.size[1])
+        corners = int(random.integers(grains.corners[0], grains.corners[1], endpoint=True))
+        stone = draw(random, diameter, corners, dim)
+        if dim == 2:
+            angle = random.uniform(0, 2 * np.pi)
+            # what was drawn lies in its cell, not the centroid
+            yield stone, position + rotation_matrix(np.array([angle])) @ stone.centroid, angle
+        else:
+            yield stone, position, random.normal(size=4)
 
 
 @contextmanager
@@ -97,22 +115,14 @@ def name_shape(where: str) -> Iterator[None]:
 
 def shape_of(body: BodyTable, dim: int) -> Any:
     """The shape that a body's table names.  Raises `ShapeError` with the body's name."""
+    from rigid_lcp.shapes import Disc, Polygon, Polyhedron, Sphere, box
+
     with name_shape(f"body {body.name}"):
-        if dim == 2:
-            from rigid_lcp.shapes import Disc, Polygon
-
-            if body.radius is not None:
-                return Disc(body.radius)
-            if body.box is not None:
-                return Polygon.rectangle(*body.box)
-            return Polygon(np.array(body.vertices))
-        from rigid_lcp.shapes import Polyhedron, Sphere, box
-
         if body.radius is not None:
-            return Sphere(body.radius)
+            return Disc(body.radius) if dim == 2 else Sphere(body.radius)
         if body.box is not None:
-            return box(*body.box)
-        return Polyhedron(np.array(body.vertices))
+            return Polygon.rectangle(*body.box) if dim == 2 else box(*body.box)
+        return (Polygon if dim == 2 else Polyhedron)(np.array(body.vertices))
 
 
 def loads_of(file: SceneFile) -> Loads | None:

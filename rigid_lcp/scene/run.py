@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import time
 from collections.abc import Callable
 from math import ceil
@@ -33,36 +31,15 @@ def simulation_of(file: SceneFile) -> tuple[Scene, Simulation]:
 
     Raises `SceneError`, `ShapeError`, or `Overlapping` for bodies that overlap.
     """
-    run = file.tables.run
-    scene = scene_build(file)
+    tables, scene = file.tables, scene_build(file)
+    wear = None if tables.wear is None else Wear(**tables.wear.model_dump())
+    run, strength, breakage = tables.run, tables.strength, None
+    if strength is not None:
+        breakage = Breakage(strength.tension, **strength.model_dump(exclude={"tension"}))
     return scene, Simulation(
-        scene, run.method, step=run.step, tolerance=run.tolerance, loads=loads_of(file),
-        wear=read_wear(file), breakage=read_breakage(file),
+        scene, run.method, step=run.step, tolerance=run.tolerance, loads=loads_of(file), wear=wear,
+        breakage=breakage,
     )  # fmt: skip
-
-
-def read_wear(file: SceneFile) -> Wear | None:
-    """How grains wear, or None where the scene does not say."""
-    table = file.tables.wear
-    if table is None:
-        return None
-    return Wear(table.coefficient, table.every, table.volume_scale)
-
-
-def read_breakage(file: SceneFile) -> Breakage | None:
-    """When grains break, or None where the scene does not say."""
-    table = file.tables.strength
-    if table is None:
-        return None
-    return Breakage(
-        table.tension, table.every, table.smallest, table.modulus, table.reference_volume,
-        table.unique,
-    )  # fmt: skip
-
-
-def frame_times(duration: float, frames: int) -> Floats:
-    """Times of the frames [s], (frames + 1,): the start and ``frames`` equal spans."""
-    return np.linspace(0.0, duration, frames + 1)
 
 
 def scene_run(
@@ -73,7 +50,7 @@ def scene_run(
     Raises what the simulation raises; the frames before stay.
     """
     duration = file.tables.run.duration
-    times = frame_times(duration, file.tables.run.frames)
+    times = np.linspace(0.0, duration, file.tables.run.frames + 1)
     there = folder.frames() if resume else []
     spent = restore_frame(there[-1], run) if there else 0.0
     if not there:
@@ -102,11 +79,9 @@ def history_of(folder: RunFolder) -> dict[str, Floats]:
 
 def write_history(path: Path, history: dict[str, Floats]) -> None:
     """Write the history as CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(history)
-    writer.writerows(zip(*(column.tolist() for column in history.values()), strict=True))
-    write_whole(path, text.getvalue())
+    rows = zip(*(column.tolist() for column in history.values()), strict=True)
+    lines = [",".join(map(str, row)) for row in (history, *rows)]
+    write_whole(path, "\n".join(lines) + "\n")
 
 
 def plan_steps(file: SceneFile) -> tuple[int, float]:

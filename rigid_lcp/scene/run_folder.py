@@ -72,6 +72,8 @@ def read_frame(path: Path) -> dict[str, Any]:
     as numbers.  Raises one of `DAMAGED` if it can not be read, or is of another version."""
     with path.open("rb") as stream, np.load(stream) as file:  # it leaves damaged ones open
         arrays = {name: file[name] for name in file.files}
+    if arrays.get("wear_counts", np.zeros(0)).ndim != 1:
+        raise ValueError("its corners wore as those of an earlier version did")
     arrays |= {name: arrays[name].item() for name in (*COUNTERS, "energy", "overlap", "cpu")}
     arrays["pace"] = Pace(**{f.name: arrays[f"pace_{f.name}"].item() for f in fields(Pace)})
     arrays["motion"] = Motion(**{f.name: arrays[f"motion_{f.name}"] for f in fields(Motion)})

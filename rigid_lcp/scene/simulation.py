@@ -6,7 +6,8 @@
 
 from __future__ import annotations
 
-from math import ceil, nan
+from functools import partial
+from math import ceil, inf, nan
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -23,19 +24,19 @@ from rigid_lcp.errors import (
 )
 from rigid_lcp.motion import (
     MOST_STEPS,
-    CheckedLoads,
     Loads,
     Motion,
     Pace,
     Scene,
     advance_runge_kutta,
+    check_loads,
     contact_forces,
     is_finite,
     make_world,
-    require_body,
     require_line,
-    require_residual,
+    require_number_in,
     require_seconds,
+    require_whole_in,
     step_moreau,
     too_many_steps,
     too_much,
@@ -74,24 +75,22 @@ class Simulation:
     ``method``: ``time-stepping`` (any scene) or ``acceleration`` (Runge-Kutta, section 9; raises
     `NoSolution` where no finite forces exist).  ``step`` [s]: length of the steps, for
     ``acceleration`` the longest one; default 1e-3 s.  ``tolerance``: scale-free residual of the
-    contact forces; ``accept``: a step of many contacts that ends at or below it is left there
-    rather than to the dearest methods; above ``give_up`` the run stops.  ``loads(time, motion)``:
-    further forces and torques (n, 3) or (n, 6) [N, N m].
+    contact forces.  ``loads(time, motion)``: further forces and torques (n, 3) or (n, 6) [N, N m].
     ``wear``, ``breakage``: grains lose their corners, break (time stepping only); none by default.
     Raises `SceneError`, or `Overlapping` where bodies overlap at the start.
     """
 
     def __init__(
         self, scene: Scene, method: Method = "time-stepping", *, step: float = 1e-3,
-        tolerance: float = 1e-12, accept: float = ACCEPT, give_up: float = GIVE_UP,
-        loads: Loads | None = None, wear: Wear | None = None,
+        tolerance: float = 1e-12, loads: Loads | None = None, wear: Wear | None = None,
         breakage: Breakage | None = None,
     ) -> None:  # fmt: skip
         check_run(scene, method, loads, wear, breakage)
         step = require_seconds(step, "step", least=SHORTEST_STEP)
-        tolerance = require_residual(tolerance, "tolerance")
-        accept = require_residual(accept, "accept", zero=True)
-        give_up = require_residual(give_up, "give_up")
+        remedy = "give a positive number, say 1e-9"
+        tolerance = require_number_in(
+            tolerance, 0.0, inf, "tolerance", "Simulation", remedy, above=True
+        )
         self.wear, self.breakage = wear, breakage
         self.worn = None if wear is None else start_wear(scene)
         """What corners have lost; None without wear."""
@@ -99,8 +98,7 @@ class Simulation:
         """Grains that broke; by `fragment` at a tension of NaN."""
         self.world, self.motion = make_world(scene)
         self.method, self.step, self.tolerance = method, step, tolerance
-        self.accept, self.give_up = accept, give_up
-        self.loads = None if loads is None else CheckedLoads(loads)
+        self.loads = None if loads is None else partial(check_loads, loads)
         self.pace = Pace(step, step)
         """Step control of ``acceleration``, and its counts."""
         self.time = 0.0
@@ -160,28 +158,30 @@ class Simulation:
         more.  Raises `ShapeError` for a disc, a fixed body, or a sliver, `SceneError` for a body
         or a line that is none.
         """
-        body = require_body(body, len(self.motion.position))
+        last = len(self.motion.position) - 1
+        remedy = f"give a whole number, 0 to {last}, as Scene.add returned it"
+        body = require_whole_in(body, 0, "the body", "fragment", remedy, last)
         line = require_line(line, self.motion.dim)
         scene = split_body(self.world.scene, self.motion, body, *line)
-        part = self._go_on_broken(scene, body)
-        self.broken.append(Broken(self.time, body, part, nan, nan))
-        return part
+        return self._go_on_broken(scene, body, nan, nan)
 
-    def _go_on_broken(self, scene: Scene, body: int) -> int:
+    def _go_on_broken(self, scene: Scene, body: int, tension: float, strength: float) -> int:
         self.world, self.motion = make_world(scene)
         if self.worn is not None:
             self.worn = wear_on_after_break(self.worn, scene, body)
         whole = (self.contacts.body_a == body) | (self.contacts.body_b == body)
         self.contacts = self.contacts[~whole]
-        return len(scene.bodies) - 1
+        part = len(scene.bodies) - 1
+        self.broken.append(Broken(self.time, body, part, tension, strength))
+        return part
 
-    def unique_forces(self, stiffness: float = 1.0) -> ContactForces:
+    def unique_forces(self) -> ContactForces:
         """Forces that elastic contacts would choose now (section 8), worn corners softer.
 
         For grains at rest or in slow motion.  Raises `NotConverged` where they are not found.
         """
         loads = None if self.loads is None else self.loads(self.time, self.motion)
-        return unique_forces(self.world, self.motion, loads, stiffness, self.wear, self.worn)
+        return unique_forces(self.world, self.motion, loads, self.wear, self.worn)
 
     @property
     def positions(self) -> Floats:
@@ -221,7 +221,7 @@ class Simulation:
             loads = self.loads(self.time + h / 2, middle)
         try:
             made = step_moreau(
-                self.world, self.motion, loads, h, self.contacts, self.tolerance, self.accept
+                self.world, self.motion, loads, h, self.contacts, self.tolerance, ACCEPT
             )
         except ProblemError as error:
             raise too_much(self.world, self.motion, loads, h, self.time, error) from error
@@ -254,8 +254,7 @@ class Simulation:
             for body, line in found:
                 scene_now = break_scene(self.world.scene, self.motion, body, line)
                 if scene_now is not None:
-                    part = self._go_on_broken(scene_now, body)
-                    self.broken.append(Broken(self.time, body, part, line.tension, line.strength))
+                    self._go_on_broken(scene_now, body, line.tension, line.strength)
             if found:
                 grains = int(self.world.movable.sum())
                 refuse_dust(self.breakage, grains, len(self.broken), self.time)
@@ -274,7 +273,7 @@ class Simulation:
     def _judge(self, residual: float, message: str) -> None:
         self.worst_residual = max(self.worst_residual, residual)
         self.steps_above += not residual <= self.tolerance
-        if not residual <= self.give_up:
+        if not residual <= GIVE_UP:
             raise NotConverged(
                 f"the contact forces have a residual of {residual:.2g}",
                 where=f"step {self.steps}, {self.time:.6g} s",

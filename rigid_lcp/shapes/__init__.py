@@ -10,8 +10,7 @@ from numpy.random import Generator
 
 from rigid_lcp.shapes.disc import Disc
 from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.numbers import require_vector
-from rigid_lcp.shapes.plain_numbers import real_numbers
+from rigid_lcp.shapes.numbers import real_numbers, require_vector
 from rigid_lcp.shapes.polygon import Polygon
 from rigid_lcp.shapes.polyhedron import Polyhedron, box
 from rigid_lcp.shapes.rotations import (
@@ -26,13 +25,12 @@ from rigid_lcp.shapes.rotations import (
     unit_quaternion,
 )
 from rigid_lcp.shapes.sphere import Sphere
-from rigid_lcp.shapes.stones import cut_points, fragments
 from trackbed.choices import find_choice
 
 __all__ = [
-    "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "box", "cut_points", "fragments",
-    "get_shape", "quaternion_of_matrix", "quaternion_of_rotation", "quaternion_product",
-    "quaternion_rate", "real_numbers", "require_vector", "rotate", "rotate_back", "rotation_matrix",
+    "Disc", "HalfSpace", "Polygon", "Polyhedron", "Sphere", "box", "get_shape",
+    "quaternion_of_matrix", "quaternion_of_rotation", "quaternion_product", "quaternion_rate",
+    "real_numbers", "require_vector", "rotate", "rotate_back", "rotation_matrix",
     "turn_quaternion", "unit_quaternion",
 ]  # fmt: skip
 

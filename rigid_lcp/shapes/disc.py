@@ -20,16 +20,11 @@ class Disc:
         object.__setattr__(self, "radius", require_length(self.radius, "radius", "disc"))
 
     @property
-    def area(self) -> float:
-        """Area [m^2]."""
-        return pi * self.radius**2
-
-    @property
     def reach(self) -> float:
         """Radius [m]."""
         return self.radius
 
     def mass_properties(self, density: float) -> tuple[float, float]:
         """Mass [kg] and moment of inertia [kg m^2] at ``density`` [kg/m^2]."""
-        mass = density * self.area
+        mass = density * (pi * self.radius**2)
         return mass, mass * self.radius**2 / 2

@@ -8,12 +8,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rigid_lcp.errors import SceneError, ShapeError
-from rigid_lcp.shapes.plain_numbers import real_numbers
 
 Floats = NDArray[np.float64]
 
 LEAST, MOST = 1e-50, 1e50
 """Lengths that a shape may have [m]: their fourth powers are numbers still."""
+
+
+def real_numbers(values: ArrayLike) -> Floats:
+    """A copy of ``values`` as floats; `TypeError` or `ValueError` says what else they are.
+
+    numpy drops the imaginary part of complex numbers, and takes masked ones for what they hide.
+    """
+    if np.ma.is_masked(values):
+        raise TypeError("some are masked")
+    if np.iscomplexobj(values):
+        raise TypeError("complex ones")
+    return np.array(values, dtype=float)
 
 
 def require_finite_shape(values: ArrayLike, what: str, where: str) -> Floats:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import pi
 from numbers import Integral
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,7 @@ from rigid_lcp.errors import ShapeError
 from rigid_lcp.shapes.numbers import LEAST, MOST, require_finite_shape, require_length
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 STRAIGHT = 1e-12
 """Sine of the turn at a vertex below which three vertices count as one line [-]."""
@@ -70,14 +72,36 @@ class Polygon:
         angle = 2 * pi * np.arange(corners) / corners
         return cls(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
 
+    @classmethod
+    def of_corners(cls, vertices: ArrayLike) -> Self:
+        """The polygon with the ``vertices`` (n, 2) [m] of another in its body frame.
+
+        They are taken as they are, the round-off of their centroid and all: so a shape is made
+        again from its corners to the last bit.
+        """
+        made = cls(vertices)
+        object.__setattr__(made, "vertices", np.array(vertices, dtype=float))
+        return made
+
     @cached_property
     def area(self) -> float:
         """Area [m^2]."""
         return _moments(self.vertices)[0]
 
     @cached_property
-    def face_normals(self) -> Floats:
-        """Outward unit normals (n, 2); face k runs from vertex k to vertex k + 1."""
+    def faces(self) -> Ints:
+        """First and second corner of each face (n, 2); face k begins at corner k."""
+        corner = np.arange(len(self.vertices))
+        return np.column_stack([corner, np.roll(corner, -1)])
+
+    @property
+    def edges(self) -> Ints:
+        """The faces, as those of a polyhedron have their edges."""
+        return self.faces
+
+    @cached_property
+    def normals(self) -> Floats:
+        """Outward unit normals (n, 2) of the faces."""
         along = np.roll(self.vertices, -1, axis=0) - self.vertices
         along /= np.linalg.norm(along, axis=1)[:, None]
         return np.column_stack([along[:, 1], -along[:, 0]])

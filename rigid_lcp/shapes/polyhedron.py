@@ -6,7 +6,6 @@ is turned is the state's business.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
@@ -24,20 +23,9 @@ FLATNESS = 1e-9
 below, and what a grain has for edges far above."""
 
 
-@dataclass(frozen=True)
-class SolidIntegrals:
-    """Integrals over a solid of unit density."""
-
-    volume: float
-    """[m^3]."""
-    centroid: Floats
-    """[m], (3,)."""
-    inertia: Floats
-    """About the centroid [m^5], (3, 3)."""
-
-
-def integrate_solid(points: Floats, triangles: Ints) -> SolidIntegrals:
-    """Exact integrals over the solid inside a closed surface of triangles wound outwards.
+def integrate_solid(points: Floats, triangles: Ints) -> tuple[float, Floats, Floats]:
+    """Volume [m^3], centroid (3,) [m], and inertia over density about it (3, 3) [m^5] of the solid
+    inside a closed surface of triangles wound outwards; exact.
 
     The divergence theorem splits the solid into signed tetrahedra with one corner in the mean of
     the points; each integral of 1, x, x x^T over a tetrahedron is a closed form (Tonon, J. Math.
@@ -53,7 +41,7 @@ def integrate_solid(points: Floats, triangles: Ints) -> SolidIntegrals:
     second += np.einsum("t,ti,tj->ij", six, total, total)
     second = second / 120.0 - volume * np.outer(centroid, centroid)
     inertia = np.trace(second) * np.eye(3) - second
-    return SolidIntegrals(float(volume), centroid + middle, 0.5 * (inertia + inertia.T))
+    return float(volume), centroid + middle, 0.5 * (inertia + inertia.T)
 
 
 class Polyhedron:
@@ -70,7 +58,7 @@ class Polyhedron:
     def __init__(self, points: ArrayLike) -> None:
         triangles, corners = _hull(points)
         found = integrate_solid(corners, triangles)
-        self._settle(corners - found.centroid, triangles, found)
+        self._settle(corners - found[1], triangles, found)
 
     @classmethod
     def of_corners(cls, vertices: ArrayLike) -> Self:
@@ -84,15 +72,14 @@ class Polyhedron:
         made._settle(corners, triangles, integrate_solid(corners, triangles))
         return made
 
-    def _settle(self, vertices: Floats, triangles: Ints, found: SolidIntegrals) -> None:
-        self.centroid: Floats = found.centroid
-        """Centre of mass in the coordinates of the points given [m], (3,)."""
+    def _settle(
+        self, vertices: Floats, triangles: Ints, found: tuple[float, Floats, Floats]
+    ) -> None:
+        self.volume, self.centroid, self.inertia = found
+        """Volume [m^3]; centre of mass in the coordinates of the points given [m], (3,); inertia
+        tensor over density about the centre of mass, in the body frame [m^5]."""
         self.vertices = vertices
         """Corners in the body frame [m], (v, 3)."""
-        self.volume: float = found.volume
-        """Volume [m^3]."""
-        self.inertia: Floats = found.inertia
-        """Inertia tensor over density about the centre of mass, in the body frame [m^5]."""
         self.faces, self.normals, self.distances = _faces(self.vertices, triangles)
         """Corners of each face, anticlockwise from outside; outward unit normals (f, 3);
         distances d of the faces from the centre of mass [m], (f,), as in eq. 9."""

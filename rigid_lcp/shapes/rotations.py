@@ -1,8 +1,9 @@
 """Rotations in space by unit quaternions ``(w, x, y, z)``; spins in the world frame [rad/s].
 
 A quaternion turns body coordinates to world coordinates: ``v_world = R(q) v_body``.  All
-functions take one rotation or a stack of them, (..., 4) with (..., 3).  Formulas: Shuster, J.
-Astronaut. Sci. 41 (1993) 439.
+functions take one rotation or a stack of them, (..., 4) with (..., 3).  `rotation_matrix`, `rotate`
+and `rotate_back` take angles (..., 1) [rad] too, and turn vectors (..., 2) of the plane.
+Formulas: Shuster, J. Astronaut. Sci. 41 (1993) 439.
 """
 
 from __future__ import annotations
@@ -47,13 +48,18 @@ def quaternion_of_rotation(rotation_vector: ArrayLike) -> Floats:
 
 
 def rotation_matrix(quaternion: Floats) -> Floats:
-    """``R(q)``, (..., 3, 3), of unit quaternions (..., 4)."""
-    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
+    """``R(q)``, (..., 3, 3), of unit quaternions (..., 4); (..., 2, 2) of angles (..., 1)."""
+    components = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
+    if len(components) == 1:
+        c, s = np.cos(components[0]), np.sin(components[0])
+        rows = [[c, -s], [s, c]]
+    else:
+        w, x, y, z = components
+        rows = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 

@@ -23,20 +23,11 @@ class Sphere:
         object.__setattr__(self, "radius", require_length(self.radius, "radius", "sphere"))
 
     @property
-    def volume(self) -> float:
-        """Volume [m^3]."""
-        return 4.0 / 3.0 * np.pi * self.radius**3
-
-    @property
-    def inertia(self) -> Floats:
-        """Inertia tensor over density about the centre [m^5], (3, 3)."""
-        return 0.4 * self.volume * self.radius**2 * np.eye(3)
-
-    @property
     def reach(self) -> float:
         """Radius [m]."""
         return self.radius
 
     def mass_properties(self, density: float) -> tuple[float, Floats]:
         """Mass [kg] and inertia tensor (3, 3) [kg m^2] at ``density`` [kg/m^3]."""
-        return density * self.volume, density * self.inertia
+        volume = 4.0 / 3.0 * np.pi * self.radius**3
+        return density * volume, density * (0.4 * volume * self.radius**2 * np.eye(3))

@@ -14,56 +14,49 @@ What the limit is:
   convex, so f is unique, whatever the order of contacts and bodies and whatever the start.
 - Where contacts slide or open while others hold by friction (friction mobilised inside a jammed
   pile): equilibrium of springs and sliders loaded in one go from nothing.  Coulomb's law has no
-  potential, and there is more than one such state: relaxed from another one
-  (`relax_from`), the forces of a box of 46 discs with friction 1 or 5 differ by up to
-  36 %, and in a wedge with a history of sliding by 8 times (sliders with memory, MD).  All obey eqs
-  26 and 27.  The unique forces are by definition those reached from no displacements.
+  potential, and there is more than one such state: relaxed from another one (``begin``), the
+  forces of a box of 46 discs with friction 1 or 5 differ by up to 36 %.  All obey eqs 26 and 27.
+  The unique forces are by definition those reached from no displacements.
 - Where bodies accelerate: displacements drift along the motion for ever, which opens what opens
   and slides what slides, friction against the velocity, and the forces of the contacts that hold
   are as above.
 
-So an earlier answer (``start``) may change the cost and never the answer.  Without friction the
-relaxation goes on from it, as the energy is convex.  With friction it is first asked whether all
-contacts hold (`rigid_lcp.unique.held_contacts`: one factorisation, from the problem alone): then
-this is the answer, and a start has nothing to add.  Else the relaxation is done from nothing: which
-state it ends in hangs on where it begins, and no cheaper check tells it from its rivals.  Between
-states that are near round-off may decide, so all is done in the problem's own order
-(`rigid_lcp.unique.own_order`), and the way to the state with the load rounded to 1e-9: the same
-numbers, whatever the order of contacts and bodies.  From there the last digits are found.
+Without friction the energy is convex.  With it, it is first asked whether all contacts hold
+(`find_held_displacement`): then this is the answer, from one factorisation.  Else the
+relaxation is done from nothing.  Between states that are near round-off may decide, so all is done
+in the problem's own order (`put_in_own_order`), and the way to the state with the load
+rounded to 1e-9: the same numbers, whatever the order of contacts and bodies.  From there the last
+digits are found.
 
-Measured, one thread, warm: towers of 10, 50 and 200 boxes (20 to 400 contacts) 0.01 to 0.1 s, a
-frictionless pyramid of 465 discs (1,335 contacts) 0.6 s.  Pyramids between walls at
-friction 0.3, a fourth to a third of their contacts sliding: 37 to 378 contacts, 0.04 to 1 s, and
-not found with 592 and more.  On large piles that slide the tangent of springs and sliders along the
-way has eigenvalues with negative real parts, and the relaxation does not settle
-(`docs/rigid-indeterminacy.md`); the answer then says so.
+On large piles that slide the tangent of springs and sliders along the way has eigenvalues with
+negative real parts, and the relaxation does not settle (`docs/rigid-indeterminacy.md`, with costs);
+the answer then says so.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.linalg import splu
 
-from rigid_lcp.friction.problem import FrictionProblem
-from rigid_lcp.unique.elastic_network import ElasticNetwork
-from rigid_lcp.unique.held_contacts import find_held_displacement
+from rigid_lcp.errors import ProblemError
+from rigid_lcp.friction.problem import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.unique.elastic_network import ElasticNetwork, coulomb_spring, slider_forces
 from rigid_lcp.unique.micro_displacements import (
     ElasticForces,
     bodies_of,
     contact_stiffness,
-    coulomb_spring,
     free_motion,
-    keep_small_start,
     mass_free_jacobian,
-    read_start_displacement,
     stiffest_mode,
 )
-from rigid_lcp.unique.own_order import OwnOrder, own_order
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
 FIRST_STEP = 1e3
 """First h in units of the stiffest mode's time."""
 LONGEST_STEP = 1e6
@@ -79,138 +72,128 @@ of their length that these grow by in a step."""
 STEPS_MAX = 400
 STEP_GROWTH, STEP_GROWTH_SLIDING = 10.0, 3.0
 """Factors on h after a step that was found, without and with friction."""
+HELD_STEP, HELD_STEPS = 1e10, 8
+"""Length of the proximal steps of contacts that hold in units of the stiffest mode's time, and how
+many are made, all with one factorisation: each leaves 1e-10 over the softest mode of the error."""
+OUTSIDE_CONE = 1e-3
+"""Part of the greatest force by which a contact may be outside its cone after the first step."""
 
 
 def elastic_limit(
-    problem: FrictionProblem,
-    stiffness: ArrayLike = 1.0,
-    *,
-    start: ElasticForces | ArrayLike | None = None,
-    tolerance: float = 1e-12,
-    iterations_max: int = 2000,
-) -> ElasticForces:
+    problem: FrictionProblem, stiffness: ArrayLike = 1.0, *, begin: ArrayLike | None = None,
+    tolerance: float = 1e-12, iterations_max: int = 2000,
+) -> ElasticForces:  # fmt: skip
     """Forces that springs at the contacts choose, in the limit of stiff springs.
 
     ``problem`` with bodies; ``stiffness`` [N/m], see `contact_stiffness` (ratios matter only);
-    ``start``: an earlier answer, or displacements (ndof,) [m, rad], which may save steps without
-    friction and is of no effect with it (module docstring); ``tolerance``: on the
-    scale-free residual and on the relative change of the forces in a last step (where bodies
-    accelerate, the change may stall at 1e-11 by round-off and is then accepted).
-    ``iterations_max`` counts Newton steps.  Raises `ProblemError` for a start that does not fit
-    the problem; never raises for want of convergence.
+    ``tolerance``: on the scale-free residual and on the relative change of the forces in a last
+    step (where bodies accelerate, the change may stall at 1e-11 by round-off and is then accepted).
+    ``iterations_max`` counts Newton steps.  ``begin``: displacements (ndof,) [m, rad] at which the
+    relaxation begins, to see whether a state is an equilibrium of eqs 37 and 38; not for the unique
+    forces, which begin at none, as with friction each state may lead to its own.  Raises
+    `ProblemError` for displacements that do not fit; never for want of convergence.
     """
-    bodies = bodies_of(problem)
-    begun, _ = read_start_displacement(start, bodies, (problem.contacts, problem.dim))
-    order, springs = _springs(problem, stiffness)
-    network, begun = springs.network, begun[order.column]
-    if problem.friction.any():
-        held = find_held_displacement(
-            order.problem, network.jacobian, network.free, network.stiffness, tolerance
-        )
-        if held is not None:
-            return _restore_order(_held(order.problem, springs, held), order)
-        return _restore_order(
-            _relax_from_nothing(order.problem, springs, tolerance, iterations_max), order
-        )
-    begun = keep_small_start(
-        begun, bodies_of(order.problem), springs.mode * network.stiffness, network.jacobian,
-        network.free,
-    )  # fmt: skip
-    return _restore_order(_from(begun, order.problem, springs, tolerance, iterations_max), order)
-
-
-def relax_from(
-    problem: FrictionProblem,
-    displacement: ArrayLike,
-    stiffness: ArrayLike = 1.0,
-    *,
-    tolerance: float = 1e-12,
-    iterations_max: int = 2000,
-) -> ElasticForces:
-    """Forces in the limit of the relaxation that begins at ``displacement`` (ndof,) [m, rad].
-
-    Everything else as `elastic_limit` has it, which begins at none.  Use it to see whether a state
-    (that of springs with a history, say) is an equilibrium of eqs 37 and 38; when not to use it:
-    for the unique forces, as with friction each state may lead to its own.
-    """
-    begun, _ = read_start_displacement(
-        displacement, bodies_of(problem), (problem.contacts, problem.dim)
-    )
-    order, springs = _springs(problem, stiffness)
-    found = _from(begun[order.column], order.problem, springs, tolerance, iterations_max)
-    return _restore_order(found, order)
-
-
-@dataclass(frozen=True)
-class _Springs:
-    """The springs of a problem, scaled to the stiffest mode: h = 1 is a step without overshoot."""
-
-    network: ElasticNetwork
-    root: sp.csr_array
-    """``M^-1/2``, (ndof, ndof)."""
-    mode: float
-    """The stiffest mode [1/s^2]."""
-
-
-def _springs(problem: FrictionProblem, stiffness: ArrayLike) -> tuple[OwnOrder, _Springs]:
-    """The problem in its own order, and its springs in that order."""
-    k = contact_stiffness(problem, stiffness)
-    order = own_order(problem, bodies_of(problem))
-    jacobian, root = mass_free_jacobian(bodies_of(order.problem))
-    free = free_motion(jacobian, order.problem.offset)
-    k = k[order.contact]
+    freedoms = bodies_of(problem).jacobian.shape[1]
+    begun = np.zeros(freedoms) if begin is None else np.asarray(begin, dtype=float)
+    if begun.shape != (freedoms,) or not np.isfinite(begun).all():
+        raise ProblemError(
+            f"begin is not {freedoms} finite displacements, one for each freedom", where="begin",
+            remedy="give the displacement of an answer for the same bodies, or none",
+        )  # fmt: skip
+    mine, contact, row, column = put_in_own_order(problem)
+    jacobian, root = mass_free_jacobian(bodies_of(mine))
+    k = contact_stiffness(problem, stiffness)[contact]
     # a power of two: round-off of the mode is then none of the stiffness
     mode = 2.0 ** int(np.ceil(np.log2(stiffest_mode(jacobian, k) or 1.0)))
-    network = ElasticNetwork(jacobian, free, k / mode, order.problem.friction)
-    return order, _Springs(network, root, mode)
+    # in units of the stiffest mode: h = 1 is a step without overshoot
+    network = ElasticNetwork(jacobian, free_motion(jacobian, mine.offset), k / mode, mine.friction)
+    if problem.friction.any() and begin is None:
+        found = find_held_forces(mine, network, tolerance)
+        if found is None:
+            found = _relax_from_nothing(mine, network, tolerance, iterations_max)
+    else:
+        # deformations of displacements: others would be a self-stress for good
+        deformation = -mode * (bodies_of(mine).jacobian @ begun[column]).reshape(k.shape)
+        found, _ = _relax(mine, network, deformation, FIRST_STEP, tolerance, iterations_max)
+    force, displacement = np.empty_like(found.r), begun.copy()
+    force[row] = found.r
+    displacement[column] += root @ found.displacement / mode
+    return replace(found, r=force, displacement=displacement)
 
 
-def _restore_order(found: ElasticForces, order: OwnOrder) -> ElasticForces:
-    r, displacement = order.restored(found.r, found.displacement)
-    return replace(found, r=r, displacement=displacement)
+def put_in_own_order(problem: FrictionProblem) -> tuple[FrictionProblem, Ints, Ints, Ints]:
+    """The problem with contacts and bodies in an order that is theirs and not that of their
+    numbers; the numbers of its contacts (nc,), forces (nc * dim,), freedoms (ndof,) in ``problem``.
+
+    Where a problem has several solutions round-off decides between them, and round-off hangs on the
+    order of sums.  Contacts are sorted by what q does to their normal velocities through W twice,
+    bodies by how fast it moves them: numbers that no two have alike but by symmetry.
+    """
+    bodies = bodies_of(problem)
+    dim, size = problem.dim, bodies.body_size
+    once = bodies.product(problem.offset)
+    contact = np.argsort(bodies.product(once)[::dim], kind="stable")
+    speed = np.linalg.norm((bodies.spread @ once).reshape(-1, size), axis=1)
+    body = np.argsort(speed, kind="stable")
+    row = (contact[:, None] * dim + np.arange(dim)).ravel()
+    column = (body[:, None] * size + np.arange(size)).ravel()
+    jacobian = sp.csr_array(bodies.jacobian[row][:, column])
+    inverse_mass = sp.csr_array(bodies.inverse_mass[column][:, column])
+    for each in (jacobian, inverse_mass):
+        each.sort_indices()
+    space = BodySpace(jacobian, inverse_mass, size)
+    mine = friction_problem(space, problem.offset[row], problem.friction[contact], dim)
+    return mine, contact, row, column
 
 
-def _held(problem: FrictionProblem, springs: _Springs, displacement: Floats) -> ElasticForces:
-    """The answer of contacts that all hold, at mass-free ``displacement`` (ndof,)."""
-    network = springs.network
-    nil = np.zeros(network.stiffness.shape)
-    deformation = -(network.jacobian @ displacement).reshape(nil.shape)
-    force, _ = coulomb_spring(deformation, nil, network.stiffness, problem.friction)
-    return ElasticForces(
-        force.ravel(), springs.root @ displacement / springs.mode, nil,
-        problem.residual(force.ravel()), "solved", 1,
-    )  # fmt: skip
+def find_held_forces(
+    problem: FrictionProblem, network: ElasticNetwork, tolerance: float
+) -> ElasticForces | None:
+    """The answer, with mass-free displacements, where all contacts hold; None where they do not.
 
-
-def _from(
-    begun: Floats, problem: FrictionProblem, springs: _Springs, tolerance: float,
-    iterations_max: int,
-) -> ElasticForces:  # fmt: skip
-    """Relaxation from displacements ``begun`` (ndof,) [m, rad]."""
-    # starting deformations are those of displacements: others would be a self-stress for good
-    jacobian = bodies_of(problem).jacobian
-    deformation = -springs.mode * (jacobian @ begun).reshape(springs.network.stiffness.shape)
-    found, _ = _relax_steps(problem, springs, deformation, FIRST_STEP, tolerance, iterations_max)
-    return replace(found, displacement=begun + found.displacement)
+    Let every contact be closed and stick (a frictionless one carry its normal force), so that
+    springs are linear, ``f = -K J dq``.  Balance ``J^T f + Q = 0`` then has one f: K is positive,
+    and f is the force of least ``sum f^2 / k`` of all that balance, cones or no cones.  If it lies
+    in the cones of friction it solves the rigid problem, is that of Coulomb's springs at rest, and
+    the least there is in the cones as well.
+    """
+    jacobian, springs = network.jacobian, network.stiffness.copy()
+    springs[problem.friction <= 0.0, 1:] = 0.0
+    weighted = sp.csr_array(sp.diags_array(springs.ravel()) @ jacobian)
+    identity = sp.eye_array(jacobian.shape[1], format="csc")
+    solve = splu(sp.csc_array(identity / HELD_STEP + jacobian.T @ weighted)).solve
+    displacement, trial = np.zeros(jacobian.shape[1]), np.zeros(springs.shape)
+    for _ in range(HELD_STEPS):
+        displacement = displacement + solve(network.free + jacobian.T @ trial.ravel())
+        before, trial = trial, -(weighted @ displacement).reshape(springs.shape)
+        force = slider_forces(trial, problem.friction * np.maximum(trial[:, 0], 0.0))
+        if not np.abs(trial - force).max() <= OUTSIDE_CONE * np.abs(trial).max():
+            return None
+        change = float(np.linalg.norm(trial - before))
+        if (
+            change <= tolerance * float(np.linalg.norm(trial))
+            and problem.residual(force.ravel()) <= tolerance
+        ):
+            deformation = -(jacobian @ displacement).reshape(springs.shape)
+            r = coulomb_spring(deformation, network.stiffness, problem.friction).ravel()
+            return ElasticForces(r, displacement, problem.residual(r), "solved", 1)
+    return None
 
 
 def _relax_from_nothing(
-    problem: FrictionProblem, springs: _Springs, tolerance: float, iterations_max: int
+    problem: FrictionProblem, network: ElasticNetwork, tolerance: float, iterations_max: int
 ) -> ElasticForces:
     """Relaxation from no displacements: to the state of the load in `ROUNDED` digits, which the
     round-off of q has no part in, and from there to that of the load itself."""
-    network = springs.network
     free = rounded(network.free)
     rough = replace(problem, offset=network.jacobian @ free)
-    near = replace(
-        springs, network=ElasticNetwork(network.jacobian, free, network.stiffness, problem.friction)
-    )
+    near = ElasticNetwork(network.jacobian, free, network.stiffness, problem.friction)
     none = np.zeros(network.stiffness.shape)
-    first, deformation = _relax_steps(rough, near, none, FIRST_STEP, tolerance, iterations_max)
+    first, deformation = _relax(rough, near, none, FIRST_STEP, tolerance, iterations_max)
     if not first.solved:
         return replace(first, residual=problem.residual(first.r))
     rest = max(iterations_max - first.iterations, 1)  # the forces of none would be zero
-    last, _ = _relax_steps(problem, springs, deformation, LONGEST_STEP, tolerance, rest)
+    last, _ = _relax(problem, network, deformation, LONGEST_STEP, tolerance, rest)
     return replace(
         last, displacement=first.displacement + last.displacement,
         iterations=first.iterations + last.iterations,
@@ -223,16 +206,14 @@ def rounded(numbers: Floats) -> Floats:
     return np.asarray(np.round(numbers / unit) * unit)
 
 
-def _relax_steps(
-    problem: FrictionProblem, springs: _Springs, deformation: Floats, h: float, tolerance: float,
-    iterations_max: int,
+def _relax(
+    problem: FrictionProblem, network: ElasticNetwork, deformation: Floats, h: float,
+    tolerance: float, iterations_max: int,
 ) -> tuple[ElasticForces, Floats]:  # fmt: skip
     """Implicit relaxation from ``deformation`` (nc, dim), the first step of length ``h``; the
-    forces with the displacements made, and the deformation at the end."""
-    network, mode = springs.network, springs.mode
+    forces with the mass-free displacements made, and the deformation at the end."""
     jacobian, shape = network.jacobian, network.stiffness.shape
-    nil = np.zeros(shape)
-    way, force = np.zeros(jacobian.shape[1]), nil
+    way, force = np.zeros(jacobian.shape[1]), np.zeros(shape)
     residual, change, longest = np.inf, np.inf, LONGEST_STEP
     growth = STEP_GROWTH_SLIDING if problem.friction.any() else STEP_GROWTH
     solved = shape[0] == 0
@@ -248,7 +229,7 @@ def _relax_steps(
         way = way + move
         deformation = deformation - (jacobian @ move).reshape(shape)
         previous, earlier = force, change
-        force, _ = coulomb_spring(deformation, nil, network.stiffness, problem.friction)
+        force = coulomb_spring(deformation, network.stiffness, problem.friction)
         residual = problem.residual(force.ravel())
         size = float(np.linalg.norm(force))
         change = float(np.linalg.norm(force - previous)) / size if size > 0 else 0.0
@@ -270,8 +251,7 @@ def _relax_steps(
         "in more ways than one"
     )  # fmt: skip
     found = ElasticForces(
-        force.ravel(), springs.root @ way / mode, nil, residual,
-        "solved" if solved else "not converged", spent, message,
+        force.ravel(), way, residual, "solved" if solved else "not converged", spent, message
     )  # fmt: skip
     return found, deformation
 

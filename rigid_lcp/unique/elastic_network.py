@@ -37,42 +37,39 @@ def slider_forces(trial: Floats, allowed: Floats) -> Floats:
     return force
 
 
-def slider_energy(trial: Floats, stiffness: Floats, allowed: Floats) -> float:
-    """Energy [J] whose derivative by deformation is `slider_forces`, friction limits held fixed."""
-    normal = np.maximum(trial[:, 0], 0.0)
-    size = np.linalg.norm(trial[:, 1:], axis=1)
-    elastic = np.minimum(size, allowed)
-    sliding = np.divide(elastic, size, out=np.ones_like(size), where=size > 0)
-    # 1/2 f^2 / k of the springs, then work at the constant force of the sliders
-    tangential = (trial[:, 1:] ** 2 / stiffness[:, 1:]).sum(axis=1) * sliding * (1 - sliding / 2)
-    return float(np.sum(normal**2 / (2 * stiffness[:, 0]) + tangential))
+def coulomb_spring(deformation: Floats, stiffness: Floats, friction: Floats) -> Floats:
+    """Eq. 38 with springs: ``f_N = k xi_N`` in compression, ``f_T = k_T xi_T`` up to friction.
+
+    A function of xi alone, as eq. 38 is written: it forgets the path that led there.
+    ``deformation`` xi (nc, dim) [m], compression positive, tangents as the force on body a;
+    ``stiffness`` (nc, dim) [N/m]; ``friction`` (nc,); the force (nc, dim) [N].
+    """
+    trial = stiffness * deformation
+    return slider_forces(trial, friction * np.maximum(trial[:, 0], 0.0))
 
 
-def slider_slope(
-    trial: Floats, stiffness: Floats, allowed: Floats, friction: Floats | None = None
-) -> Floats:
-    """Derivative of `slider_forces` by deformation, (nc, dim, dim) [N/m].
+def slider_slope(trial: Floats, stiffness: Floats, friction: Floats) -> Floats:
+    """Derivative of `coulomb_spring` by deformation, (nc, dim, dim) [N/m].
 
-    With ``friction`` (nc,) the limits follow the normal forces (Coulomb), else they are fixed
-    (Tresca).  At a kink: the closed, sticking side.  Tangential stiffness is the same both ways.
+    At a kink: the closed, sticking side.  Tangential stiffness is the same both ways.
     """
     count, dim = trial.shape
     closed = trial[:, 0] >= 0
+    allowed = friction * np.maximum(trial[:, 0], 0.0)
     size = np.linalg.norm(trial[:, 1:], axis=1)
     slides = size > allowed
     diagonal = stiffness.copy()
     diagonal[~closed, 0] = 0.0
     # a limit of zero can not stick, at zero deformation neither
-    diagonal[(allowed <= 0) & ~(closed & (friction > 0 if friction is not None else False)), 1:] = 0
+    diagonal[(allowed <= 0) & ~(closed & (friction > 0)), 1:] = 0
     blocks = np.zeros((count, dim, dim))
     blocks[:, range(dim), range(dim)] = diagonal
     along = trial[slides, 1:] / size[slides, None]
     share = allowed[slides] / size[slides]
     across = np.eye(dim - 1) - along[:, :, None] * along[:, None, :]
     blocks[slides, 1:, 1:] = share[:, None, None] * across * stiffness[slides, None, 1:]
-    if friction is not None:
-        push = np.where(closed, friction * stiffness[:, 0], 0.0)[slides]
-        blocks[slides, 1:, 0] = push[:, None] * along
+    push = np.where(closed, friction * stiffness[:, 0], 0.0)[slides]
+    blocks[slides, 1:, 0] = push[:, None] * along
     return blocks
 
 
@@ -110,22 +107,23 @@ class ElasticNetwork:
         order = np.argsort(key.reshape(count, dim)[:, 0], kind="stable")
         return order, (order[:, None] * dim + np.arange(dim)).ravel()
 
-    def trial(self, deformation: Floats, move: Floats) -> Floats:
-        """Spring forces (nc, dim) after the move, before contacts open or slide."""
+    def find_imbalance(
+        self, deformation: Floats, move: Floats, h: float
+    ) -> tuple[Floats, Floats, float]:
+        """``d / h - Q - J^T f``, (ndof,), zero for the move d of an implicit step, and its norm.
+
+        First of all the spring forces (nc, dim) after the move, before contacts open or slide.
+        """
         moved = deformation - (self.jacobian @ move).reshape(deformation.shape)
-        return np.asarray(self.stiffness * moved)
+        trial = np.asarray(self.stiffness * moved)
+        force = slider_forces(trial, self.friction * np.maximum(trial[:, 0], 0.0))
+        imbalance = np.asarray(move / h - self.free - self.jacobian.T @ force.ravel())
+        return trial, imbalance, float(np.linalg.norm(imbalance))
 
-    def allowed(self, trial: Floats) -> Floats:
-        """Coulomb's friction limits (nc,) of trial forces."""
-        return self.friction * np.maximum(trial[:, 0], 0.0)
-
-    def imbalance(self, force: Floats, move: Floats, h: float) -> Floats:
-        """``d / h - Q - J^T f``, (ndof,): zero for the move d of an implicit step."""
-        return np.asarray(move / h - self.free - self.jacobian.T @ force.ravel())
-
-    def newton_direction(self, blocks: Floats, imbalance: Floats, h: float) -> Floats:
-        """``-(1 / h + J^T f' J)^-1`` times the imbalance; ``blocks`` f' (nc, dim, dim)."""
+    def newton_direction(self, trial: Floats, imbalance: Floats, h: float) -> Floats:
+        """``-(1 / h + J^T f' J)^-1`` times the imbalance; f' at ``trial`` forces (nc, dim)."""
         self.newton_steps += 1
+        blocks = slider_slope(trial, self.stiffness, self.friction)
         count, dim, _ = blocks.shape
         pointer = np.arange(count + 1)
         law = sp.bsr_array((blocks, pointer[:-1], pointer), shape=(count * dim, count * dim))
@@ -136,27 +134,19 @@ class ElasticNetwork:
         self, deformation: Floats, move: Floats, h: float, steps: int
     ) -> tuple[Floats, bool]:
         """Newton's method under Coulomb's law from a first ``move``; move, whether found."""
-
-        def state(move: Floats) -> tuple[Floats, Floats, Floats, float]:
-            trial = self.trial(deformation, move)
-            allowed = self.allowed(trial)
-            imbalance = self.imbalance(slider_forces(trial, allowed), move, h)
-            return trial, allowed, imbalance, float(np.linalg.norm(imbalance))
-
-        trial, allowed, imbalance, error = state(move)
+        trial, imbalance, error = self.find_imbalance(deformation, move, h)
         for _ in range(steps):
             if error <= 1e-15 * self.load:
                 return move, True
-            blocks = slider_slope(trial, self.stiffness, allowed, self.friction)
-            direction = self.newton_direction(blocks, imbalance, h)
+            direction = self.newton_direction(trial, imbalance, h)
             for halvings in range(12):
                 tried = move + direction / 2**halvings
-                found = state(tried)
-                if found[3] < (1 - 1e-4 / 2**halvings) * error:
+                found = self.find_imbalance(deformation, tried, h)
+                if found[2] < (1 - 1e-4 / 2**halvings) * error:
                     break
             else:
                 break
-            move, (trial, allowed, imbalance, error) = tried, found
+            move, (trial, imbalance, error) = tried, found
         # no more descent: round-off, if the balance is as good as it can be
         return move, error <= 1e-11 * self.load
 
@@ -186,40 +176,36 @@ class ElasticNetwork:
         move = h * (self.free + self.jacobian.T @ self.force)
         return self.coulomb_step(deformation, move, h, 10)
 
-    def tresca_step(
-        self, deformation: Floats, move: Floats, h: float, allowed: Floats
-    ) -> tuple[Floats, Floats]:
-        """Least energy with friction limits ``allowed`` (nc,); move (ndof,), trial (nc, dim)."""
+    def frictionless_step(self, deformation: Floats, move: Floats, h: float) -> Floats:
+        """The move (ndof,) of least energy, from a first ``move``."""
 
-        def energy(move: Floats) -> tuple[float, Floats]:
-            trial = self.trial(deformation, move)
-            springs = slider_energy(trial, self.stiffness, allowed)
-            return float(move @ move / (2 * h) - self.free @ move + springs), trial
+        def energy(move: Floats, trial: Floats) -> float:
+            springs = float(np.sum(np.maximum(trial[:, 0], 0.0) ** 2 / (2 * self.stiffness[:, 0])))
+            return float(move @ move / (2 * h) - self.free @ move + springs)
 
-        value, trial = energy(move)
+        trial, imbalance, error = self.find_imbalance(deformation, move, h)
+        value = energy(move, trial)
         for _ in range(60):
-            imbalance = self.imbalance(slider_forces(trial, allowed), move, h)
-            error = float(np.linalg.norm(imbalance))
             if error <= 1e-9 * self.load:
                 break
-            blocks = slider_slope(trial, self.stiffness, allowed)
-            direction = self.newton_direction(blocks, imbalance, h)
+            direction = self.newton_direction(trial, imbalance, h)
             descent = float(imbalance @ direction)
             for halvings in range(20):
                 tried = move + direction / 2**halvings
-                value_tried, trial_tried = energy(tried)
+                found = self.find_imbalance(deformation, tried, h)
+                value_tried = energy(tried, found[0])
                 if value_tried <= value + 1e-4 * descent / 2**halvings + 1e-15 * abs(value):
                     break
             else:
                 break
-            move, value, trial = tried, value_tried, trial_tried
-        return move, trial
+            move, value, (trial, imbalance, error) = tried, value_tried, found
+        return move
 
     def implicit_step(self, deformation: Floats, h: float) -> tuple[Floats, bool]:
         """Move d (ndof,) of one implicit step from deformations xi (nc, dim), whether found."""
         move = np.zeros(self.jacobian.shape[1])
         if not self.friction.any():
-            move, _ = self.tresca_step(deformation, move, h, self.friction)
+            move = self.frictionless_step(deformation, move, h)
             return self.coulomb_step(deformation, move, h, 5)
         found, converged = self.coulomb_step(deformation, move, h, 15)
         return (found, True) if converged else self.friction_step(deformation, h)

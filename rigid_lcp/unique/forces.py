@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import NotConverged
-from rigid_lcp.friction.problem import friction_problem, require_number
+from rigid_lcp.friction.problem import friction_problem
 from rigid_lcp.motion import (
     Motion,
     World,
@@ -22,7 +22,7 @@ from rigid_lcp.motion import (
     replace_rates,
 )
 from rigid_lcp.unique.elastic_limit import elastic_limit
-from rigid_lcp.wear import SolidWear, Wear, WearState, contact_stiffness_worn
+from rigid_lcp.wear import Wear, WearState, contact_stiffness_worn
 
 CLOSED = 1e-6
 """Contacts are closed up to this share of the smallest body's size: time steps leave gaps of their
@@ -30,18 +30,16 @@ accuracy."""
 
 
 def unique_forces(
-    world: World, motion: Motion, loads: ArrayLike | None = None, stiffness: float = 1.0,
-    wear: Wear | None = None, worn: WearState | SolidWear | None = None, tolerance: float = 1e-10,
+    world: World, motion: Motion, loads: ArrayLike | None = None, wear: Wear | None = None,
+    worn: WearState | None = None,
 ) -> ContactForces:  # fmt: skip
     """Forces of elastic contacts at the state ``motion``, the same for any order and solver.
 
-    ``loads`` (n, 3) or (n, 6) [N, N m]; ``stiffness`` of all contacts, only its ratio to others
-    matters; with ``wear`` and ``worn`` that of worn corners is smaller
-    (`rigid_lcp.wear.contact_stiffness_worn`).  For grains at rest or in slow motion: impacts are
-    not in it.  Raises `NotConverged` where the limit is not found (many sliding contacts),
-    `UsageError` for a stiffness that is not above zero.
+    ``loads`` (n, 3) or (n, 6) [N, N m].  All contacts are equally stiff, but with ``wear`` and
+    ``worn`` worn ones less (`rigid_lcp.wear.contact_stiffness_worn`).  For grains at rest or in
+    slow motion: impacts are not in it.  Raises `NotConverged` where the limit is not found (many
+    sliding contacts).
     """
-    stiffness = require_number(stiffness, "stiffness")
     contacts = world.contacts(motion, 0.5 * CLOSED * world.length)
     none = np.zeros((len(contacts), motion.dim))
     if len(contacts) == 0:
@@ -51,10 +49,10 @@ def unique_forces(
     problem = friction_problem(
         space, find_contact_offset(contacts, motion, free), contacts.friction, motion.dim
     )
-    k = np.full(len(contacts), stiffness)
+    k = np.ones(len(contacts))
     if wear is not None and worn is not None:
-        k = contact_stiffness_worn(worn, wear, contacts, stiffness)
-    found = elastic_limit(problem, k, tolerance=tolerance)
+        k = contact_stiffness_worn(worn, wear, contacts)
+    found = elastic_limit(problem, k, tolerance=1e-10)
     if not found.solved:
         raise NotConverged(
             f"the forces of elastic contacts were not found (residual {found.residual:.2g})",

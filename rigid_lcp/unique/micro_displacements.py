@@ -6,7 +6,7 @@ displacements dq on top of their positions, these deform the contacts, and the d
 relaxed, overdamped, until the forces are consistent (eq. 27):
 
     xi = D dq                     (37)  deformations, [m]
-    f = f(xi)                     (38)  `coulomb_spring`, or a law of your own
+    f = f(xi)                     (38)  `rigid_lcp.unique.elastic_network.coulomb_spring`, or yours
     a = A f + b                   (26)  contact accelerations
     D (dq' - dq) = -h a           (40)  repeated until (27) holds
 
@@ -23,8 +23,7 @@ What the paper leaves open, and what is done here:
   are an increasing function of xi, hence without friction or with all contacts sticking, where
   the limit is the weighted minimum-norm solution (`rigid_lcp.unique.elastic_limit`).  Coulomb's law
   where contacts slide is no such function: the state reached can then depend on where the
-  relaxation begins (`coulomb_spring`), so it begins at no displacements, and the forces do depend
-  on the path of a law with memory (`ForceLaw`).
+  relaxation begins, so it begins at no displacements.
 - h is not given: `stable_step` derives it.  The number of iterations grows as the ratio of the
   stiffest to the softest mode; `elastic_limit` finds the same forces without that cost.
 - The last line of eq. 27 lacks ``a_T f_T <= 0``: friction opposes sliding.  The residual has it.
@@ -42,19 +41,11 @@ from scipy.sparse.linalg import splu
 
 from rigid_lcp.errors import ProblemError
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, Status, natural_residual
-from rigid_lcp.unique.held_contacts import find_held_displacement, keep_held_stiffness
+from rigid_lcp.unique.elastic_network import coulomb_spring
 
 Floats = NDArray[np.float64]
-ForceLaw = Callable[[Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
-"""Eq. 38: ``law(deformation, slip, stiffness, friction) -> (force, slip)``.
-
-``deformation`` xi (nc, dim) [m], compression positive, tangents as the force on body a;
-``slip`` (nc, dim) [m], what the law remembers of earlier sliding, zero at first; ``stiffness``
-(nc, dim) [N/m]; ``friction`` (nc,); ``force`` (nc, dim) [N].
-"""
-
-GREATEST_START = 1e4
-"""Pull of the springs over the load, above which a start is not used."""
+ForceLaw = Callable[[Floats, Floats, Floats], Floats]
+"""Eq. 38: ``law(deformation, stiffness, friction) -> force``, see `coulomb_spring`."""
 
 
 @dataclass(frozen=True)
@@ -64,9 +55,7 @@ class ElasticForces:
     r: Floats
     """Forces, (nc * dim,) [N] (impulses [N s] where the problem is one of impulses)."""
     displacement: Floats
-    """Micro-displacements dq, (ndof,) [m, rad]: the next step's start."""
-    slip: Floats
-    """What the force law remembers, (nc, dim) [m]: part of the next step's start."""
+    """Micro-displacements dq, (ndof,) [m, rad]."""
     residual: float
     """Scale-free natural residual of r: how well eqs 26 and 27 hold [-]."""
     status: Status
@@ -78,32 +67,6 @@ class ElasticForces:
     def solved(self) -> bool:
         """The tolerance was reached."""
         return self.status == "solved"
-
-
-def coulomb_spring(
-    deformation: Floats, slip: Floats, stiffness: Floats, friction: Floats
-) -> tuple[Floats, Floats]:
-    """Eq. 38 with springs: ``f_N = k xi_N`` in compression, ``f_T = k_T xi_T`` up to friction.
-
-    A function of xi alone, as eq. 38 is written: it forgets the path that led there.  See
-    `ForceLaw` for shapes and units; ``slip`` comes back as it was (nil, unless you gave some).
-    """
-    trial = stiffness * (deformation - slip)
-    normal = np.maximum(trial[:, 0], 0.0)
-    size = np.linalg.norm(trial[:, 1:], axis=1)
-    allowed = friction * normal
-    share = np.divide(allowed, size, out=np.ones_like(size), where=size > allowed)
-    return np.column_stack([normal, trial[:, 1:] * share[:, None]]), slip
-
-
-def spring(
-    deformation: Floats, slip: Floats, stiffness: Floats, friction: Floats
-) -> tuple[Floats, Floats]:
-    """Eq. 38 of contacts that hold: linear, pulling as well as pushing; ``slip`` is of no effect.
-
-    For contacts that `rigid_lcp.unique.held_contacts` has found to hold in the end.
-    """
-    return stiffness * deformation, slip
 
 
 def contact_stiffness(problem: FrictionProblem, stiffness: ArrayLike) -> Floats:
@@ -196,100 +159,45 @@ def bodies_of(problem: FrictionProblem) -> BodySpace:
 
 
 def micro_displacements(
-    problem: FrictionProblem,
-    stiffness: ArrayLike = 1.0,
-    start: ElasticForces | ArrayLike | None = None,
-    step: float | None = None,
-    tolerance: float = 1e-12,
-    *,
-    law: ForceLaw = coulomb_spring,
-    iterations_max: int = 200_000,
-) -> ElasticForces:
-    """Contact forces by the paper's overdamped relaxation of micro-displacements.
+    problem: FrictionProblem, stiffness: ArrayLike = 1.0, step: float | None = None,
+    tolerance: float = 1e-12, *, law: ForceLaw = coulomb_spring, iterations_max: int = 200_000,
+) -> ElasticForces:  # fmt: skip
+    """Contact forces by the paper's overdamped relaxation of micro-displacements, from none.
 
-    ``problem`` with bodies; ``stiffness`` [N/m], see `contact_stiffness`; ``start``: an earlier
-    answer, or displacements (ndof,) [m, rad]; ``step`` h [s^2] (default: `stable_step`);
-    ``tolerance`` on the scale-free residual; ``law``: eq. 38.  Raises `ProblemError` for a start
-    that does not fit; never for want of convergence: see ``status``.
-
-    With `coulomb_spring` a start changes the cost and not the answer: without friction, and where
-    all contacts hold (`rigid_lcp.unique.held_contacts`; springs are then linear on the way as
-    well), there is one limit; elsewhere with friction the start is left aside.  A law with memory,
-    or of your own, begins at the start as it is.  When not to use it: for many grains, where
+    ``problem`` with bodies; ``stiffness`` [N/m], see `contact_stiffness`; ``step`` h [s^2]
+    (default: `stable_step`); ``tolerance`` on the scale-free residual; ``law``: eq. 38.  Never
+    raises for want of convergence: see ``status``.  When not to use it: for many grains, where
     `rigid_lcp.unique.elastic_limit` has the same answer at a fraction of the cost.
     """
     bodies = bodies_of(problem)
     shape = (problem.contacts, problem.dim)
     k = contact_stiffness(problem, stiffness)
     jacobian, root = mass_free_jacobian(bodies)
-    coast = free_motion(jacobian, problem.offset)
-    free = root @ coast
+    free = root @ free_motion(jacobian, problem.offset)
     if step is None:
         step = stable_step(jacobian, k)
-    displacement, slip = read_start_displacement(start, bodies, shape)
-    if law is coulomb_spring:
-        slip = np.zeros(shape)
-        displacement = keep_small_start(displacement, bodies, k, jacobian, coast)
-    if law is coulomb_spring and problem.friction.any():
-        mode = stiffest_mode(jacobian, k) or 1.0
-        if find_held_displacement(problem, jacobian, coast, k / mode, tolerance) is None:
-            displacement = np.zeros_like(displacement)
-        else:
-            law, k = spring, keep_held_stiffness(k, problem.friction)
+    displacement = np.zeros(len(free))
     lost = problem.offset - bodies.jacobian @ free
 
-    best = (np.inf, np.zeros(shape), displacement, slip)
+    best = (np.inf, np.zeros(shape), displacement)
     for iterations in range(iterations_max + 1):  # noqa: B007 (its last value is reported)
         deformation = -(bodies.jacobian @ displacement).reshape(shape)
-        force, slip = law(deformation, slip, k, problem.friction)
+        force = law(deformation, k, problem.friction)
         motion = bodies.inverse_mass @ (bodies.jacobian.T @ force.ravel()) + free
         acceleration = (bodies.jacobian @ motion + lost).reshape(shape)
         residual = natural_residual(force, acceleration, problem.friction, problem.rho)
         if not residual >= best[0]:
-            best = (residual, force, displacement, slip)
+            best = (residual, force, displacement)
         if residual <= tolerance or not np.isfinite(residual):
             break
         displacement = displacement + step * motion
-    residual, force, displacement, slip = best
+    residual, force, displacement = best
     solved = residual <= tolerance
     message = "" if solved else (
         f"the relaxation stopped after {iterations} steps at a residual of {residual:.2g} "
         f"(asked: {tolerance:.2g})\n  -> use elastic_limit, a smaller step, or ask for less"
     )  # fmt: skip
     return ElasticForces(
-        force.ravel(), displacement, slip, residual, "solved" if solved else "not converged",
-        iterations, message,
+        force.ravel(), displacement, residual, "solved" if solved else "not converged", iterations,
+        message,
     )  # fmt: skip
-
-
-def read_start_displacement(
-    start: ElasticForces | ArrayLike | None, bodies: BodySpace, shape: tuple[int, int]
-) -> tuple[Floats, Floats]:
-    """Displacements (ndof,) and slip (nc, dim) to begin with; raises `ProblemError`."""
-    freedoms = bodies.jacobian.shape[1]
-    slip = np.zeros(shape)
-    if start is None:
-        return np.zeros(freedoms), slip
-    if isinstance(start, ElasticForces):
-        slip = start.slip if start.slip.shape == shape else slip
-        start = start.displacement
-    displacement = np.asarray(start, dtype=float).ravel()
-    if displacement.shape != (freedoms,) or not np.isfinite(displacement).all():
-        raise ProblemError(
-            f"start is not {freedoms} finite displacements, one for each freedom", where="start",
-            remedy="give the displacement of an earlier answer for the same bodies, or none",
-        )  # fmt: skip
-    return displacement, slip
-
-
-def keep_small_start(
-    displacement: Floats, bodies: BodySpace, stiffness: Floats, jacobian: sp.csr_array,
-    free: Floats,
-) -> Floats:  # fmt: skip
-    """The start ``displacement`` (ndof,), or none where its round-off would be left in the forces.
-
-    ``stiffness`` (nc, dim) [N/m]; ``jacobian`` mass free; ``free`` (ndof,), see `free_motion`.
-    """
-    pull = jacobian.T @ (stiffness.ravel() * (bodies.jacobian @ displacement))
-    small = np.linalg.norm(pull) <= GREATEST_START * np.linalg.norm(free)
-    return displacement if small else np.zeros_like(displacement)

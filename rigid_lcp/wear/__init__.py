@@ -1,7 +1,6 @@
 """Wear and breakage of grains."""
 
-from rigid_lcp.wear.breakage import Breakage, Broken, break_scene, breaks, refuse_dust
-from rigid_lcp.wear.corners import (
+from rigid_lcp.wear.abrasion import (
     Wear,
     WearState,
     contact_stiffness_worn,
@@ -10,13 +9,12 @@ from rigid_lcp.wear.corners import (
     step_wear,
     wear_on_after_break,
 )
+from rigid_lcp.wear.breakage import Breakage, Broken, break_scene, breaks, refuse_dust
+from rigid_lcp.wear.cuts import WornShape
 from rigid_lcp.wear.fragmentation import split_body
-from rigid_lcp.wear.polygons import WornPolygon
-from rigid_lcp.wear.polyhedra import WornPolyhedron
-from rigid_lcp.wear.solids import SolidWear
 
 __all__ = [
-    "Breakage", "Broken", "SolidWear", "Wear", "WearState", "WornPolygon", "WornPolyhedron",
-    "break_scene", "breaks", "contact_stiffness_worn", "refuse_dust", "replace_worn", "split_body",
-    "start_wear", "step_wear", "wear_on_after_break",
+    "Breakage", "Broken", "Wear", "WearState", "WornShape", "break_scene", "breaks",
+    "contact_stiffness_worn", "refuse_dust", "replace_worn", "split_body", "start_wear",
+    "step_wear", "wear_on_after_break",
 ]  # fmt: skip

@@ -1,58 +1,226 @@
-"""Abrasion: edges lose volume by the work of friction, and their contacts change gradually.
+"""Abrasion in a run: friction takes corners and edges off grains (section 8).
 
 Archard (J. Appl. Phys. 24 (1953) 981): volume worn per length of sliding is ``K F_N / H``.  With
 ``F_T = mu F_N`` it is a volume per work of friction, ``V = k W`` with ``k = K / (mu H)``
-(Reye 1860).
+(Reye 1860).  The work ``-f_T . s`` over the slip s at a contact is shared alike by the corners and
+edges that make it: all of it goes to a corner on a face, half to each of two crossing edges.  What
+they lose is kept, and cut off now and then (`rigid_lcp.wear.cuts`).
 
-Two effects, both small in one step: the corner loses the worn volume (`rigid_lcp.wear.polygons`),
-and, as section 8 of the paper proposes, "gradually changing the force law (38), which describes
-changing edge properties" (`worn_stiffness`, for `elastic_limit`).
+What stays goes on as part of the rigid motion of the whole; what is worn off takes its momentum
+and energy away.  Faces, discs, spheres, half-spaces and fixed bodies keep their shape.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from sys import float_info
+from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from rigid_lcp.contact import FEATURE_BITS, MOST_EDGES, ContactForces, Contacts, contact_frames
 from rigid_lcp.errors import ShapeError
+from rigid_lcp.motion import Motion, relative_velocity, require_number_in, require_whole_in
+from rigid_lcp.shapes import Polygon, Polyhedron, rotate_back
+from rigid_lcp.wear.cuts import WornShape, place_plane, rub_corners, unworn, wear_shape
+from rigid_lcp.wear.fragmentation import scene_at, take_on_motion
+
+if TYPE_CHECKING:
+    from rigid_lcp.motion import Body, Scene
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
-def friction_work(force: ArrayLike, velocity: ArrayLike, duration: float) -> Floats:
-    """Work that friction takes from the motion at each contact, (nc,) [J], never below zero.
-
-    ``force`` (nc, dim) [N] on body a, ``velocity`` (nc, dim) [m/s] of a against b, both (n, t..)
-    as everywhere; ``duration`` [s].  With impulses [N s] for forces, give a duration of 1.
-    """
-    f, v = np.asarray(force, dtype=float), np.asarray(velocity, dtype=float)
-    return np.maximum(-(f[:, 1:] * v[:, 1:]).sum(axis=1), 0.0) * duration
+STIFFNESS_LEFT = 0.1
+"""Share of the stiffness that stays at a worn corner [-]."""
 
 
-def worn_volume(work: ArrayLike, wear_coefficient: float) -> Floats:
-    """``V = k W`` [m^3] for work (nc,) [J]; ``wear_coefficient`` k [m^3/J] = K / (mu H)."""
-    if not (np.isfinite(wear_coefficient) and wear_coefficient >= 0):
-        raise ShapeError(
-            f"the wear coefficient is {wear_coefficient}", where="abrasion",
-            remedy="give zero or more, in m^3/J (1e-15 to 1e-12 for rock)",
+@dataclass(frozen=True)
+class Wear:
+    """How grains wear in a run."""
+
+    coefficient: float
+    """k of ``V = k W`` [m^3/J], in 2D [m^2 per J/m], the same number (Reye 1860, Archard 1953)."""
+    every: int = 20
+    """Steps between cuts."""
+    volume_scale: float | None = None
+    """V_0 of `contact_stiffness_worn` [m^3, m^2 in 2D]; None: stiffness does not change."""
+
+    def __post_init__(self) -> None:
+        require_number_in(
+            self.coefficient, 0.0, float_info.max, "the wear coefficient", "wear",
+            "give zero or more, in m^3/J (1e-15 to 1e-12 for rock)",
         )  # fmt: skip
-    return wear_coefficient * np.asarray(work, dtype=float)
+        require_whole_in(self.every, 1, "every", "wear", "give 1 or more steps between cuts")
+        if self.volume_scale is not None:
+            remedy = "give a volume above zero, or None"
+            require_number_in(
+                self.volume_scale, 0.0, np.inf, "volume_scale", "wear", remedy, above=True
+            )
 
 
-def worn_stiffness(
-    stiffness: ArrayLike, worn: ArrayLike, volume_scale: float, left: float = 0.1
-) -> Floats:
-    """Stiffness [N/m] of contacts at edges that have lost ``worn`` (nc,) [m^3].
+@dataclass
+class WearState:
+    """What the corners and edges of all grains of a scene have lost; volumes are areas in 2D."""
 
-    ``k = k0 (left + (1 - left) exp(-V / V_0))``: crushed and rounded edges yield more.  The paper
-    gives no law; this is the simplest gradual one, with ``volume_scale`` V_0 [m^3] and the share
-    ``left`` of the stiffness that stays.  ``stiffness`` (nc,) or (nc, dim).
+    grains: list[WornShape | None]
+    """None for a body that does not wear."""
+    volume: float = 0.0
+    """All that has been worn, cut off or not [m^3]."""
+    work: float = 0.0
+    """All work of friction, at features that wear and elsewhere [J]."""
+    mass: float = 0.0
+    """Mass cut off [kg]."""
+    energy: float = 0.0
+    """Kinetic and potential energy that went with it [J]."""
+
+    @property
+    def pending(self) -> Floats:
+        """Volume worn on every plane and not yet cut off [m^3]."""
+        return np.concatenate([np.zeros(0), *(g.pending for g in self.grains if g is not None)])
+
+
+def start_wear(scene: Scene) -> WearState:
+    """The grains of a scene as they are, nothing lost."""
+    return WearState([_unworn(body) for body in scene.bodies])
+
+
+def wear_on_after_break(state: WearState, scene: Scene, body: int) -> WearState:
+    """The state of a scene in which ``body`` was broken and its second part added at the end.
+
+    The parts are wear's new beginning; what the whole had not yet lost is dropped.
     """
-    if not (volume_scale > 0 and 0 < left <= 1):
-        raise ShapeError(
-            f"volume_scale is {volume_scale}, left is {left}", where="worn_stiffness",
-            remedy="give a volume above zero and a share in (0, 1]",
-        )  # fmt: skip
-    k = np.asarray(stiffness, dtype=float)
-    share = left + (1 - left) * np.exp(-np.asarray(worn, dtype=float) / volume_scale)
-    return np.asarray(k * (share[:, None] if k.ndim == 2 else share))
+    grains = list(state.grains)
+    grains[body] = _unworn(scene.bodies[body])
+    return replace(state, grains=[*grains, _unworn(scene.bodies[-1])])
+
+
+def _unworn(body: Body) -> WornShape | None:
+    wears = body.movable and isinstance(body.shape, Polygon | Polyhedron)
+    return unworn(body.shape) if wears else None
+
+
+def find_features(state: WearState, contacts: Contacts, row: int) -> Iterator[tuple[int, Ints]]:
+    """Bodies and corners (one: a corner, two: an edge) of what wears at the contact ``row``."""
+    a, b = int(contacts.body_a[row]), int(contacts.body_b[row])
+    key = int(contacts.key[row])
+    first, second = (key >> FEATURE_BITS) % (1 << FEATURE_BITS), key % (1 << FEATURE_BITS)
+    grain_a, grain_b = state.grains[a], state.grains[b]
+    at_corner = contacts.radius_b[row] == 0
+    if contacts.dim == 2:
+        if grain_a is not None:
+            yield a, np.array([first])
+        elif grain_b is not None and at_corner:  # a disc at a corner of b
+            yield b, np.array([second])
+        return
+    if grain_a is not None:
+        edge = first >= MOST_EDGES
+        yield a, grain_a.shape.edges[first - MOST_EDGES, :2] if edge else np.array([first])
+    if grain_b is None:
+        return
+    edges, faces = grain_b.shape.edges[:, :2], len(grain_b.shape.faces)
+    if contacts.radius_a[row] > 0:  # a sphere: faces, then edges, then corners of b
+        on_sphere = key % (1 << 2 * FEATURE_BITS) - faces
+        if 0 <= on_sphere < len(edges):
+            yield b, edges[on_sphere]
+        elif on_sphere >= len(edges):
+            yield b, np.array([on_sphere - len(edges)])
+    elif second >= MOST_EDGES:
+        yield b, edges[second - MOST_EDGES]
+    elif at_corner:  # corner on corner: named after the faces
+        yield b, np.array([second - faces])
+
+
+def find_slip_work(contacts: ContactForces, before: Motion, after: Motion, h: float) -> Floats:
+    """Work of friction at each contact in a step of ``h`` [s], (nc,) [J], never below zero.
+
+    With the mean of the velocities before and after: what the step's impulses take from the
+    kinetic energy, and the slip of a step that is half drift with one, half with the other.
+    """
+    mean = Motion(
+        0.5 * (before.position + after.position), before.angle,
+        0.5 * (before.velocity + after.velocity), 0.5 * (before.spin + after.spin),
+    )  # fmt: skip
+    slip = relative_velocity(contacts, mean)
+    force = np.einsum("cij,cj->ci", contact_frames(contacts.normal), contacts.force)
+    return np.maximum(-(force[:, 1:] * slip[:, 1:]).sum(axis=1), 0.0) * h
+
+
+def step_wear(
+    state: WearState, wear: Wear, contacts: ContactForces, before: Motion, after: Motion, h: float
+) -> None:
+    """Add the wear of a step of ``h`` [s] between the states ``before`` and ``after``."""
+    if len(contacts) == 0:
+        return
+    work = find_slip_work(contacts, before, after, h)
+    state.work += float(work.sum())
+    rub_grains(state, contacts, wear.coefficient * work)
+
+
+def rub_grains(state: WearState, contacts: Contacts, volume: Floats) -> None:
+    """Add what each contact wears, (nc,) [m^3], to the features that make it."""
+    for row in np.flatnonzero(volume > 0):
+        features = list(find_features(state, contacts, int(row)))
+        for body, corners in features:
+            grain = state.grains[body]
+            if grain is not None:
+                share = float(volume[row]) / len(features)
+                state.grains[body] = rub_corners(grain, corners, share)
+                state.volume += share
+
+
+def contact_stiffness_worn(state: WearState, wear: Wear, contacts: Contacts) -> Floats:
+    """Stiffness of contacts at worn features over that of others, (nc,) [-], for
+    `rigid_lcp.unique.elastic_limit`.
+
+    Section 8 proposes "gradually changing the force law (38), which describes changing edge
+    properties", and gives no law; this is the simplest, as crushed and rounded edges yield more:
+    ``k / k_0 = left + (1 - left) exp(-V / V_0)``, V the most that a feature of the contact has
+    lost.  Without ``wear.volume_scale`` V_0 all stay as they are.
+    """
+    lost = np.zeros(len(contacts))
+    if wear.volume_scale is None:
+        return np.ones(len(contacts))
+    for row in range(len(contacts)):
+        for body, corners in find_features(state, contacts, row):
+            grain = state.grains[body]
+            plane = None if grain is None else place_plane(grain, corners)
+            if grain is not None and plane is not None:
+                lost[row] = max(lost[row], grain.lost[plane] + grain.pending[plane])
+    return np.asarray(STIFFNESS_LEFT + (1 - STIFFNESS_LEFT) * np.exp(-lost / wear.volume_scale))
+
+
+def replace_worn(scene: Scene, motion: Motion, state: WearState) -> tuple[Scene, WearState] | None:
+    """The scene at ``motion`` with the pending wear cut off; None where there is none to cut.
+
+    Grains keep the motion of the whole: velocity ``v + w x d`` where the centre of mass is now.
+    Raises `ShapeError` as `wear_shape` does.
+    """
+    worn = scene_at(scene, motion)
+    made = replace(state, grains=list(state.grains))
+    for k, grain in enumerate(state.grains):
+        try:
+            cut = None if grain is None else wear_shape(grain)
+        except ShapeError as error:
+            raise error.at(f"wear of {scene.called(k)}") from error
+        if cut is None:
+            continue
+        made.grains[k], way = cut
+        before = worn.bodies[k]
+        worn.bodies[k] = after = take_on_motion(before, cut[0].shape, way)
+        made.mass += before.mass - after.mass
+        made.energy += energy_of(before, scene.gravity) - energy_of(after, scene.gravity)
+    if all(new is old for new, old in zip(made.grains, state.grains, strict=True)):
+        return None
+    return worn, made
+
+
+def energy_of(body: Body, gravity: Floats) -> float:
+    """Kinetic and potential energy of a body [J]."""
+    spin = rotate_back(body.angle, body.spin) if len(body.spin) == 3 else body.spin
+    inertia = np.reshape(body.inertia, (len(spin), len(spin)))
+    kinetic = 0.5 * body.mass * body.velocity @ body.velocity + 0.5 * spin @ inertia @ spin
+    return float(kinetic - body.mass * np.asarray(gravity) @ body.position)

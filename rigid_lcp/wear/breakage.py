@@ -2,8 +2,7 @@
 
 Every so many steps each polygon (polyhedron) that moves is judged by the criteria of
 `rigid_lcp.wear.strength`; what is above its strength is split (`rigid_lcp.wear.fragmentation`)
-along the
-line, or in 3D by a plane through the line, that joins its greatest pair of opposite forces.
+along the line, or in 3D by a plane through it, that joins its greatest pair of opposite forces.
 
 Forces are the means over the last step.  In an impact they grow as 1 / h: with breakage, h is the
 duration of impacts.  Where forces are not unique they are those that the solver found, and boxes
@@ -23,15 +22,16 @@ from numpy.typing import NDArray
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import SceneError, ShapeError
 from rigid_lcp.motion import Motion, require_number_in, require_whole_in
+from rigid_lcp.shapes import rotation_matrix
+from rigid_lcp.wear.cuts import find_volume
 from rigid_lcp.wear.fragmentation import split_body
-from rigid_lcp.wear.strength import Break, find_splitting_line, weibull_strength
+from rigid_lcp.wear.strength import Break, find_splitting_line
 
 if TYPE_CHECKING:
     from rigid_lcp.motion import Body, Scene
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
 
 DUST = 100
 """Parts of a grain of the start, on average, beyond which grains break without end: without a size
@@ -51,33 +51,39 @@ class Breakage:
     """Volume (2D: area) below which grains do not break [m^3, m^2]; with zero a run ends with a
     `SceneError` where grains turn to `DUST`."""
     modulus: float | None = None
-    """Weibull's modulus of the size effect, `strength.weibull_strength`; None: none."""
+    """Weibull's modulus m of the size effect [-], 2 to 4 for ballast; None: none."""
     reference_volume: float | None = None
     """[m^3, m^2]"""
     unique: bool = False
     """Judge by the forces of elastic contacts (`rigid_lcp.unique.forces`), impacts left out."""
 
     def __post_init__(self) -> None:
-        positive, steps = "give a tension above zero", "give 1 or more steps between judgements"
-        require_number_in(
-            self.strength, 0.0, float_info.max, "strength", "breakage", positive, above=True
-        )
+        for value, what in (
+            (self.strength, "strength"),
+            (self.modulus, "modulus"),
+            (self.reference_volume, "reference_volume"),
+        ):
+            if value is not None or what == "strength":
+                remedy = f"give a {what} above zero"
+                require_number_in(value, 0.0, float_info.max, what, "breakage", remedy, above=True)
+        steps, volume = "give 1 or more steps between judgements", "give a volume, or zero"
         require_whole_in(self.every, 1, "every", "breakage", steps)
-        require_number_in(
-            self.smallest, 0.0, np.inf, "smallest", "breakage", "give a volume, or zero"
-        )
+        require_number_in(self.smallest, 0.0, np.inf, "smallest", "breakage", volume)
         if (self.modulus is None) != (self.reference_volume is None):
             raise ShapeError(
                 "a size effect needs both modulus and reference_volume", where="breakage",
                 remedy="give both or neither",
             )  # fmt: skip
-        self.draw_strength(1.0)
 
     def draw_strength(self, volume: float) -> float:
-        """Tension that a grain of ``volume`` [m^3, m^2] bears [Pa]."""
+        """Tension [Pa] that 37 % (1 / e) of the grains of ``volume`` [m^3, m^2] survive.
+
+        The chance to survive a tension S in a volume V is ``exp(-(V / V0) (S / S0)^m)`` (Weibull
+        1951; for grains McDowell and Bolton, Geotechnique 48 (1998) 667).
+        """
         if self.modulus is None or self.reference_volume is None:
             return self.strength
-        return weibull_strength(self.strength, volume, self.reference_volume, self.modulus)
+        return float(self.strength * (self.reference_volume / volume) ** (1 / self.modulus))
 
 
 @dataclass(frozen=True)
@@ -107,17 +113,11 @@ def gather_forces(contacts: ContactForces, body: int) -> tuple[Floats, Floats]:
     )
 
 
-def grain_volume(body: Body) -> float:
-    """Volume [m^3], in 2D area [m^2], of a polygon or polyhedron."""
-    return float(body.shape.area if body.shape.dim == 2 else body.shape.volume)
-
-
 def breaks(
     scene: Scene, motion: Motion, contacts: ContactForces, breakage: Breakage
 ) -> list[tuple[int, Break]]:
     """The grains that break under their contact forces, and where, by their number."""
     found = []
-    kind = "brazilian" if scene.dim == 2 else "point-load"
     carries = contacts.normal_force > 0
     touched = np.bincount(
         np.concatenate([contacts.body_a[carries], contacts.body_b[carries]]),
@@ -127,14 +127,12 @@ def breaks(
         body = scene.bodies[k]
         if not body.movable or not hasattr(body.shape, "vertices"):
             continue
-        volume = grain_volume(body)
+        volume = find_volume(body.shape)
         if volume < breakage.smallest:
             continue
         points, forces = gather_forces(contacts, int(k))
-        line = find_splitting_line(
-            points, forces, motion.position[k], volume, breakage.draw_strength(volume),
-            "brazilian" if kind == "brazilian" else "point-load",
-        )  # fmt: skip
+        strength = breakage.draw_strength(volume)
+        line = find_splitting_line(points, forces, motion.position[k], volume, strength)
         if line is not None:
             found.append((int(k), line))
     return found
@@ -159,7 +157,7 @@ def break_scene(scene: Scene, motion: Motion, body: int, line: Break) -> Scene |
     """
     direction = line.direction
     if scene.dim == 3:  # the plane holds the line and, as far as it can, the least inertia's axis
-        direction = _plane_normal(scene.bodies[body], motion, body, direction)
+        direction = find_plane_normal(scene.bodies[body], motion.angle[body], direction)
     for point in (line.point, motion.position[body]):
         try:
             return split_body(scene, motion, body, point, direction)
@@ -168,12 +166,9 @@ def break_scene(scene: Scene, motion: Motion, body: int, line: Break) -> Scene |
     return None
 
 
-def _plane_normal(body: Body, motion: Motion, number: int, along: Floats) -> Floats:
+def find_plane_normal(body: Body, quaternion: Floats, along: Floats) -> Floats:
     """Normal of the plane through the line: across it, along the longest axis left (3D)."""
-    from rigid_lcp.shapes import rotation_matrix
-
-    frame = rotation_matrix(motion.angle[number : number + 1])[0]
-    arms = body.shape.vertices @ frame.T
+    arms = body.shape.vertices @ rotation_matrix(quaternion).T
     across = arms - np.outer(arms @ along, along)
     _, vectors = np.linalg.eigh(across.T @ across)
     normal = vectors[:, -1] - (vectors[:, -1] @ along) * along

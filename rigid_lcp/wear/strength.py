@@ -14,20 +14,14 @@ of a grain of the same mean stress; that is a criterion, not the stress field of
 for tangential forces it is no more than that for discs either.
 In 3D: ``F / d^2`` of the greatest pair of opposite forces (Jaeger, Int. J. Rock Mech. Min. Sci. 4
 (1967) 219; the usual measure of the strength of ballast stones).
-
-Size effect: the chance to survive a tension S in a volume V is ``exp(-(V / V0) (S / S0)^m)``
-(Weibull 1951; for grains McDowell and Bolton, Geotechnique 48 (1998) 667).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from rigid_lcp.errors import ShapeError
+from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
@@ -46,97 +40,64 @@ class Break:
     """[Pa]"""
 
 
-def mean_stress(points: ArrayLike, forces: ArrayLike, centre: ArrayLike, volume: float) -> Floats:
+def mean_stress(points: Floats, forces: Floats, centre: Floats, volume: float) -> Floats:
     """Mean stress of a grain, symmetric part, (dim, dim) [Pa], tension positive.
 
     ``points`` (n, dim) [m] and ``forces`` (n, dim) [N] on the grain; ``centre`` of mass (dim,);
-    ``volume`` [m^3], in 2D area times thickness.  Raises `ShapeError` for no volume.
+    ``volume`` [m^3], in 2D area times thickness.
     """
-    if not volume > 0:
-        raise ShapeError(
-            f"the volume of the grain is {volume}", where="mean_stress",
-            remedy="give m^3 above zero, in 2D area times thickness",
-        )  # fmt: skip
-    arm = np.atleast_2d(np.asarray(points, float)) - np.asarray(centre, float)
-    stress = np.atleast_2d(np.asarray(forces, float)).T @ arm / volume
+    stress = forces.T @ (points - centre) / volume
     return np.asarray((stress + stress.T) / 2)
 
 
-def brazilian_tension(stress: ArrayLike) -> float:
+def brazilian_tension(stress: Floats) -> float:
     """Greatest tension [Pa] at the centre of a disc with mean ``stress`` (2, 2), see the module.
 
     Negative where even that is compression.
     """
-    least, most = np.linalg.eigvalsh(np.asarray(stress, dtype=float))
+    least, most = np.linalg.eigvalsh(stress)
     return float((3 * most - least) / 2)
 
 
-def find_opposite_pair(points: ArrayLike, forces: ArrayLike) -> tuple[int, int, float] | None:
+def find_opposite_pair(points: Floats, forces: Floats) -> tuple[int, int, float] | None:
     """The two contacts that squeeze the grain most between them, and by how much [N].
 
     The squeeze of a pair is the lesser of the two forces' components along the line that joins
     them, towards each other.  None where no pair squeezes.
     """
-    place = np.asarray(points, dtype=float)
-    push = np.asarray(forces, dtype=float)
     best: tuple[int, int, float] | None = None
-    for i in range(len(place)):
-        for j in range(i + 1, len(place)):
-            apart = place[j] - place[i]
+    for i in range(len(points)):
+        for j in range(i + 1, len(points)):
+            apart = points[j] - points[i]
             distance = float(np.linalg.norm(apart))
             if distance == 0:
                 continue
-            squeeze = min(float(push[i] @ apart), -float(push[j] @ apart)) / distance
+            squeeze = min(float(forces[i] @ apart), -float(forces[j] @ apart)) / distance
             if squeeze > (best[2] if best else 0.0):
                 best = (i, j, squeeze)
     return best
 
 
-def weibull_strength(
-    strength: float, volume: float, reference_volume: float, modulus: float,
-    survival: float = np.exp(-1.0),
-) -> float:  # fmt: skip
-    """Tension [Pa] that a grain of ``volume`` survives with the chance ``survival``.
-
-    ``strength`` [Pa]: that of ``reference_volume`` [m^3] at a chance of 1 / e (37 %); ``modulus``
-    m [-], 2 to 4 for ballast.  A random number as ``survival`` gives each grain its own strength.
-    """
-    if not (volume > 0 and reference_volume > 0 and modulus > 0 and 0 < survival < 1):
-        raise ShapeError(
-            f"volumes {volume}, {reference_volume}, modulus {modulus}, survival {survival}",
-            where="weibull_strength", remedy="all above zero, and survival below one",
-        )  # fmt: skip
-    return float(strength * (-np.log(survival) * reference_volume / volume) ** (1 / modulus))
-
-
 def find_splitting_line(
-    points: ArrayLike, forces: ArrayLike, centre: ArrayLike, volume: float, strength: float,
-    kind: Literal["brazilian", "point-load"] = "brazilian",
-) -> Break | None:  # fmt: skip
+    points: Floats, forces: Floats, centre: Floats, volume: float, strength: float
+) -> Break | None:
     """Whether a grain breaks under its contact forces, and along which line; None if it holds.
 
     ``points`` (n, dim) [m], ``forces`` (n, dim) [N] on the grain, ``centre`` (dim,) [m],
-    ``volume`` [m^3] (2D: area times thickness), ``strength`` [Pa].  ``brazilian``: 2D, from the
-    mean stress; ``point-load``: ``F / d^2`` of the greatest pair, for 3D.  The crack runs through
-    the greatest pair of opposite forces; in 3D, where a line does not fix a plane, the plane
-    through it is the caller's choice.
+    ``volume`` [m^3] (2D: area times thickness), ``strength`` [Pa]: Brazilian in 2D, point load in
+    3D.  The crack runs through the greatest pair of opposite forces; in 3D, where a line does not
+    fix a plane, the plane through it is the caller's choice.
     """
-    place = np.asarray(points, dtype=float)
-    pair = find_opposite_pair(place, forces)
+    pair = find_opposite_pair(points, forces)
     if pair is None:
         return None
     i, j, squeeze = pair
-    apart = place[j] - place[i]
+    apart = points[j] - points[i]
     distance = float(np.linalg.norm(apart))
-    if kind == "brazilian":
-        if place.shape[1] != 2:
-            raise ShapeError(
-                "the Brazilian criterion is for 2D", where="splitting_line",
-                remedy="use kind='point-load' in 3D",
-            )  # fmt: skip
-        tension = brazilian_tension(mean_stress(place, forces, centre, volume))
+    if points.shape[1] == 2:
+        tension = brazilian_tension(mean_stress(points, forces, centre, volume))
     else:
         tension = squeeze / distance**2
     if tension < strength:
         return None
-    return Break((place[i] + place[j]) / 2, apart / distance, tension, strength)
+    return Break((points[i] + points[j]) / 2, apart / distance, tension, strength)

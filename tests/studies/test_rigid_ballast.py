@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp.motion.world import Scene, make_world
-from rigid_lcp.scene.pouring import place_grains
+from rigid_lcp.scene.file import place_grains
 from rigid_lcp.scene.types import Grains
 from rigid_lcp.shapes.half_space import HalfSpace
 from rigid_lcp.shapes.polygon import Polygon

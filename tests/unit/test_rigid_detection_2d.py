@@ -7,15 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
 from rigid_lcp.contact.arrays import Contacts, contact_rows
-from rigid_lcp.contact.detection_plane import detect_2d, shapes_2d, widest_face
+from rigid_lcp.contact.detection_plane import detect_2d, shapes_2d
 from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs, place_shapes
 from rigid_lcp.errors import Overlapping, SceneError
-from rigid_lcp.motion.world import Scene
-from rigid_lcp.scene.simulation import Simulation
-from rigid_lcp.shapes.disc import Disc
-from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.polygon import Polygon
 
 BOX = Polygon.rectangle(1.0, 1.0)
 
@@ -46,13 +42,6 @@ def test_two_faces_make_two_contacts(shift: float) -> None:
     np.testing.assert_allclose(contacts.normal[:, 1], upward, atol=1e-15)
     if shift:
         assert sorted(contacts.body_a) == [0, 1]
-
-
-def test_wide_on_narrow_and_the_reverse() -> None:
-    wide = Polygon.rectangle(3.0, 1.0)
-    for shapes in ([BOX, wide], [wide, BOX]):
-        contacts = found(shapes, [(0, 0), (0, 1)], [0, 0])
-        np.testing.assert_allclose(np.sort(contacts.point[:, 0]), [-0.5, 0.5])
 
 
 def test_corner_on_face() -> None:
@@ -126,23 +115,6 @@ def test_broad_phase_finds_every_near_pair(seed: int) -> None:
     near = (x0[:, None] <= x1) & (x0 <= x1[:, None]) & (y0[:, None] <= y1) & (y0 <= y1[:, None])
     expected = np.argwhere(np.triu(near, 1))
     np.testing.assert_array_equal(near_pairs(arrays.kind, boxes, arrays.movable), expected)
-
-
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=30, deadline=None)
-def test_widest_face_is_the_separation(seed: int) -> None:
-    """Against all vertices over all faces in plain NumPy."""
-    _, places, angles = heap(seed, 2)
-    polygons = [Polygon.regular(5, 1.0), Polygon.regular(3, 0.7)]
-    arrays = shapes_2d(polygons, np.ones(2, bool))
-    vertices, normals = place_shapes(
-        arrays.kind, arrays.first, arrays.vertices, arrays.normals, places, angles
-    )
-    own, outward, other = vertices[:5], normals[:5], vertices[5:]
-    heights = ((other[None] - own[:, None]) * outward[:, None]).sum(axis=2).min(axis=1)
-    face, separation = widest_face(own, outward, other)
-    assert separation == pytest.approx(heights.max(), abs=1e-14)
-    assert face == heights.argmax()
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-3, 3), st.floats(-100, 100))

@@ -7,23 +7,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rigid_lcp import Disc, HalfSpace, Polyhedron, Sphere, box
 from rigid_lcp.contact.detection_space import place_solids, shapes_3d
-from rigid_lcp.contact.manifold import MOST
 from rigid_lcp.contact.near_pairs import bound_shapes, near_pairs
 from rigid_lcp.contact.placed_solids import MOST_EDGES
 from rigid_lcp.errors import SceneError
-from rigid_lcp.shapes.disc import Disc
-from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.polyhedron import Polyhedron, box
 from rigid_lcp.shapes.rotations import (
     quaternion_of_rotation,
     quaternion_product,
     rotate,
     unit_quaternion,
 )
-from rigid_lcp.shapes.sphere import Sphere
-from rigid_lcp.shapes.stones import ballast_stone
-from tests.rigid_solids import CUBE, FLOOR, UPRIGHT, contacts, near_pair, sorted_points
+from tests.rigid_solids import (
+    CUBE,
+    FLOOR,
+    UPRIGHT,
+    ballast_stone,
+    contacts,
+    near_pair,
+    sorted_points,
+)
 
 # --- closed forms ---
 
@@ -77,18 +80,6 @@ def test_a_shared_octagon_keeps_its_corners() -> None:
     assert np.allclose(np.diff(angle), np.pi / 4)
 
 
-def test_many_corners_are_thinned_out_evenly() -> None:
-    """A face of 40 corners on a floor keeps `MOST`: none is more than 0.1 of the radius outside."""
-    around = 2 * np.pi * np.arange(40) / 40
-    ring = np.column_stack([np.cos(around), np.sin(around)])
-    drum = Polyhedron(np.vstack([np.column_stack([ring, np.full(40, z)]) for z in (0, 1)]))
-    found = contacts([drum, FLOOR], [[0, 0, 0.5], [0, 0, 0]])
-    assert len(found) == MOST
-    angle = np.sort(np.arctan2(found.point[:, 1], found.point[:, 0]))
-    widest = np.diff(angle, append=angle[0] + 2 * np.pi).max()
-    assert 1 - np.cos(widest / 2) < 0.1
-
-
 @settings(max_examples=30, deadline=None)
 @given(st.floats(-4.0, -1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_tilted_faces_have_the_gap_of_each_corner(digits: float, x: float, y: float) -> None:
@@ -121,6 +112,45 @@ def test_crossing_edges_have_the_cross_product_as_normal() -> None:
     assert np.allclose(found.normal[0], -normal, atol=1e-15)
     assert found.gap[0] == pytest.approx(gap, abs=1e-15)
     assert np.allclose(found.point[0], top + 0.1 * u, atol=1e-14)
+
+
+# --- spheres ---
+
+
+@pytest.mark.parametrize(
+    ("centre", "normal", "radius_b"),
+    [
+        ([0.1, 0.2, 0.8], [0, 0, 1], np.inf),  # over a face
+        ([0.7, 0.1, 0.7], [2**-0.5, 0, 2**-0.5], 0.0),  # over an edge
+        ([0.6, 0.6, 0.6], [3**-0.5] * 3, 0.0),  # over a corner
+        ([0.1, 0.0, 0.4], [0, 0, 1], np.inf),  # centre inside
+    ],
+)
+def test_sphere_on_box(centre: list[float], normal: list[float], radius_b: float) -> None:
+    nearest = np.clip(centre, -0.5, 0.5)
+    distance = np.linalg.norm(centre - nearest) if max(centre) > 0.5 else centre[2] - 0.5
+    found = contacts([CUBE, Sphere(0.3)], [[0, 0, 0], centre], margin=0.5)
+    assert (found.body_a[0], found.body_b[0]) == (1, 0)
+    assert np.allclose(found.normal[0], normal, atol=1e-15)
+    assert found.gap[0] == pytest.approx(distance - 0.3, abs=1e-15)
+    assert np.allclose(found.point[0], np.array(centre) - 0.3 * found.normal[0])
+    assert (found.radius_a[0], found.radius_b[0]) == (0.3, radius_b)
+
+
+def test_spheres_and_floor() -> None:
+    """Eq. 8, and a sphere over a plane."""
+    shapes = [Sphere(0.5), Sphere(0.25), FLOOR]
+    found = contacts(shapes, [[0, 0, 0.5], [0.45, 0.6, 0.5], [0, 0, 0]])
+    assert list(zip(found.body_a.tolist(), found.body_b.tolist(), strict=True)) == [(0, 1), (0, 2)]
+    assert np.allclose(found.gap, [0.0, 0.0], atol=1e-15)
+    assert np.allclose(found.normal, [[-0.6, -0.8, 0.0], [0.0, 0.0, 1.0]])
+    assert found.radius_b.tolist() == [0.25, np.inf]
+
+
+def test_spheres_in_one_place_part_along_z() -> None:
+    found = contacts([Sphere(0.5), Sphere(0.5)], np.zeros((2, 3)))
+    assert np.array_equal(found.normal, [[0.0, 0.0, 1.0]])
+    assert found.gap[0] == -1.0
 
 
 # --- symmetries and names ---

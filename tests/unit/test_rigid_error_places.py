@@ -2,45 +2,40 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rigid_lcp import Disc, Polygon, Polyhedron, Scene, Simulation, Sphere, box
+import rigid_lcp
+from rigid_lcp import Disc, Polygon, Polyhedron, Scene, Simulation, Sphere, box, errors
 from rigid_lcp.errors import NotConverged, RigidError, SceneError, ShapeError, UsageError
-from rigid_lcp.shapes.stones import cut
 from tests.rigid_runs import SLIDING_BLOCK
 from trackbed import command
 
+NAMES = {
+    name for name, kind in vars(errors).items()
+    if isinstance(kind, type) and issubclass(kind, RigidError)
+}  # fmt: skip
 NEAR = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1e-10, 0], [1e-10, 0, 1]]
 """Corners 0 and 4 nearly the same, so that faces do not meet edge to edge."""
 
 
-@pytest.mark.parametrize("offset", [9.0, -9.0])
-def test_a_plane_that_misses_says_how_far_to_move_it(offset):
-    """Corners of a unit cube at +-1/2; the normal is twice a unit vector, so the plane is at 4.5 m.
-
-    By the way that the remedy names it goes through the centre of mass, and cuts.
-    """
-    cube, normal = box(1.0, 1.0, 1.0), np.array([2.0, 0.0, 0.0])
-    with pytest.raises(ShapeError, match=r"do.* not cut .* corners lie \S+ to \S+ m") as raised:
-        cut(cube, normal, offset)
-    moved = float(raised.value.remedy.split("by ")[1].split(" m")[0])
-    assert moved == pytest.approx(-offset / 2, rel=1e-3)
-    parts = cut(cube, normal, offset + 2 * moved)
-    assert [part.volume for part in parts] == pytest.approx([0.5, 0.5], rel=1e-3)
-
-
 @pytest.mark.parametrize("dim", [2, 3])
-def test_a_line_or_plane_that_misses_names_the_body(dim):
+def test_a_line_or_plane_that_misses_names_the_body_and_how_far_to_move_it(dim):
+    """By the way that the remedy names it goes through the centre of mass."""
     scene = Scene(dim=dim)
     shape = Polygon.rectangle(1, 1) if dim == 2 else box(1, 1, 1)
-    scene.add(shape, density=1.0, name="stone")
-    place = np.zeros(dim)
-    place[0] = 9.0
-    with pytest.raises(ShapeError, match=r"^stone, (split|cut): .*\n  -> move the (line|plane)"):
-        Simulation(scene).fragment(0, (place, np.eye(dim)[1 if dim == 2 else 0]))
+    scene.add(shape, density=1.0, name="stone", position=np.ones(dim))
+    place = np.full(dim, 5.5)
+    run, along = Simulation(scene), np.eye(dim)[1 if dim == 2 else 0]
+    words = r"^stone: .* misses .* corners lie \S+ to \S+ m from it\n  -> move it"
+    with pytest.raises(ShapeError, match=words) as raised:
+        run.fragment(0, (place, 2 * along))
+    place[0] += (-1.0 if dim == 2 else 1.0) * float(raised.value.remedy.split()[6])
+    run.fragment(0, (place, 2 * along))
+    assert run.world.mass == pytest.approx([0.5, 0.5], rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -102,3 +97,15 @@ def test_a_scene_file_s_huge_load_and_gravity_are_named_by_body_and_key(
     scene.write_text("gravity = [0, -1e200]\n" + SLIDING_BLOCK, encoding="utf-8")
     assert command.main(["rigid", str(scene), "--dry-run"]) == 3
     assert "gravity.1: must be at least -1e+18, not -1e+200" in capsys.readouterr().err
+
+
+def test_every_error_has_a_remedy() -> None:
+    """Each call of an error's class names its ``remedy`` (or passes keywords on)."""
+    calls = {
+        f"{path.name}:{node.lineno}": {each.arg for each in node.keywords}
+        for path in Path(rigid_lcp.__file__).parent.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in NAMES
+    }
+    assert len(calls) > 100
+    assert [place for place, named in calls.items() if not named & {"remedy", None}] == []

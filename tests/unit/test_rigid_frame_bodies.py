@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigid_lcp.errors import SceneError
-from rigid_lcp.report.page import draw_frames
+from rigid_lcp.report.page import draw_movie
 from rigid_lcp.scene.file import scene_read
 from rigid_lcp.scene.frame_bodies import pack_bodies
 from rigid_lcp.scene.run import left_out, scene_run, simulation_of, summary_of
@@ -30,7 +30,7 @@ def test_frames_of_changed_bodies_are_drawn(tmp_path):
     scene_run(file, run, folder, resume=False, progress=lambda *_: None)
     assert run.broken
     assert run.worn.volume > 0
-    assert len(draw_frames(folder, scene, "broken")) == 7
+    assert len(draw_movie(folder, scene, "broken")) == 7
 
 
 def test_a_run_that_asks_for_neither_keeps_no_bodies(tmp_path):
@@ -67,6 +67,10 @@ def test_wear_in_space_is_kept_and_named(tmp_path):
     summary = summary_of(file, scene, run, folder)
     assert summary["worn"] == run.worn.volume > 0
     assert summary["worn_mass"] == pytest.approx(2700 * arrays["wear_lost"].sum())
+    last = folder.frames()[-1]  # of corners that wore in another way: computed again
+    with np.load(last) as frame:
+        np.savez(last, **{**frame, "wear_counts": np.zeros((3, 2))})
+    assert last not in folder.frames()
 
 
 def test_bodies_of_a_frame_are_numbered_as_they_broke(tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation, solve_friction
+from rigid_lcp import Disc, HalfSpace, Polygon, Scene, Simulation
 
 Floats = NDArray[np.float64]
 
@@ -142,18 +142,3 @@ def test_a_symmetric_heap_stays_symmetric():
     mirrored = [0, 3, 2, 1, 5, 4]
     np.testing.assert_allclose(run.positions[mirrored] * [-1, 1], run.positions, atol=1e-12)
     np.testing.assert_allclose(-run.spins[mirrored], run.spins, atol=1e-9)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_a_contact_counted_twice_changes_no_motion(dim):
-    """Forces of the two share what the one had: ``J^T r`` is the same where motion is unique."""
-    rng = np.random.default_rng(5)
-    jacobian = rng.normal(size=(dim, 6))
-    q = np.array([-1.0, 0.4, -0.2])[:dim]
-    single = solve_friction(jacobian @ jacobian.T, q, 0.3, dim)
-    twice = np.vstack([jacobian, jacobian])
-    double = solve_friction(twice @ twice.T, np.concatenate([q, q]), 0.3, dim)
-    assert single.solved
-    assert double.solved
-    np.testing.assert_allclose(double.r.reshape(2, dim).sum(axis=0), single.r, atol=1e-10)
-    np.testing.assert_allclose(double.u, np.concatenate([single.u, single.u]), atol=1e-10)

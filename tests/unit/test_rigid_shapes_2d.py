@@ -7,12 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rigid_lcp.errors import SceneError, ShapeError, UsageError
-from rigid_lcp.motion.world import Scene, make_world
-from rigid_lcp.scene.simulation import Simulation
-from rigid_lcp.shapes.disc import Disc
-from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.polygon import Polygon
+from rigid_lcp import HalfSpace, Polygon, Scene
+from rigid_lcp.errors import ShapeError
+from rigid_lcp.motion.world import make_world
 
 SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 
@@ -53,14 +50,18 @@ def test_far_from_the_origin(seed: int) -> None:
 def test_normals_point_outwards() -> None:
     polygon = Polygon([(0, 0), (2, 0), (0, 1)])
     middle = 0.5 * (polygon.vertices + np.roll(polygon.vertices, -1, axis=0))
-    assert ((middle * polygon.face_normals).sum(axis=1) > 0).all()
-    np.testing.assert_allclose(np.linalg.norm(polygon.face_normals, axis=1), 1.0)
+    assert ((middle * polygon.normals).sum(axis=1) > 0).all()
+    np.testing.assert_allclose(np.linalg.norm(polygon.normals, axis=1), 1.0)
 
 
 @pytest.mark.parametrize(
     ("vertices", "what", "remedy"),
     [
         (SQUARE[::-1], "clockwise", "reverse"),
+        ("ab", "not numbers", "metres"),
+        ([(0, 0), (1, 1), (1, 0), (0, 1)], "crosses itself", "convex"),
+        (np.ma.masked_equal(SQUARE, 1), "masked", "metres"),
+        (np.array(SQUARE) * 1j, "complex", "metres"),
         ([(0, 0), (2, 0), (0.5, 0.5), (0, 2)], "not convex", "hull"),
         ([(0, 0), (1, 0), (2, 0), (1, 1)], "on a line", "leave it out"),
         ([(0, 0), (1, 1), (2, 2)], "on a line", "area"),
@@ -77,47 +78,10 @@ def test_polygon_refused(vertices: object, what: str, remedy: str) -> None:
     assert remedy in error.value.remedy
 
 
-def test_others_refused() -> None:
-    for radius in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ShapeError, match="radius"):
-            Disc(radius)
-    with pytest.raises(ShapeError, match="normal"):
-        HalfSpace((0, 0))
-    with pytest.raises(ShapeError, match="offset"):
-        HalfSpace((0, 1), np.nan)
-    with pytest.raises(ShapeError, match="not numbers"):
-        Polygon("square")  # type: ignore[arg-type]
-
-
 def test_half_space_is_normalised() -> None:
     floor = HalfSpace((0, 3.0), 2.0)
     np.testing.assert_array_equal(floor.normal, [0, 1])
     assert (floor.dim, HalfSpace((0, 0, 1)).dim) == (2, 3)
-
-
-def test_scene_refused() -> None:
-    scene = Scene(2)
-    box = Polygon.rectangle(1, 1)
-    with pytest.raises(SceneError, match="density"):
-        scene.add(box)
-    with pytest.raises(SceneError, match="density"):
-        scene.add(box, density=-1.0)
-    with pytest.raises(SceneError, match="friction"):
-        scene.add(box, density=1.0, friction=-0.1)
-    with pytest.raises(SceneError, match="restitution"):
-        scene.add(box, density=1.0, restitution=1.1)
-    with pytest.raises(SceneError, match="position"):
-        scene.add(box, density=1.0, position=(0, 0, 0))
-    with pytest.raises(SceneError, match="2 dimensions"):
-        scene.add(HalfSpace((0, 0, 1)))
-    with pytest.raises(SceneError, match="dim"):
-        Scene(4)
-    with pytest.raises(SceneError, match="no body can move"):
-        make_world(scene)
-    scene.add(box, density=1.0)
-    for wrong in ({"method": "euler"}, {"step": 0.0}, {"step": np.nan}):
-        with pytest.raises(UsageError):
-            Simulation(scene, **wrong)  # type: ignore[arg-type]
 
 
 def test_body_stays_where_its_vertices_were_given() -> None:

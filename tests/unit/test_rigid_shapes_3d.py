@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from rigid_lcp import Polyhedron, Sphere, box
 from rigid_lcp.errors import ShapeError
-from rigid_lcp.shapes.polyhedron import Polyhedron, box
-from rigid_lcp.shapes.sphere import Sphere
 
 
 def test_faces_of_a_box_are_rectangles() -> None:

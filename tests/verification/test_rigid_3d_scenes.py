@@ -5,14 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rigid_lcp import HalfSpace, Polyhedron, Scene, Simulation, Sphere, box
 from rigid_lcp.motion.gyroscopic import Floats, angular_momentum
-from rigid_lcp.motion.world import Scene
-from rigid_lcp.scene.simulation import Simulation
-from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.polyhedron import Polyhedron, box
 from rigid_lcp.shapes.rotations import quaternion_of_rotation, rotate, unit_quaternion
-from rigid_lcp.shapes.sphere import Sphere
-from rigid_lcp.shapes.stones import ballast_stone
+from tests.rigid_solids import ballast_stone
 
 G = 9.81
 FLOOR = HalfSpace([0.0, 0.0, 1.0], 0.0)
@@ -23,16 +19,6 @@ def on_floor(shape: object, **state: object) -> Simulation:
     scene.add(shape, density=2000.0, **state)  # type: ignore[arg-type]
     scene.add(FLOOR)
     return Simulation(scene)
-
-
-@pytest.mark.long
-def test_box_at_rest_stays_and_weighs_what_it_should() -> None:
-    run = on_floor(box(1.0, 0.6, 0.4), position=[0.0, 0.0, 0.2], friction=0.5)
-    run.advance(0.3)
-    assert np.abs(run.positions[0] - [0.0, 0.0, 0.2]).max() < 1e-14
-    assert np.abs(run.velocities).max() < 1e-14
-    weight = 2000.0 * 0.24 * G
-    assert run.contacts.normal_force.sum() == pytest.approx(weight, rel=1e-12)
 
 
 @pytest.mark.parametrize("corners", [5, 8])
@@ -87,44 +73,7 @@ def test_box_on_incline_slides_below_the_angle_of_friction(excess: float, azimut
     assert np.allclose(run.positions[0] - 0.25 * normal, wanted, rtol=0, atol=G * 1e-12)
 
 
-@pytest.mark.long
-def test_a_kicked_box_slides_straight_in_every_direction() -> None:
-    """A box pushed along the floor stops after v^2 / (2 mu g), straight ahead."""
-    for azimuth in (0.0, 0.7, np.pi / 4):
-        ahead = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-        turn = quaternion_of_rotation([0.0, 0.0, azimuth])
-        run = on_floor(box(1.0, 1.0, 0.1), position=[0.0, 0.0, 0.05], friction=0.4,
-                       angle=turn, velocity=0.5 * ahead)  # fmt: skip
-        run.advance(0.14)  # it stops after v / (mu g) = 0.127 s
-        reached = run.positions[0] - [0.0, 0.0, 0.05]
-        # the last step of h = 1e-3 in which it stops: mu g h^2 / 8
-        assert reached @ ahead == pytest.approx(0.25 / (2 * 0.4 * G), abs=0.4 * G * 1e-6)
-        assert np.linalg.norm(reached - (reached @ ahead) * ahead) < 1e-10
-
-
 # --- spheres ---
-
-
-def test_a_sphere_with_backspin_rolls_as_the_textbook_says() -> None:
-    """Friction mu g against the first slip s0 until it is gone, at t = 2 |s0| / (7 mu g).
-
-    Then the sphere rolls with ``v = (5 v0 - 2 w0 x x) / 7``, x from the centre to the floor: the
-    angular momentum about the contact is kept.  With oblique backspin the path is a parabola.
-    """
-    radius, v0 = 0.1, np.array([1.0, 0.2, 0.0])
-    spin0 = np.array([3.0, -10.0, 7.0])
-    run = on_floor(Sphere(radius), position=[0.0, 0.0, radius], velocity=v0, spin=spin0,
-                   friction=0.5)  # fmt: skip
-    slip = v0 + np.cross(spin0, [0.0, 0.0, -radius])
-    duration = 2 * np.linalg.norm(slip) / (7 * 0.5 * G)
-    run.advance(0.5 * duration)
-    wanted = v0 - 0.5 * G * 0.5 * duration * slip / np.linalg.norm(slip)
-    assert np.allclose(run.velocities[0], wanted, atol=1e-9)  # slides: constant deceleration
-    run.advance(duration)
-    rolling = (5 * v0 - 2 * np.cross(spin0, [0.0, 0.0, -radius])) / 7
-    assert np.allclose(run.velocities[0], rolling, atol=1e-9)
-    found = run.velocities[0] + np.cross(run.spins[0], [0.0, 0.0, -radius])
-    assert np.linalg.norm(found) < 1e-9
 
 
 @pytest.mark.long

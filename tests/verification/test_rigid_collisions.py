@@ -11,9 +11,9 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rigid_lcp.collision.impulses import Collision, Floats, Law, collide
+from rigid_lcp import BodySpace, collide
+from rigid_lcp.collision.impulses import Law
 from rigid_lcp.errors import ProblemError, UsageError
-from rigid_lcp.friction.problem.definition import BodySpace
 from tests.rigid_collision_sets import (
     cradle,
     cradle_answer,
@@ -22,11 +22,6 @@ from tests.rigid_collision_sets import (
     random_collision,
 )
 from tests.rigid_networks import network_bodies
-
-
-def energy_of(bodies: BodySpace, velocity: Floats, found: Collision) -> tuple[float, float]:
-    """Kinetic energy before and after."""
-    return kinetic_energy(bodies, velocity), kinetic_energy(bodies, found.velocity)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
@@ -68,19 +63,19 @@ def test_random_collisions_never_make_energy() -> None:
     for law in ("moreau", "newton", "moreau", "newton"):
         bodies, velocity, eps, mu = random_collision(generator)
         found = collide(bodies, velocity, eps, mu, law=law)  # type: ignore[arg-type]
-        before, after = energy_of(bodies, velocity, found)
+        before, after = kinetic_energy(bodies, velocity), kinetic_energy(bodies, found.velocity)
         assert found.solved, found.message
         assert after <= before * (1 + 1e-12)
 
 
-@given(st.floats(0.0, 1.0), st.integers(0, 10**6))
+@given(st.floats(0.0, 1.0) | st.just(1.0), st.integers(0, 10**6))
 @settings(deadline=None, max_examples=8)
 def test_energy_is_as_derived(eps: float, seed: int) -> None:
     """One eps, one round: ``E' - E = -(1 - eps)/2 dp . |v|``; and no contact approaches."""
     bodies, velocity = network_bodies(30, seed)
     normal = (bodies.jacobian @ velocity)[::2]
     found = collide(bodies, velocity, eps, max_rounds=200)
-    before, after = energy_of(bodies, velocity, found)
+    before, after = kinetic_energy(bodies, velocity), kinetic_energy(bodies, found.velocity)
     assert found.solved, found.message
     assert after - before == pytest.approx(found.energy_change, abs=1e-12 * before)
     assert found.energy_change <= 1e-13 * before
@@ -91,15 +86,6 @@ def test_energy_is_as_derived(eps: float, seed: int) -> None:
     assert left.min() >= -1e-11 * np.abs(normal).max()
 
 
-def test_elastic_collisions_conserve_energy() -> None:
-    """eps = 1: exactly, round for round, until the last."""
-    bodies, velocity = network_bodies(80, 3)
-    found = collide(bodies, velocity, 1.0, max_rounds=500)
-    before, after = energy_of(bodies, velocity, found)
-    assert found.solved, found.message
-    assert after == pytest.approx(before, rel=1e-11)
-
-
 @given(st.integers(0, 10**6))
 @settings(deadline=None, max_examples=8)
 def test_different_restitution_makes_no_energy(seed: int) -> None:
@@ -108,7 +94,7 @@ def test_different_restitution_makes_no_energy(seed: int) -> None:
     contacts = bodies.jacobian.shape[0] // 2
     eps = np.random.default_rng(seed).uniform(0.0, 1.0, contacts)
     found = collide(bodies, velocity, eps, max_rounds=200)
-    before, after = energy_of(bodies, velocity, found)
+    before, after = kinetic_energy(bodies, velocity), kinetic_energy(bodies, found.velocity)
     assert found.solved
     assert after <= before * (1 + 1e-12)
 
@@ -165,29 +151,25 @@ def test_a_sliding_ball(law: Law) -> None:
     assert found.energy_change < 0
 
 
-def test_energy_that_would_grow_is_said_and_prevented() -> None:
-    """A rod that hits with its tip: Newton's law with friction can make energy (Kane's paradox).
-
-    ``watched`` lets it and says so, ``safe`` does not; Moreau's law never does for one eps.
-    """
+def test_energy_that_would_grow_is_prevented_and_said() -> None:
+    """A rod that hits with its tip: Newton's law with friction can make energy (Kane's paradox), so
+    restitution is scaled down; Moreau's law never does for one eps."""
     sine, cosine = np.sin(0.6), np.cos(0.6)
     rod = one_body([([0.0, 1.0], [-0.5 * cosine, -0.5 * sine])], 1.0 / 12.0)
     g = np.random.default_rng(0)
-    grew = 0
+    scaled = 0
     for _ in range(60):
         velocity = g.normal(size=3)
-        watched = collide(rod, velocity, 0.9, 1.0, law="newton", energy="watched")
-        safe = collide(rod, velocity, 0.9, 1.0, law="newton")
-        moreau = collide(rod, velocity, 0.9, 1.0, law="moreau", energy="watched")
+        newton = collide(rod, velocity, 0.9, 1.0, law="newton")
+        moreau = collide(rod, velocity, 0.9, 1.0, law="moreau")
         size = kinetic_energy(rod, velocity)
-        assert safe.energy_change <= 1e-11 * size
+        assert newton.energy_change <= 1e-11 * size
         assert moreau.energy_change <= 1e-11 * size
-        if watched.energy_change > 1e-9 * size:
-            grew += 1
-            assert "grew" in watched.message
-            assert safe.restitution_scale < 1.0
-            assert "scaled" in safe.message
-    assert grew > 0
+        assert moreau.restitution_scale == 1.0
+        if newton.restitution_scale < 1.0:
+            scaled += 1
+            assert "scaled" in newton.message
+    assert scaled > 0
 
 
 def wedged_rod() -> BodySpace:
@@ -200,10 +182,9 @@ def wedged_rod() -> BodySpace:
     return BodySpace(sp.csr_array(np.array(rows)), sp.csr_array(sp.eye_array(3)), 3)
 
 
-def test_impulses_that_do_not_exist_change_nothing() -> None:
-    """Newton's law, mu = 2: ``safe`` takes restitution back until there are impulses, and the rod
-    stops; ``watched`` says that there are none, and leaves the velocities.  Moreau's law has them,
-    u' = -eps u.  Below mu = 1 all is well: spin -eps."""
+def test_impulses_that_do_not_exist_take_restitution_back() -> None:
+    """Newton's law, mu = 2: restitution is taken back until there are impulses, and the rod stops.
+    Moreau's law has them, u' = -eps u.  Below mu = 1 all is well: spin -eps."""
     spin = [0.0, 0.0, 1.0]
     safe = collide(wedged_rod(), spin, 0.5, 2.0, law="newton")
     assert safe.solved
@@ -211,11 +192,6 @@ def test_impulses_that_do_not_exist_change_nothing() -> None:
     assert safe.restitution_scale == 0.0
     assert safe.energy_change == pytest.approx(-0.5)
     assert "no impulses were found" in safe.message
-    watched = collide(wedged_rod(), spin, 0.5, 2.0, law="newton", energy="watched")
-    assert not watched.solved
-    assert watched.residual > 0.1
-    assert (watched.velocity == spin).all()
-    assert not watched.impulse.any()
     for law, mu in (("moreau", 2.0), ("newton", 0.9)):
         found = collide(wedged_rod(), spin, 0.5, mu, law=law)  # type: ignore[arg-type]
         assert found.solved
@@ -231,19 +207,6 @@ def test_what_approaches_within_the_tolerance_ends_the_rounds() -> None:
     assert found.solved, found.message
     assert found.rounds == 1
     assert (found.impulse == 0.0).all()
-
-
-@pytest.mark.parametrize("law", ["newton", "moreau"])
-def test_networks_with_friction(law: Law) -> None:
-    """Many contacts, each with its eps: no approach is left, energy does not grow."""
-    bodies, velocity = network_bodies(30, 2)
-    contacts = bodies.jacobian.shape[0] // 2
-    eps = np.random.default_rng(0).uniform(0.0, 0.8, contacts)
-    found = collide(bodies, velocity, eps, 0.4, law=law)
-    before, after = energy_of(bodies, velocity, found)
-    assert found.solved, found.message
-    assert after <= before * (1 + 1e-12)
-    assert found.impulse.reshape(-1, 2)[:, 0].min() >= 0
 
 
 def test_nothing_collides() -> None:
@@ -347,7 +310,7 @@ def test_bodies_that_are_none(jacobian: Any, inverse_mass: Any, where: str) -> N
     "wrong",
     [
         {"tolerance": None}, {"max_rounds": "a"}, {"max_rounds": np.inf},
-        {"law": "x"}, {"energy": "zz"}, {"still": np.nan}, {"rest_speed": -1.0},
+        {"law": "x"}, {"still": np.nan}, {"rest_speed": -1.0},
         {"tolerance": 0.0}, {"tolerance": np.nan}, {"max_rounds": -1}, {"max_rounds": 0.5},
     ],
     ids=str,

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from rigid_lcp import Disc, HalfSpace, Polygon, Scene
 from rigid_lcp.contact.arrays import Contacts, contact_rows
 from rigid_lcp.motion.equations import (
     body_space,
@@ -17,10 +18,7 @@ from rigid_lcp.motion.equations import (
     relative_velocity,
 )
 from rigid_lcp.motion.state import Motion, displace_motion, replace_rates
-from rigid_lcp.motion.world import Scene, World, make_world
-from rigid_lcp.shapes.disc import Disc
-from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.polygon import Polygon
+from rigid_lcp.motion.world import World, make_world
 
 Floats = NDArray[np.float64]
 PAIRS = {

@@ -8,13 +8,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from rigid_lcp import HalfSpace, Sphere
 from rigid_lcp.contact.arrays import Contacts, contact_frames
 from rigid_lcp.contact.detection_space import detect_3d, shapes_3d
 from rigid_lcp.motion.equations import inertial_acceleration, relative_velocity
 from rigid_lcp.motion.state import Motion, displace_motion
-from rigid_lcp.shapes.half_space import HalfSpace
 from rigid_lcp.shapes.rotations import quaternion_of_rotation, quaternion_product, rotate
-from rigid_lcp.shapes.sphere import Sphere
 from tests.rigid_solids import CUBE, UPRIGHT, contacts, near_pair
 
 Floats = NDArray[np.float64]

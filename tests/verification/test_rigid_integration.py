@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigid_lcp.scene.simulation import Method, Simulation
+from rigid_lcp import Simulation
+from rigid_lcp.scene.simulation import Method
 from tests import rigid_motions as motions
-from tests.rigid_motions import rocking_block_answer
 
 
 def coordinates(run: Simulation) -> NDArray[np.float64]:
@@ -34,25 +32,6 @@ def test_rod_tips_over_the_edge_and_slides(method: Method, step: float) -> None:
     assert run.contacts.status.tolist() == ["slide"]
     # where it starts to slide is not met: the step that holds it is of second order
     assert coordinates(run) == pytest.approx(motions.rod_over_edge_answer(0.3), abs=2e-5)
-
-
-def test_rocking_block_is_upright_when_housner_says() -> None:
-    """At the times of impact, by quadrature, the block of the equations of motion stands upright,
-    on the floor, and between its first two has swung as far as its energy lets it."""
-    block = (0.2, 1.0, 0.1)
-    times, share = rocking_block_answer(*block, 2)
-    for time in times:
-        x, height, angle = motions.rocking_block_state(*block, time)
-        assert abs(angle) < 1e-10
-        assert height == pytest.approx(1.0, abs=1e-10)
-        assert x == pytest.approx(-0.2, abs=1e-10)
-    alpha, radius = np.arctan2(0.2, 1.0), sqrt(1.04)
-    x, height, angle = motions.rocking_block_state(*block, times.mean())
-    assert height / radius - np.cos(alpha) == pytest.approx(
-        share * (np.cos(alpha - 0.1) - np.cos(alpha)), rel=1e-9
-    )
-    assert angle > 0  # to the left, as it came from the right
-    assert x < -0.2
 
 
 @pytest.mark.parametrize("friction", [0.0, motions.ORBIT_FRICTION])

@@ -11,7 +11,7 @@ Regular and Chaotic Dynamics 8 (2003) 375).
 
 from __future__ import annotations
 
-from math import atan, ceil, pi, sqrt
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -54,15 +54,6 @@ def billiard_answer(ratio: float) -> tuple[int, float, float]:
         count += 1
 
 
-@pytest.mark.parametrize("ratio", [1.0, 100.0, 1e4])
-def test_galperin_counts_digits_of_pi(ratio: float) -> None:
-    """The reference itself: 3, 31, 314 collisions, with the energy of the start."""
-    count, light, heavy = billiard_answer(ratio)
-    assert count == ceil(pi / atan(sqrt(1 / ratio)) - 1e-9) - 1
-    assert count == int(pi * sqrt(ratio))
-    assert light**2 + ratio * heavy**2 == pytest.approx(ratio, rel=1e-12)
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("step", [1e-2, 1e-3])
 @pytest.mark.parametrize("ratio", [1.0, 100.0, 1e4])
@@ -79,16 +70,6 @@ def test_a_light_ball_between_a_wall_and_a_heavy_one(ratio: float, step: float, 
     assert run.velocities[2, 0] == pytest.approx(heavy, abs=error)
     assert run.energy == pytest.approx(begin, rel=1e-15 * (count + 10))
     assert run.steps_cut_off == 0
-
-
-def test_collisions_that_run_out_of_rounds_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With 100 rounds a step, the 314 collisions lose energy, and the run tells of it."""
-    monkeypatch.setattr(passed_collisions, "PASSING_ROUNDS", 100)
-    run = billiard(1e4, 1e-2)
-    begin = run.energy
-    run.advance(0.3)
-    assert run.energy < 0.5 * begin
-    assert run.steps_cut_off >= 1
 
 
 def test_an_inelastic_collapse_ends() -> None:

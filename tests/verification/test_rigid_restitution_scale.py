@@ -7,18 +7,12 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from rigid_lcp import BodySpace, Disc, HalfSpace, Polygon, Scene, Simulation, Sphere, box
 from rigid_lcp.collision.passing import Closing, Impulses
 from rigid_lcp.collision.restitution_scale import StepVelocities, gains_energy
 from rigid_lcp.errors import NotConverged
-from rigid_lcp.friction.problem.definition import BodySpace
 from rigid_lcp.motion.acceleration_forces import find_forces
-from rigid_lcp.motion.world import Scene
-from rigid_lcp.scene.simulation import Method, Simulation
-from rigid_lcp.shapes.disc import Disc
-from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.polygon import Polygon
-from rigid_lcp.shapes.polyhedron import box
-from rigid_lcp.shapes.sphere import Sphere
+from rigid_lcp.scene.simulation import Method
 
 Floats = NDArray[np.float64]
 ROUND_OFF = 1e-13
@@ -51,13 +45,6 @@ def test_a_rod_that_comes_down_at_a_slant_gains_nothing(method: Method, friction
     assert run.velocities[0, 1] > 0.0
     assert 0.95 * energy <= run.energy <= energy * (1.0 + ROUND_OFF)
     assert run.steps_scaled == 1
-
-
-def test_without_friction_restitution_stays_as_it_is() -> None:
-    run = Simulation(tilted_rod(0.0), step=0.01)
-    energy = run.energy
-    run.advance(1.0)
-    assert run.energy == pytest.approx(energy, rel=ROUND_OFF)
 
 
 def wedged_rod(friction: float) -> Scene:

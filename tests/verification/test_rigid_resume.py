@@ -6,34 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from rigid_lcp import Simulation
 from rigid_lcp.scene.file import SceneFile, scene_read
 from rigid_lcp.scene.run import scene_run, simulation_of
 from rigid_lcp.scene.run_folder import FRAME, RunFolder
-from rigid_lcp.scene.simulation import Simulation
 from tests.rigid_runs import SLIDING_BLOCK, WORN_AND_BROKEN, WORN_IN_SPACE, frame_bits
-
-POURED = """
-dimensions = 2
-[run]
-duration = 0.2
-step = 2e-3
-frames = 4
-[surface]
-friction = 0.6
-[[ground]]
-normal = [0, 1]
-[[ground]]
-normal = [1, 0]
-offset = -0.1
-[[grains]]
-count = 8
-size = [0.03, 0.06]
-corners = [5, 8]
-density = 2700.0
-region_low = [-0.1, 0.0]
-region_high = [0.1, 0.3]
-seed = 3
-"""
 
 BOUNCING = """
 dimensions = 2
@@ -80,9 +57,11 @@ position = [0.05, 0.02, 0.45]
 spin = [3.0, 0.0, 1.0]
 """
 
+PILE = Path(__file__).parents[2] / "trackbed" / "scenes" / "pile.toml"
+FEW = ("grains.0.count=8", "run.duration=0.2", "run.step=2e-3", "run.frames=4", "load.0.begin=0.1")
 SCENES = {
-    "sliding": SLIDING_BLOCK, "poured": POURED, "bouncing": BOUNCING, "tumbling": TUMBLING,
-    "worn and broken": WORN_AND_BROKEN, "worn in space": WORN_IN_SPACE,
+    "sliding": SLIDING_BLOCK, "poured": PILE.read_text(), "bouncing": BOUNCING,
+    "tumbling": TUMBLING, "worn and broken": WORN_AND_BROKEN, "worn in space": WORN_IN_SPACE,
 }  # fmt: skip
 
 
@@ -98,7 +77,7 @@ def test_a_resumed_run_is_the_uninterrupted_one(tmp_path: Path, kind: str) -> No
     """From every frame on; whatever a step needs of the one before is in the frame."""
     path = tmp_path / "scene.toml"
     path.write_text(SCENES[kind], encoding="utf-8")
-    file = scene_read(path)
+    file = scene_read(path, FEW if kind == "poured" else ())
     folder = RunFolder(tmp_path / "run")
     folder.path.mkdir()
     whole = run_in(folder, file, resume=False)

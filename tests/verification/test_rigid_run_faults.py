@@ -10,7 +10,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,8 @@ from typing import Any
 import pytest
 
 import trackbed
+from rigid_lcp import Simulation
 from rigid_lcp.scene.run_folder import RunFolder
-from rigid_lcp.scene.simulation import Simulation
 from tests.forked_commands import Commands
 from tests.rigid_runs import SLIDING_BLOCK, frame_bits
 from trackbed import command
@@ -129,59 +128,6 @@ def test_full_disk_at_a_picture(
     assert (tmp_path / "run" / name).stat().st_size > 0
 
 
-def test_files_that_the_system_cuts_short(
-    scene: Path, whole: list[dict[str, Any]], tmp_path: Path
-) -> None:
-    """A limit on the length of files, set by the system, is reported like a full disk."""
-    command = [sys.executable, "-m", "trackbed", *run_words(scene, tmp_path / "run")]
-    limited = ["bash", "-c", 'ulimit -f 2; exec "$@"', "bash", *command]  # 2 KiB; a frame has 7
-    ended = subprocess.run(
-        limited, capture_output=True, text=True, cwd=Path(trackbed.__file__).parents[1]
-    )
-    assert ended.returncode == 5, ended.stderr
-    assert "frame_000000.npz: can not be written (File too large)" in ended.stderr
-    goes_on(scene, tmp_path / "run", whole)
-
-
-def test_folder_that_can_not_be_made(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "file").write_text("mine", encoding="utf-8")
-    for folder in (tmp_path / "file", tmp_path / "file" / "run", Path("/proc/run")):
-        assert command.main(run_words(scene, folder)) == 2
-        said = capsys.readouterr().err
-        assert f"{folder}: can not be written (" in said
-        assert "give another folder" in said
-    assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
-
-
-@pytest.mark.parametrize("comes_back", [False, True])
-def test_folder_that_vanishes(
-    scene: Path,
-    whole: list[dict[str, Any]],
-    tmp_path: Path,
-    comes_back: bool,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """Removed, or replaced by another's of the same name: nothing is written there."""
-    folder, advance = tmp_path / "run", Simulation.advance
-
-    def remove(run: Simulation, seconds: float) -> None:
-        advance(run, seconds)
-        if run.steps == 20:
-            shutil.rmtree(folder)
-            if comes_back:
-                folder.mkdir()
-                (folder / ".lock").touch()
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Simulation, "advance", remove)
-        assert command.main(run_words(scene, folder)) == 2
-    assert "removed or replaced while the run went on" in capsys.readouterr().err
-    assert [path.name for path in folder.glob("*")] == ([".lock"] if comes_back else [])
-    goes_on(scene, folder, whole)
-
-
 # --- killed and stopped -----------------------------------------------------------------------
 
 
@@ -201,30 +147,6 @@ def test_killed_at_every_file_operation(
         assert len(found) == len(list(folder.glob("frame_*")))
         assert found == whole[: len(found)]
         goes_on(scene, folder, whole)
-
-
-@pytest.mark.long
-def test_killed_at_random_times(
-    commands: Commands, scene: Path, whole: list[dict[str, Any]], tmp_path: Path
-) -> None:
-    """A run that is killed again and again loses no frame that it had, and comes to its end."""
-    began = time.monotonic()
-    assert commands.run(*run_words(scene, tmp_path / "timed")) == 0
-    span, times, kills, number = time.monotonic() - began, random.Random(SEED), 0, 0
-    while kills < 20:
-        folder = tmp_path / f"run_{number}"
-        kept = len(frame_bits(folder)) if folder.exists() else 0
-        commands.start(*run_words(scene, folder, "--resume"))
-        time.sleep(times.uniform(0.0, span))
-        if commands.kill() == -signal.SIGKILL:
-            kills += 1
-            found = frame_bits(folder) if folder.exists() else []
-            assert len(found) == len(list(folder.glob("frame_*"))) >= kept
-            assert found == whole[: len(found)], f"kill {kills}, seed {SEED}"
-        else:  # it came to its end before
-            assert frame_bits(folder) == whole
-            number += 1
-    goes_on(scene, folder, whole)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

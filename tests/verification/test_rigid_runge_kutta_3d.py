@@ -8,16 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rigid_lcp.motion.gyroscopic import angular_momentum
-from rigid_lcp.motion.world import Scene
-from rigid_lcp.scene.simulation import Method, Simulation
-from rigid_lcp.shapes.half_space import HalfSpace
-from rigid_lcp.shapes.polyhedron import Polyhedron, box
+from rigid_lcp import HalfSpace, Polyhedron, Scene, Simulation, Sphere, box
+from rigid_lcp.scene.simulation import Method
 from rigid_lcp.shapes.rotations import quaternion_of_rotation, rotate
-from rigid_lcp.shapes.sphere import Sphere
 from tests import rigid_motions as motions
-from tests.rigid_motions import STONE
-from tests.rigid_motions import STONE_SPIN as SPIN
 
 Floats = NDArray[np.float64]
 G = 9.81
@@ -49,23 +43,13 @@ def test_a_free_stone_obeys_eulers_equations(method: Method, order: float) -> No
     assert np.allclose(orders(error, [2e-3, 1e-3, 5e-4]), order, atol=0.25)
 
 
-def test_a_free_stone_keeps_energy_and_angular_momentum() -> None:
-    run = motions.stone_in_flight("acceleration", 1e-3)
-    run.advance(0.2)
-    mass, inertia = STONE.mass_properties(DENSITY)
-    momentum = inertia @ SPIN
-    found = angular_momentum(inertia, run.angles[0], run.spins[0])
-    # fourth order: (|w| h)^4 = 3e-6 a radian, over 8 rad, with a constant of 1/120 at most
-    assert np.linalg.norm(found - momentum) < 3e-7 * np.linalg.norm(momentum)
-    energy = 0.5 * mass * 0.25 + 0.5 * SPIN @ momentum
-    assert run.energy == pytest.approx(energy, rel=3e-7)
-
-
 # --- rolling ---
 
 
-@pytest.mark.parametrize("step", [0.02, 0.01])
-def test_a_sphere_stops_slipping_and_rolls(step: float) -> None:
+@pytest.mark.parametrize(
+    ("method", "step"), [("acceleration", 0.02), ("acceleration", 0.01), ("time-stepping", 1e-3)]
+)
+def test_a_sphere_stops_slipping_and_rolls(method: Method, step: float) -> None:
     """Slip s0 = v0 + w0 x x, gone at t = 2 |s0| / (7 mu g); then v = (5 v0 - 2 w0 x x) / 7.
 
     Not straight on: with oblique backspin the path before is a parabola.  Constant forces in both
@@ -76,17 +60,17 @@ def test_a_sphere_stops_slipping_and_rolls(step: float) -> None:
     scene = Scene(3)
     scene.add(Sphere(radius), density=DENSITY, position=-arm, velocity=v0, spin=spin0, friction=mu)
     scene.add(FLOOR)
-    run = Simulation(scene, "acceleration", step=step)
+    run = Simulation(scene, method, step=step)
     slip = v0 + np.cross(spin0, arm)
     seconds = 2 * np.linalg.norm(slip) / (7 * mu * G)
     run.advance(0.7 * seconds)
     sliding = v0 - mu * G * 0.7 * seconds * slip / np.linalg.norm(slip)
-    assert np.allclose(run.velocities[0], sliding, atol=1e-13)
+    assert np.allclose(run.velocities[0], sliding, atol=1e-13 if method == "acceleration" else 1e-9)
     run.advance(0.8 * seconds)
     rolling = (5 * v0 - 2 * np.cross(spin0, arm)) / 7
     assert np.allclose(run.velocities[0], rolling, atol=1e-9)
     assert np.allclose(np.cross(arm, run.spins[0])[:2], rolling[:2], atol=1e-9)
-    assert run.spins[0, 2] == pytest.approx(7.0, rel=1e-13)
+    assert run.spins[0, 2] == pytest.approx(7.0, rel=1e-9)
     assert run.contacts.status.tolist() == ["stick"]
 
 
@@ -130,7 +114,7 @@ def test_a_sphere_rolls_in_circles_on_a_turntable(method: Method) -> None:
     off = 1e-12 if method == "acceleration" else 2e-5
     np.testing.assert_allclose(run.velocities[1, :2], turn @ v0[:2], atol=off)
     friction = np.linalg.norm(run.contacts.tangential_force[0])
-    mass = DENSITY * Sphere(radius).volume
+    mass = Sphere(radius).mass_properties(DENSITY)[0]
     assert friction == pytest.approx(mass * rate * np.linalg.norm(v0), rel=max(off, 1e-10) * 10)
 
 

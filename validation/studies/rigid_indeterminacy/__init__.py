@@ -2,7 +2,7 @@
 
 Question: rigid grains with more contact forces than equations of balance have many forces that
 fit; are those of the direct limit (`rigid_lcp.unique.elastic_limit`) the ones molecular dynamics
-tends to, do order and start matter, and what do they cost?
+tends to, does order matter, and what do they cost?
 Answer: without friction, and where contacts stick, springs differ by 1/k until round-off; where
 contacts slide, the forces depend on the history, and springs may rest in another state.
 

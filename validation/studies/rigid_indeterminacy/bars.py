@@ -1,4 +1,4 @@
-"""The bars: the limit is least energy, springs tend to it, order and start do not matter."""
+"""The bars: the limit is least energy, springs tend to it, order does not matter."""
 
 from __future__ import annotations
 
@@ -54,4 +54,3 @@ def _check_order(row: Row) -> Iterator[Check]:
                     why=WHY)  # fmt: skip
         if pile["found"]:
             yield _below(f"{pile['pile']}: other order", pile["order"], ORDER_BAR)
-            yield _below(f"{pile['pile']}: other start", pile["start"], ORDER_BAR)

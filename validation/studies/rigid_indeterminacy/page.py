@@ -92,12 +92,12 @@ def _sliding(rows: Sequence[Row]) -> str:
 
 
 def _order(row: Row) -> str:
-    """What another order, other numbers and another start do."""
+    """What another order and other numbers do."""
     return format_table(
-        ("pile", "contacts", "sliding", "other order", "and other start"),
+        ("pile", "contacts", "sliding", "other order"),
         [
             [pile["pile"], str(pile["contacts"]), str(pile["sliding"]),
-             _number(pile["order"]) if pile["found"] else "not found", _number(pile["start"])]
+             _number(pile["order"]) if pile["found"] else "not found"]
             for pile in row["piles"]
         ],
     )  # fmt: skip

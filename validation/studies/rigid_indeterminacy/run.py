@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigid_lcp.friction.problem.definition import FrictionProblem
-from rigid_lcp.unique.elastic_limit import elastic_limit, relax_from
+from rigid_lcp.unique.elastic_limit import elastic_limit
 from rigid_lcp.unique.micro_displacements import micro_displacements
 from validation.bench.rigid.static_grains import Grains, beam, groove, pyramid, renumbered, wedge
 from validation.studies.rigid_indeterminacy.liggghts import liggghts_rest, liggghts_there
@@ -133,7 +133,7 @@ def measure_scene(scene: Scene) -> Row:
         run = keep(SPRINGS, began, rest.force, stiffness=stiffness, ramp=ramp)
         if scene.slides and ramp >= SLOW:
             # whether the springs' forces are those of another state of eq. 38
-            other = relax_from(problem, stiffness * weight * rest.displacement).r
+            other = elastic_limit(problem, begin=stiffness * weight * rest.displacement).r
             run["other_state"] = float(np.abs(other - answer.r).max()) / weight
             run["from_it"] = float(np.abs(rest.force.ravel() - other).max()) / weight
         if scene.discs and liggghts_there():
@@ -149,31 +149,30 @@ def measure_scene(scene: Scene) -> Row:
 
 
 def measure_order() -> Row:
-    """Independence of the order of contacts, the numbers of bodies and the start, on pyramids."""
+    """Independence of the order of contacts and the numbers of bodies, on pyramids."""
     return {"piles": [try_order(rows, friction) for rows in PILES for friction in (0.0, 0.3, 5.0)]}
 
 
 def try_order(rows: int, friction: float) -> Row:
     """A pyramid of so many rows: relative differences (2-norm) of all forces with contacts and
-    bodies in random order, and with a random start of a tenth of the displacements as well."""
+    bodies in random order."""
     grains = pyramid(rows, walls=friction < 1, seed=rows)
     problem = grains.problem(friction)
     rng = np.random.default_rng(rows)
     contact, body = rng.permutation(problem.contacts), rng.permutation(len(grains.mass))
     mixed = renumbered(grains, contact, body).problem(friction)
     first = elastic_limit(problem)
-    begun = 0.1 * rng.normal(size=len(first.displacement)) * np.abs(first.r).max()
     row: Row = {
         "pile": f"pyramid of {len(grains.mass)}, friction {friction:g}",
-        "contacts": problem.contacts, "found": first.solved, "order": None, "start": None,
+        "contacts": problem.contacts, "found": first.solved, "order": None,
         "sliding": count_sliding(first.r.reshape(-1, 2), friction),
     }  # fmt: skip
-    for name, start in (("order", None), ("start", begun)) if first.solved else ():
-        other = elastic_limit(mixed, start=start)
+    if first.solved:
+        other = elastic_limit(mixed)
         back = np.empty((problem.contacts, 2))
         back[contact] = other.r.reshape(-1, 2)
-        row[name] = float(np.linalg.norm(back.ravel() - first.r) / np.linalg.norm(first.r))
-        row["found"] = row["found"] and other.solved
+        row["order"] = float(np.linalg.norm(back.ravel() - first.r) / np.linalg.norm(first.r))
+        row["found"] = other.solved
     return row
 
 
