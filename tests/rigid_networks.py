@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from scipy.spatial import Delaunay
 
 from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from tests.rigid_collision_sets import contact_rows
+from validation.bench.rigid import packings
+from validation.bench.rigid.friction_problems import read_problem
 
 Floats = NDArray[np.float64]
 GRAVITY, STEP = 9.81, 1e-3
@@ -61,30 +64,52 @@ def network(grains: int, mu: float, seed: int = 0) -> FrictionProblem:
     return friction_problem(bodies.matrix, bodies.jacobian @ velocity, mu, 2)
 
 
+def random_bodies(pairs, bodies, dim, generator, full=False) -> BodySpace:
+    """Contacts in random directions between such pairs of bodies (-1: the ground), whose masses are
+    random: one a body, or ``full`` matrices."""
+    size = 3 * dim - 3
+    jacobian = np.zeros((len(pairs) * dim, bodies * size))
+    for c, pair in enumerate(pairs):
+        for body in pair:
+            if body >= 0:
+                block = generator.normal(size=(dim, size))
+                jacobian[c * dim : (c + 1) * dim, body * size : (body + 1) * size] = block
+    inverse = sp.diags_array(np.repeat(1.0 / generator.uniform(1.0, 3.0, bodies), size))
+    if full:
+        roots = generator.normal(size=(bodies, size, size))
+        inverse = sp.block_diag([root @ root.T + np.eye(size) for root in roots])
+    return BodySpace(sp.csr_array(jacobian), sp.csr_array(inverse), size)
+
+
+def random_pairs(contacts, bodies, generator):
+    """Two of so many bodies and the ground, which is -1, for each contact."""
+    return [generator.choice(bodies + 1, 2, replace=False) - 1 for _ in range(contacts)]
+
+
 def tower_bodies(boxes: int, top: float = 1.0) -> BodySpace:
     """Unit boxes on each other, two contacts a face: redundant by one friction force each."""
-    jacobian = np.zeros((4 * boxes, 3 * boxes))
-    for box in range(boxes):
-        for k, x in enumerate((-0.5, 0.5)):
-            row = 4 * box + 2 * k
-            up = np.array([0.0, 1.0])
-            jacobian[row : row + 2, 3 * box : 3 * box + 3] = contact_rows(up, np.array([x, -0.5]))
-            if box:
-                below = contact_rows(up, np.array([x, 0.5]))
-                jacobian[row : row + 2, 3 * box - 3 : 3 * box] = -below
-    mass = np.ones(boxes)
-    mass[-1] = top
-    inverse = np.repeat(1.0 / mass, 3)
-    inverse[2::3] *= 6.0
-    return BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.diags_array(inverse)), 3)
+    bodies = packings.tower(boxes, 2, top_mass=top).bodies
+    assert bodies is not None
+    return bodies
 
 
 def tower(boxes: int, mu: float, top: float = 1.0) -> FrictionProblem:
-    """A tower under gravity for a step, at rest before."""
-    bodies = tower_bodies(boxes, top)
-    fall = np.zeros(3 * boxes)
-    fall[1::3] = -GRAVITY * STEP
-    return friction_problem(bodies.matrix, bodies.jacobian @ fall, mu, 2)
+    """A tower under gravity for a step, at rest before, by W alone."""
+    made = packings.tower(boxes, 2, top_mass=top, friction=mu, step=STEP)
+    return friction_problem(made.delassus, made.offset, mu, 2)
+
+
+def stack_on_slope(masses, slope=0.0, friction=0.5, dim=2, step=STEP) -> FrictionProblem:
+    """Boxes of such masses [kg] upon each other that fall along a floor of such a slope [rad]."""
+    bodies = packings.tower(len(masses), dim, friction=friction).bodies
+    assert bodies is not None
+    size = bodies.body_size
+    inverse = bodies.inverse_mass.diagonal() / np.repeat(masses, size)
+    space = BodySpace(bodies.jacobian, sp.csr_array(sp.diags_array(inverse)), size)
+    fall = np.zeros(space.jacobian.shape[1])
+    fall[dim - 1 :: size] = -GRAVITY * step * np.cos(slope)
+    fall[::size] = GRAVITY * step * np.sin(slope)
+    return friction_problem(space, space.jacobian @ fall, friction, dim)
 
 
 def stored(name: str, mu: float | None = None) -> FrictionProblem:
@@ -93,7 +118,5 @@ def stored(name: str, mu: float | None = None) -> FrictionProblem:
     path = Path(home) / "friction_problems" / f"{name}.npz"
     if not home or not path.exists():
         pytest.skip("TRACKBED_DATA does not name a folder with friction_problems/" + name)
-    numbers = np.load(path)
-    matrix = sp.load_npz(path.with_name(f"{name}_W.npz"))
-    friction = numbers["mu"] if mu is None else mu
-    return friction_problem(matrix, numbers["q"], friction, int(numbers["dim"]))
+    made = read_problem(path)
+    return made if mu is None else replace(made, friction=np.full(made.contacts, mu))

@@ -34,6 +34,7 @@ from rigid_lcp.sparse.products import (
     multiply_factors,
     multiply_transposed,
 )
+from tests.rigid_networks import random_bodies, random_pairs
 
 BODIES, CONTACTS = 7, 12
 Floats = NDArray[np.float64]
@@ -43,22 +44,16 @@ def arrays(matrix: sp.csr_array) -> tuple[Floats, ...]:
     return matrix.indptr, matrix.indices, matrix.data
 
 
-def random_bodies(dim: int) -> tuple[sp.csr_array, sp.csr_array]:
+def some_bodies(dim: int) -> tuple[sp.csr_array, sp.csr_array]:
     """J of contacts between pairs of bodies, some with one only, and a full M^-1 of each."""
-    g, size = np.random.default_rng(dim), 3 * dim - 3
-    jacobian = np.zeros((CONTACTS * dim, BODIES * size))
-    for c in range(CONTACTS):
-        for body in g.choice(BODIES, size=g.integers(1, 3), replace=False):
-            jacobian[c * dim : (c + 1) * dim, body * size : (body + 1) * size] = g.standard_normal(
-                (dim, size)
-            )
-    blocks = [b @ b.T + np.eye(size) for b in g.standard_normal((BODIES, size, size))]
-    return sp.csr_array(jacobian), sp.csr_array(sp.block_diag(blocks, format="csr"))
+    g = np.random.default_rng(dim)
+    made = random_bodies(random_pairs(CONTACTS, BODIES, g), BODIES, dim, g, full=True)
+    return made.jacobian, made.inverse_mass
 
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_products_are_those_of_the_matrices(dim):
-    jacobian, inverse = random_bodies(dim)
+    jacobian, inverse = some_bodies(dim)
     g = np.random.default_rng(1)
     r, v = g.standard_normal(jacobian.shape[0]), g.standard_normal(jacobian.shape[1])
     w = (jacobian @ inverse @ jacobian.T).toarray()
@@ -73,7 +68,7 @@ def test_products_are_those_of_the_matrices(dim):
 
 def test_diagonals_of_w_with_masses_alone_and_columns_given_twice():
     """``J_i M^-1 J_i^T`` where M^-1 is diagonal, and of a row that names a column two times."""
-    jacobian, _ = random_bodies(2)
+    jacobian, _ = some_bodies(2)
     inverse = sp.csr_array(sp.diags_array(np.random.default_rng(5).uniform(1, 3, 3 * BODIES)))
     both = (*arrays(jacobian), *arrays(inverse))
     expected = np.diag((jacobian @ inverse @ jacobian.T).toarray())
@@ -87,7 +82,7 @@ def test_diagonals_of_w_with_masses_alone_and_columns_given_twice():
 @pytest.mark.parametrize("dim", [2, 3])
 def test_blocks_of_the_jacobian_assemble_the_matrix_of_bodies(dim):
     """``J^T K J`` block by block, and the way there and back, ``J^T r`` and ``r - K J v``."""
-    jacobian, inverse = random_bodies(dim)
+    jacobian, inverse = some_bodies(dim)
     size, g = 3 * dim - 3, np.random.default_rng(2)
     first, body, block = split_jacobian(*arrays(jacobian), dim, size)
     again = np.zeros(jacobian.shape)

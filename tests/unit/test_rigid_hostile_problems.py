@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rigid_lcp import BodySpace, solve_friction
-from rigid_lcp.errors import ProblemError
-from rigid_lcp.friction.files.formats import read_problem
+from rigid_lcp import solve_friction
 from rigid_lcp.friction.problem.cones import natural_map, natural_residual
 from rigid_lcp.friction.problem.definition import friction_problem, judge_forces
 from tests.rigid_static_problems import tower
@@ -25,110 +22,6 @@ W = np.diag([1.0, 2.0, 1.0, 2.0])
 Q = np.array([-1.0, 0.5, 1.0, 0.0])
 R = np.array([1.0, -0.25, 0.0, 0.0])
 """Contact 0 sticks: ``r_T = -q_T / W_TT``, less than mu r_N = 0.5; contact 1 parts."""
-
-
-# --- what is no problem -----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("w", "q", "mu", "dim", "words"),
-    [
-        (np.ma.masked_array(W, mask=W == 2.0), Q, 0.5, 2, "W.*masked"),
-        (W, np.ma.masked_array(Q, mask=[1, 0, 0, 0]), 0.5, 2, "q.*masked"),
-        (W * (1 + 1j), Q, 0.5, 2, "W is not made of numbers.*complex"),
-        (sp.csr_array(W * (1 + 1j)), Q, 0.5, 2, "W is not made of numbers.*complex"),
-        (W, Q * 1j, 0.5, 2, "q is not made of numbers"),
-        (W, Q, "0.5", 2, "mu is not made of numbers"),
-        (W, Q, 0.5, 2.0, "dim is 2.0"),
-        (W, Q, 0.5, np.array([2, 3]), "dim is array"),
-        (W, Q, np.inf, 2, "mu.*not finite"),
-        (W, Q, 1e20, 2, "contact 0: friction is 1e"),
-        (W * 1e-200, Q, 0.5, 2, "W: its largest"),
-        (W * 1e200, Q, 0.5, 2, "W: its largest"),
-        (W, Q * 1e200, 0.5, 2, "q: its largest"),
-        ([], [], 0.5, 2, "1 dimensions"),
-        (sp.coo_array(Q), Q, 0.5, 2, "W: it has 1 dimensions"),
-        (np.eye(6), np.ones((2, 3)), 0.5, 2, r"q has shape \(2, 3\)"),
-    ],
-)
-def test_what_can_not_be_computed_with_is_named(w, q, mu, dim, words):
-    with pytest.raises(ProblemError, match=words):
-        solve_friction(w, q, mu, dim)
-
-
-def test_a_start_by_components_is_not_read_by_contacts():
-    """(dim, nc) holds the right count of numbers in the wrong order; (nc, dim) is right."""
-    start = np.array([[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]])
-    assert solve_friction(np.eye(6), np.ones((3, 2)), 0.5, 2, start=start).solved
-    with pytest.raises(ProblemError, match=r"start has shape \(2, 3\)"):
-        solve_friction(np.eye(6), np.ones((3, 2)), 0.5, 2, start=start.T)
-
-
-def bodies_of(**changed: object) -> BodySpace:
-    parts = {
-        "jacobian": sp.csr_array(np.eye(2, 3)), "inverse_mass": sp.csr_array(np.eye(3)),
-        "body_size": 3,
-    }  # fmt: skip
-    return BodySpace(**(parts | changed))  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("changed", "words"),
-    [
-        ({"jacobian": np.eye(2, 3)}, "jacobian is no sparse matrix by rows"),
-        ({"inverse_mass": sp.csc_array(np.eye(3))}, "inverse_mass is no sparse matrix by rows"),
-        ({"jacobian": sp.csr_array(np.full((2, 3), np.nan))}, "jacobian holds .* not finite"),
-        ({"inverse_mass": sp.csr_array(np.diag([1.0, -1.0, 1.0]))}, "negative"),
-        ({"inverse_mass": sp.csr_array(np.eye(6))}, "3 columns"),
-        ({"body_size": 2}, "a body 2 freedoms"),
-    ],
-)
-def test_factors_that_do_not_fit_are_named(changed, words):
-    with pytest.raises(ProblemError, match=words):
-        solve_friction(bodies_of(**changed), [-1.0, 0.0], 0.5, 2)
-    assert solve_friction(bodies_of(), [-1.0, 0.0], 0.5, 2).solved
-
-
-# --- what is one --------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "matrix",
-    [
-        sp.linalg.aslinearoperator(W), sp.linalg.aslinearoperator(sp.csr_array(W)),
-        np.asfortranarray(W), W.astype(int), W.astype(np.float32), W.astype(object), W.tolist(),
-        sp.dok_array(W), sp.lil_matrix(W), sp.csr_array(W.astype(int)),
-    ],
-)  # fmt: skip
-def test_operators_and_matrices_of_any_kind_are_the_same_problem(matrix):
-    np.testing.assert_allclose(solve_friction(matrix, Q, 0.5, 2).r, R, atol=1e-14)
-
-
-def test_an_operator_wider_than_a_block_of_columns_is_written_out_whole():
-    rng = np.random.default_rng(1)
-    part = rng.normal(size=(600, 3))
-    problem = friction_problem(sp.linalg.aslinearoperator(part @ part.T), np.zeros(600), 0.5, 3)
-    np.testing.assert_allclose(problem.delassus.toarray(), part @ part.T, atol=1e-13)
-
-
-def test_what_the_caller_owns_stays_as_it_was():
-    """W with entries twice and out of order is added up in a copy; q and mu are no views."""
-    rows = sp.csr_array((np.array([1.0, 1.0, 2.0]), np.array([0, 0, 1]), np.array([0, 2, 3])))
-    q, mu = np.array([-1.0, 0.5]), np.array([0.5])
-    kept = rows.data.copy(), rows.indices.copy(), rows.indptr.copy()
-    problem = friction_problem(rows, q, mu, 2)
-    for before, after in zip(kept, (rows.data, rows.indices, rows.indptr), strict=True):
-        np.testing.assert_array_equal(before, after)
-    np.testing.assert_array_equal(problem.delassus.toarray(), [[2.0, 0.0], [0.0, 2.0]])
-    q[0], mu[0] = 7.0, 7.0
-    assert problem.offset[0] == -1.0
-    assert problem.friction[0] == 0.5
-
-
-def test_arrays_that_can_not_be_written_are_read():
-    w, q = W.copy(), Q.copy()
-    w.flags.writeable = q.flags.writeable = False
-    np.testing.assert_allclose(solve_friction(w, q, 0.5, 2).r, R, atol=1e-14)
 
 
 # --- the measure of an answer -------------------------------------------------------------------
@@ -290,61 +183,6 @@ def test_no_solution_is_a_proof(method):
         elif found.solved:
             assert complementarity_error(w, q, mu, 2, found.r) <= 1e-9
     assert said > 0
-
-
-# --- files ------------------------------------------------------------------------------------
-
-
-def npz_written(path: Path) -> None:
-    np.savez_compressed(path, W=W, q=Q, mu=np.full(2, 0.5))
-
-
-def hdf5_written(path: Path) -> None:
-    import h5py
-
-    rows = sp.csr_array(W)
-    with h5py.File(path, "w") as file:
-        file["fclib_local/spacedim"] = np.array([2])
-        file["fclib_local/vectors/q"], file["fclib_local/vectors/mu"] = Q, np.full(2, 0.5)
-        parts = {"m": [4], "n": [4], "nz": [-2], "p": rows.indptr, "i": rows.indices}
-        for name, values in (parts | {"x": rows.data}).items():
-            file[f"fclib_local/W/{name}"] = values
-
-
-@pytest.mark.parametrize(
-    ("written", "checked"),
-    [
-        pytest.param(npz_written, True, id="npz"),
-        pytest.param(hdf5_written, False, id="hdf5", marks=pytest.mark.peer("h5py")),
-    ],
-)
-def test_a_file_cut_or_spoilt_anywhere_is_named(tmp_path: Path, written, checked):
-    """Every cut and flipped byte gives a problem or a `ProblemError`, and no other error.
-
-    Where the format has check sums (``checked``) it gives the problem that was written.
-    """
-    whole = tmp_path / f"whole.{'npz' if checked else 'hdf5'}"
-    written(whole)
-    content, rng = whole.read_bytes(), np.random.default_rng(3)
-    path = whole.with_stem("spoilt")
-    named = 0
-    for trial in range(300):
-        spoilt = bytearray(content)
-        if trial % 2:
-            spoilt = spoilt[: int(rng.integers(0, len(content)))]
-        else:
-            for place in rng.integers(0, len(content), 4):
-                spoilt[place] ^= 1 << int(rng.integers(0, 8))
-        path.write_bytes(bytes(spoilt))
-        try:
-            problem = read_problem(path)
-        except ProblemError as error:
-            named += str(path) in str(error)
-        else:
-            named += 1
-            if checked:
-                np.testing.assert_array_equal(problem.delassus.toarray(), W)
-    assert named == 300
 
 
 @pytest.mark.parametrize("dim", [2, 3])

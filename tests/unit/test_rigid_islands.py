@@ -13,27 +13,15 @@ from scipy.sparse.csgraph import connected_components
 from rigid_lcp.friction.auto.islands import cut_out_island, islands, solve_islands
 from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
 from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from tests.rigid_networks import random_bodies
 
 Floats = NDArray[np.float64]
-
-
-def pairs_problem(pairs: list[tuple[int, int]], bodies: int, seed: int, dim: int) -> BodySpace:
-    """Contacts between random faces of bodies; body -1 is the ground."""
-    generator, size = np.random.default_rng(seed), 3 * dim - 3
-    jacobian = np.zeros((len(pairs) * dim, bodies * size))
-    for c, pair in enumerate(pairs):
-        for body in pair:
-            if body >= 0:
-                block = generator.normal(size=(dim, size))
-                jacobian[c * dim : (c + 1) * dim, body * size : (body + 1) * size] = block
-    mass = np.repeat(generator.uniform(1, 3, bodies), size)
-    return BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.diags(1 / mass)), size)
 
 
 def three_islands(dim: int) -> FrictionProblem:
     """Contacts 0, 3 on bodies 0, 1; contacts 1, 4 on bodies 3, 2; contact 2 on body 4 alone."""
     pairs = [(0, -1), (3, 2), (4, -1), (1, 0), (2, -1)]
-    space = pairs_problem(pairs, 5, 3, dim)
+    space = random_bodies(pairs, 5, dim, np.random.default_rng(3))
     offset = np.tile([-1.0, 0.4, -0.2][:dim], 5)
     problem = friction_problem(space, offset, 0.4, dim)
     assert isinstance(problem, FrictionProblem)
@@ -55,7 +43,7 @@ def test_found_by_bodies_and_by_matrix(dim: int, factors: bool) -> None:
 
 def test_ground_and_held_bodies_join_nothing() -> None:
     """Two boxes on a third that is held: its inverse mass is zero, W has no entry between them."""
-    space = pairs_problem([(0, 1), (2, 1)], 3, 0, 2)
+    space = random_bodies([(0, 1), (2, 1)], 3, 2, np.random.default_rng(0))
     held = space.inverse_mass.toarray()
     held[3:6, 3:6] = 0.0
     space = BodySpace(space.jacobian, sp.csr_array(held), 3)
@@ -98,7 +86,7 @@ def test_same_answer_apart_and_however_numbered(
     renumbered, each island sees the same numbers, so equal to round-off.
     """
     pairs = [(a, -1 if a == b else b) for a, b in pairs if max(a, b) >= 0] or [(0, -1)]
-    space = pairs_problem(pairs, 8, seed, dim)
+    space = random_bodies(pairs, 8, dim, np.random.default_rng(seed))
     generator = np.random.default_rng(seed)
     offset = space.jacobian @ generator.normal(size=8 * space.body_size)
     problem = FrictionProblem(None, offset, np.full(len(pairs), 0.3), dim, space)
@@ -126,7 +114,9 @@ def test_same_answer_apart_and_however_numbered(
 
 def test_whole_is_as_fine_as_asked() -> None:
     """A light island beside a heavy one, whose rho differ by 1e6: the whole is judged, not each."""
-    heavy, light = (pairs_problem([(0, -1), (1, 0)], 2, seed, 2) for seed in (1, 2))
+    heavy, light = (
+        random_bodies([(0, -1), (1, 0)], 2, 2, np.random.default_rng(seed)) for seed in (1, 2)
+    )
     velocity = np.random.default_rng(5).normal(size=6)
     offset = np.concatenate([1e-3 * heavy.jacobian @ velocity, light.jacobian @ velocity])
     matrix = sp.block_diag([heavy.matrix * 1e-6, light.matrix]).tocsr()
@@ -159,7 +149,7 @@ def test_islands_are_the_connected_parts_of_w(
     random = np.random.default_rng(seed)
     pairs = [(int(a), int(b)) for a, b in random.integers(-1, bodies, (contacts, 2))]
     pairs = [(a, b if b != a else -1) for a, b in pairs]
-    space = pairs_problem(pairs, bodies, seed, 2)
+    space = random_bodies(pairs, bodies, 2, random)
     problem = FrictionProblem(None, np.zeros(2 * contacts), np.zeros(contacts), 2, space)
     pattern = np.abs(space.matrix.toarray()).reshape(contacts, 2, contacts, 2).max(axis=(1, 3)) > 0
     _, label = connected_components(sp.csr_array(pattern), directed=False)

@@ -10,35 +10,25 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rigid_lcp.friction.methods.gauss_seidel import sweep_blocks
-from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
 from rigid_lcp.friction.sweeps.blocks import find_relative_velocities, lay_out_bodies
-from rigid_lcp.friction.sweeps.body_kernel import REGULAR, inverses, pack_contacts
+from rigid_lcp.friction.sweeps.body_kernel import inverses, pack_contacts
 from rigid_lcp.friction.sweeps.contact_kernel import visit_all
 from tests.rigid_local import solve_contact
+from tests.rigid_networks import random_bodies, random_pairs
 
 Floats = NDArray[np.float64]
 
 
 def some_problem(seed: int, dim: int, contacts: int, mu: float) -> FrictionProblem:
-    """Random J of pairs of few bodies, some of them the ground: redundant and strongly coupled."""
-    random = np.random.default_rng(seed)
-    size, bodies = 3 * dim - 3, max(2, contacts // 2)
-    rows = np.zeros((contacts * dim, bodies * size))
-    for c in range(contacts):
-        a, b = random.choice(bodies + 1, size=2, replace=False)
-        for body in (a, b):
-            if body < bodies:
-                rows[c * dim : (c + 1) * dim, body * size : (body + 1) * size] = random.normal(
-                    size=(dim, size)
-                )
-    inverse_mass = sp.diags_array(random.uniform(0.1, 10.0, bodies * size))
-    space = BodySpace(sp.csr_array(rows), sp.csr_array(inverse_mass), size)
+    """Random pairs of few bodies, some of them the ground: redundant and strongly coupled."""
+    random, bodies = np.random.default_rng(seed), max(2, contacts // 2)
+    space = random_bodies(random_pairs(contacts, bodies, random), bodies, dim, random)
     return friction_problem(space, random.normal(size=contacts * dim), mu, dim)
 
 
@@ -94,16 +84,8 @@ def test_a_sweep_is_that_of_the_exact_local_solutions(
 @pytest.mark.parametrize("full", [False, True])
 def test_blocks_of_the_bodies_make_w(dim: int, full: bool) -> None:
     """``B B^T`` is W, for masses alone and for bodies whose inertia couples its axes."""
-    random, size = np.random.default_rng(7), 3 * dim - 3
-    jacobian = np.zeros((4 * dim, 3 * size))
-    for c, pair in enumerate(((0,), (0, 1), (1, 2), (2, 0))):
-        for body in pair:
-            jacobian[c * dim : (c + 1) * dim, body * size : (body + 1) * size] = random.normal(
-                size=(dim, size)
-            )
-    root = random.normal(size=(3, size, size))
-    masses = [m @ m.T if full else np.diag(np.diag(m) ** 2 + 0.1) for m in root]
-    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(sp.block_diag(masses)), size)
+    random = np.random.default_rng(7)
+    space = random_bodies([(0, -1), (0, 1), (1, 2), (2, 0)], 3, dim, random, full)
     problem = friction_problem(space, random.normal(size=4 * dim), 0.4, dim)
     bodies = lay_out_bodies(problem)
     assert bodies is not None
@@ -133,7 +115,6 @@ def test_inverses_invert_or_are_zero(dim: int) -> None:
         strong = 0.3 * np.abs(local[:, 0, 1]) >= local[:, 0, 0]
         assert strong.any()
         assert not known[strong].any()
-    assert REGULAR > 0.0
 
 
 def test_packed_rows_hold_what_a_visit_reads() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -199,7 +200,8 @@ def test_normal_part_of_w() -> None:
 @pytest.mark.parametrize("skew", [0.0, 1e-3])
 def test_faces(most: float, skew: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """``A + shift`` of some contacts in any order, by a band and by sparse LU, against numpy."""
-    monkeypatch.setattr(sys.modules[frictionless.__module__], "BAND_MOST", most)
+    module = sys.modules[frictionless.__module__]
+    monkeypatch.setattr(module, "NUMBERS", replace(module.NUMBERS, band_most=most))
     g = np.random.default_rng(5)
     a = network(40, 0.0).delassus[::2][:, ::2].tocsr()
     a.data *= 1 + skew * g.normal(size=a.nnz)

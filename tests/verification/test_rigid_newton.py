@@ -23,6 +23,8 @@ from rigid_lcp.friction.linear.lorentz_cones import (
 from rigid_lcp.friction.methods.interior_point import Path, coulomb_velocity, interior_point
 from rigid_lcp.friction.methods.newton import alart_curnier, newton
 from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from tests.rigid_networks import random_bodies
+from validation.bench.rigid.packings import tower
 
 
 def inside(generator: np.random.Generator, contacts: int, dim: int) -> np.ndarray:
@@ -34,18 +36,9 @@ def inside(generator: np.random.Generator, contacts: int, dim: int) -> np.ndarra
 def chain(bodies: int, dim: int, seed: int = 0) -> FrictionProblem:
     """Bodies, each bound to the one before and to the ground by contacts at random."""
     g = np.random.default_rng(seed)
-    size = 3 if dim == 2 else 6
-    jacobian = np.zeros((2 * bodies * dim, bodies * size))
-    for k in range(bodies):
-        own = slice(size * k, size * (k + 1))
-        jacobian[2 * k * dim : (2 * k + 1) * dim, own] = g.standard_normal((dim, size))
-        rows = slice((2 * k + 1) * dim, (2 * k + 2) * dim)
-        jacobian[rows, own] = g.standard_normal((dim, size))
-        if k:
-            jacobian[rows, size * (k - 1) : size * k] = g.standard_normal((dim, size))
-    inverse_mass = sp.block_diag([np.eye(size) * g.uniform(0.1, 2.0) for _ in range(bodies)])
-    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(inverse_mass), size)
-    velocity = jacobian @ g.standard_normal(bodies * size)
+    pairs = [pair for k in range(bodies) for pair in ((k, -1), (k, k - 1))]
+    space = random_bodies(pairs, bodies, dim, g)
+    velocity = space.jacobian @ g.standard_normal(bodies * space.body_size)
     return friction_problem(space, velocity, g.uniform(0.1, 0.9, 2 * bodies), dim)
 
 
@@ -201,19 +194,8 @@ def test_newton_does_not_depend_on_units(force, velocity):
 def test_the_shift_falls_where_only_it_holds_the_steps_up():
     """A tower whose contacts all stick: W's least eigenvalue falls as height^-2 and less, and
     proximal steps with a shift kept at 1e-5 would take off but a part of the error each."""
-    boxes = 60
-    jacobian = np.zeros((4 * boxes, 3 * boxes))
-    for k in range(boxes):
-        for side, arm in enumerate((-0.5, 0.5)):
-            row = 4 * k + 2 * side
-            jacobian[row, 3 * k + 1], jacobian[row, 3 * k + 2] = 1.0, arm
-            jacobian[row + 1, 3 * k], jacobian[row + 1, 3 * k + 2] = 1.0, 0.5
-            if k:
-                jacobian[row, 3 * k - 2], jacobian[row, 3 * k - 1] = -1.0, -arm
-                jacobian[row + 1, 3 * k - 3], jacobian[row + 1, 3 * k - 1] = -1.0, 0.5
-    inverse_mass = sp.diags_array(np.tile([1.0, 1.0, 6.0], boxes))
-    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(inverse_mass), 3)
-    offset = jacobian @ np.tile([0.2, -1.0, 0.0], boxes)
+    space = tower(60, 2).bodies
+    offset = space.jacobian @ np.tile([0.2, -1.0, 0.0], 60)
     problem = friction_problem(space, offset, 0.9, 2)
     rough = interior_point(problem, None, 1e-4, Path(convex=True))
     exact = newton(problem, rough.r, 1e-13)

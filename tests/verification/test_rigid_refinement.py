@@ -14,29 +14,12 @@ from rigid_lcp.friction.attempts.refinement import gmres, refined
 from rigid_lcp.friction.attempts.sticking import sticking
 from rigid_lcp.friction.linear.factorisation import factorisation
 from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
+from tests.rigid_networks import stack_on_slope
 from validation.bench.rigid.scenes import light_on_heavy, stack
 
 Floats = NDArray[np.float64]
 
 G = 9.81
-
-
-def column(masses: list[float]) -> FrictionProblem:
-    """Blocks upon each other that fall: two contacts each in the plane, hyperstatic."""
-    bodies = len(masses)
-    jacobian = np.zeros((4 * bodies, 3 * bodies))
-    for k in range(bodies):
-        for side, x in enumerate((-0.5, 0.5)):
-            row = 4 * k + 2 * side  # own lower corner upon the block (or floor) below
-            jacobian[row, 3 * k : 3 * k + 3] = 0, 1, x
-            jacobian[row + 1, 3 * k : 3 * k + 3] = -1, 0, -0.5
-            if k:
-                jacobian[row, 3 * k - 3 : 3 * k] = 0, -1, -x
-                jacobian[row + 1, 3 * k - 3 : 3 * k] = 1, 0, -0.5
-    inverse = np.repeat(1 / np.array(masses), 3) * np.tile([1, 1, 6.0], bodies)
-    space = BodySpace(sp.csr_array(jacobian), sp.csr_array(np.diag(inverse)), 3)
-    fall = np.tile([0.0, -G, 0.0], bodies)
-    return friction_problem(space, space.jacobian @ fall, 0.5, 2)
 
 
 @pytest.mark.parametrize("ratio", [1e4, 1e8, 1e10])
@@ -47,7 +30,7 @@ def test_great_mass_ratios_to_round_off(ratio: float, heavy_on_top: bool) -> Non
     R is the weight of all above and on; each of the forces on a light block is known to 1e-16 R.
     """
     masses = [1.0] * 6 + [ratio] if heavy_on_top else [1.0, ratio, 1.0]
-    problem = column(masses)
+    problem = stack_on_slope(masses, step=1.0)
     exact = refined(problem, shifted_steps(problem, 1), 0.0)
     stuck = sticking(problem, 1e-15)
     floor = 1e-16 * G * sum(masses)
@@ -73,7 +56,7 @@ def shifted_steps(problem: FrictionProblem, steps: int) -> Floats:
 
 def test_units_do_not_matter() -> None:
     """Kilograms to grams, powers of two to be exact in binary: the same velocities to the bit."""
-    one = column([1.0, 1e6, 1.0])
+    one = stack_on_slope([1.0, 1e6, 1.0], step=1.0)
     assert one.bodies is not None
     scaled = BodySpace(one.bodies.jacobian, sp.csr_array(one.bodies.inverse_mass / 1024.0), 3)
     other = friction_problem(scaled, one.offset, 0.5, 2)
@@ -84,7 +67,7 @@ def test_units_do_not_matter() -> None:
 
 def test_gmres_solves_what_has_a_solution() -> None:
     """A singular ``A + B W`` and a right hand side in its range, against NumPy's least squares."""
-    problem = column([1.0, 3.0, 1e7])
+    problem = stack_on_slope([1.0, 3.0, 1e7], step=1.0)
     size, contacts = len(problem.offset), problem.contacts
     identity = np.broadcast_to(np.eye(2), (contacts, 2, 2)).copy()
     a = np.zeros_like(identity)

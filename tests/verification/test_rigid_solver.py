@@ -12,13 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rigid_lcp import BodySpace, solve_friction
 from rigid_lcp.friction.auto import paths as solver_paths
-from rigid_lcp.friction.auto import sweeps as solver_sweeps
 from rigid_lcp.friction.auto import trial as solver_trial
 from rigid_lcp.friction.auto.paths import (
     CONVEX,
@@ -27,13 +25,13 @@ from rigid_lcp.friction.auto.paths import (
     follow_sharp_path,
     smooth_further,
 )
-from rigid_lcp.friction.auto.plan import ALL_PATHS, LAST, run_plan, step_friction
+from rigid_lcp.friction.auto.plan import ALL_PATHS, LAST, run_plan
 from rigid_lcp.friction.auto.solve import solve_auto
-from rigid_lcp.friction.auto.sweeps import TURNS
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
-from rigid_lcp.friction.files.formats import read_problem
 from rigid_lcp.friction.linear.factorisation import factorisation
 from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
+from validation.bench.rigid import packings
+from validation.bench.rigid.friction_problems import read_problem
 from validation.bench.rigid.packings import packing
 
 FOLDER = Path(os.environ.get("TRACKBED_DATA", "")) / "friction_problems"
@@ -66,44 +64,10 @@ def test_block_on_a_slope(dim, ratio):
     assert found.u[-1] == pytest.approx(sliding, abs=1e-10)
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_nothing_approaches_so_there_are_no_forces(dim):
-    q = np.array([0.0, 3.0, -2.0][:dim])
-    found = solve_friction(np.eye(dim), q, 0.7, dim)
-    assert found.method == "no forces"
-    assert found.residual == 0.0
-    np.testing.assert_array_equal(found.r, 0.0)
-
-
 def tower(boxes: int, top: float, dim: int) -> tuple[BodySpace, np.ndarray]:
     """Unit boxes on each other, contacts at the corners of each face, under gravity 1."""
-    size = 3 if dim == 2 else 6
-    corners = [(-0.5,), (0.5,)] if dim == 2 else [(x, y) for x in (-0.5, 0.5) for y in (-0.5, 0.5)]
-    blocks = np.zeros((2, len(corners), dim, size))
-    for side, height in enumerate((-0.5, 0.5)):
-        for c, corner in enumerate(corners):
-            if dim == 2:  # normal up; u = v + phi x (x, h)
-                blocks[side, c] = [[0, 1, corner[0]], [1, 0, -height]]
-                continue
-            x, y, h = *corner, height
-            blocks[side, c] = [
-                [0, 0, 1, y, -x, 0], [1, 0, 0, 0, h, -y], [0, 1, 0, -h, 0, x]
-            ]  # fmt: skip
-    jacobian = np.zeros((boxes * len(corners) * dim, boxes * size))
-    per = len(corners) * dim
-    for k in range(boxes):
-        jacobian[k * per : (k + 1) * per, k * size : (k + 1) * size] = blocks[0].reshape(per, size)
-        if k:
-            jacobian[k * per : (k + 1) * per, (k - 1) * size : k * size] -= blocks[1].reshape(
-                per, size
-            )
-    mass = np.ones(boxes)
-    mass[-1] = top
-    inertia = [1.0, 1.0, 1 / 6] if dim == 2 else [1.0] * 3 + [1 / 6] * 3
-    inverse = sp.diags_array(1.0 / np.concatenate([m * np.array(inertia) for m in mass]))
-    gravity = np.zeros(boxes * size)
-    gravity[1 if dim == 2 else 2 :: size] = -1.0
-    return BodySpace(sp.csr_array(jacobian), sp.csr_array(inverse), size), jacobian @ gravity
+    made = packings.tower(boxes, dim, top_mass=top, step=1.0 / packings.GRAVITY)
+    return made.bodies, made.offset
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -305,24 +269,6 @@ def test_where_a_proof_is_at_hand_no_path_is_tried():
     assert "interior-point iterations" not in found.work
 
 
-def test_the_search_ends_after_the_effort_that_is_stated(monkeypatch):
-    """With no floor of flops, no turns and no points, paths end once they cost `Limits.last_share`
-    of what went before, the last one included: six paths and twice the factorisations otherwise."""
-    problem = random_problem(40, 30, 0.5, 3)
-    all_paths = solve_auto(problem).work
-    monkeypatch.setattr(solver_trial, "LIMITS", replace(LIMITS, last_flops=0.0))
-    monkeypatch.setattr(solver_sweeps, "run_points", lambda trial, most, flops: False)
-    turns = replace(TURNS, flops=0.0)
-    for module in (solver_sweeps, solver_paths):
-        monkeypatch.setattr(module, "TURNS", turns)
-    found = solve_auto(problem)
-    assert not found.solved
-    assert "->" in found.message
-    for work in ("factorisations", "interior-point iterations"):
-        assert found.work[work] < 0.6 * all_paths[work]
-    assert found.work["factorisations"] < 2 * 800
-
-
 def test_contacts_in_any_order():
     bodies, q = tower(8, 2.0, 3)
     order = np.random.default_rng(1).permutation(32)
@@ -344,15 +290,3 @@ def test_real_problems(path):
     else:
         found = solve_auto(read_problem(path))
     assert found.residual <= 1e-12, found.message
-
-
-def test_friction_of_a_thousand_beside_none_is_reached_in_steps():
-    """A bed whose contacts have friction 0.5 but for a fifth with none and a tenth with 1,000."""
-    problem = packing(60, 2, seed=3, friction=0.5)
-    draw = np.random.default_rng(11).random(problem.contacts)
-    mixed = np.where(draw < 0.2, 0.0, np.where(draw > 0.9, 1000.0, 0.5))
-    hard = friction_problem(problem.bodies, problem.offset, mixed, 2)
-    trial = Trial(hard, None, 1e-12)
-    assert step_friction(trial)
-    assert hard.residual(trial.best.r) <= 1e-12
-    assert not step_friction(Trial(problem, None, 1e-12))  # nothing to reach

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 
 from rigid_lcp import solve_friction
 from rigid_lcp.friction.attempts.sticking import STICKING, heaviness, seem_to_stick, sticking
 from rigid_lcp.friction.linear.factorisation import factorisation
 from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
-from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
-from tests.rigid_networks import GRAVITY, STEP, tower
-from validation.bench.rigid.packings import tower as packed_tower
+from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
+from tests.rigid_networks import GRAVITY, STEP, stack_on_slope, tower
 
 
 @pytest.mark.parametrize("top", [1.0, 1e4])
@@ -68,18 +66,6 @@ def test_the_guess_has_no_units():
     normal, again = (each.r.reshape(-1, 2, 2)[:, :, 0].sum(axis=1) for each in (plain, other))
     assert again / 1e6 == pytest.approx(normal, rel=1e-12)
     assert other.residual < 1e-15
-
-
-def stack_on_slope(masses, slope, friction=0.5, dim=2):
-    """Boxes of such masses [kg] upon each other that fall along a floor of such a slope [rad]."""
-    bodies = packed_tower(len(masses), dim, friction=friction).bodies
-    size = bodies.body_size
-    inverse = bodies.inverse_mass.diagonal() / np.repeat(masses, size)
-    space = BodySpace(bodies.jacobian, sp.csr_array(sp.diags_array(inverse)), size)
-    fall = np.zeros(space.jacobian.shape[1])
-    fall[dim - 1 :: size] = -GRAVITY * STEP * np.cos(slope)
-    fall[::size] = GRAVITY * STEP * np.sin(slope)
-    return friction_problem(space, space.jacobian @ fall, friction, dim)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

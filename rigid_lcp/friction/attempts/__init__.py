@@ -1,8 +1,12 @@
 """Ways that the plan tries beside the methods."""
 
-from rigid_lcp.friction.attempts.extrapolated_points import POINTS, extrapolated_points
 from rigid_lcp.friction.attempts.frictionless import frictionless, lcp
-from rigid_lcp.friction.attempts.proximal_newton import PROXIMAL, proximal_newton
+from rigid_lcp.friction.attempts.proximal_points import (
+    POINTS,
+    PROXIMAL,
+    extrapolated_points,
+    proximal_newton,
+)
 from rigid_lcp.friction.attempts.refinement import refined
 from rigid_lcp.friction.attempts.smoothed_path import smoothed_path
 from rigid_lcp.friction.attempts.sticking import heaviness, seem_loose, seem_to_stick, sticking

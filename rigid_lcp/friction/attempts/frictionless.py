@@ -16,7 +16,7 @@ regular, and proximal steps with the same factor take it out.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,10 +40,8 @@ from rigid_lcp.friction.problem import (
 from rigid_lcp.friction.sweeps import (
     face_band,
     face_bandwidth,
-    face_rows,
     normal_products,
     normal_sweeps,
-    pick_rows,
 )
 
 Floats = NDArray[np.float64]
@@ -51,23 +49,41 @@ Bools = NDArray[np.bool_]
 Indices = NDArray[np.int32]
 Solve = Callable[[Floats], Floats]
 
-NORMAL_SHIFT = 1e-8
-"""Relative shift of the diagonal: a small one is soon taken out again."""
-SWEEPS, SWEEPS_AT_ONCE, SETTLED = 400, 20, 1
-"""Most sweeps before the first exchange; they end when so few contacts changed sides in 20."""
-SWEEPS_BETWEEN = 100
-"""Sweeps instead of an exchange,"""
-SMOOTHED, SMOOTHINGS, HASTE = 2, 3, 15
-"""as long as more contacts than that are wrong, so many times; with self-stress they mislead, so
-that the exchanges begin again without them where so many do not end."""
-NORMAL_SHIFT_STEPS = 20
-BAND_MOST, BAND_OVERHEAD = 1.3e8, 20
-"""Banded Cholesky up to about so many multiplications, the band counted so much wider: half of what
-sparse LU takes in the plane, as much as it where 1,700 spheres touch."""
-SIGN_MARGIN = 1e-13
-"""Relative size of an acceleration or force that counts as zero."""
-EXCHANGE_PATIENCE = 5
-"""Exchanges at once that may fail to make violations fewer, before one at a time."""
+
+@dataclass(frozen=True)
+class FrictionlessNumbers:
+    """Sweeps, exchanges of sides and proximal steps."""
+
+    shift: float = 1e-8
+    """Of the diagonal, over its mean [-]: a small one is soon taken out again,"""
+    shift_steps: int = 20
+    """in so many proximal steps at most."""
+    sweeps: int = 400
+    """Most sweeps before the first exchange;"""
+    settled: tuple[int, int] = (20, 1)
+    """they end when in so many of them so few contacts changed sides."""
+    sweeps_between: int = 100
+    """Sweeps instead of an exchange,"""
+    smoothed: int = 2
+    """as long as more contacts than that are wrong,"""
+    smoothings: int = 3
+    """so many times; with self-stress they mislead,"""
+    haste: int = 15
+    """so that the exchanges begin again without them where so many do not end."""
+    exchanges: int = 60
+    """Exchanges of a proximal step at most."""
+    patience: int = 5
+    """Exchanges at once that may fail to make violations fewer, before one at a time."""
+    sign_margin: float = 1e-13
+    """Size of an acceleration or force that counts as zero, over the greatest [-]."""
+    band_most: float = 1.3e8
+    """Banded Cholesky up to about so many multiplications,"""
+    band_overhead: int = 20
+    """the band counted so much wider: half of what sparse LU takes in the plane, as much as it
+    where 1,700 spheres touch."""
+
+
+NUMBERS = FrictionlessNumbers()
 
 
 def lcp(
@@ -114,8 +130,6 @@ def frictionless(
     problem: FrictionProblem,
     start: Floats | None = None,
     tolerance: float = 1e-12,
-    *,
-    max_exchanges: int = 60,
 ) -> FrictionSolution:
     """Solve a friction problem without friction (mu = 0), in 2D or 3D.
 
@@ -135,13 +149,13 @@ def frictionless(
     a, b = build_normal_matrix(problem), np.ascontiguousarray(problem.offset[::dim])
     first = np.zeros(nc) if start is None else np.maximum(start[::dim], 0.0)
     rows = a.indptr, a.indices, a.data
-    sweeps = normal_sweeps(*rows, b, first, SWEEPS, SWEEPS_AT_ONCE, SETTLED)
+    sweeps = normal_sweeps(*rows, b, first, NUMBERS.sweeps, *NUMBERS.settled)
     work = {"sweeps": float(sweeps), "exchanges": 0.0, "proximal": 0.0}
     order = reverse_cuthill_mckee(a, symmetric_mode=True)
     best, least = np.zeros(nc), np.inf
-    for smoothings, limit in ((SMOOTHINGS, HASTE), (0, max_exchanges)):
+    for smoothings, limit in ((NUMBERS.smoothings, NUMBERS.haste), (0, NUMBERS.exchanges)):
         f, carries = first.copy(), first > 0.0
-        for step in range(NORMAL_SHIFT_STEPS):
+        for step in range(NUMBERS.shift_steps):
             before = work["exchanges"]
             f, sharper = pivot_principally(
                 a, b, order, f, carries, work, limit, smoothings if step == 0 else 0
@@ -179,9 +193,9 @@ def pivot_principally(
     factor and no change of sides.
     """
     unit = float(a_matrix.diagonal().mean()) or 1.0
-    shift = NORMAL_SHIFT * unit
+    shift = NUMBERS.shift * unit
     offset = b - shift * before
-    fewest, patience = len(b) + 1, EXCHANGE_PATIENCE
+    fewest, patience = len(b) + 1, NUMBERS.patience
     smoothed = False
     scale = float(np.abs(b).max()) or 1.0
     f = np.zeros(len(b))
@@ -193,23 +207,23 @@ def pivot_principally(
         solve = build_face_solver(a_matrix, inside, shift)
         f[inside] = solve(-offset[inside])
         a = offset + a_matrix @ f + shift * f
-        size = scale + unit * float(np.abs(f).max())
-        wrong = np.where(carries, f < -SIGN_MARGIN * size / unit, a < -SIGN_MARGIN * size)
+        margin = NUMBERS.sign_margin * (scale + unit * float(np.abs(f).max()))
+        wrong = np.where(carries, f < -margin / unit, a < -margin)
         count = int(wrong.sum())
         if count == 0 or limit <= 0:
             break
         if smoothed and count > 0.7 * fewest:
             smoothings = 0
         if count < fewest:
-            fewest, patience = count, EXCHANGE_PATIENCE
+            fewest, patience = count, NUMBERS.patience
         else:
             patience -= 1
-        smoothed = count > SMOOTHED and patience == EXCHANGE_PATIENCE and smoothings > 0
+        smoothed = count > NUMBERS.smoothed and patience == NUMBERS.patience and smoothings > 0
         if smoothed:
             smoothings -= 1
             f = np.maximum(f, 0.0)
             rows = a_matrix.indptr, a_matrix.indices, a_matrix.data
-            normal_sweeps(*rows, b, f, SWEEPS_BETWEEN, SWEEPS_BETWEEN, 0)
+            normal_sweeps(*rows, b, f, NUMBERS.sweeps_between, NUMBERS.sweeps_between, 0)
             carries[:] = f > 0.0
         else:
             if patience < 0:
@@ -228,16 +242,12 @@ def build_normal_matrix(problem: FrictionProblem) -> sp.csr_array:
     """A: the normal rows and columns of W, (nc, nc), without W where its factors are known."""
     dim, nc, bodies = problem.dim, problem.contacts, problem.bodies
     if problem.matrix is None and bodies is not None:
-        rows = pick_rows(*_arrays(bodies.jacobian), dim)
+        normal = bodies.jacobian[::dim]
         start, index, value = normal_products(
-            *rows, *_arrays(bodies.inverse_mass), bodies.jacobian.shape[1]
+            *_arrays(normal), *_arrays(bodies.inverse_mass), normal.shape[1]
         )
-    else:
-        start, index, value = pick_rows(*_arrays(problem.delassus), dim)
-        kept = index % dim == 0
-        start = np.concatenate([[0], np.cumsum(kept)])[start]
-        index, value = index[kept] // dim, value[kept]
-    return sp.csr_array((value, index, start), (nc, nc))
+        return sp.csr_array((value, index, start), (nc, nc))
+    return sp.csr_array(problem.delassus[::dim][:, ::dim])
 
 
 def normal_residual(a_matrix: sp.csr_array, b: Floats, f: Floats, rho: float) -> float:
@@ -258,16 +268,15 @@ def build_face_solver(a_matrix: sp.csr_array, inside: Indices, shift: float) -> 
         return lambda right: right
     rows = _arrays(a_matrix)
     width = face_bandwidth(rows[0], rows[1], inside)
-    if len(inside) * (width + BAND_OVERHEAD) ** 2 <= BAND_MOST:
+    if len(inside) * (width + NUMBERS.band_overhead) ** 2 <= NUMBERS.band_most:
         band, symmetric = face_band(*rows, inside, shift, width)
         if symmetric:
             cholesky, info = scipy.linalg.lapack.dpbtrf(band.T, lower=1, overwrite_ab=1)
             if info == 0:
                 return lambda right: scipy.linalg.lapack.dpbtrs(cholesky, right, lower=1)[0]
-    start, index, value = face_rows(*rows, inside, shift)
-    columns = sp.csc_array((value, index, start), (len(inside), len(inside)))
+    face = sp.csr_array(a_matrix[inside][:, inside] + shift * sp.eye_array(len(inside)))
     factor = splu(
-        columns, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, relax=4,
+        face.T, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1, relax=4,
         options={"SymmetricMode": True},
     )  # fmt: skip
     return lambda right: factor.solve(right, "T")  # its rows were taken for columns

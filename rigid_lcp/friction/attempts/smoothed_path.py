@@ -25,7 +25,7 @@ the point what it is.
 
 The path of a non-monotone law may still fold.  Then that of another rounding is followed, which
 folds elsewhere, from a sigma some times as great.  When none leads on the best point is given back,
-from which `rigid_lcp.friction.attempts.extrapolated_points` often ends.
+from which `rigid_lcp.friction.attempts.proximal_points` often ends.
 """
 
 from __future__ import annotations
@@ -89,8 +89,8 @@ SMOOTHED = SmoothedNumbers()
 
 def smoothed_path(
     problem: FrictionProblem,
-    tolerance: float = 1e-12,
     begin: tuple[Floats, float] | None = None,
+    tolerance: float = 1e-12,
     *,
     linear: Factorisation | None = None,
     factorisations: int = SMOOTHED.factorisations,

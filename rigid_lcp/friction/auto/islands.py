@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from rigid_lcp.friction.problem import BodySpace, FrictionProblem, FrictionSolution, judge_forces
 from rigid_lcp.friction.sweeps import NONE, solve_contacts_apart
@@ -24,8 +24,6 @@ from rigid_lcp.sparse import diagonal_blocks
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Indices = NDArray[Any]
-Flags = NDArray[np.bool_]
 Method = Callable[..., FrictionSolution]
 
 ISLAND_ROUNDS = 4
@@ -38,83 +36,19 @@ def islands(problem: FrictionProblem) -> list[Integers]:
     if contacts == 0:
         return []
     if problem.bodies is not None:
-        space = problem.bodies
-        rows = space.inverse_mass
-        mass = diagonal_blocks(rows.indptr, rows.indices, rows.data, space.body_size)
-        movable = np.asarray(mass.any(axis=(1, 2)))
-        label, count = label_by_bodies(*problem.body_jacobians, movable)
+        first, body, block = problem.body_jacobians
+        rows = problem.bodies.inverse_mass
+        mass = diagonal_blocks(rows.indptr, rows.indices, rows.data, problem.bodies.body_size)
+        joins = np.asarray(mass.any(axis=(1, 2)))[body] & block.any(axis=(1, 2))
+        one = np.repeat(np.arange(contacts), np.diff(first))[joins]
+        other, count = contacts + body[joins], contacts + len(mass)
     else:
-        rows = problem.delassus
-        label, count = label_by_contacts(rows.indptr, rows.indices, rows.data, dim)
-    if count == 1:
-        return [np.arange(contacts)]
+        w = problem.delassus.tocoo()
+        one, other, count = (w.row // dim)[w.data != 0.0], (w.col // dim)[w.data != 0.0], contacts
+    graph = sp.coo_array((np.ones(len(one), dtype=np.int8), (one, other)), shape=(count, count))
+    label = connected_components(graph, directed=False)[1][:contacts]  # in order of first contacts
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-
-
-@njit(cache=True)
-def label_by_bodies(
-    first: Integers, body: Integers, block: Floats, movable: Flags
-) -> tuple[Integers, int]:
-    """Number of every contact's island, (nc,), and how many there are.
-
-    J by its blocks; a body that is not ``movable`` joins nothing.
-    """
-    contacts = len(first) - 1
-    parent = np.arange(contacts + len(movable))
-    for c in range(contacts):
-        for k in range(first[c], first[c + 1]):
-            if movable[body[k]] and block[k].any():
-                join(parent, c, contacts + body[k])
-    return order_labels(parent, contacts)
-
-
-@njit(cache=True)
-def label_by_contacts(
-    start: Indices, index: Indices, value: Floats, dim: int
-) -> tuple[Integers, int]:
-    """`label_by_bodies` where only W is known, by rows."""
-    contacts = (len(start) - 1) // dim
-    parent, apart = np.arange(contacts), contacts
-    for row in range(contacts * dim):
-        for k in range(start[row], start[row + 1]):
-            if value[k] != 0.0 and join(parent, row // dim, index[k] // dim):
-                apart -= 1
-        if apart == 1:
-            break
-    return order_labels(parent, contacts)
-
-
-@njit(cache=True)
-def join(parent: Integers, a: int, b: int) -> bool:
-    """Make one tree of those of a and b; the lesser root stays (Galler and Fischer 1964).  Whether
-    they were two."""
-    a, b = root_of(parent, a), root_of(parent, b)
-    parent[max(a, b)] = min(a, b)
-    return a != b
-
-
-@njit(cache=True)
-def root_of(parent: Integers, a: int) -> int:
-    """The root of a tree; the way there is halved."""
-    while parent[a] != a:
-        parent[a] = parent[parent[a]]
-        a = parent[a]
-    return a
-
-
-@njit(cache=True)
-def order_labels(parent: Integers, contacts: int) -> tuple[Integers, int]:
-    """Trees numbered in the order of their smallest contact, which is their root."""
-    label, count = np.empty(contacts, dtype=np.int64), 0
-    for c in range(contacts):
-        root = root_of(parent, c)
-        if root == c:
-            label[c] = count
-            count += 1
-        else:
-            label[c] = label[root]
-    return label, count
 
 
 def cut_out_island(problem: FrictionProblem, contacts: Integers) -> FrictionProblem:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.friction.attempts import heaviness, seem_loose, smoothed_path
+from rigid_lcp.friction.attempts import heaviness, seem_loose, seem_to_stick, smoothed_path
 from rigid_lcp.friction.auto.sweeps import TURNS, take_turns
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
 from rigid_lcp.friction.linear import SingularSystem
-from rigid_lcp.friction.methods import PATH_ITERATIONS, Path, PathStep, interior_point
+from rigid_lcp.friction.methods import Path, PathStep, interior_point
 from rigid_lcp.friction.problem import FrictionSolution, length
 
 Floats = NDArray[np.float64]
@@ -62,10 +62,6 @@ class ConvexPath:
 class HeavyPath:
     """Where light bodies bear heavy ones."""
 
-    newton: int = 12
-    """Steps of Newton from the forces of sticking."""
-    patience: int = 5
-    """Of them, that may fail to halve the residual."""
     steps: int = 20
     """Along the convex path, which has to go further."""
     end_newton: int = 10
@@ -112,15 +108,6 @@ TURN_PATHS = (
 TURN_PATH_STEPS = 45
 """Paths from whose ends turns begin again, and steps along each: how many turns are needed differs
 by ten between starts that look alike, so a few of many starts cost less than many of one."""
-PATHS = (
-    (Path(rounding=0.3, compliance=0.01), 100),
-    (Path(rounding=0.03, compliance=1.0), 100),
-    (Path(rounding=1.0, compliance=0.1), 100),
-    (Path(rounding=1e-3, compliance=1e-3), 300),
-    (Path(rounding=0.3, compliance=0.1), 300),
-    (Path(convex=True, compliance=1e-4), 300),
-)
-"""Paths of the interior point, and sweeps of Gauss-Seidel where Newton fails at their end."""
 
 
 # --- what sticks ------------------------------------------------------------------------------
@@ -130,24 +117,13 @@ def stick_all(trial: Trial) -> bool:
     """One factorisation, exact for towers and much of what stands.  With a start, and where
     factorisations are dear, only if the best point looks like it."""
     if not trial.cold or trial.dear:
-        return trial.stick_if_likely()
+        if seem_to_stick(trial.problem, trial.best.r):
+            trial.stick()
+        return trial.best.solved
     trial.stuck = trial.stick()
     if not trial.best.solved:
         trial.loose = seem_loose(trial.problem, trial.stuck.r)
         trial.heaviness = heaviness(trial.problem, trial.stuck.r)
-    return trial.best.solved
-
-
-def step_from_best(trial: Trial) -> bool:
-    """Newton from the best point."""
-    trial.newton(trial.best.r, LIMITS.newton, trial.best.method)
-    return trial.best.solved
-
-
-def step_from_stuck(trial: Trial) -> bool:
-    """Newton from the forces of sticking, where light bodies bear heavy ones."""
-    assert trial.stuck is not None
-    trial.newton(trial.stuck.r, HEAVY.newton, trial.stuck.method, HEAVY.patience)
     return trial.best.solved
 
 
@@ -212,10 +188,13 @@ def seems_at_rest(trial: Trial) -> bool:
     return best.residual <= CONVEX.until and length(best.u) <= CONVEX.rest * length(offset)
 
 
-def follow(trial: Trial, path: PathStep, until: float, steps: int) -> FrictionSolution:
-    """So many steps on a path at most."""
+def follow(trial: Trial, path: Path | PathStep, until: float, steps: int) -> FrictionSolution:
+    """So many steps at most along a path, or on along one that is begun."""
+    begun, kind = (path, path.path) if isinstance(path, PathStep) else (None, path)
     return trial.keep(
-        interior_point(trial.problem, None, until, path.path, iterations=steps, begun=path)
+        interior_point(
+            trial.problem, None, until, kind, linear=trial.factors, iterations=steps, begun=begun
+        )
     )
 
 
@@ -228,12 +207,8 @@ def end_path(trial: Trial, path: PathStep, found: FrictionSolution) -> bool:
 def follow_sharp_path(trial: Trial) -> bool:
     """`SHARP` and Newton from its end, and turns from where that is near."""
     trial.sharp = True
-    found = trial.keep(
-        interior_point(
-            trial.problem, None, max(SHARP.until, trial.tolerance), SHARP.path,
-            linear=trial.factors, iterations=min(SHARP.steps, trial.affordable),
-        )
-    )  # fmt: skip
+    steps = min(SHARP.steps, trial.affordable)
+    found = follow(trial, SHARP.path, max(SHARP.until, trial.tolerance), steps)
     if found.residual <= SHARP.useful:
         found = trial.newton(found.r, LIMITS.newton, found.method)
     if not trial.best.solved and found.residual <= SHARP.near:
@@ -246,12 +221,8 @@ def smooth_further(trial: Trial) -> bool:
     extrapolated points."""
     assert trial.path_point is not None
     trial.smoothed = True
-    found = smoothed_path(
-        trial.problem, trial.tolerance, trial.path_point, linear=trial.linear,
-        factorisations=min(FURTHER.factorisations, trial.affordable),
-    )  # fmt: skip
-    trial.keep(found)
-    trial.sharpen()
+    most = min(FURTHER.factorisations, trial.affordable)
+    found = trial.attempt(smoothed_path, trial.path_point, factorisations=most)
     if trial.best.solved or found.residual > FURTHER.useful:
         return trial.best.solved
     trial.drift(FURTHER.points, FURTHER.points_flops, found)
@@ -265,36 +236,14 @@ def turn_from_paths(trial: Trial) -> bool:
     Forces there are inside their cones, far from every change of status, and so a self-stress has
     less way to go than from swept ones, which lie on the cones' boundaries.
     """
-    problem, most = trial.problem, trial.effort + TURNS.flops
+    most = trial.effort + TURNS.flops
     if trial.path_end is not None and take_turns(trial, trial.path_end):
         return True
     for path in TURN_PATHS:
         if trial.effort > most or not trial.affordable:
             break
-        found = interior_point(
-            problem, None, max(LIMITS.hand_over, trial.tolerance), path, linear=trial.linear,
-            iterations=min(TURN_PATH_STEPS, trial.affordable),
-        )  # fmt: skip
-        if trial.polish(trial.keep(found), factorisations=0) or take_turns(trial, found.r):
-            return True
-    return False
-
-
-def follow_paths(trial: Trial) -> bool:
-    """The interior point along `PATHS`; each end goes to Newton, and if that is not enough to
-    Gauss-Seidel and Newton again, within `Trial.bound_effort`."""
-    problem = trial.problem
-    for path, sweeps in PATHS:
-        if trial.effort > trial.bound or not trial.affordable:
-            break
-        found = trial.keep(
-            interior_point(
-                problem, None, max(LIMITS.hand_over, trial.tolerance), path, linear=trial.linear,
-                iterations=min(PATH_ITERATIONS, trial.affordable),
-            )
-        )  # fmt: skip
-        if trial.polish(found) or trial.sweep(found.r, sweeps, "interior-point"):
-            return True
-        if trial.accepts() and not trial.small:
+        steps = min(TURN_PATH_STEPS, trial.affordable)
+        found = follow(trial, path, max(LIMITS.hand_over, trial.tolerance), steps)
+        if trial.polish(found, factorisations=0) or take_turns(trial, found.r):
             return True
     return False

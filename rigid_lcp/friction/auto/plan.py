@@ -19,16 +19,14 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rigid_lcp.friction.attempts import PROXIMAL, frictionless
+from rigid_lcp.friction.attempts import PROXIMAL
 from rigid_lcp.friction.auto import paths as along
 from rigid_lcp.friction.auto import sweeps as by
 from rigid_lcp.friction.auto.trial import ENDLESS, Trial
-from rigid_lcp.friction.problem import FrictionProblem
+from rigid_lcp.friction.problem import FrictionProblem, prove_forces_insufficient
 
 Floats = NDArray[np.float64]
 
-FRICTION_STEPS = (10.0, 30.0, 100.0, 300.0)
-"""Coefficients of friction [-] at which greater ones stop on their way."""
 PROOF_CONTACTS = 3000
 """Up to so many contacts a linear programme looks for the proof that there is no solution."""
 
@@ -75,37 +73,6 @@ def attempts(
     return trial
 
 
-# --- attempts that need more than a method ----------------------------------------------------
-
-
-def try_frictionless(trial: Trial) -> bool:
-    """Sweeps and principal pivoting, exact: there are no tangential unknowns."""
-    trial.keep(frictionless(trial.problem, trial.start, trial.tolerance))
-    return trial.best.solved
-
-
-def step_friction(trial: Trial) -> bool:
-    """Friction above 10 (contacts that all but cannot slide, beside others that can) in steps,
-    each from the forces of the step before; whether the tolerance is reached.
-
-    The steeper a cone is, the less of its inside a path or a sweep sees; a little steeper one holds
-    most of the forces of the last.
-    """
-    problem, start = trial.problem, None
-    for most in FRICTION_STEPS:
-        if not problem.friction.max(initial=0.0) > most:
-            break
-        eased = replace(problem, friction=np.minimum(problem.friction, most))
-        found = attempts(eased, start, trial.tolerance, plan=FIRST + LAST).best
-        if not found.solved:
-            return False
-        start = found.r
-    if start is not None:
-        found = attempts(problem, start, trial.tolerance, plan=FIRST).solution()
-        trial.keep(found, "friction in steps")
-    return trial.best.solved
-
-
 def prove_insoluble(trial: Trial) -> bool:
     """Look for a proof that there is no solution, before paths are followed in vain."""
     if not is_proved_insoluble(trial.problem):
@@ -117,8 +84,6 @@ def prove_insoluble(trial: Trial) -> bool:
 
 def is_proved_insoluble(problem: FrictionProblem) -> bool:
     """Whether a linear programme proves that there is no solution."""
-    from rigid_lcp.friction.problem import prove_forces_insufficient
-
     return problem.contacts <= PROOF_CONTACTS and prove_forces_insufficient(problem)
 
 
@@ -128,81 +93,59 @@ def is_proved_insoluble(problem: FrictionProblem) -> bool:
 
 FROM_PATH = (
     Stage("sharp path", lambda t: not t.sharp, along.follow_sharp_path),
-    Stage("sweeps first", lambda t: t.sweeps_a_factorisation > 20.0 and t.path_end is not None,
-          by.sweep_from_path),
+    Stage("sweeps first", lambda t: t.sweeps_a_factorisation > 20.0, by.sweep_from_path),
     Stage("smoothed path", lambda t: True, along.smooth_further),
-    Stage("turns", lambda t: True, by.turn_from_best),
+    Stage("turns", lambda t: True, lambda t: by.take_turns(t, t.best.r)),
 )  # fmt: skip
 """From where the convex path ended short.  The sharp path solves most of what is left and jams
 where forces are many times what approaches; the smoothed one need not stay inside the cones
 (kicked, tilted and slippery beds); turns let a self-stress grow a long way."""
 
 ALL_PATHS = (
-    Stage("sharp path, dear", lambda t: t.dear and not t.sharp, along.follow_sharp_path),
     Stage("convex path, late", lambda t: t.path_point is None, along.follow_convex_path),
-    Stage("from path", lambda t: t.path_point is not None, FROM_PATH),
+    Stage("from path, late", lambda t: t.path_point is not None, FROM_PATH),
 )
-"""The paths not followed yet, as factorisations are dear or there was a start.  Where they are dear
-the sharp one goes first, as it solves more."""
-
-DEEP = (
-    Stage("deep sweeps", lambda t: True, by.sweep_deep),
-    Stage("accept, moving", lambda t: t.accept > 0.0, Trial.accepts_large),
-    Stage("convex path, moving", lambda t: t.accept == 0.0, along.follow_convex_path),
-    Stage("deep sweeps, path", lambda t: t.accept == 0.0 and t.path_end is not None,
-          by.sweep_deep_from_path),
-)  # fmt: skip
-"""A large bed with a start, to the last digits: near 1e-7 Newton's method still guesses dozens of
-10,000 contacts wrong; after sweeps far down, in one run, few.  The end of the convex path is no
-better than the best point, but sweeps from it end sooner."""
+"""The paths not followed yet, as factorisations are dear or there was a start."""
 
 FIRST = (
-    Stage("frictionless", lambda t: not t.problem.friction.any(), try_frictionless),
     Stage("few sweeps", lambda t: t.cold and not t.small, by.sweep_briefly),
     Stage("all stick", lambda t: True, along.stick_all),
     Stage("few sweeps, loose", lambda t: t.small and t.loose and not t.heavy, by.sweep_briefly),
-    Stage("Newton, nearly stuck", lambda t: t.nearly_stuck, along.step_from_best),
-    Stage("Newton, heavy", lambda t: t.heavy and not t.loose and not t.nearly_stuck,
-          along.step_from_stuck),
     Stage("heavy path", lambda t: t.heavy, along.follow_heavy_path),
-    Stage("convex path", lambda t: t.stuck is not None and not t.heavy and not t.nearly_stuck,
-          along.follow_convex_path),
+    Stage("convex path", lambda t: t.stuck is not None and not t.heavy, along.follow_convex_path),
     Stage("sweeps, small", lambda t: t.small,
           lambda t: t.sweep(t.start, 100, until=t.coarse, factorisations=20)),
     Stage("from path", lambda t: t.path_point is not None, FROM_PATH),
-    Stage("deep", lambda t: t.moving and not t.rough and not t.dear, DEEP),
+    Stage("deep sweeps", lambda t: t.moving and not t.rough and not t.dear, by.sweep_deep),
+    Stage("accept, moving", lambda t: t.very_large and t.moving and not t.rough and not t.dear,
+          Trial.accepts),
     Stage("sweeps, yielding", lambda t: t.rough and t.moving, by.sweep_yielding),
-    Stage("sweeps, rough", lambda t: t.rough and t.new,
+    Stage("sweeps, rough", lambda t: t.rough and not t.moving,
           lambda t: t.sweep(None, 1000, factorisations=0)),
-    Stage("accept, rough", lambda t: t.rough and not t.small, Trial.accepts),
     Stage("sweeps, dear", lambda t: not t.small and t.dear,
           lambda t: t.sweep(t.start, 6000, factorisations=0)),
     Stage("paths, dear", lambda t: not t.small and t.cold and t.dear, ALL_PATHS),
     Stage("sweeps and points, small", lambda t: t.small,
           partial(by.sweep_on, sweeps=1000, points=PROXIMAL.factorisations)),
-    Stage("sweeps and points, new", lambda t: t.new, partial(by.sweep_on, sweeps=1000, points=20)),
-    Stage("sweeps, moving", lambda t: t.moving, partial(by.sweep_on, sweeps=1000, points=0)),
+    Stage("sweeps and points, new", lambda t: not t.small and t.start is None,
+          partial(by.sweep_on, sweeps=1000, points=20)),
     Stage("sweeps and points, moving", lambda t: t.moving,
           partial(by.sweep_on, sweeps=2000, points=20)),
     Stage("accept", lambda t: not t.small, Trial.accepts),
     Stage("last digits", lambda t: t.coarse > t.tolerance, lambda t: t.sweep(t.best.r, 1000)),
 )  # fmt: skip
 """What solves nearly all: what sticks, the convex path, Gauss-Seidel with momentum and proximal
-points by Newton at its end.  Where one place of a large moving bed resists, points fail for all."""
+points by Newton at its end.  A large bed with a start goes far down by sweeps in one run: near 1e-7
+Newton's method still guesses dozens of 10,000 contacts wrong, after these few."""
 
 LAST = (
     Stage("proof", lambda t: t.forces > ENDLESS, prove_insoluble),
     Stage("one turn", lambda t: t.gives_energy, by.turn_once),
     Stage("paths, late", lambda t: t.convex_useful and not t.smoothed, ALL_PATHS),
-    Stage("bound", lambda t: True, Trial.bound_effort),
     Stage("turns from paths", lambda t: True, along.turn_from_paths),
-    Stage("points", lambda t: True,
-          lambda t: by.run_points(t, 1500, max(5e9, t.effort))),
-    Stage("interior point", lambda t: True, along.follow_paths),
-    Stage("more points", lambda t: True, lambda t: by.run_points(t, 4000, 4e10)),
-    Stage("more sweeps", lambda t: t.effort <= t.bound, lambda t: t.sweep(None, 2000)),
+    Stage("points", lambda t: True, lambda t: by.run_points(t, 1500, max(5e9, t.effort))),
 )  # fmt: skip
 """What is dear and seldom needed, where nothing proves that there is no solution: some ten seconds
 of it solve large packings of little friction."""
 
-PLAN = (*FIRST, Stage("friction in steps", lambda t: True, step_friction), *LAST)
+PLAN = (*FIRST, *LAST)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from rigid_lcp.friction.attempts import proximal_newton
 from rigid_lcp.friction.auto.trial import LIMITS, Trial
-from rigid_lcp.friction.methods import gauss_seidel
 from rigid_lcp.friction.problem import FrictionSolution
 
 Floats = NDArray[np.float64]
@@ -77,10 +76,7 @@ BRIEF, LONG, TURNS = BriefSweeps(), LongSweeps(), Turns()
 def sweep_briefly(trial: Trial) -> bool:
     """A few sweeps, and more where they converge fast (`BriefSweeps`)."""
     for sweeps, slow in ((BRIEF.sweeps, BRIEF.creep), (BRIEF.fast_sweeps, (0, np.inf))):
-        found = gauss_seidel(
-            trial.problem, trial.best.r, trial.tolerance, sweeps, sweeper=trial.sweeper, slow=slow
-        )
-        trial.keep(found)
+        found = trial.swept(trial.best.r, trial.tolerance, sweeps, slow=slow)
         if trial.best.solved or found.residual > BRIEF.fast:
             break
     if trial.small:
@@ -108,12 +104,9 @@ def sweep_yielding(trial: Trial) -> bool:
     ):  # fmt: skip
         return True
     if not trial.dear:
-        trial.keep(
-            proximal_newton(
-                trial.problem, trial.best.r, trial.tolerance, linear=trial.linear,
-                factorisations=LONG.factorisations, first_shift=LONG.shift,
-            ),
-            trial.best.method,
+        trial.attempt(
+            proximal_newton, trial.best.r, trial.best.method, factorisations=LONG.factorisations,
+            first_shift=LONG.shift,
         )  # fmt: skip
     return trial.best.solved
 
@@ -123,11 +116,10 @@ def sweep_deep(trial: Trial) -> bool:
     return trial.sweep(trial.start, LONG.sweeps, until=LONG.until, factorisations=0)
 
 
-def sweep_deep_from_path(trial: Trial) -> bool:
-    """The same from the end of the convex path."""
-    return trial.sweep(
-        trial.path_end, LONG.sweeps, "interior-point", until=LONG.until, factorisations=0
-    )
+def turn_once(trial: Trial) -> bool:
+    """Where W gives energy no solution need exist: what is near is found in one turn, the last."""
+    take_turns(trial, trial.best.r if trial.path_end is None else trial.path_end, patience=1)
+    return True
 
 
 def sweep_from_path(trial: Trial) -> bool:
@@ -137,15 +129,11 @@ def sweep_from_path(trial: Trial) -> bool:
     return trial.best.solved
 
 
-def turn_from_best(trial: Trial) -> bool:
-    """Turns from the best point."""
-    return take_turns(trial, trial.best.r)
-
-
-def turn_once(trial: Trial) -> bool:
-    """Where W gives energy no solution need exist: what is near is found in one turn, the last."""
-    take_turns(trial, trial.best.r if trial.path_end is None else trial.path_end, patience=1)
-    return True
+def sweep_turn(trial: Trial, start: Floats) -> FrictionSolution:
+    """Sweeps of one turn from ``start``, and where they end."""
+    found = trial.swept(start, trial.tolerance, TURNS.sweeps, last=True)
+    trial.sharpen()
+    return found
 
 
 def run_points(trial: Trial, most: int, flops: float) -> bool:
@@ -171,14 +159,3 @@ def take_turns(trial: Trial, force: Floats, patience: int | None = None) -> bool
         if found.residual < 0.5 * mark:
             mark, waited = found.residual, 0
     return trial.best.solved
-
-
-def sweep_turn(trial: Trial, start: Floats) -> FrictionSolution:
-    """Sweeps of one turn from ``start``, and where they end."""
-    found = trial.keep(
-        gauss_seidel(
-            trial.problem, start, trial.tolerance, TURNS.sweeps, sweeper=trial.sweeper, last=True
-        )
-    )
-    trial.sharpen()
-    return found

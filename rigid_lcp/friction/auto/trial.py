@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +16,10 @@ from rigid_lcp.friction.attempts import (
     extrapolated_points,
     proximal_newton,
     refined,
-    seem_to_stick,
     sticking,
 )
 from rigid_lcp.friction.linear import Factorisation, factorisation
-from rigid_lcp.friction.methods import NEWTON_PATIENCE, Sweeper, gauss_seidel, make_sweeper, newton
+from rigid_lcp.friction.methods import NEWTON, Sweeper, gauss_seidel, newton
 from rigid_lcp.friction.problem import (
     FORCE_ROUND_OFF,
     FrictionProblem,
@@ -77,11 +78,6 @@ class Limits:
     of a step before that know but some of the contacts may be a little above 1, and lead on."""
     great_forces: float = 1e4
     """Forces over ``rho |q|`` [-], above which such a residual hides velocities."""
-    last_share: float = 1.0
-    """What the paths of the interior point may cost in all before no further one is begun: so
-    many times what was spent before them [-],"""
-    last_flops: float = 2e10
-    """or so many flops (some seconds), if that is more."""
 
 
 LIMITS = Limits()
@@ -108,8 +104,6 @@ class Trial:
         """Forces at which all contacts stick, where there is no start."""
         self.loose, self.heaviness = False, 1.0
         """Of these forces: whether much seems loose, and what heavy bodies ask for (`sticking`)."""
-        self.bound = np.inf
-        """Effort beyond which the last attempts end."""
         self.start: Floats | None = None
         """The forces given to start from; None where they mislead."""
         if start is not None:
@@ -124,14 +118,14 @@ class Trial:
         return self.problem.contacts <= LIMITS.few_contacts
 
     @property
-    def new(self) -> bool:
-        """Whether a large problem has no start."""
-        return not self.small and self.start is None
-
-    @property
     def moving(self) -> bool:
         """Whether a large problem has a start: a step of a bed in motion."""
         return not self.small and self.start is not None
+
+    @property
+    def very_large(self) -> bool:
+        """Whether the next step of a bed in motion is due before dear methods are tried."""
+        return self.problem.contacts >= MANY_CONTACTS
 
     @property
     def rough(self) -> bool:
@@ -160,28 +154,14 @@ class Trial:
         """Whether light bodies bear heavy ones."""
         return self.heaviness > 1.0
 
-    @property
-    def nearly_stuck(self) -> bool:
-        """Whether Newton may take over from the forces of sticking."""
-        return self.stuck is not None and self.best.residual <= LIMITS.hand_over / self.heaviness
-
     def accepts(self) -> bool:
         """Whether the best point is good enough for who asked."""
         return self.best.residual <= self.accept
 
-    def accepts_large(self) -> bool:
-        """The same for a bed in motion, where the next step is due unless it is a small one."""
-        return self.accepts() and self.problem.contacts >= MANY_CONTACTS
-
-    def bound_effort(self) -> bool:
-        """Set the effort beyond which the last attempts end, by what was spent so far."""
-        self.bound = max(LIMITS.last_flops, (1.0 + LIMITS.last_share) * self.effort)
-        return False
-
     @cached_property
     def sweeper(self) -> Sweeper:
         """The sweeps of this problem."""
-        return make_sweeper(self.problem)
+        return Sweeper(self.problem)
 
     @property
     def factors(self) -> Factorisation:
@@ -215,39 +195,43 @@ class Trial:
         return found
 
     def polish(
-        self,
-        found: FrictionSolution,
-        after: str = "",
-        factorisations: int = PROXIMAL.factorisations,
+        self, found: FrictionSolution, factorisations: int = PROXIMAL.factorisations
     ) -> bool:
         """Proximal points from a point of another method; whether the tolerance is reached."""
         if self.best.solved or not np.isfinite(found.residual):
             return self.best.solved
         if found.residual <= LIMITS.hand_over:
-            found = self.newton(found.r, LIMITS.newton, after or found.method)
+            found = self.newton(found.r, LIMITS.newton, found.method)
         if self.best.solved or factorisations == 0:
             return self.best.solved
-        self.keep(
-            proximal_newton(
-                self.problem, found.r, self.tolerance, linear=self.factors,
-                factorisations=min(factorisations, self.affordable),
-            ),
-            after or found.method,
-        )  # fmt: skip
-        self.sharpen()
+        most = min(factorisations, self.affordable)
+        self.attempt(proximal_newton, found.r, found.method, factorisations=most)
         return self.best.solved
 
+    def attempt(
+        self, method: Callable[..., FrictionSolution], start: Any, after: str = "", **options: Any
+    ) -> FrictionSolution:
+        """What ``method`` finds from ``start`` with this problem's factors: kept, and sharpened."""
+        found = method(self.problem, start, self.tolerance, linear=self.factors, **options)
+        self.keep(found, after)
+        self.sharpen()
+        return found
+
+    def swept(
+        self, start: Floats | None, until: float, sweeps: int, **options: Any
+    ) -> FrictionSolution:
+        """What so many sweeps of Gauss-Seidel find, to a residual of ``until``."""
+        return self.keep(
+            gauss_seidel(self.problem, start, until, sweeps, sweeper=self.sweeper, **options)
+        )
+
     def sweep(
-        self, start: Floats | None, sweeps: int, after: str = "", until: float = 0.0,
+        self, start: Floats | None, sweeps: int, until: float = 0.0,
         factorisations: int = PROXIMAL.factorisations,
     ) -> bool:  # fmt: skip
         """Gauss-Seidel to a residual of ``until``, and Newton; whether the tolerance is reached."""
-        until = max(until, self.tolerance)
-        found = self.keep(
-            gauss_seidel(self.problem, start, until, sweeps, sweeper=self.sweeper), after
-        )
-        name = f"{after} + gauss-seidel" if after else "gauss-seidel"
-        return self.best.solved or self.polish(found, name, factorisations)
+        found = self.swept(start, max(until, self.tolerance), sweeps)
+        return self.best.solved or self.polish(found, factorisations)
 
     def drift(
         self, most: int, flops: float, start: FrictionSolution | None = None,
@@ -259,21 +243,9 @@ class Trial:
         start = start or self.best
         if count < LIMITS.few_points:
             return start
-        found = self.keep(
-            extrapolated_points(
-                self.problem, start.r, self.tolerance, linear=self.factors, factorisations=count,
-                patience=patience,
-            ),
-            start.method,
-        )  # fmt: skip
-        self.sharpen()
-        return found
-
-    def stick_if_likely(self) -> bool:
-        """Where the best point looks like it: all contacts stick; whether that is the answer."""
-        if seem_to_stick(self.problem, self.best.r):
-            self.stick()
-        return self.best.solved
+        return self.attempt(
+            extrapolated_points, start.r, start.method, factorisations=count, patience=patience
+        )
 
     def stick(self) -> FrictionSolution:
         """Forces at which all contacts stick."""
@@ -325,18 +297,11 @@ class Trial:
             self.best = Trial(self.problem, None, self.tolerance).best
 
     def newton(
-        self, start: Floats, steps: int, after: str, patience: int = NEWTON_PATIENCE
+        self, start: Floats, steps: int, after: str, patience: int = NEWTON.patience
     ) -> FrictionSolution:
         """So many steps of Newton, and one more where the answer is to be exact."""
-        found = self.keep(
-            newton(
-                self.problem, start, self.tolerance, linear=self.factors,
-                iterations=min(steps, self.affordable), patience=patience,
-            ),
-            after,
-        )  # fmt: skip
-        self.sharpen()
-        return found
+        steps = min(steps, self.affordable)
+        return self.attempt(newton, start, after, iterations=steps, patience=patience)
 
     def sharpen(self) -> None:
         """Newton without its shift, from a solution, where the tolerance asks for an exact one."""
@@ -374,9 +339,7 @@ class Trial:
         ):
             return
         more = int(np.ceil(LIMITS.more_sweeps * self.work.get("sweeps", 0.0)))
-        self.keep(
-            gauss_seidel(self.problem, self.best.r, FORCE_ROUND_OFF, more, sweeper=self.sweeper)
-        )
+        self.swept(self.best.r, FORCE_ROUND_OFF, more)
 
     def solution(self, status: Status | None = None, message: str = "") -> FrictionSolution:
         """The best point, with the work of all attempts."""

@@ -57,16 +57,29 @@ Floats = NDArray[np.float64]
 POLISHED = True
 """Newton's method is called from its end."""
 
-PATH_ITERATIONS = 50
-BOUNDARY_SHARE = 0.99
-"""Part of the way to the nearest cone's boundary that a step may go."""
-LEAST_CENTRING = 1e-6
-"""The predictor never aims lower than so many times the present gap."""
-BACK_OFF_STEP, BACK_OFF_GAP = 0.05, 3.0
-"""A step shorter than this is replaced by one towards the middle, with a gap so many times as
-large and the lack left as it is."""
-SHORT_STEP, SHORT_STEPS = 0.03, 4
-"""So many steps in a row shorter than this: the path has folded, or there is no solution."""
+
+@dataclass(frozen=True)
+class InteriorNumbers:
+    """Steps, and what ends them."""
+
+    iterations: int = 50
+    """At most."""
+    boundary_share: float = 0.99
+    """Part of the way to the nearest cone's boundary [-] that a step may go."""
+    least_centring: float = 1e-6
+    """The predictor never aims lower than so many times the present gap [-]."""
+    back_off_step: float = 0.05
+    """A step shorter than this [-] is replaced by one towards the middle,"""
+    back_off_gap: float = 3.0
+    """with a gap so many times as large [-] and the lack left as it is."""
+    short_step: float = 0.03
+    """Where steps are shorter than this [-],"""
+    short_steps: int = 4
+    """so many in a row: the path has folded, or there is no solution."""
+
+
+INTERIOR = InteriorNumbers()
+LEAST_CENTRING = INTERIOR.least_centring
 
 
 @dataclass(frozen=True)
@@ -91,7 +104,7 @@ def interior_point(
     path: Path = Path(),
     *,
     linear: Factorisation | None = None,
-    iterations: int = PATH_ITERATIONS,
+    iterations: int = INTERIOR.iterations,
     begun: PathStep | None = None,
 ) -> FrictionSolution:
     """Follow the path until the residual is at or below ``tolerance``.
@@ -116,13 +129,13 @@ def interior_point(
         residual = problem.residual(force)
         if residual < best_residual:
             best, best_residual = force, residual
-        if not residual > tolerance or done == iterations or short == SHORT_STEPS:
+        if not residual > tolerance or done == iterations or short == INTERIOR.short_steps:
             break
         try:
             length = step.take()
         except SingularSystem:
             break
-        done, short = done + 1, short + 1 if length < SHORT_STEP else 0
+        done, short = done + 1, short + 1 if length < INTERIOR.short_step else 0
     return judge_forces(
         problem, best, tolerance, "interior-point",
         {"iterations": float(done), "factorisations": float(done + (begun is None))},
@@ -186,10 +199,10 @@ class PathStep:
         square = cone_product(scaled, scaled)
         dx, ds = direction(-square)
         dx, ds = direction(aim_corrector(x, s, dx, ds, eta, point, square))
-        length = BOUNDARY_SHARE * step_length(x, s, dx, ds)
-        if length < BACK_OFF_STEP:  # off the path: back to its middle, higher up
-            dx, ds = direction(BACK_OFF_GAP * gap * self.unit - square, 0.0)
-            length = BOUNDARY_SHARE * step_length(x, s, dx, ds)
+        length = INTERIOR.boundary_share * step_length(x, s, dx, ds)
+        if length < INTERIOR.back_off_step:  # off the path: back to its middle, higher up
+            dx, ds = direction(INTERIOR.back_off_gap * gap * self.unit - square, 0.0)
+            length = INTERIOR.boundary_share * step_length(x, s, dx, ds)
         length = min(1.0, length)
         if not np.isfinite(length) or not (np.isfinite(dx).all() and np.isfinite(ds).all()):
             raise SingularSystem

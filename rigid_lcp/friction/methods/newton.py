@@ -13,6 +13,8 @@ limit has no error from it, unlike Tikhonov's.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -31,18 +33,29 @@ from rigid_lcp.friction.problem import (
 Floats = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
-NEWTON_ITERATIONS = 50
-FIRST_SHIFTS = (1e-5, 1e-3)
-"""Proximal shifts over mean(diag W) to begin with, tried in turn."""
-LEAST_SHIFT, QUIET = 1e-10, 0.01
-"""The shift falls by `QUIET` at a step on which no contact changes its status: then it is all that
-holds the steps up.  While some do a great one is better: round-off is divided by it, and contacts
-that hardly bear would change at every step."""
-BEARABLE = 1e-2
-"""Part of what makes the contacts approach, ``rho |q|``, that the first shift may hold back of the
-forces: a great weight on light bodies answers at a small eigenvalue of W."""
-NEWTON_PATIENCE = 8
-"""Steps that may fail to halve the best residual: contacts change status before it falls."""
+
+@dataclass(frozen=True)
+class NewtonNumbers:
+    """Shifts and steps."""
+
+    first_shifts: tuple[float, float] = (1e-5, 1e-3)
+    """Proximal shifts over mean(diag W) [-] to begin with, tried in turn."""
+    least_shift: float = 1e-10
+    """Least of them [-]."""
+    quiet: float = 0.01
+    """The shift falls by this factor at a step on which no contact changes its status: then it is
+    all that holds the steps up.  While some do a great one is better: round-off is divided by it,
+    and contacts that hardly bear would change at every step."""
+    bearable: float = 1e-2
+    """Part of what makes the contacts approach, ``rho |q|`` [-], that the first shift may hold back
+    of the forces: a great weight on light bodies answers at a small eigenvalue of W."""
+    iterations: int = 50
+    """Steps at most,"""
+    patience: int = 8
+    """and those that may fail to halve the best residual, as contacts change status first."""
+
+
+NEWTON = NewtonNumbers()
 
 
 @njit(cache=True)
@@ -101,15 +114,15 @@ def newton(
     tolerance: float = 1e-12,
     *,
     linear: Factorisation | None = None,
-    iterations: int = NEWTON_ITERATIONS,
-    patience: int = NEWTON_PATIENCE,
+    iterations: int = NEWTON.iterations,
+    patience: int = NEWTON.patience,
 ) -> FrictionSolution:
     """Newton steps from ``start`` (zero forces if None) until the residual is small enough.
 
     Converges fast near a solution, and may go anywhere from a poor start: give it the point of
     another method.  Where it does not halve its residual in ``patience`` steps it goes back to its
     best point and on with a greater shift, which is slower and steadier; asked for less patience
-    than `NEWTON_PATIENCE` it ends there.  ``linear``: factorisations of this problem's W, made if
+    than by default it ends there.  ``linear``: factorisations of this problem's W, made if
     not given.
 
     Raises `ProblemError` for a start that is none, `UsageError` for other options that are none.
@@ -124,16 +137,17 @@ def newton(
         best = require_start(start, len(best), problem.dim)
     best_residual, done = problem.residual(best), 0
     offered = problem.rho * length(problem.offset)
-    first = min(FIRST_SHIFTS[0], BEARABLE * offered / (length(best) or 1.0)) or FIRST_SHIFTS[0]
-    least_shift = min(LEAST_SHIFT, QUIET * first)
-    for shift in (first, *FIRST_SHIFTS[1:]) if patience >= NEWTON_PATIENCE else (first,):
+    most, *others = NEWTON.first_shifts
+    first = min(most, NEWTON.bearable * offered / (length(best) or 1.0)) or most
+    least_shift = min(NEWTON.least_shift, NEWTON.quiet * first)
+    for shift in (first, *others) if patience >= NEWTON.patience else (first,):
         force, waited, mark = best, 0, best_residual
         status = np.zeros(0, dtype=np.int8)
         while best_residual > tolerance and done < iterations and waited < patience:
             velocity, last = problem.velocity(force).reshape(shape), status
             f, a, b, status = alart_curnier(force.reshape(shape), velocity, problem.friction, rho)
             if np.array_equal(status, last):
-                shift = max(least_shift, QUIET * shift)
+                shift = max(least_shift, NEWTON.quiet * shift)
             done, waited = done + 1, waited + 1
             try:
                 solve = linear.factor(a + (shift / problem.rho) * b, b)

@@ -26,6 +26,7 @@ from rigid_lcp.friction.pivots.updates import (
     leave_reduced,
     multiply_geometry,
     refresh_reduced,
+    scatter_column,
     slide_sign,
     solve_reduced,
 )
@@ -33,8 +34,8 @@ from rigid_lcp.friction.pivots.updates import (
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-DONE, RAY, CYCLED, RETURNED, SINGULAR, TOO_MANY = range(6)
-"""How a drive ends: consistent; without bound; lists repeat; back at s = 0; singular; too long."""
+DONE, RAY, CYCLED, SINGULAR, TOO_MANY = range(5)
+"""How a drive ends: consistent; without bound; lists repeat; singular; too long."""
 NO_EVENT, TOUCHES, PARTS, STICKS, SLIDES = range(5)
 """Events of step 3: none, (a), (b), (c), (d)."""
 NORMAL, TANGENTIAL, OFFSET = range(3)
@@ -227,16 +228,14 @@ def lists_repeat(seen: Ints, repeats: int, signature: int) -> bool:
 @njit(cache=True)
 def drive(
     geometry: Geometry, reduced: Reduced, b: Floats, f: Floats, a: Floats, rate: Floats,
-    what: int, contact: int, goal: float, reversal: bool, limit: int, codes: Ints, trace: Floats,
-    count: Ints,
+    what: int, contact: int, goal: float, reversal: bool, limit: int, codes: Ints, count: Ints,
 ) -> tuple[int, int]:  # fmt: skip
     """Steps 2 to 4 for one driven quantity; returns how it ended and the contact where.
 
     ``what``: NORMAL or TANGENTIAL force of ``contact``, until it is consistent, or OFFSET, until
-    s is ``goal`` (b then holds its new value).  ``reversal``: after an event go on in the sense in
-    which the contact that moved stays consistent, even if s falls.  ``codes`` (nc, 6) random
-    numbers, one for a contact in a list; ``trace`` (m, 7) takes driven contact, what, contact,
-    from, to, step and s of each event while it has room; ``count`` (1,) counts events.
+    s is ``goal`` (b then holds its new value).  ``reversal``, of an offset: after an event go on in
+    the sense in which the contact that moved stays consistent, even if s falls.  ``codes`` (nc, 6)
+    random numbers, one for a contact in a list; ``count`` (1,) counts events.
     """
     df, da = np.zeros(len(f)), np.zeros(len(f))
     seen = np.zeros(256, dtype=np.int64)
@@ -252,29 +251,22 @@ def drive(
         done, end = find_driven_end(
             geometry, contact, what, sense, ahead, goal - travelled, f, a, df, da
         )  # fmt: skip
-        back = travelled if ahead < 0.0 and what != OFFSET else np.inf
-        if done == np.inf and step == np.inf and back == np.inf:
+        if done == np.inf and step == np.inf:
             return RAY, contact
-        last = min(done, back) <= step
+        last = done <= step
         if last:
-            step = min(done, back)
+            step = done
         travelled += ahead * step
         f += (ahead * step) * df
         a += (ahead * step) * da
         if what == OFFSET:
             b += (ahead * step) * rate
         if last:
-            if back < done:
-                return RETURNED, contact
             if what == NORMAL:
                 a[geometry.normal[contact]] = 0.0
             elif what == TANGENTIAL:
                 return (DONE if move_contact(geometry, reduced, contact, end) else SINGULAR), 0
             return DONE, contact
-        if count[0] < len(trace):
-            row = trace[count[0]]
-            row[0], row[1], row[2], row[3], row[4] = contact, what, who, reduced.kind[who], to
-            row[5], row[6] = ahead * step, travelled
         count[0] += 1
         signature ^= codes[who, reduced.kind[who]] ^ codes[who, to]
         scale = max(scale, abs(travelled))
@@ -305,3 +297,45 @@ def snap_event(geometry: Geometry, f: Floats, a: Floats, who: int, event: int, t
         a[t] = 0.0
     else:
         f[t] = slide_sign(to) * geometry.mu[who] * f[n]
+
+
+@njit(cache=True)
+def consider_contacts(
+    geometry: Geometry, reduced: Reduced, b: Floats, f: Floats, a: Floats, order: Ints,
+    limit: int, codes: Ints, count: Ints,
+) -> tuple[int, int]:  # fmt: skip
+    """Section 6, steps 1 to 4 for one contact after the other; how it ended, and where."""
+    rate, nothing = np.zeros(len(b)), np.zeros(len(b))
+    for c in order:
+        settle_values(geometry, reduced, b, nothing, f, a)
+        n, t, slip = geometry.normal[c], geometry.tangent[c], geometry.slip[c]
+        if a[n] >= 0.0:  # step 1
+            reduced.kind[c] = BREAKING
+            continue
+        rate[:] = 0.0
+        scatter_column(geometry, n, 1.0, rate)
+        if slip != 0:
+            scatter_column(geometry, t, slip * geometry.mu[c], rate)
+        ended, where = drive(
+            geometry, reduced, b, f, a, rate, NORMAL, c, np.inf, False, limit - count[0],
+            codes, count,
+        )  # fmt: skip
+        if ended != DONE:
+            return ended, where
+        if slip != 0 or t < 0:
+            to = SLIDING_DOWN if slip < 0 else SLIDING_UP
+            if not move_contact(geometry, reduced, c, to):
+                return SINGULAR, c
+            continue
+        if not move_contact(geometry, reduced, c, TURNING):
+            return SINGULAR, c
+        rate[:] = 0.0
+        scatter_column(geometry, t, 1.0 if a[t] < 0.0 else -1.0, rate)
+        ended, where = drive(
+            geometry, reduced, b, f, a, rate, TANGENTIAL, c, np.inf, False, limit - count[0],
+            codes, count,
+        )  # fmt: skip
+        if ended != DONE:
+            return ended, where
+    settle_values(geometry, reduced, b, nothing, f, a)
+    return DONE, -1

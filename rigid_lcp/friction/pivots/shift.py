@@ -12,6 +12,8 @@ friction it is judged by its residual).  The shift falls as long as that takes f
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,14 +30,28 @@ from rigid_lcp.friction.problem import FrictionProblem
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SHIFT_LEAST = 1e-6
-"""Relative shift below which round-off in the inverse would make events up."""
-SHIFT_STEPS = 60
-"""Most proximal steps that take the shift out,"""
-FEW_PIVOTS = 10
-"""Pivots of a proximal step after which the shift can fall faster."""
-SHIFT_PATIENCE = 12
-"""and most without a better residual: self-stress moves on for a while before it settles."""
+
+@dataclass(frozen=True)
+class ShiftNumbers:
+    """How the shift falls, and what ends that."""
+
+    least: float = 1e-6
+    """Over the mean of the diagonal [-]: below it round-off in the inverse would make events up."""
+    steps: int = 60
+    """Most proximal steps that take the shift out,"""
+    patience: int = 12
+    """and most without a better residual: self-stress moves on for a while before it settles."""
+    fall: float = 0.1
+    """Factor of the shift at a proximal step [-],"""
+    steep_fall: float = 0.01
+    """and after one of few pivots [-]:"""
+    few_pivots: int = 10
+    """so many at most."""
+    least_pace: float = 0.1
+    """Exponent of that factor [-], halved after a step of too many pivots, below which it ends."""
+
+
+SHIFT = ShiftNumbers()
 
 
 def change_shift(state: Pivots, shift: float) -> bool:
@@ -58,12 +74,14 @@ def remove_shift(problem: FrictionProblem, state: Pivots, tolerance: float, few:
     """
     exact, best = problem.offset[state.rows], read_pivots_force(problem, state)
     least, idle, pace = measure_pivots_residual(problem, state, best), 0, 1.0
-    taken, floor = 0, SHIFT_LEAST * state.unit
-    for _ in range(SHIFT_STEPS if state.shift[0] > 0.0 else 0):
-        if idle == SHIFT_PATIENCE:
+    taken, floor = 0, SHIFT.least * state.unit
+    for _ in range(SHIFT.steps if state.shift[0] > 0.0 else 0):
+        if idle == SHIFT.patience:
             break
-        before, shift, spent = copy_pivots(state), float(state.shift[0]), int(state.events[0])
-        smaller = min(shift, max((0.1 if taken > FEW_PIVOTS else 0.01) ** pace * shift, floor))
+        before = state.reduced.kind.copy(), state.f.copy(), state.a.copy()
+        shift, spent = float(state.shift[0]), int(state.events[0])
+        fall = SHIFT.fall if taken > SHIFT.few_pivots else SHIFT.steep_fall
+        smaller = min(shift, max(fall**pace * shift, floor))
         if least <= tolerance:
             smaller = shift  # what comes now is cheap, and free where no list changes
         if smaller < shift:
@@ -73,7 +91,7 @@ def remove_shift(problem: FrictionProblem, state: Pivots, tolerance: float, few:
         taken = int(state.events[0]) - spent
         if ended != DONE:
             restore_pivots(state, before, shift)
-            if smaller == shift or pace < 0.1:
+            if smaller == shift or pace < SHIFT.least_pace:
                 break
             pace *= 0.5
             continue
@@ -104,11 +122,6 @@ def find_lists_force(
     found = read_pivots_force(problem, state)
     with np.errstate(over="ignore", invalid="ignore"):  # where eq. 28 is singular but to round-off
         return found if measure_pivots_residual(problem, state, found) < residual else force
-
-
-def copy_pivots(state: Pivots) -> tuple[Ints, Floats, Floats]:
-    """The lists, f and a, to come back to."""
-    return state.reduced.kind.copy(), state.f.copy(), state.a.copy()
 
 
 def restore_pivots(state: Pivots, kept: tuple[Ints, Floats, Floats], shift: float) -> None:

@@ -18,13 +18,12 @@ from rigid_lcp.friction.pivots.drive import (
     DONE,
     OFFSET,
     RAY,
-    RETURNED,
     SINGULAR,
     TOO_MANY,
     drive,
     settle_values,
 )
-from rigid_lcp.friction.pivots.updates import LIST_NAMES, Geometry, Reduced, start_reduced
+from rigid_lcp.friction.pivots.updates import LISTS, Geometry, Reduced, start_reduced
 from rigid_lcp.friction.problem import (
     FrictionProblem,
     FrictionSolution,
@@ -59,7 +58,6 @@ class Pivots(NamedTuple):
     diagonal: tuple[Ints, Ints]
     """Where the diagonal of A stands among its values by rows and by columns."""
     codes: Ints
-    trace: Floats
     events: Ints
     """(1,) changes of lists so far."""
 
@@ -69,7 +67,6 @@ def start_pivots(
     shift: float,
     perturbation: float,
     tangential_velocity: ArrayLike | None,
-    traced: bool,
 ) -> Pivots:
     """The kernels' arrays of a 2D problem, or of normal equations alone where mu = 0.
 
@@ -117,8 +114,7 @@ def start_pivots(
     return Pivots(
         geometry, start_reduced(nc, len(rows)), b, np.zeros(len(rows)), b.copy(), rows, unit,
         np.array([shift * unit]), inside,
-        generator.integers(2**62, size=(nc, len(LIST_NAMES))),
-        np.zeros((200 * nc + 1000 if traced else 0, 7)), np.zeros(1, dtype=np.int64),
+        generator.integers(2**62, size=(nc, LISTS)), np.zeros(1, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -129,7 +125,7 @@ def drive_offset(state: Pivots, change: Floats, goal: float, reversal: bool, lim
     target = state.b + goal * change
     ended, _ = drive(
         state.geometry, state.reduced, state.b, state.f, state.a, change, OFFSET, 0, goal,
-        reversal, max(limit - int(state.events[0]), 0), state.codes, state.trace, state.events,
+        reversal, max(limit - int(state.events[0]), 0), state.codes, state.events,
     )  # fmt: skip
     if ended == DONE:
         state.b[:] = target
@@ -178,7 +174,6 @@ _ENDS: dict[int, tuple[Status, str]] = {
     DONE: ("not converged", "the shift of the diagonal came out to a residual of {res:.2g} only"),
     RAY: ("not converged", "what is driven grows without bound (a ray){where}"),
     CYCLED: ("cycled", "the lists repeat without progress{where}"),
-    RETURNED: ("not converged", "the force that is driven came back to zero{where}"),
     SINGULAR: ("singular", "the reduced equations (28) became singular{where}"),
     TOO_MANY: ("not converged", "the pivots allowed were used up{where}"),
 }

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-NEW, BREAKING, STATIC, SLIDING_UP, SLIDING_DOWN, TURNING = range(6)
+LISTS = 6
+NEW, BREAKING, STATIC, SLIDING_UP, SLIDING_DOWN, TURNING = range(LISTS)
 """Lists: not yet considered, NC, C_F, C+, C-; and the contact whose tangential force is driven."""
-LIST_NAMES = ("new", "NC", "C_F", "C+", "C-", "driven")
 
 
 class Geometry(NamedTuple):

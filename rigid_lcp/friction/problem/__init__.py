@@ -23,13 +23,12 @@ from rigid_lcp.friction.problem.definition import (
     friction_problem,
     judge_forces,
 )
-from rigid_lcp.friction.problem.energy_proof import gives_energy
-from rigid_lcp.friction.problem.force_proof import prove_forces_insufficient
+from rigid_lcp.friction.problem.proofs import gives_energy, prove_forces_insufficient
 
 __all__ = [
-    "BODY_SIZE", "FORCE_ROUND_OFF", "MOST_FRICTION", "SHARE_LEFT", "BodySpace", "FrictionProblem",
-    "FrictionSolution", "Status", "check_factors", "friction_problem", "gives_energy", "in_range",
-    "judge_forces", "length", "natural_map", "natural_residual", "prove_forces_insufficient",
-    "read_order", "require_finite", "require_matrix", "require_number", "require_start",
-    "require_whole",
+    "BODY_SIZE", "FORCE_ROUND_OFF", "MOST_FRICTION", "SHARE_LEFT", "BodySpace",
+    "FrictionProblem", "FrictionSolution", "Status", "check_factors", "friction_problem",
+    "gives_energy", "in_range", "judge_forces", "length", "natural_map", "natural_residual",
+    "prove_forces_insufficient", "read_order", "require_finite", "require_matrix",
+    "require_number", "require_start", "require_whole",
 ]  # fmt: skip

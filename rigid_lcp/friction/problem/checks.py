@@ -1,4 +1,4 @@
-"""What a friction problem may be made of: numbers, matrices and operators as a caller has them."""
+"""What a friction problem may be made of: numbers and matrices as a caller has them."""
 
 from __future__ import annotations
 
@@ -16,12 +16,6 @@ Integers = NDArray[np.int64]
 
 LEAST, MOST = 1e-100, 1e100
 """Range of the largest number of W, and of q: squares beyond it are no numbers any more."""
-COLUMNS_AT_ONCE = 256
-"""Columns of an operator that are written out at a time."""
-
-
-OPERATOR = "let it return a number for every row"
-"""What to do about an operator whose products are none."""
 FROM_A_DIVISION = "look for a mass of zero or a division by zero where it was made"
 """What to do about numbers that are not finite."""
 
@@ -39,16 +33,13 @@ def require_finite(values: ArrayLike, name: str, remedy: str = FROM_A_DIVISION) 
         )  # fmt: skip
     try:
         given = np.asarray(values)
-        array = given.astype(float) if given.dtype.kind in "biufO" else None
+        if given.dtype.kind not in "biufO":
+            raise TypeError(f"but of {given.dtype}")
+        array: Floats = given.astype(float)
     except (TypeError, ValueError) as error:
         raise ProblemError(
             f"{name} is not made of numbers ({error})", where=name, remedy="give real numbers"
         ) from error
-    if array is None:
-        raise ProblemError(
-            f"{name} is not made of numbers (but of {given.dtype})", where=name,
-            remedy="give real numbers",
-        )  # fmt: skip
     bad = np.flatnonzero(~np.isfinite(array))
     if len(bad):
         raise ProblemError(
@@ -124,12 +115,7 @@ def in_range(values: Floats, name: str, least: float = LEAST) -> None:
 
 
 def require_matrix(matrix: Any, name: str = "W") -> sp.csr_array:
-    """W from a dense or sparse matrix, or a scipy `LinearOperator` (n products with columns).
-
-    ``name``: what messages call it.
-    """
-    if hasattr(matrix, "matmat") and not sp.issparse(matrix):
-        matrix = write_out_operator(matrix, name)
+    """W from a dense or sparse matrix; ``name``: what messages call it."""
     given = matrix if sp.issparse(matrix) else require_finite(matrix, name)
     if given.ndim != 2:
         raise ProblemError(
@@ -144,38 +130,6 @@ def require_matrix(matrix: Any, name: str = "W") -> sp.csr_array:
         w = w.copy()  # the caller's indices are not ours to sort
         w.sum_duplicates()
     return w
-
-
-def write_out_operator(operator: Any, name: str) -> sp.csr_array:
-    """The matrix of an operator, from its products with the columns of the identity.
-
-    Raises `ProblemError` where it has no shape, or its products are not of that shape.
-    """
-    shape = getattr(operator, "shape", None)
-    if not isinstance(shape, tuple) or [isinstance(n, Integral) for n in shape] != [True, True]:
-        raise ProblemError(
-            f"the operator's shape is {shape!r}", where=name,
-            remedy="give it a shape, (rows, columns), or use scipy's LinearOperator",
-        )  # fmt: skip
-    rows, columns = shape
-    parts = []
-    for first in range(0, columns, COLUMNS_AT_ONCE):
-        width = min(COLUMNS_AT_ONCE, columns - first)
-        unit = np.zeros((columns, width))
-        unit[first + np.arange(width), np.arange(width)] = 1.0
-        try:
-            product = operator.matmat(unit)
-        except ValueError as error:  # scipy's, of a product that it can not put into shape
-            raise ProblemError(
-                f"the operator's product failed ({error})", where=name, remedy=OPERATOR
-            ) from error
-        if np.shape(product) != (rows, width):
-            raise ProblemError(
-                f"the operator's product of {columns} x {width} numbers has shape "
-                f"{np.shape(product)}, not {(rows, width)}", where=name, remedy=OPERATOR,
-            )  # fmt: skip
-        parts.append(sp.csc_array(require_finite(product, name)))
-    return sp.csr_array(sp.hstack(parts)) if parts else sp.csr_array((rows, columns))
 
 
 def check_factors(jacobian: sp.csr_array, inverse: sp.csr_array, size: int) -> None:

@@ -286,9 +286,8 @@ def friction_problem(
 ) -> FrictionProblem:
     """Check W, q and mu and make a `FrictionProblem` of them; what was given is left as it is.
 
-    ``matrix``: W (nc * dim, nc * dim) as a dense or sparse matrix, as a scipy `LinearOperator`,
-    which is written out by nc * dim products, or as a `BodySpace`; ``offset`` q (nc * dim,) or
-    (nc, dim); ``friction`` mu (nc,), or one number for all; ``dim`` 2 or 3.
+    ``matrix``: W (nc * dim, nc * dim) as a dense or sparse matrix, or as a `BodySpace`; ``offset``
+    q (nc * dim,) or (nc, dim); ``friction`` mu (nc,), or one number for all; ``dim`` 2 or 3.
     Raises `ProblemError`, which names what is wrong and where.
     """
     if not isinstance(dim, int | np.integer) or dim not in (2, 3):

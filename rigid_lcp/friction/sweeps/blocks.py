@@ -1,8 +1,7 @@
 """A friction problem laid out contact after contact for kernels that visit one at a time.
 
 `BodyBlocks`: each contact knows its two bodies and two small Jacobians, so that a visit costs the
-same however many neighbours there are.  `MatrixBlocks`: the rows of W in dim x dim blocks, where
-only W is known.
+same however many neighbours there are.  Where only W is known its rows in dim x dim blocks do.
 """
 
 from __future__ import annotations
@@ -69,16 +68,6 @@ def find_relative_velocities(body: Integers, block: Floats, velocity: Floats) ->
                 for k in range(velocity.shape[1]):
                     relative[c, i] += block[c, side, i, k] * velocity[moved, k]
     return relative
-
-
-@dataclass(frozen=True)
-class MatrixBlocks:
-    """Rows of W in blocks: ``block[start[c]:start[c + 1]]`` at the contacts ``column``."""
-
-    start: Integers
-    column: Integers
-    block: Floats
-    local: Floats
 
 
 def lay_out_bodies(problem: FrictionProblem) -> BodyBlocks | None:
@@ -176,18 +165,17 @@ def root_inverse_mass(space: BodySpace) -> Floats | None:
     return scale[:, :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
 
 
-def lay_out_matrix(problem: FrictionProblem) -> MatrixBlocks:
-    """W in blocks, with one on the diagonal of every row, of zeros if need be."""
+def lay_out_matrix(problem: FrictionProblem) -> tuple[Floats, Integers, Integers, Floats]:
+    """Rows of W in blocks, ``block[start[c]:start[c + 1]]`` at contacts ``column``, and the blocks
+    on the diagonal (nc, dim, dim), zeros if need be: ``local``, ``start``, ``column``, ``block``"""
     dim, contacts = problem.dim, problem.contacts
     blocks = problem.delassus_blocks if contacts else None
     if blocks is None:
         empty = np.zeros((0, dim, dim))
-        return MatrixBlocks(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), empty, empty)
+        return empty, np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64), empty
     row = np.repeat(np.arange(contacts), np.diff(blocks.indptr))
     own = row == blocks.indices
     local = np.zeros((contacts, dim, dim))
     local[row[own]] = blocks.data[own]
-    return MatrixBlocks(
-        blocks.indptr.astype(np.int64), blocks.indices.astype(np.int64),
-        np.ascontiguousarray(blocks.data), local,
-    )  # fmt: skip
+    start, column = blocks.indptr.astype(np.int64), blocks.indices.astype(np.int64)
+    return local, start, column, np.ascontiguousarray(blocks.data)

@@ -8,6 +8,7 @@ over a hundred contacts costs a few microseconds.
 
 from __future__ import annotations
 
+from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -22,25 +23,39 @@ from rigid_lcp.friction.sweeps.local_contact import NONE, solve_contact_2d, solv
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-CHANGE_GROWTH = 1.5
-"""Momentum starts again when a sweep changes the forces by so many times the least change since
-it last did: without this large beds (10,000 contacts) swing on at 1e-4, as nothing turns back."""
-CHECK_EVERY, CHECK_AFTER = 0.1, 5.0
-"""The residual costs about a sweep: it is taken when the sweeps have grown by this part, and by so
-many at least, and when the change a sweep makes has fallen as far as the residual should."""
+
+@dataclass(frozen=True)
+class SweepNumbers:
+    """Momentum, order and looks at the residual."""
+
+    change_growth: float = 1.5
+    """Momentum starts again when a sweep changes the forces by so many times the least change [-]
+    since it last did: without this large beds (10,000 contacts) swing on at 1e-4, as nothing turns
+    back."""
+    check_every: float = 0.1
+    """The residual costs about a sweep: it is taken when the sweeps have grown by this part [-],"""
+    check_after: float = 5.0
+    """and by so many at least, and when the change a sweep makes has fallen as far as the residual
+    should."""
+    many_contacts: int = 2000
+    """From so many contacts on only some sweeps go over all of them, and the others over those that
+    bear: beds in motion have two open contacts for one that does."""
+    all_every: int = 10
+    """One sweep of so many goes over all."""
+    stalled: float = 100.0
+    """Where the sweeps since the last look, so many at least and as many as all before,"""
+    stalls: float = 0.7
+    """leave more than this part of the residual [-], the order is turned round: in one order sweeps
+    may go round in circles, at a few contacts that slide, which in the other they leave at once."""
 
 
-MANY_CONTACTS, ALL_EVERY = 2000, 10
-"""From so many contacts on only one sweep of so many goes over all of them, and the others over
-those that bear: beds in motion have two open contacts for one that does."""
-STALLED, STALLS = 100.0, 0.7
-"""Where the sweeps since the last look, so many at least and as many as all before, leave more than
-this part of the residual, the order is turned round: in one order sweeps may go round in circles,
-at a few contacts that slide, which in the other they leave at once."""
+CHANGE_GROWTH, CHECK_EVERY, CHECK_AFTER, MANY_CONTACTS, ALL_EVERY, STALLED, STALLS = astuple(
+    SweepNumbers()
+)
 
 
 class SweepBlocks(NamedTuple):
-    """A problem as the kernels read it: `BodyBlocks`, or `MatrixBlocks` where ``body`` is empty."""
+    """A problem as the kernels read it: `BodyBlocks`, or the rows of W where ``body`` is empty."""
 
     offset: Floats
     friction: Floats
@@ -99,26 +114,21 @@ def visit_all(
 
 @njit(cache=True)
 def sweep_once(
-    blocks: SweepBlocks, state: Momentum, force: Floats, visit: Integers, backward: Integers,
-    symmetric: bool, momentum: bool,
+    blocks: SweepBlocks, state: Momentum, force: Floats, visit: Integers, momentum: bool
 ) -> int:  # fmt: skip
     """One sweep from ``y = r + beta (r - r before)``; changes ``force`` and ``state``.
 
     Called with the forces it left; returns as `visit_all`.
     """
     tally, part = state.tally, 0.0
-    back = symmetric and int(tally[0]) % 2 == 1
-    if momentum and not back:
+    if momentum:
         later = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * tally[1] ** 2))
         part = (tally[1] - 1.0) / later
         extrapolate(state.velocity, state.last_velocity, part)
         tally[1] = later
-    last = state.last.copy() if back else state.last  # the way made is that of there and back
-    stuck, product, square = visit_all(
-        blocks, force, last, state.velocity, part, backward if back else visit
-    )
+    stuck, product, square = visit_all(blocks, force, state.last, state.velocity, part, visit)
     tally[0] += len(visit) / len(force)
-    if momentum and (not symmetric or back):
+    if momentum:
         tally[3] = np.sqrt(square)
         tally[2] = min(tally[2], tally[3])
         if product > 0.0 or tally[3] > CHANGE_GROWTH * tally[2]:
@@ -131,8 +141,8 @@ def sweep_once(
 
 @njit(cache=True)
 def sweep_until_small(
-    blocks: SweepBlocks, state: Momentum, force: Floats, visit: Integers, backward: Integers,
-    symmetric: bool, momentum: bool, tolerance: float, sweeps: int, trial: int, useful: float,
+    blocks: SweepBlocks, state: Momentum, force: Floats, momentum: bool, tolerance: float,
+    sweeps: int, trial: int, useful: float,
 ) -> tuple[Floats, float, int]:  # fmt: skip
     """Sweep until the residual is at or below ``tolerance``, or ``sweeps`` are done in all, or
     ``trial`` of them left more than ``useful``.
@@ -143,16 +153,17 @@ def sweep_until_small(
     best, stuck, enough = force.copy(), 0, 0.0
     best_residual = residual_of(blocks, force)
     mark, marked = best_residual, 0.0
-    some = momentum and not symmetric and len(visit) >= MANY_CONTACTS
+    visit = np.arange(len(force))
+    some = momentum and len(visit) >= MANY_CONTACTS
     count, carry = 0, visit
     while best_residual > tolerance and state.tally[0] < sweeps:
         done = state.tally[0]
         check = min(float(sweeps), done + max(CHECK_AFTER, np.ceil(CHECK_EVERY * done)))
         while state.tally[0] < check:
             if some and count % ALL_EVERY > 0:
-                sweep_once(blocks, state, force, carry, carry, symmetric, momentum)
+                sweep_once(blocks, state, force, carry, momentum)
             else:
-                stuck = sweep_once(blocks, state, force, visit, backward, symmetric, momentum)
+                stuck = sweep_once(blocks, state, force, visit, momentum)
                 if some:
                     carry = carrying(force, state.last, visit)
             count += 1
@@ -160,7 +171,7 @@ def sweep_until_small(
                 break
         if momentum and state.tally[0] >= max(STALLED, 2.0 * marked):
             if best_residual > STALLS * mark:
-                visit, backward, count = backward, visit, 0
+                visit, count = visit[::-1].copy(), 0
                 state.tally[1], state.tally[2] = 1.0, np.inf
             mark, marked = best_residual, state.tally[0]
         residual = residual_of(blocks, force)

@@ -19,26 +19,6 @@ SYMMETRIC = 1e-13
 
 
 @njit(cache=True)
-def pick_rows(
-    start: Indices, index: Indices, value: Floats, stride: int
-) -> tuple[Indices, Indices, Floats]:
-    """Every ``stride``-th row of a matrix, from the first."""
-    count = (len(start) - 1) // stride
-    picked_start = np.zeros(count + 1, np.int32)
-    for c in range(count):
-        length = start[stride * c + 1] - start[stride * c]
-        picked_start[c + 1] = picked_start[c] + length
-    picked_index = np.empty(picked_start[count], np.int32)
-    picked_value = np.empty(picked_start[count])
-    for c in range(count):
-        first, last = picked_start[c], picked_start[c + 1]
-        begin = start[stride * c]
-        picked_index[first:last] = index[begin : begin + last - first]
-        picked_value[first:last] = value[begin : begin + last - first]
-    return picked_start, picked_index, picked_value
-
-
-@njit(cache=True)
 def normal_products(
     start: Indices, index: Indices, value: Floats, mass_start: Indices, mass_index: Indices,
     inverse_mass: Floats, freedoms: int,
@@ -118,37 +98,6 @@ def face_band(
             if above > 0:
                 other = max(other, abs(band[k, above] - value[j]))
     return band, other <= SYMMETRIC * largest
-
-
-@njit(cache=True)
-def face_rows(
-    start: Indices, index: Indices, value: Floats, inside: Indices, shift: float
-) -> tuple[Indices, Indices, Floats]:
-    """Rows and columns ``inside`` of a matrix, in order, with ``shift`` on the diagonal."""
-    rank = np.full(len(start) - 1, -1, np.int32)
-    total = len(inside)
-    for k in range(len(inside)):
-        rank[inside[k]] = k
-        total += start[inside[k] + 1] - start[inside[k]]
-    face_start = np.zeros(len(inside) + 1, np.int32)
-    face_index, face_value = np.empty(total, np.int32), np.empty(total)
-    end = 0
-    for k in range(len(inside)):
-        place = -1
-        for j in range(start[inside[k]], start[inside[k] + 1]):
-            column = rank[index[j]]
-            if column >= 0:
-                face_index[end], face_value[end] = column, value[j]
-                if column == k:
-                    place = end
-                end += 1
-        if place < 0:
-            place = end
-            face_index[end], face_value[end] = k, 0.0
-            end += 1
-        face_value[place] += shift
-        face_start[k + 1] = end
-    return face_start, face_index[:end].copy(), face_value[:end].copy()
 
 
 SWEEP_GROWTH = 1.5

@@ -22,7 +22,7 @@ from numba.core.event import install_recorder
 
 from rigid_lcp.friction.auto.solve import solve_friction
 from rigid_lcp.friction.problem.definition import FrictionProblem
-from rigid_lcp.friction.problem.energy_proof import gives_energy
+from rigid_lcp.friction.problem.proofs import gives_energy
 from validation.bench.rigid.examination import FAMILIES, Family
 from validation.bench.rigid.friction_problems import NamedProblem, all_problems, bodies_anew
 from validation.bench.rigid.judge import residual_extended

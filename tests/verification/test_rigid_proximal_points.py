@@ -1,5 +1,5 @@
-"""Extrapolated proximal points: a drift of known length, a packing that nothing else solves, units,
-work in its budget."""
+"""Proximal points, plain and with a centre that runs ahead: towers and jammed random problems to
+round-off, a drift of known length, what nothing else solves, units, work in its budget."""
 
 from __future__ import annotations
 
@@ -8,24 +8,109 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rigid_lcp import solve_friction
-from rigid_lcp.friction.attempts.extrapolated_points import POINTS, extrapolated_points
-from rigid_lcp.friction.attempts.proximal_newton import find_proximal_point, proximal_newton
+from rigid_lcp.friction.attempts.proximal_points import (
+    POINTS,
+    extrapolated_points,
+    find_proximal_point,
+    hopeless,
+    proximal_newton,
+)
 from rigid_lcp.friction.auto.paths import turn_from_paths
 from rigid_lcp.friction.auto.trial import Trial
 from rigid_lcp.friction.linear.factorisation import factorisation
 from rigid_lcp.friction.methods.gauss_seidel import gauss_seidel
 from rigid_lcp.friction.problem.definition import FrictionProblem, friction_problem
 from validation.bench.rigid.examination import family_named
-from validation.bench.rigid.packings import packing
+from validation.bench.rigid.packings import packing, tower
 
 Floats = NDArray[np.float64]
 
 FRICTION, APPROACH = 0.5, 1e-9
+
+
+def jammed(seed: int, contacts: int, freedoms: int, dim: int) -> FrictionProblem:
+    """More contacts than freedoms, ``q = J v`` so that all can be stopped: redundant."""
+    g = np.random.default_rng(seed)
+    jacobian = g.standard_normal((contacts * dim, freedoms))
+    offset = jacobian @ g.standard_normal(freedoms)
+    made: FrictionProblem = friction_problem(
+        jacobian @ jacobian.T, offset, g.choice([0.0, 0.1, 0.5, 2.0], contacts), dim
+    )
+    return made
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_towers_to_round_off_from_a_few_sweeps(dim: int) -> None:
+    """Redundant corners, nothing slides: W is singular, each shifted system is not."""
+    problem = tower(20, dim)
+    start = gauss_seidel(problem, tolerance=1e-12, sweeps=50)
+    found = proximal_newton(problem, start.r, 1e-13)
+    assert found.solved, found.message
+    assert found.work["factorisations"] < 40
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(
+    method=st.sampled_from([proximal_newton, extrapolated_points]), seed=st.integers(0, 10**6),
+    dim=st.sampled_from([2, 3]), contacts=st.integers(1, 20),
+)  # fmt: skip
+def test_never_worse_than_its_start_and_within_its_budget(method, seed, dim, contacts) -> None:
+    """Random redundant contacts that can all be stopped."""
+    problem = jammed(seed, contacts, max(2, contacts // 2), dim)
+    start = gauss_seidel(problem, tolerance=1e-10, sweeps=20)
+    found = method(problem, start.r, 1e-11, factorisations=25)
+    assert found.residual <= start.residual
+    assert found.residual == pytest.approx(problem.residual(found.r), abs=1e-16)
+    assert found.work["factorisations"] <= 25
+    assert found.solved or "->" in found.message
+
+
+def test_a_proximal_point_is_the_answer_of_the_shifted_problem() -> None:
+    """``u = (W + alpha) r + q - alpha r_k``, judged by the residual of that problem."""
+    problem = jammed(3, 12, 8, 2)
+    centre = gauss_seidel(problem, tolerance=1e-10, sweeps=3).r
+    alpha = 1.0 / problem.rho
+    force, found, _ = find_proximal_point(problem, centre, alpha, factorisation(problem), 1e-14, 20)
+    assert found
+    shifted = friction_problem(
+        sp.csr_array(problem.delassus + alpha * sp.eye_array(24)),
+        problem.offset - alpha * centre, problem.friction, 2,
+    )  # fmt: skip
+    assert shifted.residual(force) < 1e-12
+    assert problem.residual(force) > 1e-9  # one point is not yet the limit
+
+
+def test_units_change_nothing() -> None:
+    """W in other units (metres to millimetres, kg to g): the same points."""
+    problem = jammed(5, 10, 6, 3)
+    start = gauss_seidel(problem, tolerance=1e-10, sweeps=30).r
+    here = proximal_newton(problem, start, 1e-12, factorisations=15)
+    scaled = friction_problem(
+        problem.delassus * 2.0**-10, problem.offset * 2.0**10, problem.friction, 3
+    )
+    there = proximal_newton(scaled, start * 2.0**20, 1e-12, factorisations=15)
+    np.testing.assert_allclose(there.r, here.r * 2.0**20, rtol=1e-6, atol=1e-6 * abs(there.r).max())
+    assert there.work == here.work
+
+
+def test_a_point_that_goes_in_a_circle_is_given_up() -> None:
+    """Errors of a circle, of a way astray, and of points that were found, as they were measured."""
+    circle = [4e-7, 7e-5, 5e-7, 7.00001e-5]
+    astray = [7e-6, 9e-3, 2e-1, 8e-1]
+    found = [2e-4, 2e-5, 9e-4, 6e-5, 3e-5, 3e-5 * 1.1, 6e-17]
+    assert hopeless(circle)
+    assert not hopeless(circle[:3])
+    assert hopeless(astray)
+    assert hopeless([1.0, np.nan])
+    late = [2e-5, 8e-5, 4e-6, 2e-4, 8.5e-5, 3e-6, 6e-17]
+    for errors in (found, late):
+        assert not any(hopeless(errors[: k + 1]) for k in range(len(errors)))
 
 
 def squeezed_row() -> FrictionProblem:
@@ -117,45 +202,26 @@ def test_the_end_of_a_path_is_a_start_too() -> None:
     assert trial.best.residual <= 1e-12
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
-@given(seed=st.integers(0, 10**6), dim=st.sampled_from([2, 3]), contacts=st.integers(1, 20))
-def test_never_worse_than_its_start_and_within_its_budget(
-    seed: int, dim: int, contacts: int
-) -> None:
-    """Random redundant contacts that can all be stopped, ``q = J v``."""
-    g = np.random.default_rng(seed)
-    jacobian = g.standard_normal((contacts * dim, max(2, contacts // 2)))
-    problem = friction_problem(
-        jacobian @ jacobian.T, jacobian @ g.standard_normal(jacobian.shape[1]),
-        g.choice([0.0, 0.1, 0.5, 2.0], contacts), dim,
-    )  # fmt: skip
-    start = gauss_seidel(problem, tolerance=1e-10, sweeps=20)
-    found = extrapolated_points(problem, start.r, 1e-11, factorisations=40)
-    assert found.residual <= start.residual
-    assert found.residual == pytest.approx(problem.residual(found.r), abs=1e-16)
-    assert found.work["factorisations"] <= 40
-    assert found.solved or "->" in found.message
-
-
 @pytest.mark.parametrize("units", [(1e3, 1.0), (1.0, 1e-6), (1e3, 1e3)])
-def test_units_change_nothing(units: tuple[float, float]) -> None:
+def test_units_change_no_squeeze(units: tuple[float, float]) -> None:
     """Lengths and masses in other units (powers of ten): the same squeeze, to round-off."""
     length, mass = units
     problem = squeezed_row()
     other = friction_problem(
         problem.delassus.toarray() / mass, problem.offset * length, problem.friction, 2
     )
-    found = extrapolated_points(other, None, 1e-13)
+    found = extrapolated_points(other, np.zeros(6), 1e-13)
     assert found.solved, found.message
     force = found.r / (mass * length)
     np.testing.assert_allclose(force[[0, 2]], [FRICTION, FRICTION], atol=1e-8)
 
 
-def test_an_answer_needs_no_mending() -> None:
+@pytest.mark.parametrize("method", [proximal_newton, extrapolated_points])
+def test_an_answer_needs_no_mending(method) -> None:
     """An answer given as start is kept, at no cost."""
     problem = squeezed_row()
     exact = np.array([FRICTION + 2 * APPROACH, 0, FRICTION + APPROACH, 0, 1, -FRICTION])
-    found = extrapolated_points(problem, exact, 1e-12)
+    found = method(problem, exact, 1e-12)
     assert found.solved
     assert found.work["factorisations"] == 0
     np.testing.assert_array_equal(found.r, exact)
