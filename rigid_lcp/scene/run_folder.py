@@ -7,11 +7,6 @@ whatever kills a run costs at most the time since its last frame.
 from __future__ import annotations
 
 import io
-import lzma
-import struct
-import tokenize
-import zipfile
-import zlib
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,6 +15,7 @@ import numpy as np
 
 from rigid_lcp.contact import ContactForces
 from rigid_lcp.errors import SceneError
+from rigid_lcp.friction.files import DAMAGED
 from rigid_lcp.motion import Motion, Pace
 from rigid_lcp.scene.frame_bodies import pack_bodies, restore_bodies
 from rigid_lcp.scene.simulation import Simulation
@@ -30,13 +26,6 @@ __all__ = ["FRAME", "RESULT", "RunFolder", "read_frame", "restore_frame"]
 
 FRAME = "frame_{:06d}.npz"
 COUNTERS = ("time", "steps", "worst_residual", "steps_above", "steps_scaled", "steps_cut_off")
-
-DAMAGED = (
-    OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError,
-    MemoryError, OverflowError, SyntaxError, tokenize.TokenError, struct.error, zipfile.BadZipFile,
-    zlib.error, lzma.LZMAError,
-)  # fmt: skip
-"""What numpy raises as it reads a damaged file: any byte of it may be wrong."""
 
 
 class RunFolder(run_folder.RunFolder):

@@ -1,10 +1,10 @@
 """Named friction problems on which solvers are compared: stored real ones, and generated families.
 
 Stored: those of the folder ``friction_problems`` under the environment variable ``TRACKBED_DATA``
-(real ones of the test suite of Siconos, Apache-2.0, and packings).  Test suite: the others of its
-source package (``numerics/src/FrictionContact/test/data``), which no setting was chosen by, written
-as npz into the folder TRACKBED_SICONOS.  Unseen: the same, changed: q by 5 % noise, friction by a
-factor from 0.7 to 1.3, contacts in another order, all by a seed.
+(real ones of the test suite of Siconos, Apache-2.0, and packings).  Test suite: the other problems
+in Siconos's own files, which no setting was chosen by, in the folder TRACKBED_SICONOS (in its
+source package ``numerics/src/FrictionContact/test/data``).  Unseen: the same, changed: q by
+5 % noise, friction by a factor from 0.7 to 1.3, contacts in another order, all by a seed.
 Generated: towers, and settled packings of discs and spheres, also without friction, of other seeds
 and frictions, which no setting was chosen by, and near yield: a stored packing under less friction.
 Large packings settle for minutes and are kept in the folder TRACKBED_BEDS, if set.
@@ -21,18 +21,16 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from rigid_lcp.friction.problem.definition import (
-    BODY_SIZE,
-    BodySpace,
-    FrictionProblem,
-    friction_problem,
-)
+from rigid_lcp.friction.files.formats import read_problem
+from rigid_lcp.friction.problem.definition import BodySpace, FrictionProblem, friction_problem
 from validation.bench.rigid.packings import crystal, packing, tower
 
 NONUNIQUE = "nonunique_discs_125"
 """The stored problem that comes with several solutions; not raced."""
 SIX_DIGITS = ("granularflow",)
 """Problems whose W was printed to six digits: their residual can be asked for 1e-10."""
+OTHER_KINDS = ("GFC3D", "GRFC3D", "LMGC_GFC3D", "RFC3D", "rfc3d", "gfc2d", "ACinputs", "CubeH8")
+"""How the names of problems of other kinds begin (in text by masses, rolling, inputs of tests)."""
 NOISE, FRICTION_FACTORS = 0.05, (0.7, 1.3)
 GRAINS = {2: "discs", 3: "spheres"}
 
@@ -66,41 +64,40 @@ def data_folder() -> Path | None:
 
 def stored_problems() -> list[NamedProblem]:
     """The stored problems, small ones first; none without the folder."""
-    return _problems_in(data_folder(), "stored")
+    folder = data_folder()
+    if folder is None:
+        return []
+    paths = [
+        path for path in folder.glob("*.npz")
+        if not path.stem.endswith(("_W", "_H")) and path.stem != NONUNIQUE
+    ]  # fmt: skip
+    problems = [
+        NamedProblem(stored_name(path.stem), "stored", partial(read_problem, path))
+        for path in paths
+    ]
+    return sorted(problems, key=lambda each: (each.make().contacts, each.name))
+
+
+def stored_name(stem: str) -> str:
+    """``KaplasTower-i1061-4.hdf5.dat`` without its endings."""
+    return stem.removesuffix(".dat").removesuffix(".hdf5")
 
 
 def suite_problems() -> list[NamedProblem]:
-    """Siconos's problems that are not stored, small ones first; none without their folder."""
+    """Siconos's problems in contact space, and those by masses of FCLIB, that are not stored."""
     named = os.environ.get("TRACKBED_SICONOS")
-    stored = {each.name for each in stored_problems()}
-    found = _problems_in(Path(named) if named else None, "test suite")
-    return [each for each in found if each.name not in stored]
-
-
-def read_problem(path: Path) -> FrictionProblem:
-    """``NAME.npz`` with q, mu, dim; beside it W, ``NAME_W.npz``, or J, ``NAME_H.npz``, for which it
-    has the diagonal of M^-1, Minv."""
-    parts, factor = np.load(path), path.with_name(f"{path.stem}_H.npz")
-    q, mu = parts["q"], parts["mu"]
-    dim = int(parts["dim"]) if "dim" in parts else len(q) // len(mu)
-    if not factor.is_file():
-        return friction_problem(sp.load_npz(path.with_name(f"{path.stem}_W.npz")), q, mu, dim)
-    inverse = sp.csr_array(sp.diags_array(parts["Minv"]))
-    bodies = BodySpace(sp.csr_array(sp.load_npz(factor)), inverse, BODY_SIZE[dim])
-    return friction_problem(bodies, q, mu, dim)
-
-
-def _problems_in(folder: Path | None, family: str) -> list[NamedProblem]:
-    if folder is None:
+    if named is None or not Path(named).is_dir():
         return []
-    problems = [
-        NamedProblem(
-            path.stem.removesuffix(".dat").removesuffix(".hdf5"), family,
-            partial(read_problem, path),
-        )
-        for path in folder.glob("*.npz")
-        if not path.stem.endswith(("_W", "_H")) and path.stem != NONUNIQUE
+    stored = {each.name for each in stored_problems()}
+    paths = [
+        path for path in Path(named).iterdir()
+        if path.suffix in (".dat", ".hdf5") and not path.name.startswith(OTHER_KINDS)
+        and stored_name(path.name) not in stored
     ]  # fmt: skip
+    problems = [
+        NamedProblem(stored_name(path.name), "test suite", partial(read_problem, path))
+        for path in paths
+    ]
     return sorted(problems, key=lambda each: (each.make().contacts, each.name))
 
 

@@ -1,0 +1,208 @@
+"""Friction problems of FCLIB (HDF5).
+
+Acary et al., FCLIB: a collection of discrete 3D frictional contact problems, Inria RT-0444 (2014).
+``fclib_local`` has spacedim, vectors/q, vectors/mu and W by its parts m, n, nz, p, i, x; nz = -1
+are compressed columns, -2 compressed rows, and nz >= 0 that many triplets, i their rows and p their
+columns, as CSparse has them and the library's own files (its header says the other way round: H,
+which is not square, fits only so).  ``fclib_global`` has M, H, vectors/f, vectors/w instead
+(`rigid_lcp.friction.files.fclib`).  Order of contacts and signs are ours.  Rolling friction
+(spacedim 5) and equality constraints (V, R; G) are refused.
+
+Friction problems of FCLIB by masses (``fclib_global``): ``M v = H r + f``, ``u = H^T v + w``.
+
+Acary et al., FCLIB, Inria RT-0444 (2014).  With ``W = H^T M^-1 H`` and ``q = w + H^T M^-1 f`` it is
+the problem of `rigid_lcp.friction.problem.definition`, and where M is made of one block a body, the
+bodies are known.  ``J = H^T``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from rigid_lcp.errors import LibraryMissing, ProblemError
+from rigid_lcp.friction.files.damaged import DAMAGED, describe_damage, name_missing_part
+from rigid_lcp.friction.problem import BODY_SIZE, BodySpace, FrictionProblem, friction_problem
+from rigid_lcp.sparse import diagonal_blocks
+
+Floats = NDArray[np.float64]
+PARTS = {"fclib_local": (("W",), ("q", "mu")), "fclib_global": (("M", "H"), ("f", "w", "mu"))}
+"""Matrices and vectors of a problem, by its group."""
+
+
+def read_fclib_problem(path: Path) -> FrictionProblem:
+    """The problem of a file.  Raises `ProblemError`, and `LibraryMissing` without h5py."""
+    with _open_fclib(path) as file:
+        kind = "fclib_global" if "fclib_global" in file else "fclib_local"
+        if kind not in file:
+            raise ProblemError(
+                "it has no group fclib_local or fclib_global", where=str(path),
+                remedy="give a problem of FCLIB",
+            )  # fmt: skip
+        group = file[kind]
+        if any(name in group for name in ("V", "R", "G")):
+            raise ProblemError(
+                "it has equality constraints (V, R or G) beside its contacts", where=str(path),
+                remedy="eliminate them first: W - V R^-1 V^T, q - V R^-1 s",
+            )  # fmt: skip
+        dim = int(_numbers(group, "spacedim", path).ravel()[0])
+        if dim == 5:
+            raise ProblemError(
+                "it has rolling friction (spacedim 5)", where=str(path),
+                remedy="only sliding friction is known: spacedim 2 or 3",
+            )  # fmt: skip
+        names, vectors = PARTS[kind]
+        matrices = [_read_fclib_matrix(group, name, path) for name in names]
+        given = [_numbers(group, f"vectors/{name}", path).ravel() for name in vectors]
+    with describe_damage(path):
+        if kind == "fclib_global":
+            return build_global_problem(matrices[0], matrices[1], given[0], given[1], given[2], dim)
+        problem: FrictionProblem = friction_problem(matrices[0], given[0], given[1], dim)
+    return problem
+
+
+def read_fclib_forces(path: Path) -> Floats:
+    """Its solution, (1, nc * dim), or none (0, nc * dim).  Raises as `read_fclib_problem`."""
+    with _open_fclib(path) as file:
+        name = "fclib_global/vectors/w" if "fclib_global" in file else "fclib_local/vectors/q"
+        q = _numbers(file, name, path)
+        if "solution" not in file:
+            return np.zeros((0, q.size))
+        forces = _numbers(file, "solution/r", path)
+    if forces.size != q.size:
+        raise ProblemError(
+            f"it has {forces.size} numbers where q has {q.size}", where=f"{path}: solution/r",
+            remedy="look whether the solution is that of this problem",
+        )  # fmt: skip
+    return np.asarray(forces, dtype=float).reshape(1, -1)
+
+
+@contextmanager
+def _open_fclib(path: Path) -> Iterator[Any]:
+    try:
+        import h5py  # type: ignore[import-untyped, unused-ignore]
+    except ImportError as error:
+        raise LibraryMissing(
+            "HDF5 files are read by h5py, which is not installed", where=str(path),
+            remedy="pip install h5py",
+        ) from error  # fmt: skip
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise ProblemError(
+            f"it can not be read as HDF5: {error}", where=str(path),
+            remedy="fetch it again; a few lines of text stand for a file that Git LFS keeps",
+        ) from error  # fmt: skip
+    try:
+        with file:
+            yield file
+    except DAMAGED as error:  # h5py opens a file whose inside is damaged
+        raise ProblemError(
+            f"a part of it can not be read: {error}", where=str(path), remedy="fetch it again"
+        ) from error
+
+
+def _numbers(group: Any, name: str, path: Path) -> NDArray[Any]:
+    """A data set as an array of numbers."""
+    if name not in group:
+        raise name_missing_part(path, f"{group.name.rstrip('/')}/{name}".lstrip("/"), sorted(group))
+    try:
+        values = np.asarray(group[name])
+    except (OSError, ValueError, TypeError) as error:
+        raise ProblemError(
+            f"it can not be read: {error}", where=f"{path}: {name}", remedy="write the file again"
+        ) from error
+    if values.dtype.kind not in "iuf" or not values.size:
+        raise ProblemError(
+            "it is not made of numbers", where=f"{path}: {name}", remedy="write the file again"
+        )
+    return values
+
+
+def _read_fclib_matrix(kind: Any, name: str, path: Path) -> sp.csr_array:
+    """A matrix from m, n, nz, p, i, x."""
+    if name not in kind:
+        raise name_missing_part(path, f"{kind.name.strip('/')}/{name}", sorted(kind))
+    group = kind[name]
+    m, n, nz = (int(_numbers(group, name, path).ravel()[0]) for name in ("m", "n", "nz"))
+    p, i, x = (_numbers(group, name, path).ravel() for name in ("p", "i", "x"))
+    try:
+        if nz == -2:
+            matrix = sp.csr_array((x, i, p), shape=(m, n))
+        elif nz == -1:
+            matrix = sp.csc_array((x, i, p), shape=(m, n))
+        elif nz >= 0:
+            matrix = sp.coo_array((x[:nz], (i[:nz], p[:nz])), shape=(m, n))
+        else:
+            raise ValueError(f"nz = {nz} is none of -2 (rows), -1 (columns), >= 0 (triplets)")
+        if nz < 0:
+            matrix.check_format(full_check=True)
+        return sp.csr_array(matrix)
+    except (ValueError, IndexError) as error:
+        raise ProblemError(
+            f"its m, n, nz, p, i and x are no matrix: {error}",
+            where=f"{path}: {group.name.strip('/')}", remedy="fetch or write the file again",
+        ) from error  # fmt: skip
+
+
+def build_global_problem(
+    mass: sp.csr_array, directions: sp.csr_array, force: Floats, velocity: Floats, mu: Floats,
+    dim: int,
+) -> FrictionProblem:  # fmt: skip
+    """The problem of M (ndof, ndof), H (ndof, nc * dim), f (ndof,), w (nc * dim,) and mu (nc,).
+
+    Raises `ProblemError` where sizes do not fit or M is singular.
+    """
+    freedoms, rows = directions.shape
+    if mass.shape != (freedoms, freedoms) or force.shape != (freedoms,):
+        raise ProblemError(
+            f"M is {mass.shape[0]} x {mass.shape[1]} and f has {force.size} numbers for "
+            f"{freedoms} freedoms (rows of H)", where="M, f",
+            remedy="give a row of M and a number of f for every row of H",
+        )  # fmt: skip
+    if velocity.shape != (rows,):
+        raise ProblemError(
+            f"w has {velocity.size} numbers for {rows} columns of H", where="w",
+            remedy="give a number for every column of H",
+        )  # fmt: skip
+    jacobian = sp.csr_array(directions.T)
+    size = BODY_SIZE[dim] if dim in BODY_SIZE and in_blocks(mass, BODY_SIZE[dim]) else 0
+    try:
+        if size:
+            inverse = invert_masses(mass, size)
+            matrix, moved = BodySpace(jacobian, inverse, size), inverse @ force
+        else:
+            factor = splu(sp.csc_array(mass))
+            spread = sp.csr_array(factor.solve(directions.toarray()))
+            matrix, moved = sp.csr_array(jacobian @ spread), factor.solve(force)
+    except (RuntimeError, ValueError, np.linalg.LinAlgError) as error:
+        raise ProblemError(
+            f"M can not be inverted: {error}", where="M",
+            remedy="look for a body without mass or moment of inertia",
+        ) from error  # fmt: skip
+    made: FrictionProblem = friction_problem(matrix, velocity + jacobian @ moved, mu, dim)
+    return made
+
+
+def in_blocks(mass: sp.csr_array, size: int) -> bool:
+    """Whether M (ndof, ndof) has nothing beside one block of ``size`` freedoms a body."""
+    places = mass.tocoo()
+    row, column = places.row[places.data != 0.0], places.col[places.data != 0.0]
+    return mass.shape[0] % size == 0 and bool((row // size == column // size).all())
+
+
+def invert_masses(mass: sp.csr_array, size: int) -> sp.csr_array:
+    """M^-1 block by block.  Raises LinAlgError where one is singular."""
+    blocks = diagonal_blocks(mass.indptr, mass.indices, mass.data, size)
+    number = np.arange(len(blocks))
+    rows = (np.linalg.inv(blocks), number, np.arange(len(blocks) + 1))
+    inverse = sp.csr_array(sp.bsr_array(rows, shape=mass.shape))
+    inverse.eliminate_zeros()
+    return inverse
