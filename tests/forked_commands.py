@@ -244,5 +244,20 @@ def processes_in(folder: Path) -> list[int]:
     return found
 
 
+def gone(folder: Path) -> bool:
+    """Whether, within a minute, no process works in a folder or below it any more."""
+    return comes_true(lambda: not processes_in(folder))
+
+
+def comes_true(true: Callable[[], object], within_s: float = 60) -> bool:
+    """Whether something becomes so within some seconds."""
+    deadline = time.monotonic() + within_s
+    while not true():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.01)
+    return True
+
+
 if __name__ == "__main__":
     main()

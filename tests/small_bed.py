@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
+import csv
+from pathlib import Path
+
+
+def read_rows(run: Path) -> list[dict[str, str]]:
+    """Rows of a run's ``settlement.csv``."""
+    with (run / "settlement.csv").open() as stream:
+        return list(csv.DictReader(stream))
+
 
 def small_bed(k: int, h: int, total_cycles: int) -> str:
     """Its scene file: windows of 2 cycles, then of ``k``, jumps of ``h``, so many in all."""

@@ -84,13 +84,6 @@ def test_every_block_is_found() -> None:
     assert len(blocks()) == sum(language != "console" for language in languages) > 0
 
 
-def test_links_into_the_repository_exist() -> None:
-    """Each relative link or picture of README is a file here."""
-    for target in re.findall(r"\]\(([^)#]+)\)", README):
-        if not target.startswith("http"):
-            assert (ROOT / target).exists(), target
-
-
 def test_make_targets_exist() -> None:
     """Each ``make`` command of README and CONTRIBUTING is a target of the Makefile."""
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))

@@ -34,8 +34,6 @@ from adapters.bed.radii import (
 )
 from adapters.bed.sample import (
     GRAVITY,
-    PAPER_COORDINATION,
-    PAPER_WEIGHT,
     SURFACE_SHARE,
     draw_sample_start,
     find_sample_mass,
@@ -56,7 +54,7 @@ from adapters.bed.state import (
 
 __all__ = [
     "CHAIN_FACTOR", "DAMPING_FACTOR", "GOLDEN_ANGLE", "GRAVITY", "OVERLAP_BOUND",
-    "PAPER_COORDINATION", "PAPER_WEIGHT", "SURFACE_SHARE", "Bed", "BoolArray", "Contacts",
+    "SURFACE_SHARE", "Bed", "BoolArray", "Contacts",
     "Container", "FloatArray", "HertzStiffness", "IntArray", "Neighbours", "RadiusDistribution",
     "State", "Walls", "bed_measure", "check_bed", "collision", "contact_law", "count_sides",
     "damping_of_rebound", "draw_sample_start", "equivalent_modulus", "expect_grain_count",

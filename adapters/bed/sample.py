@@ -22,12 +22,6 @@ from adapters.errors import NotConverged, SceneError
 GRAVITY = 9.81
 """Acceleration of gravity [m/s^2], along -z."""
 
-PAPER_COORDINATION = 5.0
-"""Coordination number that the paper's bed approaches after the rain (Fig. 3b)."""
-
-PAPER_WEIGHT = 13.6
-"""Weight of the paper's bed [N] (Fig. 3a), which its Table 1 does not give."""
-
 SURFACE_SHARE = 0.9
 """Part of a bed's height, from the floor, that lies below the uneven free surface."""
 

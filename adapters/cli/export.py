@@ -10,7 +10,6 @@ from adapters.cli.arguments import add_json_flag, add_run_argument, print_json
 OPENED_BY = {
     "vtu": "ParaView; colour grains by displacement, glyph: sphere, scale: radius, factor 2",
     "ovito": "OVITO; contacts by its modifier Load trajectory",
-    "stl": "ParaView, CAD or an engine's mesh walls",
     "csv": "a spreadsheet, pandas or R",
 }
 """Format -> what opens it."""

@@ -20,16 +20,28 @@ JUMP_KEYS = ("procedure.k", "procedure.h")
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``verb`` to its parser."""
-    {
-        "run": register_run,
-        "resume": register_resume,
-        "status": register_status,
-        "report": register_report,
-    }[verb](parser)
+    if verb == "run":
+        register_run(parser)
+    else:
+        add_run_argument(parser)
+    if verb in ("run", "resume"):
+        parser.add_argument(
+            "--cycle-by-cycle", action="store_true",
+            help="where the bed ratchets or collapses, so that no jump is allowed, or a jump and "
+            "its shorter tries failed, compute cycles instead of stopping with exit code 6",
+        )  # fmt: skip
+    elif verb == "status":
+        add_json_flag(parser)
+    else:
+        parser.add_argument("--open", action="store_true", help="show it, when there is a display")
+    commands = {
+        "run": run_command, "resume": run_resume, "status": run_status, "report": run_report,
+    }  # fmt: skip
+    parser.set_defaults(command=commands[verb])
 
 
 def register_run(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``run``."""
+    """Arguments of ``run`` alone."""
     add_scene_arguments(parser)
     parser.add_argument(
         "--run-folder", type=Path, metavar="FOLDER", help="default: run/ beside the scene"
@@ -49,20 +61,9 @@ def register_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--cycles", type=int, metavar="N", help="short for --set procedure.total_cycles=N"
     )
-    add_cycle_by_cycle_flag(parser)
     parser.add_argument(
         "--dry-run", action="store_true", help="write the decks and print the engine's command"
     )
-    parser.set_defaults(command=run_command)
-
-
-def add_cycle_by_cycle_flag(parser: argparse.ArgumentParser) -> None:
-    """Add ``--cycle-by-cycle``."""
-    parser.add_argument(
-        "--cycle-by-cycle", action="store_true",
-        help="where the bed ratchets or collapses, so that no jump is allowed, or a jump and its "
-        "shorter tries failed, compute cycles instead of stopping with exit code 6",
-    )  # fmt: skip
 
 
 def list_jump_overrides(arguments: argparse.Namespace) -> list[str]:
@@ -96,13 +97,6 @@ def run_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def register_resume(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``resume``."""
-    add_run_argument(parser)
-    add_cycle_by_cycle_flag(parser)
-    parser.set_defaults(command=run_resume)
-
-
 def run_resume(arguments: argparse.Namespace) -> int:
     """Go on with a run from its last window that passes the checks."""
     from adapters.procedure import run as procedure
@@ -111,29 +105,17 @@ def run_resume(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def register_status(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``status``."""
-    add_run_argument(parser)
-    add_json_flag(parser)
-    parser.set_defaults(command=run_status)
-
-
 def run_status(arguments: argparse.Namespace) -> int:
     """Print how far a run is, and in sentences what came out."""
+    from dataclasses import asdict
+
     from adapters.procedure import describe_result, judge_progress, read_run_record
 
     record = read_run_record(arguments.run_folder)
-    print_fields(judge_progress(record).to_dict(), arguments.json)
+    print_fields(asdict(judge_progress(record)), arguments.json)
     if not arguments.json:
         print("", *describe_result(record), sep="\n")
     return 0
-
-
-def register_report(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``report``."""
-    add_run_argument(parser)
-    parser.add_argument("--open", action="store_true", help="show it, when there is a display")
-    parser.set_defaults(command=run_report)
 
 
 def run_report(arguments: argparse.Namespace) -> int:

@@ -12,17 +12,15 @@ from adapters.errors import EngineMissing, UsageError
 
 def register(verb: str, parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``verb`` to its parser."""
-    {
-        "doctor": register_doctor,
-        "new": register_new,
-        "cite": register_cite,
-    }[verb](parser)
+    from trackbed.scenes import scene_names
 
-
-def register_doctor(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``doctor``."""
-    add_json_flag(parser)
-    parser.set_defaults(command=run_doctor)
+    if verb == "doctor":
+        add_json_flag(parser)
+    elif verb == "new":
+        parser.add_argument("name", metavar="NAME", help="; ".join(scene_names()))
+        parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
+    commands = {"doctor": run_doctor, "new": run_new, "cite": run_cite}
+    parser.set_defaults(command=commands[verb])
 
 
 def run_doctor(arguments: argparse.Namespace) -> int:
@@ -43,15 +41,6 @@ def run_doctor(arguments: argparse.Namespace) -> int:
     if not has_usable_engine(found):
         raise EngineMissing("no engine is installed, so nothing can be run", remedy=ENGINE_REMEDY)
     return 0
-
-
-def register_new(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``new``."""
-    from trackbed.scenes import scene_names
-
-    parser.add_argument("name", metavar="NAME", help="; ".join(scene_names()))
-    parser.add_argument("folder", metavar="FOLDER", type=Path, help="made when it is not there")
-    parser.set_defaults(command=run_new)
 
 
 def run_new(arguments: argparse.Namespace) -> int:
@@ -76,11 +65,6 @@ def run_new(arguments: argparse.Namespace) -> int:
     control = " --control" if verb == "run" else ""
     print(f"{path}\nnext: trackbed {verb} {shlex.quote(str(path))}{control}")
     return 0
-
-
-def register_cite(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``cite``."""
-    parser.set_defaults(command=run_cite)
 
 
 def run_cite(arguments: argparse.Namespace) -> int:

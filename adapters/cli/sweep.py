@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from adapters.cli.arguments import add_json_flag, add_scene_arguments, list_overrides, print_json
 from adapters.errors import SweepIncomplete, UsageError
@@ -78,27 +77,26 @@ def run_sweep_command(arguments: argparse.Namespace) -> int:
         progress.say(f"warning: {warning}")
     results = run_sweep(sweep, cluster, progress)
     bands, paths = write_results(sweep, results)
+    bands = [band for band in bands if len(band.cycle)]
     if arguments.json:
         last = [
             {
                 "settings": dict(band.settings), "seeds": band.seeds, "cycle": int(band.cycle[-1]),
-                "mean_m": float(band.mean[-1]), "band_m": _half(band.half[-1]),
+                "mean_m": float(band.mean[-1]), "band_m": band.half_at_end,
             }
             for band in bands
-            if len(band.cycle)
         ]  # fmt: skip
         print_json(
             make_sweep_record(sweep, cluster, results) | {"settlements": last, "files": paths}
         )
     else:
         for band in bands:
-            if len(band.cycle):
-                half = _half(band.half[-1])
-                spread = "" if half is None else f" +- {1e6 * half:.2f}"
-                print(
-                    f"{band.group}: {1e6 * band.mean[-1]:.2f}{spread} um at cycle "
-                    f"{band.cycle[-1]:.0f}, {band.seeds} of {band.asked} seeds"
-                )
+            half = band.half_at_end
+            spread = "" if half is None else f" +- {1e6 * half:.2f}"
+            print(
+                f"{band.group}: {1e6 * band.mean[-1]:.2f}{spread} um at cycle "
+                f"{band.cycle[-1]:.0f}, {band.seeds} of {band.asked} seeds"
+            )
         print("\n".join(paths.values()))
     failed = [result for result in results if result.state != "finished"]
     if failed:
@@ -110,7 +108,3 @@ def run_sweep_command(arguments: argparse.Namespace) -> int:
             remedy="remove the cause and give the same command again: it runs only these",
         )
     return 0
-
-
-def _half(value: Any) -> float | None:
-    return float(value) if value == value else None

@@ -1,4 +1,4 @@
-"""A run as files of other programs: ParaView, OVITO, CAD, tables."""
+"""A run as files of other programs: ParaView, OVITO, tables."""
 
 from adapters.export.formats import export_run
 from adapters.export.instants import read_exported_run

@@ -1,4 +1,4 @@
-"""A run in the formats of other tools: VTU for ParaView, dumps for OVITO, STL of walls, CSV.
+"""A run in the formats of other tools: VTU for ParaView, dumps for OVITO, CSV.
 
 A file holds what the scene names: without friction there is no tangential force, without load
 cycles no displacement and no piston.  Cycles inside a jump have no state, only its end has.
@@ -10,11 +10,11 @@ from pathlib import Path
 
 from adapters.errors import UsageError
 from adapters.export.instants import ExportedRun
-from adapters.export.meshes import export_stl, export_vtu
+from adapters.export.meshes import export_vtu
 from adapters.export.tables import export_csv, export_ovito
 from adapters.files import name_full_disk
 
-FORMATS = {"vtu": export_vtu, "ovito": export_ovito, "stl": export_stl, "csv": export_csv}
+FORMATS = {"vtu": export_vtu, "ovito": export_ovito, "csv": export_csv}
 """Name of a format -> function of the run, a folder and the cycles between two instants."""
 
 

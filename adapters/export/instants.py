@@ -10,7 +10,7 @@ import numpy as np
 
 from adapters.bed import FloatArray, IntArray, State, neighbours
 from adapters.errors import UsageError
-from adapters.procedure import CONTROL, Record, Track, read_run_record
+from adapters.procedure import CONTROL, Track, read_run_record
 from adapters.scene import Scene
 
 
@@ -78,12 +78,6 @@ class ExportedRun:
         """Last cycle end computed; 0 before loading."""
         return max((outcome.last_cycle for _, outcome in self.track.windows), default=0)
 
-    def piston_heights(self, every: int = 1) -> Iterator[tuple[int, float]]:
-        """Cycle and height of the piston's face [m] at each of `states`."""
-        first = self.track.window(self.track.windows[0][0]).piston_start
-        for state in self.states(every):
-            yield state.cycle, state.piston_height if state.cycle else first
-
     def piston_samples(self) -> Iterator[dict[str, FloatArray | IntArray]]:
         """All samples of the piston, window by window: cycles done, forces [N], height [m]."""
         for name, _ in self.track.windows:
@@ -98,20 +92,19 @@ class ExportedRun:
 
 
 def read_exported_run(run_folder: Path, variant: str = "") -> ExportedRun:
-    """A run of the folder: the procedure, or ``control`` and the like beside it.
+    """A run of the folder: the procedure, or the ``control`` beside it.
 
     Raises `UsageError` for a folder or variant that is not there, or not yet prepared.
     """
     record = read_run_record(run_folder)
-    tracks = _tracks(record)
-    if variant not in tracks:
-        known = ", ".join(sorted(filter(None, tracks))) or "none"
+    track = {"": record.run, CONTROL: record.control}.get(variant)
+    if track is None:
+        known = "none" if record.control is None else CONTROL
         raise UsageError(
             f"there is no run {variant} beside this one; there are: {known}",
             where=str(run_folder),
             remedy="trackbed run SCENE --control makes the control",
         )
-    track = tracks[variant]
     if track.preparation is None:
         raise UsageError(
             "the bed is not prepared yet, so there is nothing to export",
@@ -119,9 +112,3 @@ def read_exported_run(run_folder: Path, variant: str = "") -> ExportedRun:
             remedy="wait for it, or go on with: trackbed resume RUN",
         )
     return ExportedRun(record.scene, track)
-
-
-def _tracks(record: Record) -> dict[str, Track]:
-    """All runs of a record by name; the procedure's is empty."""
-    tracks = {"": record.run} | {track.name: track for track in record.others}
-    return tracks if record.control is None else tracks | {CONTROL: record.control}

@@ -48,19 +48,18 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
     Raises `JumpRefused` where the bed, or a piston on a part of it, ratchets or collapses, unless
     the run was asked to go on.
     """
-    procedure = run.scene.procedure
-    assert procedure is not None
+    procedure = run.procedure
     assert procedure.tolerance is not None
     settings = Settings(
         procedure.tolerance, procedure.healing_cycles, procedure.total_cycles, run.cycle_by_cycle
     )
     journal = Journal(run)
-    rows = _rows(run, bed)
+    rows = run.outcome(bed.window).rows
     control = begin(bed.cycle, float(rows[-1]["settlement"]))
     while True:
         if (seated := seat(run, bed, procedure.carried_cycles)).cycle > bed.cycle:
             bed = seated
-            control = begin(bed.cycle, float(_rows(run, bed)[-1]["settlement"]))
+            control = begin(bed.cycle, float(run.outcome(bed.window).rows[-1]["settlement"]))
         decision = decide(control, settings, find_piston_regime(run, control))
         if decision.action == "end":
             return bed
@@ -69,7 +68,7 @@ def settle_controlled(run: Run, bed: Bed) -> Bed:
             raise refused(run, decision)
         if decision.action == "compute":
             bed = stages.compute(run, bed, decision.window)
-            rows = _rows(run, bed)
+            rows = run.outcome(bed.window).rows
             stretch = make_stretch(rows, control.settlement)
             control = observe(control, stretch, float(rows[-1]["settlement"]))
         else:
@@ -129,9 +128,9 @@ def jump_and_check(
         run.folder.give_up(name, str(error))
         run.progress.say(f"the jump of {decision.jump} cycles from {bed.cycle} failed: {error}")
         return bed, reject(control, decision, nan, settings)
-    rows = _rows(run, after)
+    rows = run.outcome(after.window).rows
     settlement = float(rows[-1]["settlement"])
-    stretch = make_stretch(rows, float(read_jump_row(run, name)["settlement"]))
+    stretch = make_stretch(rows, float(run.outcome(name).rows[-1]["settlement"]))
     check = judge(control, decision, settings, stretch, settlement)
     record = {"jump": decision.jump, "window": healing + decision.window, **asdict(check)}
     journal.write(CHECK, decision.cycle, decision.attempt, record)
@@ -141,8 +140,7 @@ def jump_and_check(
         f"taken back: the bed gained {1e6 * check.gained:.3g} um, and the rates on both sides give "
         f"{1e6 * check.expected:.3g} um: an error of {100 * check.error:+.3g} % of the total"
     )
-    outcomes = [run.folder.outcome(stage) for stage in (name, after.window)]
-    lost_s = sum(sum_cost(outcome.cost) for outcome in outcomes if outcome is not None)
+    lost_s = sum(sum_cost(run.outcome(stage).cost) for stage in (name, after.window))
     lost = {"lost_s": lost_s, "lost_cycles": healing + decision.window}
     run.folder.give_up(name, why, error=check.error, **lost)
     run.folder.discard(run.folder.path / after.window)
@@ -230,15 +228,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(inner) for inner in value]
     return None if isinstance(value, float) and not isfinite(value) else value
-
-
-def _rows(run: Run, bed: Bed) -> list[dict[str, Any]]:
-    outcome = run.folder.outcome(bed.window)
-    assert outcome is not None
-    return outcome.rows
-
-
-def read_jump_row(run: Run, name: str) -> dict[str, Any]:
-    outcome = run.folder.outcome(name)
-    assert outcome is not None
-    return outcome.rows[-1]

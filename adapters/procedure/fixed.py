@@ -35,8 +35,7 @@ def settle_fixed(run: Run, bed: Bed) -> Bed:
     Where less is left than the shortest h, cycles are computed; where jumps waited for the piston,
     the last is one of what is left, if it skips no fewer cycles than its healing costs.
     """
-    p = run.scene.procedure
-    assert p is not None
+    p = run.procedure
     k = p.window_cycles
     if bed.cycle < p.total_cycles:
         bed = stages.compute(run, bed, min(k, p.total_cycles - bed.cycle))
@@ -64,8 +63,7 @@ def jump_and_heal(run: Run, bed: Bed, h: int) -> Bed:
     its retries failed: `compute_on` if the run may compute what it cannot jump, else raises
     `NotCredible`.
     """
-    p = run.scene.procedure
-    assert p is not None
+    p = run.procedure
     why = ""
     for attempt in range(1, RETRIES + 2):
         name = f"jump_{bed.cycle:06d}_{attempt}"
@@ -123,8 +121,7 @@ def report_settled(run: Run, name: str, asked: float, share: float) -> None:
 def compute_on(run: Run, bed: Bed) -> Bed:
     """Windows in place of a jump: one at the first place that no jump leaves, twice as many at each
     further one, so that tries stay few where none succeeds."""
-    p = run.scene.procedure
-    assert p is not None
+    p = run.procedure
     last_tries = (
         n for n in run.folder.stage_names() if re.fullmatch(rf"jump_\d+_{RETRIES + 1}", n)
     )
@@ -145,8 +142,7 @@ def find_history_gain(run: Run, bed: Bed, h: int) -> float | None:
     Cycles count from the last in which it hung: from there on the bed takes the load for the first
     time, and settles by ln of these, as one does that carried its piston from the rain on.
     """
-    p = run.scene.procedure
-    assert p is not None
+    p = run.procedure
     if p.settlement == "law" or h == 0:
         return None
     hung, outcomes = counted_from(run, bed), run.folder.outcomes()

@@ -103,20 +103,9 @@ def _number(value: object) -> float:
     return float(value) if isinstance(value, int | float) else nan
 
 
-def read_history(folder: RunFolder) -> History:
-    """The table of the run in ``folder``, what its failed jumps lost included."""
-    lost = [(jump.first_cycle, jump.lost_s) for jump in failed_jumps(folder)]
-    return history_of(folder.outcomes(), lost)
-
-
 def list_jumped_spans(outcomes: Sequence[Outcome]) -> list[tuple[int, int]]:
     """Cycles before and after each jump."""
     return [(o.first_cycle, o.last_cycle) for o in outcomes if o.stage == "jump" and o.rows]
-
-
-def cycles_computed(cycle: int, spans: Sequence[tuple[int, int]]) -> int:
-    """Cycles among the first ``cycle`` that were computed; ``cycle`` lies outside the jumps."""
-    return cycle - sum(last - first for first, last in spans if last <= cycle)
 
 
 def find_last_common_cycle(own: History, full: History) -> int:
@@ -138,18 +127,14 @@ class FailedJump:
 
 def failed_jumps(folder: RunFolder) -> tuple[FailedJump, ...]:
     """The jumps of a run that were given up, in order."""
-    events = folder.events()
-    return tuple(
-        FailedJump(stage, place_stage(stage)[0], why, _lost_s(folder, stage, events))
-        for stage in folder.stage_names()
-        if (why := folder.failure(stage))
-    )
-
-
-def _lost_s(folder: RunFolder, stage: str, events: Sequence[dict[str, Any]]) -> float:
-    """What a failed jump lost [s]: as it was noted where the jump was taken back."""
-    noted = folder.failure_details(stage).get("lost_s")
-    return find_lost_time(stage, folder.outcome(stage), events) if noted is None else float(noted)
+    events, found = folder.events(), []
+    for stage in folder.stage_names():
+        if why := folder.failure(stage):
+            lost = folder.failure_details(stage).get("lost_s")  # noted where it was taken back
+            if lost is None:
+                lost = find_lost_time(stage, folder.outcome(stage), events)
+            found.append(FailedJump(stage, place_stage(stage)[0], why, float(lost)))
+    return tuple(found)
 
 
 def find_lost_time(stage: str, outcome: Outcome | None, events: Sequence[dict[str, Any]]) -> float:

@@ -28,9 +28,8 @@ CONTROL = "control"
 
 @dataclass(frozen=True)
 class Track:
-    """One run of the scene: the procedure, its control, or another variant beside it."""
+    """One run of the scene: the procedure, or the full run beside it."""
 
-    name: str
     folder: RunFolder
     outcomes: tuple[Outcome, ...]
     """Finished stages in order, failed jumps left out."""
@@ -51,21 +50,20 @@ class Track:
         """The outcome of the rain of grains, once it is done."""
         return next((o for o in self.outcomes if o.stage == "preparation"), None)
 
+    def stages(self, kind: str) -> list[tuple[str, Outcome]]:
+        """Folder and outcome of every finished stage of a kind."""
+        pairs = zip(self.names, self.outcomes, strict=True)
+        return [(name, outcome) for name, outcome in pairs if outcome.stage == kind]
+
     @property
     def jumps(self) -> list[tuple[str, Outcome]]:
         """Folder and outcome of every jump that was kept."""
-        return [
-            pair for pair in zip(self.names, self.outcomes, strict=True) if pair[1].stage == "jump"
-        ]
+        return self.stages("jump")
 
     @property
     def windows(self) -> list[tuple[str, Outcome]]:
         """Folder and outcome of every window."""
-        return [
-            pair
-            for pair in zip(self.names, self.outcomes, strict=True)
-            if pair[1].stage == "window"
-        ]
+        return self.stages("window")
 
     def start(self) -> State:
         """The bed before the first load cycle."""
@@ -87,13 +85,6 @@ class Track:
                 return load_state(self.folder.path / name / "relaxed.npz").position
         raise UsageError(f"no state was computed at cycle {cycle}", where=str(self.folder.path))
 
-    def before(self, jump: Outcome) -> State | None:
-        """The computed state a jump starts from."""
-        for name, outcome in self.windows:
-            if outcome.last_cycle == jump.first_cycle:
-                return self.window(name).state(-1)
-        return None
-
 
 @dataclass(frozen=True)
 class Record:
@@ -105,8 +96,6 @@ class Record:
     run: Track
     control: Track | None
     """None when there is none, or it has not yet a cycle of its own."""
-    others: tuple[Track, ...]
-    """Further runs of the scene inside the folder, such as one from a perturbed state."""
 
 
 def read_run_record(path: Path) -> Record:
@@ -114,19 +103,12 @@ def read_run_record(path: Path) -> Record:
     folder = RunFolder(path)
     manifest = folder.manifest()
     scene = load_scene(path / "scene.toml", manifest["overrides"])
-    beside = {
-        inner.name: read_track(inner.name, RunFolder(inner))
-        for inner in sorted(path.iterdir())
-        if (inner / "settlement.csv").exists()
-    }
-    control = beside.pop(CONTROL, None)
-    if control is not None and not len(control.history.cycle):
-        control = None
-    others = tuple(track for track in beside.values() if len(track.history.cycle))
-    return Record(path, manifest, scene, read_track("this run", folder), control, others)
+    control = read_track(RunFolder(path / CONTROL))
+    has_control = len(control.history.cycle) > 0
+    return Record(path, manifest, scene, read_track(folder), control if has_control else None)
 
 
-def read_track(name: str, folder: RunFolder) -> Track:
+def read_track(folder: RunFolder) -> Track:
     """One run's finished stages, failures and events."""
     stages = [
         (stage, outcome)
@@ -137,7 +119,6 @@ def read_track(name: str, folder: RunFolder) -> Track:
     home = folder.path / "discarded"
     discarded = sorted(p.name for p in home.iterdir() if any(p.iterdir())) if home.exists() else []
     return Track(
-        name=name,
         folder=folder,
         outcomes=tuple(outcome for _, outcome in stages),
         names=tuple(stage for stage, _ in stages),
@@ -160,7 +141,6 @@ def find_comparable_cycle(record: Record) -> int:
 
 
 Event = dict[str, Any]
-
 
 DECISION, CHECK = "decision", "jump checked"
 """Events of a controlled run: what was decided and why; a jump beside what was computed behind."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from adapters.bed import draw_sample_start, sample_radii
 from adapters.engines import find_engine, get_engine, interruptible, list_real_engines
 from adapters.errors import EngineMissing, SceneError, UsageError
 from adapters.files import RunFolder, name_full_disk
@@ -18,19 +21,17 @@ from adapters.procedure.fixed import settle_fixed
 from adapters.procedure.progress import Progress
 from adapters.procedure.stages import Bed, Clock, Run, Variant
 from adapters.scene import Scene, flatten_keys, load_scene
-from trackbed.run_files import write_whole
+from trackbed.run_files import record_provenance, write_whole
 
 OWN_FILES = ("lock", "scene.toml", "load_series.csv", "dry_run")
 """What may be in a run folder before its manifest is written."""
 
 CONTROL = Variant("control", jumps=False)
-CONTROL_STILL = Variant("control_still", still=True)
 
 
 def settle(run: Run) -> Bed:
     """The flow chart, Fig. 10: rain, k_i cycles, then k cycles and a jump of h until the end."""
-    p = run.scene.procedure
-    assert p is not None
+    p = run.procedure
     bed = stages.prepare(run)
     bed = stages.compute(run, bed, p.k_i)
     bed = replace(bed, start=replace(bed.start, perturbation=run.variant.perturbation))
@@ -168,8 +169,6 @@ def settle_manifest(
     folder: RunFolder, scene: Scene, scene_path: Path, overrides: Sequence[str], control: bool
 ) -> None:
     """Write the manifest of a new run, or refuse a folder that holds another scene's run."""
-    from trackbed.run_files import record_provenance
-
     path = folder.path / "manifest.json"
     if path.exists():
         manifest = folder.manifest()
@@ -190,8 +189,6 @@ def settle_manifest(
     if scene.loading is not None and scene.loading.series is not None:
         shutil.copyfile(scene.loading.series, folder.path / "load_series.csv")
         kept.append('loading.series="load_series.csv"')
-    import sys
-
     manifest = {
         "scene": record_scene(scene),
         "overrides": kept,
@@ -221,10 +218,6 @@ def refuse_differences(old: dict[str, Any], new: dict[str, Any], path: Path) -> 
 
 def _dry_run(scene: Scene, run_path: Path) -> None:
     """Write the decks of the rain of grains and print the command that runs them."""
-    import shlex
-
-    from adapters.bed import draw_sample_start, sample_radii
-
     engine = get_engine(scene.engine.name)
     folder = run_path / "dry_run"
     folder.mkdir(parents=True, exist_ok=True)

@@ -112,14 +112,12 @@ def find_last_hung_cycle(run: Run, bed: Bed) -> int:
 
 def counted_from(run: Run, bed: Bed) -> int:
     """Cycle from which the first k_i count: 0 unless the run waits and its piston hung."""
-    assert run.scene.procedure is not None
-    return find_last_hung_cycle(run, bed) if run.scene.procedure.seating == "waits" else 0
+    return find_last_hung_cycle(run, bed) if run.procedure.seating == "waits" else 0
 
 
 def seat(run: Run, bed: Bed, cycles: int) -> Bed:
     """Windows until the bed has carried its piston for so many ``cycles``, where the run waits."""
-    p = run.scene.procedure
-    assert p is not None
+    p = run.procedure
     while (hung := counted_from(run, bed)) and bed.cycle < min(hung + cycles, p.total_cycles):
         run.progress.say(f"the piston hung on few grains until cycle {hung}: computing on")
         bed = stages.compute(run, bed, min(p.window_cycles, p.total_cycles - bed.cycle))
@@ -131,8 +129,7 @@ def warn_if_hung(run: Run, bed: Bed) -> None:
 
     Once: not where the jump, or a try of it, is in the folder.
     """
-    p = run.scene.procedure
-    assert p is not None
+    p = run.procedure
     if p.seating == "waits" or f"jump_{bed.cycle:06d}_1" in run.folder.stage_names():
         return
     hung = find_last_hung_cycle(run, bed)

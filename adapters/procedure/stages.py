@@ -42,7 +42,7 @@ from adapters.moves import get_move
 from adapters.procedure import checks
 from adapters.procedure.progress import Progress
 from adapters.procedure.room import find_room, find_top_under
-from adapters.scene import Scene
+from adapters.scene import Procedure, Scene
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,18 @@ class Run:
     clock: Clock = field(default_factory=Clock)
     computed_here: int = 0
 
+    @property
+    def procedure(self) -> Procedure:
+        """How a loaded scene is gone through; only such a run goes beyond its preparation."""
+        assert self.scene.procedure is not None
+        return self.scene.procedure
+
+    def outcome(self, stage: str) -> Outcome:
+        """The record of a stage that is finished."""
+        found = self.folder.outcome(stage)
+        assert found is not None
+        return found
+
 
 @dataclass(frozen=True)
 class Bed:
@@ -119,8 +131,7 @@ def prepare(run: Run, start: tuple[FloatArray, float] | None = None) -> Bed:
     of the scene's random ones.
     """
     scene, name = run.scene, "preparation"
-    outcome = run.folder.outcome(name)
-    if outcome is None:
+    if run.folder.outcome(name) is None:
         sample = scene.sample
         run.progress.say(f"rain of {scene.grain_count} grains")
         radius = sample_radii(sample.grain_radius.law, scene.grain_count, sample.seed)
@@ -144,8 +155,6 @@ def prepare(run: Run, start: tuple[FloatArray, float] | None = None) -> Bed:
         }
         cost = run.clock.lap(done.cpu_s, done.start_up_s)
         _finish(run, folder, Outcome(name, 0, 0, [], cost, notes=notes))
-        outcome = run.folder.outcome(name)
-    assert outcome is not None
     state = load_state(run.folder.path / name / "state.npz")
     top = find_top_under(state.position, state.radius, scene.piston_reach)
     restart = run.folder.path / name / "end.restart"
@@ -184,13 +193,8 @@ def compute(run: Run, bed: Bed, cycles: int, healing: int = 0) -> Bed:
             "window", bed.cycle, bed.cycle + cycles, rows, cost, checks=figures, notes=notes
         )
         _finish(run, folder, outcome)
-    return find_bed_behind(run.folder, name, outcome, healing)
-
-
-def find_bed_behind(folder: RunFolder, name: str, outcome: Outcome, healing: int = 0) -> Bed:
-    """Where the finished window ``name`` leaves a run in ``folder``; ``healing``: `compute`."""
     start = EngineStart(
-        folder.path / name / "end.restart",
+        run.folder.path / name / "end.restart",
         outcome.notes["time_step"],
         outcome.notes["piston_mesh"],
         outcome.notes["piston_height"],
@@ -263,8 +267,7 @@ def estimate(run: Run, window: Window, healing: int, h: int) -> tuple[State, Flo
     The piston follows the law of its own heights, so that a loose grain cannot lift it; it is
     never placed above where it is.
     """
-    procedure = run.scene.procedure
-    assert procedure is not None
+    procedure = run.procedure
     with run.clock.part("fit"):
         law, move = get_law(procedure.law), get_move(procedure.move)
         cycle = window.cycle[healing:].astype(float)
@@ -310,8 +313,7 @@ def settlement_rows(run: Run, window: Window, healing: int) -> list[dict[str, An
 
 
 def _row(run: Run, state: State, kind: str) -> dict[str, Any]:
-    preparation = run.folder.outcome("preparation")
-    assert preparation is not None
+    preparation = run.outcome("preparation")
     container = run.scene.container
     walls = container.walls(state.piston_height, run.scene.piston_reach)
     touching = neighbours(state.position, state.radius, walls)
@@ -357,8 +359,7 @@ def _finish(run: Run, folder: Path, outcome: Outcome) -> Path:
 
 def _watch(run: Run, bed: Bed, folder: Path) -> Callable[[], None]:
     """A function that shows progress from what the engine has written so far."""
-    procedure = run.scene.procedure
-    assert procedure is not None
+    procedure = run.procedure
     outcomes = run.folder.outcomes()
     computed = sum(o.last_cycle - o.first_cycle for o in outcomes if o.stage == "window")
     rows = [row for outcome in outcomes for row in outcome.rows]
@@ -380,8 +381,7 @@ def _watch(run: Run, bed: Bed, folder: Path) -> Callable[[], None]:
 
 def count_cycles_to_compute(run: Run, cycle: int) -> int:
     """Cycles still to be computed from ``cycle`` on, as an estimate for the time left."""
-    procedure = run.scene.procedure
-    assert procedure is not None
+    procedure = run.procedure
     left = procedure.total_cycles - cycle
     if not run.variant.jumps:
         return left

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
 from typing import Any
@@ -48,10 +48,6 @@ class Status:
     """Cycles the full run beside it has done; None without one."""
     next: str
     """The command that goes on from here."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Fields by name, as ``trackbed status --json`` prints them."""
-        return asdict(self)
 
 
 def status(run_folder: Path) -> Status:

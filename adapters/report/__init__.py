@@ -1,9 +1,6 @@
-"""The report of a run: numbers, figures, verdict."""
+"""The report of a run: numbers, figure, verdict."""
 
-from adapters.report.drawing import WIDTH
+from adapters.report.figure import add_legend, make_panels
 from adapters.report.page import write_report
 
-__all__ = [
-    "WIDTH",
-    "write_report",
-]
+__all__ = ["add_legend", "make_panels", "write_report"]

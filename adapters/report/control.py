@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from html import escape
-from math import inf
 
 from adapters.jumps import BAND_PROBABILITY
 from adapters.procedure import Record, estimate_band_of_run, list_checks, list_decisions
@@ -19,25 +18,26 @@ def control(record: Record) -> str:
     checks = list_checks(track.events)
     rows = []
     for decision in list_decisions(track.events):
-        check = checks.get((decision["cycle"], decision["attempt"]), {})
-        check = check if decision["action"] == "jump" else {}
-        limits = [(name, inf if value is None else value) for name, value in decision["limits"]]
-        others = ", ".join(f"{name} {value:.0f}" for name, value in limits if value < 1e6)
-        moved = "moved" if "moved" in decision else "gain"  # older runs have one for both
-        bound = "" if decision["bound"] is None else plain(decision["bound"], "d")
+        lengths = [""] * 4
+        if decision["jump"]:
+            moved = "moved" if "moved" in decision else "gain"  # older runs have one for both
+            lengths = [plain(decision["jump"], "d")]
+            lengths += [micrometres(decision[name]) for name in ("gain", moved, "half_width")]
+        came = [""] * 3
+        check = checks.get((decision["cycle"], decision["attempt"]))
+        if check and decision["action"] == "jump":
+            came = [per_cent(check["error"], "+.2f"), plain(check["deviation"], "+.1f")]
+            came.append("kept" if check["accepted"] else "taken back")
+        finite = [(name, h) for name, h in decision["limits"] if h is not None]
+        others = ", ".join(f"{name} {h:.0f}" for name, h in finite if h < 1e6)
         rows.append(
             (
                 plain(decision["cycle"], "d"),
                 escape(decision["action"]),
-                plain(decision["jump"], "d") if decision["jump"] else "",
                 plain(decision["window"], "d"),
-                bound,
-                micrometres(decision["gain"]) if decision["jump"] else "",
-                micrometres(decision[moved]) if decision["jump"] else "",
-                micrometres(decision["half_width"]) if decision["jump"] else "",
-                per_cent(check["error"], "+.2f") if check else "",
-                plain(check["deviation"], "+.1f") if check else "",
-                ("kept" if check["accepted"] else "taken back") if check else "",
+                "" if decision["bound"] is None else plain(decision["bound"], "d"),
+                *lengths,
+                *came,
                 escape(decision["why"]) + (f" ({escape(others)})" if others else ""),
             )
         )
@@ -77,9 +77,9 @@ def control(record: Record) -> str:
             (
                 "cycle",
                 "",
-                "<i>h</i>",
                 "<i>k</i>",
                 "eq. 15",
+                "<i>h</i>",
                 "gain expected (µm)",
                 "moved by (µm)",
                 "half-width (µm)",

@@ -1,22 +1,19 @@
 """Error against cost of a run beside its control: pure functions of tables and positions.
 
-Speed-up      S = T_full / T_procedure
-Gained time   G = S - 1, so "180 %" is S = 2.8 (the paper quotes gained times, defines them nowhere)
-
-T is CPU time of the engine with all its processes and of Python: engine, start-up, parsing,
-fitting, relaxing, everything else, and what failed jumps lost; counted from the start of loading
-unless "with preparation" is said.
+Speed-up S = T_full / T_procedure, where T is CPU time of the engine with all its processes and of
+Python: engine, start-up, parsing, fitting, relaxing, everything else, and what failed jumps lost;
+counted from the start of loading unless "with preparation" is said.  The paper quotes gained times
+S - 1, so that its "180 %" is S = 2.8, and defines them nowhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 
 import numpy as np
 
-from adapters.bed import FloatArray, IntArray
+from adapters.bed import FloatArray
 from adapters.files import Outcome
 from adapters.laws import Law
 from adapters.laws.fit import measure_coordinates_error, measure_displacement_error
@@ -27,9 +24,6 @@ COORDINATION_BAR = 0.03
 
 HEIGHT_BAR = 0.05
 """Greatest change of the mean height by a relaxation over the jump's own settlement."""
-
-PYTHON_BAR = 0.05
-"""Greatest share of Python in the CPU time of a run."""
 
 
 def relative_error(value: float, reference: float) -> float:
@@ -42,11 +36,6 @@ def speed_up(full_s: float, procedure_s: float) -> float:
     return full_s / procedure_s if procedure_s > 0 else nan
 
 
-def gained_time(ratio: float) -> float:
-    """G = S - 1 of a speed-up S: 1.8 ("180 %") for S = 2.8."""
-    return ratio - 1
-
-
 @dataclass(frozen=True)
 class Comparison:
     """A way to the bed at one cycle, its errors against the full run, and its cost.
@@ -57,27 +46,22 @@ class Comparison:
     name: str
     computed: int
     """Load cycles the engine computed for it."""
-    settlement: float = nan
+    settlement: float
     """[m]"""
-    settlement_error: float = nan
+    settlement_error: float
     coordination_number: float = nan
     """Mean of the last `AVERAGED` cycles, as the elastic deflection."""
     coordination_number_error: float = nan
-    relative_density: float = nan
-    relative_density_error: float = nan
     elastic_deflection: float = nan
     """[m]"""
     elastic_deflection_error: float = nan
-    displacement_error: float = nan
-    """E_r (eq. 22) of the residual displacement since the start of loading."""
     jump_displacement_error: float = nan
-    """E_r of the residual displacement since the state before the first jump."""
+    """E_r (eq. 22) of the residual displacement since the state before the first jump."""
     coordinates_error: float = nan
     """E_r of the coordinates, as in the paper: small for any method."""
     cpu_s: float = nan
     """CPU time from the start of loading [s]."""
     speed_up: float = nan
-    gained_time: float = nan
     speed_up_with_preparation: float = nan
 
 
@@ -85,8 +69,6 @@ class Comparison:
 class Beds:
     """Centres [m], shape (n, 3), that E_r is measured between."""
 
-    start: FloatArray
-    """Before loading."""
     before_jump: FloatArray | None
     """Before the first jump; the last computed state both runs share.  None without a jump."""
     full: FloatArray
@@ -110,85 +92,45 @@ def comparison(
     ``preparation_s``: CPU time of the preparation, the same for both [s].  E_r needs ``beds``.
     """
     mine, truth = own.row(own_cycle), full.row(full_cycle)
-    late = {
-        column: (own.late_mean(column, own_cycle), full.late_mean(column, full_cycle))
+    coordination, deflection = (
+        (own.late_mean(column, own_cycle), full.late_mean(column, full_cycle))
         for column in ("coordination_number", "elastic_deflection")
-    }
+    )
     cost, full_cost = float(own.cpu_s[mine]), float(full.cpu_s[truth])
-    ratio = speed_up(full_cost, cost)
+    displacement = coordinates = nan
+    if beds is not None:
+        coordinates = measure_coordinates_error(beds.full, beds.own)
+        # Without a move of the full run E_r has no denominator.
+        if beds.before_jump is not None and not np.array_equal(beds.before_jump, beds.full):
+            displacement = measure_displacement_error(beds.before_jump, beds.full, beds.own)
     return Comparison(
         name=name,
         computed=own.computed(own_cycle),
         settlement=float(own.settlement[mine]),
         settlement_error=relative_error(own.settlement[mine], full.settlement[truth]),
-        coordination_number=late["coordination_number"][0],
-        coordination_number_error=relative_error(*late["coordination_number"]),
-        relative_density=float(own.relative_density[mine]),
-        relative_density_error=relative_error(
-            own.relative_density[mine], full.relative_density[truth]
-        ),
-        elastic_deflection=late["elastic_deflection"][0],
-        elastic_deflection_error=relative_error(*late["elastic_deflection"]),
-        displacement_error=nan if beds is None else _displacement_error(beds.start, beds),
-        jump_displacement_error=(
-            nan if beds is None else _displacement_error(beds.before_jump, beds)
-        ),
-        coordinates_error=nan if beds is None else measure_coordinates_error(beds.full, beds.own),
+        coordination_number=coordination[0],
+        coordination_number_error=relative_error(*coordination),
+        elastic_deflection=deflection[0],
+        elastic_deflection_error=relative_error(*deflection),
+        jump_displacement_error=displacement,
+        coordinates_error=coordinates,
         cpu_s=cost,
-        speed_up=ratio,
-        gained_time=gained_time(ratio),
+        speed_up=speed_up(full_cost, cost),
         speed_up_with_preparation=speed_up(full_cost + preparation_s, cost + preparation_s),
     )
 
 
-def _displacement_error(start: FloatArray | None, beds: Beds) -> float:
-    """E_r, nan where the full run did not move on from ``start`` and E_r has no denominator."""
-    if start is None or np.array_equal(start, beds.full):
+def extrapolate_curve(full: History, law: Law, first: int, last: int, cycle: int) -> float:
+    """Settlement at ``cycle`` [m] by the law fitted to that of cycles ``first`` to ``last``.
+
+    No bed is relaxed or resubmitted; nan where the law needs more cycles.
+    """
+    rows = (full.cycle >= first) & (full.cycle <= last)
+    if rows.sum() <= law.minimum_cycles:
         return nan
-    return measure_displacement_error(start, beds.full, beds.own)
-
-
-@dataclass(frozen=True)
-class CostLine:
-    """A cheaper way to the settlement at one cycle, at several costs."""
-
-    computed: IntArray
-    """Load cycles computed, shape (c,)."""
-    cpu_s: FloatArray
-    """CPU time from the start of loading [s], shape (c,)."""
-    settlement_error: FloatArray
-    """Relative and signed, shape (c,)."""
-
-
-def stopped_early(full: History, cycle: int) -> CostLine:
-    """The full run stopped at each earlier cycle and taken for the bed of ``cycle``.
-
-    That is "jump and move nothing" with every length of jump: the null hypothesis of any method.
-    """
-    early = full.cycle < cycle
-    error = full.settlement[early] / full.settlement[full.row(cycle)] - 1
-    return CostLine(full.cycle[early], full.cpu_s[early], error)
-
-
-def curve_fitted(full: History, law: Law, first: int, cycle: int, at: Sequence[int]) -> CostLine:
-    """The law fitted to the settlement from cycle ``first`` on, stopped at each cycle of ``at``.
-
-    Extrapolates the curve from there to ``cycle``, without relaxing or resubmitting any bed: it
-    gives a settlement and no state.  The CPU time of the fit itself is left out (milliseconds).
-    """
-    kept, errors = [], []
-    for last in at:
-        rows = (full.cycle >= first) & (full.cycle <= last)
-        if rows.sum() <= law.minimum_cycles:
-            continue
-        parameters = law.fit(full.cycle[rows].astype(float), full.settlement[rows])
-        on = float(law.increment(parameters, float(last), float(cycle)))
-        kept.append(full.row(last))
-        errors.append(
-            relative_error(full.settlement[kept[-1]] + on, full.settlement[full.row(cycle)])
-        )
-    index = np.array(kept, int)
-    return CostLine(full.cycle[index], full.cpu_s[index], np.array(errors))
+    parameters = law.fit(full.cycle[rows].astype(float), full.settlement[rows])
+    on = float(law.increment(parameters, float(last), float(cycle)))
+    return float(full.settlement[full.row(last)]) + on
 
 
 @dataclass(frozen=True)
@@ -202,8 +144,6 @@ class JumpFigures:
     stage: str
     first_cycle: int
     last_cycle: int
-    method: str
-    """Of relaxation."""
     estimated: float
     """Settlement over the jump by the law."""
     truth: float
@@ -218,10 +158,6 @@ class JumpFigures:
     """Relative change of the coordination number, walls counted, before the jump to relaxed."""
     height_change: float
     """|relaxed - estimated mean height| over the jump's own settlement."""
-    coordination_ok: bool | None
-    """Within `COORDINATION_BAR`; None where not measured."""
-    height_ok: bool | None
-    """Within `HEIGHT_BAR`; None where not measured."""
 
 
 def measure_jump(stage: str, jump: Outcome, own: History, full: History | None) -> JumpFigures:
@@ -232,11 +168,10 @@ def measure_jump(stage: str, jump: Outcome, own: History, full: History | None) 
         heights = {when: record[when]["mean_height"] for when in ("before", "estimated", "relaxed")}
         estimated = heights["before"] - heights["estimated"]
         change = heights["estimated"] - heights["relaxed"]
-        if "hops" not in record:  # grains that change places keep neither, by design
-            coordination = relative_error(
-                record["relaxed"]["coordination_number"], record["before"]["coordination_number"]
-            )
-            height = abs(change) / abs(estimated) if estimated else nan
+        coordination = relative_error(
+            record["relaxed"]["coordination_number"], record["before"]["coordination_number"]
+        )
+        height = abs(change) / abs(estimated) if estimated else nan
     healed = jump.last_cycle
     for cycle, kind in zip(own.cycle, own.kind, strict=True):
         if kind == "healing" and cycle == healed + 1:
@@ -244,20 +179,9 @@ def measure_jump(stage: str, jump: Outcome, own: History, full: History | None) 
     truth = _settled(full, jump.first_cycle, jump.last_cycle)
     healing = _settled(own, jump.last_cycle, healed) - _settled(full, jump.last_cycle, healed)
     return JumpFigures(
-        stage,
-        jump.first_cycle,
-        jump.last_cycle,
-        record["method"],
-        estimated,
-        truth,
-        estimated - truth,
-        change,
-        healing,
-        coordination,
-        height,
-        None if np.isnan(coordination) else abs(coordination) <= COORDINATION_BAR,
-        None if np.isnan(height) else height <= HEIGHT_BAR,
-    )
+        stage, jump.first_cycle, jump.last_cycle, estimated, truth, estimated - truth, change,
+        healing, coordination, height,
+    )  # fmt: skip
 
 
 def _settled(history: History | None, first: int, last: int) -> float:

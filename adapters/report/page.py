@@ -1,34 +1,39 @@
 """The report of a run: ``report.html``, ``report.json`` and ``figures/`` in its folder.
 
-The page is one file that loads nothing.  It begins with one claim and where it fails, and gives
-the error beside the cost it saved; `adapters.report.error` defines both.
+The page is one file that loads nothing.  It begins with one claim and where it fails, gives the
+error beside the cost it saved (`adapters.report.error` defines both), then jumps and failures.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
+from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from adapters.bed import PAPER_COORDINATION, FloatArray, load_state, neighbours
-from adapters.files import Outcome, name_full_disk
-from adapters.procedure import Record, Track, list_jumped_spans, read_run_record
-from adapters.report.bed import PAPER_DENSITY, karrech
-from adapters.report.numbers import TWIN_SCATTER, Numbers, name_variant, numbers_of
-from adapters.report.preparation import read_preparation
-from adapters.report.sections import body
-from adapters.report.verdict import PROCEDURE
-from trackbed.report import page
+from adapters.files import name_full_disk
+from adapters.procedure import AVERAGED, Record, list_jumped_spans, read_run_record
+from adapters.report.control import control
+from adapters.report.error import Comparison
+from adapters.report.figure import draw_settlement
+from adapters.report.jumps import describe_jumps
+from adapters.report.numbers import Numbers, numbers_of
+from adapters.report.verdict import FITTED, FULL, NOTHING, PROCEDURE, PYTHON_BAR
+from trackbed.report import (
+    MINUS,
+    TIMES,
+    bullets,
+    folded,
+    micrometres,
+    page,
+    paragraph,
+    per_cent,
+    picture,
+    plain,
+    save_figure,
+    section,
+    table,
+)
 from trackbed.run_files import write_whole
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-JUMPS_SHOWN = 4
-"""Jumps whose penetrations are drawn: the first ones and the last."""
 
 
 def write_report(run_folder: Path) -> Path:
@@ -40,118 +45,256 @@ def write_report(run_folder: Path) -> Path:
     record = read_run_record(run_folder)
     numbers = numbers_of(record)
     with name_full_disk(run_folder):
-        figures = write_figures(record, numbers)
+        figure = write_figure(record, numbers) if numbers.cycle else None
         write_whole(run_folder / "report.json", numbers.to_json())
-        html = page(f"Settlement of {numbers.scene}", body(record, numbers, figures))
+        html = page(f"Settlement of {numbers.scene}", body(record, numbers, figure))
         write_whole(run_folder / "report.html", html)
     return run_folder / "report.html"
 
 
-def write_figures(record: Record, numbers: Numbers) -> dict[str, Path]:
-    """Draw every figure that the run has reached; their files by name."""
-    from trackbed.report import save_figure
-
+def write_figure(record: Record, numbers: Numbers) -> Path:
+    """Draw the settlement; the picture's path."""
     folder = record.path / "figures"
     folder.mkdir(exist_ok=True)
-    files = {name: save_figure(draw, folder / name) for name, draw in _figures(record, numbers)}
-    return {name.partition(".")[0]: path for name, path in files.items()}
-
-
-def _figures(record: Record, numbers: Numbers) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """File name and drawing of each figure."""
-    from adapters.report import figures
-
-    series = read_preparation(record)
-    if series is not None:
-        paper = (PAPER_DENSITY, PAPER_COORDINATION) if karrech(record) else (None, None)
-        yield "preparation.svg", partial(figures.draw_preparation, series, *paper)
-    run = record.run.history
-    if not len(run.cycle):
-        return
-    control = None if record.control is None else record.control.history
+    full = None if record.control is None else record.control.history
     spans = list_jumped_spans(record.run.outcomes)
-    others = [(name_variant(track.name), track.history) for track in record.others]
-    title = ""
-    if (row := numbers.row(PROCEDURE)) is not None:
+    row, title = numbers.row(PROCEDURE), ""
+    if row is not None:
         title = f"error {100 * row.settlement_error:+.1f} % at a speed-up of {row.speed_up:.2f}"
-    settlement = partial(figures.draw_settlement, run, control, others, spans, title)
-    yield "settlement.png", settlement
-    if numbers.stopped_early is not None and numbers.curve_fitted is not None:
-        lines = (
-            ("full run stopped early, nothing moved", numbers.stopped_early),
-            ("law fitted to the full run's curve, no bed", numbers.curve_fitted),
+    return save_figure(
+        lambda: draw_settlement(record.run.history, full, spans, title), folder / "settlement.png"
+    )
+
+
+def body(record: Record, numbers: Numbers, figure: Path | None) -> Iterator[str]:
+    """All sections; those that the run has not reached are left out."""
+    yield f'<h1>Settlement under cyclic load</h1><p class="scene">{escape(numbers.scene)}</p>'
+    yield from _claim(record, numbers)
+    if numbers.cycle:
+        yield _settlement(numbers, figure)
+        if numbers.error_rows:
+            yield _error(numbers)
+        yield _cost(numbers)
+        yield control(record)
+        yield describe_jumps(record, numbers)
+    yield _failures(numbers)
+    yield section("What the model leaves out", bullets(map(escape, numbers.left_out)))
+    yield _provenance(numbers)
+    yield section(
+        "Make it again", paragraph("In this run folder:"), f"<pre>{escape(numbers.reproduce)}</pre>"
+    )
+
+
+def _claim(record: Record, numbers: Numbers) -> Iterator[str]:
+    """One falsifiable sentence, and where it fails."""
+    row = numbers.row(PROCEDURE)
+    full = numbers.row(FULL)
+    if not numbers.cycle:
+        state = "is settled" if numbers.preparation else "is not settled yet"
+        yield paragraph(f"The bed {state}; no load cycle has been computed.", "claim")
+        return
+    begun = (
+        f"{numbers.cycle} load cycles settle the mean grain by {micrometres(numbers.settlement)} µm"
+    )
+    if not numbers.finished:
+        begun = f"Unfinished, at cycle {numbers.cycle} of {numbers.total_cycles}: {begun}"
+    if row is None or full is None:
+        claim = (
+            f"{begun}, computing {numbers.cycles_computed} of them. The error is unknown: "
+            f"{explain_unknown(record)}. Counted in cycles, the speed-up is at most "
+            f"{plain(numbers.speed_up_of_cycles, '.2f')}."
         )
-        yield (
-            "error_cost.svg",
-            partial(figures.draw_error_cost, numbers.error_rows, lines, *_scatter(record, numbers)),
+    else:
+        at = ""
+        if numbers.compared_at != numbers.cycle:
+            at = f" At cycle {numbers.compared_at} it is {micrometres(row.settlement)} µm."
+        claim = (
+            f"{begun}.{at} The full run, every cycle computed, gives "
+            f"{micrometres(full.settlement)} µm, so the error is {per_cent(row.settlement_error)}, "
+            f"at a speed-up of {plain(row.speed_up, '.2f')} "
+            f"({plain(row.cpu_s, '.1f')} s of CPU time instead of {plain(full.cpu_s, '.1f')} s "
+            "from the start of loading; "
+            f"{plain(row.speed_up_with_preparation, '.2f')} with preparation)."
         )
-    yield "coordination.svg", partial(figures.draw_coordination, run, control, spans)
-    if beds := list(_penetrations(record)):
-        yield "penetration.svg", partial(figures.draw_penetration, beds)
-    yield "sample.png", partial(figures.draw_sample, _samples(record), record.run.start().radius)
-    yield "piston.svg", partial(figures.draw_piston, run, spans, *_last_cycle(record))
-    yield "cost.svg", partial(figures.draw_cost, numbers.costs)
+    yield paragraph(claim, "claim")
+    if numbers.fails:
+        fails = bullets(escape(sentence) + "." for sentence in numbers.fails)
+        yield f'<div class="fails"><p>Where it fails:</p>{fails}</div>'
 
 
-def _scatter(record: Record, numbers: Numbers) -> tuple[float, str]:
-    """Error below which two full runs do not differ, and how it is known; nan when not."""
-    if (floor := numbers.floor) is not None:
-        return floor, "h = 0 and perturbed full runs"
-    if karrech(record):
-        return TWIN_SCATTER, "scatter of twin runs"
-    return np.nan, ""
+def explain_unknown(record: Record) -> str:
+    """Why the error is unknown."""
+    if record.manifest.get("control"):
+        return "the full run beside it is not past the first jump yet"
+    return "there is no full run beside it (<code>trackbed run … --control</code> adds it)"
 
 
-def _penetrations(record: Record) -> Iterator[tuple[str, dict[str, FloatArray]]]:
-    """Title and overlaps [m] before, as estimated and relaxed, for the jumps shown."""
-    jumps = record.run.jumps
-    shown = jumps if len(jumps) <= JUMPS_SHOWN else [*jumps[: JUMPS_SHOWN - 1], jumps[-1]]
-    for name, jump in shown:
-        overlaps = {when: bed for when, bed in _overlaps(record, name, jump) if len(bed)}
-        if overlaps:
-            yield f"jump from cycle {jump.first_cycle} to {jump.last_cycle}", overlaps
+def _settlement(numbers: Numbers, figure: Path | None) -> str:
+    """The curve: the picture of the report."""
+    caption = (
+        "Drop of the mean height of the grains since the preparation, at the end of each load "
+        "cycle (load at its trough). Grey spans were jumped. "
+    )
+    if numbers.row(NOTHING) is not None:
+        caption += (
+            "Dotted: the same jumps with nothing moved, which is the full run with the jumped "
+            "cycles cut out."
+        )
+    return section("Settlement", picture(figure, "Settlement curve", caption))
 
 
-def _overlaps(record: Record, name: str, jump: Outcome) -> Iterator[tuple[str, FloatArray]]:
-    folder = record.run.folder.path / name
-    relaxed = load_state(folder / "relaxed.npz")
-    before = record.run.before(jump)
-    estimated = load_state(folder / "estimated.npz")
-    for when, state, height in (
-        ("before", before, np.nan if before is None else before.piston_height),
-        ("estimated", estimated, relaxed.piston_height),
-        ("relaxed", relaxed, relaxed.piston_height),
-    ):
-        if state is not None:
-            walls = record.scene.container.walls(height, record.scene.piston_reach)
-            touching = neighbours(state.position, state.radius, walls)
-            yield when, touching.overlap[touching.overlap > 0]
-
-
-def _samples(record: Record) -> list[tuple[str, FloatArray, FloatArray]]:
-    """Title, centres [m] and residual displacements [m] of the beds that are drawn."""
-
-    def moved(track: Track, cycle: int) -> tuple[FloatArray, FloatArray]:
-        position = track.position(cycle)
-        return position, np.linalg.norm(position - start, axis=1)
-
-    start = record.run.start().position
-    cycle = int(record.run.history.cycle[-1])
-    now, displacement = moved(record.run, cycle)
-    panels = [
-        ("before loading", start, displacement),
-        (f"after {cycle} cycles, this run", now, displacement),
+def _error(numbers: Numbers) -> str:
+    """Error against speed-up: definitions, table, and what it cannot show."""
+    definition = paragraph(
+        "Speed-up <i>S</i> = <i>T</i><sub>full</sub> / <i>T</i><sub>procedure</sub>: CPU time of "
+        "engine and Python with everything in it, from the start of loading. The paper's gained "
+        f"time of 180 % is <i>S</i> {MINUS} 1 = 1.8."
+    )
+    header = (
+        f"at cycle {numbers.compared_at}",
+        "cycles computed",
+        "settlement (µm), error",
+        "coordination number, error",
+        "elastic deflection (µm), error",
+        "E<sub>r</sub> of displacements",
+        "E<sub>r</sub> of coordinates",
+        "CPU time (s)",
+        "speed-up",
+    )
+    rows = [
+        (
+            row.name,
+            str(row.computed),
+            show_with_error(row, micrometres(row.settlement), row.settlement_error),
+            show_with_error(
+                row, plain(row.coordination_number, ".3f"), row.coordination_number_error
+            ),
+            show_with_error(row, micrometres(row.elastic_deflection), row.elastic_deflection_error),
+            plain(row.jump_displacement_error, ".2f"),
+            plain(row.coordinates_error, ".4f"),
+            plain(row.cpu_s, ".1f"),
+            plain(row.speed_up, ".2f"),
+        )
+        for row in numbers.error_rows
     ]
-    if record.control is not None and cycle in record.control.history.cycle:
-        panels.append((f"after {cycle} cycles, full run", *moved(record.control, cycle)))
-    return panels
+    return section(
+        "Error against speed-up",
+        definition,
+        table(
+            "Errors are signed and relative to the full run at the same cycle. Coordination number "
+            f"(contacts with grains) and deflection are means over the last {AVERAGED} computed "
+            f"cycles. “{NOTHING}” is the full run after as many cycles as this run "
+            f"computed: the null hypothesis. “{FITTED}” extrapolates the full run's curve "
+            "from there by the scene's law: a settlement, but no bed. E<sub>r</sub> of eq. 22 of "
+            "the displacements since the state before the first jump: 1 is the error of leaving "
+            "all grains there; of the coordinates, as in the paper: small for any method.",
+            header,
+            rows,
+            PROCEDURE,
+        ),
+        folded("What this comparison cannot show", bullets(LIMITS)),
+    )
 
 
-def _last_cycle(record: Record) -> tuple[int, FloatArray, FloatArray, FloatArray]:
-    """The last computed cycle: its number, phase, target and contact force [N]."""
-    name, outcome = record.run.windows[-1]
-    window = record.run.window(name)
-    piston, (start, end) = window.piston, window.time_step[-2:]
-    last = piston.time_step > start
-    phase = (piston.time_step[last] - start) / (end - start)
-    return outcome.last_cycle, phase, piston.target_force[last], piston.contact_force[last]
+LIMITS = (
+    "One run beside one run. A bed of grains is chaotic: two full runs of 1,085 grains, one grain "
+    "of the second moved by 1e-10 m at the start, differed by 7 % in settlement after 60 cycles. A "
+    "smaller error in a single run is luck; a method is judged by the means of several, and single "
+    "grains prove none.",
+    "The control repeats the stages before the first jump bit for bit, so they agree by "
+    "construction and are in both costs.",
+    "CPU times are of one machine that other work may have shared; grain-steps are not.",
+    "A failed jump is charged with elapsed time, since the CPU time of an engine that was given up "
+    "is not known. Work lost to stops of the run is not charged.",
+)
+
+
+def show_with_error(row: Comparison, value: str, error: float) -> str:
+    """A value and its error; the full run has none."""
+    shown = "" if row.name == FULL else per_cent(error)
+    return f'{value} <span class="error">{shown}</span>'
+
+
+def _cost(numbers: Numbers) -> str:
+    """Where the time went, and the work that no machine changes."""
+    purposes = (
+        ("engine: time steps", "engine", ".1f"),
+        ("engine: start-up", "start_up", ".1f"),
+        ("parse", "parse", ".2f"),
+        ("fit", "fit", ".2f"),
+        ("relax", "relax", ".2f"),
+        ("other Python", "other_python", ".2f"),
+        ("failed jumps, by the clock", "failed_jumps", ".1f"),
+        ("total", "total", ".1f"),
+        ("preparation, not in the total", "preparation", ".1f"),
+        ("load cycles computed", "cycles_computed", "d"),
+        ("grain-steps", "grain_steps", ".3g"),
+    )
+    rows = [
+        (label, *(plain(getattr(cost, purpose), form) for cost in numbers.costs))
+        for label, purpose, form in purposes
+    ]
+    shares = (per_cent(cost.python_share, ".1f") for cost in numbers.costs)
+    return section(
+        "Cost",
+        table(
+            "CPU time in s from the start of loading. Python's share counts parse, fit, relax and "
+            f"other Python; its bar is {100 * PYTHON_BAR:.0f} %. Grain-steps (grains {TIMES} time "
+            "steps computed) are work that no machine changes.",
+            ("", *(cost.name for cost in numbers.costs)),
+            [*rows, ("Python's share", *shares)],
+            "total",
+        ),
+    )
+
+
+def _failures(numbers: Numbers) -> str:
+    """Failures named and counted."""
+    counted = paragraph(
+        f"Failed attempts at a jump: {len(numbers.failed_jumps)}; stops before the end: "
+        f"{len(numbers.stops)}; unfinished or superseded stages moved to discarded/: "
+        f"{len(numbers.discarded)}."
+    )
+    items = [f"<code>{escape(stage)}</code>: {escape(why)}" for stage, why in numbers.failed_jumps]
+    items += [f"stopped {escape(time)}: {escape(why)}" for time, why in numbers.stops]
+    items += [f"discarded <code>{escape(name)}</code>" for name in numbers.discarded]
+    return section("Failures", counted, bullets(items) if items else "")
+
+
+def _provenance(numbers: Numbers) -> str:
+    """Where the result comes from."""
+    source = numbers.provenance
+    versions = source.get("versions", {})
+    rows = [
+        ("started (UTC)", escape(str(source.get("started", "")))),
+        ("command", f"<code>{escape(str(source.get('command', '')))}</code>"),
+        ("commit", f"<code>{escape(source.get('commit') or 'not a checkout')}</code>"),
+        ("machine", escape(str(source.get("machine", "")))),
+        ("engine", escape("; ".join(numbers.engines) or "not started")),
+        ("versions", escape(", ".join(f"{name} {version}" for name, version in versions.items()))),
+        ("seed", escape(str(numbers.parameters.get("sample.seed", "")))),
+    ]
+    bed = [
+        (name.replace("_", " ").replace(".", ": "), plain(value, ".4g"))
+        for name, value in numbers.preparation.items()
+    ]
+    parameters = [
+        (f"<code>{escape(key)}</code>", escape(_shown(value)))
+        for key, value in numbers.parameters.items()
+    ]
+    decks = [(f"<code>{escape(k)}</code>", f"<code>{v}</code>") for k, v in numbers.decks.items()]
+    words = frozenset({1})
+    parts = [table("", (), rows, words=words)]
+    for title, caption, found in (
+        ("The settled bed before loading", "SI units.", bed),
+        ("Effective parameters", "SI units.", parameters),
+        ("Decks", "SHA-256.", decks),
+    ):
+        if found:
+            parts.append(folded(title, table(caption, (), found, words=words)))
+    return section("Provenance", *parts)
+
+
+def _shown(value: object) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return text if len(text) < 80 else text[:77] + "..."

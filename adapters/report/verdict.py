@@ -1,16 +1,15 @@
-"""A run's figures against their bars, and the sentences on where its claim fails."""
+"""What a run cost, by purpose, and the sentences on where its claim fails."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from math import isfinite, nan
-from typing import Any
+from math import nan
 
 import numpy as np
 
 from adapters.procedure import FORCE_ERROR_GOAL, FORCE_START_CYCLES, Record, Track, sum_cost
-from adapters.report.error import COORDINATION_BAR, HEIGHT_BAR, PYTHON_BAR, Comparison, JumpFigures
+from adapters.report.error import COORDINATION_BAR, HEIGHT_BAR, Comparison, JumpFigures
 
 PROCEDURE, NOTHING, FITTED, FULL = (
     "this run",
@@ -19,6 +18,9 @@ PROCEDURE, NOTHING, FITTED, FULL = (
     "full run (control)",
 )
 """Names of the rows of the error table."""
+
+PYTHON_BAR = 0.05
+"""Greatest share of Python in the CPU time of a run."""
 
 FEW_GRAINS = 500
 """Fewer grains than this settle in bursts: one such bed cannot judge a law."""
@@ -49,32 +51,6 @@ class CostSplit:
     """Work that no machine changes: grains times time steps computed."""
 
 
-@dataclass(frozen=True)
-class PistonFigures:
-    """How the piston's force followed its target in one window; nan for three cycles or less."""
-
-    window: str
-    first_cycle: int
-    last_cycle: int
-    mean_error: float
-    """Root mean square over all cycles after the first three, over the peak force."""
-    worst_error: float
-    """The greatest of single cycles."""
-    ok: bool | None
-    """``worst_error`` within the bar; None where there is none."""
-
-
-@dataclass(frozen=True)
-class Bar:
-    """A figure against its bar."""
-
-    name: str
-    value: float
-    bar: float
-    ok: bool | None
-    """None where the figure is not known."""
-
-
 def split_cost(record: Record, track: Track) -> CostSplit:
     """CPU time of a track by purpose."""
     loading = [outcome for outcome in track.outcomes if outcome.stage != "preparation"]
@@ -85,8 +61,8 @@ def split_cost(record: Record, track: Track) -> CostSplit:
     python = sum(parts[purpose] for purpose in ("parse", "fit", "relax", "other"))
     failed = sum(jump.lost_s for jump in track.failed_jumps)
     total = parts["engine"] + python + failed
-    computed = sum(o.last_cycle - o.first_cycle for o in loading if o.stage == "window")
-    prepared = track.preparation
+    # The engine's count of time steps goes on through jumps.
+    ends = [o.notes["time_step"] for o in track.outcomes if o.stage in ("preparation", "window")]
     return CostSplit(
         name=PROCEDURE if track is record.run else FULL,
         engine=parts["engine"] - parts["start_up"],
@@ -98,72 +74,49 @@ def split_cost(record: Record, track: Track) -> CostSplit:
         failed_jumps=failed,
         total=total,
         python_share=python / total if total > 0 else nan,
-        preparation=nan if prepared is None else sum_cost(prepared.cost),
-        cycles_computed=computed,
-        grain_steps=float(record.scene.grain_count * count_time_steps(track)),
+        preparation=nan if track.preparation is None else sum_cost(track.preparation.cost),
+        cycles_computed=sum(o.last_cycle - o.first_cycle for o in loading if o.stage == "window"),
+        grain_steps=float(record.scene.grain_count * (ends[-1] - ends[0])) if ends else 0.0,
     )
-
-
-def count_time_steps(track: Track) -> int:
-    """Time steps computed since the preparation; the engine's count goes on through jumps."""
-    ends = [o.notes["time_step"] for o in track.outcomes if o.stage in ("preparation", "window")]
-    return int(ends[-1] - ends[0]) if ends else 0
-
-
-def measure_piston(name: str, rows: list[dict[str, Any]]) -> PistonFigures:
-    """Force errors of one window after its first three cycles."""
-    errors = np.array([row["force_error"] for row in rows[FORCE_START_CYCLES:]], float)
-    ends = (rows[0]["cycle"] - 1, rows[-1]["cycle"])
-    if not len(errors):
-        return PistonFigures(name, *ends, nan, nan, None)
-    worst = float(errors.max())
-    mean = float(np.sqrt(np.mean(errors**2)))
-    return PistonFigures(name, *ends, mean, worst, worst <= FORCE_ERROR_GOAL)
-
-
-def list_bars(
-    rows: tuple[Comparison, ...],
-    jumps: tuple[JumpFigures, ...],
-    costs: tuple[CostSplit, ...],
-    piston: tuple[PistonFigures, ...],
-) -> Iterator[Bar]:
-    """Figures against their bars."""
-
-    def bar(name: str, values: list[float], limit: float) -> Bar:
-        known = [abs(value) for value in values if isfinite(value)]
-        worst = max(known, default=nan)
-        return Bar(name, worst, limit, worst <= limit if known else None)
-
-    errors = [row.coordination_number_error for row in rows if row.name == PROCEDURE]
-    yield bar("coordination number against the control", errors, COORDINATION_BAR)
-    yield bar(
-        "coordination number changed by a jump and its relaxation",
-        [jump.coordination_change for jump in jumps],
-        COORDINATION_BAR,
-    )
-    yield bar(
-        "mean height changed by relaxation, over the jump's own settlement",
-        [jump.height_change for jump in jumps],
-        HEIGHT_BAR,
-    )
-    yield bar(
-        "piston's rms force error in its worst cycle after three",
-        [window.worst_error for window in piston],
-        FORCE_ERROR_GOAL,
-    )
-    yield bar("Python's share of the CPU time", [c.python_share for c in costs[:1]], PYTHON_BAR)
 
 
 def list_fails(
-    record: Record, rows: tuple[Comparison, ...], bars: tuple[Bar, ...]
+    record: Record,
+    rows: Sequence[Comparison],
+    jumps: Sequence[JumpFigures],
+    cost: CostSplit,
 ) -> Iterator[str]:
     """Where the claim fails: cheaper ways that do as well, bars missed, a bed too small."""
     if not len(record.run.history.cycle):
         return
     yield from _beaten({row.name: row for row in rows})
-    for bar in bars:
-        if bar.ok is False:
-            yield f"{bar.name} is {100 * bar.value:.1f} %, above {100 * bar.bar:.0f} %"
+    force = [
+        row["force_error"]
+        for _, window in record.run.windows
+        for row in window.rows[FORCE_START_CYCLES:]
+    ]
+    for name, values, bar in (
+        (
+            "coordination number against the control",
+            [row.coordination_number_error for row in rows if row.name == PROCEDURE],
+            COORDINATION_BAR,
+        ),
+        (
+            "coordination number changed by a jump and its relaxation",
+            [jump.coordination_change for jump in jumps],
+            COORDINATION_BAR,
+        ),
+        (
+            "mean height changed by relaxation, over the jump's own settlement",
+            [jump.height_change for jump in jumps],
+            HEIGHT_BAR,
+        ),
+        ("piston's rms force error in its worst cycle after three", force, FORCE_ERROR_GOAL),
+        ("Python's share of the CPU time", [cost.python_share], PYTHON_BAR),
+    ):
+        worst = find_greatest(values)
+        if worst > bar:
+            yield f"{name} is {100 * worst:.1f} %, above {100 * bar:.0f} %"
     if record.run.failed_jumps:
         yield f"attempts at a jump that failed: {len(record.run.failed_jumps)}"
     if record.scene.grain_count < FEW_GRAINS:
@@ -171,6 +124,11 @@ def list_fails(
             f"a bed of {record.scene.grain_count} grains settles in bursts: it shows the machinery "
             "and cannot judge a law"
         )
+
+
+def find_greatest(values: Iterable[float]) -> float:
+    """The greatest size of known values; 0 for none."""
+    return float(np.nanmax(np.abs([0.0, *values])))
 
 
 def _beaten(rows: dict[str, Comparison]) -> Iterator[str]:

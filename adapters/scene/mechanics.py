@@ -151,12 +151,8 @@ def _narrow(scene: Values) -> Iterator[Problem]:
 
 
 def _few_steps(scene: Values) -> Iterator[Problem]:
-    if scene.get("engine.time_step") is None:
-        longest = scene.need("engine.rayleigh_share") * _rayleigh_time(scene)
-    else:
-        longest = scene.need("engine.time_step")
-    frequency = scene.need("loading.frequency")
-    steps = 1 / (frequency * longest)
+    longest = _rayleigh_share(scene) * _rayleigh_time(scene)
+    steps = 1 / (scene.need("loading.frequency") * longest)
     if steps < STEPS_DOUBTFUL:
         yield Problem("loading.frequency", f"a cycle is only {steps:.3g} time steps long")
 

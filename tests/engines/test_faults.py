@@ -8,21 +8,26 @@ from __future__ import annotations
 
 import resource
 import signal
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from adapters.engines import lammps as engine_lammps
-from adapters.engines.contract import get_engine
-from adapters.errors import EngineMissing, TrackbedError
-from adapters.files.dump import Frame, read_frames, write_dump
+from adapters.errors import TrackbedError
 from adapters.files.run_folder import RunFolder
 from adapters.procedure.run import run_scene
 from adapters.scene.tables import Scene
-from tests.engine_sample import AFTER, FIRST, JUMP, QUIET, SECOND, Damage, Sample, fake_damaged
+from tests.damaged_files import (
+    Damage,
+    cut,
+    gone,
+    last_frame,
+    lost_from_the_start,
+    track_with,
+    with_value,
+    without_grain,
+)
+from tests.engine_sample import AFTER, FIRST, JUMP, QUIET, SECOND, Sample, fake_damaged
 from trackbed import command
 
 PREPARATION = "preparation"
@@ -59,66 +64,20 @@ def check_goes_on(sample: Sample, run: Path) -> None:
 # --- what an engine may leave, with exit code 0 ----------------------------------------------
 
 
-def last_frame(change: Callable[[Frame], Frame]) -> Damage:
-    """Change the last frame of ``states.dump``."""
-
-    def damage(folder: Path) -> None:
-        *before, last = read_frames(folder / "states.dump")
-        write_dump(folder / "states.dump", [*before, change(last)])
-
-    return damage
-
-
-def with_value(column: str, value: float) -> Damage:
-    """Another value for grain 7."""
-
-    def change(frame: Frame) -> Frame:
-        values = frame.values.copy()
-        values[6, frame.columns.index(column)] = value
-        return replace(frame, values=values)
-
-    return last_frame(change)
-
-
-def without_grain(frame: Frame) -> Frame:
-    return replace(frame, values=np.delete(frame.values, 6, axis=0))
-
-
-def lost_from_the_start(folder: Path) -> None:
-    frames = list(read_frames(folder / "states.dump"))
-    write_dump(folder / "states.dump", [without_grain(frame) for frame in frames])
-
-
-def cut(name: str, share: float) -> Damage:
-    """A file that ends early, as on a full disk."""
-
-    def damage(folder: Path) -> None:
-        content = (folder / name).read_bytes()
-        (folder / name).write_bytes(content[: int(share * len(content))])
-
-    return damage
-
-
-def piston_nan(folder: Path) -> None:
-    lines = (folder / "piston.txt").read_text().splitlines()
-    words = lines[-5].split()
-    lines[-5] = " ".join([*words[:2], "nan", *words[3:]])
-    (folder / "piston.txt").write_text("\n".join(lines) + "\n")
-
-
-def without_file(name: str) -> Damage:
-    return lambda folder: (folder / name).unlink()
-
-
 LEFT: dict[str, tuple[str, Damage, int, str]] = {
     "nan": (SECOND, with_value("z", np.nan), 6, "column z of grain 7 is nan"),
     "nan in the rain": (PREPARATION, with_value("vx", np.nan), 6, "column vx of grain 7 is nan"),
-    "nan of the piston": (SECOND, piston_nan, 6, "piston's record is not finite"),
+    "nan of the piston": (
+        SECOND,
+        track_with(slice(-5, -4), 2, np.nan),
+        6,
+        "piston's record is not finite",
+    ),
     "lost grain": (SECOND, last_frame(without_grain), 6, "lost grains: 7"),
     "lost in the rain": (PREPARATION, lost_from_the_start, 6, "1 of 40 grains are lost"),
     "flying grain": (SECOND, with_value("z", 1e3), 6, "mean move in one cycle"),
     "states cut": (SECOND, cut("states.dump", 0.6), 6, "the file ends inside"),
-    "no piston": (SECOND, without_file("piston.txt"), 5, "left no piston.txt"),
+    "no piston": (SECOND, gone("piston.txt"), 5, "left no piston.txt"),
 }
 """Stage, damage to what the engine left there, exit code, words."""
 
@@ -213,67 +172,6 @@ def test_disk_with_too_little_room_for_a_saved_scene(
     sample.fault(run, 'ulimit -f 400; exec "$@"')
     check_failure(sample, run, 5, "File too large", capsys)
     assert RunFolder(run).stage_names() == KEPT[SECOND]
-
-
-# --- no program, another one, no MPI ----------------------------------------------------------
-
-OLD = {
-    "liggghts": "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.1.0, compiled long ago)",
-    "lammps": "Large-scale Atomic/Molecular Massively Parallel Simulator - 29 Sep 2021 - Update 2",
-    "yade": "Yade version: 2021.01a",
-}
-"""What versions say of themselves that are too old."""
-
-
-def on_path(sample: Sample, folder: Path, monkeypatch: pytest.MonkeyPatch, says: str) -> None:
-    """Nothing on the PATH but a program of the engine's name that says this; "" for none."""
-    program = folder / sample.name
-    if says:
-        program.write_text(f"#!/bin/sh\necho '{says}'\n")
-        program.chmod(0o755)
-    monkeypatch.setenv("PATH", str(folder))
-    words = [str(program)] if says else None
-    monkeypatch.setattr(engine_lammps, "find_lammps_program", lambda: words)
-
-
-@pytest.mark.parametrize("stage", [PREPARATION, SECOND])
-def test_missing_program(
-    sample: Sample,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    stage: str,
-) -> None:
-    """A machine without the engine, at the start or when a run goes on: how to get it."""
-    real(sample)
-    run = sample.copy(tmp_path / "run", *LOST[stage])
-    with monkeypatch.context() as patch:
-        on_path(sample, tmp_path, patch, "")
-        check_failure(sample, run, 4, "is not installed", capsys)
-        with pytest.raises(EngineMissing, match="install"):
-            get_engine(sample.name).version()
-    if stage == SECOND:
-        check_goes_on(sample, run)
-
-
-@pytest.mark.parametrize("says", ["old", "something else", " "])
-def test_wrong_version(
-    sample: Sample,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    says: str,
-) -> None:
-    """A program of that name that is too old, or another one, or mute: with its own words."""
-    real(sample)
-    run = sample.copy(tmp_path / "run", *LOST[SECOND])
-    answer = OLD[sample.name] if says == "old" else says
-    told = {"old": r"3\.1\.0|29 Sep 2021|2021\.01a", " ": "it says: nothing"}.get(says, says)
-    with monkeypatch.context() as patch:
-        on_path(sample, tmp_path, patch, answer)
-        check_failure(sample, run, 4, "or later; it says: ", capsys)
-        with pytest.raises(EngineMissing, match=told):
-            get_engine(sample.name).version()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import shlex
 import shutil
 import subprocess
@@ -18,7 +17,6 @@ from pathlib import Path
 
 import pytest
 
-from adapters.engines.process import run_process
 from adapters.files.run_folder import RunFolder
 from tests.engines.test_cluster_scene import SMALL
 from tests.forked_commands import processes_in
@@ -79,15 +77,8 @@ class JobSweep:
         scene.write_text(scene_path("karrech-coarse").read_text())
         where = ["--scheduler", "slurm", "--cluster-config", folder / "cluster.toml"]
         self.words = [
-            "sweep",
-            scene,
-            *set_words(settings),
-            *words,
-            "--into",
-            self.into,
-            *where,
-            "--json",
-        ]
+            "sweep", scene, *set_words(settings), *words, "--into", self.into, *where, "--json",
+        ]  # fmt: skip
 
     def launcher(self, name: str, text: str) -> None:
         path = self.folder / name
@@ -142,42 +133,23 @@ def test_members_run_in_jobs(tmp_path: Path) -> None:
 
 
 @pytest.mark.engine("liggghts")
-def test_a_killed_job_is_replaced(tmp_path: Path) -> None:
-    """Its member goes on in the next one, and ends with the table of a run that was left alone."""
-    launcher = json.dumps([str(tmp_path / "good")])
-    settings = [*TINY, 'engine.name="liggghts"', "procedure.total_cycles=8"]
-    sweep = JobSweep(tmp_path, settings, "--set", f"engine.launcher={launcher}")
-    child = sweep.start()
-    until(lambda: [*sweep.into.glob("members/*/window_000002")] or child.poll() is not None)
-    (first,) = sweep.jobs_seen()
-    answer("scancel", first)
-    printed, said = child.communicate(timeout=PATIENCE_S)
-    assert child.returncode == 0, said
-    assert json.loads(printed)["counts"] == {"finished": 1}
-    assert len(sweep.jobs_seen()) == 2
-    (run,) = (sweep.into / "members").iterdir()
-    assert "resumed" in [event["event"] for event in RunFolder(run).events()]
-    alone = tmp_path / "alone"
-    words = [sys.executable, "-m", "trackbed", "run", tmp_path / "scene.toml"]
-    subprocess.run(
-        [*words, *set_words(settings), "--run-folder", alone], check=True, capture_output=True
-    )
-    assert (alone / "settlement.csv").read_bytes() == (run / "settlement.csv").read_bytes()
-    sweep.nothing_left()
-
-
-@pytest.mark.engine("liggghts")
-def test_a_stopped_sweep_leaves_no_job(tmp_path: Path) -> None:
-    """SIGTERM: exit code 130, jobs given back, no engine goes on; the same command would."""
+def test_a_killed_job_is_replaced_and_a_stopped_sweep_leaves_none(tmp_path: Path) -> None:
+    """A killed job's member goes on in the next one.  SIGTERM: exit code 130, jobs given back, no
+    engine goes on; the same command would."""
     launcher = json.dumps([str(tmp_path / "good")])
     settings = [*TINY, 'engine.name="liggghts"', "procedure.total_cycles=200"]
     sweep = JobSweep(tmp_path, settings, "--set", f"engine.launcher={launcher}")
     child = sweep.start()
     until(lambda: [*sweep.into.glob("members/*/window_000002")] or child.poll() is not None)
+    (first,) = sweep.jobs_seen()
+    answer("scancel", first)
+    until(lambda: len(sweep.jobs_seen()) == 2 or child.poll() is not None)
     child.terminate()
     _, said = child.communicate(timeout=PATIENCE_S)
     assert child.returncode == 130, said
     assert "the same command goes on with the sweep" in said
+    (run,) = (sweep.into / "members").iterdir()
+    assert "resumed" in [event["event"] for event in RunFolder(run).events()]
     sweep.nothing_left()
 
 
@@ -213,18 +185,3 @@ def test_srun_starts_the_engine(
     logs = [path.read_text() for path in (tmp_path / "run").rglob("screen.txt")]
     assert logs
     assert all("2 by 1 by 1 MPI" in text for text in logs)
-
-
-def test_an_interrupted_srun_leaves_no_task(tmp_path: Path) -> None:
-    """Its tasks belong to SLURM's daemon: killed with its group, it would leave them computing."""
-    name = f"trackbed-{os.getpid()}"
-
-    def interrupted() -> None:
-        if len([*tmp_path.glob("task.*")]) == 2:
-            raise KeyboardInterrupt
-
-    task = ": > task.$SLURM_PROCID; sleep 600"
-    with pytest.raises(KeyboardInterrupt):
-        run_process(["srun", "-J", name, "-n", "2", "sh", "-c", task], tmp_path, interrupted)
-    until(lambda: not processes_in(tmp_path))
-    until(lambda: not answer("squeue", "-h", "-n", name))

@@ -113,20 +113,16 @@ def test_overlap_of_a_pair(share: float) -> None:
     ("axis", "place"), [(2, 0.6 * RADIUS), (0, 0.03 - 0.6 * RADIUS), (1, -0.03 + 0.6 * RADIUS)]
 )
 def test_overlap_with_a_wall(axis: int, place: float) -> None:
-    """A grain 0.4 r inside the floor or the cylinder shows 0.4."""
+    """A grain 0.4 r inside the floor or the cylinder shows 0.4; outside, as deep as it is far."""
+    position = window().position.copy()
+    position[-1, 1, 0] = 1.0
+    with pytest.raises(NotCredible, match="greatest overlap"):
+        check_window(SCENE, window(position=position), 4)
     position = window().position.copy()
     position[3, 0] = [0, 0, 2.5 * RADIUS]
     position[3, 0, axis] = place
     figures = figures_of_window(SCENE, window(position=position))
     assert figures.overlap_share == pytest.approx(0.4, rel=1e-9)
-
-
-def test_a_grain_outside_is_an_overlap() -> None:
-    """A grain that left through a wall is as deep in it as it is far."""
-    position = window().position.copy()
-    position[-1, 1, 0] = 1.0
-    with pytest.raises(NotCredible, match="greatest overlap"):
-        check_window(SCENE, window(position=position), 4)
 
 
 def test_the_state_before_the_window_is_not_judged() -> None:
@@ -159,7 +155,11 @@ def test_mean_move() -> None:
 
 @pytest.mark.parametrize("cycle", range(4))
 def test_force_error(cycle: int) -> None:
-    """A constant error in one cycle is its own rms, over the peak 2 N; three cycles are free."""
+    """A constant error in one cycle is its own rms, over the peak 2 N; three cycles are free, and
+    with none behind them the figure is nan, which is no fault."""
+    short = figures_of_window(SCENE, window(3))
+    assert np.isnan(short.force_error)
+    check_bounds(SCENE, short)
     plain = window().piston
     force = plain.contact_force.copy()
     force[cycle * SAMPLES : (cycle + 1) * SAMPLES] += 0.3
@@ -178,13 +178,6 @@ def test_elastic_deflection_is_what_the_piston_comes_back_by() -> None:
     height = np.concatenate([0.01 + c * -30e-6 + dip for c in range(4)])
     found = tracked(height=height).piston.elastic_deflection(STEPS)
     np.testing.assert_allclose(found, 70e-6, atol=1e-12)
-
-
-def test_short_window_has_no_force_error() -> None:
-    """With no cycle behind the first three the figure is nan, and that is no fault."""
-    figures = figures_of_window(SCENE, window(3))
-    assert np.isnan(figures.force_error)
-    check_bounds(SCENE, figures)
 
 
 @pytest.mark.parametrize(
@@ -209,19 +202,13 @@ def test_bounds(name: str, bound: float, words: str, excess: float) -> None:
     assert ("as heavy as 33 mean grains" in caught.value.remedy) == (name == "force_error")
 
 
-@pytest.mark.parametrize("cycles", [3, 5])
-def test_missing_cycles(cycles: int) -> None:
-    """A window of four cycles is not one of three, nor of five."""
-    with pytest.raises(EngineFailed, match=f"4 of {cycles} cycle ends"):
-        check_complete(SCENE, window(4), cycles)
-
-
-def test_wrong_steps() -> None:
-    """Cycle ends must lie a cycle apart."""
+def test_missing_cycles() -> None:
+    """A window of four cycles is not one of three, nor of five; cycle ends lie a cycle apart."""
     step = window().time_step.copy()
     step[-1] += 1
-    with pytest.raises(EngineFailed, match="cycle ends"):
-        check_complete(SCENE, window(time_step=step), 4)
+    for one, cycles in ((window(4), 3), (window(4), 5), (window(time_step=step), 4)):
+        with pytest.raises(EngineFailed, match=f"4 of {cycles} cycle ends"):
+            check_complete(SCENE, one, cycles)
 
 
 def test_lost_grains_are_named() -> None:
@@ -232,24 +219,21 @@ def test_lost_grains_are_named() -> None:
         check_complete(SCENE, one, 4)
 
 
-@pytest.mark.parametrize("name", ["position", "velocity", "spin"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_not_finite(name: str, value: float) -> None:
-    """The first cycle with a number that is not finite is named."""
-    array = getattr(window(), name).copy()
-    array[2:, 1, 2] = value
-    with pytest.raises(NotCredible, match=f"{name} is not finite from cycle 9 on"):
-        check_complete(SCENE, window(**{name: array}), 4)
-
-
-@pytest.mark.parametrize("name", ["target_force", "contact_force", "height"])
-def test_piston_not_finite(name: str) -> None:
-    """nan in the piston's record is a fault, although nan stands for "not judged" in figures."""
-    array = getattr(window().piston, name).copy()
-    array[150:] = np.nan
+def test_not_finite(value: float) -> None:
+    """The first cycle, or step of the piston's record, with a number that is not finite is named,
+    although nan stands for "not judged" in figures."""
+    for name in ("position", "velocity", "spin"):
+        array = getattr(window(), name).copy()
+        array[2:, 1, 2] = value
+        with pytest.raises(NotCredible, match=f"{name} is not finite from cycle 9 on"):
+            check_complete(SCENE, window(**{name: array}), 4)
     step = window().piston.time_step[150]
-    with pytest.raises(NotCredible, match=rf"not finite from step {step} on"):
-        check_complete(SCENE, tracked(**{name: array}), 4)
+    for name in ("target_force", "contact_force", "height"):
+        array = getattr(window().piston, name).copy()
+        array[150:] = value
+        with pytest.raises(NotCredible, match=rf"not finite from step {step} on"):
+            check_complete(SCENE, tracked(**{name: array}), 4)
 
 
 @pytest.mark.parametrize("left", [399, 250, 0])

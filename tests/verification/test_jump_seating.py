@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from adapters.bed.state import FloatArray
@@ -30,10 +28,10 @@ from adapters.procedure.seating import (
     compare_deflection,
     estimate_constrained_modulus,
     find_hung_cycles,
-    spans,
 )
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
+from tests.small_bed import read_rows
 from trackbed.scenes import scene_path
 
 COARSE = scene_path("karrech-coarse")
@@ -75,14 +73,10 @@ def rows_like(scene: Scene, count: int = 3, **columns: float) -> list[dict[str, 
     density, coordination = (
         np.array([given[name]]) for name in ("relative_density", "coordination_number")
     )
-    strain, _ = quad(
-        lambda s: (
-            1
-            / estimate_constrained_modulus(grain.young, grain.poisson, density, coordination, s)[0]
-        ),
-        float(stress[-1]),
-        float(stress.max()),
+    modulus = partial(
+        estimate_constrained_modulus, grain.young, grain.poisson, density, coordination
     )
+    strain, _ = quad(lambda s: 1 / modulus(s)[0], float(stress[-1]), float(stress.max()))
     given = {"elastic_deflection": strain * given["piston_height"]} | given
     return [{"cycle": n + 1, "kind": "computed", **given} for n in range(count)]
 
@@ -115,53 +109,25 @@ def test_a_load_series_may_begin_anywhere(tmp_path: Path, shift: float) -> None:
     assert found == pytest.approx([np.nan if shift == 0.5 else 1.0], rel=1e-4, nan_ok=True)
 
 
-@given(st.floats(-6, 6), st.floats(-6, 6))
-def test_deflection_is_told_in_any_unit(force: float, length: float) -> None:
-    """Stress and moduli times a, lengths times b: the ratio is the same to round-off."""
-    a, b = 10.0**force, 10.0**length
-    scene = load_scene(COARSE, [])
-    assert scene.loading is not None
-    grain = scene.material.grain.model_copy(update={"young": a * scene.material.grain.young})
-    load = {name: a * getattr(scene.loading, name) for name in ("mean", "amplitude")}
-    other = scene.model_copy(
-        update={
-            "material": scene.material.model_copy(update={"grain": grain}),
-            "loading": scene.loading.model_copy(update=load),
-        }
-    )
-    rows = rows_like(scene, 1, elastic_deflection=3e-6)
-    scaled = [
-        rows[0] | {name: b * rows[0][name] for name in ("piston_height", "elastic_deflection")}
-    ]
-    expected = compare_deflection(scene, rows)
-    assert compare_deflection(other, scaled) == pytest.approx(expected, rel=1e-12)
-
-
-def test_a_bed_without_contacts_tells_nothing() -> None:
-    """No stiffness, no ratio: nothing is said to hang."""
-    scene = load_scene(COARSE, [])
-    rows = rows_like(scene, 4)
-    rows[-1]["coordination_number"] = 0.0
-    assert np.isnan(compare_deflection(scene, rows)).tolist() == [False] * 3 + [True]
-    assert not len(find_hung_cycles(scene, [Outcome("window", 0, 4, rows, {})]))
-
-
-def test_first_and_healing_cycles_do_not_count() -> None:
-    """Of 20 first cycles the first four take the load for the first time."""
+def test_what_does_not_count() -> None:
+    """Of 20 first cycles the first four take the load for the first time; a bed without contacts
+    has no stiffness and no ratio."""
     scene = load_scene(COARSE, ["procedure.k_i=20"])
     rows = rows_like(scene, 30)
+    rows[-1]["coordination_number"] = 0.0
+    assert np.isnan(compare_deflection(scene, rows)).tolist() == [False] * 29 + [True]
     for number, kind in ((4, "computed"), (6, "computed"), (9, "healing"), (12, "jumped")):
         rows[number - 1] |= {"kind": kind, "elastic_deflection": 1.0}
     assert find_hung_cycles(scene, [Outcome("window", 0, 30, rows, {})]).tolist() == [6]
 
 
-@pytest.mark.parametrize(
-    ("cycles", "words"),
-    [([], ""), ([3], "3 to 3"), ([1, 2, 3, 7, 9, 10], "1 to 3, 7 to 7, 9 to 10")],
-)
-def test_cycles_in_words(cycles: list[int], words: str) -> None:
-    """Runs of cycles that follow one another."""
-    assert spans(np.array(cycles, int)) == words
+def hang(monkeypatch: pytest.MonkeyPatch, hung: Callable[[FloatArray], Any]) -> None:
+    """Have the piston hang in cycles told."""
+
+    def compare(_: Scene, rows: list[dict[str, Any]]) -> FloatArray:
+        return np.where(hung(np.array([row["cycle"] for row in rows], float)), HANGS, 1.0)
+
+    monkeypatch.setattr(jump_seating, "compare_deflection", compare)
 
 
 def settle(
@@ -176,11 +142,7 @@ def settle(
     Jumps (cycles done before and behind), rows of the table, what was said.
     """
 
-    def hangs(_: Scene, rows: list[dict[str, Any]]) -> FloatArray:
-        cycle = np.array([row["cycle"] for row in rows])
-        return np.where((cycle >= hung[0]) & (cycle <= hung[1]), HANGS, 1.0)
-
-    monkeypatch.setattr(jump_seating, "compare_deflection", hangs)
+    hang(monkeypatch, lambda cycle: (cycle >= hung[0]) & (cycle <= hung[1]))
     said: list[str] = []
     progress = Progress(quiet=True)
     monkeypatch.setattr(progress, "say", said.append)
@@ -191,11 +153,9 @@ def settle(
         overrides=['engine.name="fake"', "procedure.k_i=10", "procedure.k=5", *overrides],
         progress=progress,
     )
-    with (folder / "settlement.csv").open() as stream:
-        rows = list(csv.DictReader(stream))
     outcomes = RunFolder(folder).outcomes()
     jumps = [(one.first_cycle, one.last_cycle) for one in outcomes if one.stage == "jump"]
-    return jumps, rows, said
+    return jumps, read_rows(folder), said
 
 
 FIXED = ("procedure.h=60", "procedure.healing_cycles=2", "procedure.total_cycles=82")
@@ -306,10 +266,7 @@ def by_tolerance(
 ) -> RunFolder:
     """Jumps by a tolerance of .1 on the fake engine whose piston hangs in cycles told."""
 
-    def hangs(_: Scene, rows: list[dict[str, Any]]) -> FloatArray:
-        return np.where(hung(np.array([row["cycle"] for row in rows], float)), HANGS, 1.0)
-
-    monkeypatch.setattr(jump_seating, "compare_deflection", hangs)
+    hang(monkeypatch, hung)
     text = COARSE.read_text(encoding="utf-8")
     kept = [line for line in text.splitlines() if not line.startswith(("k =", "h ="))]
     scene = folder.with_suffix(".toml")

@@ -17,7 +17,7 @@ import pytest
 from adapters.engines import process as engine_process
 from adapters.engines.process import run_process
 from adapters.files.run_folder import RunFolder
-from tests.forked_commands import Commands, alive, awaited, processes_in
+from tests.forked_commands import Commands, alive, awaited, comes_true, gone
 from tests.small_bed import small_bed
 from trackbed import command
 
@@ -214,38 +214,25 @@ def test_no_engine_is_left_behind(
     assert alive(engine)
     os.kill(pid, number)
     assert commands.end() == status, commands.output.read_text()
-    deadline = time.monotonic() + 60
-    while alive(engine) and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert not alive(engine)
-
-
-def test_engine_ends_with_its_run_when_python_lives_on(tmp_path: Path) -> None:
-    """In a notebook Python stays after Ctrl-C; the engine and what it started do not."""
-
-    def interrupted() -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run_process(["sh", "-c", "sleep 600 & sleep 600"], tmp_path, interrupted)
-    deadline = time.monotonic() + 60
-    while processes_in(tmp_path) and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert processes_in(tmp_path) == []
+    assert comes_true(lambda: not alive(engine))
 
 
 @pytest.mark.parametrize(
     ("launcher", "end_s"),
     [
+        (": > started; sleep 600 & sleep 600", 60),
         ("setsid sleep 600 & task=$!; trap 'kill $task; exit' TERM; : > started; wait", 60),
         ("trap '' TERM; : > started; sleep 600", 0.2),
     ],
-    ids=["tasks are another's", "deaf"],
+    ids=["plain", "tasks are another's", "deaf"],
 )
-def test_a_launcher_can_end_its_tasks(
+def test_engine_ends_with_its_run_when_python_lives_on(
     launcher: str, end_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Tasks that belong to another process, as srun's do, end with their launcher; it is asked."""
+    """In a notebook Python stays after Ctrl-C; the engine and what it started do not.
+
+    Tasks that belong to another process, as srun's do, end with their launcher; it is asked.
+    """
     monkeypatch.setattr(engine_process, "END_S", end_s)
 
     def interrupted() -> None:
@@ -254,7 +241,4 @@ def test_a_launcher_can_end_its_tasks(
 
     with pytest.raises(KeyboardInterrupt):
         run_process(["sh", "-c", launcher], tmp_path, interrupted)
-    deadline = time.monotonic() + 60
-    while processes_in(tmp_path) and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert processes_in(tmp_path) == []
+    assert gone(tmp_path)

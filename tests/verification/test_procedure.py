@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,12 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adapters.bed.contact_law import HertzStiffness
-from adapters.bed.container import Walls
 from adapters.bed.state import FloatArray, State, load_state
 from adapters.engines.contract import get_engine
 from adapters.engines.fake import SETTLEMENT
-from adapters.errors import NotConverged, NotCredible, SceneError, UsageError
+from adapters.errors import NotConverged, NotCredible, UsageError
 from adapters.files.run_folder import Outcome, RunFolder
 from adapters.files.window import Window, load_window
 from adapters.procedure import fixed as jump_fixed
@@ -29,10 +24,9 @@ from adapters.procedure import stages
 from adapters.procedure.fixed import find_known_room
 from adapters.procedure.progress import Progress
 from adapters.procedure.stages import Run, Variant
-from adapters.relaxation.measured import Relaxation
-from adapters.relaxation.methods import relax
 from adapters.scene.file import load_scene
 from adapters.scene.tables import Scene
+from tests.small_bed import read_rows
 from trackbed.scenes import scene_path
 
 QUIET = Progress(quiet=True)
@@ -47,12 +41,7 @@ def settle(folder: Path, *overrides: str, control: bool = False) -> list[dict[st
         overrides=['engine.name="fake"', "procedure.h=20", *overrides],
         progress=QUIET,
     )
-    return rows_of(folder)
-
-
-def rows_of(folder: Path) -> list[dict[str, str]]:
-    with (folder / "settlement.csv").open() as stream:
-        return list(csv.DictReader(stream))
+    return read_rows(folder)
 
 
 def stages_of(folder: Path) -> list[str]:
@@ -87,15 +76,6 @@ def test_flow_chart(tmp_path: Path) -> None:
     assert max(kinds) == 70
 
 
-def test_settlement_of_the_closed_form(tmp_path: Path) -> None:
-    """Against u = a ln(1 + N): the log law fits N, which differs by 1/N, less than 1 % here."""
-    rows = settle(tmp_path / "run")
-    final = float(rows[-1]["settlement"])
-    assert final == pytest.approx(SETTLEMENT * np.log(1 + 100), rel=0.01)
-    jumped = [float(row["settlement"]) for row in rows if row["kind"] == "jumped"]
-    assert jumped[0] > 0
-
-
 def test_healing_cycles_stay_out_of_the_fit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -114,50 +94,14 @@ def test_healing_cycles_stay_out_of_the_fit(
     assert second.tolist() == list(range(55, 76))  # 40 + 10 jumped + 5 healing, then k = 20
 
 
-def test_control_computes_every_cycle_and_shares_the_start(tmp_path: Path) -> None:
-    """The control has no jump; its files before the first jump are those of the procedure."""
-    settle(tmp_path / "run", control=True)
-    control = tmp_path / "run" / "control"
-    assert all(row["kind"] == "computed" for row in rows_of(control))
-    assert [int(row["cycle"]) for row in rows_of(control)] == list(range(1, 101))
-    shared = Path("window_000020") / "states.npz"
-    assert (control / shared).samefile(tmp_path / "run" / shared)
-
-
 def test_no_jump_h_zero(tmp_path: Path) -> None:
     """h = 0 resubmits without a jump: it ends where the control does, to the relaxation's bar."""
     still = settle(tmp_path / "still", "procedure.h=0", control=True)
-    control = rows_of(tmp_path / "still" / "control")
+    control = read_rows(tmp_path / "still" / "control")
     assert any(name.startswith("jump") for name in stages_of(tmp_path / "still"))
     assert float(still[-1]["settlement"]) == pytest.approx(
         float(control[-1]["settlement"]), abs=1e-6
     )
-
-
-def test_failed_jump_is_tried_again_half_as_long(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Two failures leave h = 20, 10, 5; the events name each; the run goes on."""
-    lengths: list[int] = []
-    real = stages.jump
-
-    def fail_twice(
-        run: stages.Run, bed: stages.Bed, h: int, attempt: int, gain: float | None, share: float
-    ) -> stages.Bed:
-        lengths.append(h)
-        if attempt <= 2:
-            raise NotConverged("made to fail")
-        return real(run, bed, h, attempt, gain, share)
-
-    monkeypatch.setattr(stages, "jump", fail_twice)
-    rows = settle(tmp_path / "run", "procedure.total_cycles=90")
-    assert lengths[:3] == [20, 10, 5]
-    assert next(int(row["cycle"]) for row in rows if row["kind"] == "jumped") == 45
-    events = RunFolder(tmp_path / "run").events()
-    assert [e["stage"] for e in events if e["event"] == "jump failed"][:2] == [
-        "jump_000040_1",
-        "jump_000040_2",
-    ]
 
 
 def test_a_jump_that_lifts_the_bed_is_no_jump(
@@ -183,21 +127,33 @@ def test_a_jump_that_lifts_the_bed_is_no_jump(
     settle(tmp_path / "little")
 
 
+def no_room(
+    monkeypatch: pytest.MonkeyPatch, where: Callable[[State, FloatArray, float], bool]
+) -> None:
+    """No relaxation finds room ``where`` bed before, target and piston's height say so."""
+    real = jump_room.relaxed
+
+    def relaxed(
+        scene: Scene, before: State, target: FloatArray, piston_height: float
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        if where(before, target, piston_height):
+            raise NotConverged("made to fail")
+        return real(scene, before, target, piston_height)
+
+    monkeypatch.setattr(jump_room, "relaxed", relaxed)
+
+
+def drop(before: State, target: FloatArray) -> float:
+    """Settlement of the mean grain [m]."""
+    return float((before.position - target)[:, 2].mean())
+
+
 def test_piston_waits_where_grains_have_no_room_below_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A given settlement with no room under a piston that goes down: the bed is relaxed under the
     old one, settles by its gain all the same, and the piston comes to lie on it."""
-    real = jump_room.relaxed
-
-    def jammed(
-        scene: Scene, before: State, target: FloatArray, piston_height: float
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        if piston_height < before.piston_height:
-            raise NotConverged("made to fail")
-        return real(scene, before, target, piston_height)
-
-    monkeypatch.setattr(jump_room, "relaxed", jammed)
+    no_room(monkeypatch, lambda before, target, height: height < before.piston_height)
     settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=90")
     folder = RunFolder(tmp_path / "run")
     outcome = folder.outcome("jump_000040_1")
@@ -217,16 +173,10 @@ def test_what_a_bed_has_no_room_for_is_made_good_by_the_next_jump(
     """u = a ln(1 + N) and jumps by history of 20 and 15 cycles, of which the first may move by no
     more than 6 um: a ln(61 / 41) = 7.9 um is halved.  The next is asked for a ln(101 / 86) and for
     that half; a differs by 2 % from N in place of 1 + N."""
-    real = jump_room.relaxed
-
-    def tight(
-        scene: Scene, before: State, target: FloatArray, piston_height: float
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        if before.cycle == 40 and (before.position - target)[:, 2].mean() > 6e-6:
-            raise NotConverged("made to fail")
-        return real(scene, before, target, piston_height)
-
-    monkeypatch.setattr(jump_room, "relaxed", tight)
+    no_room(
+        monkeypatch,
+        lambda before, target, _: before.cycle == 40 and drop(before, target) > 6e-6,
+    )
     keys = ('procedure.settlement="history"', "procedure.h=[20, 15]", "procedure.total_cycles=125")
     rows = settle(tmp_path / "run", *keys)
     jumps = [one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump"]
@@ -255,7 +205,7 @@ def test_room_that_jumps_found() -> None:
         (jump(130, 500, 6.25, 1), 12.5),
         (jump(160, 2, 2, 1), 12.5),
         (jump(190, 0, 0, 1), 12.5),
-        (jump(220, 400, 8, 1), 16),  # of 12.5, as grains changed places
+        (jump(220, 400, 8, 1), 16),
         (jump(250, 60, 20, 1), 40),
     ]
     jumps = [one for one, _ in made]
@@ -264,75 +214,17 @@ def test_room_that_jumps_found() -> None:
         assert 1e6 * find_known_room(jumps, one.last_cycle) == pytest.approx(room)
 
 
-Relaxed = Callable[[Scene, State, FloatArray, float], tuple[FloatArray, dict[str, Any]]]
-
-
-def jammed_at_40(real: Relaxed) -> Relaxed:
-    """As `jump_room.relaxed`, but that at cycle 40 only the bed as it is has room."""
-
-    def relaxed(
-        scene: Scene, before: State, target: FloatArray, piston_height: float
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        if before.cycle == 40 and not np.array_equal(target, before.position):
-            raise NotConverged("made to fail")
-        return real(scene, before, target, piston_height)
-
-    return relaxed
-
-
-def test_grains_that_change_places_settle_by_what_they_do(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """No smallest move has room at the first jump, of a ln(61 / 41).  With the key
-    grains change places, which settles the bed by a third more than asked: the jump is not tried
-    again, and the next, of a ln(101 / 86), is asked for that third less.  Without the key that way
-    is never called."""
-    drawn, said = [], io.StringIO()
-    called: list[float] = []
-
-    def rearranged(
-        target: FloatArray, before: State, walls: Walls, stiffness: HertzStiffness,
-        generator: np.random.Generator, *, walls_after: Walls, gravity: float,
-    ) -> tuple[Relaxation, int]:  # fmt: skip
-        drawn.append(generator.random())
-        called.append(float((before.position - target)[:, 2].mean()))
-        assert walls_after.plane_point[-1, 2] < walls.plane_point[-1, 2]
-        position = before.position + 4 / 3 * (target - before.position)
-        measured = relax(before.position, before, walls, stiffness, gravity=gravity)
-        return replace(measured, position=position, method="rearranged"), 7
-
-    monkeypatch.setattr(jump_room, "relaxed", jammed_at_40(jump_room.relaxed))
-    monkeypatch.setattr("adapters.relaxation.rearrange", rearranged)
-    keys = ('procedure.settlement="history"', "procedure.h=[20, 15]", "procedure.total_cycles=125")
-    settle(tmp_path / "found", *keys)
-    assert not called
-    monkeypatch.setattr(QUIET, "quiet", False)
-    monkeypatch.setattr(QUIET, "stream", said)
-    rows = settle(tmp_path / "run", *keys, 'procedure.jammed="rearranged"')
-    assert "um where it owes 7.87: grains changed places" in said.getvalue()
-    first, second = (o for o in RunFolder(tmp_path / "run").outcomes() if o.stage == "jump")
-    asked = SETTLEMENT * np.log(61 / 41)
-    assert called == [pytest.approx(asked, rel=0.02)]
-    assert (first.notes["attempt"], first.notes["relaxation"]["hops"]) == (1, 7)
-    assert first.notes["asked"] == pytest.approx(called[0])
-    assert first.notes["gain"] == pytest.approx(4 / 3 * called[0])
-    going_on = SETTLEMENT * np.log(101 / 86)
-    assert second.notes["asked"] == pytest.approx(
-        going_on - first.notes["asked"] / 3, abs=0.02 * going_on
-    )
-    assert float(rows[-1]["settlement"]) == pytest.approx(SETTLEMENT * np.log(126), rel=0.01)
-    for stage in ("jump_000040_1", "window_000060", "jump_000085_1", "window_000100"):
-        shutil.rmtree(tmp_path / "run" / stage)
-    assert settle(tmp_path / "run", *keys, 'procedure.jammed="rearranged"') == rows
-    assert drawn[0] == drawn[1]  # killed and resumed, a run draws the same kicks
-
-
 def test_a_jump_of_no_settlement_is_tried_with_less_of_its_move(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """History asks the first jump for nothing, and what its grains move beside one another has no
     room: tried with less and less of that, the run goes on from where they were."""
-    monkeypatch.setattr(jump_room, "relaxed", jammed_at_40(jump_room.relaxed))
+    no_room(
+        monkeypatch,
+        lambda before, target, _: (
+            before.cycle == 40 and not np.array_equal(target, before.position)
+        ),
+    )
     monkeypatch.setattr(jump_fixed, "find_history_gain", lambda *_: 0.0)
     settle(tmp_path / "run", 'procedure.settlement="history"', "procedure.total_cycles=90")
     jump = next(one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump")
@@ -344,16 +236,7 @@ def test_a_jammed_bed_is_moved_by_what_it_has_room_for(
 ) -> None:
     """No move of more than 2 um has room, where 8, 4 and less are asked for: every jump but the
     first ones moves the bed, and by no less than half of that from then on."""
-    real = jump_room.relaxed
-
-    def tight(
-        scene: Scene, before: State, target: FloatArray, piston_height: float
-    ) -> tuple[FloatArray, dict[str, Any]]:
-        if (before.position - target)[:, 2].mean() > 2e-6:
-            raise NotConverged("made to fail")
-        return real(scene, before, target, piston_height)
-
-    monkeypatch.setattr(jump_room, "relaxed", tight)
+    no_room(monkeypatch, lambda before, target, _: drop(before, target) > 2e-6)
     keys = ('procedure.settlement="history"', "procedure.h=20", "procedure.total_cycles=400")
     settle(tmp_path / "run", *keys)
     jumps = [one for one in RunFolder(tmp_path / "run").outcomes() if one.stage == "jump"]
@@ -363,41 +246,33 @@ def test_a_jammed_bed_is_moved_by_what_it_has_room_for(
     assert jumps[-1].notes["asked"] > 8e-6
 
 
-def test_jump_that_keeps_failing_ends_the_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """After the first attempt and three shorter ones: exit code 6, the windows before are kept."""
-
-    def fail(*_: object) -> stages.Bed:
-        raise NotCredible("made to fail")
-
-    monkeypatch.setattr(stages, "jump", fail)
-    with pytest.raises(NotCredible, match="failed 4 times") as caught:
-        settle(tmp_path / "run")
-    assert caught.value.exit_code == 6
-    assert int(rows_of(tmp_path / "run")[-1]["cycle"]) == 40
-
-
-def test_piston_is_never_lifted_by_a_jump(tmp_path: Path) -> None:
-    """The piston follows the law of its own heights, downwards only."""
-    settle(tmp_path / "run")
-    run = tmp_path / "run"
-    before = load_window(run / "window_000020" / "states.npz").piston_heights()[-1]
-    after = load_window(run / "window_000060" / "states.npz").piston_start
-    assert after <= before
-    drop = SETTLEMENT * np.log(61 / 41)
-    assert before - after == pytest.approx(drop, rel=0.05)
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Window]:
-    """A finished run on the fake engine, and its window from cycle 20 to 40."""
+    """A finished run on the fake engine, with its control, and its window from cycle 20 to 40."""
     path = tmp_path_factory.mktemp("finished") / "run"
-    settle(path)
+    settle(path, control=True)
     manifest = RunFolder(path).manifest()
     scene = load_scene(path / "scene.toml", manifest["overrides"])
     run = Run(scene, RunFolder(path), get_engine("fake"), Variant(), QUIET)
     return run, load_window(path / "window_000020" / "states.npz")
+
+
+def test_a_run_and_its_control(finished: tuple[Run, Window]) -> None:
+    """Against u = a ln(1 + N): the log law fits N, which differs by 1/N, less than 1 % here; the
+    piston goes down with the bed, never up.  The control has no jump, and its files before the
+    first jump are those of the procedure."""
+    run = finished[0].folder.path
+    rows, control = read_rows(run), read_rows(run / "control")
+    assert float(rows[-1]["settlement"]) == pytest.approx(SETTLEMENT * np.log(1 + 100), rel=0.01)
+    assert next(float(row["settlement"]) for row in rows if row["kind"] == "jumped") > 0
+    before = load_window(run / "window_000020" / "states.npz").piston_heights()[-1]
+    after = load_window(run / "window_000060" / "states.npz").piston_start
+    assert after <= before
+    assert before - after == pytest.approx(SETTLEMENT * np.log(61 / 41), rel=0.05)
+    assert all(row["kind"] == "computed" for row in control)
+    assert [int(row["cycle"]) for row in control] == list(range(1, 101))
+    shared = Path("window_000020") / "states.npz"
+    assert (run / "control" / shared).samefile(run / shared)
 
 
 @pytest.mark.parametrize("per_cycle", [-2e-6, 0.0, 3e-6])
@@ -434,31 +309,12 @@ def test_rolling_spheres_have_two_fifths_of_their_motion_in_their_spin(
     assert rows[0]["kinetic_translational"] == pytest.approx(float(linear), rel=1e-12)
 
 
-def test_another_scene_is_refused_with_the_difference(tmp_path: Path) -> None:
-    """A changed physical parameter names both values and leaves the run as it was."""
-    settle(tmp_path / "run")
-    before = (tmp_path / "run" / "settlement.csv").read_bytes()
-    with pytest.raises(SceneError, match=r"loading\.frequency: 50\.0 in the run, 25\.0 now"):
-        settle(tmp_path / "run", "loading.frequency=25.0")
-    assert (tmp_path / "run" / "settlement.csv").read_bytes() == before
-
-
 def test_a_folder_of_something_else_is_refused(tmp_path: Path) -> None:
     """Nothing is written among a user's own files."""
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "thesis.txt").write_text("mine")
     with pytest.raises(UsageError, match="something else"):
         settle(tmp_path / "run")
-
-
-def test_unloaded_scene_is_prepared_only(tmp_path: Path) -> None:
-    """Without loading there are no cycles, and no piston."""
-    text = scene_path("karrech-coarse").read_text()
-    head, _, rest = text.partition("[loading]")
-    scene = tmp_path / "scene.toml"
-    scene.write_text(head + "[engine]" + rest.partition("[engine]")[2])
-    procedure.run_scene(scene, tmp_path / "run", overrides=['engine.name="fake"'], progress=QUIET)
-    assert stages_of(tmp_path / "run") == ["preparation"]
 
 
 def test_costs_add_up(tmp_path: Path) -> None:

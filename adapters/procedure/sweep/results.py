@@ -53,6 +53,11 @@ class Band:
     half: FloatArray
     """Half the width of the confidence band [m], shape (c,); nan for a single seed."""
 
+    @property
+    def half_at_end(self) -> float | None:
+        """`half` at the last cycle [m]; None for a single seed."""
+        return _number(self.half[-1])
+
 
 def estimate_mean(values: FloatArray, confidence: float = CONFIDENCE) -> tuple[Any, Any]:
     """Mean over axis 0 and half the t interval, t_(n-1) s/sqrt(n); nan for one sample.
@@ -171,24 +176,16 @@ def save_table(stem: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
 def draw_bands(bands: Sequence[Band]) -> Figure:
     """Mean settlement of every setting with its band, against load cycles, linear and log."""
     from matplotlib import colormaps
-    from matplotlib.figure import Figure
 
-    from adapters.report import WIDTH
+    from adapters.report import add_legend, make_panels
 
-    figure = Figure(figsize=(WIDTH, 3.9))
-    linear, logarithmic = figure.subplots(1, 2, sharey=True)
+    figure, *panels = make_panels(f"mean over seeds, {100 * CONFIDENCE:.0f} % band")
     for number, band in enumerate(bands):
         colour = colormaps["viridis"](0.05 + 0.85 * number / max(len(bands) - 1, 1))
         label = f"{band.group} ({band.seeds} of {band.asked} seeds)"
-        for panel in (linear, logarithmic):
+        for panel in panels:
             panel.plot(band.cycle, 1e6 * band.mean, color=colour, label=label)
             low, high = band.mean - band.half, band.mean + band.half
             panel.fill_between(band.cycle, 1e6 * low, 1e6 * high, color=colour, alpha=0.2, lw=0.8)
-    linear.set(ylabel="mean settlement of the grains (µm)", xlabel="load cycles", xlim=(0, None))
-    linear.invert_yaxis()
-    logarithmic.set(xscale="log", xlabel="load cycles (logarithmic)")
-    logarithmic.xaxis.set_major_formatter("{x:g}")
-    logarithmic.set_title(f"mean over seeds, {100 * CONFIDENCE:.0f} % band", loc="right")
-    handles, labels = linear.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2, columnspacing=1.2)
+    add_legend(figure, 2)
     return figure
